@@ -1,0 +1,33 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+package_name = 'glider_bringup'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    packages=find_packages(exclude=['test']),
+    package_data={package_name: ['scenarios/*']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
+        (f'share/{package_name}', ['package.xml']),
+        (f'share/{package_name}/launch', glob('launch/*.launch.py')),
+    ],
+    install_requires=['setuptools'],
+    extras_require={'test': ['pytest', 'hypothesis']},
+    zip_safe=False,
+    maintainer='The glider stack authors',
+    maintainer_email='maintainers@example.com',
+    description='Missions of an underwater glider: scenarios, runner, recorder, command line.',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'recorder_node = glider_bringup.nodes.recorder_node:main',
+            'glider = glider_bringup.cli:main',
+        ],
+    },
+)

@@ -1,0 +1,143 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The architecture, checked by reading every import in the source tree."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+SOURCES = Path(__file__).resolve().parents[1] / 'src'
+
+#: What each package may import from the others.
+MAY_IMPORT = {
+    'glider_model': set(),
+    'glider_guidance': {'glider_model'},
+    'glider_control': {'glider_model'},
+    'glider_bringup': {'glider_model', 'glider_guidance', 'glider_control'},
+}
+
+#: Folders of a package whose modules may speak ROS.
+ROS_FOLDERS = {'nodes', 'ros'}
+
+ROS_MODULES = {'rclpy', 'builtin_interfaces', 'std_srvs', 'ament_index_python', 'rpyutils'}
+
+
+def is_ros(module: str) -> bool:
+    """Tell whether a top-level module is part of ROS 2."""
+    return (
+        module in ROS_MODULES
+        or module.endswith(('_msgs', '_interfaces'))
+        or module.startswith(('rosidl', 'rcl_', 'rmw', 'tf2', 'ros2'))
+    )
+
+
+def is_launch(module: str) -> bool:
+    """Tell whether a top-level module belongs to the launch system."""
+    return module == 'launch' or module.startswith('launch_')
+
+
+def imports(path: Path, package_root: Path) -> set[str]:
+    """Top-level modules that a file imports anywhere, also inside functions.
+
+    A relative import is resolved: one that leaves its package would name a module outside it.
+    """
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'), str(path))):
+        if isinstance(node, ast.Import):
+            found.update(alias.name.partition('.')[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            found.add(node.module.partition('.')[0])
+        elif isinstance(node, ast.ImportFrom):
+            parents = path.relative_to(package_root).parts[: -node.level]
+            found.add(parents[0] if parents else f'{"." * node.level}{node.module or ""}')
+        elif (
+            isinstance(node, ast.Call)
+            and getattr(node.func, 'id', getattr(node.func, 'attr', None))
+            in ('import_module', '__import__')
+            and node.args
+            and isinstance(node.args[0], ast.Constant)
+        ):
+            found.add(str(node.args[0].value).partition('.')[0])
+    return found
+
+
+def violations(sources: Path) -> list[str]:
+    """One sentence for each import under ``sources`` that the architecture forbids."""
+    found = []
+    for package, allowed in MAY_IMPORT.items():
+        root = sources / package
+        for path in sorted(root.rglob('*.py')):
+            place = path.relative_to(root).parts
+            is_test = place[0] == 'test'
+            for module in sorted(imports(path, root)):
+                name = path.relative_to(sources)
+                if module in MAY_IMPORT and module != package and module not in allowed:
+                    found.append(f'{name}: {package} must not import {module}')
+                if is_launch(module) and not (place[0] == 'launch' or is_test):
+                    found.append(f'{name}: only launch files import {module}')
+                if is_ros(module) and not (ROS_FOLDERS & set(place[1:-1]) or is_test):
+                    found.append(f'{name}: only nodes/ and ros/ import {module}')
+    return found
+
+
+def test_every_package_is_checked():
+    """A package that is not in the table would escape the rules."""
+    assert {path.parent.name for path in SOURCES.glob('*/package.xml')} == set(MAY_IMPORT)
+
+
+def test_imports_follow_the_architecture():
+    found = violations(SOURCES)
+    assert not found, '\n' + '\n'.join(found)
+
+
+@pytest.mark.parametrize(
+    ('path', 'source', 'sentence'),
+    [
+        ('glider_model/glider_model/plant.py', 'import rclpy', 'only nodes/ and ros/'),
+        ('glider_model/glider_model/a.py', 'from nav_msgs.msg import Odometry', 'nav_msgs'),
+        ('glider_model/glider_model/a.py', 'def f():\n    import std_srvs.srv', 'std_srvs'),
+        ('glider_model/glider_model/a.py', 'from builtin_interfaces.msg import Time', 'builtin'),
+        ('glider_model/glider_model/a.py', 'from rosidl_runtime_py import convert', 'rosidl'),
+        ('glider_model/glider_model/nodes_.py', 'import rclpy', 'rclpy'),
+        ('glider_bringup/launch/a.launch.py', 'import rclpy', 'only nodes/ and ros/'),
+        ('glider_bringup/glider_bringup/a.py', 'import launch_ros', 'only launch files'),
+        ('glider_model/glider_model/a.py', 'import glider_bringup.score', 'glider_bringup'),
+        ('glider_model/test/test_a.py', 'import glider_control', 'glider_control'),
+        ('glider_guidance/glider_guidance/a.py', 'from glider_control import pid', 'control'),
+        ('glider_control/glider_control/a.py', 'import glider_guidance.los', 'guidance'),
+        ('glider_control/glider_control/a.py', 'from glider_bringup import runner', 'bringup'),
+        (
+            'glider_control/glider_control/a.py',
+            "import importlib\nimportlib.import_module('glider_guidance.los')",
+            'guidance',
+        ),
+    ],
+)
+def test_a_violation_is_found(tmp_path, path, source, sentence):
+    file = tmp_path / path
+    file.parent.mkdir(parents=True)
+    file.write_text(source + '\n')
+    found = violations(tmp_path)
+    assert len(found) == 1
+    assert path in found[0]
+    assert sentence in found[0]
+
+
+@pytest.mark.parametrize(
+    ('path', 'source'),
+    [
+        ('glider_model/glider_model/nodes/plant_node.py', 'import rclpy, glider_model.plant'),
+        ('glider_model/glider_model/ros/messages.py', 'from nav_msgs.msg import Odometry'),
+        ('glider_guidance/glider_guidance/los.py', 'from glider_model.frames import wrap'),
+        ('glider_control/glider_control/pid.py', 'from . import allocation'),
+        ('glider_bringup/glider_bringup/direct.py', 'import glider_control, glider_guidance'),
+        ('glider_bringup/launch/glider.launch.py', 'import launch, launch_ros.actions'),
+        ('glider_model/test/test_messages.py', 'from nav_msgs.msg import Odometry'),
+    ],
+)
+def test_what_the_architecture_allows_is_accepted(tmp_path, path, source):
+    file = tmp_path / path
+    file.parent.mkdir(parents=True)
+    file.write_text(source + '\n')
+    assert violations(tmp_path) == []
