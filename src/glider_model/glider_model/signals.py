@@ -1,0 +1,76 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What travels between the four blocks: plain numbers in NED / FRD, SI units and radians."""
+
+from typing import NamedTuple
+
+#: Length of one tick (s) and of one tick in the integer nanoseconds of a message stamp.
+TICK_S = 0.1
+TICK_NS = 100_000_000
+
+
+class Odometry(NamedTuple):
+    """Where the vehicle is and how it moves over ground."""
+
+    p_n: float  #: north (m)
+    p_e: float  #: east (m)
+    p_d: float  #: depth (m, + down)
+    q_w: float  #: attitude quaternion q_NB, body FRD to NED
+    q_x: float
+    q_y: float
+    q_z: float
+    u: float  #: velocity over ground in body axes FRD (m/s)
+    v: float
+    w: float
+    p: float  #: angular rate in body axes FRD (rad/s)
+    q: float
+    r: float
+
+
+class Joints(NamedTuple):
+    """Positions of the three actuators, or the targets commanded to them."""
+
+    m_b: float  #: net heaviness from the buoyancy engine (kg, + sinks)
+    x_p: float  #: pitch mass from its neutral position (m, + forward: nose down)
+    mu: float  #: roll mass rotation about the x axis (rad, 0 hangs straight down)
+
+
+class Water(NamedTuple):
+    """Velocity of the water over ground, NED (m/s)."""
+
+    v_n: float
+    v_e: float
+    v_d: float
+
+
+class Reference(NamedTuple):
+    """What guidance asks of control."""
+
+    p_n: float  #: virtual target on the path (m)
+    p_e: float
+    p_d: float
+    phi: float  #: desired roll, pitch, heading (rad)
+    theta: float
+    psi: float
+    v_n: float  #: desired velocity over ground (m/s); v_d is the vertical rate, + down
+    v_e: float
+    v_d: float
+    phi_dot: float  #: desired Euler angle rates (rad/s)
+    theta_dot: float
+    psi_dot: float
+
+
+class TrackingError(NamedTuple):
+    """Position relative to the virtual target, in the path frame (m)."""
+
+    e1: float  #: along the path
+    e2: float  #: across, + to starboard of the path
+    e3: float  #: normal to both, + below the path
+
+
+class Wrench(NamedTuple):
+    """Force and moments that control demands."""
+
+    tau_w: float  #: heave force, + down (N)
+    tau_p: float  #: roll moment (N m)
+    tau_q: float  #: pitch moment (N m)

@@ -1,0 +1,297 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Vehicles: a validated YAML file, every number with unit and source, to kernel parameters."""
+
+import math
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Literal, NamedTuple
+
+import pydantic
+from pydantic import Field
+
+from glider_model.settings import ConfigurationError, Settings, read_yaml, validate
+
+VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
+
+
+@cache
+def quantity(unit: str, **limits: float) -> type[Settings]:
+    """Model of one number with its unit and source; ``limits`` are those of pydantic's Field."""
+    return pydantic.create_model(
+        f'Quantity[{unit}]',
+        __base__=Settings,
+        value=(float, Field(description=f'number in {unit}', **limits)),
+        unit=(Literal[unit], Field(description='unit of the value')),
+        source=(str, Field(min_length=3, description='where the number comes from')),
+    )
+
+
+Positive = {'gt': 0.0, 'le': 1e5}
+NotNegative = {'ge': 0.0, 'le': 1e5}
+Signed = {'ge': -1e5, 'le': 1e5}
+
+
+class Vector(Settings):
+    """Three numbers along x, y, z with unit and source."""
+
+    value: Annotated[list[float], Field(min_length=3, max_length=3)]
+    unit: str
+    source: Annotated[str, Field(min_length=3)]
+
+    @pydantic.field_validator('value')
+    @classmethod
+    def _bounded(cls, value: list[float]) -> list[float]:
+        if any(abs(number) > 1e5 for number in value):
+            raise ValueError('every component must be within +-1e5')
+        return value
+
+
+def _vector(unit: str, not_negative: bool = False):
+    """Vector whose unit, and if asked sign, is checked."""
+
+    def check(vector: Vector) -> Vector:
+        if vector.unit != unit:
+            raise ValueError(f'unit is {vector.unit!r} (allowed: {unit!r})')
+        if not_negative and min(vector.value) < 0.0:
+            raise ValueError(f'value = {vector.value} has a negative component (allowed: >= 0)')
+        return vector
+
+    return Annotated[Vector, pydantic.AfterValidator(check)]
+
+
+class RigidBodySettings(Settings):
+    """Hull without the moving mass. Origin at the centre of buoyancy, axes FRD."""
+
+    hull_mass: quantity('kg', **Positive)
+    hull_center_of_mass: _vector('m')
+    hull_inertia: _vector('kg m^2', not_negative=True)  # about the origin
+
+
+class AddedMassSettings(Settings):
+    """Positive added mass M_A (Fossen's -X_udot, ...), symmetric, with its two cross terms."""
+
+    linear: _vector('kg', not_negative=True)
+    angular: _vector('kg m^2', not_negative=True)
+    sway_yaw: quantity('kg m', **Signed)
+    heave_pitch: quantity('kg m', **Signed)
+
+
+class HydrodynamicsSettings(Settings):
+    """Coefficients of the viscous forces and moments (Graver 2005; Zhang et al. 2013)."""
+
+    K_D0: quantity('kg/m', **NotNegative)
+    K_D: quantity('kg/m/rad^2', **NotNegative)
+    K_L0: quantity('kg/m', **Signed)
+    K_L: quantity('kg/m/rad', **Signed)
+    K_beta: quantity('kg/m/rad', **Signed)
+    K_MR: quantity('kg/rad', **Signed)
+    K_p: quantity('kg s/rad', **Signed)
+    K_M0: quantity('kg', **Signed)
+    K_M: quantity('kg/rad', **Signed)
+    K_q: quantity('kg s/rad', **Signed)
+    K_MY: quantity('kg/rad', **Signed)
+    K_r: quantity('kg s/rad', **Signed)
+    linear_damping: _vector('kg/s')
+    linear_angular_damping: _vector('kg m^2/s')
+    quadratic_damping: _vector('kg/m')
+    quadratic_angular_damping: _vector('kg m^2')
+
+
+class MovingMassSettings(Settings):
+    """Mass that slides along x for pitch and turns about x for roll."""
+
+    mass: quantity('kg', **Positive)
+    neutral_x: quantity('m', ge=-10.0, le=10.0)
+    radius: quantity('m', gt=0.0, le=1.0)
+    inertia: _vector('kg m^2', not_negative=True)  # about its own centre, turning with it
+    travel: quantity('m', gt=0.0, le=2.0)
+    rate: quantity('m/s', gt=0.0, le=1.0)
+    rotation: quantity('deg', gt=0.0, le=180.0)
+    rotation_rate: quantity('deg/s', gt=0.0, le=180.0)
+
+
+class BuoyancyEngineSettings(Settings):
+    """Oil pump: net heaviness within +-range."""
+
+    range: quantity('kg', gt=0.0, le=50.0)
+    rate: quantity('kg/s', gt=0.0, le=10.0)
+
+
+class HullSettings(Settings):
+    """Outer shape, used where the hull breaks the surface."""
+
+    length: quantity('m', gt=0.1, le=20.0)
+    diameter: quantity('m', gt=0.01, le=5.0)
+
+
+class SteeringSettings(Settings):
+    """Turn rate (starboard +) over sine of roll in a gentle spiral, as ``glider trim`` solves it.
+
+    Its sign belongs to vehicle and phase: lift points the other way in the climb.
+    """
+
+    dive: quantity('rad/s', ge=-1.0, le=1.0)
+    climb: quantity('rad/s', ge=-1.0, le=1.0)
+
+
+class Vehicle(Settings):
+    """A vehicle file."""
+
+    name: Annotated[str, Field(pattern=r'^[a-z0-9_]+$')]
+    description: str
+    rigid_body: RigidBodySettings
+    moving_mass: MovingMassSettings
+    buoyancy_engine: BuoyancyEngineSettings
+    hull: HullSettings
+    added_mass: AddedMassSettings
+    hydrodynamics: HydrodynamicsSettings
+    steering: SteeringSettings
+
+    def params(self) -> 'VehicleParams':
+        """Kernel parameters, SI and radians."""
+        body, mass, added = self.rigid_body, self.moving_mass, self.added_mass
+        hydro, pump = self.hydrodynamics, self.buoyancy_engine
+        coefficients = (
+            'K_D0 K_D K_L0 K_L K_beta K_MR K_p K_M0 K_M K_q K_MY K_r'.split()
+        )
+        r_s = body.hull_center_of_mass.value
+        return VehicleParams(
+            m=body.hull_mass.value + mass.mass.value,
+            s_x=body.hull_mass.value * r_s[0],
+            s_y=body.hull_mass.value * r_s[1],
+            s_z=body.hull_mass.value * r_s[2],
+            i_xx=body.hull_inertia.value[0],
+            i_yy=body.hull_inertia.value[1],
+            i_zz=body.hull_inertia.value[2],
+            m_p=mass.mass.value,
+            x_p0=mass.neutral_x.value,
+            R_p=mass.radius.value,
+            i_px=mass.inertia.value[0],
+            i_py=mass.inertia.value[1],
+            i_pz=mass.inertia.value[2],
+            a_11=added.linear.value[0],
+            a_22=added.linear.value[1],
+            a_33=added.linear.value[2],
+            a_44=added.angular.value[0],
+            a_55=added.angular.value[1],
+            a_66=added.angular.value[2],
+            a_26=added.sway_yaw.value,
+            a_35=added.heave_pitch.value,
+            **{name: getattr(hydro, name).value for name in coefficients},
+            D_u=hydro.linear_damping.value[0],
+            D_v=hydro.linear_damping.value[1],
+            D_w=hydro.linear_damping.value[2],
+            D_p=hydro.linear_angular_damping.value[0],
+            D_q=hydro.linear_angular_damping.value[1],
+            D_r=hydro.linear_angular_damping.value[2],
+            D_uu=hydro.quadratic_damping.value[0],
+            D_vv=hydro.quadratic_damping.value[1],
+            D_ww=hydro.quadratic_damping.value[2],
+            D_pp=hydro.quadratic_angular_damping.value[0],
+            D_qq=hydro.quadratic_angular_damping.value[1],
+            D_rr=hydro.quadratic_angular_damping.value[2],
+            hull_radius=0.5 * self.hull.diameter.value,
+            m_b_max=pump.range.value,
+            m_b_rate=pump.rate.value,
+            x_p_max=mass.travel.value,
+            x_p_rate=mass.rate.value,
+            mu_max=math.radians(mass.rotation.value),
+            mu_rate=math.radians(mass.rotation_rate.value),
+        )
+
+
+class VehicleParams(NamedTuple):
+    """A vehicle as the kernels see it: SI, radians, FRD, origin at the centre of buoyancy."""
+
+    m: float  #: total mass (kg)
+    s_x: float  #: first moment of the hull without moving mass (kg m)
+    s_y: float
+    s_z: float
+    i_xx: float  #: inertia of the hull without moving mass about the origin (kg m^2)
+    i_yy: float
+    i_zz: float
+    m_p: float  #: moving mass (kg), its neutral x (m), radius (m), own inertia (kg m^2)
+    x_p0: float
+    R_p: float
+    i_px: float
+    i_py: float
+    i_pz: float
+    a_11: float  #: added mass (kg), inertia (kg m^2) and cross terms (kg m)
+    a_22: float
+    a_33: float
+    a_44: float
+    a_55: float
+    a_66: float
+    a_26: float
+    a_35: float
+    K_D0: float  #: viscous coefficients, see HydrodynamicsSettings
+    K_D: float
+    K_L0: float
+    K_L: float
+    K_beta: float
+    K_MR: float
+    K_p: float
+    K_M0: float
+    K_M: float
+    K_q: float
+    K_MY: float
+    K_r: float
+    D_u: float  #: linear damping (kg/s, kg m^2/s)
+    D_v: float
+    D_w: float
+    D_p: float
+    D_q: float
+    D_r: float
+    D_uu: float  #: quadratic damping (kg/m, kg m^2)
+    D_vv: float
+    D_ww: float
+    D_pp: float
+    D_qq: float
+    D_rr: float
+    hull_radius: float  #: (m)
+    m_b_max: float  #: actuator ranges (kg, m, rad) and rates (per s)
+    m_b_rate: float
+    x_p_max: float
+    x_p_rate: float
+    mu_max: float
+    mu_rate: float
+
+
+def vehicle_names() -> list[str]:
+    """Names of the vehicles that come with the package."""
+    return sorted(path.stem for path in VEHICLE_FOLDER.glob('*.yaml'))
+
+
+def vehicle_path(name: str) -> Path:
+    """File of a vehicle given by name, or by path.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is neither a vehicle of that name nor such a file.
+    """
+    known = VEHICLE_FOLDER / f'{name}.yaml'
+    if known.is_file():
+        return known
+    path = Path(name)
+    if path.suffix not in ('.yaml', '.yml'):
+        raise ConfigurationError(
+            f'vehicle = {name!r}: no such vehicle '
+            f'(allowed: {", ".join(vehicle_names())}, or a path to a .yaml file)'
+        )
+    if not path.is_file():
+        raise ConfigurationError(f'{path}: no such vehicle file')
+    return path
+
+
+def load_vehicle(name: str) -> Vehicle:
+    """Load and validate a vehicle by name or path.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming file, field, value and allowed range.
+    """
+    path = vehicle_path(name)
+    return validate(Vehicle, read_yaml(path), str(path))
