@@ -1,0 +1,416 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Guidance: path, line of sight, profile and current observer put together."""
+
+import math
+from typing import Literal, NamedTuple
+
+from pydantic import Field
+
+from glider_guidance.current_observer import ObserverParams, ObserverState, observer_step
+from glider_guidance.los import (
+    approach_angles,
+    crab_heading,
+    desired_direction,
+    target_rate,
+)
+from glider_guidance.path import (
+    PathParams,
+    PathSettings,
+    StraightPath,
+    path_angles,
+    path_closest,
+    path_errors,
+    path_point,
+    path_tangent,
+)
+from glider_guidance.profile import (
+    GLIDING_DOWN,
+    INITIAL_PROFILE,
+    SURFACE_PREPARATION,
+    SURFACING,
+    WAITING_ON_SURFACE,
+    ProfileParams,
+    ProfileSettings,
+    ProfileState,
+    is_gliding,
+    profile_step,
+    profile_targets,
+)
+from glider_model.command_filter import Filtered, FilterParams, filter_angle
+from glider_model.frames import euler_from_quaternion, rotate_to_ned, wrap_angle
+from glider_model.kernel import kernel
+from glider_model.polar import (
+    Polar,
+    glide_alpha,
+    glide_horizontal_speed,
+    glide_vertical_rate,
+    make_polar,
+    steepen,
+)
+from glider_model.settings import Settings
+from glider_model.signals import TICK_S, Reference, TrackingError, Water
+from glider_model.vehicle import load_vehicle
+
+#: The flight model is believed this long after a glide began (s).
+SETTLED_S = 120.0
+#: An infeasible course is reported once it has lasted this long (s).
+INFEASIBLE_S = 60.0
+#: The flight model is believed above this vertical rate (m/s) and pitch (rad).
+MODEL_VERTICAL_RATE = 0.05
+MODEL_PITCH = math.radians(12.0)
+#: Time constant of the estimated speed through the water (s).
+SPEED_FILTER_S = 30.0
+#: The virtual target moves no faster than this (m/s).
+TARGET_SPEED_MAX = 3.0
+
+
+class LosSettings(Settings):
+    """Line of sight."""
+
+    method: Literal['observer', 'paper'] = Field(
+        'observer',
+        description='observer: crab into the estimated current; paper: as printed, no estimate',
+    )
+    lookahead_m: float = Field(
+        40.0,
+        ge=1.0,
+        le=10000.0,
+        description='lookahead of the observer method (m)',
+        json_schema_extra={'tunable': True},
+    )
+    delta1_m: float = Field(
+        3.2,
+        ge=0.1,
+        le=10000.0,
+        description="Delta1, lookahead of the paper's method (m)",
+        json_schema_extra={'tunable': True},
+    )
+    delta1_per_s: float = Field(
+        0.1,
+        gt=0.0,
+        le=5.0,
+        description='delta1, pull of the virtual target toward the vehicle (1/s)',
+        json_schema_extra={'tunable': True},
+    )
+    delta2: float = Field(
+        1.0,
+        ge=0.05,
+        le=20.0,
+        description='delta2, ratio of the vertical lookahead to the distance (-)',
+        json_schema_extra={'tunable': True},
+    )
+
+
+class ObserverSettings(Settings):
+    """Current observer."""
+
+    k3_per_s: float = Field(
+        0.02,
+        gt=0.0,
+        le=1.0,
+        description='K3, gain on position (1/s)',
+        json_schema_extra={'tunable': True},
+    )
+    k4_per_s2: float = Field(
+        1e-4,
+        gt=0.0,
+        le=0.1,
+        description='K4, gain on the current (1/s^2)',
+        json_schema_extra={'tunable': True},
+    )
+
+
+class CommandFilterSettings(Settings):
+    """Command filters of heading and pitch."""
+
+    heading_frequency_radps: float = Field(
+        0.15, gt=0.0, le=2.0, description='natural frequency of the heading filter (rad/s)'
+    )
+    heading_rate_radps: float = Field(
+        0.012, gt=0.0, le=1.0, description='largest rate of the desired heading (rad/s)'
+    )
+    pitch_frequency_radps: float = Field(
+        0.12, gt=0.0, le=2.0, description='natural frequency of the pitch filter (rad/s)'
+    )
+    pitch_rate_radps: float = Field(
+        0.03, gt=0.0, le=1.0, description='largest rate of the desired pitch (rad/s)'
+    )
+
+
+class GuidanceLawSettings(Settings):
+    """How to guide, whatever the vehicle and the path: the guidance section of a scenario."""
+
+    los: LosSettings = Field(LosSettings(), description='line of sight')
+    observer: ObserverSettings = Field(ObserverSettings(), description='current observer')
+    filters: CommandFilterSettings = Field(
+        CommandFilterSettings(), description='command filters'
+    )
+
+
+class GuidanceSettings(GuidanceLawSettings):
+    """Everything the guidance node is told."""
+
+    vehicle: str = Field('zhang2021', description='vehicle whose glide polar and pump are used')
+    path: PathSettings = Field(
+        StraightPath(kind='straight', length_m=25000.0), description='path to follow'
+    )
+    profile: ProfileSettings = Field(ProfileSettings(), description='sawtooth')
+    dives: int = Field(
+        0, ge=0, le=100000, description='dives before waiting on the surface; 0: no end'
+    )
+
+    def params(self) -> 'GuidanceParams':
+        """Kernel parameters."""
+        vehicle = load_vehicle(self.vehicle).params()
+        filters = self.filters
+        return GuidanceParams(
+            self.path.params(),
+            self.profile.params(self.dives, vehicle.m_b_rate),
+            make_polar(vehicle),
+            self.los.method == 'observer',
+            self.los.lookahead_m if self.los.method == 'observer' else self.los.delta1_m,
+            self.los.delta1_per_s,
+            self.los.delta2,
+            ObserverParams(self.observer.k3_per_s, self.observer.k4_per_s2),
+            FilterParams(filters.heading_frequency_radps, filters.heading_rate_radps),
+            FilterParams(filters.pitch_frequency_radps, filters.pitch_rate_radps),
+        )
+
+    def initial_state(self) -> 'GuidanceState':
+        """State before the first tick."""
+        return GuidanceState(
+            0,
+            INITIAL_PROFILE,
+            0.0,
+            ObserverState(0.0, 0.0, 0.0, 0.0),
+            Filtered(0.0, 0.0),
+            Filtered(0.0, 0.0),
+            0.0,
+            0.0,
+            0,
+        )
+
+
+class GuidanceParams(NamedTuple):
+    """Guidance as the kernels see it."""
+
+    path: PathParams
+    profile: ProfileParams
+    polar: Polar
+    compensates: bool  #: crab into the estimated current
+    lookahead: float  #: (m)
+    target_gain: float  #: delta1 (1/s)
+    vertical_ratio: float  #: delta2
+    observer: ObserverParams
+    heading_filter: FilterParams
+    pitch_filter: FilterParams
+
+
+class GuidanceState(NamedTuple):
+    """Guidance between two ticks."""
+
+    tick: int
+    profile: ProfileState
+    s: float  #: path parameter of the virtual target (m)
+    observer: ObserverState
+    heading: Filtered
+    pitch: Filtered
+    speed: float  #: filtered horizontal speed through the water (m/s)
+    heading_command: float  #: held while the vehicle turns (rad)
+    infeasible_ticks: int
+
+
+class GuidanceOutput(NamedTuple):
+    """What guidance publishes."""
+
+    reference: Reference
+    error: TrackingError
+    current: Water
+    stage: int
+    infeasible: bool
+
+
+@kernel
+def guidance_abort(state):
+    """Ask for the surface, now and for good."""
+    profile = state.profile
+    return GuidanceState(
+        state.tick,
+        ProfileState(profile.stage, profile.ticks, profile.dives, True),
+        state.s,
+        state.observer,
+        state.heading,
+        state.pitch,
+        state.speed,
+        state.heading_command,
+        state.infeasible_ticks,
+    )
+
+
+@kernel
+def _start(state, odometry, psi, theta, params):
+    """State at the first tick: closest point of the path, filters at the measured attitude."""
+    flat = not params.profile.follows_path
+    s = path_closest(odometry.p_n, odometry.p_e, odometry.p_d, flat, params.path)
+    pitch = -params.profile.pitch
+    rate = glide_vertical_rate(pitch, params.profile.net_heaviness, params.polar)
+    stage = GLIDING_DOWN if params.profile.follows_path else SURFACE_PREPARATION
+    return GuidanceState(
+        state.tick,
+        ProfileState(stage, 0, state.profile.dives, state.profile.aborted),
+        s,
+        state.observer,
+        Filtered(psi, 0.0),
+        Filtered(theta, 0.0),
+        glide_horizontal_speed(pitch, rate, params.polar),
+        psi,
+        0,
+    )
+
+
+@kernel
+def guidance_step(state, odometry, params, dt):
+    """One tick of guidance.
+
+    Parameters
+    ----------
+    state : GuidanceState
+    odometry : Odometry
+        Measured pose and velocity over ground.
+    params : GuidanceParams
+    dt : float
+        Length of the tick (s).
+
+    Returns
+    -------
+    GuidanceState, GuidanceOutput
+    """
+    q_w, q_x, q_y, q_z = odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
+    _, theta, psi = euler_from_quaternion(q_w, q_x, q_y, q_z)
+    ground_n, ground_e, ground_d = rotate_to_ned(
+        q_w, q_x, q_y, q_z, odometry.u, odometry.v, odometry.w
+    )
+    if state.tick == 0:
+        state = _start(state, odometry, psi, theta, params)
+    follows_path = params.profile.follows_path
+
+    # where the vehicle is relative to the path
+    d_n, d_e, d_d = path_tangent(state.s, params.path)
+    if not follows_path:
+        d_d = 0.0
+    slope = math.sqrt(d_n * d_n + d_e * d_e + d_d * d_d)
+    gamma_d, rho_d = path_angles(d_n, d_e, d_d)
+    e1, e2, e3 = path_errors(
+        odometry.p_n, odometry.p_e, odometry.p_d, state.s, gamma_d, rho_d, params.path
+    )
+
+    # what the vehicle is doing
+    if follows_path and not state.profile.aborted:
+        profile = ProfileState(
+            GLIDING_DOWN, state.profile.ticks + 1, state.profile.dives, False
+        )
+    else:
+        profile = profile_step(state.profile, odometry.p_d, ground_d, params.profile)
+    stage = profile.stage
+    pitch_target, rate_target = profile_targets(
+        stage, ground_d, params.profile, params.polar
+    )
+    if not follows_path:
+        e3 = 0.0
+
+    # speed through the water and current
+    settled = is_gliding(stage) and profile.ticks * dt > SETTLED_S
+    valid = (
+        settled
+        and abs(theta) > MODEL_PITCH
+        and abs(ground_d) > MODEL_VERTICAL_RATE
+        and theta * ground_d < 0.0
+    )
+    model_speed = glide_horizontal_speed(theta, ground_d, params.polar)
+    observer = observer_step(
+        state.observer,
+        ground_n,
+        ground_e,
+        model_speed * math.cos(psi),
+        model_speed * math.sin(psi),
+        valid,
+        params.observer,
+        dt,
+    )
+    speed = state.speed
+    if valid:
+        speed += dt / SPEED_FILTER_S * (model_speed - speed)
+
+    # direction to fly
+    gamma_r, rho_r = approach_angles(e2, e3, params.lookahead, params.vertical_ratio)
+    if not follows_path:
+        rho_r = 0.0
+    chi_d, upsilon_d = desired_direction(gamma_d, rho_d, gamma_r, rho_r)
+    heading_command, _, feasible = crab_heading(
+        chi_d, speed, observer.current_n, observer.current_e
+    )
+    _, _, path_feasible = crab_heading(
+        gamma_d, speed, observer.current_n, observer.current_e
+    )
+    if not params.compensates:
+        heading_command = chi_d
+    infeasible_ticks = 0 if path_feasible else state.infeasible_ticks + 1
+    surfaced = (
+        stage == WAITING_ON_SURFACE or stage == SURFACE_PREPARATION or stage == SURFACING
+    )
+    if not is_gliding(stage) and not surfaced:
+        heading_command = state.heading_command
+
+    # pitch and vertical rate
+    if follows_path and not profile.aborted:
+        pitch_target = steepen(upsilon_d)
+        pitch_target += glide_alpha(pitch_target, params.polar)
+        rate_target = glide_vertical_rate(
+            pitch_target, params.profile.net_heaviness, params.polar
+        )
+    heading = filter_angle(state.heading, heading_command, params.heading_filter, dt)
+    pitch = filter_angle(state.pitch, pitch_target, params.pitch_filter, dt)
+
+    # virtual target
+    progress = (ground_n * d_n + ground_e * d_e + ground_d * d_d) / slope
+    s = state.s + dt * target_rate(
+        progress, e1, slope, params.target_gain, TARGET_SPEED_MAX
+    )
+    t_n, t_e, t_d = path_point(state.s, params.path)
+    if not follows_path:
+        t_d = params.profile.depth if rate_target > 0.0 else 0.0
+
+    reference = Reference(
+        t_n,
+        t_e,
+        t_d,
+        0.0,
+        pitch.value,
+        heading.value,
+        math.cos(chi_d) * speed,
+        math.sin(chi_d) * speed,
+        rate_target,
+        0.0,
+        pitch.rate,
+        heading.rate,
+    )
+    output = GuidanceOutput(
+        reference,
+        TrackingError(e1, e2, e3),
+        Water(observer.current_n, observer.current_e, 0.0),
+        stage,
+        infeasible_ticks * dt > INFEASIBLE_S,
+    )
+    new_state = GuidanceState(
+        state.tick + 1,
+        profile,
+        s,
+        observer,
+        heading,
+        pitch,
+        speed,
+        heading_command,
+        infeasible_ticks,
+    )
+    return new_state, output

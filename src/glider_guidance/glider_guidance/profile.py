@@ -1,0 +1,180 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The yo: a state machine over the paper's four stages and the inflections between them."""
+
+import math
+from typing import Literal, NamedTuple
+
+from pydantic import Field
+
+from glider_model.kernel import kernel
+from glider_model.polar import Polar, glide_vertical_rate
+from glider_model.settings import Settings
+from glider_model.signals import TICK_S
+
+SURFACE_PREPARATION = 0
+GLIDING_DOWN = 1
+INFLECTING_UP = 2
+GLIDING_UP = 3
+INFLECTING_DOWN = 4
+WAITING_ON_SURFACE = 5
+SURFACING = 6
+
+STAGE_NAMES = (
+    'surface preparation',
+    'gliding down',
+    'inflecting up',
+    'gliding up',
+    'inflecting down',
+    'waiting on the surface',
+    'surfacing on abort',
+)
+
+#: Shallower than this the vehicle has reached the surface (m).
+AT_SURFACE_M = 1.0
+#: Share of the glide's vertical rate at which the pitch goes over in a turn.
+PITCH_OVER = 0.5
+
+
+class ProfileSettings(Settings):
+    """Sawtooth, or flight along a three-dimensional path."""
+
+    mode: Literal['profile', 'path'] = Field(
+        'profile',
+        description='profile: sawtooth at fixed pitch over the path; path: full 3-D line of sight',
+    )
+    depth_m: float = Field(
+        1000.0, ge=10.0, le=12000.0, description='depth of the lower turn (m)'
+    )
+    top_depth_m: float = Field(
+        10.0, ge=2.0, le=1000.0, description='depth of the upper turn between dives (m)'
+    )
+    pitch_deg: float = Field(
+        30.0, ge=13.0, le=60.0, description='glide pitch, nose down diving and up climbing (deg)'
+    )
+    net_heaviness_kg: float = Field(
+        0.4,
+        gt=0.0,
+        le=20.0,
+        description='net heaviness that sets the speed, - when climbing (kg)',
+    )
+    prepare_s: float = Field(
+        60.0, ge=0.0, le=86400.0, description='surface preparation before a dive (s)'
+    )
+    wait_s: float = Field(
+        600.0, ge=0.0, le=864000.0, description='waiting on the surface after the last dive (s)'
+    )
+
+    def params(self, dives: int, pump_rate_kgps: float) -> 'ProfileParams':
+        """Kernel parameters for so many dives (0: no end) with this pump: turns are led."""
+        return ProfileParams(
+            self.mode == 'path',
+            self.depth_m,
+            min(self.top_depth_m, 0.5 * self.depth_m),
+            math.radians(self.pitch_deg),
+            self.net_heaviness_kg,
+            dives,
+            round(self.prepare_s / TICK_S),
+            round(self.wait_s / TICK_S),
+            2.0 / 3.0 * self.net_heaviness_kg / pump_rate_kgps,
+        )
+
+
+class ProfileParams(NamedTuple):
+    """Profile as the kernels see it."""
+
+    follows_path: bool
+    depth: float  #: lower turn (m)
+    top_depth: float  #: upper turn (m)
+    pitch: float  #: magnitude (rad)
+    net_heaviness: float  #: magnitude (kg)
+    dives: int
+    prepare_ticks: int
+    wait_ticks: int
+    lead_s: float  #: vertical way left once the pump starts, over the vertical rate (s)
+
+
+class ProfileState(NamedTuple):
+    """Stage of the yo."""
+
+    stage: int
+    ticks: int  #: ticks in this stage
+    dives: int  #: dives completed
+    aborted: bool
+
+
+INITIAL_PROFILE = ProfileState(SURFACE_PREPARATION, 0, 0, False)
+
+
+@kernel
+def _next_stage(state, depth, vertical_rate, params):
+    """Stage that follows from where the vehicle is."""
+    stage = state.stage
+    lead = abs(vertical_rate) * params.lead_s
+    if state.aborted:
+        return WAITING_ON_SURFACE if depth < AT_SURFACE_M else SURFACING
+    if stage == SURFACE_PREPARATION and state.ticks >= params.prepare_ticks:
+        return GLIDING_DOWN
+    if stage == GLIDING_DOWN and depth + lead >= params.depth:
+        return INFLECTING_UP
+    if stage == INFLECTING_UP and vertical_rate < -0.05:
+        return GLIDING_UP
+    if stage == GLIDING_UP:
+        last = params.dives > 0 and state.dives + 1 >= params.dives
+        if last:
+            return WAITING_ON_SURFACE if depth < AT_SURFACE_M else GLIDING_UP
+        return INFLECTING_DOWN if depth - lead <= params.top_depth else GLIDING_UP
+    if stage == INFLECTING_DOWN and vertical_rate > 0.05:
+        return GLIDING_DOWN
+    finished = params.dives > 0 and state.dives >= params.dives
+    if stage == WAITING_ON_SURFACE and state.ticks >= params.wait_ticks and not finished:
+        return SURFACE_PREPARATION
+    return stage
+
+
+@kernel
+def profile_step(state, depth, vertical_rate, params):
+    """Advance the stage by one tick, from depth (m) and vertical rate (m/s, + down)."""
+    stage = _next_stage(state, depth, vertical_rate, params)
+    if stage == state.stage:
+        return ProfileState(stage, state.ticks + 1, state.dives, state.aborted)
+    climbed = state.stage == GLIDING_UP
+    return ProfileState(stage, 0, state.dives + (1 if climbed else 0), state.aborted)
+
+
+@kernel
+def is_descending(stage):
+    """Whether a stage asks the vehicle to go down."""
+    return stage == GLIDING_DOWN or stage == INFLECTING_DOWN
+
+
+@kernel
+def is_gliding(stage):
+    """Whether a stage is a steady glide, not a turn or the surface."""
+    return stage == GLIDING_DOWN or stage == GLIDING_UP
+
+
+@kernel
+def profile_targets(stage, vertical_rate, params, polar):
+    """Pitch (rad) and vertical rate (m/s, + down) that a stage asks for.
+
+    In a turn the pump needs minutes, the pitch half a minute. Pitched over at once, a vehicle
+    that is still heavy glides backwards; so the pitch goes over when the vertical rate has fallen
+    to ``PITCH_OVER`` of the glide's. In preparation the nose is already turned down while the
+    buoyancy keeps the vehicle up.
+    """
+    rate = glide_vertical_rate(-params.pitch, params.net_heaviness, polar)
+    down = is_descending(stage)
+    nose_down = down or stage == SURFACE_PREPARATION
+    if stage == INFLECTING_UP:
+        nose_down = vertical_rate > PITCH_OVER * rate
+    elif stage == INFLECTING_DOWN:
+        nose_down = vertical_rate > -PITCH_OVER * rate
+    return -params.pitch if nose_down else params.pitch, rate if down else -rate
+
+
+def mission_time_s(params: ProfileParams, polar: Polar, dives: int) -> float:
+    """Estimated time (s) of so many dives, from surface preparation to surfacing."""
+    _, rate = profile_targets(GLIDING_DOWN, 0.0, params, polar)
+    legs = 2.0 * dives * params.depth / rate
+    return params.prepare_ticks * TICK_S + legs + 2.0 * dives * params.lead_s

@@ -1,0 +1,222 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The yo, flown by a point that has a pump and nothing else: w = W sign(m) sqrt(abs(m) / m_0)."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glider_guidance.profile import (
+    GLIDING_DOWN,
+    GLIDING_UP,
+    INFLECTING_DOWN,
+    INFLECTING_UP,
+    INITIAL_PROFILE,
+    PITCH_OVER,
+    STAGE_NAMES,
+    SURFACE_PREPARATION,
+    SURFACING,
+    WAITING_ON_SURFACE,
+    ProfileSettings,
+    ProfileState,
+    is_descending,
+    is_gliding,
+    mission_time_s,
+    profile_step,
+    profile_targets,
+)
+from glider_model.polar import make_polar
+from glider_model.signals import TICK_S
+from glider_model.vehicle import load_vehicle
+
+quick = settings(max_examples=50, deadline=None)
+
+POLAR = make_polar(load_vehicle('zhang2021').params())
+PUMP = 0.004
+ALL_STAGES = range(len(STAGE_NAMES))
+DEEP_STAGES = [GLIDING_DOWN, INFLECTING_UP, GLIDING_UP, INFLECTING_DOWN]
+ROUND = [SURFACE_PREPARATION, GLIDING_DOWN, INFLECTING_UP, GLIDING_UP]
+
+
+def glide_rate(params):
+    """Vertical rate of the steady dive (m/s)."""
+    return profile_targets(GLIDING_DOWN, 0.0, params, POLAR)[1]
+
+
+class Point:
+    """A point with a pump, in a profile."""
+
+    def __init__(self, dives=1, pump=PUMP, **fields):
+        self.settings = ProfileSettings(**fields)
+        self.params = self.settings.params(dives, pump)
+        self.pump = pump
+        self.state = INITIAL_PROFILE
+        self.depth, self.rate = 0.0, 0.0
+        self.net = -self.settings.net_heaviness_kg
+        self.stages, self.depths = [self.state.stage], [0.0]
+
+    def tick(self):
+        self.state = profile_step(self.state, self.depth, self.rate, self.params)
+        full = self.settings.net_heaviness_kg
+        wanted = math.copysign(
+            full, profile_targets(self.state.stage, self.rate, self.params, POLAR)[1]
+        )
+        step = self.pump * TICK_S
+        self.net += min(step, max(-step, wanted - self.net))
+        self.rate = math.copysign(
+            glide_rate(self.params) * math.sqrt(abs(self.net) / full), self.net
+        )
+        self.depth += TICK_S * self.rate
+        if self.depth < 0.0:
+            self.depth, self.rate = 0.0, 0.0
+        if self.state.stage != self.stages[-1]:
+            self.stages.append(self.state.stage)
+        self.depths.append(self.depth)
+
+    def fly(self, seconds):
+        for _ in range(round(seconds / TICK_S)):
+            self.tick()
+        return self
+
+
+def test_one_dive_passes_the_stages_in_order_and_ends_waiting():
+    point = Point(dives=1, depth_m=100.0).fly(2500.0)
+    assert point.stages == [*ROUND, WAITING_ON_SURFACE]
+
+
+@pytest.mark.parametrize('dives', [1, 2, 3])
+def test_so_many_dives_are_flown_and_counted(dives):
+    point = Point(dives=dives, depth_m=50.0, top_depth_m=5.0).fly(700.0 * dives + 1500.0)
+    again = [INFLECTING_DOWN, *ROUND[1:]] * (dives - 1)
+    assert point.stages == [*ROUND, *again, WAITING_ON_SURFACE]
+    assert point.state.dives == dives
+
+
+def test_without_an_end_the_sawtooth_goes_on():
+    point = Point(dives=0, depth_m=50.0, top_depth_m=5.0).fly(6000.0)
+    teeth = [*ROUND, *[INFLECTING_DOWN, *ROUND[1:]] * 20]
+    assert len(point.stages) > 20
+    assert point.stages == teeth[: len(point.stages)]
+
+
+@pytest.mark.parametrize('pump', [0.002, 0.004, 0.016])
+@pytest.mark.parametrize('net', [0.2, 0.8])
+def test_lead_puts_the_lower_turn_on_the_target(pump, net):
+    """The pump's way is 2/3 W m_0 / pump: the deepest point is the target within 0.2 m."""
+    point = Point(dives=0, pump=pump, net_heaviness_kg=net, depth_m=300.0).fly(3000.0)
+    assert max(point.depths) == pytest.approx(300.0, abs=0.2)
+
+
+def test_lead_puts_the_upper_turn_on_the_top_depth():
+    point = Point(dives=0, depth_m=300.0, top_depth_m=40.0).fly(6000.0)
+    below = point.depths[point.depths.index(max(point.depths)) :]
+    assert min(below) == pytest.approx(40.0, abs=0.2)
+
+
+@quick
+@given(st.floats(10.0, 1000.0), st.floats(2.0, 1000.0))
+def test_upper_turn_is_never_below_half_of_the_lower(depth_m, top_depth_m):
+    params = ProfileSettings(depth_m=depth_m, top_depth_m=top_depth_m).params(0, PUMP)
+    assert params.top_depth == min(top_depth_m, 0.5 * depth_m)
+
+
+def test_preparation_lasts_as_long_as_asked():
+    point = Point(prepare_s=30.0).fly(30.0)
+    assert point.state.stage == SURFACE_PREPARATION
+    point.fly(0.2)
+    assert point.state.stage == GLIDING_DOWN
+
+
+@pytest.mark.parametrize('stage', ALL_STAGES)
+def test_abort_leads_to_surfacing_from_every_stage(stage):
+    params = ProfileSettings().params(1, PUMP)
+    state = profile_step(ProfileState(stage, 100, 0, True), 200.0, 0.2, params)
+    assert state.stage == SURFACING
+
+
+@pytest.mark.parametrize('stage', ALL_STAGES)
+def test_abort_at_the_surface_stays_there(stage):
+    params = ProfileSettings(wait_s=0.0, prepare_s=0.0).params(5, PUMP)
+    state = ProfileState(stage, 10**6, 0, True)
+    for _ in range(100):
+        state = profile_step(state, 0.2, 0.0, params)
+    assert state.stage == WAITING_ON_SURFACE
+
+
+@pytest.mark.parametrize('after_s', [30.0, 200.0, 380.0, 600.0])
+def test_aborted_vehicle_comes_up_and_waits(after_s):
+    point = Point(dives=0, depth_m=100.0).fly(after_s)
+    point.state = point.state._replace(aborted=True)
+    point.fly(1500.0)
+    assert point.state.stage == WAITING_ON_SURFACE
+    assert point.depth < 1.0
+
+
+@pytest.mark.parametrize('stage', [SURFACE_PREPARATION, GLIDING_UP, WAITING_ON_SURFACE, SURFACING])
+def test_stages_that_lead_up_ask_for_a_rate_upward(stage):
+    params = ProfileSettings().params(1, PUMP)
+    assert profile_targets(stage, 0.0, params, POLAR)[1] == -glide_rate(params)
+
+
+@quick
+@given(st.sampled_from(ALL_STAGES), st.floats(-1.0, 1.0), st.floats(13.0, 60.0))
+def test_targets_are_always_the_glide_or_its_mirror_image(stage, vertical_rate, pitch_deg):
+    params = ProfileSettings(pitch_deg=pitch_deg).params(1, PUMP)
+    pitch, rate = profile_targets(stage, vertical_rate, params, POLAR)
+    assert abs(pitch) == math.radians(pitch_deg)
+    assert abs(rate) == pytest.approx(glide_rate(params), rel=1e-12)
+    assert (rate > 0.0) == is_descending(stage)
+
+
+@pytest.mark.parametrize('stage', [GLIDING_DOWN, GLIDING_UP])
+def test_in_a_glide_the_nose_points_where_the_vehicle_goes(stage):
+    params = ProfileSettings().params(1, PUMP)
+    pitch, rate = profile_targets(stage, 0.0, params, POLAR)
+    assert pitch * rate < 0.0
+    assert is_gliding(stage)
+
+
+@pytest.mark.parametrize(('stage', 'sign'), [(INFLECTING_UP, 1.0), (INFLECTING_DOWN, -1.0)])
+@quick
+@given(share=st.floats(-1.0, 1.0))
+def test_pitch_goes_over_once_the_vertical_rate_has_halved(stage, sign, share):
+    """The nose stays in the old direction until the rate is ``PITCH_OVER`` of the glide's."""
+    params = ProfileSettings().params(1, PUMP)
+    vertical_rate = sign * share * glide_rate(params)
+    pitch, _ = profile_targets(stage, vertical_rate, params, POLAR)
+    old = share > PITCH_OVER
+    assert math.copysign(1.0, pitch) == (-sign if old else sign)
+
+
+def test_nose_is_down_before_the_dive_begins():
+    params = ProfileSettings().params(1, PUMP)
+    assert profile_targets(SURFACE_PREPARATION, 0.0, params, POLAR)[0] < 0.0
+
+
+def test_pitch_goes_over_once_in_a_turn():
+    """Seen over a whole turn of the point: one change of sign, while it still goes down."""
+    point, pitches, rates = Point(dives=0, depth_m=60.0), [], []
+    while point.state.stage != GLIDING_UP:
+        point.tick()
+        if point.state.stage == INFLECTING_UP:
+            pitches.append(
+                profile_targets(point.state.stage, point.rate, point.params, POLAR)[0]
+            )
+            rates.append(point.rate)
+    changes = [i for i in range(1, len(pitches)) if pitches[i] != pitches[i - 1]]
+    assert len(changes) == 1
+    assert rates[changes[0]] == pytest.approx(PITCH_OVER * glide_rate(point.params), rel=0.01)
+
+
+@pytest.mark.parametrize('dives', [1, 3])
+def test_estimated_time_is_that_of_the_flight(dives):
+    """What the progress bar is drawn from, within 5 %."""
+    point = Point(dives=dives, depth_m=300.0)
+    ticks = 0
+    while point.state.stage != WAITING_ON_SURFACE:
+        point.tick()
+        ticks += 1
+    estimate = mission_time_s(point.params, POLAR, dives)
+    assert estimate == pytest.approx(ticks * TICK_S, rel=0.05)
