@@ -1,0 +1,356 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The adaptive law: command-filtered backstepping for roll and pitch, bank to turn for heading.
+
+Zhang et al. (2021), equations (12)-(29), made whole (docs/paper.md). For each of roll and pitch,
+with the angle error K1 and the rate error K2 = omega - a_s:
+
+    a     = J3^-1 (Omega_s' - L1 K1 - h r)                          (16)
+    tau   = M a_s' - B2 K2 - B1 J3^T K1bar - Phi^T theta_hat        (18)
+    theta_hat' = Proj[Gamma (Phi K2bar - sigma theta_hat)]          (19)
+
+K1bar = K1 - xi and K2bar = K2 - zeta are the errors less what the command filter and the actuators
+are to blame for (Farrell et al. 2009), so that neither is learnt as a disturbance. Regressors are
+scaled such that every parameter is a moment in N m. Unknown to the law: damping, static moments,
+trim, steering effectiveness and its sign.
+"""
+
+import math
+from typing import NamedTuple
+
+from pydantic import Field
+
+from glider_control.steering import (
+    STEERING_SPEED,
+    SteeringLearningSettings,
+    SteeringParams,
+    SteeringState,
+    effective_steering,
+    learn_steering,
+)
+from glider_model.command_filter import Filtered, FilterParams, filter_command
+from glider_model.frames import wrap_angle
+from glider_model.kernel import kernel
+from glider_model.rigid_body import GRAVITY
+from glider_model.settings import Settings
+from glider_model.vehicle import VehicleParams
+
+_TUNABLE = {'tunable': True}
+
+#: Typical size of the regressors: V^2 alpha, V^2 (m^2/s^2), side force (N), rates (rad/s).
+SCALE_ALPHA, SCALE_V2, SCALE_SIDE, SCALE_ROLL_RATE, SCALE_PITCH_RATE = 0.01, 0.25, 2.0, 0.05, 0.03
+#: Adaptation waits below this speed (m/s) and vertical rate (m/s), and this long after a turn (s).
+LEARN_SPEED, LEARN_VERTICAL_RATE, LEARN_AFTER_S = 0.15, 0.12, 20.0
+#: Natural frequency of the filter on the virtual rate command (rad/s), and its rate limit.
+RATE_FILTER = FilterParams(2.0, 10.0)
+
+
+class ChannelSettings(Settings):
+    """Gains of one channel, roll or pitch."""
+
+    l1_per_s: float = Field(
+        0.15, gt=0.0, le=5.0, description='L1, angle error (1/s)', json_schema_extra=_TUNABLE
+    )
+    b1: float = Field(
+        6.0, gt=0.0, le=500.0, description='B1, angle (N m/rad)', json_schema_extra=_TUNABLE
+    )
+    b2: float = Field(
+        20.0, gt=0.0, le=500.0, description='B2, rate (N m s/rad)', json_schema_extra=_TUNABLE
+    )
+    gamma: float = Field(
+        0.3, ge=0.0, le=50.0, description='Gamma, adaptation (N m/rad)', json_schema_extra=_TUNABLE
+    )
+    sigma_per_s: float = Field(
+        1e-5, ge=0.0, le=1.0, description='sigma, leakage (rad/(N m s))', json_schema_extra=_TUNABLE
+    )
+    bound: float = Field(
+        3.0, gt=0.0, le=100.0, description='projection: largest parameter (N m)'
+    )
+
+
+class AdaptiveSettings(Settings):
+    """Gains of the adaptive law."""
+
+    pitch: ChannelSettings = Field(ChannelSettings(), description='pitch channel')
+    roll: ChannelSettings = Field(
+        ChannelSettings(l1_per_s=0.3, b1=6.0, b2=3.0, gamma=1.0), description='roll channel'
+    )
+    heading_kp_per_s: float = Field(
+        0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=_TUNABLE
+    )
+    heading_kd: float = Field(
+        0.3, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=_TUNABLE
+    )
+    steering: SteeringLearningSettings = Field(
+        SteeringLearningSettings(), description='estimator of the steering effectiveness'
+    )
+
+
+class ChannelParams(NamedTuple):
+    """Gains of one channel and the inertia it turns."""
+
+    l1: float
+    b1: float
+    b2: float
+    gamma: float
+    sigma: float
+    bound: float
+    inertia: float  #: rigid body and added (kg m^2)
+
+
+class AdaptiveParams(NamedTuple):
+    """Adaptive law as the kernels see it."""
+
+    roll: ChannelParams
+    pitch: ChannelParams
+    heading_kp: float
+    heading_kd: float
+    steering: SteeringParams
+    mass: float  #: of the vehicle (kg)
+    roll_limit: float  #: (rad)
+    roll_filter: FilterParams
+
+
+class ChannelState(NamedTuple):
+    """Filter and compensation signals of one channel."""
+
+    rate: Filtered  #: a_s, the virtual rate command filtered (rad/s)
+    xi: float  #: angle error that the filter is to blame for (rad)
+    zeta: float  #: rate error that the actuator is to blame for (rad/s)
+    tau: float  #: last demanded moment (N m)
+    k1: float  #: compensated errors, for the monitor
+    k2: float
+
+
+class AdaptiveState(NamedTuple):
+    """Everything the law has learnt, and its filters."""
+
+    roll: Filtered  #: phi_s
+    roll_channel: ChannelState
+    pitch_channel: ChannelState
+    roll_theta: tuple[float, float, float]  #: bias, side force, roll damping (N m)
+    pitch_theta: tuple[float, float, float, float]  #: bias, V^2 alpha, V^2, pitch damping (N m)
+    dive: SteeringState
+    climb: SteeringState
+    lagged: float  #: regressor of the steering estimator
+    steady_s: float  #: time since the last turn (s)
+
+
+def make_adaptive(
+    settings: AdaptiveSettings, vehicle: VehicleParams, roll_limit: float, roll_filter
+) -> AdaptiveParams:
+    """Kernel parameters for a vehicle whose masses, but nothing else, are known."""
+
+    def channel(gains: ChannelSettings, inertia: float) -> ChannelParams:
+        return ChannelParams(
+            gains.l1_per_s,
+            gains.b1,
+            gains.b2,
+            gains.gamma,
+            gains.sigma_per_s,
+            gains.bound,
+            inertia,
+        )
+
+    return AdaptiveParams(
+        channel(settings.roll, vehicle.i_xx + vehicle.a_44),
+        channel(settings.pitch, vehicle.i_yy + vehicle.a_55),
+        settings.heading_kp_per_s,
+        settings.heading_kd,
+        settings.steering.params(),
+        vehicle.m,
+        roll_limit,
+        roll_filter,
+    )
+
+
+def initial_adaptive(settings: AdaptiveSettings) -> AdaptiveState:
+    """State of a law that knows nothing yet."""
+    channel = ChannelState(Filtered(0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
+    return AdaptiveState(
+        Filtered(0.0, 0.0),
+        channel,
+        channel,
+        (0.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0, 0.0),
+        settings.steering.initial_state(1.0),
+        settings.steering.initial_state(-1.0),
+        0.0,
+        0.0,
+    )
+
+
+@kernel
+def _project(theta, direction, sigma, params, dt):
+    """One step of a parameter along ``direction``, with leakage, inside the bound."""
+    moved = theta + dt * params.gamma * (direction - sigma * theta)
+    return min(params.bound, max(-params.bound, moved))
+
+
+@kernel
+def channel_step(state, error, command, rate, applied, coupling, params, dt):
+    """Errors, virtual rate and compensation signals of one channel, before the moment.
+
+    Parameters
+    ----------
+    state : ChannelState
+    error : float
+        K1, measured angle less desired (rad).
+    command : float
+        a, virtual rate command (rad/s).
+    rate : float
+        Measured body rate (rad/s).
+    applied : float
+        Moment that the actuator makes (N m).
+    coupling : float
+        Element of J3 from this rate to this angle (-).
+
+    Returns
+    -------
+    Filtered, xi, zeta, k1_bar, k2, k2_bar
+    """
+    filtered = filter_command(state.rate, command, RATE_FILTER, dt)
+    xi = state.xi + dt * (-params.l1 * state.xi + coupling * (filtered.value - command))
+    # damping of the zeta filter: implicit, so that a light vehicle stays stable
+    zeta = (state.zeta + dt * (applied - state.tau) / params.inertia) / (
+        1.0 + dt * params.b2 / params.inertia
+    )
+    k2 = rate - filtered.value
+    return filtered, xi, zeta, error - xi, k2, k2 - zeta
+
+
+@kernel
+def bank_to_turn(state, measured, reference, speed, params, dt):
+    """Roll command (rad) that steers to the reference heading, and what it learnt of steering.
+
+    phi_s = asin sat((psi_s' + k_psi e + k_d (psi_s' - psi') - d_hat) / (b_hat V / V_0))
+    """
+    ratio = max(speed, LEARN_SPEED) / STEERING_SPEED
+    share = dt / (params.steering.lag_s + dt)
+    lagged = state.lagged + share * (math.sin(measured.phi) * ratio - state.lagged)
+    gliding = abs(measured.vertical_rate) > LEARN_VERTICAL_RATE and speed > LEARN_SPEED
+    steady_s = state.steady_s + dt if gliding else 0.0
+    dive, climb = state.dive, state.climb
+    if not gliding:
+        return 0.0, dive, climb, lagged, steady_s
+    diving = measured.vertical_rate > 0.0
+    now = dive if diving else climb
+    if steady_s > params.steering.lag_s:
+        now = learn_steering(now, lagged, measured.psi_dot, params.steering, dt)
+        if diving:
+            dive = now
+        else:
+            climb = now
+    error = wrap_angle(reference.psi - measured.psi)
+    turn = (
+        reference.psi_dot
+        + params.heading_kp * error
+        + params.heading_kd * (reference.psi_dot - measured.psi_dot)
+        - now.d
+    )
+    limit = math.sin(params.roll_limit)
+    demand = turn / (effective_steering(now, params.steering) * ratio)
+    return math.asin(min(limit, max(-limit, demand))), dive, climb, lagged, steady_s
+
+
+@kernel
+def adaptive_step(
+    state, measured, reference, speed, alpha, m_b, applied, held, params, dt
+):
+    """Roll and pitch moment (N m) of the adaptive law.
+
+    Parameters
+    ----------
+    state : AdaptiveState
+    measured : Measured
+    reference : Reference
+    speed, alpha : float
+        Speed through the water (m/s) and angle of attack (rad), by the flight model.
+    m_b : float
+        Net heaviness (kg).
+    applied : tuple of float
+        Roll and pitch moment that the moving mass makes now (N m).
+    held : tuple of bool
+        Whether roll and pitch mass are at their limits: their parameters wait.
+    params : AdaptiveParams
+    dt : float
+
+    Returns
+    -------
+    AdaptiveState, tau_p, tau_q
+    """
+    roll_command, dive, climb, lagged, steady_s = bank_to_turn(
+        state, measured, reference, speed, params, dt
+    )
+    roll = filter_command(state.roll, roll_command, params.roll_filter, dt)
+
+    s_phi, c_phi = math.sin(measured.phi), math.cos(measured.phi)
+    t_theta = math.tan(measured.theta)
+    c_theta = math.cos(measured.theta)
+    # body rates from Euler rates
+    p = measured.phi_dot - math.sin(measured.theta) * measured.psi_dot
+    q = c_phi * measured.theta_dot + s_phi * c_theta * measured.psi_dot
+    r = c_phi * c_theta * measured.psi_dot - s_phi * measured.theta_dot
+
+    e_phi = wrap_angle(measured.phi - roll.value)
+    e_theta = measured.theta - reference.theta
+    a_phi = roll.rate - params.roll.l1 * e_phi
+    a_theta = reference.theta_dot - params.pitch.l1 * e_theta
+    a_q = (a_theta + s_phi * r) / max(c_phi, 0.2)
+    a_p = a_phi - c_phi * t_theta * r - s_phi * t_theta * a_q
+
+    rate_p, xi_p, zeta_p, k1_p, k2_p, k2bar_p = channel_step(
+        state.roll_channel, e_phi, a_p, p, applied[0], 1.0, params.roll, dt
+    )
+    rate_q, xi_q, zeta_q, k1_q, k2_q, k2bar_q = channel_step(
+        state.pitch_channel, e_theta, a_q, q, applied[1], c_phi, params.pitch, dt
+    )
+
+    # regressors; the side force that sideslip makes, from the lateral balance of a turn
+    v2 = speed * speed
+    side = params.mass * speed * r - m_b * GRAVITY * c_theta * s_phi
+    phi_p = (1.0, side / SCALE_SIDE, rate_p.value / SCALE_ROLL_RATE)
+    phi_q = (1.0, v2 * alpha / SCALE_ALPHA, v2 / SCALE_V2, rate_q.value / SCALE_PITCH_RATE)
+
+    th_p, th_q = state.roll_theta, state.pitch_theta
+    tau_p = (
+        params.roll.inertia * rate_p.rate
+        - params.roll.b2 * k2_p
+        - params.roll.b1 * k1_p
+        - (phi_p[0] * th_p[0] + phi_p[1] * th_p[1] + phi_p[2] * th_p[2])
+    )
+    tau_q = (
+        params.pitch.inertia * rate_q.rate
+        - params.pitch.b2 * k2_q
+        - params.pitch.b1 * (c_phi * k1_q + s_phi * t_theta * k1_p)
+        - (phi_q[0] * th_q[0] + phi_q[1] * th_q[1] + phi_q[2] * th_q[2] + phi_q[3] * th_q[3])
+    )
+
+    learning = steady_s > LEARN_AFTER_S
+    if learning and not held[0]:
+        s = params.roll.sigma
+        th_p = (
+            _project(th_p[0], phi_p[0] * k2bar_p, s, params.roll, dt),
+            _project(th_p[1], phi_p[1] * k2bar_p, s, params.roll, dt),
+            _project(th_p[2], phi_p[2] * k2bar_p, s, params.roll, dt),
+        )
+    if learning and not held[1]:
+        s = params.pitch.sigma
+        th_q = (
+            _project(th_q[0], phi_q[0] * k2bar_q, s, params.pitch, dt),
+            _project(th_q[1], phi_q[1] * k2bar_q, s, params.pitch, dt),
+            _project(th_q[2], phi_q[2] * k2bar_q, s, params.pitch, dt),
+            _project(th_q[3], phi_q[3] * k2bar_q, s, params.pitch, dt),
+        )
+    new_state = AdaptiveState(
+        roll,
+        ChannelState(rate_p, xi_p, zeta_p, tau_p, k1_p, k2bar_p),
+        ChannelState(rate_q, xi_q, zeta_q, tau_q, k1_q, k2bar_q),
+        th_p,
+        th_q,
+        dive,
+        climb,
+        lagged,
+        steady_s,
+    )
+    return new_state, tau_p, tau_q

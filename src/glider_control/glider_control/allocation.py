@@ -1,0 +1,96 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""From demanded moments to the positions of the moving mass, and back.
+
+The moving mass makes moments by gravity alone:
+
+    tau_p = g (S_y g_z - S_z g_y),   S_y = s_y + m_p R sin mu
+    tau_q = g (S_z g_x - S_x g_z),   S_x = s_x + m_p (x_0 + x_p),  S_z = s_z + m_p R cos mu
+
+with (g_x, g_y, g_z) the direction of gravity in body axes. Both are solved exactly.
+"""
+
+import math
+from typing import NamedTuple
+
+from glider_model.kernel import kernel
+from glider_model.rigid_body import GRAVITY
+from glider_model.vehicle import VehicleParams
+
+#: Nose-up or nose-down beyond this, gravity gives no pitch authority: g_z is held here (-).
+SMALLEST_G_Z = 0.2
+
+
+class AllocationParams(NamedTuple):
+    """Masses and ranges of the actuators."""
+
+    s_x: float  #: first moment of the hull (kg m)
+    s_z: float
+    m_p: float  #: moving mass (kg)
+    x_p0: float  #: its neutral position (m)
+    R_p: float  #: its radius (m)
+    m_b_max: float  #: ranges (kg, m, rad)
+    x_p_max: float
+    mu_max: float
+
+
+def make_allocation(vehicle: VehicleParams) -> AllocationParams:
+    """What allocation needs to know of a vehicle: what a scale and a ruler tell."""
+    return AllocationParams(
+        vehicle.s_x,
+        vehicle.s_z,
+        vehicle.m_p,
+        vehicle.x_p0,
+        vehicle.R_p,
+        vehicle.m_b_max,
+        vehicle.x_p_max,
+        vehicle.mu_max,
+    )
+
+
+@kernel
+def gravity_direction(phi, theta):
+    """Direction of gravity in body axes."""
+    return (
+        -math.sin(theta),
+        math.cos(theta) * math.sin(phi),
+        math.cos(theta) * math.cos(phi),
+    )
+
+
+@kernel
+def allocate_roll(tau_p, phi, theta, params):
+    """Rotation mu (rad) of the roll mass that makes the roll moment ``tau_p`` (N m).
+
+    A sin mu - B cos mu = tau_p + g s_z g_y with A = m_p R g g_z and B = m_p R g g_y.
+    Held within the range; out of reach, the end of the range on the demanded side.
+    """
+    _, g_y, g_z = gravity_direction(phi, theta)
+    lever = params.m_p * params.R_p * GRAVITY
+    a, b = lever * g_z, lever * g_y
+    demand = (tau_p + GRAVITY * params.s_z * g_y) / max(math.sqrt(a * a + b * b), 1e-9)
+    mu = math.asin(min(1.0, max(-1.0, demand))) + math.atan2(b, a)
+    return min(params.mu_max, max(-params.mu_max, mu))
+
+
+@kernel
+def allocate_pitch(tau_q, mu, phi, theta, params):
+    """Position x_p (m from neutral) of the pitch mass that makes the pitch moment ``tau_q``.
+
+    x_p = (S_z g_x - tau_q / g) / (g_z m_p) - s_x / m_p - x_0, held within the range.
+    """
+    g_x, _, g_z = gravity_direction(phi, theta)
+    s_z = params.s_z + params.m_p * params.R_p * math.cos(mu)
+    s_x = (s_z * g_x - tau_q / GRAVITY) / max(g_z, SMALLEST_G_Z)
+    x_p = (s_x - params.s_x) / params.m_p - params.x_p0
+    return min(params.x_p_max, max(-params.x_p_max, x_p))
+
+
+@kernel
+def moments(x_p, mu, phi, theta, params):
+    """Roll and pitch moment (N m) that given positions of the moving mass make."""
+    g_x, g_y, g_z = gravity_direction(phi, theta)
+    s_x = params.s_x + params.m_p * (params.x_p0 + x_p)
+    s_y = params.m_p * params.R_p * math.sin(mu)
+    s_z = params.s_z + params.m_p * params.R_p * math.cos(mu)
+    return GRAVITY * (s_y * g_z - s_z * g_y), GRAVITY * (s_z * g_x - s_x * g_z)

@@ -1,0 +1,276 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Control: measurement, attitude law, vertical-rate law and allocation put together.
+
+The channels cannot be swapped: buoyancy sets speed and vertical rate, the mass forward or aft sets
+pitch, the mass turned to a side sets roll and so heading.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from pydantic import Field
+
+from glider_control.adaptive import (
+    AdaptiveParams,
+    AdaptiveSettings,
+    AdaptiveState,
+    adaptive_step,
+    initial_adaptive,
+    make_adaptive,
+)
+from glider_control.allocation import (
+    AllocationParams,
+    allocate_pitch,
+    allocate_roll,
+    make_allocation,
+    moments,
+)
+from glider_control.measurement import Measured, measure
+from glider_control.pid import (
+    HeadingSettings,
+    PidParams,
+    PidSettings,
+    PidState,
+    pid_step,
+)
+from glider_model.command_filter import Filtered, FilterParams
+from glider_model.kernel import kernel
+from glider_model.polar import (
+    Polar,
+    glide_alpha,
+    glide_net_heaviness,
+    glide_speed,
+    make_polar,
+    steepen,
+)
+from glider_model.rigid_body import GRAVITY
+from glider_model.settings import Settings
+from glider_model.signals import Joints, Wrench
+from glider_model.vehicle import load_vehicle
+
+_TUNABLE = {'tunable': True}
+
+#: Bits of ``ControlOutput.saturation``.
+SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL = 1, 2, 4
+#: The vertical-rate integrator works within this error of the vertical rate (m/s).
+VERTICAL_RATE_WINDOW = 0.1
+
+
+class BuoyancySettings(Settings):
+    """Vertical rate on the buoyancy engine."""
+
+    ki_kg_per_m: float = Field(
+        0.004,
+        ge=0.0,
+        le=10.0,
+        description='integral of the vertical-rate error (kg/m)',
+        json_schema_extra=_TUNABLE,
+    )
+    trim_limit_kg: float = Field(
+        0.3, ge=0.0, le=20.0, description='largest correction by the integral (kg)'
+    )
+
+
+class FilterSettings(Settings):
+    """What keeps noise from moving the motors."""
+
+    attitude_s: float = Field(
+        2.0, gt=0.0, le=60.0, description='time constant of the attitude filter (s)'
+    )
+    buoyancy_dead_band_kg: float = Field(
+        0.005, ge=0.0, le=1.0, description='change of command that the pump ignores (kg)'
+    )
+    pitch_dead_band_m: float = Field(
+        1e-4, ge=0.0, le=0.1, description='change of command that the pitch mass ignores (m)'
+    )
+    roll_dead_band_deg: float = Field(
+        0.2, ge=0.0, le=10.0, description='change of command that the roll mass ignores (deg)'
+    )
+
+
+class ControlLawSettings(Settings):
+    """How to control, whatever the vehicle: the control section of a scenario."""
+
+    law: Literal['adaptive', 'pid'] = Field('adaptive', description='attitude law')
+    adaptive: AdaptiveSettings = Field(
+        AdaptiveSettings(), description='gains of the adaptive law'
+    )
+    pid: PidSettings = Field(PidSettings(), description='gains of the PID law')
+    heading: HeadingSettings = Field(HeadingSettings(), description='bank to turn')
+    buoyancy: BuoyancySettings = Field(BuoyancySettings(), description='vertical-rate law')
+    filters: FilterSettings = Field(FilterSettings(), description='filters and dead bands')
+
+
+class ControlSettings(ControlLawSettings):
+    """Everything the control node is told."""
+
+    vehicle: str = Field('zhang2021', description='vehicle: masses, ranges, polar, steering')
+
+    def params(self) -> 'ControlParams':
+        """Kernel parameters."""
+        vehicle = load_vehicle(self.vehicle)
+        kernel_vehicle = vehicle.params()
+        heading, filters = self.heading, self.filters
+        roll_limit = math.radians(heading.roll_limit_deg)
+        roll_filter = FilterParams(heading.roll_frequency_radps, heading.roll_rate_radps)
+        return ControlParams(
+            make_allocation(kernel_vehicle),
+            make_polar(kernel_vehicle),
+            self.law == 'adaptive',
+            make_adaptive(self.adaptive, kernel_vehicle, roll_limit, roll_filter),
+            PidParams(
+                *(getattr(self.pid, name) for name in PidSettings.model_fields),
+                vehicle.steering.dive.value,
+                vehicle.steering.climb.value,
+                roll_limit,
+                roll_filter,
+            ),
+            self.buoyancy.ki_kg_per_m,
+            self.buoyancy.trim_limit_kg,
+            filters.attitude_s,
+            Joints(
+                filters.buoyancy_dead_band_kg,
+                filters.pitch_dead_band_m,
+                math.radians(filters.roll_dead_band_deg),
+            ),
+            Joints(-kernel_vehicle.m_b_max, 0.0, 0.0),
+        )
+
+    def initial_state(self) -> 'ControlState':
+        """State before the first tick."""
+        return ControlState(
+            0,
+            Measured(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            initial_adaptive(self.adaptive),
+            PidState(0.0, 0.0, 0.0, Filtered(0.0, 0.0)),
+            0.0,
+            Joints(0.0, 0.0, 0.0),
+        )
+
+
+class ControlParams(NamedTuple):
+    """Control as the kernels see it."""
+
+    allocation: AllocationParams
+    polar: Polar
+    adapts: bool  #: adaptive law, else PID
+    adaptive: AdaptiveParams
+    pid: PidParams
+    buoyancy_ki: float  #: (kg/m)
+    buoyancy_trim_max: float  #: (kg)
+    attitude_s: float
+    dead_band: Joints
+    safe_command: Joints  #: as buoyant as possible, mass at neutral, roll level
+
+
+class ControlState(NamedTuple):
+    """Control between two ticks."""
+
+    tick: int
+    measured: Measured
+    adaptive: AdaptiveState
+    pid: PidState
+    buoyancy_trim: float  #: integral of the vertical-rate law (kg)
+    command: Joints  #: last command
+
+
+class ControlOutput(NamedTuple):
+    """What control publishes."""
+
+    command: Joints
+    wrench: Wrench
+    saturation: int  #: sum of SATURATED_* bits
+
+
+@kernel
+def _hold(command, last, band, limit):
+    """``last``, unless the command leaves the dead band or reaches the end of the range."""
+    if abs(command - last) <= band and abs(command) < limit:
+        return last
+    return command
+
+
+@kernel
+def vertical_rate_law(trim, measured, reference, joints, params, dt):
+    """Net heaviness (kg) for the reference's vertical rate, and the new integral.
+
+    The glide polar gives the weight of the steady glide; the integral corrects what the vehicle
+    and the water's density differ by. It waits while the vehicle turns over.
+    """
+    forward = glide_net_heaviness(reference.theta, reference.v_d, params.polar)
+    error = reference.v_d - measured.vertical_rate
+    limit = params.allocation.m_b_max
+    steady = abs(error) < VERTICAL_RATE_WINDOW and abs(joints.m_b - forward - trim) < 0.05
+    if steady:
+        trim += dt * params.buoyancy_ki * error
+        trim = min(params.buoyancy_trim_max, max(-params.buoyancy_trim_max, trim))
+    return min(limit, max(-limit, forward + trim)), trim
+
+
+@kernel
+def control_step(state, odometry, joints, reference, params, dt):
+    """One tick of control.
+
+    Parameters
+    ----------
+    state : ControlState
+    odometry : Odometry
+        Measured pose and velocity over ground.
+    joints : Joints
+        Where the actuators are.
+    reference : Reference
+    params : ControlParams
+    dt : float
+        Length of the tick (s).
+
+    Returns
+    -------
+    ControlState, ControlOutput
+    """
+    first = state.tick == 0
+    last = joints if first else state.command
+    limits = params.allocation
+    measured = measure(state.measured, odometry, first, params.attitude_s, dt)
+    speed = glide_speed(measured.theta, measured.vertical_rate, params.polar)
+
+    held = (abs(last.mu) >= limits.mu_max, abs(last.x_p) >= limits.x_p_max)
+    adaptive, pid = state.adaptive, state.pid
+    if params.adapts:
+        steep = steepen(measured.theta)
+        adaptive, tau_p, tau_q = adaptive_step(
+            adaptive,
+            measured,
+            reference,
+            speed,
+            glide_alpha(steep, params.polar),
+            joints.m_b,
+            moments(joints.x_p, joints.mu, measured.phi, measured.theta, limits),
+            held,
+            params.adaptive,
+            dt,
+        )
+    else:
+        pid, tau_p, tau_q = pid_step(
+            pid, measured, reference, speed, held[1], held[0], params.pid, dt
+        )
+    m_b, trim = vertical_rate_law(
+        state.buoyancy_trim, measured, reference, joints, params, dt
+    )
+    mu = allocate_roll(tau_p, measured.phi, measured.theta, limits)
+    x_p = allocate_pitch(tau_q, joints.mu, measured.phi, measured.theta, limits)
+
+    command = Joints(
+        _hold(m_b, last.m_b, params.dead_band.m_b, limits.m_b_max),
+        _hold(x_p, last.x_p, params.dead_band.x_p, limits.x_p_max),
+        _hold(mu, last.mu, params.dead_band.mu, limits.mu_max),
+    )
+    saturation = 0
+    if abs(command.m_b) >= limits.m_b_max:
+        saturation |= SATURATED_BUOYANCY
+    if abs(command.x_p) >= limits.x_p_max:
+        saturation |= SATURATED_PITCH
+    if abs(command.mu) >= limits.mu_max:
+        saturation |= SATURATED_ROLL
+    output = ControlOutput(command, Wrench(m_b * GRAVITY, tau_p, tau_q), saturation)
+    return ControlState(state.tick + 1, measured, adaptive, pid, trim, command), output

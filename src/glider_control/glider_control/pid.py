@@ -1,0 +1,176 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The tuned PID law: pitch, roll and heading, with yaw-rate damping and rate feed-forward.
+
+It is the opponent that the adaptive law is measured against, so it is made as good as it gets. It
+knows the vehicle: steering effectiveness and its sign in both phases, and the masses.
+"""
+
+import math
+from typing import NamedTuple
+
+from pydantic import Field
+
+from glider_control.steering import STEERING_SPEED
+from glider_model.command_filter import Filtered, FilterParams, filter_command
+from glider_model.frames import wrap_angle
+from glider_model.kernel import kernel
+from glider_model.settings import Settings
+
+_TUNABLE = {'tunable': True}
+
+
+class PidSettings(Settings):
+    """Gains of the PID law. Moments in N m, angles in rad."""
+
+    pitch_kp: float = Field(
+        8.0, ge=0.0, le=1000.0, description='pitch, N m/rad', json_schema_extra=_TUNABLE
+    )
+    pitch_ki: float = Field(
+        0.08, ge=0.0, le=100.0, description='pitch, N m/(rad s)', json_schema_extra=_TUNABLE
+    )
+    pitch_kd: float = Field(
+        10.0, ge=0.0, le=1000.0, description='pitch rate, N m s/rad', json_schema_extra=_TUNABLE
+    )
+    roll_kp: float = Field(
+        8.0, ge=0.0, le=1000.0, description='roll, N m/rad', json_schema_extra=_TUNABLE
+    )
+    roll_ki: float = Field(
+        0.4, ge=0.0, le=100.0, description='roll, N m/(rad s)', json_schema_extra=_TUNABLE
+    )
+    roll_kd: float = Field(
+        2.0, ge=0.0, le=1000.0, description='roll rate, N m s/rad', json_schema_extra=_TUNABLE
+    )
+    heading_kp_per_s: float = Field(
+        0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=_TUNABLE
+    )
+    heading_ki_per_s2: float = Field(
+        2e-4, ge=0.0, le=0.1, description='heading integral (1/s^2)', json_schema_extra=_TUNABLE
+    )
+    heading_kd: float = Field(
+        0.3, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=_TUNABLE
+    )
+
+
+class HeadingSettings(Settings):
+    """Bank to turn."""
+
+    roll_limit_deg: float = Field(
+        30.0, ge=1.0, le=60.0, description='largest commanded roll (deg)'
+    )
+    roll_frequency_radps: float = Field(
+        0.5, gt=0.0, le=5.0, description='natural frequency of the roll filter (rad/s)'
+    )
+    roll_rate_radps: float = Field(
+        0.08, gt=0.0, le=1.0, description='largest rate of the desired roll (rad/s)'
+    )
+
+
+class PidParams(NamedTuple):
+    """Gains, and how the vehicle steers."""
+
+    pitch_kp: float
+    pitch_ki: float
+    pitch_kd: float
+    roll_kp: float
+    roll_ki: float
+    roll_kd: float
+    heading_kp: float
+    heading_ki: float
+    heading_kd: float
+    steering_dive: float  #: turn rate over sin(roll) at STEERING_SPEED (rad/s), signed
+    steering_climb: float
+    roll_limit: float  #: (rad)
+    roll_filter: FilterParams
+
+
+class PidState(NamedTuple):
+    """Integrators and the roll filter."""
+
+    pitch_integral: float  #: (N m)
+    roll_integral: float  #: (N m)
+    heading_integral: float  #: (rad/s)
+    roll: Filtered
+
+
+#: Below this vertical rate the vehicle is turning over and cannot be steered (m/s).
+STEERING_VERTICAL_RATE = 0.12
+#: Integrators are held within these bounds (N m, N m, rad/s).
+PITCH_INTEGRAL_MAX, ROLL_INTEGRAL_MAX, HEADING_INTEGRAL_MAX = 3.0, 2.0, 0.005
+
+
+@kernel
+def _clip(number, limit):
+    return min(limit, max(-limit, number))
+
+
+@kernel
+def heading_to_roll(state, measured, reference, speed, params, dt):
+    """Roll command (rad) and heading integral that steer to the reference heading.
+
+    phi_s = asin sat((psi_s' + k_psi e + k_d (psi_s' - psi') + d) / (b V / V_0))
+    """
+    if abs(measured.vertical_rate) < STEERING_VERTICAL_RATE:
+        return 0.0, state.heading_integral
+    steering = params.steering_dive if measured.vertical_rate > 0.0 else params.steering_climb
+    gain = steering * max(speed, 0.15) / STEERING_SPEED
+    error = wrap_angle(reference.psi - measured.psi)
+    turn = (
+        reference.psi_dot
+        + params.heading_kp * error
+        + params.heading_kd * (reference.psi_dot - measured.psi_dot)
+        + state.heading_integral
+    )
+    demand = turn / gain
+    limit = math.sin(params.roll_limit)
+    integral = state.heading_integral
+    if abs(demand) < limit or demand * gain * error < 0.0:
+        integral = _clip(integral + dt * params.heading_ki * error, HEADING_INTEGRAL_MAX)
+    return math.asin(_clip(demand, limit)), integral
+
+
+@kernel
+def pid_step(state, measured, reference, speed, pitch_held, roll_held, params, dt):
+    """Roll and pitch moment (N m) of the PID law.
+
+    Parameters
+    ----------
+    state : PidState
+    measured : Measured
+    reference : Reference
+    speed : float
+        Speed through the water (m/s).
+    pitch_held, roll_held : bool
+        The actuator was at its limit: its integrator waits.
+    params : PidParams
+    dt : float
+
+    Returns
+    -------
+    PidState, tau_p, tau_q
+    """
+    roll_command, heading_integral = heading_to_roll(
+        state, measured, reference, speed, params, dt
+    )
+    roll = filter_command(state.roll, roll_command, params.roll_filter, dt)
+
+    e_phi = wrap_angle(roll.value - measured.phi)
+    roll_integral = state.roll_integral
+    if not roll_held:
+        roll_integral = _clip(roll_integral + dt * params.roll_ki * e_phi, ROLL_INTEGRAL_MAX)
+    tau_p = (
+        params.roll_kp * e_phi + params.roll_kd * (roll.rate - measured.phi_dot) + roll_integral
+    )
+
+    e_theta = reference.theta - measured.theta
+    pitch_integral = state.pitch_integral
+    if not pitch_held:
+        pitch_integral = _clip(
+            pitch_integral + dt * params.pitch_ki * e_theta, PITCH_INTEGRAL_MAX
+        )
+    tau_q = (
+        params.pitch_kp * e_theta
+        + params.pitch_kd * (reference.theta_dot - measured.theta_dot)
+        + pitch_integral
+    )
+    return PidState(pitch_integral, roll_integral, heading_integral, roll), tau_p, tau_q
