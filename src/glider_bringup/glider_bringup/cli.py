@@ -1,0 +1,333 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command line: ``./glider COMMAND``, or ``glider COMMAND`` in a sourced workspace."""
+
+import json
+import sys
+from contextlib import contextmanager
+from dataclasses import asdict
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Literal, get_args
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from glider_bringup.scenario import (
+    DEFAULT_SCENARIO,
+    Scenario,
+    load_scenario,
+    parse_assignment,
+    scenario_names,
+)
+from glider_control.control import ControlLawSettings
+from glider_guidance.guidance import LosSettings
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_S
+from glider_model.trim import Trim, solve_trim
+from glider_model.vehicle import load_vehicle, vehicle_names
+
+EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
+
+app = typer.Typer(
+    name='glider',
+    help='Underwater gliders: simulate, guide, control, record.',
+    epilog='Example: ./glider run current_8deg --controller pid',
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={'help_option_names': ['-h', '--help']},
+)
+# Standard output carries results only; progress and messages go to standard error.
+output = Console(highlight=False)
+messages = Console(stderr=True, highlight=False)
+
+
+def _choices(name: str, model, field: str) -> type[Enum]:
+    """Choices of an option, from the settings field that it sets."""
+    return Enum(name, {text: text for text in get_args(model.model_fields[field].annotation)})
+
+
+Engine = Enum('Engine', {text: text for text in get_args(Literal['nodes', 'direct'])})
+Controller = _choices('Controller', ControlLawSettings, 'law')
+Guidance = _choices('Guidance', LosSettings, 'method')
+Json = Annotated[
+    bool, typer.Option('--json', help='Print one JSON object and nothing else on standard output.')
+]
+
+
+@app.command(epilog='Example: ./glider run current_8deg --engine direct --duration full --json')
+def run(
+    scenario: Annotated[
+        str, typer.Argument(help='Scenario by name (./glider list) or path of its YAML file.')
+    ] = DEFAULT_SCENARIO,
+    engine: Annotated[
+        Engine,
+        typer.Option(
+            help='nodes: ROS 2 processes over topics; direct: one compiled loop. Same results.'
+        ),
+    ] = Engine.nodes,
+    controller: Annotated[
+        Controller | None, typer.Option(help='Attitude law, instead of the scenario\'s.')
+    ] = None,
+    guidance: Annotated[
+        Guidance | None, typer.Option(help='Line of sight, instead of the scenario\'s.')
+    ] = None,
+    duration: Annotated[
+        str | None,
+        typer.Option(
+            metavar='S|full',
+            help='Simulated seconds, or the scenario\'s full duration. Default: its dives.',
+        ),
+    ] = None,
+    speed: Annotated[
+        str, typer.Option(metavar='X|max', help='Times real time (nodes only).')
+    ] = 'max',
+    seed: Annotated[int | None, typer.Option(help='Seed, instead of the scenario\'s.')] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--set', metavar='FIELD=VALUE', help='Change a scenario field; can be repeated.'
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help='Folder for the run\'s files. Default: runs/<time>-<name>.')
+    ] = None,
+    bag: Annotated[
+        bool, typer.Option('--bag', help='Record a bag in a direct run too; nodes always do.')
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Fly a scenario; record it and print the scorecard."""
+    fields = dict(parse_assignment(text) for text in changes or [])
+    if controller:
+        fields['control.law'] = controller.value
+    if guidance:
+        fields['guidance.los.method'] = guidance.value
+    if seed is not None:
+        fields['seed'] = seed
+    if duration is not None:
+        fields['dives'] = 0
+        if duration != 'full':
+            fields['duration_s'] = _number('--duration', duration, 'full', TICK_S, 1e8)
+    rate = 0.0 if speed == 'max' else _number('--speed', speed, 'max', 0.01, 1e6)
+    if rate and engine is Engine.direct:
+        raise ConfigurationError('--speed: the direct engine knows only max')
+    flown = load_scenario(scenario, fields)
+    card, folder = _fly(flown, engine, rate, out, bag)
+    if as_json:
+        print(json.dumps(card))
+    else:
+        _print_card(card, folder)
+    if card['status'] == 'aborted':
+        raise typer.Exit(
+            EXIT_INTERRUPTED if card['reason'] == 'interrupted' else EXIT_FAILED
+        )
+
+
+def _fly(scenario: Scenario, engine: Engine, rate: float, out: Path | None, bag: bool):
+    """Fly and score a scenario with a progress bar; the scorecard and the run folder."""
+    from glider_bringup import mission
+
+    folder = mission.make_run_folder(scenario, out)
+    messages.print(f'{scenario.name}: {scenario.description}')
+    with _progress(scenario, mission.planned_ticks(scenario)) as update:
+        if engine is Engine.nodes:
+            flight, scores = mission.fly_nodes(scenario, folder, rate, update)
+        else:
+            flight, scores = mission.fly_direct(scenario, folder, bag, update)
+    card = mission.scorecard(scenario, engine.value, flight, scores)
+    mission.write_score(folder, card)
+    if flight.reason:
+        messages.print(f'[red]{flight.status}: {flight.reason}')
+    return card, folder
+
+
+def _number(option: str, text: str, word: str, low: float, high: float) -> float:
+    """Number of an option that also takes a word."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = float('nan')
+    if not low <= number <= high:
+        raise ConfigurationError(
+            f'{option} {text}: not usable (allowed: {low:g} to {high:g}, or {word})'
+        )
+    return number
+
+
+@contextmanager
+def _progress(scenario: Scenario, ticks: int):
+    """Progress bar with simulated time, real-time factor and depth; yields its update."""
+    bar = Progress(
+        TextColumn('{task.description}'),
+        BarColumn(),
+        TextColumn('{task.percentage:3.0f} %'),
+        TextColumn('{task.fields[state]}'),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=messages,
+        transient=True,
+    )
+    task = bar.add_task('starting', total=ticks, state='')
+
+    def update(flown: int, depth_m: float) -> None:
+        elapsed = bar.tasks[0].elapsed or 0.0
+        factor = flown * TICK_S / elapsed if elapsed > 0.0 else 0.0
+        bar.update(
+            task,
+            completed=min(flown, ticks),
+            description='flying',
+            state=f'{flown * TICK_S:,.0f} s  x{factor:,.0f}  depth {depth_m:6.1f} m',
+        )
+
+    with bar:
+        yield update
+
+
+def _print_card(card: dict, folder: Path) -> None:
+    """Print the scorecard for a person."""
+
+    def show(value, unit: str, digits: int = 2) -> str:
+        return '-' if value is None else f'{value:,.{digits}f} {unit}'
+
+    track, pitch = card['cross_track_m'], card['pitch_error_deg']
+    heading, depth = card['heading_fluctuation_deg'], card['depth_m']
+    rows = (
+        ('status', card['status'] + (f' ({card["reason"]})' if card['reason'] else '')),
+        ('flown', f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}'),
+        ('engine', f'{card["engine"]}, seed {card["seed"]}'),
+        ('simulated time', show(card['sim_time_s'], 's', 1)),
+        ('real-time factor', show(card['real_time_factor'], '', 0)),
+        (
+            'messages',
+            f'{card["messages_recorded"]:,} recorded, {card["messages_lost"]} lost',
+        ),
+        ('dives', str(card['dives'])),
+        ('along path', show(card['distance_along_path_m'], 'm', 0)),
+        ('cross-track, steady', f'rms {show(track["rms_steady"], "m", 3)}, max '
+         f'{show(track["max_steady"], "m", 3)}'),
+        ('cross-track, all', f'max {show(track["max_all"], "m")}'),
+        ('pitch error, steady', f'rms {show(pitch["rms_steady"], "deg", 3)}, max '
+         f'{show(pitch["max_steady"], "deg", 3)}'),
+        ('heading fluctuation', f'rms {show(heading["rms_steady"], "deg", 3)}, max '
+         f'{show(heading["max_steady"], "deg", 3)}'),
+        ('depth', f'max {show(depth["max"], "m", 1)}, overshoot '
+         f'{show(depth["overshoot"], "m", 1)}'),
+    )  # fmt: skip
+    table = Table(title=card['scenario'], show_header=False, title_justify='left')
+    for name, text in rows:
+        table.add_row(name, text)
+    output.print(table)
+    output.print(f'run folder: {folder}', soft_wrap=True)
+
+
+@app.command(epilog='Example: ./glider trim zhang2021 --net-heaviness-kg 0.4 --pitch-deg -30')
+def trim(
+    vehicle: Annotated[str, typer.Argument(help='Vehicle by name or path of its YAML file.')],
+    net_heaviness_kg: Annotated[
+        float, typer.Option('--net-heaviness-kg', help='Net heaviness, + sinks (kg).')
+    ],
+    pitch_deg: Annotated[
+        float | None, typer.Option('--pitch-deg', help='Pitch, + nose up (deg).')
+    ] = None,
+    pitch_mass_m: Annotated[
+        float | None,
+        typer.Option('--pitch-mass-m', help='Pitch mass from its neutral position (m).'),
+    ] = None,
+    roll_mass_deg: Annotated[
+        float, typer.Option('--roll-mass-deg', help='Roll mass, + to starboard (deg).')
+    ] = 0.0,
+    as_json: Json = False,
+) -> None:
+    """Solve the steady glide or spiral of a vehicle."""
+    solution = solve_trim(
+        load_vehicle(vehicle).params(), net_heaviness_kg, pitch_deg, pitch_mass_m, roll_mass_deg
+    )
+    values = asdict(solution)
+    if as_json:
+        print(json.dumps(values))
+    else:
+        _print_trim(vehicle, solution)
+    if not solution.converged:
+        messages.print('[red]no steady state found within the vehicle\'s ranges')
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _print_trim(vehicle: str, solution: Trim) -> None:
+    table = Table(title=vehicle, show_header=False, title_justify='left')
+    for name, value in asdict(solution).items():
+        if value is None:
+            value = 'straight'
+        table.add_row(name, f'{value:.5g}' if isinstance(value, float) else str(value))
+    output.print(table)
+
+
+@app.command(epilog='Example: ./glider score runs/20260101-120000-current_8deg --json')
+def score(
+    folder: Annotated[Path, typer.Argument(metavar='RUN', help='Folder of a run.')],
+    as_json: Json = False,
+) -> None:
+    """Score a run again, from its bag; a run without a bag shows the score it was given."""
+    from glider_bringup import mission
+
+    with messages.status('reading the bag'):
+        card = mission.score_again(folder)
+    if as_json:
+        print(json.dumps(card))
+    else:
+        _print_card(card, folder)
+
+
+@app.command(epilog='Example: ./glider figure runs/20260101-120000-current_8deg --out run.png')
+def figure(
+    folder: Annotated[Path, typer.Argument(metavar='RUN', help='Folder of a run with a bag.')],
+    out: Annotated[
+        Path | None, typer.Option(help='Image file: png, svg or pdf. Default: RUN/run.png.')
+    ] = None,
+) -> None:
+    """Draw a run: track, depth, errors, attitude, current and actuators."""
+    from glider_bringup import mission
+
+    file = out or folder / 'run.png'
+    with messages.status('reading the bag'):
+        mission.draw(folder, file)
+    output.print(f'drawn: {file}', soft_wrap=True)
+
+
+@app.command('list', epilog='Example: ./glider list --json')
+def list_all(as_json: Json = False) -> None:
+    """List the scenarios and vehicles that come with the stack."""
+    scenarios = {name: load_scenario(name).description for name in scenario_names()}
+    vehicles = {name: load_vehicle(name).description for name in vehicle_names()}
+    if as_json:
+        print(json.dumps({'scenarios': scenarios, 'vehicles': vehicles}))
+        return
+    for title, entries in (('Scenarios', scenarios), ('Vehicles', vehicles)):
+        table = Table(title=title, show_header=False, title_justify='left')
+        for name, description in entries.items():
+            table.add_row(name, description)
+        output.print(table)
+
+
+@app.command(epilog='Example: ./glider test')
+def test() -> None:
+    """Run all tests: each package's, then those of the whole system."""
+    raise ConfigurationError('test: run it through the ./glider script of the workspace')
+
+
+def main() -> int:
+    """Run the command line; mistakes of the user become one message and exit code 2."""
+    try:
+        app(prog_name='./glider')
+    except ConfigurationError as error:
+        for line in str(error).splitlines():
+            messages.print(line, style='red', markup=False, soft_wrap=True)
+        return EXIT_USAGE
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,148 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The direct engine: the four steps of the nodes in one compiled loop.
+
+What a message would do to the numbers (NED to ENU and back, through a quaternion) is done here
+too, so that a run over topics and a direct run of one scenario agree to the last bit.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from glider_control.control import ControlParams, ControlState, control_step
+from glider_guidance.guidance import GuidanceParams, GuidanceState, guidance_step
+from glider_model.current import CurrentParams, CurrentState, current_step
+from glider_model.frames import (
+    odometry_from_wire,
+    odometry_to_wire,
+    reference_from_wire,
+    reference_to_wire,
+    water_from_wire,
+    water_to_wire,
+    wrench_to_wire,
+)
+from glider_model.kernel import kernel
+from glider_model.plant import (
+    PlantParams,
+    PlantState,
+    plant_finished,
+    plant_joints,
+    plant_odometry,
+    plant_step,
+)
+from glider_model.signals import TICK_S
+
+#: Columns of a log row: what the topics of one tick carry, as on the wire, and three flags.
+COLUMNS = {
+    'odom': slice(0, 13),
+    'joint_states': slice(13, 16),
+    'current_velocity': slice(16, 19),
+    'reference': slice(19, 32),
+    'tracking_error': slice(32, 35),
+    'current_estimate': slice(35, 38),
+    'command': slice(38, 41),
+    'wrench': slice(41, 44),
+    'stage': 44,
+    'infeasible': 45,
+    'saturation': 46,
+}
+ROW = 47
+#: Ticks that are flown before the log is handed on: one hour.
+BLOCK_TICKS = 36000
+
+
+class MissionParams(NamedTuple):
+    """Parameters of the four blocks."""
+
+    plant: PlantParams
+    current: CurrentParams
+    guidance: GuidanceParams
+    control: ControlParams
+
+
+class MissionState(NamedTuple):
+    """States of the four blocks."""
+
+    plant: PlantState
+    current: CurrentState
+    guidance: GuidanceState
+    control: ControlState
+
+
+@kernel
+def _put(log, row, start, values):
+    for i, value in enumerate(values):
+        log[row, start + i] = value
+
+
+@kernel
+def fly(state, params, log, dt):
+    """Fly until the log is full or the mission ends.
+
+    Parameters
+    ----------
+    state : MissionState
+    params : MissionParams
+    log : float64[n, ROW]
+        One row is filled for each tick.
+    dt : float
+        Length of the tick (s).
+
+    Returns
+    -------
+    MissionState
+        State after the last tick that was filled in.
+    int
+        Number of rows filled.
+    bool
+        Whether the mission has ended.
+    """
+    plant, current, guidance, control = state
+    for row in range(log.shape[0]):
+        odometry_wire = odometry_to_wire(plant_odometry(plant))
+        odometry = odometry_from_wire(odometry_wire)
+        joints = plant_joints(plant)
+        position = (odometry.p_n, odometry.p_e, odometry.p_d)
+        current, water = current_step(current, position, plant.tick * dt, params.current, dt)
+        water_wire = water_to_wire(water)
+        guidance, guided = guidance_step(guidance, odometry, params.guidance, dt)
+        reference_wire = reference_to_wire(guided.reference)
+        reference = reference_from_wire(reference_wire)
+        control, controlled = control_step(
+            control, odometry, joints, reference, params.control, dt
+        )
+        _put(log, row, 0, odometry_wire)
+        _put(log, row, 13, joints)
+        _put(log, row, 16, water_wire)
+        _put(log, row, 19, reference_wire)
+        _put(log, row, 32, guided.error)
+        _put(log, row, 35, water_to_wire(guided.current))
+        _put(log, row, 38, controlled.command)
+        _put(log, row, 41, wrench_to_wire(controlled.wrench))
+        log[row, 44] = guided.stage
+        log[row, 45] = guided.infeasible
+        log[row, 46] = controlled.saturation
+        finished = plant_finished(plant, params.plant)
+        plant = plant_step(
+            plant, controlled.command, water_from_wire(water_wire), params.plant, dt
+        )
+        if finished:
+            return MissionState(plant, current, guidance, control), row + 1, True
+    return MissionState(plant, current, guidance, control), log.shape[0], False
+
+
+def fly_blocks(state: MissionState, params: MissionParams) -> Iterator[np.ndarray]:
+    """Fly a mission block by block.
+
+    Yields
+    ------
+    float64[n, ROW]
+        Log rows, n <= BLOCK_TICKS. The array is used again for the next block.
+    """
+    log = np.empty((BLOCK_TICKS, ROW))
+    finished = False
+    while not finished:
+        state, rows, finished = fly(state, params, log, TICK_S)
+        yield log[:rows]

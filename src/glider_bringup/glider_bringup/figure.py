@@ -1,0 +1,168 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A picture of a run: where it went, how deep, how far off, and what the actuators did."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from glider_bringup.direct import COLUMNS, ROW
+from glider_model.signals import TICK_S
+
+#: Topics that a picture is drawn from.
+DRAWN = (
+    'odom',
+    'joint_states',
+    'current_velocity',
+    'reference',
+    'tracking_error',
+    'current_estimate',
+)
+#: A picture shows about this many points of each curve.
+POINTS = 4000
+#: Arrows that show the current along the track.
+ARROWS = 12
+
+_KNOT = 1852.0 / 3600.0
+_BLUE, _ORANGE, _GREY, _GREEN = '#1f6fb4', '#e07b1a', '#8a8a8a', '#2f8f4e'
+
+
+class Record:
+    """A log thinned for drawing. Angles in deg, NED; attributes are arrays over time."""
+
+    def __init__(self, blocks: Iterable[np.ndarray]) -> None:
+        thinned, first = [], 0
+        for block in blocks:
+            thinned.append(block[(-first) % 10 :: 10].copy())
+            first += len(block)
+        log = np.concatenate(thinned) if thinned else np.empty((0, ROW))
+        step = max(1, len(log) // POINTS)
+        self.time_s = (np.arange(len(log)) * 10 * TICK_S)[::step]
+        log = log[::step]
+        odom, reference = log[:, COLUMNS['odom']], log[:, COLUMNS['reference']]
+        self.east, self.north, self.depth = odom[:, 0], odom[:, 1], -odom[:, 2]
+        self.target_east, self.target_north = reference[:, 0], reference[:, 1]
+        self.roll, self.pitch, self.heading = _attitude_deg(odom[:, 3:7])
+        _, self.pitch_ref, self.heading_ref = _attitude_deg(reference[:, 3:7])
+        self.cross_track = log[:, COLUMNS['tracking_error']][:, 1]
+        self.descending = reference[:, 9] < 0.0
+        self.joints = log[:, COLUMNS['joint_states']]
+        self.current = log[:, COLUMNS['current_velocity']]
+        self.estimate = log[:, COLUMNS['current_estimate']]
+
+
+def _attitude_deg(q_el: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Roll, pitch, heading (deg, NED / FRD) of quaternions w x y z in ENU / FLU."""
+    w, x, y, z = q_el.T
+    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return np.degrees(roll), -np.degrees(pitch), np.degrees(np.unwrap(0.5 * np.pi - yaw))
+
+
+def draw_run(record: Record, title: str, file: Path) -> None:
+    """Draw a run into an image file; the suffix of ``file`` says which kind (png, svg, pdf)."""
+    import matplotlib
+
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplot_mosaic(
+        [['track', 'depth'], ['track', 'cross'], ['heading', 'pitch'], ['current', 'joints']],
+        figsize=(12.0, 12.0),
+        height_ratios=[1.0, 1.0, 1.0, 1.0],
+        layout='constrained',
+    )
+    hours = record.time_s / 3600.0
+    _draw_track(axes['track'], record)
+    _draw_curves(
+        axes['depth'], hours, 'Depth', 'depth (m)', (('depth', record.depth, _BLUE),)
+    )
+    axes['depth'].invert_yaxis()
+    _draw_curves(
+        axes['cross'],
+        hours,
+        'Cross-track error',
+        'off the path, + to starboard (m)',
+        (('cross-track error', record.cross_track, _BLUE),),
+    )
+    for turn in np.flatnonzero(record.descending[1:] != record.descending[:-1]) + 1:
+        axes['cross'].axvline(hours[turn], color=_GREY, linewidth=0.8, linestyle=':')
+    if len(hours):
+        axes['cross'].plot([], [], color=_GREY, linestyle=':', label='inflection')
+    axes['cross'].legend(loc='upper right', fontsize='small')
+    _draw_curves(
+        axes['heading'],
+        hours,
+        'Heading',
+        'heading (deg from north)',
+        (('desired', record.heading_ref, _ORANGE), ('heading', record.heading, _BLUE)),
+    )
+    _draw_curves(
+        axes['pitch'],
+        hours,
+        'Pitch',
+        'pitch, + nose up (deg)',
+        (('desired', record.pitch_ref, _ORANGE), ('pitch', record.pitch, _BLUE)),
+    )
+    _draw_curves(
+        axes['current'],
+        hours,
+        'Current',
+        'water velocity (kn)',
+        (
+            ('north', record.current[:, 1] / _KNOT, _BLUE),
+            ('north, estimated', record.estimate[:, 1] / _KNOT, _ORANGE),
+            ('east', record.current[:, 0] / _KNOT, _GREEN),
+            ('east, estimated', record.estimate[:, 0] / _KNOT, _GREY),
+        ),
+    )
+    _draw_curves(
+        axes['joints'],
+        hours,
+        'Actuators',
+        'share of 1 kg, 100 mm, 100 deg',
+        (
+            ('net heaviness / 1 kg', record.joints[:, 0], _BLUE),
+            ('pitch mass / 100 mm', 10.0 * record.joints[:, 1], _ORANGE),
+            ('roll mass / 100 deg', np.degrees(record.joints[:, 2]) / 100.0, _GREEN),
+        ),
+    )
+    figure.suptitle(title)
+    figure.savefig(file, dpi=100)
+    pyplot.close(figure)
+
+
+def _draw_track(axis, record: Record) -> None:
+    """Plan view with the path and arrows of the current."""
+    axis.plot(
+        record.target_east / 1e3, record.target_north / 1e3, color=_ORANGE, label='desired path'
+    )
+    axis.plot(record.east / 1e3, record.north / 1e3, color=_BLUE, label='track')
+    if len(record.east):
+        axis.plot(record.east[0] / 1e3, record.north[0] / 1e3, 'o', color=_BLUE, label='start')
+        pick = np.linspace(0, len(record.east) - 1, ARROWS).astype(int)
+        axis.quiver(
+            record.east[pick] / 1e3,
+            record.north[pick] / 1e3,
+            record.current[pick, 0],
+            record.current[pick, 1],
+            color=_GREY,
+            width=0.004,
+            label='current',
+        )
+    axis.set_aspect('equal', adjustable='datalim')
+    axis.set(title='Track', xlabel='east (km)', ylabel='north (km)')
+    axis.grid(alpha=0.3)
+    axis.legend(loc='upper right', fontsize='small')
+
+
+def _draw_curves(axis, hours, title: str, label: str, curves) -> None:
+    """Curves over time with a title and a labelled axis."""
+    for name, values, colour in curves:
+        axis.plot(hours, values, color=colour, linewidth=1.2, label=name)
+    axis.set(title=title, xlabel='time (h)', ylabel=label)
+    axis.grid(alpha=0.3)
+    if len(curves) > 1:
+        axis.legend(loc='upper right', fontsize='small')

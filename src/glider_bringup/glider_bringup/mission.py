@@ -1,0 +1,219 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flying a scenario into a run folder, with either engine.
+
+A run is a folder: a bag in rosbag2 layout, the scenario and vehicle that made it, the score.
+"""
+
+import json
+import time
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import NamedTuple
+
+from glider_bringup.direct import MissionParams, MissionState, fly_blocks
+from glider_bringup.figure import DRAWN, Record, draw_run
+from glider_bringup.ros.bag import BagWriter
+from glider_bringup.ros.bag_log import LogWriter, read_blocks, recorded_and_lost
+from glider_bringup.runner import run_nodes
+from glider_bringup.scenario import Scenario, load_scenario
+from glider_bringup.score import Scorer
+from glider_guidance.profile import mission_time_s
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_S
+from glider_model.vehicle import load_vehicle, vehicle_path
+
+SCENARIO_FILE, VEHICLE_FILE, SCORE_FILE = 'scenario.yaml', 'vehicle.yaml', 'score.json'
+
+#: Called now and then with the ticks flown and the depth (m).
+Progress = Callable[[int, float], None]
+
+
+class Flight(NamedTuple):
+    """How a flight ended, apart from what its topics tell."""
+
+    status: str  #: completed or aborted
+    reason: str  #: why it was aborted
+    wall_time_s: float
+    messages_recorded: int
+    messages_lost: int
+
+
+def planned_ticks(scenario: Scenario) -> int:
+    """Ticks that a run of the scenario takes; an estimate where dives end it."""
+    duration_s = scenario.duration_s
+    if scenario.dives:
+        guidance = scenario.guidance_settings().params()
+        dives_s = mission_time_s(guidance.profile, guidance.polar, scenario.dives)
+        duration_s = min(duration_s, dives_s + scenario.plant_settings().surface_s)
+    return max(1, round(duration_s / TICK_S))
+
+
+def make_run_folder(scenario: Scenario, out: Path | None) -> Path:
+    """Folder of a new run, with its scenario and vehicle in it.
+
+    Raises
+    ------
+    ConfigurationError
+        If the folder cannot be made, or already holds something.
+    """
+    stamp = datetime.now().strftime('%Y%m%d-%H%M%S')
+    folder = out or Path('runs') / f'{stamp}-{scenario.name}'
+    for attempt in range(2, 100):
+        if out or not folder.exists():
+            break
+        folder = Path('runs') / f'{stamp}-{scenario.name}-{attempt}'
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise ConfigurationError(
+                f'--out {folder}: not empty; a run is never written over another (allowed: a new '
+                f'or empty folder)'
+            )
+        vehicle = vehicle_path(scenario.vehicle)
+        (folder / VEHICLE_FILE).write_bytes(vehicle.read_bytes())
+        beside = scenario.model_copy(update={'vehicle': VEHICLE_FILE})
+        (folder / SCENARIO_FILE).write_text(beside.to_yaml(), encoding='utf-8')
+    except OSError as error:
+        raise ConfigurationError(f'{folder}: {error.strerror}') from None
+    return folder
+
+
+def mission_of(scenario: Scenario) -> tuple[MissionState, MissionParams]:
+    """State at tick 0 and parameters of the four blocks."""
+    blocks = (
+        scenario.plant_settings(),
+        scenario.current_settings(),
+        scenario.guidance_settings(),
+        scenario.control_settings(),
+    )
+    state = MissionState(*(block.initial_state() for block in blocks))
+    return state, MissionParams(*(block.params() for block in blocks))
+
+
+def fly_direct(
+    scenario: Scenario, folder: Path, with_bag: bool, progress: Progress
+) -> tuple[Flight, dict]:
+    """Fly with the direct engine; Ctrl-C ends it as aborted with what was flown."""
+    state, params = mission_of(scenario)
+    scorer = Scorer()
+    bag = _open_bag(scenario, folder) if with_bag else None
+    status, reason, ticks = 'completed', '', 0
+    start = time.perf_counter()
+    try:
+        for log in fly_blocks(state, params):
+            scorer.add(log)
+            if bag:
+                bag.add(log)
+            ticks += len(log)
+            progress(ticks, float(-log[-1, 2]))
+    except KeyboardInterrupt:
+        status, reason = 'aborted', 'interrupted'
+    wall_time_s = time.perf_counter() - start
+    recorded = bag.close() if bag else 0
+    return Flight(status, reason, wall_time_s, recorded, 0), _score(scenario, scorer)
+
+
+def _open_bag(scenario: Scenario, folder: Path) -> LogWriter:
+    attachments = [folder / SCENARIO_FILE, folder / VEHICLE_FILE]
+    points = scenario.path.points(500)
+    return LogWriter(BagWriter(folder, scenario.name, attachments=attachments), points)
+
+
+def fly_nodes(
+    scenario: Scenario, folder: Path, speed: float, progress: Progress
+) -> tuple[Flight, dict]:
+    """Fly over node processes and topics; the score is read back from the bag."""
+    result = run_nodes(scenario, folder, speed, progress)
+    scorer = Scorer()
+    for log in read_blocks(folder):
+        scorer.add(log)
+    recorded, lost = recorded_and_lost(folder, result.status == 'completed')
+    flight = Flight(result.status, result.reason, result.wall_time_s, recorded, lost)
+    return flight, _score(scenario, scorer)
+
+
+def _score(scenario: Scenario, scorer: Scorer) -> dict:
+    settle_s = scenario.settle_time_s(scorer.ticks * TICK_S)
+    return scorer.result(settle_s, scenario.profile.depth_m)
+
+
+def scorecard(scenario: Scenario, engine: str, flight: Flight, scores: dict) -> dict:
+    """Contents of ``score.json``."""
+    scores = dict(scores)
+    infeasible = scores.pop('infeasible')
+    status = flight.status
+    if status == 'completed' and infeasible:
+        status = 'infeasible'
+    sim_time_s = scores['sim_time_s']
+    return {
+        'scenario': scenario.name,
+        'vehicle': load_vehicle(scenario.vehicle).name,
+        'controller': scenario.control.law,
+        'guidance': scenario.guidance.los.method,
+        'engine': engine,
+        'seed': scenario.seed,
+        'status': status,
+        'reason': flight.reason,
+        'ticks': scores.pop('ticks'),
+        'sim_time_s': scores.pop('sim_time_s'),
+        'wall_time_s': flight.wall_time_s,
+        'real_time_factor': sim_time_s / flight.wall_time_s if flight.wall_time_s else None,
+        'messages_recorded': flight.messages_recorded,
+        'messages_lost': flight.messages_lost,
+        **scores,
+    }
+
+
+def write_score(folder: Path, card: dict) -> None:
+    """Write ``score.json``."""
+    (folder / SCORE_FILE).write_text(json.dumps(card, indent=2) + '\n', encoding='utf-8')
+
+
+def score_again(folder: Path) -> dict:
+    """Scorecard of a run, computed afresh from its bag if it has one.
+
+    Raises
+    ------
+    ConfigurationError
+        If the folder does not hold a run.
+    """
+    old = _read_score(folder)
+    if not list(folder.glob('*.mcap')):
+        return old
+    scenario = load_scenario(str(folder / SCENARIO_FILE))
+    scorer = Scorer()
+    for log in read_blocks(folder):
+        scorer.add(log)
+    status = 'aborted' if old['status'] == 'aborted' else 'completed'
+    recorded, lost = recorded_and_lost(folder, status == 'completed')
+    flight = Flight(status, old['reason'], old['wall_time_s'], recorded, lost)
+    return scorecard(scenario, old['engine'], flight, _score(scenario, scorer))
+
+
+def _read_score(folder: Path) -> dict:
+    path = folder / SCORE_FILE
+    try:
+        return json.loads(path.read_text(encoding='utf-8'))
+    except FileNotFoundError:
+        raise ConfigurationError(f'{folder}: not a run folder, it has no {SCORE_FILE}') from None
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(f'{path}: cannot be read: {error}') from None
+
+
+def draw(folder: Path, file: Path) -> None:
+    """Draw a run's bag into an image file.
+
+    Raises
+    ------
+    ConfigurationError
+        If the folder has no bag, or the image cannot be written.
+    """
+    scenario = load_scenario(str(folder / SCENARIO_FILE))
+    record = Record(read_blocks(folder, DRAWN))
+    title = f'{scenario.name}: {scenario.description}'
+    try:
+        draw_run(record, title, file)
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(f'{file}: cannot be written: {error}') from None

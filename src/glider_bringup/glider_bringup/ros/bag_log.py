@@ -1,0 +1,169 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Bags to log rows and back: what lets one function score and draw every kind of run."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
+from rclpy.serialization import deserialize_message
+
+from glider_bringup.direct import BLOCK_TICKS, COLUMNS, ROW
+from glider_bringup.ros.bag import BagWriter
+from glider_guidance.nodes.guidance_node import path_message, stage_event
+from glider_model.ros.codec import to_cdr
+from glider_model.ros.messages import TOPICS
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_NS
+
+_PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
+
+#: Topics that the score is computed from.
+SCORED = ('odom', 'reference', 'tracking_error')
+
+
+class LogWriter:
+    """Writes the log rows of a direct run as the messages that the nodes would have published."""
+
+    def __init__(self, bag: BagWriter, path_points: np.ndarray) -> None:
+        self._bag = bag
+        self._tick = 0
+        self._told: tuple[int, bool] | None = None
+        bag.write('path', 0, to_cdr(path_message(path_points)))
+
+    def add(self, log: np.ndarray) -> None:
+        """Add a block of rows, float64[n, ROW]."""
+        stamps = (np.arange(len(log)) + self._tick) * TICK_NS
+        self._tell(stamps, log)
+        payloads = {}
+        for topic in _PER_TICK:
+            values = log[:, COLUMNS[topic.name]] if topic.name in COLUMNS else log[:, :0]
+            payloads[topic.name] = topic.codec.encode_many(stamps, values)
+        self._bag.write_ticks(stamps, payloads)
+        self._tick += len(log)
+
+    def _tell(self, stamps: np.ndarray, log: np.ndarray) -> None:
+        """Write the diagnostics of each change of stage or feasibility."""
+        flags = log[:, [COLUMNS['stage'], COLUMNS['infeasible']]]
+        changed = np.flatnonzero(np.any(flags[1:] != flags[:-1], axis=1)) + 1
+        for row in (0, *changed):
+            now = (int(flags[row, 0]), bool(flags[row, 1]))
+            if now != self._told:
+                self._told = now
+                stamp = int(stamps[row])
+                self._bag.write('/diagnostics', stamp, to_cdr(stage_event(stamp, *now)))
+
+    def close(self) -> int:
+        """Complete the bag; the number of messages in it."""
+        self._bag.close()
+        return sum(self._bag.counts.values())
+
+
+def _open(folder: Path) -> tuple[SeekingReader, dict[str, str]]:
+    """Reader of a run's bag, and the bag's name of each topic."""
+    files = sorted(folder.glob('*.mcap'))
+    if len(files) != 1:
+        raise ConfigurationError(f'{folder}: expected one .mcap file, found {len(files)}')
+    reader = SeekingReader(files[0].open('rb'))
+    try:
+        summary = reader.get_summary()
+    except McapError as error:
+        raise ConfigurationError(f'{files[0]}: not a readable MCAP file: {error}') from None
+    if summary is None:
+        raise ConfigurationError(f'{files[0]}: the file is not complete, it has no summary')
+    names = {}
+    for channel in summary.channels.values():
+        for topic in TOPICS.values():
+            if channel.topic == topic.name or channel.topic.endswith('/' + topic.name):
+                names[topic.name] = channel.topic
+    return reader, names
+
+
+def _read_infeasible(reader: SeekingReader, topic: str | None) -> list[tuple[int, bool]]:
+    """Ticks at which the course became infeasible or feasible, from /diagnostics."""
+    changes = []
+    for _, _, message in reader.iter_messages(topics=[topic] if topic else []):
+        for status in deserialize_message(message.data, DiagnosticArray).status:
+            for pair in status.values:
+                if pair.key == 'infeasible':
+                    changes.append((message.log_time // TICK_NS, pair.value == 'true'))
+    return changes
+
+
+def read_blocks(folder: Path, topics: Iterable[str] = SCORED) -> Iterator[np.ndarray]:
+    """Log rows of a bag, as the direct engine would have given them.
+
+    Parameters
+    ----------
+    folder : Path
+        Run folder.
+    topics : iterable of str
+        Topics to read; the columns of the others, stage and saturation are NaN.
+
+    Yields
+    ------
+    float64[n, ROW]
+        Rows of consecutive ticks, until the first tick that lacks one of the topics.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no bag that can be read, or it lacks a topic.
+    """
+    reader, names = _open(folder)
+    wanted = {}
+    for name in topics:
+        if name not in names:
+            raise ConfigurationError(f'{folder}: the bag has no topic {name}')
+        wanted[names[name]] = (TOPICS[name].codec, COLUMNS[name])
+    infeasible = _read_infeasible(reader, names.get('/diagnostics'))
+    log = np.full((BLOCK_TICKS, ROW), np.nan)
+    seen = np.zeros(BLOCK_TICKS, dtype=np.int64)
+    start = 0
+
+    def finish(rows: int) -> np.ndarray:
+        log[:rows, COLUMNS['infeasible']] = 0.0
+        for tick, flag in infeasible:
+            log[max(0, tick - start) : rows, COLUMNS['infeasible']] = flag
+        return log[:rows]
+
+    for _, channel, message in reader.iter_messages(topics=list(wanted)):
+        codec, columns = wanted[channel.topic]
+        stamp_ns, values = codec.decode(message.data)
+        row = stamp_ns // TICK_NS - start
+        if row >= BLOCK_TICKS:
+            complete = int(np.count_nonzero(seen == len(wanted)))
+            yield finish(complete)
+            if complete < BLOCK_TICKS:
+                return
+            start += BLOCK_TICKS
+            row -= BLOCK_TICKS
+            log[:] = np.nan
+            seen[:] = 0
+        log[row, columns] = values
+        seen[row] += 1
+    missing = np.flatnonzero(seen != len(wanted))
+    yield finish(int(missing[0]) if len(missing) else BLOCK_TICKS)
+
+
+def recorded_and_lost(folder: Path, complete: bool) -> tuple[int, int]:
+    """Number of messages in a bag, and of per-tick messages that ought to be but are not.
+
+    A run that was cut short (``complete`` is false) may lack messages of its last tick, which is
+    not a loss.
+    """
+    reader, names = _open(folder)
+    statistics = reader.get_summary().statistics
+    channels = reader.get_summary().channels
+    counts = {
+        channel.topic: statistics.channel_message_counts.get(number, 0)
+        for number, channel in channels.items()
+    }
+    per_tick = [counts[names[topic.name]] for topic in _PER_TICK if topic.name in names]
+    ticks = max(per_tick, default=0)
+    expected = ticks if complete else ticks - 1
+    lost = sum(max(0, expected - count) for count in per_tick)
+    return sum(counts.values()), lost

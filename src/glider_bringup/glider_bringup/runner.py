@@ -1,0 +1,349 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flies a scenario over ROS 2: one process per node, started, watched and stopped together."""
+
+import ctypes
+import fcntl
+import json
+import os
+import selectors
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+PLANT, RECORDER = 'plant_node', 'recorder_node'
+
+#: Module of every node, in the order in which they are started.
+MODULES = {
+    'guidance_node': 'glider_guidance.nodes.guidance_node',
+    'control_node': 'glider_control.nodes.control_node',
+    'current_node': 'glider_model.nodes.current_node',
+    RECORDER: 'glider_bringup.nodes.recorder_node',
+    PLANT: 'glider_model.nodes.plant_node',
+}
+
+_DOMAINS = range(1, 102)
+_FATAL = 'fatal: '
+_PR_SET_PDEATHSIG = 1
+_LIBC = ctypes.CDLL(None)
+#: Signals of a stop, and how long (s) a process has after each.
+_ESCALATION = ((signal.SIGINT, 2.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 2.0))
+#: Nodes have this long (s) to leave by themselves after a completed run.
+_LEAVE_S = 3.0
+#: A failure is seen within this time (s) after nodes left because of it.
+_AFTERMATH_S = 1.0
+
+
+class RunnerResult(NamedTuple):
+    """How a run over nodes ended."""
+
+    status: str  #: 'completed', 'aborted' (by a signal to the runner) or 'failed'
+    reason: str = ''  #: one or more sentences for the person
+    culprit: str = ''  #: node that failed
+    exit_code: int = 0  #: of the culprit; negative: the signal that killed it
+    startup_s: float = 0.0  #: wall time from the start of the processes to the first tick
+    flight_s: float = 0.0  #: wall time from the first tick to the end
+    progress: Mapping[str, Any] = {}  #: last word of the recorder
+
+
+def node_commands(params_file: Path, namespace: str = '/glider') -> dict[str, list[str]]:
+    """Command line of every node."""
+    ros = ['--ros-args', '--params-file', str(params_file), '-r', f'__ns:={namespace}']
+    return {name: [sys.executable, '-m', module, *ros] for name, module in MODULES.items()}
+
+
+@contextmanager
+def domain_id() -> Iterator[int]:
+    """ROS domain of a run: $ROS_DOMAIN_ID, or one that no other run on this machine uses.
+
+    Raises
+    ------
+    RuntimeError
+        If all of them are taken.
+    """
+    if os.environ.get('ROS_DOMAIN_ID'):
+        yield int(os.environ['ROS_DOMAIN_ID'])
+        return
+    for offset in range(len(_DOMAINS)):
+        domain = _DOMAINS[(os.getpid() + offset) % len(_DOMAINS)]
+        path = Path(tempfile.gettempdir()) / f'glider-ros-domain-{domain}.lock'
+        try:
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError:
+            continue
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(descriptor)
+            continue
+        try:
+            yield domain
+        finally:
+            os.close(descriptor)
+        return
+    raise RuntimeError('every ROS domain from 1 to 101 is in use by another run')
+
+
+class _Process:
+    """One node and what it says."""
+
+    def __init__(self, name: str, command: Sequence[str], environment: dict[str, str]) -> None:
+        self.name = name
+        last_signal = signal.SIGTERM if name == RECORDER else signal.SIGKILL
+        parent = os.getpid()
+
+        def tie_to_runner() -> None:
+            _LIBC.prctl(_PR_SET_PDEATHSIG, last_signal)
+            if os.getppid() != parent:
+                os._exit(1)
+
+        self.popen = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=environment,
+            start_new_session=True,
+            preexec_fn=tie_to_runner,
+        )
+        self.last_line = ''
+        self.fatal = ''
+
+    def note(self, line: str) -> None:
+        """Remember a line for the case that it was the last."""
+        if line.startswith(_FATAL):
+            self.fatal = line.removeprefix(_FATAL)
+        elif self.fatal:
+            self.fatal += '\n' + line
+        if line.strip():
+            self.last_line = line.strip()
+
+    @property
+    def code(self) -> int | None:
+        return self.popen.poll()
+
+    def send(self, number: int) -> None:
+        if self.popen.poll() is None:
+            self.popen.send_signal(number)
+
+    def epitaph(self) -> str:
+        """How the process ended, in words."""
+        code = self.popen.returncode
+        if code < 0:
+            return f'{self.name} was killed by {signal.Signals(-code).name}'
+        if self.fatal:
+            return self.fatal
+        if code == 0:
+            return f'{self.name} ended before the run was complete'
+        tail = f': {self.last_line}' if self.last_line else ''
+        return f'{self.name} ended with exit code {code}{tail}'
+
+
+class _Run:
+    """The processes of one run, their output, and the order to stop."""
+
+    def __init__(self, commands, environment, on_progress, on_log) -> None:
+        self._on_progress, self._on_log = on_progress, on_log
+        self._selector = selectors.DefaultSelector()
+        self._partial: dict[int, bytes] = {}
+        self.signal: int | None = None
+        self.started_s = time.monotonic()
+        self.first_tick_s: float | None = None
+        self.progress: dict[str, Any] = {}
+        self.processes: dict[str, _Process] = {}
+        for name, command in commands.items():
+            process = _Process(name, command, environment)
+            self.processes[name] = process
+            for pipe in (process.popen.stdout, process.popen.stderr):
+                os.set_blocking(pipe.fileno(), False)
+                self._selector.register(pipe, selectors.EVENT_READ, process)
+                self._partial[pipe.fileno()] = b''
+
+    # ------------------------------------------------------------------ output
+
+    def pump(self, timeout_s: float) -> None:
+        """Pass on what the nodes have said, waiting at most ``timeout_s`` for it."""
+        for key, _ in self._selector.select(timeout_s):
+            self._read(key.fileobj, key.data)
+
+    def _read(self, pipe: IO[bytes], process: _Process) -> None:
+        data = os.read(pipe.fileno(), 65536)
+        *lines, rest = (self._partial[pipe.fileno()] + data).split(b'\n')
+        self._partial[pipe.fileno()] = rest
+        if not data:
+            self._selector.unregister(pipe)
+            lines += [rest] if rest else []
+        for line in lines:
+            self._line(process, line.decode(errors='replace'), pipe is process.popen.stdout)
+
+    def _line(self, process: _Process, line: str, is_stdout: bool) -> None:
+        if is_stdout and process.name == RECORDER and line.startswith('{'):
+            self.progress = json.loads(line)
+            if self.first_tick_s is None:
+                self.first_tick_s = time.monotonic()
+            if self._on_progress:
+                self._on_progress(self.progress)
+            return
+        process.note(line)
+        self._on_log(f'[{process.name}] {line}')
+
+    # ------------------------------------------------------------------ watching
+
+    def watch(self) -> tuple[str, _Process | None]:
+        """Wait for the end. Status, and the process that is to blame for a failure."""
+        while True:
+            self.pump(0.1)
+            if self.signal is not None:
+                return 'aborted', None
+            ended = [p for p in self.processes.values() if p.code is not None]
+            if not ended:
+                continue
+            self.pump(0.0)
+            if not self._is_complete():
+                return 'failed', self._culprit()
+            self._wait_for(self.processes.values(), _LEAVE_S)
+            return 'completed', None
+
+    def _is_complete(self) -> bool:
+        """Whether the run has come to its end, by the word of the recorder if there is one."""
+        if RECORDER in self.processes:
+            return bool(self.progress.get('complete'))
+        return self.processes[PLANT].code == 0
+
+    def _culprit(self) -> _Process:
+        """Of the dead, the one that did not merely notice that another one was ill.
+
+        Nodes that leave because the plant gave up may be gone before the plant is.
+        """
+        deadline = time.monotonic() + _AFTERMATH_S
+        while True:
+            ended = [p for p in self.processes.values() if p.code is not None]
+            first = min(ended, key=lambda p: (p.code == 0, p.code == 3))
+            if first.code != 0 or time.monotonic() > deadline:
+                return first
+            self.pump(0.05)
+
+    def _wait_for(self, processes, timeout_s: float) -> bool:
+        processes = list(processes)
+        deadline = time.monotonic() + timeout_s
+        while any(p.code is None for p in processes) and time.monotonic() < deadline:
+            self.pump(0.05)
+        return all(p.code is not None for p in processes)
+
+    # ------------------------------------------------------------------ the end
+
+    def stop(self) -> None:
+        """End every process; the recorder last, so that it has everything."""
+        recorder = [p for p in self.processes.values() if p.name == RECORDER]
+        others = [p for p in self.processes.values() if p.name != RECORDER]
+        first = 0 if self.first_tick_s is not None else 1
+        for group in (others, recorder):
+            for number, patience_s in _ESCALATION[first:]:
+                if all(p.code is not None for p in group):
+                    break
+                for process in group:
+                    process.send(number)
+                self._wait_for(group, patience_s)
+        while self._selector.get_map():
+            before = len(self._selector.get_map())
+            self.pump(0.2)
+            if len(self._selector.get_map()) == before and not self._selector.select(0):
+                break
+        for process in self.processes.values():
+            process.popen.stdout.close()
+            process.popen.stderr.close()
+        self._selector.close()
+
+
+def _print_log(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
+
+
+def run_nodes(
+    commands: Mapping[str, Sequence[str]],
+    log_file: Path,
+    *,
+    on_progress: Callable[[dict[str, Any]], None] | None = None,
+    on_log: Callable[[str], None] = _print_log,
+) -> RunnerResult:
+    """Start the nodes, wait for the end of the run, stop them all.
+
+    Parameters
+    ----------
+    commands : mapping
+        Command line by node name, as of `node_commands`.
+    log_file : Path
+        Gets every line that a node prints, with the node's name in front.
+    on_progress : callable, optional
+        Gets what the recorder says several times a second: tick, t_s, depth_m, stage, messages,
+        lost; in the last one also complete, and counts by topic.
+    on_log : callable
+        Gets the lines that also go to ``log_file``.
+
+    Returns
+    -------
+    RunnerResult
+        No process is left when it comes back. SIGINT and SIGTERM to this process abort the run.
+    """
+    with domain_id() as domain, log_file.open('w', encoding='utf-8') as log:
+        environment = {
+            **os.environ,
+            'ROS_DOMAIN_ID': str(domain),
+            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+            'RCUTILS_COLORIZED_OUTPUT': '0',
+            'PYTHONUNBUFFERED': '1',
+        }
+
+        def tell(line: str) -> None:
+            log.write(line + '\n')
+            log.flush()
+            on_log(line)
+
+        run = _Run(commands, environment, on_progress, tell)
+        with _signals(run):
+            try:
+                status, culprit = run.watch()
+            finally:
+                run.stop()
+        return _result(run, status, culprit)
+
+
+def _result(run: _Run, status: str, culprit: _Process | None) -> RunnerResult:
+    now = time.monotonic()
+    first = run.first_tick_s or now
+    reason, name, code = '', '', 0
+    if status == 'aborted':
+        reason = f'stopped by {signal.Signals(run.signal).name}'
+    if culprit is not None:
+        reason, name, code = culprit.epitaph(), culprit.name, culprit.popen.returncode
+        if code == 3:
+            named = [other for other in run.processes if other in reason]
+            name = min(named, key=reason.index, default=name)
+    return RunnerResult(
+        status, reason, name, code, first - run.started_s, now - first, run.progress
+    )
+
+
+@contextmanager
+def _signals(run: _Run) -> Iterator[None]:
+    """Turn SIGINT and SIGTERM into an orderly end of the run."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def remember(number, frame) -> None:
+        run.signal = run.signal or number
+
+    before = {n: signal.signal(n, remember) for n in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

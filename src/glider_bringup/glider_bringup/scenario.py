@@ -1,0 +1,211 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Scenarios: one validated YAML file that says everything about a mission."""
+
+from pathlib import Path
+from typing import Any
+
+import pydantic
+import yaml
+from pydantic import Field
+
+from glider_control.control import ControlLawSettings, ControlSettings
+from glider_guidance.guidance import GuidanceLawSettings, GuidanceSettings
+from glider_guidance.path import PathSettings, StraightPath
+from glider_guidance.profile import ProfileSettings
+from glider_model.current import CurrentSettings
+from glider_model.plant import InitialSettings, PlantSettings
+from glider_model.settings import ConfigurationError, Settings, read_yaml, validate
+from glider_model.vehicle import vehicle_names, vehicle_path
+from glider_model.water import WaterSettings
+
+SCENARIO_FOLDER = Path(__file__).parent / 'scenarios'
+DEFAULT_SCENARIO = 'current_8deg'
+
+#: A run of this simulated time or more is a long one, with the longer settling time (s).
+LONG_RUN_S = 20000.0
+SETTLE_LONG_S, SETTLE_SHORT_S = 7200.0, 1800.0
+
+#: Fields of which only one can be given: setting one of them by hand replaces the other.
+_ALTERNATIVES = (('speed_kn', 'speed_mps'), ('angle_deg', 'direction_deg'))
+
+
+class Scenario(Settings):
+    """A mission: vehicle, water, path, profile, current, guidance, control, and its end."""
+
+    name: str = Field(pattern=r'^[A-Za-z0-9_.-]+$', description='name, used for files')
+    description: str = Field('', description='what the scenario shows')
+    vehicle: str = Field(
+        'zhang2021', description='vehicle by name, or path of a file relative to this one'
+    )
+    seed: int = Field(0, ge=0, le=2**63 - 1, description='seed of everything random')
+    dives: int = Field(
+        1, ge=0, le=100000, description='dives of a run without --duration; 0: until duration_s'
+    )
+    duration_s: float = Field(
+        108000.0, ge=0.1, le=1e8, description='simulated time of --duration full (s)'
+    )
+    settle_s: float | None = Field(
+        None,
+        ge=0.0,
+        le=1e8,
+        description='time left out of the score (s); by default 7200 in long runs, else 1800',
+    )
+    initial: InitialSettings = Field(
+        InitialSettings(depth_m=0.1), description='state at the start'
+    )
+    water: WaterSettings = Field(WaterSettings(), description='density of the water')
+    current: CurrentSettings = Field(CurrentSettings(), description='current')
+    path: PathSettings = Field(
+        StraightPath(kind='straight', length_m=25000.0), description='path to follow'
+    )
+    profile: ProfileSettings = Field(ProfileSettings(), description='sawtooth')
+    guidance: GuidanceLawSettings = Field(GuidanceLawSettings(), description='guidance')
+    control: ControlLawSettings = Field(ControlLawSettings(), description='control')
+
+    @pydantic.field_validator('current')
+    @classmethod
+    def _one_seed(cls, current: CurrentSettings) -> CurrentSettings:
+        if 'seed' in current.model_fields_set:
+            raise ValueError('seed belongs to the scenario, not to its current')
+        return current
+
+    def plant_settings(self) -> PlantSettings:
+        """What the plant node is told."""
+        return PlantSettings(
+            vehicle=self.vehicle,
+            water=self.water,
+            initial=self.initial,
+            duration_s=self.duration_s,
+            dives=self.dives,
+        )
+
+    def current_settings(self) -> CurrentSettings:
+        """What the current node is told: directions absolute, the scenario's seed."""
+        resolved = self.current.resolved(self.path.course_rad())
+        return resolved.model_copy(update={'seed': self.seed})
+
+    def guidance_settings(self) -> GuidanceSettings:
+        """What the guidance node is told."""
+        return GuidanceSettings(
+            vehicle=self.vehicle,
+            path=self.path,
+            profile=self.profile,
+            dives=self.dives,
+            **dict(self.guidance),
+        )
+
+    def control_settings(self) -> ControlSettings:
+        """What the control node is told."""
+        return ControlSettings(vehicle=self.vehicle, **dict(self.control))
+
+    def settle_time_s(self, sim_time_s: float) -> float:
+        """Settling time (s) of a run that lasted ``sim_time_s``."""
+        if self.settle_s is not None:
+            return self.settle_s
+        return SETTLE_LONG_S if sim_time_s >= LONG_RUN_S else SETTLE_SHORT_S
+
+    def to_yaml(self) -> str:
+        """The scenario as a file that loads to the same scenario."""
+        values = self.model_dump(mode='json', exclude_none=True, exclude={'current': {'seed'}})
+        return yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+
+
+def scenario_names() -> list[str]:
+    """Names of the scenarios that come with the package."""
+    return sorted(path.stem for path in SCENARIO_FOLDER.glob('*.yaml'))
+
+
+def scenario_path(name: str) -> Path:
+    """File of a scenario given by name or by path.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is neither a scenario of that name nor such a file.
+    """
+    known = SCENARIO_FOLDER / f'{name}.yaml'
+    if known.is_file():
+        return known
+    path = Path(name)
+    if path.suffix not in ('.yaml', '.yml'):
+        raise ConfigurationError(
+            f'scenario = {name!r}: no such scenario '
+            f'(allowed: {", ".join(scenario_names())}, or a path to a .yaml file)'
+        )
+    if not path.is_file():
+        raise ConfigurationError(f'{path}: no such scenario file')
+    return path
+
+
+def load_scenario(name: str = DEFAULT_SCENARIO, changes: dict[str, Any] | None = None) -> Scenario:
+    """Load a scenario and change some of its fields.
+
+    Parameters
+    ----------
+    name : str
+        Name of a scenario that comes with the package, or path of a file.
+    changes : dict
+        Values by dotted field name, such as ``{'current.speed_kn': 0.5}``.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming file, field, value and allowed range.
+    """
+    path = scenario_path(name)
+    values = read_yaml(path)
+    values.setdefault('name', path.stem)
+    for field, value in (changes or {}).items():
+        _set_field(values, field, value)
+    source = str(path)
+    if changes:
+        source += ' with ' + ', '.join(f'{field}={value}' for field, value in changes.items())
+    scenario = validate(Scenario, values, source, path.parent)
+    return _find_vehicle(scenario, path.parent, source)
+
+
+def _find_vehicle(scenario: Scenario, folder: Path, source: str) -> Scenario:
+    """Scenario whose vehicle file is known to exist, wherever nodes are started from."""
+    beside = folder / scenario.vehicle
+    name = scenario.vehicle
+    if name not in vehicle_names() and beside.suffix and beside.is_file():
+        name = str(beside.resolve())
+    try:
+        path = vehicle_path(name)
+    except ConfigurationError as error:
+        raise ConfigurationError(f'{source}: {error}') from None
+    return scenario.model_copy(
+        update={'vehicle': name if name in vehicle_names() else str(path.resolve())}
+    )
+
+
+def _set_field(values: dict, field: str, value) -> None:
+    """Set a field by its dotted name, making the mappings on the way."""
+    *parents, last = field.split('.')
+    for parent in parents:
+        values = values.setdefault(parent, {})
+        if not isinstance(values, dict):
+            raise ConfigurationError(f'--set {field}: {parent} is not a group of fields')
+    for pair in _ALTERNATIVES:
+        if last in pair:
+            for other in pair:
+                values.pop(other, None)
+    values[last] = value
+
+
+def parse_assignment(text: str) -> tuple[str, Any]:
+    """Field and value of a ``path.to.field=value`` option; the value is read as YAML.
+
+    Raises
+    ------
+    ConfigurationError
+        If the text has not this form.
+    """
+    field, sign, value = text.partition('=')
+    if not sign or not field.strip():
+        raise ConfigurationError(f'--set {text}: expected path.to.field=value')
+    try:
+        return field.strip(), yaml.safe_load(value)
+    except yaml.YAMLError:
+        raise ConfigurationError(f'--set {text}: the value is not valid YAML') from None

@@ -1,0 +1,216 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a run achieved: the scorecard, from the numbers on the topics alone.
+
+The same function scores a bag and a direct run. "Steady" counts what is after the settling time,
+more than 600 s away from every inflection on either side, and deeper than 30 m. "All" leaves out
+the settling time only. An inflection is where the desired vertical rate changes its sign.
+"""
+
+import math
+
+import numpy as np
+
+from glider_bringup.direct import COLUMNS
+from glider_model.frames import euler_from_quaternion, odometry_from_wire, reference_from_wire
+from glider_model.kernel import kernel
+from glider_model.plant import DIVE_ABOVE_M, DIVE_BELOW_M
+from glider_model.signals import TICK_S
+
+#: Around an inflection (s) and shallower than this (m) nothing counts as steady.
+INFLECTION_MARGIN_S = 600.0
+STEADY_DEPTH_M = 30.0
+#: Heading fluctuation is about the mean over this time (s).
+HEADING_MEAN_S = 300.0
+#: A run is infeasible if the course could not be held for this share of the scored time.
+INFEASIBLE_SHARE = 0.5
+
+_SERIES = 9
+_DEPTH, _E2, _PITCH, _PITCH_REF, _HEADING, _RATE_REF, _TARGET_N, _TARGET_E, _INFEASIBLE = range(9)
+
+_ODOM, _REFERENCE = COLUMNS['odom'], COLUMNS['reference']
+_E2_COLUMN = COLUMNS['tracking_error'].start + 1
+_INFEASIBLE_COLUMN = COLUMNS['infeasible']
+_ODOM_START, _REFERENCE_START = _ODOM.start, _REFERENCE.start
+
+
+@kernel
+def _wire(log, row, start):
+    """Thirteen numbers of a log row as a tuple."""
+    return (
+        log[row, start],
+        log[row, start + 1],
+        log[row, start + 2],
+        log[row, start + 3],
+        log[row, start + 4],
+        log[row, start + 5],
+        log[row, start + 6],
+        log[row, start + 7],
+        log[row, start + 8],
+        log[row, start + 9],
+        log[row, start + 10],
+        log[row, start + 11],
+        log[row, start + 12],
+    )
+
+
+@kernel
+def _extract(log, series):
+    """Fill ``series`` (float64[n, 9]) with what the score needs of ``log`` (float64[n, ROW])."""
+    for row in range(log.shape[0]):
+        odometry = odometry_from_wire(_wire(log, row, _ODOM_START))
+        reference = reference_from_wire(_wire(log, row, _REFERENCE_START))
+        _, theta, psi = euler_from_quaternion(
+            odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
+        )
+        series[row, _DEPTH] = odometry.p_d
+        series[row, _E2] = log[row, _E2_COLUMN]
+        series[row, _PITCH] = theta
+        series[row, _PITCH_REF] = reference.theta
+        series[row, _HEADING] = psi
+        series[row, _RATE_REF] = reference.v_d
+        series[row, _TARGET_N] = reference.p_n
+        series[row, _TARGET_E] = reference.p_e
+        series[row, _INFEASIBLE] = log[row, _INFEASIBLE_COLUMN]
+
+
+class Scorer:
+    """Collects log blocks, then gives the score."""
+
+    def __init__(self) -> None:
+        self._blocks: list[np.ndarray] = []
+        self._last: np.ndarray | None = None
+
+    def add(self, log: np.ndarray) -> None:
+        """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
+        if not len(log):
+            return
+        series = np.empty((len(log), _SERIES))
+        _extract(log, series)
+        self._blocks.append(series)
+        self._last = log[-1].copy()
+
+    @property
+    def ticks(self) -> int:
+        """Ticks taken in."""
+        return sum(len(block) for block in self._blocks)
+
+    def result(self, settle_s: float, target_depth_m: float) -> dict:
+        """Scores of everything taken in.
+
+        Parameters
+        ----------
+        settle_s : float
+            Settling time (s).
+        target_depth_m : float
+            Depth of the lower turn, for the overshoot (m).
+
+        Returns
+        -------
+        dict
+            The run's part of ``score.json``: ticks, dives, distance_along_path_m, cross_track_m,
+            pitch_error_deg, heading_fluctuation_deg, depth_m, final_state, and ``infeasible``.
+            A figure without data is None.
+        """
+        series = np.concatenate(self._blocks) if self._blocks else np.empty((0, _SERIES))
+        ticks = len(series)
+        steady, scored = _windows(series, settle_s)
+        e2 = series[:, _E2]
+        pitch_error = np.degrees(series[:, _PITCH] - series[:, _PITCH_REF])
+        heading = _heading_fluctuation_deg(series[:, _HEADING])
+        deepest = float(np.max(series[:, _DEPTH])) if ticks else None
+        return {
+            'ticks': ticks,
+            'sim_time_s': _round(ticks * TICK_S),
+            'dives': _count_dives(series[:, _DEPTH]),
+            'distance_along_path_m': _length(series[:, _TARGET_N], series[:, _TARGET_E]),
+            'cross_track_m': {
+                'rms_steady': _rms(e2[steady]),
+                'max_steady': _largest(e2[steady]),
+                'max_all': _largest(e2[scored]),
+            },
+            'pitch_error_deg': {
+                'rms_steady': _rms(pitch_error[steady]),
+                'max_steady': _largest(pitch_error[steady]),
+            },
+            'heading_fluctuation_deg': {
+                'rms_steady': _rms(heading[steady]),
+                'max_steady': _largest(heading[steady]),
+            },
+            'depth_m': {
+                'max': deepest,
+                'overshoot': None if deepest is None else max(0.0, deepest - target_depth_m),
+            },
+            'final_state': self._final_state(),
+            'infeasible': bool(
+                scored.any()
+                and np.mean(series[scored, _INFEASIBLE]) >= INFEASIBLE_SHARE
+            ),
+        }
+
+    def _final_state(self) -> dict | None:
+        """Position, attitude and velocity over ground (body axes FRD) of the last tick."""
+        if self._last is None:
+            return None
+        odometry = odometry_from_wire(tuple(float(x) for x in self._last[_ODOM]))
+        attitude = euler_from_quaternion(
+            odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
+        )
+        return {
+            'position_ned_m': [odometry.p_n, odometry.p_e, odometry.p_d],
+            'attitude_rpy_rad': list(attitude),
+            'velocity_mps': [odometry.u, odometry.v, odometry.w],
+        }
+
+
+def _windows(series: np.ndarray, settle_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Masks of the steady and of all scored ticks."""
+    ticks = len(series)
+    scored = np.arange(ticks) * TICK_S > settle_s
+    steady = scored & (series[:, _DEPTH] > STEADY_DEPTH_M)
+    margin = round(INFLECTION_MARGIN_S / TICK_S)
+    down = series[:, _RATE_REF] > 0.0
+    for turn in np.flatnonzero(down[1:] != down[:-1]) + 1:
+        steady[max(0, turn - margin) : turn + margin + 1] = False
+    return steady, scored
+
+
+def _heading_fluctuation_deg(heading: np.ndarray) -> np.ndarray:
+    """Heading less its running mean over HEADING_MEAN_S, in deg."""
+    if not len(heading):
+        return heading
+    unwrapped = np.unwrap(heading)
+    half = round(0.5 * HEADING_MEAN_S / TICK_S)
+    total = np.concatenate(([0.0], np.cumsum(unwrapped - unwrapped[0])))
+    index = np.arange(len(heading))
+    first = np.maximum(index - half, 0)
+    last = np.minimum(index + half + 1, len(heading))
+    mean = (total[last] - total[first]) / (last - first)
+    return np.degrees(unwrapped - unwrapped[0] - mean)
+
+
+def _count_dives(depth: np.ndarray) -> int:
+    """Number of times that the vehicle went deep and came back, as the plant counts them."""
+    zone = np.zeros(len(depth), dtype=np.int8)
+    zone[depth > DIVE_BELOW_M] = 1
+    zone[depth < DIVE_ABOVE_M] = -1
+    zone = zone[zone != 0]
+    return int(np.count_nonzero((zone[:-1] == 1) & (zone[1:] == -1)))
+
+
+def _length(north: np.ndarray, east: np.ndarray) -> float:
+    """Way of the virtual target along the path (m)."""
+    return float(np.sum(np.hypot(np.diff(north), np.diff(east))))
+
+
+def _rms(values: np.ndarray) -> float | None:
+    return float(math.sqrt(np.mean(values * values))) if len(values) else None
+
+
+def _largest(values: np.ndarray) -> float | None:
+    return float(np.max(np.abs(values))) if len(values) else None
+
+
+def _round(seconds: float) -> float:
+    """Seconds without the rounding of 0.1."""
+    return round(seconds, 6)

@@ -1,0 +1,54 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Compiles every kernel once, so that the first run does not have to: set-up calls this."""
+
+import numpy as np
+
+from glider_bringup.direct import ROW, fly
+from glider_bringup.mission import mission_of
+from glider_bringup.scenario import load_scenario
+from glider_bringup.score import Scorer
+from glider_control.control import control_step
+from glider_guidance.guidance import guidance_abort, guidance_step
+from glider_model.current import current_step
+from glider_model.frames import (
+    odometry_from_wire,
+    odometry_to_wire,
+    reference_from_wire,
+    reference_to_wire,
+    water_from_wire,
+    water_to_wire,
+    wrench_to_wire,
+)
+from glider_model.plant import plant_finished, plant_joints, plant_odometry, plant_step
+from glider_model.signals import TICK_S
+from glider_model.trim import solve_trim
+
+
+def main() -> None:
+    """One tick by the direct engine, one by the steps as the nodes call them, and a trim."""
+    state, params = mission_of(load_scenario())
+    log = np.zeros((1, ROW))
+    fly(state, params, log, TICK_S)
+    scorer = Scorer()
+    scorer.add(log)
+    scorer.result(0.0, 0.0)
+
+    plant, current, guidance, control = state
+    odometry = odometry_from_wire(odometry_to_wire(plant_odometry(plant)))
+    joints = plant_joints(plant)
+    position = (odometry.p_n, odometry.p_e, odometry.p_d)
+    _, water = current_step(current, position, 0.0, params.current, TICK_S)
+    water = water_from_wire(water_to_wire(water))
+    guidance, guided = guidance_step(guidance, odometry, params.guidance, TICK_S)
+    guidance_abort(guidance)
+    reference = reference_from_wire(reference_to_wire(guided.reference))
+    _, controlled = control_step(control, odometry, joints, reference, params.control, TICK_S)
+    wrench_to_wire(controlled.wrench)
+    plant = plant_step(plant, controlled.command, water, params.plant, TICK_S)
+    plant_finished(plant, params.plant)
+    solve_trim(params.plant.vehicle, 0.4, pitch_deg=-30.0)
+
+
+if __name__ == '__main__':
+    main()
