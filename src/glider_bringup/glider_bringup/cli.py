@@ -41,8 +41,9 @@ app = typer.Typer(
     context_settings={'help_option_names': ['-h', '--help']},
 )
 # Standard output carries results only; progress and messages go to standard error.
-output = Console(highlight=False)
-messages = Console(stderr=True, highlight=False)
+# Names, descriptions and folders come from people: brackets in them are no markup.
+output = Console(highlight=False, markup=False)
+messages = Console(stderr=True, highlight=False, markup=False)
 
 
 def _choices(name: str, model, field: str) -> type[Enum]:
@@ -123,7 +124,7 @@ def run(
         _print_card(card, folder)
     if card['status'] == 'aborted':
         raise typer.Exit(
-            EXIT_INTERRUPTED if card['reason'] == 'interrupted' else EXIT_FAILED
+            EXIT_INTERRUPTED if card['reason'].startswith('stopped by') else EXIT_FAILED
         )
 
 
@@ -135,14 +136,19 @@ def _fly(scenario: Scenario, engine: Engine, rate: float, out: Path | None, bag:
     messages.print(f'{scenario.name}: {scenario.description}')
     with _progress(scenario, mission.planned_ticks(scenario)) as update:
         if engine is Engine.nodes:
-            flight, scores = mission.fly_nodes(scenario, folder, rate, update)
+            flight, scores = mission.fly_nodes(scenario, folder, rate, update, _print_log)
         else:
             flight, scores = mission.fly_direct(scenario, folder, bag, update)
     card = mission.scorecard(scenario, engine.value, flight, scores)
     mission.write_score(folder, card)
     if flight.reason:
-        messages.print(f'[red]{flight.status}: {flight.reason}')
+        messages.print(f'{flight.status}: {flight.reason}', style='red')
     return card, folder
+
+
+def _print_log(line: str) -> None:
+    """Show a line that a node printed."""
+    messages.print(line, soft_wrap=True)
 
 
 def _number(option: str, text: str, word: str, low: float, high: float) -> float:
@@ -252,7 +258,7 @@ def trim(
     else:
         _print_trim(vehicle, solution)
     if not solution.converged:
-        messages.print('[red]no steady state found within the vehicle\'s ranges')
+        messages.print('no steady state found within the vehicle\'s ranges', style='red')
         raise typer.Exit(EXIT_FAILED)
 
 
@@ -324,7 +330,7 @@ def main() -> int:
         app(prog_name='./glider')
     except ConfigurationError as error:
         for line in str(error).splitlines():
-            messages.print(line, style='red', markup=False, soft_wrap=True)
+            messages.print(line, style='red', soft_wrap=True)
         return EXIT_USAGE
     return 0
 

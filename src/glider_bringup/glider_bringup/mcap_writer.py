@@ -135,7 +135,7 @@ class McapWriter:
         rows = np.empty((count, width), np.uint8)
         starts = len(self._chunk) + np.arange(count, dtype='<u8') * np.uint64(width)
         column = 0
-        for channel_id, payload in zip(channel_ids, payloads):
+        for channel_id, payload in zip(channel_ids, payloads, strict=True):
             size = payload.shape[1]
             head = _MESSAGE.pack(Opcode.MESSAGE, 22 + size, channel_id, 0, 0, 0)
             end = column + len(head)
@@ -220,9 +220,7 @@ class McapWriter:
             for record in records:
                 record.write(summary)
             if records:
-                offsets.append(
-                    SummaryOffset(opcode, summary_start + start, summary.count - start)
-                )
+                offsets.append(SummaryOffset(opcode, summary_start + start, summary.count - start))
         offsets_start = summary_start + summary.count
         for offset in offsets:
             offset.write(summary)

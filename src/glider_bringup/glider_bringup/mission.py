@@ -16,7 +16,8 @@ from glider_bringup.direct import MissionParams, MissionState, fly_blocks
 from glider_bringup.figure import DRAWN, Record, draw_run
 from glider_bringup.ros.bag import BagWriter
 from glider_bringup.ros.bag_log import LogWriter, read_blocks, recorded_and_lost
-from glider_bringup.runner import run_nodes
+from glider_bringup.ros.node_parameters import node_parameters, write_parameters
+from glider_bringup.runner import node_commands, run_nodes
 from glider_bringup.scenario import Scenario, load_scenario
 from glider_bringup.score import Scorer
 from glider_guidance.profile import mission_time_s
@@ -25,6 +26,10 @@ from glider_model.signals import TICK_S
 from glider_model.vehicle import load_vehicle, vehicle_path
 
 SCENARIO_FILE, VEHICLE_FILE, SCORE_FILE = 'scenario.yaml', 'vehicle.yaml', 'score.json'
+PARAMETERS_FILE, LOG_FILE = 'parameters.yaml', 'log.txt'
+
+#: Exit code of a node that refuses its parameters.
+EXIT_CONFIGURATION = 2
 
 #: Called now and then with the ticks flown and the depth (m).
 Progress = Callable[[int, float], None]
@@ -109,7 +114,7 @@ def fly_direct(
             ticks += len(log)
             progress(ticks, float(-log[-1, 2]))
     except KeyboardInterrupt:
-        status, reason = 'aborted', 'interrupted'
+        status, reason = 'aborted', 'stopped by SIGINT'
     wall_time_s = time.perf_counter() - start
     recorded = bag.close() if bag else 0
     return Flight(status, reason, wall_time_s, recorded, 0), _score(scenario, scorer)
@@ -122,15 +127,33 @@ def _open_bag(scenario: Scenario, folder: Path) -> LogWriter:
 
 
 def fly_nodes(
-    scenario: Scenario, folder: Path, speed: float, progress: Progress
+    scenario: Scenario, folder: Path, speed: float, progress: Progress, on_log: Callable[[str], None]
 ) -> tuple[Flight, dict]:
-    """Fly over node processes and topics; the score is read back from the bag."""
-    result = run_nodes(scenario, folder, speed, progress)
+    """Fly over node processes and topics; the score is read back from the bag.
+
+    ``speed`` is in times real time, 0.0 being as fast as possible; ``on_log`` gets each line that
+    a node prints.
+    """
+    attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)
+    parameters = node_parameters(
+        scenario, speed=speed, record_to=folder, attachments=attachments
+    )
+    write_parameters(parameters, folder / PARAMETERS_FILE)
+    result = run_nodes(
+        node_commands(folder / PARAMETERS_FILE),
+        folder / LOG_FILE,
+        on_progress=lambda said: progress(said['tick'], said['depth_m']),
+        on_log=on_log,
+    )
+    if result.exit_code == EXIT_CONFIGURATION:
+        raise ConfigurationError(result.reason)
+    completed = result.status == 'completed'
     scorer = Scorer()
     for log in read_blocks(folder):
         scorer.add(log)
-    recorded, lost = recorded_and_lost(folder, result.status == 'completed')
-    flight = Flight(result.status, result.reason, result.wall_time_s, recorded, lost)
+    recorded, lost = recorded_and_lost(folder, completed)
+    status = 'completed' if completed else 'aborted'
+    flight = Flight(status, result.reason, result.flight_s, recorded, lost)
     return flight, _score(scenario, scorer)
 
 

@@ -16,7 +16,7 @@ from glider_guidance.profile import ProfileSettings
 from glider_model.current import CurrentSettings
 from glider_model.plant import InitialSettings, PlantSettings
 from glider_model.settings import ConfigurationError, Settings, read_yaml, validate
-from glider_model.vehicle import vehicle_names, vehicle_path
+from glider_model.vehicle import load_vehicle, vehicle_names, vehicle_path
 from glider_model.water import WaterSettings
 
 SCENARIO_FOLDER = Path(__file__).parent / 'scenarios'
@@ -27,7 +27,11 @@ LONG_RUN_S = 20000.0
 SETTLE_LONG_S, SETTLE_SHORT_S = 7200.0, 1800.0
 
 #: Fields of which only one can be given: setting one of them by hand replaces the other.
-_ALTERNATIVES = (('speed_kn', 'speed_mps'), ('angle_deg', 'direction_deg'))
+_ALTERNATIVES = (
+    ('speed_kn', 'speed_mps'),
+    ('angle_deg', 'direction_deg'),
+    ('descent_per_turn_m', 'slope_deg'),
+)
 
 
 class Scenario(Settings):
@@ -166,7 +170,7 @@ def load_scenario(name: str = DEFAULT_SCENARIO, changes: dict[str, Any] | None =
 
 
 def _find_vehicle(scenario: Scenario, folder: Path, source: str) -> Scenario:
-    """Scenario whose vehicle file is known to exist, wherever nodes are started from."""
+    """Scenario whose vehicle file is known to be good, wherever nodes are started from."""
     beside = folder / scenario.vehicle
     name = scenario.vehicle
     if name not in vehicle_names() and beside.suffix and beside.is_file():
@@ -175,6 +179,7 @@ def _find_vehicle(scenario: Scenario, folder: Path, source: str) -> Scenario:
         path = vehicle_path(name)
     except ConfigurationError as error:
         raise ConfigurationError(f'{source}: {error}') from None
+    load_vehicle(str(path))
     return scenario.model_copy(
         update={'vehicle': name if name in vehicle_names() else str(path.resolve())}
     )

@@ -7,13 +7,13 @@ import signal
 import struct
 import sys
 import time
-from collections import deque
 from pathlib import Path
 
 from pydantic import Field
 from std_msgs.msg import Header
 
 from glider_bringup.ros.bag import BagWriter
+from glider_bringup.tick_order import TickOrder
 from glider_model.ros import health, messages, qos
 from glider_model.ros.codec import to_cdr
 from glider_model.ros.messages import TOPICS
@@ -24,6 +24,8 @@ from glider_model.signals import TICK_NS
 
 _DRAIN_S = 0.02
 _PROGRESS_S = 0.25
+
+PER_TICK = [topic.name for topic in TOPICS.values() if topic.per_tick]
 
 
 class RecorderSettings(Settings):
@@ -50,20 +52,15 @@ class RecorderNode(TickNode):
             )
         except OSError as error:
             raise ConfigurationError(f'{error.filename}: {error.strerror}') from None
-        self.stamps: dict[str, int] = {}
-        self.lost = 0
+        self.order = TickOrder(PER_TICK, TICK_NS, self.write)
         self.has_path = False
-        self.stage = ''
-        self.last_odom = b''
-        self.written_ns = -TICK_NS
+        self.stage, self.last_odom = '', b''
         self.final_ns: int | None = None
         self.stopped = False
         self.progress_s = 0.0
-        self.queues = {t.name: deque() for t in TOPICS.values() if t.per_tick}
-        self.events: list[tuple[int, str, bytes]] = []
-        for name in self.queues:
+        for name in PER_TICK:
             self.add_input(name)
-        self.path_in = self._subscription(TOPICS['path'], self.on_path, raw=True, gated=False)
+        self._subscription(TOPICS['path'], self.on_path, gated=False)
         self.recorded = self._publisher(TOPICS['recorded'])
         self.outputs['recorded'] = (TOPICS['recorded'], self.recorded)
         signal.signal(signal.SIGINT, self.on_signal)
@@ -80,18 +77,19 @@ class RecorderNode(TickNode):
         return item
 
     def on_signal(self, number, frame) -> None:
+        """Remember to stop; `drain` does it, with everything that has come."""
         self.stopped = True
 
-    # ------------------------------------------------------------------ what comes in
-
-    def on_path(self, raw: bytes) -> None:
-        sec, nanosec = struct.unpack_from('<iI', raw, 4)
-        self.events.append((sec * 1_000_000_000 + nanosec, 'path', raw))
-        self.has_path = True
-
     def unmatched(self) -> list[str]:
+        """What is missing; the path is part of it, so that it is recorded first."""
         missing = super().unmatched()
         return missing or ([] if self.has_path else ['guidance_node has not published path'])
+
+    def on_path(self, raw: bytes) -> None:
+        """Keep the path, under the stamp it carries."""
+        sec, nanosec = struct.unpack_from('<iI', raw, 4)
+        self.order.add_event('path', sec * 1_000_000_000 + nanosec, raw)
+        self.has_path = True
 
     def _on_event(self, array) -> None:
         super()._on_event(array)
@@ -101,9 +99,10 @@ class RecorderNode(TickNode):
                     self.stage = pair.value
         if not health.is_routine(array):
             stamp_ns = array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec
-            self.events.append((stamp_ns, '/diagnostics', to_cdr(array)))
+            self.order.add_event('/diagnostics', stamp_ns, to_cdr(array))
 
     def on_report(self, report: health.Report) -> None:
+        """Learn the last tick from the plant."""
         if report.node == messages.PLANT and report.phase in (health.FINISHED, health.FAILED):
             self.over_since_s = time.monotonic()
             self.final_ns = report.stamp_ns if report.phase == health.FINISHED else -1
@@ -111,103 +110,66 @@ class RecorderNode(TickNode):
     def drain(self) -> None:
         """Take and write whatever has come; end when the run is over and all of it is here."""
         for item in self.inputs:
-            self._drain_topic(item)
+            name, stamp_of = item.topic.name, item.topic.codec.decode_stamp
+            while (raw := take(item.subscription)) is not None:
+                self.order.add(name, stamp_of(raw), raw)
         while (array := take(self._events_in)) is not None:
             self._on_event(array)
-        self._write_complete_ticks()
-        self._print_progress()
-        if self.stopped or (self.final_ns is not None and self.written_ns >= self.final_ns):
-            raise Stop(0)
-
-    def watch(self) -> None:
-        if self.over_since_s is not None and time.monotonic() - self.over_since_s > FAREWELL_S:
-            raise Stop(0)
-
-    def _drain_topic(self, item) -> None:
-        name, codec = item.topic.name, item.topic.codec
-        queue = self.queues[name]
-        while (raw := take(item.subscription)) is not None:
-            stamp_ns = codec.decode_stamp(raw)
-            expected_ns = self.stamps.get(name, stamp_ns - TICK_NS) + TICK_NS
-            if self.ticks.lockstep and stamp_ns > expected_ns:
-                self.lost += (stamp_ns - expected_ns) // TICK_NS
-            self.stamps[name] = stamp_ns
-            queue.append((stamp_ns, raw))
-
-    # ------------------------------------------------------------------ what goes out
-
-    def _write_complete_ticks(self) -> None:
         if not self.ticks.lockstep:
-            self._write_rest()
+            self.order.write_rest()
             self.bag.flush()
-            return
-        on_disk = False
-        while all(self.queues.values()):
-            stamp_ns = min(queue[0][0] for queue in self.queues.values())
-            self._write_tick(stamp_ns)
-            on_disk = self.bag.end_tick(stamp_ns) or on_disk
-        if on_disk:
-            self._publish_recorded()
+        elif self.order.write_complete(self.bag.end_tick):
+            self.publish_recorded()
+        if self.last_odom and time.monotonic() - self.progress_s > _PROGRESS_S:
+            self.print_progress()
+        if self.stopped or (self.final_ns is not None and self.order.written_ns >= self.final_ns):
+            raise Stop(0)
 
-    def _write_tick(self, stamp_ns: int) -> None:
-        for name, queue in self.queues.items():
-            if queue and queue[0][0] == stamp_ns:
-                raw = queue.popleft()[1]
-                self.bag.write(name, stamp_ns, raw)
-                if name == 'odom':
-                    self.last_odom = raw
-        self.written_ns = stamp_ns
-        if self.events:
-            self._write_events(stamp_ns)
+    def write(self, name: str, stamp_ns: int, raw: bytes) -> None:
+        """Write one message, in the order that the recording shall have."""
+        self.bag.write(name, stamp_ns, raw)
+        if name == 'odom':
+            self.last_odom = raw
 
-    def _write_events(self, stamp_ns: int) -> None:
-        due = sorted(event for event in self.events if event[0] <= stamp_ns)
-        self.events = [event for event in self.events if event[0] > stamp_ns]
-        for event_ns, name, raw in due:
-            self.bag.write(name, event_ns, raw)
-
-    def _write_rest(self) -> None:
-        """Write what belongs to ticks that will not be completed."""
-        while any(self.queues.values()):
-            self._write_tick(min(queue[0][0] for queue in self.queues.values() if queue))
-
-    def _publish_recorded(self) -> None:
+    def publish_recorded(self) -> None:
+        """Let the plant go on."""
         header = Header()
-        header.stamp.sec, header.stamp.nanosec = divmod(self.written_ns, 1_000_000_000)
+        header.stamp.sec, header.stamp.nanosec = divmod(self.order.written_ns, 1_000_000_000)
         self.recorded.publish(header)
 
-    def _print_progress(self, final: bool = False) -> None:
-        now = time.monotonic()
-        if not self.settings.progress or not self.last_odom:
+    def print_progress(self, **more) -> None:
+        """Print one JSON line for whoever started this process."""
+        if not self.settings.progress:
             return
-        if not final and now - self.progress_s < _PROGRESS_S:
-            return
-        self.progress_s = now
-        _, odom = TOPICS['odom'].codec.decode(self.last_odom)
+        self.progress_s = time.monotonic()
+        odom = TOPICS['odom'].codec.decode(self.last_odom)[1] if self.last_odom else (0.0,) * 3
         line = {
-            'tick': self.written_ns // TICK_NS,
-            't_s': self.written_ns / 1e9,
+            'tick': self.order.written_ns // TICK_NS,
+            't_s': self.order.written_ns / 1e9,
             'depth_m': -odom[2],
             'stage': self.stage,
             'messages': sum(self.bag.counts.values()),
-            'lost': self.lost,
+            'lost': self.order.lost if self.ticks.lockstep else 0,
         }
-        if final:
-            complete = self.final_ns is not None and 0 <= self.final_ns <= self.written_ns
-            line.update(complete=complete, counts=self.bag.counts)
-        print(json.dumps(line), flush=True)
+        print(json.dumps({**line, **more}), flush=True)
+
+    def watch(self) -> None:
+        """Do not wait for ever for ticks that do not come."""
+        if self.over_since_s is not None and time.monotonic() - self.over_since_s > FAREWELL_S:
+            raise Stop(0)
 
     def close(self) -> None:
-        self._write_rest()
-        self._write_events(2**62)
+        """Write what is left, and complete the folder."""
+        self.order.write_rest()
         self.bag.close()
-        self._print_progress(final=True)
+        complete = self.final_ns is not None and 0 <= self.final_ns <= self.order.written_ns
+        self.print_progress(complete=complete, counts=self.bag.counts)
         if self.context.ok():
-            self.report(health.FINISHED, stamp_ns=max(0, self.written_ns))
-            time.sleep(0.1)
+            self.report(health.FINISHED, stamp_ns=max(0, self.order.written_ns))
 
 
 def main(args=None) -> int:
+    """Run the node; returns its exit code."""
     return run(RecorderNode, args)
 
 

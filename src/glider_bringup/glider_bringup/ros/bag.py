@@ -155,7 +155,7 @@ class BagWriter:
         chunk_of = stamps_ns // (CHUNK_TICKS * TICK_NS)
         edges = [0, *(np.flatnonzero(np.diff(chunk_of)) + 1), len(stamps_ns)]
         channels = [self._channels[topic] for topic in payloads]
-        for start, end in zip(edges[:-1], edges[1:]):
+        for start, end in zip(edges[:-1], edges[1:], strict=True):
             if start:
                 self._mcap.flush()
             blocks = [payload[start:end] for payload in payloads.values()]

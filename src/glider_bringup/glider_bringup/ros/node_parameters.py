@@ -1,0 +1,54 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""From a scenario to the one parameter file that is handed to all nodes."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from glider_bringup.scenario import Scenario
+from glider_model.ros import messages
+from glider_model.ros.parameters import parameters_yaml, to_parameters
+
+
+def node_parameters(
+    scenario: Scenario,
+    *,
+    speed: float = 0.0,
+    lockstep: bool = True,
+    record_to: Path | None = None,
+    attachments: Iterable[Path] = (),
+) -> dict[str, dict]:
+    """Nested parameters of every node, by node name.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    speed : float
+        Times real time; 0.0: as fast as possible.
+    lockstep : bool
+    record_to : Path, optional
+        Folder of the recording. Without it there is no recorder.
+    attachments : iterable of Path
+        Files to store in the recording.
+    """
+    common = {'lockstep': lockstep, 'record': record_to is not None}
+    nodes = {
+        messages.PLANT: {**to_parameters(scenario.plant_settings()), 'speed': speed},
+        messages.CURRENT: to_parameters(scenario.current_settings()),
+        messages.GUIDANCE: to_parameters(scenario.guidance_settings()),
+        messages.CONTROL: to_parameters(scenario.control_settings()),
+    }
+    if record_to is not None:
+        nodes[messages.RECORDER] = {
+            'folder': str(record_to.resolve()),
+            'name': scenario.name,
+            'attachments': json.dumps([str(path.resolve()) for path in attachments]),
+            'progress': True,
+        }
+    return {name: {**parameters, **common} for name, parameters in nodes.items()}
+
+
+def write_parameters(nodes: dict[str, dict], file: Path, namespace: str = '/glider') -> None:
+    """Write the parameter file for ``--params-file``."""
+    file.write_text(parameters_yaml(nodes, namespace), encoding='utf-8')

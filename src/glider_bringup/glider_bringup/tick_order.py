@@ -1,0 +1,91 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Brings messages that arrive topic by topic into the order of a recording: tick by tick."""
+
+from collections import deque
+from collections.abc import Callable, Iterable
+
+
+class TickOrder:
+    """Holds messages back until their tick is complete, then hands them on in a fixed order.
+
+    Two recordings of one run thereby have the same bytes, whatever the order of arrival was.
+
+    Parameters
+    ----------
+    topics : iterable of str
+        Per-tick topics, in the order in which a tick is written.
+    period_ns : int
+        Length of a tick.
+    write : callable
+        Called with (topic, stamp_ns, payload).
+    """
+
+    def __init__(
+        self,
+        topics: Iterable[str],
+        period_ns: int,
+        write: Callable[[str, int, bytes], None],
+    ) -> None:
+        self._queues: dict[str, deque[tuple[int, bytes]]] = {name: deque() for name in topics}
+        self._newest_ns: dict[str, int] = {}
+        self._events: list[tuple[int, str, bytes]] = []
+        self._period_ns = period_ns
+        self._write = write
+        self.written_ns = -period_ns  #: stamp of the newest tick that was handed on
+        self.lost = 0  #: messages whose stamps were skipped
+
+    def add(self, topic: str, stamp_ns: int, payload: bytes) -> None:
+        """Take a message of a per-tick topic."""
+        due_ns = self._newest_ns.get(topic, stamp_ns - self._period_ns) + self._period_ns
+        self.lost += max(0, (stamp_ns - due_ns) // self._period_ns)
+        self._newest_ns[topic] = stamp_ns
+        self._queues[topic].append((stamp_ns, payload))
+
+    def add_event(self, topic: str, stamp_ns: int, payload: bytes) -> None:
+        """Take a message that belongs to a tick, but does not come with every tick."""
+        self._events.append((stamp_ns, topic, payload))
+
+    def write_complete(self, end_tick: Callable[[int], bool]) -> bool:
+        """Hand on every tick that is complete.
+
+        Parameters
+        ----------
+        end_tick : callable
+            Called with the stamp after each tick; says whether it is on disk.
+
+        Returns
+        -------
+        bool
+            Whether anything went to disk.
+        """
+        on_disk = False
+        while all(self._queues.values()):
+            self._write_tick()
+            on_disk = end_tick(self.written_ns) or on_disk
+        return on_disk
+
+    def write_rest(self) -> None:
+        """Hand on everything, also of ticks that are not complete."""
+        while any(self._queues.values()):
+            self._write_tick()
+        self._write_events()
+
+    def _write_tick(self) -> None:
+        stamp_ns = min(queue[0][0] for queue in self._queues.values() if queue)
+        for topic, queue in self._queues.items():
+            while queue and queue[0][0] == stamp_ns:
+                self._write(topic, stamp_ns, queue.popleft()[1])
+        self.written_ns = stamp_ns
+        if self._events:
+            self._write_events(stamp_ns)
+
+    def _write_events(self, until_ns: int | None = None) -> None:
+        later = []
+        for event in sorted(self._events):
+            stamp_ns, topic, payload = event
+            if until_ns is None or stamp_ns <= until_ns:
+                self._write(topic, stamp_ns, payload)
+            else:
+                later.append(event)
+        self._events = later

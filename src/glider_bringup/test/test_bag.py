@@ -1,0 +1,242 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A recording opens everywhere, holds exactly what was written, and survives a kill."""
+
+import struct
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.exceptions import EndOfFile
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.records import Message
+from mcap.stream_reader import StreamReader
+from mcap_ros2.reader import read_ros2_messages
+from nav_msgs.msg import Path as PathMessage
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter, message_definition, type_hash
+from glider_bringup.tick_order import TickOrder
+from glider_model.ros.codec import to_cdr
+from glider_model.ros.messages import TOPICS
+from glider_model.signals import TICK_NS
+
+PER_TICK = {topic.name: topic for topic in TOPICS.values() if topic.per_tick}
+TICKS = 2 * CHUNK_TICKS + 40
+
+
+def numbers(topic, ticks: int) -> np.ndarray:
+    """A row of recognisable numbers for each tick."""
+    width = len(topic.codec.fields)
+    return np.arange(ticks)[:, None] + np.arange(width)[None, :] / 16.0
+
+
+def write_one_by_one(folder, ticks=TICKS, close=True, attachments=()):
+    bag = BagWriter(folder, 'run', attachments=attachments)
+    for tick in range(ticks):
+        for name, topic in PER_TICK.items():
+            row = numbers(topic, ticks)[tick]
+            bag.write(name, tick * TICK_NS, topic.codec.encode(tick * TICK_NS, row))
+        bag.end_tick(tick * TICK_NS)
+    if close:
+        bag.close()
+    return bag
+
+
+def write_at_once(folder, ticks=TICKS):
+    bag = BagWriter(folder, 'run')
+    stamps = np.arange(ticks) * TICK_NS
+    bag.write_ticks(
+        stamps,
+        {
+            name: topic.codec.encode_many(stamps, numbers(topic, ticks))
+            for name, topic in PER_TICK.items()
+        },
+    )
+    bag.close()
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('bag')
+    scenario = folder / 'scenario.yaml'
+    scenario.write_text('seed: 7\n')
+    write_one_by_one(folder, attachments=[scenario])
+    return folder
+
+
+@pytest.mark.parametrize('store', [None, Stores.ROS2_JAZZY])
+def test_rosbags_reads_every_message(folder, store):
+    typestore = get_typestore(store) if store else None
+    seen = {name: [] for name in PER_TICK}
+    with AnyReader([folder], default_typestore=typestore) as reader:
+        stamps = []
+        for connection, stamp_ns, raw in reader.messages():
+            reader.deserialize(raw, connection.msgtype)
+            seen[connection.topic.removeprefix('/glider/')].append(stamp_ns)
+            stamps.append(stamp_ns)
+    assert stamps == sorted(stamps)
+    assert all(seen[name] == [tick * TICK_NS for tick in range(TICKS)] for name in PER_TICK)
+
+
+def test_mcap_ros2_reads_the_numbers_that_were_written(folder):
+    expected = numbers(PER_TICK['odom'], TICKS)
+    tick = 0
+    for message in read_ros2_messages(str(folder / 'run_0.mcap'), topics=['/glider/odom']):
+        pose = message.ros_msg.pose.pose
+        assert message.log_time_ns == message.publish_time_ns == tick * TICK_NS
+        assert pose.position.z == expected[tick, 2]
+        assert pose.orientation.w == expected[tick, 3]
+        assert message.ros_msg.twist.twist.angular.z == expected[tick, 12]
+        tick += 1
+    assert tick == TICKS
+
+
+def test_checksums_summary_and_attachments(folder):
+    with (folder / 'run_0.mcap').open('rb') as file:
+        reader = make_reader(file, validate_crcs=True)
+        assert reader.get_header().profile == 'ros2'
+        statistics = reader.get_summary().statistics
+        assert statistics.message_count == len(list(reader.iter_messages()))
+        assert statistics.message_count == TICKS * len(PER_TICK)
+        attachments = list(reader.iter_attachments())
+        assert [a.name for a in attachments] == ['scenario.yaml']
+        assert attachments[0].data == b'seed: 7\n'
+        assert [m.name for m in reader.iter_metadata()] == ['rosbag2']
+    with (folder / 'run_0.mcap').open('rb') as file:
+        reader = NonSeekingReader(file, validate_crcs=True)
+        assert len(list(reader.iter_messages())) == statistics.message_count
+
+
+def test_metadata_has_the_shape_of_jazzy(folder):
+    information = yaml.safe_load((folder / 'metadata.yaml').read_text())
+    assert list(information) == ['rosbag2_bagfile_information']
+    information = information['rosbag2_bagfile_information']
+    assert list(information) == [
+        'version',
+        'storage_identifier',
+        'duration',
+        'starting_time',
+        'message_count',
+        'topics_with_message_count',
+        'compression_format',
+        'compression_mode',
+        'relative_file_paths',
+        'files',
+        'custom_data',
+        'ros_distro',
+    ]
+    assert information['version'] == 9
+    assert information['duration'] == {'nanoseconds': (TICKS - 1) * TICK_NS}
+    assert information['message_count'] == TICKS * len(PER_TICK)
+    assert information['relative_file_paths'] == ['run_0.mcap']
+    odom = information['topics_with_message_count'][1]
+    assert odom['message_count'] == TICKS
+    assert odom['topic_metadata']['name'] == '/glider/odom'
+    assert odom['topic_metadata']['type_description_hash'].startswith('RIHS01_')
+    qos = odom['topic_metadata']['offered_qos_profiles'][0]
+    assert (qos['history'], qos['reliability']) == ('keep_last', 'reliable')
+    assert (qos['durability'], qos['depth']) == ('volatile', 1024)
+    assert qos['deadline'] == {'sec': 9223372036, 'nsec': 854775807}
+
+
+def test_channels_say_what_rosbag2_says(folder):
+    with (folder / 'run_0.mcap').open('rb') as file:
+        summary = make_reader(file).get_summary()
+    for channel in summary.channels.values():
+        assert channel.message_encoding == 'cdr'
+        assert summary.schemas[channel.schema_id].encoding == 'ros2msg'
+        assert yaml.safe_load(channel.metadata['offered_qos_profiles'])[0]['depth'] > 0
+        assert channel.metadata['topic_type_hash'].startswith('RIHS01_')
+
+
+@pytest.mark.parametrize('ticks', [1, CHUNK_TICKS, CHUNK_TICKS + 1, TICKS])
+def test_writing_at_once_gives_the_same_file(tmp_path, ticks):
+    write_one_by_one(tmp_path / 'a', ticks)
+    write_at_once(tmp_path / 'b', ticks)
+    for name in ('run_0.mcap', 'metadata.yaml'):
+        assert (tmp_path / 'a' / name).read_bytes() == (tmp_path / 'b' / name).read_bytes()
+
+
+@pytest.mark.parametrize(('share', 'chunks'), [(0.02, 1), (0.2, 1), (0.98, 2)])
+def test_torn_file_reads_up_to_the_last_whole_chunk(tmp_path, share, chunks):
+    write_one_by_one(tmp_path, CHUNK_TICKS, close=False)
+    file = tmp_path / 'run_0.mcap'
+    whole = file.stat().st_size
+    write_one_by_one(tmp_path, TICKS, close=False)
+    assert not (tmp_path / 'metadata.yaml').exists()
+    data = file.read_bytes()
+    file.write_bytes(data[: whole + int(share * (len(data) - whole))])
+    stamps = []
+    with file.open('rb') as stream, pytest.raises((EndOfFile, struct.error)):
+        for record in StreamReader(stream).records:
+            if isinstance(record, Message):
+                stamps.append(record.log_time)
+    ticks = range(chunks * CHUNK_TICKS)
+    assert stamps == [tick * TICK_NS for tick in ticks for _ in PER_TICK]
+
+
+def test_folder_of_an_earlier_run_does_not_pass_for_this_one(tmp_path):
+    write_one_by_one(tmp_path, 3)
+    assert (tmp_path / 'metadata.yaml').exists()
+    BagWriter(tmp_path, 'run')
+    assert not (tmp_path / 'metadata.yaml').exists()
+
+
+def test_empty_recording_is_valid(tmp_path):
+    BagWriter(tmp_path, 'run').close()
+    with AnyReader([tmp_path]) as reader:
+        assert list(reader.messages()) == []
+
+
+def test_late_event_keeps_its_stamp(tmp_path):
+    bag = BagWriter(tmp_path, 'run')
+    clock = PER_TICK['/clock'].codec
+    bag.write('/clock', 5 * TICK_NS, clock.encode(5 * TICK_NS, ()))
+    bag.write('path', 0, to_cdr(PathMessage()))
+    bag.close()
+    with AnyReader([tmp_path]) as reader:
+        assert [(c.topic, stamp) for c, stamp, _ in reader.messages()] == [
+            ('/glider/path', 0),
+            ('/clock', 5 * TICK_NS),
+        ]
+
+
+@pytest.mark.parametrize('type_name', sorted({topic.type_name for topic in TOPICS.values()}))
+def test_definition_and_hash_are_those_of_the_distribution(type_name):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    assert type_hash(type_name) == store.hash_rihs01(type_name)
+    types = get_types_from_msg(message_definition(type_name), type_name)
+    for name, definition in types.items():
+        assert store.fielddefs[name][1] == definition[1]
+
+
+@given(st.permutations(6 * ['a', 'b']))
+def test_order_of_arrival_does_not_show_in_the_recording(arrivals):
+    written = []
+    order = TickOrder(['a', 'b'], 1, lambda *message: written.append(message[:2]))
+    order.add_event('event', 3, b'')
+    for place, topic in enumerate(arrivals):
+        order.add(topic, arrivals[:place].count(topic), b'')
+        order.write_complete(lambda stamp_ns: False)
+    expected = [(topic, tick) for tick in range(6) for topic in ('a', 'b')]
+    expected.insert(8, ('event', 3))
+    assert written == expected
+    assert order.lost == 0
+
+
+def test_incomplete_ticks_are_written_at_the_end_and_gaps_are_counted():
+    written = []
+    order = TickOrder(['a', 'b'], 10, lambda *message: written.append(message))
+    for stamp_ns in (0, 10, 40):
+        order.add('a', stamp_ns, b'a')
+    order.add('b', 0, b'b')
+    assert order.write_complete(lambda stamp_ns: stamp_ns == 0)
+    assert written == [('a', 0, b'a'), ('b', 0, b'b')]
+    order.write_rest()
+    assert written[2:] == [('a', 10, b'a'), ('a', 40, b'a')]
+    assert order.lost == 2
+    assert order.written_ns == 40

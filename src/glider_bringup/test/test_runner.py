@@ -1,0 +1,241 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The runner with small processes in place of the nodes: no ROS, all the ways to die."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from glider_bringup import runner
+from glider_bringup.runner import PLANT, RECORDER, domain_id, node_commands, run_nodes
+
+#: A node that says it is there, and then waits for a signal.
+WAIT = """
+import os, signal, sys, time
+print('up', os.getpid(), flush=True)
+{setup}
+while True:
+    time.sleep(0.02)
+    {loop}
+"""
+CALM = 'for s in (signal.SIGINT, signal.SIGTERM): signal.signal(s, lambda *a: sys.exit(0))'
+DEAF = 'for s in (signal.SIGINT, signal.SIGTERM): signal.signal(s, signal.SIG_IGN)'
+
+#: A recorder: progress at once, a last word when it is told to stop or after a while.
+RECORD = """
+import json, signal, sys, time
+def say(**more):
+    print(json.dumps(dict(tick=7, t_s=0.7, depth_m=1.0, stage='', messages=63, lost=0, **more)),
+          flush=True)
+stop = []
+for s in (signal.SIGINT, signal.SIGTERM): signal.signal(s, lambda *a: stop.append(1))
+say()
+end = time.monotonic() + {seconds}
+while not stop and time.monotonic() < end:
+    time.sleep(0.01)
+say(complete=not stop, counts={{}})
+"""
+
+
+def python(source: str) -> list[str]:
+    return [sys.executable, '-c', source]
+
+
+def node(setup: str = CALM, loop: str = 'pass') -> list[str]:
+    return python(WAIT.format(setup=setup, loop=loop))
+
+
+def recorder(seconds: float = 1e9) -> list[str]:
+    return python(RECORD.format(seconds=seconds))
+
+
+def after(seconds: float, action: str) -> list[str]:
+    """A node that does something after a while."""
+    return node(
+        f'{CALM}; start = time.monotonic()', f'time.monotonic() - start > {seconds} and ({action})'
+    )
+
+
+LEAVE = 'sys.exit(0)'
+
+
+@pytest.fixture
+def fly(tmp_path):
+    """Run commands; gives result, log lines and the pids of the nodes."""
+
+    def run(commands, **arguments):
+        lines = []
+        result = run_nodes(commands, tmp_path / 'log.txt', on_log=lines.append, **arguments)
+        assert (tmp_path / 'log.txt').read_text().splitlines() == lines
+        pids = [int(line.split()[-1]) for line in lines if '] up ' in line]
+        assert not [pid for pid in pids if is_alive(pid)]
+        return result, lines
+
+    return run
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    with open(f'/proc/{pid}/stat', encoding='ascii') as stat:
+        return stat.read().rpartition(')')[2].split()[0] != 'Z'
+
+
+def test_complete_run(fly):
+    seen = []
+    commands = {
+        'guidance_node': after(0.5, LEAVE),
+        RECORDER: recorder(0.3),
+        PLANT: after(0.5, LEAVE),
+    }
+    result, lines = fly(commands, on_progress=seen.append)
+    assert result.status == 'completed'
+    assert result.reason == result.culprit == ''
+    assert seen[0]['tick'] == 7
+    assert result.progress['complete'] is True
+    assert result.startup_s > 0.0 < result.flight_s
+    assert any(line.startswith('[guidance_node] up') for line in lines)
+
+
+@pytest.mark.parametrize('name', ['guidance_node', RECORDER, PLANT])
+@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGSEGV])
+def test_killed_node_is_named(fly, name, number):
+    commands = {'guidance_node': node(), RECORDER: recorder(), PLANT: node()}
+    die = python(f'import os, time; time.sleep(0.3); os.kill(os.getpid(), {int(number)})')
+    started = time.monotonic()
+    result, _ = fly({**commands, name: die})
+    assert result.status == 'failed'
+    assert result.culprit == name
+    assert result.exit_code == -number
+    assert number.name in result.reason
+    assert time.monotonic() - started < 10.0
+
+
+@pytest.mark.parametrize('name', ['guidance_node', PLANT])
+def test_node_that_leaves_early_is_named(fly, name):
+    commands = {'guidance_node': node(), RECORDER: recorder(), PLANT: node()}
+    result, _ = fly({**commands, name: after(0.3, LEAVE)})
+    assert (result.status, result.culprit) == ('failed', name)
+    assert 'before the run was complete' in result.reason
+
+
+def test_last_words_of_a_node_are_the_reason(fly):
+    words = "print('fatal: plant_node: parameter speed = -1', file=sys.stderr); sys.exit(2)"
+    commands = {'guidance_node': node(), PLANT: python(f'import sys; {words}')}
+    result, lines = fly(commands)
+    assert result.exit_code == 2
+    assert result.culprit == PLANT
+    assert result.reason == 'plant_node: parameter speed = -1'
+    assert '[plant_node] fatal: plant_node: parameter speed = -1' in lines
+
+
+def test_crash_shows_its_last_line(fly):
+    commands = {'guidance_node': python('raise ValueError("no good")'), PLANT: node()}
+    result, _ = fly(commands)
+    assert result.culprit == 'guidance_node'
+    assert 'no good' in result.reason
+
+
+def test_plant_that_blames_a_peer_is_believed_over_those_who_left(fly):
+    blame = "print('fatal: guidance_node did not publish', file=sys.stderr, flush=True)"
+    commands = {
+        'guidance_node': node(),
+        'control_node': after(0.2, LEAVE),
+        PLANT: after(0.5, f'{blame} or sys.exit(3)'),
+    }
+    result, _ = fly(commands)
+    assert (result.status, result.culprit) == ('failed', 'guidance_node')
+    assert 'did not publish' in result.reason
+
+
+def test_deaf_node_is_killed(fly):
+    commands = {'guidance_node': node(DEAF), RECORDER: recorder(), PLANT: after(0.3, LEAVE)}
+    started = time.monotonic()
+    result, _ = fly(commands)
+    assert result.culprit == PLANT
+    assert time.monotonic() - started < 10.0
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_signal_aborts_the_run_and_the_recorder_has_the_last_word(fly, number):
+    commands = {'guidance_node': node(), RECORDER: recorder(), PLANT: node()}
+
+    def interrupt(progress):
+        if 'complete' not in progress:
+            threading.Timer(0.2, os.kill, (os.getpid(), number)).start()
+
+    before = signal.getsignal(number)
+    result, _ = fly(commands, on_progress=interrupt)
+    assert result.status == 'aborted'
+    assert number.name in result.reason
+    assert result.progress['complete'] is False
+    assert signal.getsignal(number) is before
+
+
+@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGTERM])
+def test_no_node_survives_the_runner(tmp_path, number):
+    source = (
+        'import sys; from pathlib import Path\n'
+        'from glider_bringup.runner import run_nodes\n'
+        f'run_nodes({dict(guidance_node=node(DEAF), recorder_node=recorder(), plant_node=node())},'
+        f' Path({str(tmp_path / "log.txt")!r}))\n'
+    )
+    process = subprocess.Popen(python(source), stderr=subprocess.PIPE, text=True)
+    pids = []
+    while len(pids) < 2:
+        line = process.stderr.readline()
+        assert line, 'the runner ended too early'
+        if '] up ' in line:
+            pids.append(int(line.split()[-1]))
+    process.send_signal(number)
+    process.communicate(timeout=20)
+    deadline = time.monotonic() + 10.0
+    while any(is_alive(pid) for pid in pids):
+        assert time.monotonic() < deadline
+        threading.Event().wait(0.02)
+
+
+def test_ctrl_c_in_a_terminal_reaches_the_runner_only(fly):
+    report = "print('group', os.getpgrp() == os.getpid(), flush=True)"
+    commands = {'guidance_node': node(f'{CALM}; {report}'), PLANT: after(0.3, LEAVE)}
+    _, lines = fly(commands)
+    assert '[guidance_node] group True' in lines
+
+
+def test_nodes_share_a_domain_that_no_other_run_has(monkeypatch, fly):
+    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
+    show = "print('domain', os.environ['ROS_DOMAIN_ID'], flush=True)"
+    with domain_id() as taken:
+        commands = {
+            'guidance_node': node(f'{CALM}; {show}'),
+            PLANT: after(0.3, f'{show} or {LEAVE}'),
+        }
+        _, lines = fly(commands)
+    domains = {line.split()[-1] for line in lines if '] domain ' in line}
+    assert len(domains) == 1
+    assert domains != {str(taken)}
+    assert 1 <= int(domains.pop()) <= 101
+
+
+def test_domain_of_the_user_is_kept(monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', '42')
+    with domain_id() as domain:
+        assert domain == 42
+
+
+def test_every_node_gets_parameters_and_namespace(tmp_path):
+    commands = node_commands(tmp_path / 'p.yaml', '/sea')
+    assert list(commands) == list(runner.MODULES)
+    for name, command in commands.items():
+        assert command[:3] == [sys.executable, '-m', runner.MODULES[name]]
+        assert str(tmp_path / 'p.yaml') in command
+        assert '__ns:=/sea' in command
+    assert json.dumps(commands)

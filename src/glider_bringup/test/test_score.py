@@ -1,0 +1,312 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Scores of made-up flights whose scores are known."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import uniform_filter1d
+from scipy.spatial.transform import Rotation
+
+from glider_bringup.direct import COLUMNS, ROW
+from glider_bringup.score import Scorer
+from glider_model.signals import TICK_S
+
+quick = settings(max_examples=20, deadline=None)
+
+TARGET_M = 1000.0
+
+
+def wire_quaternion(theta, psi):
+    """Attitude as on a topic, ENU / FLU, w x y z: yaw is pi/2 - psi, pitch is -theta."""
+    theta, psi = np.broadcast_arrays(theta, psi)
+    angles = np.stack([math.pi / 2.0 - psi, -theta, np.zeros_like(psi)], axis=-1)
+    return np.roll(Rotation.from_euler('ZYX', angles).as_quat(), 1, axis=-1)
+
+
+def make_log(t, **given):
+    """Log of a flight: a column for each name, a number or float64[n]; rad and m."""
+    value = {
+        'north': 0.0,
+        'east': 0.0,
+        'depth': 500.0,
+        'theta': -0.5,
+        'psi': 0.0,
+        'e2': 0.0,
+        'theta_ref': -0.5,
+        'psi_ref': 0.0,
+        'rate_ref': 0.25,
+        'target_n': 0.0,
+        'target_e': 0.0,
+        'infeasible': 0.0,
+        **given,
+    }
+    log = np.zeros((len(t), ROW))
+    odom, reference = log[:, COLUMNS['odom']], log[:, COLUMNS['reference']]
+    odom[:, 0], odom[:, 1], odom[:, 2] = value['east'], value['north'], -value['depth']
+    odom[:, 3:7] = wire_quaternion(value['theta'], value['psi'])
+    reference[:, 0], reference[:, 1] = value['target_e'], value['target_n']
+    reference[:, 3:7] = wire_quaternion(value['theta_ref'], value['psi_ref'])
+    reference[:, 9] = -value['rate_ref']
+    log[:, COLUMNS['tracking_error'].start + 1] = value['e2']
+    log[:, COLUMNS['infeasible']] = value['infeasible']
+    return log
+
+
+def ticks(seconds):
+    return TICK_S * np.arange(round(seconds / TICK_S))
+
+
+def score(log, settle_s=0.0, target_m=TARGET_M):
+    scorer = Scorer()
+    scorer.add(log)
+    return scorer.result(settle_s, target_m)
+
+
+def test_sinusoidal_error_has_its_rms_and_its_amplitude():
+    """3 m of amplitude over whole periods: rms 3 / sqrt(2)."""
+    t = ticks(5000.0)
+    track = score(make_log(t, e2=3.0 * np.sin(2.0 * math.pi * t / 100.0)))['cross_track_m']
+    assert track['rms_steady'] == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
+    assert track['max_steady'] == pytest.approx(3.0, rel=1e-6)
+    assert track['max_all'] == pytest.approx(3.0, rel=1e-6)
+
+
+def test_negative_error_counts_like_a_positive_one():
+    assert score(make_log(ticks(2000.0), e2=-4.0))['cross_track_m']['max_all'] == 4.0
+
+
+@quick
+@given(st.floats(-20.0, 20.0), st.floats(-175.0, 175.0))
+def test_pitch_error_is_the_difference_in_degrees(error_deg, heading_deg):
+    t = ticks(800.0)
+    log = make_log(
+        t, theta=np.full(len(t), -0.5 + math.radians(error_deg)), psi=heading_deg / 57.3
+    )
+    pitch = score(log)['pitch_error_deg']
+    assert pitch['rms_steady'] == pytest.approx(abs(error_deg), abs=1e-6)
+    assert pitch['max_steady'] == pytest.approx(abs(error_deg), abs=1e-6)
+
+
+def pulse(t, at_s):
+    """A single tick of 7 m of cross-track error."""
+    e2 = np.zeros(len(t))
+    e2[round(at_s / TICK_S)] = 7.0
+    return e2
+
+
+def test_settling_time_is_left_out_of_everything():
+    """The tick at the settling time itself is left out, the next one counts."""
+    t = ticks(2000.0)
+    for at_s, counted in ((1000.0, None), (1000.1, 7.0)):
+        track = score(make_log(t, e2=pulse(t, at_s)), settle_s=1000.0)['cross_track_m']
+        assert track['max_all'] == (counted or 0.0)
+        assert track['max_steady'] == (counted or 0.0)
+
+
+@pytest.mark.parametrize(
+    ('offset_s', 'steady'), [(-600.1, True), (-599.9, False), (599.9, False), (600.1, True)]
+)
+def test_steady_is_more_than_600_s_from_an_inflection(offset_s, steady):
+    """On either side; everything else of the turn still counts in "all"."""
+    t = ticks(4000.0)
+    rate = np.where(t < 2000.0, 0.25, -0.25)
+    track = score(make_log(t, e2=pulse(t, 2000.0 + offset_s), rate_ref=rate))['cross_track_m']
+    assert track['max_steady'] == (7.0 if steady else 0.0)
+    assert track['max_all'] == 7.0
+
+
+@pytest.mark.parametrize(('depth_m', 'steady'), [(29.9, 0.0), (30.1, 7.0)])
+def test_steady_is_deeper_than_30_m(depth_m, steady):
+    t = ticks(1000.0)
+    depth = np.where(np.abs(t - 500.0) < 50.0, depth_m, 500.0)
+    track = score(make_log(t, e2=pulse(t, 500.0), depth=depth))['cross_track_m']
+    assert track['max_steady'] == steady
+    assert track['max_all'] == 7.0
+
+
+def test_without_a_tick_there_is_no_score():
+    result = Scorer().result(0.0, TARGET_M)
+    assert result['ticks'] == 0
+    assert result['final_state'] is None
+    assert result['depth_m'] == {'max': None, 'overshoot': None}
+    assert set(result['cross_track_m'].values()) == {None}
+    json.dumps(result, allow_nan=False)
+
+
+def test_without_a_steady_tick_only_all_has_a_figure():
+    track = score(make_log(ticks(500.0), e2=2.0, depth=10.0))
+    assert track['cross_track_m'] == {'rms_steady': None, 'max_steady': None, 'max_all': 2.0}
+    assert track['pitch_error_deg'] == {'rms_steady': None, 'max_steady': None}
+    assert track['heading_fluctuation_deg'] == {'rms_steady': None, 'max_steady': None}
+
+
+def test_run_shorter_than_the_settling_time_has_no_figures():
+    result = score(make_log(ticks(500.0), e2=2.0), settle_s=1800.0)
+    assert set(result['cross_track_m'].values()) == {None}
+    assert result['infeasible'] is False
+
+
+@pytest.mark.parametrize('centre_deg', [0.0, 90.0, 179.0, 180.0, -180.0])
+def test_heading_fluctuation_is_that_of_a_sine_across_the_seam(centre_deg):
+    """2 deg of amplitude, 30 s of period: a tenth of the mean's window, so all of it counts.
+
+    The last 200 s are at the surface: there the mean's window is cut.
+    """
+    t = ticks(6000.0)
+    heading = centre_deg + 2.0 * np.sin(2.0 * math.pi * t / 30.0)
+    depth = np.where(t < 5800.0, 500.0, 5.0)
+    result = score(make_log(t, psi=np.radians(heading), depth=depth), settle_s=600.0)
+    found = result['heading_fluctuation_deg']
+    assert found['rms_steady'] == pytest.approx(2.0 / math.sqrt(2.0), rel=0.01)
+    assert found['max_steady'] == pytest.approx(2.0, rel=0.02)
+
+
+@pytest.mark.parametrize('rate_degps', [0.005, -0.05])
+def test_heading_fluctuation_leaves_out_a_slow_drift(rate_degps):
+    """A steady turn, several times around: nothing away from both ends of the log."""
+    t = ticks(20000.0)
+    depth = np.where((t > 300.0) & (t < 19700.0), 500.0, 5.0)
+    log = make_log(t, psi=np.radians(30.0 + rate_degps * t), depth=depth)
+    found = score(log, settle_s=600.0)['heading_fluctuation_deg']
+    assert found['max_steady'] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_heading_fluctuation_tells_a_limit_cycle_from_a_drift():
+    """30 deg at 400 s on a drift: the 300 s mean follows a part sinc(300/400) of the cycle."""
+    t = ticks(40000.0)
+    heading = 0.002 * t + 30.0 * np.sin(2.0 * math.pi * t / 400.0)
+    found = score(make_log(t, psi=np.radians(heading)), settle_s=600.0)
+    expected = 30.0 / math.sqrt(2.0) * (1.0 - np.sinc(300.0 / 400.0))
+    assert found['heading_fluctuation_deg']['rms_steady'] == pytest.approx(expected, rel=0.01)
+
+
+def test_dives_are_counted_below_30_and_above_20_m():
+    """Waves around either depth make no dives of their own; one that is not over counts not."""
+    depth = np.array([0, 25, 31, 29, 31, 25, 19, 22, 19, 29, 40, 21, 40, 10, 500.0])
+    assert score(make_log(ticks(1.5), depth=depth))['dives'] == 2
+
+
+def test_overshoot_is_what_is_beyond_the_target():
+    t = ticks(100.0)
+    depth = 1003.5 - np.abs(t - 50.0)
+    assert score(make_log(t, depth=depth))['depth_m'] == {
+        'max': pytest.approx(1003.5),
+        'overshoot': pytest.approx(3.5),
+    }
+    assert score(make_log(t, depth=depth), target_m=1200.0)['depth_m']['overshoot'] == 0.0
+
+
+def test_distance_is_the_way_of_the_target():
+    """Around a circle of 100 m: its circumference, not the distance from start to end."""
+    t = ticks(1000.0)
+    angle = 2.0 * math.pi * t / t[-1]
+    log = make_log(t, target_n=100.0 * np.cos(angle), target_e=100.0 * np.sin(angle))
+    assert score(log)['distance_along_path_m'] == pytest.approx(200.0 * math.pi, rel=1e-6)
+
+
+def test_final_state_is_that_of_the_last_tick():
+    log = make_log(ticks(10.0), north=3.0, east=4.0, depth=5.0, theta=-0.3, psi=2.0)
+    log[-1, COLUMNS['odom']][7:10] = 0.5, 0.02, -0.03
+    final = score(log)['final_state']
+    assert final['position_ned_m'] == pytest.approx([3.0, 4.0, 5.0], abs=1e-12)
+    assert final['attitude_rpy_rad'] == pytest.approx([0.0, -0.3, 2.0], abs=1e-9)
+    assert final['velocity_mps'] == pytest.approx([0.5, -0.02, 0.03], abs=1e-12)
+
+
+@pytest.mark.parametrize(('share', 'infeasible'), [(0.4, False), (0.6, True)])
+def test_run_is_infeasible_from_half_of_the_scored_time_on(share, infeasible):
+    t = ticks(2000.0)
+    flag = (t > 1000.0) & (t < 1000.0 + share * 1000.0)
+    assert score(make_log(t, infeasible=flag), settle_s=1000.0)['infeasible'] is infeasible
+
+
+def reference_score(t, settle_s, depth, e2, theta, theta_ref, psi, rate_ref):
+    """Cross track, pitch and heading once more, from the words that define them."""
+    turns = t[1:][np.sign(rate_ref[1:]) != np.sign(rate_ref[:-1])]
+    scored = t > settle_s + 1e-6
+    steady = scored & (depth > 30.0)
+    for turn in turns:
+        steady &= np.abs(t - turn) > 600.0 + 1e-6
+    x = np.unwrap(psi)
+    mean = uniform_filter1d(x, 3001, mode='nearest')
+    deviation = np.degrees(x - mean)
+    pitch = np.degrees(theta - theta_ref)
+
+    def rms(values):
+        return np.sqrt(np.mean(np.square(values[steady])))
+
+    return {
+        'cross_track_m': {
+            'rms_steady': rms(e2),
+            'max_steady': np.abs(e2[steady]).max(),
+            'max_all': np.abs(e2[scored]).max(),
+        },
+        'pitch_error_deg': {
+            'rms_steady': rms(pitch),
+            'max_steady': np.abs(pitch[steady]).max(),
+        },
+        'heading_fluctuation_deg': {
+            'rms_steady': rms(deviation),
+            'max_steady': np.abs(deviation[steady]).max(),
+        },
+    }
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_scores_agree_with_an_independent_implementation(seed):
+    """A random sawtooth with coloured noise on everything; 1e-6 of each figure."""
+    rng = np.random.default_rng(seed)
+    t = ticks(12000.0)
+
+    def rough(scale, seconds):
+        return (
+            scale
+            * math.sqrt(seconds)
+            * uniform_filter1d(rng.standard_normal(len(t)), round(seconds / TICK_S))
+        )
+
+    period = rng.uniform(3000.0, 5000.0)
+    phase = (t / period) % 1.0
+    depth = 400.0 * (1.0 - np.abs(2.0 * phase - 1.0)) + 20.0 + rough(1.0, 60.0)
+    flight = {
+        'depth': depth,
+        'e2': rough(2.0, 100.0),
+        'theta': -0.5 + rough(0.01, 20.0),
+        'theta_ref': -0.5 + rough(0.01, 200.0),
+        'psi': (math.pi + rough(0.1, 100.0)) % (2.0 * math.pi) - math.pi,
+        'rate_ref': np.where(phase < 0.5, 0.25, -0.25),
+    }
+    settle_s = rng.uniform(0.0, 2000.0)
+    # the ends of the log, where the mean's window is cut, are at the surface
+    flight['depth'][(t < 200.0) | (t > 11800.0)] = 1.0
+    found = score(make_log(t, **flight), settle_s)
+    for group, figures in reference_score(t, settle_s, **flight).items():
+        for name, figure in figures.items():
+            assert found[group][name] == pytest.approx(figure, rel=1e-6), (group, name)
+
+
+@quick
+@given(st.lists(st.integers(1, 3000), max_size=6))
+def test_score_does_not_depend_on_the_blocks(cuts):
+    t = ticks(1000.0)
+    log = make_log(t, e2=np.sin(t), psi=0.1 * np.sin(t / 7.0))
+    scorer = Scorer()
+    for block in np.split(log, sorted(cuts)):
+        scorer.add(block)
+    assert scorer.ticks == len(t)
+    assert scorer.result(0.0, TARGET_M) == score(log)
+
+
+def test_scorer_keeps_nothing_of_a_block_by_reference():
+    """The direct engine uses its block again."""
+    log = make_log(ticks(800.0), e2=1.0)
+    scorer = Scorer()
+    scorer.add(log)
+    before = scorer.result(0.0, TARGET_M)
+    log[:] = 9.0
+    assert scorer.result(0.0, TARGET_M) == before

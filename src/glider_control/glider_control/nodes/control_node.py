@@ -1,0 +1,84 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Control as a node: odom, joint_states and reference in; command and wrench out."""
+
+import sys
+
+from glider_control.control import ControlSettings, control_step
+from glider_model.frames import odometry_from_wire, reference_from_wire, wrench_to_wire
+from glider_model.ros import health, messages
+from glider_model.ros.parameters import declare_settings
+from glider_model.ros.tick import BlockNode, run
+from glider_model.signals import TICK_S, Joints
+
+#: Bits of the saturation mask, by actuator.
+ACTUATORS = {1: 'buoyancy engine', 2: 'pitch mass', 4: 'roll mass'}
+
+#: A change of saturation is told at most once in this time (ns).
+TELL_EVERY_NS = 1_000_000_000
+
+
+class ControlNode(BlockNode):
+    """How to get there. Free-running, it surfaces the vehicle when an input is stale."""
+
+    def __init__(self, **kwargs) -> None:
+        super().__init__(messages.CONTROL, **kwargs)
+        settings = declare_settings(self, ControlSettings, self.on_settings)
+        self.params = settings.params()
+        self.state = settings.initial_state()
+        self.told, self.told_ns = 0, -TELL_EVERY_NS
+        self.publish_wrench = self.add_output('wrench')
+        self.publish_command = self.add_output('command')
+        self.add_input('reference')
+        self.add_input('odom')
+        self.add_input('joint_states')
+        self.compile_kernels()
+        self.start_up()
+
+    def on_settings(self, settings: ControlSettings) -> None:
+        """Fly on with tunable parameters that were set at run time."""
+        self.params = settings.params()
+
+    def compile_kernels(self) -> None:
+        """Call every kernel once, so that no tick waits for the compiler."""
+        level = (*(3 * (0.0,)), 1.0, *(9 * (0.0,)))
+        odometry, reference = odometry_from_wire(level), reference_from_wire(level)
+        joints = Joints(0.0, 0.0, 0.0)
+        _, out = control_step(self.state, odometry, joints, reference, self.params, TICK_S)
+        wrench_to_wire(out.wrench)
+
+    def step(self, stamp_ns: int, reference, odom, joint_states) -> None:
+        """Answer one tick."""
+        self.state, out = control_step(
+            self.state,
+            odometry_from_wire(odom),
+            Joints(*joint_states),
+            reference_from_wire(reference),
+            self.params,
+            TICK_S,
+        )
+        self.publish_wrench(stamp_ns, wrench_to_wire(out.wrench))
+        if out.saturation != self.told and stamp_ns - self.told_ns >= TELL_EVERY_NS:
+            self.tell(stamp_ns, out.saturation)
+        self.publish_command(stamp_ns, out.command)
+
+    def tell(self, stamp_ns: int, saturation: int) -> None:
+        """Put a change of saturation on /diagnostics."""
+        self.told, self.told_ns = saturation, stamp_ns
+        names = [name for bit, name in ACTUATORS.items() if saturation & bit]
+        level = health.WARN if names else health.OK
+        message = f'at its limit: {", ".join(names)}' if names else 'no actuator at its limit'
+        self.event(stamp_ns, level, message, saturation=saturation, t_s=stamp_ns / 1e9)
+
+    def on_stale(self, stamp_ns: int) -> None:
+        """Command maximum buoyancy and level roll."""
+        self.publish_command(stamp_ns, self.params.safe_command)
+
+
+def main(args=None) -> int:
+    """Run the node; returns its exit code."""
+    return run(ControlNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

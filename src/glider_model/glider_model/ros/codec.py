@@ -1,0 +1,262 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Messages as flat tuples of floats, without building message objects.
+
+A per-tick message differs from tick to tick in its stamp and in some float64 fields; everything
+else in its CDR bytes never changes. A `Codec` finds out where those numbers lie by serializing a
+template with recognisable values in them. From then on encoding is writing numbers into a copy of
+the template, and decoding is reading them, once the rest has been compared with the template. A
+message that is laid out otherwise (another publisher, other frame names, joints in another order,
+covariances filled) is deserialized and its fields are read by name: slower, same numbers.
+"""
+
+import math
+import operator
+import struct
+
+import numpy as np
+from rclpy.serialization import deserialize_message
+
+_SECOND_NS = 1_000_000_000
+_PRIMITIVES = {
+    'boolean': '?',
+    'octet': 'c',
+    'int8': 'b',
+    'uint8': 'B',
+    'char': 'B',
+    'int16': 'h',
+    'uint16': 'H',
+    'int32': 'i',
+    'uint32': 'I',
+    'int64': 'q',
+    'uint64': 'Q',
+    'float': 'f',
+    'double': 'd',
+}
+
+
+class MessageError(ValueError):
+    """A message that cannot be used: a field is missing or is not a finite number."""
+
+
+def to_cdr(message) -> bytes:
+    """Serialize any message as little-endian CDR whose padding is always zero.
+
+    The middleware leaves whatever was in memory between aligned fields, so the bytes of one
+    message differ from process to process. These do not, and readers take them all the same.
+    """
+    body = bytearray()
+    _write_fields(body, message)
+    return b'\x00\x01\x00\x00' + bytes(body)
+
+
+def _write_fields(body: bytearray, message) -> None:
+    for name, kind in message.get_fields_and_field_types().items():
+        _write(body, getattr(message, name), kind)
+
+
+def _write(body: bytearray, value, kind: str) -> None:
+    if kind.startswith('sequence<'):
+        item = kind[len('sequence<') : -1].split(',')[0]
+        _pack(body, 'I', len(value))
+        for element in value:
+            _write(body, element, item)
+    elif kind.endswith(']'):
+        item = kind[: kind.rindex('[')]
+        for element in value:
+            _write(body, element, item)
+    elif kind.startswith('string'):
+        text = value.encode() + b'\0'
+        _pack(body, 'I', len(text))
+        body += text
+    elif kind in _PRIMITIVES:
+        _pack(body, _PRIMITIVES[kind], value)
+    else:
+        _write_fields(body, value)
+
+
+def _pack(body: bytearray, code: str, value) -> None:
+    body += bytes(-len(body) % struct.calcsize(code))
+    body += struct.pack('<' + code, value)
+
+
+class Codec:
+    """How one kind of per-tick message maps to a stamp and a tuple of floats.
+
+    Parameters
+    ----------
+    template : message
+        A message with every constant field (frame names, joint names) filled in, and with
+        sequences of the length they have in flight.
+    fields : sequence of str
+        The float64 fields that carry the numbers, in the order of the tuple, as dotted paths
+        (``'pose.pose.position.x'``). ``'position[pitch_mass]'`` is the entry of a JointState that
+        belongs to that joint.
+    stamp : str
+        Path of the builtin_interfaces/Time field.
+    """
+
+    def __init__(self, template, fields, stamp: str = 'header.stamp') -> None:
+        self.message_type = type(template)
+        self.fields = tuple(fields)
+        self._stamp_path = stamp
+        numbers = [1.0e6 + index + 0.123456789 for index in range(len(self.fields))]
+        for path, number in zip(self.fields, numbers, strict=True):
+            _set(template, path, number)
+        time = operator.attrgetter(stamp)(template)
+        time.sec, time.nanosec = 0x01234567, 0x89ABCDEF
+        raw = to_cdr(template)
+        self._stamp_at = _find(raw, struct.pack('<iI', time.sec, time.nanosec), stamp)
+        self._offsets = [
+            _find(raw, struct.pack('<d', number), path)
+            for path, number in zip(self.fields, numbers, strict=True)
+        ]
+        self._lay_out(raw)
+
+    def _lay_out(self, raw: bytes) -> None:
+        """Group the numbers into runs of neighbours and keep the constant rest."""
+        order = sorted(range(len(self.fields)), key=self._offsets.__getitem__)
+        runs: list[list[int]] = []
+        for index in order:
+            at = self._offsets[index]
+            if runs and at == runs[-1][0] + 8 * runs[-1][1]:
+                runs[-1][1] += 1
+            else:
+                runs.append([at, 1])
+        holes = sorted([(self._stamp_at, 8)] + [(at, 8 * count) for at, count in runs])
+        template = bytearray(raw)
+        for at, size in holes:
+            template[at : at + size] = bytes(size)
+        self._template = bytes(template)
+        self.size = len(template)
+        start = 0
+        self._constants = []
+        for at, size in [*holes, (self.size, 0)]:
+            if at > start:
+                self._constants.append((start, at, self._template[start:at]))
+            start = at + size
+        self._stamp_format = struct.Struct('<iI')
+        self._runs = []
+        position = 0
+        for at, count in runs:
+            picked = order[position : position + count]
+            self._runs.append((struct.Struct(f'<{count}d'), at, tuple(picked)))
+            position += count
+        in_memory_order = order == list(range(len(order)))
+        inverse = [order.index(index) for index in range(len(order))]
+        self._reorder = None if in_memory_order else operator.itemgetter(*inverse)
+
+    def encode(self, stamp_ns: int, values) -> bytes:
+        """Bytes of the message with this stamp (ns) and these numbers, ready to publish."""
+        buffer = bytearray(self._template)
+        self._stamp_format.pack_into(
+            buffer, self._stamp_at, stamp_ns // _SECOND_NS, stamp_ns % _SECOND_NS
+        )
+        for run, at, picked in self._runs:
+            run.pack_into(buffer, at, *[values[index] for index in picked])
+        return bytes(buffer)
+
+    def encode_many(self, stamps_ns, values) -> np.ndarray:
+        """Bytes of n messages at once.
+
+        Parameters
+        ----------
+        stamps_ns : int64[n]
+            Stamps in ns.
+        values : float64[n, m]
+            One row per message, columns in the order of ``fields``.
+
+        Returns
+        -------
+        uint8[n, size]
+        """
+        stamps_ns = np.asarray(stamps_ns, np.int64)
+        values = np.asarray(values, np.float64)
+        out = np.empty((len(stamps_ns), self.size), np.uint8)
+        out[:] = np.frombuffer(self._template, np.uint8)
+        stamps = np.stack((stamps_ns // _SECOND_NS, stamps_ns % _SECOND_NS), axis=1)
+        at = self._stamp_at
+        out[:, at : at + 8] = stamps.astype('<u4').view(np.uint8).reshape(-1, 8)
+        for _, at, picked in self._runs:
+            block = np.ascontiguousarray(values[:, list(picked)], '<f8')
+            out[:, at : at + 8 * len(picked)] = block.view(np.uint8).reshape(len(out), -1)
+        return out
+
+    def decode(self, raw: bytes) -> tuple[int, tuple[float, ...]]:
+        """Stamp (ns) and numbers of a serialized message.
+
+        Raises
+        ------
+        MessageError
+            If a joint is missing, or a number is NaN or infinite.
+        """
+        if len(raw) != self.size:
+            return self._decode_foreign(raw)
+        for start, end, constant in self._constants:
+            if raw[start:end] != constant:
+                return self._decode_foreign(raw)
+        values: tuple[float, ...] = ()
+        for run, at, _ in self._runs:
+            values += run.unpack_from(raw, at)
+        if self._reorder is not None:
+            values = self._reorder(values)
+        self._refuse_non_finite(values)
+        sec, nanosec = self._stamp_format.unpack_from(raw, self._stamp_at)
+        return sec * _SECOND_NS + nanosec, values
+
+    def decode_stamp(self, raw: bytes) -> int:
+        """Stamp (ns) of a serialized message; its numbers are not looked at."""
+        if len(raw) == self.size:
+            sec, nanosec = self._stamp_format.unpack_from(raw, self._stamp_at)
+            return sec * _SECOND_NS + nanosec
+        return self._stamp_of(deserialize_message(raw, self.message_type))
+
+    def _decode_foreign(self, raw: bytes) -> tuple[int, tuple[float, ...]]:
+        message = deserialize_message(raw, self.message_type)
+        values = tuple(float(_get(message, path)) for path in self.fields)
+        self._refuse_non_finite(values)
+        return self._stamp_of(message), values
+
+    def _stamp_of(self, message) -> int:
+        time = operator.attrgetter(self._stamp_path)(message)
+        return time.sec * _SECOND_NS + time.nanosec
+
+    def _refuse_non_finite(self, values) -> None:
+        if math.isfinite(sum(values)):
+            return
+        for path, value in zip(self.fields, values, strict=True):
+            if not math.isfinite(value):
+                raise MessageError(f'{path} is {value}')
+
+
+def _find(raw: bytes, pattern: bytes, path: str) -> int:
+    if raw.count(pattern) != 1:
+        raise ValueError(f'{path} cannot be located in the serialized message')
+    return raw.index(pattern)
+
+
+def _split(path: str) -> tuple[str, str]:
+    name, _, joint = path.partition('[')
+    return name, joint.rstrip(']')
+
+
+def _set(message, path: str, value: float) -> None:
+    name, joint = _split(path)
+    if joint:
+        getattr(message, name)[list(message.name).index(joint)] = value
+        return
+    *owner, leaf = path.split('.')
+    setattr(operator.attrgetter('.'.join(owner))(message) if owner else message, leaf, value)
+
+
+def _get(message, path: str) -> float:
+    name, joint = _split(path)
+    if not joint:
+        return operator.attrgetter(path)(message)
+    names, values = list(message.name), getattr(message, name)
+    if joint not in names:
+        raise MessageError(f'joint {joint!r} is missing; the message has {names}')
+    index = names.index(joint)
+    if index >= len(values):
+        raise MessageError(f'{name} of joint {joint!r} is missing')
+    return values[index]

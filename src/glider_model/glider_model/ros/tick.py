@@ -1,0 +1,514 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""How nodes march in step.
+
+The header stamp is the identity of a tick. In lockstep a node acts on a tick once every input
+carries that tick's stamp, so there is no timer in the loop, nothing drifts, and a run gives the
+same result every time. Free-running nodes act at 10 Hz on the newest inputs and watch their age.
+
+The executor of rclpy pays for every entity that it waits for and for every message it dispatches.
+A node therefore waits for one input only, the one that comes last in a tick (`Gate`), and takes
+the others by hand when that one is there.
+"""
+
+import signal
+import sys
+import time
+from collections.abc import Callable
+
+import rclpy
+from pydantic import Field
+from rclpy.callback_groups import CallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+
+from glider_model.ros import health, messages, qos
+from glider_model.ros.codec import MessageError, to_cdr
+from glider_model.ros.health import Report
+from glider_model.ros.messages import TOPICS, Topic
+from glider_model.ros.parameters import declare_settings
+from glider_model.settings import ConfigurationError, Settings
+from glider_model.signals import TICK_NS, TICK_S
+
+#: The plant is never more than this many ticks ahead of what the recorder has on disk.
+MAX_TICKS_AHEAD = 256
+
+#: A node waits this long (wall time, s) for the recorder and its peers at the end of a run.
+FAREWELL_S = 5.0
+
+#: Exit codes of a node: bad configuration, and a peer that is missing, late or wrong.
+EXIT_CONFIGURATION, EXIT_PEER = 2, 3
+
+#: Middleware forgets messages of a node that is gone: leave them this time (s) to arrive.
+_LINGER_S = 0.2
+
+_STARTUP_PERIOD_S = 0.03
+_REPORT_AFTER = 0.4
+_QUIET_PUBLISHER = PublisherEventCallbacks(use_default_callbacks=False)
+_QUIET_SUBSCRIPTION = SubscriptionEventCallbacks(use_default_callbacks=False)
+
+
+class Stop(Exception):  # noqa: N818
+    """Ends the node with an exit code; any code but 0 comes with a message for the person."""
+
+    def __init__(self, code: int, message: str = '') -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class TickSettings(Settings):
+    """How a node keeps step; the same parameters for every node."""
+
+    lockstep: bool = Field(
+        True, description='act on ticks in step with the peers; else on the newest input at 10 Hz'
+    )
+    record: bool = Field(False, description='a recorder takes part: wait for it, never outrun it')
+    startup_timeout_s: float = Field(
+        60.0, ge=0.1, le=3600.0, description='wall time that peers have to get ready (s)'
+    )
+    tick_timeout_s: float = Field(
+        5.0, ge=0.1, le=3600.0, description='wall time in which a tick has to be complete (s)'
+    )
+    input_max_age_s: float = Field(
+        1.0, ge=0.05, le=3600.0, description='free-running: older input counts as stale (s)'
+    )
+
+
+class Gate(CallbackGroup):
+    """Lets the executor wait for the subscriptions in ``awaited`` only."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.awaited: set = set()
+
+    def can_execute(self, entity) -> bool:
+        """Whether the executor shall wait for this subscription."""
+        return entity in self.awaited
+
+    def beginning_execution(self, entity) -> bool:
+        """Nothing to hold back: there is one thread."""
+        return True
+
+    def ending_execution(self, entity) -> None:
+        """Nothing to let go."""
+
+    def replace(self, old, new) -> None:
+        """Await ``new`` instead of ``old``."""
+        self.awaited.discard(old)
+        self.awaited.add(new)
+
+
+def take(subscription):
+    """Oldest message of a subscription that has not been taken yet, or None."""
+    with subscription.handle:
+        taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+    return None if taken is None else taken[0]
+
+
+class Input:
+    """A subscription, and what it brought last."""
+
+    def __init__(self, topic: Topic) -> None:
+        self.topic = topic
+        self.subscription = None
+        self.stamp_ns = -1
+        self.values: tuple[float, ...] = ()
+        self.arrived_s = -float('inf')
+
+    def accept(self, raw: bytes) -> None:
+        """Keep a message.
+
+        Raises
+        ------
+        MessageError
+            Naming topic and publisher, if it cannot be used.
+        """
+        try:
+            self.stamp_ns, self.values = self.topic.codec.decode(raw)
+        except MessageError as error:
+            raise MessageError(f'{self.topic.name} of {self.topic.publisher}: {error}') from None
+
+
+class TickNode(Node):
+    """A node that takes part in the lockstep: readiness, reports, end of the run.
+
+    Subclasses add inputs and outputs in their constructor and call `start_up` at its end.
+    """
+
+    #: Settings class of the parameters that concern ticks.
+    tick_settings = TickSettings
+
+    def __init__(self, name: str, **kwargs) -> None:
+        super().__init__(name, **kwargs)
+        self.ticks = declare_settings(self, self.tick_settings)
+        self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
+        self.gate = Gate()
+        self.inputs: list[Input] = []
+        self.outputs: dict[str, tuple[Topic, object]] = {}
+        self.reports: dict[str, Report] = {}
+        events = TOPICS['/diagnostics']
+        self._events = self._publisher(events)
+        self.outputs[events.name] = (events, self._events)
+        self._events_in = self._subscription(events, self._on_event, raw=False)
+        self.gate.awaited.add(self._events_in)
+        self._awaited = None
+        self._due_ns: int | None = None
+        self._watched_ns: int | None = None
+        self._watched_since_s = 0.0
+        self._startup_timer = None
+        self._said = ''
+        self.running = False
+        self.over_since_s: float | None = None
+
+    # ------------------------------------------------------------------ inputs and outputs
+
+    def _publisher(self, topic: Topic):
+        return self.create_publisher(
+            topic.message_type, topic.name, topic.qos, event_callbacks=_QUIET_PUBLISHER
+        )
+
+    def _subscription(self, topic: Topic, callback, *, raw=True, gated=True, profile=None):
+        return self.create_subscription(
+            topic.message_type,
+            topic.name,
+            callback,
+            profile or topic.qos,
+            callback_group=self.gate if gated else None,
+            event_callbacks=_QUIET_SUBSCRIPTION,
+            raw=raw,
+        )
+
+    def add_output(self, name: str) -> Callable[..., None]:
+        """Publisher of a topic, as a function of (stamp_ns, numbers) for per-tick topics."""
+        topic = TOPICS[name]
+        publisher = self._publisher(topic)
+        self.outputs[name] = (topic, publisher)
+        if not topic.per_tick:
+            return lambda message: publisher.publish(to_cdr(message))
+        encode, publish = topic.codec.encode, publisher.publish
+        return lambda stamp_ns, values=(): publish(encode(stamp_ns, values))
+
+    def add_input(self, name: str) -> Input:
+        """Subscribe to a per-tick topic. Add the one that comes last in a tick first."""
+        item = Input(TOPICS[name])
+        if self.ticks.lockstep:
+            item.subscription = self._subscription(
+                item.topic, lambda raw: self._on_message(item, raw)
+            )
+            if not self.inputs:
+                self._await(item)
+        else:
+            item.subscription = self._subscription(
+                item.topic,
+                lambda raw: self._on_newest(item, raw),
+                gated=False,
+                profile=qos.NEWEST,
+            )
+        self.inputs.append(item)
+        return item
+
+    def event(self, stamp_ns: int, level: bytes, message: str, **values) -> None:
+        """Put an event of the flight on /diagnostics, and in the log if it is an error."""
+        if level == health.ERROR:
+            self.get_logger().error(message)
+        self.publish_event(health.status_array(stamp_ns, self.get_name(), level, message, values))
+
+    def publish_event(self, array) -> None:
+        """Put a DiagnosticArray on /diagnostics."""
+        self._events.publish(to_cdr(array))
+
+    def report(self, phase: str, message: str = '', **fields) -> None:
+        """Tell the peers how this node is."""
+        report = Report(self.get_name(), phase, message, **fields)
+        self._events.publish(to_cdr(health.report_array(report)))
+
+    def _on_event(self, array) -> None:
+        """Keep the newest report of every node."""
+        for report in health.reports_in(array):
+            self.reports[report.node] = report
+            self.on_report(report)
+
+    def on_report(self, report: Report) -> None:
+        """React to the report of a node: say goodbye when the plant ends the run."""
+        if report.node == messages.PLANT and report.phase == health.FAILED:
+            raise Stop(0)
+        if report.node == messages.PLANT and report.phase == health.FINISHED:
+            self.over_since_s = time.monotonic()
+            self.report(health.FINISHED, stamp_ns=report.stamp_ns)
+        if self.over_since_s is not None and self.may_leave():
+            raise Stop(0)
+
+    def close(self) -> None:
+        """Last act before the node is destroyed, whatever ended it."""
+
+    def may_leave(self) -> bool:
+        """Whether nobody needs this node any more once the run is over."""
+        recorder = self.reports.get(messages.RECORDER)
+        recorded = recorder is not None and recorder.phase == health.FINISHED
+        return recorded or not self.ticks.record
+
+    def wall_timer(self, period_s: float, callback):
+        """Timer on the steady clock, whatever use_sim_time says."""
+        return self.create_timer(period_s, callback, clock=self.steady_clock)
+
+    # ------------------------------------------------------------------ start
+
+    def start_up(self) -> None:
+        """Start looking for the peers."""
+        self.report(health.STARTING, 'looking for its peers')
+        self._startup_timer = self.wall_timer(_STARTUP_PERIOD_S, self._on_startup)
+
+    def unmatched(self) -> list[str]:
+        """What is missing between this node and its peers, in words; empty if all is matched."""
+        missing = []
+        for topic, publisher in self.outputs.values():
+            readers = list(topic.readers) if self.ticks.lockstep else []
+            if self.ticks.record and topic.recorded and self.get_name() != messages.RECORDER:
+                readers.append(messages.RECORDER)
+            if not readers:
+                continue
+            names = {info.node_name for info in self.get_subscriptions_info_by_topic(topic.name)}
+            absent = [reader for reader in readers if reader not in names]
+            missing += [f'{reader} does not subscribe to {topic.name}' for reader in absent]
+            if not absent and publisher.get_subscription_count() < len(readers):
+                missing.append(f'{topic.name} is not connected to {" and ".join(readers)}')
+        for item in self.inputs:
+            infos = self.get_publishers_info_by_topic(item.topic.name)
+            if item.topic.publisher not in {info.node_name for info in infos}:
+                missing.append(f'{item.topic.publisher} does not publish {item.topic.name}')
+            elif item.subscription.get_publisher_count() < 1:
+                missing.append(f'{item.topic.name} of {item.topic.publisher} is not connected')
+        return missing
+
+    def _on_startup(self) -> None:
+        missing = self.unmatched() if self.ticks.lockstep else []
+        if missing:
+            if self._said != missing[0]:
+                self._said = missing[0]
+                self.report(health.STARTING, missing[0])
+            return
+        self.destroy_timer(self._startup_timer)
+        self.running = True
+        self._watched_since_s = time.monotonic()
+        self.report(health.READY)
+        self.wall_timer(min(0.5, 0.1 * self.ticks.tick_timeout_s), self.watch)
+        self.on_ready()
+
+    def on_ready(self) -> None:
+        """Peers are matched; free-running nodes start their timer here."""
+
+    # ------------------------------------------------------------------ lockstep
+
+    def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
+        """Act on one tick. ``inputs`` are the numbers of the inputs in the order they were added.
+
+        Subclasses implement it.
+        """
+        raise NotImplementedError
+
+    def _on_message(self, item: Input, raw: bytes) -> None:
+        self._accept(item, raw)
+        self._fire()
+
+    def _accept(self, item: Input, raw: bytes) -> None:
+        try:
+            item.accept(raw)
+        except MessageError as error:
+            raise Stop(EXIT_PEER, str(error)) from None
+
+    def _fire(self) -> None:
+        """Act on every tick that is complete, then wait for the input that is missing."""
+        while self.over_since_s is None:
+            for item in self.inputs:
+                if not self._has(item):
+                    self._await(item)
+                    return
+            self.step(self._due_ns, *[item.values for item in self.inputs])
+            self._due_ns += TICK_NS
+
+    def _await(self, item: Input) -> None:
+        if self._awaited is not item.subscription:
+            self.gate.replace(self._awaited, item.subscription)
+            self._awaited = item.subscription
+
+    def _has(self, item: Input) -> bool:
+        """Whether an input carries the stamp of the tick that is due."""
+        while self._due_ns is None or item.stamp_ns < self._due_ns:
+            if self._due_ns is None and item.stamp_ns >= 0:
+                self._due_ns = item.stamp_ns
+                continue
+            raw = take(item.subscription)
+            if raw is None:
+                return False
+            self._accept(item, raw)
+        if item.stamp_ns > self._due_ns:
+            raise Stop(
+                EXIT_PEER,
+                f'{item.topic.publisher} skipped a tick: {item.topic.name} came for '
+                f'{seconds(item.stamp_ns)} when {seconds(self._due_ns)} was due',
+            )
+        return True
+
+    # ------------------------------------------------------------------ watching
+
+    def stuck_s(self) -> float:
+        """Wall time (s) for which the tick that is due has not changed."""
+        now = time.monotonic()
+        if self._watched_ns != self._due_ns:
+            self._watched_ns, self._watched_since_s = self._due_ns, now
+        return now - self._watched_since_s
+
+    def watch(self) -> None:
+        """Look after the run every now and then."""
+        if self.over_since_s is not None:
+            if time.monotonic() - self.over_since_s > FAREWELL_S:
+                raise Stop(0)
+        elif self.ticks.lockstep:
+            self.watch_tick()
+
+    def watch_tick(self) -> None:
+        """Tell the peers if this node waits for one of them; the plant ends the run."""
+        if self._due_ns is not None:
+            self._report_wait()
+
+    def _report_wait(self) -> None:
+        if self.stuck_s() < _REPORT_AFTER * self.ticks.tick_timeout_s:
+            return
+        self._watched_since_s = float('inf')
+        missing = [item for item in self.inputs if not self._has(item)]
+        if not missing:
+            self._fire()
+            return
+        idle = len(missing) == len(self.inputs)
+        topics = {item.topic.publisher: item.topic.name for item in missing}
+        peer = messages.PLANT if idle and messages.PLANT in topics else missing[0].topic.publisher
+        self.report(
+            health.WAITING,
+            f'waits for {topics[peer]} of {peer} at {seconds(self._due_ns)}',
+            stamp_ns=self._due_ns,
+            peer=peer,
+            topic=topics[peer],
+            level=health.OK if idle else health.WARN,
+        )
+
+    # ------------------------------------------------------------------ free-running
+
+    def _on_newest(self, item: Input, raw: bytes) -> None:
+        """Keep an input in free-running mode. A stamp that stands still does not refresh it."""
+        before = item.stamp_ns
+        try:
+            item.accept(raw)
+        except MessageError as error:
+            self.get_logger().error(str(error), throttle_duration_sec=1.0)
+            return
+        if item.stamp_ns != before:
+            item.arrived_s = time.monotonic()
+
+
+class BlockNode(TickNode):
+    """Guidance, control, current: a step per tick, and the free-running timer around it."""
+
+    def __init__(self, name: str, **kwargs) -> None:
+        super().__init__(name, **kwargs)
+        self._stale: list[str] = []
+
+    def on_ready(self) -> None:
+        """Start the timer of the free-running mode."""
+        if not self.ticks.lockstep:
+            self.wall_timer(TICK_S, self._on_cycle)
+
+    def _on_cycle(self) -> None:
+        oldest = time.monotonic() - self.ticks.input_max_age_s
+        stale = [item.topic.name for item in self.inputs if item.arrived_s < oldest]
+        stamp_ns = max(item.stamp_ns for item in self.inputs)
+        if stamp_ns < 0:
+            stamp_ns = self.get_clock().now().nanoseconds
+        if stale != self._stale:
+            self._stale = stale
+            if stale:
+                self.event(stamp_ns, health.ERROR, f'missing or stale: {", ".join(stale)}')
+            else:
+                self.event(stamp_ns, health.OK, 'inputs are fresh again')
+        if stale:
+            self.on_stale(stamp_ns)
+        else:
+            self.step(stamp_ns, *[item.values for item in self.inputs])
+
+    def on_stale(self, stamp_ns: int) -> None:
+        """Act in free-running mode while an input is stale; nothing by default."""
+
+
+class _NoGuard:
+    """Stands in for the guard condition that a handler triggers when it is done."""
+
+    def trigger(self) -> None:
+        pass
+
+
+class TickExecutor(SingleThreadedExecutor):
+    """A SingleThreadedExecutor that waits once per message instead of twice.
+
+    rclpy wakes its executor after every callback, for the sake of other threads that might wait
+    for the same callback group. Here there are none, and the wake-up only makes the next wait
+    return empty-handed.
+    """
+
+    def _make_handler(self, *args):
+        guard, self._guard = self._guard, _NoGuard()
+        try:
+            return super()._make_handler(*args)
+        finally:
+            self._guard = guard
+
+
+def seconds(stamp_ns: int) -> str:
+    """Simulated time, for a message."""
+    return f't = {stamp_ns / 1e9:.1f} s'
+
+
+def run(node_type: Callable[[], TickNode], args=None) -> int:
+    """Life of a node process: init, node, spin, clean end.
+
+    Returns
+    -------
+    int
+        Exit code: 0 at the end of the run and for SIGINT and SIGTERM, 2 for a bad parameter, 3
+        for a peer that is missing, late or wrong.
+    """
+    try:
+        rclpy.init(args=args)
+    except Exception as error:
+        return _say(Stop(EXIT_CONFIGURATION, f'bad command line: {error}'))
+    node, stop = None, Stop(0)
+    try:
+        node = node_type()
+        executor = TickExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Stop as reason:
+        stop = reason
+    except ConfigurationError as error:
+        stop = Stop(EXIT_CONFIGURATION, str(error))
+    except Exception:
+        if rclpy.ok():
+            raise
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        if node is not None:
+            node.close()
+            if rclpy.ok():
+                time.sleep(_LINGER_S)
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return _say(stop)
+
+
+def _say(stop: Stop) -> int:
+    if stop.code:
+        print(f'fatal: {stop}', file=sys.stderr, flush=True)
+    return stop.code

@@ -1,0 +1,113 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flights of the plant for all tests of the model: the tick loop compiled, rows as arrays."""
+
+import numba
+import numpy as np
+import pytest
+
+from glider_model.frames import quaternion_from_euler
+from glider_model.plant import Motion, PlantParams, PlantState, plant_step
+from glider_model.signals import TICK_S, Joints, Water
+from glider_model.vehicle import load_vehicle
+from glider_model.water import WaterSettings
+
+
+# Not kept between runs: a cached function remembers the name of its module, and that depends on
+# the folder pytest is started in.
+@numba.njit(error_model='numpy')
+def _fly(state, commands, waters, params, dt):
+    count = len(commands)
+    rows = np.empty((count + 1, 16))
+    for i in range(count + 1):
+        motion, joints = state.motion, state.joints
+        for j, number in enumerate(motion):
+            rows[i, j] = number
+        rows[i, 13], rows[i, 14], rows[i, 15] = joints.m_b, joints.x_p, joints.mu
+        if i < count:
+            command = Joints(commands[i, 0], commands[i, 1], commands[i, 2])
+            water = Water(waters[i, 0], waters[i, 1], waters[i, 2])
+            state = plant_step(state, command, water, params, dt)
+    return rows, state
+
+
+class Flight:
+    """History of a flight; row 0 is the start. Columns are those of Motion, then of Joints."""
+
+    def __init__(self, rows, state):
+        self.rows, self.state = rows, state
+        self.t_s = TICK_S * np.arange(len(rows))
+
+    def __getattr__(self, name):
+        return self.rows[:, (*Motion._fields, *Joints._fields).index(name)]
+
+    @property
+    def position(self):
+        return self.rows[:, 0:3]
+
+    @property
+    def quaternion(self):
+        return self.rows[:, 3:7]
+
+    @property
+    def velocity(self):
+        """Velocity through the water, then angular rates (m/s, rad/s)."""
+        return self.rows[:, 7:13]
+
+    @property
+    def euler(self):
+        """Roll, pitch, heading (rad)."""
+        w, x, y, z = self.quaternion.T
+        return np.stack(
+            [
+                np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+                np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0)),
+                np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+            ],
+            axis=1,
+        )
+
+
+def _plant_params(vehicle='zhang2021', **water):
+    params = load_vehicle(vehicle).params() if isinstance(vehicle, str) else vehicle
+    return PlantParams(params, WaterSettings(**water).params(), 10**9, 0, 0)
+
+
+def _start(position=(0.0, 0.0, 100.0), euler=(0.0, 0.0, 0.0), velocity=(), joints=(0.0, 0.0, 0.0)):
+    velocity = tuple(float(number) for number in velocity) or (0.4, 0.0, 0.0, 0.0, 0.0, 0.0)
+    motion = Motion(
+        *(float(number) for number in position), *quaternion_from_euler(*euler), *velocity
+    )
+    joints = Joints(*(float(number) for number in joints))
+    return PlantState(motion, joints, Water(0.0, 0.0, 0.0), 0, False, 0, 0)
+
+
+def _flight(params, state, seconds, commands=None, waters=(0.0, 0.0, 0.0)):
+    count = round(seconds / TICK_S)
+    commands = state.joints if commands is None else commands
+    arrays = (
+        np.ascontiguousarray(np.broadcast_to(np.asarray(array, dtype=float), (count, 3)))
+        for array in (commands, waters)
+    )
+    return Flight(*_fly(state, *arrays, params, TICK_S))
+
+
+@pytest.fixture(scope='session')
+def plant_params():
+    """``plant_params(vehicle, **water)``: PlantParams of a vehicle by name or parameters."""
+    return _plant_params
+
+
+@pytest.fixture(scope='session')
+def start():
+    """``start(position, euler, velocity, joints)``: a PlantState at tick 0."""
+    return _start
+
+
+@pytest.fixture(scope='session')
+def fly():
+    """``fly(params, state, seconds, commands, waters)``: a Flight.
+
+    Commands (default: actuators stay) and waters are one row, or one row per tick.
+    """
+    return _flight

@@ -1,0 +1,282 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes in step: order, exactness, readiness, blame, pause, pace, and the free-running mode."""
+
+import fcntl
+import os
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.parameter import Parameter
+from std_srvs.srv import SetBool
+
+from glider_model.ros import health
+from glider_model.ros.clock import ClockNode
+from glider_model.ros.messages import CONTROL, CURRENT, GUIDANCE, PLANT, TOPICS
+from glider_model.ros.tick import BlockNode, Stop, TickExecutor
+from glider_model.signals import TICK_NS
+
+TIMEOUT_S = 30.0
+
+
+@pytest.fixture
+def context():
+    """A context in a ROS domain that no other test or run on this machine uses."""
+    for offset in range(101):
+        domain = 1 + (os.getpid() + offset) % 101
+        path = Path(tempfile.gettempdir()) / f'glider-ros-domain-{domain}.lock'
+        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            break
+        except OSError:
+            os.close(lock)
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    yield context
+    rclpy.try_shutdown(context=context)
+    os.close(lock)
+
+
+class Clock(ClockNode):
+    """Stands in for the plant: counts, and remembers what it was told."""
+
+    def __init__(self, last_tick: int = 50, **kwargs) -> None:
+        super().__init__(PLANT, **kwargs)
+        self.last_tick, self.log = last_tick, []
+        self.publish = [self.add_output(name) for name in ('/clock', 'odom', 'joint_states')]
+        self.add_input('command')
+        self.add_input('current_velocity')
+        self.start_up()
+
+    def publish_tick(self, stamp_ns: int) -> None:
+        clock, odom, joints = self.publish
+        value = float(self.tick)
+        clock(stamp_ns)
+        odom(stamp_ns, 13 * (value,))
+        joints(stamp_ns, 3 * (-value,))
+
+    def complete_tick(self, command, current) -> bool:
+        self.log.append((time.monotonic(), self.tick, command, current))
+        return self.tick < self.last_tick
+
+
+class Block(BlockNode):
+    """Stands in for a block: sends on the sum of the first numbers of its inputs."""
+
+    def __init__(self, name, inputs, outputs, mute_from=None, **kwargs) -> None:
+        super().__init__(name, **kwargs)
+        self.mute_from_ns = None if mute_from is None else mute_from * TICK_NS
+        self.steps, self.stale_steps = [], 0
+        self.publish = {name: self.add_output(name) for name in outputs}
+        for item in inputs:
+            self.add_input(item)
+        self.start_up()
+
+    def step(self, stamp_ns: int, *inputs) -> None:
+        self.steps.append(stamp_ns)
+        if self.mute_from_ns is not None and stamp_ns >= self.mute_from_ns:
+            return
+        total = sum(values[0] for values in inputs)
+        for name, publish in self.publish.items():
+            publish(stamp_ns, len(TOPICS[name].codec.fields) * (total,))
+
+    def on_stale(self, stamp_ns: int) -> None:
+        self.stale_steps += 1
+
+
+INPUTS = {
+    CURRENT: ['odom'],
+    GUIDANCE: ['odom'],
+    CONTROL: ['reference', 'odom', 'joint_states'],
+}
+OUTPUTS = {
+    CURRENT: ['current_velocity'],
+    GUIDANCE: ['tracking_error', 'current_estimate', 'reference'],
+    CONTROL: ['wrench', 'command'],
+}
+
+
+class Graph:
+    """Some of the nodes in one executor, spun until the plant stops."""
+
+    def __init__(self, context, without=(), mute=None, last_tick=50, **parameters) -> None:
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        shared = {'context': context, 'namespace': '/glider', 'use_global_arguments': False}
+        common = [p for p in overrides if p.name != 'speed']
+        self.executor = TickExecutor(context=context)
+        self.blocks = {
+            name: Block(
+                name,
+                INPUTS[name],
+                OUTPUTS[name],
+                (mute or {}).get(name),
+                parameter_overrides=common,
+                **shared,
+            )
+            for name in (CURRENT, GUIDANCE, CONTROL)
+            if name not in without
+        }
+        self.plant = Clock(last_tick, parameter_overrides=overrides, **shared)
+        self.nodes = [self.plant, *self.blocks.values()]
+        for node in self.nodes:
+            self.executor.add_node(node)
+
+    def spin(self, until=lambda: False) -> Stop | None:
+        """Spin until a condition holds, or until a node stops; that node's reason."""
+        deadline = time.monotonic() + TIMEOUT_S
+        while not until():
+            assert time.monotonic() < deadline, 'the graph hangs'
+            try:
+                self.executor.spin_once(timeout_sec=0.1)
+            except Stop as stop:
+                return stop
+        return None
+
+    def spin_until_over(self) -> Stop:
+        stop = self.spin(lambda: self.plant.over_since_s is not None)
+        assert stop is None or stop.code
+        return stop
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        for node in self.nodes:
+            node.destroy_node()
+
+
+@pytest.fixture
+def make_graph(context):
+    graphs = []
+
+    def make(**arguments):
+        graphs.append(Graph(context, **arguments))
+        return graphs[-1]
+
+    yield make
+    for graph in graphs:
+        graph.close()
+
+
+def test_every_tick_is_acted_on_once_and_in_order(make_graph):
+    graph = make_graph(last_tick=200)
+    assert graph.spin_until_over() is None
+    ticks = list(range(201))
+    assert [tick for _, tick, _, _ in graph.plant.log] == ticks
+    for block in graph.blocks.values():
+        assert block.steps == [tick * TICK_NS for tick in ticks]
+
+
+def test_a_node_uses_the_inputs_of_its_tick_and_no_other(make_graph):
+    graph = make_graph(last_tick=100)
+    graph.spin_until_over()
+    # reference = odom = k, joint_states = -k: control sends k + k - k
+    for _, tick, command, current in graph.plant.log:
+        assert command == 3 * (float(tick),)
+        assert current == 3 * (float(tick),)
+
+
+def test_everybody_leaves_when_the_run_is_complete(make_graph):
+    graph = make_graph(last_tick=3)
+    for _ in graph.nodes:
+        stop = graph.spin()
+        assert stop.code == 0
+
+
+@pytest.mark.parametrize('missing', [CURRENT, GUIDANCE, CONTROL])
+def test_missing_peer_is_named(make_graph, missing):
+    graph = make_graph(without=[missing], startup_timeout_s=1.0)
+    stop = graph.spin()
+    assert stop.code == 3
+    assert f'{missing} has not appeared' in str(stop)
+    assert graph.plant.log == []
+
+
+def test_missing_recorder_is_named(make_graph):
+    graph = make_graph(startup_timeout_s=1.0, record=True)
+    assert 'recorder_node has not appeared' in str(graph.spin())
+
+
+@pytest.mark.parametrize(
+    ('culprit', 'topic'),
+    [(CURRENT, 'current_velocity'), (GUIDANCE, 'reference'), (CONTROL, 'command')],
+)
+def test_node_that_falls_silent_is_named(make_graph, culprit, topic):
+    graph = make_graph(mute={culprit: 20}, tick_timeout_s=1.0)
+    stop = graph.spin()
+    assert stop.code == 3
+    assert str(stop).startswith(f'{culprit} did not publish {topic} for t = 2.0 s')
+
+
+def test_number_that_is_not_finite_stops_the_run(make_graph):
+    graph = make_graph()
+    guidance = graph.blocks[GUIDANCE]
+    send = guidance.publish['reference']
+    guidance.publish['reference'] = lambda stamp_ns, values: send(
+        stamp_ns, values if stamp_ns < 5 * TICK_NS else 13 * (float('nan'),)
+    )
+    stop = graph.spin()
+    assert stop.code == 3
+    assert 'reference of guidance_node' in str(stop)
+    assert 'nan' in str(stop)
+
+
+def test_speed_is_kept_without_drift(make_graph):
+    graph = make_graph(last_tick=40, speed=10.0)
+    graph.spin_until_over()
+    times = [wall_s for wall_s, *_ in graph.plant.log]
+    # tick k is not published before start + k * 10 ms, and answered soon after
+    assert times[40] - times[0] > 0.4 - 0.05
+    assert times[40] - times[0] < 0.4 + 2.0
+
+
+def test_pause_holds_the_run_and_is_not_taken_for_a_fault(make_graph, context):
+    graph = make_graph(last_tick=10**9, tick_timeout_s=0.5)
+    client_node = rclpy.create_node('client', namespace='/glider', context=context)
+    graph.nodes.append(client_node)
+    graph.executor.add_node(client_node)
+    client = client_node.create_client(SetBool, 'pause')
+    assert graph.spin(lambda: graph.plant.tick > 10 and client.service_is_ready()) is None
+
+    future = client.call_async(SetBool.Request(data=True))
+    assert graph.spin(future.done) is None
+    held_at, until = graph.plant.tick, time.monotonic() + 1.0
+    assert graph.spin(lambda: time.monotonic() > until) is None
+    assert graph.plant.tick <= held_at + 1
+
+    future = client.call_async(SetBool.Request(data=False))
+    assert graph.spin(future.done) is None
+    assert graph.spin(lambda: graph.plant.tick > held_at + 20) is None
+
+
+def test_free_running_acts_on_the_newest_input(make_graph):
+    graph = make_graph(last_tick=10, lockstep=False, speed=2.0)
+    assert graph.spin_until_over() is None
+    assert len(graph.plant.log) == 11
+    assert graph.blocks[CONTROL].steps
+
+
+def test_free_running_node_notices_stale_input_and_recovers(make_graph):
+    graph = make_graph(last_tick=10**9, lockstep=False, input_max_age_s=0.3)
+    control, guidance = graph.blocks[CONTROL], graph.blocks[GUIDANCE]
+    assert graph.spin(lambda: len(control.steps) > 2) is None
+    guidance.mute_from_ns, before = 0, control.stale_steps
+    assert graph.spin(lambda: control.stale_steps > before + 2) is None
+    guidance.mute_from_ns, before = None, len(control.steps)
+    assert graph.spin(lambda: len(control.steps) > before + 2) is None
+
+
+def test_reports_survive_the_way_over_diagnostics():
+    report = health.Report(
+        'guidance_node', health.WAITING, 'waits', 300_000_000, PLANT, 'odom', health.WARN
+    )
+    array = health.report_array(report)
+    assert health.reports_in(array) == [report]
+    assert not health.is_routine(array)
+    assert health.is_routine(health.report_array(report._replace(level=health.OK)))
+    event = health.status_array(0, 'guidance_node', health.OK, 'gliding down', {'stage': 1})
+    assert health.reports_in(event) == []
+    assert not health.is_routine(event)
