@@ -44,11 +44,12 @@ COLUMNS = {
     'current_estimate': slice(35, 38),
     'command': slice(38, 41),
     'wrench': slice(41, 44),
-    'stage': 44,
-    'infeasible': 45,
-    'saturation': 46,
+    'adaptation': slice(44, 57),
+    'stage': 57,
+    'infeasible': 58,
+    'saturation': 59,
 }
-ROW = 47
+ROW = 60
 #: Ticks that are flown before the log is handed on: one hour.
 BLOCK_TICKS = 36000
 
@@ -121,9 +122,10 @@ def fly(state, params, log, dt):
         _put(log, row, 35, water_to_wire(guided.current))
         _put(log, row, 38, controlled.command)
         _put(log, row, 41, wrench_to_wire(controlled.wrench))
-        log[row, 44] = guided.stage
-        log[row, 45] = guided.infeasible
-        log[row, 46] = controlled.saturation
+        _put(log, row, 44, controlled.adaptation)
+        log[row, 57] = guided.stage
+        log[row, 58] = guided.infeasible
+        log[row, 59] = controlled.saturation
         finished = plant_finished(plant, params.plant)
         plant = plant_step(
             plant, controlled.command, water_from_wire(water_wire), params.plant, dt

@@ -33,6 +33,7 @@ from glider_model.frames import wrap_angle
 from glider_model.kernel import kernel
 from glider_model.rigid_body import GRAVITY
 from glider_model.settings import Settings
+from glider_model.signals import Adaptation
 from glider_model.vehicle import VehicleParams
 
 _TUNABLE = {'tunable': True}
@@ -41,6 +42,8 @@ _TUNABLE = {'tunable': True}
 SCALE_ALPHA, SCALE_V2, SCALE_SIDE, SCALE_ROLL_RATE, SCALE_PITCH_RATE = 0.01, 0.25, 2.0, 0.05, 0.03
 #: Adaptation waits below this speed (m/s) and vertical rate (m/s), and this long after a turn (s).
 LEARN_SPEED, LEARN_VERTICAL_RATE, LEARN_AFTER_S = 0.15, 0.12, 20.0
+#: Heading error at which the roll command may reach its limit (rad).
+SATURATING_ERROR = 0.2
 #: Natural frequency of the filter on the virtual rate command (rad/s), and its rate limit.
 RATE_FILTER = FilterParams(2.0, 10.0)
 
@@ -73,7 +76,7 @@ class AdaptiveSettings(Settings):
 
     pitch: ChannelSettings = Field(ChannelSettings(), description='pitch channel')
     roll: ChannelSettings = Field(
-        ChannelSettings(l1_per_s=0.3, b1=6.0, b2=3.0, gamma=1.0), description='roll channel'
+        ChannelSettings(l1_per_s=0.3, b1=6.0, b2=3.0, gamma=0.2), description='roll channel'
     )
     heading_kp_per_s: float = Field(
         0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=_TUNABLE
@@ -242,14 +245,17 @@ def bank_to_turn(state, measured, reference, speed, params, dt):
         else:
             climb = now
     error = wrap_angle(reference.psi - measured.psi)
+    limit = math.sin(params.roll_limit)
+    authority = effective_steering(now, params.steering) * ratio
+    # a vehicle that steers weakly is not asked for a bandwidth it does not have
+    heading_kp = min(params.heading_kp, abs(authority) * limit / SATURATING_ERROR)
     turn = (
         reference.psi_dot
-        + params.heading_kp * error
+        + heading_kp * error
         + params.heading_kd * (reference.psi_dot - measured.psi_dot)
         - now.d
     )
-    limit = math.sin(params.roll_limit)
-    demand = turn / (effective_steering(now, params.steering) * ratio)
+    demand = turn / authority
     return math.asin(min(limit, max(-limit, demand))), dive, climb, lagged, steady_s
 
 
@@ -354,3 +360,33 @@ def adaptive_step(
         steady_s,
     )
     return new_state, tau_p, tau_q
+
+
+@kernel
+def adaptation(state, params):
+    """What the law has learnt, with the Lyapunov functions of its errors.
+
+    V1 = 1/2 sum B1 K1bar^2 and V2 = V1 + 1/2 sum M K2bar^2: equations (22) and (26) without the
+    term of the parameter errors, which nobody knows in flight.
+    """
+    roll, pitch = state.roll_channel, state.pitch_channel
+    v_1 = 0.5 * (params.roll.b1 * roll.k1 * roll.k1 + params.pitch.b1 * pitch.k1 * pitch.k1)
+    v_2 = v_1 + 0.5 * (
+        params.roll.inertia * roll.k2 * roll.k2 + params.pitch.inertia * pitch.k2 * pitch.k2
+    )
+    th_p, th_q = state.roll_theta, state.pitch_theta
+    return Adaptation(
+        th_p[0],
+        th_p[1],
+        th_p[2],
+        th_q[0],
+        th_q[1],
+        th_q[2],
+        th_q[3],
+        state.dive.b,
+        state.dive.d,
+        state.climb.b,
+        state.climb.d,
+        v_1,
+        v_2,
+    )

@@ -15,6 +15,7 @@ from glider_control.adaptive import (
     AdaptiveParams,
     AdaptiveSettings,
     AdaptiveState,
+    adaptation,
     adaptive_step,
     initial_adaptive,
     make_adaptive,
@@ -46,7 +47,7 @@ from glider_model.polar import (
 )
 from glider_model.rigid_body import GRAVITY
 from glider_model.settings import Settings
-from glider_model.signals import Joints, Wrench
+from glider_model.signals import Adaptation, Joints, Wrench
 from glider_model.vehicle import load_vehicle
 
 _TUNABLE = {'tunable': True}
@@ -180,6 +181,7 @@ class ControlOutput(NamedTuple):
 
     command: Joints
     wrench: Wrench
+    adaptation: Adaptation
     saturation: int  #: sum of SATURATED_* bits
 
 
@@ -236,6 +238,7 @@ def control_step(state, odometry, joints, reference, params, dt):
 
     held = (abs(last.mu) >= limits.mu_max, abs(last.x_p) >= limits.x_p_max)
     adaptive, pid = state.adaptive, state.pid
+    learnt = Adaptation(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if params.adapts:
         steep = steepen(measured.theta)
         adaptive, tau_p, tau_q = adaptive_step(
@@ -250,6 +253,7 @@ def control_step(state, odometry, joints, reference, params, dt):
             params.adaptive,
             dt,
         )
+        learnt = adaptation(adaptive, params.adaptive)
     else:
         pid, tau_p, tau_q = pid_step(
             pid, measured, reference, speed, held[1], held[0], params.pid, dt
@@ -272,5 +276,5 @@ def control_step(state, odometry, joints, reference, params, dt):
         saturation |= SATURATED_PITCH
     if abs(command.mu) >= limits.mu_max:
         saturation |= SATURATED_ROLL
-    output = ControlOutput(command, Wrench(m_b * GRAVITY, tau_p, tau_q), saturation)
+    output = ControlOutput(command, Wrench(m_b * GRAVITY, tau_p, tau_q), learnt, saturation)
     return ControlState(state.tick + 1, measured, adaptive, pid, trim, command), output

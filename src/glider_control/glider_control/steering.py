@@ -38,7 +38,7 @@ class SteeringLearningSettings(Settings):
         0.002, gt=0.0, le=0.1, description='standard deviation of d before it is known (rad/s)'
     )
     disturbance_drift_radps: float = Field(
-        0.001, ge=0.0, le=0.1, description='change of d to be expected in 1000 s (rad/s)'
+        0.0003, ge=0.0, le=0.1, description='change of d to be expected in 1000 s (rad/s)'
     )
     noise_radps: float = Field(
         0.002, gt=0.0, le=0.1, description='yaw rate that the model does not explain (rad/s)'

@@ -76,7 +76,14 @@ class LosSettings(Settings):
         40.0,
         ge=1.0,
         le=10000.0,
-        description='lookahead of the observer method (m)',
+        description='least lookahead of the observer method (m)',
+        json_schema_extra={'tunable': True},
+    )
+    lookahead_s: float = Field(
+        100.0,
+        ge=0.0,
+        le=3600.0,
+        description='lookahead of the observer method in time at the speed over ground (s)',
         json_schema_extra={'tunable': True},
     )
     delta1_m: float = Field(
@@ -170,6 +177,7 @@ class GuidanceSettings(GuidanceLawSettings):
             make_polar(vehicle),
             self.los.method == 'observer',
             self.los.lookahead_m if self.los.method == 'observer' else self.los.delta1_m,
+            self.los.lookahead_s if self.los.method == 'observer' else 0.0,
             self.los.delta1_per_s,
             self.los.delta2,
             ObserverParams(self.observer.k3_per_s, self.observer.k4_per_s2),
@@ -199,7 +207,8 @@ class GuidanceParams(NamedTuple):
     profile: ProfileParams
     polar: Polar
     compensates: bool  #: crab into the estimated current
-    lookahead: float  #: (m)
+    lookahead: float  #: (m), at least
+    lookahead_s: float  #: times the speed over ground, if that is more
     target_gain: float  #: delta1 (1/s)
     vertical_ratio: float  #: delta2
     observer: ObserverParams
@@ -343,7 +352,10 @@ def guidance_step(state, odometry, params, dt):
         speed += dt / SPEED_FILTER_S * (model_speed - speed)
 
     # direction to fly
-    gamma_r, rho_r = approach_angles(e2, e3, params.lookahead, params.vertical_ratio)
+    lookahead = max(
+        params.lookahead, params.lookahead_s * math.sqrt(ground_n * ground_n + ground_e * ground_e)
+    )
+    gamma_r, rho_r = approach_angles(e2, e3, lookahead, params.vertical_ratio)
     if not follows_path:
         rho_r = 0.0
     chi_d, upsilon_d = desired_direction(gamma_d, rho_d, gamma_r, rho_r)

@@ -9,6 +9,8 @@ M = M_RB + M_A = [[A, B], [B^T, D]] with A diagonal, which makes its inverse a 3
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from glider_model.kernel import kernel
 
 GRAVITY = 9.81  #: (m/s^2)
@@ -162,3 +164,32 @@ def coriolis(u, v, w, p, q, r, inertia, vehicle):
         s_z * c_x - s_x * c_z + r * h_x - p * h_z + w * a_x - u * a_z,
         s_x * c_y - s_y * c_x + p * h_y - q * h_x + u * a_y - v * a_x,
     )
+
+
+def mass_matrix(x_p: float, mu: float, vehicle) -> np.ndarray:
+    """M = M_RB + M_A, float64[6, 6], for positions of the pitch (m) and roll mass (rad)."""
+    s_x, s_y, s_z, i_xx, i_yy, i_zz, i_xy, i_xz, i_yz = rigid_body(x_p, mu, vehicle)
+    m = vehicle.m
+    matrix = np.diag(
+        [
+            m + vehicle.a_11,
+            m + vehicle.a_22,
+            m + vehicle.a_33,
+            i_xx + vehicle.a_44,
+            i_yy + vehicle.a_55,
+            i_zz + vehicle.a_66,
+        ]
+    )
+    coupling = np.array(
+        [
+            [0.0, s_z, -s_y],
+            [-s_z, 0.0, s_x + vehicle.a_26],
+            [s_y, -s_x + vehicle.a_35, 0.0],
+        ]
+    )
+    matrix[:3, 3:] = coupling
+    matrix[3:, :3] = coupling.T
+    matrix[3, 4] = matrix[4, 3] = i_xy
+    matrix[3, 5] = matrix[5, 3] = i_xz
+    matrix[4, 5] = matrix[5, 4] = i_yz
+    return matrix

@@ -74,3 +74,21 @@ class Wrench(NamedTuple):
     tau_w: float  #: heave force, + down (N)
     tau_p: float  #: roll moment (N m)
     tau_q: float  #: pitch moment (N m)
+
+
+class Adaptation(NamedTuple):
+    """What the adaptive law has learnt; all zero under the PID law."""
+
+    roll_bias_nm: float  #: parameters of the roll moment (N m)
+    roll_side_force_nm: float
+    roll_damping_nm: float
+    pitch_bias_nm: float  #: parameters of the pitch moment (N m)
+    pitch_alpha_nm: float
+    pitch_speed_nm: float
+    pitch_damping_nm: float
+    steering_dive_radps: float  #: turn rate over sin(roll) at 0.5 m/s, and its offset
+    disturbance_dive_radps: float
+    steering_climb_radps: float
+    disturbance_climb_radps: float
+    lyapunov_1: float  #: V1 and V2 without the part of the unknown parameter errors
+    lyapunov_2: float

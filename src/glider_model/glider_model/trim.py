@@ -90,9 +90,7 @@ def solve_trim(
         )
         motion = Motion(0.0, 0.0, 100.0, *q, u, v, w, p, q_rate, r)
         inertia = make_inertia(x_p, mu, vehicle)
-        return np.array(
-            acceleration(motion, net_heaviness_kg, inertia, _STILL, vehicle, _UNIFORM)
-        )
+        return np.array(acceleration(motion, net_heaviness_kg, inertia, _STILL, vehicle, _UNIFORM))
 
     sign = math.copysign(1.0, net_heaviness_kg)
     best = None
@@ -102,7 +100,7 @@ def solve_trim(
         fourth = theta if pitch_deg is None else 0.0
         z = np.array([0.5, 0.0, sign * 0.01, fourth, 0.0, 0.0])
         target, solved = mu, True
-        for mu in np.linspace(0.0, target, 2 + int(abs(target) / 0.05)):
+        for mu in np.linspace(0.0, target, 2 + int(abs(target) / 0.05)):  # noqa: B007
             answer = root(residual, z, method='hybr', tol=1e-13)
             z = answer.x
             upright = abs(unpack(z)[3]) < 0.5 * math.pi and abs(z[4]) < 0.5 * math.pi

@@ -7,9 +7,11 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
+import numpy as np
 import pydantic
 from pydantic import Field
 
+from glider_model.rigid_body import mass_matrix
 from glider_model.settings import ConfigurationError, Settings, read_yaml, validate
 
 VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
@@ -21,7 +23,7 @@ def quantity(unit: str, **limits: float) -> type[Settings]:
     return pydantic.create_model(
         f'Quantity[{unit}]',
         __base__=Settings,
-        value=(float, Field(description=f'number in {unit}', **limits)),
+        value=(float, Field(strict=True, description=f'number in {unit}', **limits)),
         unit=(Literal[unit], Field(description='unit of the value')),
         source=(str, Field(min_length=3, description='where the number comes from')),
     )
@@ -147,6 +149,20 @@ class Vehicle(Settings):
     added_mass: AddedMassSettings
     hydrodynamics: HydrodynamicsSettings
     steering: SteeringSettings
+
+    @pydantic.model_validator(mode='after')
+    def _mass_is_positive(self):
+        params = self.params()
+        for x_p in (-params.x_p_max, 0.0, params.x_p_max):
+            for mu in (0.0, 0.5 * params.mu_max, params.mu_max):
+                smallest = float(np.linalg.eigvalsh(mass_matrix(x_p, mu, params))[0])
+                if not smallest > 0.0:
+                    raise ValueError(
+                        f'rigid_body, moving_mass and added_mass make a mass matrix that is not '
+                        f'positive definite with pitch_mass = {x_p:g} m, roll_mass = {mu:.3g} rad: '
+                        f'its smallest eigenvalue is {smallest:.3g} (allowed: > 0)'
+                    )
+        return self
 
     def params(self) -> 'VehicleParams':
         """Kernel parameters, SI and radians."""

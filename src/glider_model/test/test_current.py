@@ -40,7 +40,7 @@ def water(current: CurrentSettings, depth_m=0.0, t_s=0.0, seed=0) -> np.ndarray:
     return np.array(current_step(state, (0.0, 0.0, float(depth_m)), float(t_s), params, DT)[1])
 
 
-@kernel
+@numba.njit
 def history(count, params, dt):
     """North and east velocity of ``count`` steps (m/s)."""
     state = current_initial(params)

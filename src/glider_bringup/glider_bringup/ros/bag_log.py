@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags to log rows and back: what lets one function score and draw every kind of run."""
 
+import struct
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from mcap.exceptions import McapError
-from mcap.reader import SeekingReader
+from mcap.reader import McapReader, NonSeekingReader, SeekingReader
 from rclpy.serialization import deserialize_message
 
 from glider_bringup.direct import BLOCK_TICKS, COLUMNS, ROW
@@ -62,34 +63,62 @@ class LogWriter:
         return sum(self._bag.counts.values())
 
 
-def _open(folder: Path) -> tuple[SeekingReader, dict[str, str]]:
-    """Reader of a run's bag, and the bag's name of each topic."""
+def _file(folder: Path) -> Path:
+    """The one MCAP file of a run folder."""
     files = sorted(folder.glob('*.mcap'))
     if len(files) != 1:
         raise ConfigurationError(f'{folder}: expected one .mcap file, found {len(files)}')
-    reader = SeekingReader(files[0].open('rb'))
-    try:
-        summary = reader.get_summary()
-    except McapError as error:
-        raise ConfigurationError(f'{files[0]}: not a readable MCAP file: {error}') from None
-    if summary is None:
-        raise ConfigurationError(f'{files[0]}: the file is not complete, it has no summary')
-    names = {}
-    for channel in summary.channels.values():
-        for topic in TOPICS.values():
-            if channel.topic == topic.name or channel.topic.endswith('/' + topic.name):
-                names[topic.name] = channel.topic
-    return reader, names
+    return files[0]
 
 
-def _read_infeasible(reader: SeekingReader, topic: str | None) -> list[tuple[int, bool]]:
+def _known_name(topic: str) -> str | None:
+    """Our name of a recorded topic, whatever its namespace."""
+    for name in TOPICS:
+        if topic == name or topic.endswith('/' + name):
+            return name
+    return None
+
+
+def _messages(file: Path, names: Iterable[str]) -> Iterator[tuple[str, int, bytes]]:
+    """Name, log time (ns) and payload of the messages on some topics, in file order.
+
+    A file whose writer was killed has no summary and ends anywhere; it is read up to its last
+    whole chunk.
+    """
+    wanted = set(names)
+    with file.open('rb') as stream:
+        try:
+            summary = SeekingReader(stream).get_summary()
+        except (McapError, struct.error, EOFError):
+            summary = None
+        stream.seek(0)
+        topics = None
+        reader: McapReader = NonSeekingReader(stream)
+        if summary is not None:
+            reader = SeekingReader(stream)
+            topics = [
+                channel.topic
+                for channel in summary.channels.values()
+                if _known_name(channel.topic) in wanted
+            ]
+        try:
+            for _, channel, message in reader.iter_messages(topics, log_time_order=False):
+                name = _known_name(channel.topic)
+                if name in wanted:
+                    yield name, message.log_time, message.data
+        except (McapError, struct.error, EOFError) as error:
+            if summary is not None:
+                raise ConfigurationError(f'{file}: damaged: {error}') from None
+
+
+def _infeasible_changes(file: Path) -> list[tuple[int, bool]]:
     """Ticks at which the course became infeasible or feasible, from /diagnostics."""
     changes = []
-    for _, _, message in reader.iter_messages(topics=[topic] if topic else []):
-        for status in deserialize_message(message.data, DiagnosticArray).status:
+    for _, log_time, payload in _messages(file, ['/diagnostics']):
+        for status in deserialize_message(payload, DiagnosticArray).status:
             for pair in status.values:
                 if pair.key == 'infeasible':
-                    changes.append((message.log_time // TICK_NS, pair.value == 'true'))
+                    changes.append((log_time // TICK_NS, pair.value == 'true'))
     return changes
 
 
@@ -111,15 +140,11 @@ def read_blocks(folder: Path, topics: Iterable[str] = SCORED) -> Iterator[np.nda
     Raises
     ------
     ConfigurationError
-        If there is no bag that can be read, or it lacks a topic.
+        If there is no bag, or it is damaged.
     """
-    reader, names = _open(folder)
-    wanted = {}
-    for name in topics:
-        if name not in names:
-            raise ConfigurationError(f'{folder}: the bag has no topic {name}')
-        wanted[names[name]] = (TOPICS[name].codec, COLUMNS[name])
-    infeasible = _read_infeasible(reader, names.get('/diagnostics'))
+    file = _file(folder)
+    wanted = {name: (TOPICS[name].codec, COLUMNS[name]) for name in topics}
+    infeasible = _infeasible_changes(file)
     log = np.full((BLOCK_TICKS, ROW), np.nan)
     seen = np.zeros(BLOCK_TICKS, dtype=np.int64)
     start = 0
@@ -130,9 +155,9 @@ def read_blocks(folder: Path, topics: Iterable[str] = SCORED) -> Iterator[np.nda
             log[max(0, tick - start) : rows, COLUMNS['infeasible']] = flag
         return log[:rows]
 
-    for _, channel, message in reader.iter_messages(topics=list(wanted)):
-        codec, columns = wanted[channel.topic]
-        stamp_ns, values = codec.decode(message.data)
+    for name, _, payload in _messages(file, wanted):
+        codec, columns = wanted[name]
+        stamp_ns, values = codec.decode(payload)
         row = stamp_ns // TICK_NS - start
         if row >= BLOCK_TICKS:
             complete = int(np.count_nonzero(seen == len(wanted)))
@@ -155,15 +180,23 @@ def recorded_and_lost(folder: Path, complete: bool) -> tuple[int, int]:
     A run that was cut short (``complete`` is false) may lack messages of its last tick, which is
     not a loss.
     """
-    reader, names = _open(folder)
-    statistics = reader.get_summary().statistics
-    channels = reader.get_summary().channels
-    counts = {
-        channel.topic: statistics.channel_message_counts.get(number, 0)
-        for number, channel in channels.items()
-    }
-    per_tick = [counts[names[topic.name]] for topic in _PER_TICK if topic.name in names]
-    ticks = max(per_tick, default=0)
+    file = _file(folder)
+    with file.open('rb') as stream:
+        try:
+            summary = SeekingReader(stream).get_summary()
+        except (McapError, struct.error, EOFError):
+            summary = None
+    counts = dict.fromkeys((topic.name for topic in _PER_TICK), 0)
+    if summary is None:
+        for name, _, _ in _messages(file, TOPICS):
+            counts[name] = counts.get(name, 0) + 1
+    else:
+        recorded = summary.statistics.channel_message_counts
+        for number, channel in summary.channels.items():
+            name = _known_name(channel.topic) or channel.topic
+            counts[name] = recorded.get(number, 0)
+    per_tick = [counts[topic.name] for topic in _PER_TICK]
+    ticks = max(per_tick)
     expected = ticks if complete else ticks - 1
     lost = sum(max(0, expected - count) for count in per_tick)
     return sum(counts.values()), lost

@@ -28,6 +28,7 @@ class ControlNode(BlockNode):
         self.state = settings.initial_state()
         self.told, self.told_ns = 0, -TELL_EVERY_NS
         self.publish_wrench = self.add_output('wrench')
+        self.publish_adaptation = self.add_output('adaptation')
         self.publish_command = self.add_output('command')
         self.add_input('reference')
         self.add_input('odom')
@@ -58,6 +59,7 @@ class ControlNode(BlockNode):
             TICK_S,
         )
         self.publish_wrench(stamp_ns, wrench_to_wire(out.wrench))
+        self.publish_adaptation(stamp_ns, out.adaptation)
         if out.saturation != self.told and stamp_ns - self.told_ns >= TELL_EVERY_NS:
             self.tell(stamp_ns, out.saturation)
         self.publish_command(stamp_ns, out.command)

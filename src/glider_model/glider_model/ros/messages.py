@@ -18,6 +18,7 @@ from std_msgs.msg import Header
 
 from glider_model.ros import qos
 from glider_model.ros.codec import Codec
+from glider_model.signals import Adaptation
 
 #: Frame names: the world (ENU), the body (FLU), the path frame of the tracking error.
 MAP, BASE_LINK, PATH_FRAME = 'map', 'base_link', 'path'
@@ -44,9 +45,9 @@ def _odometry(child_frame: str) -> Codec:
     return Codec(template, _POSE_AND_TWIST)
 
 
-def _joints() -> Codec:
-    template = JointState(name=list(JOINTS), position=[0.0] * len(JOINTS))
-    return Codec(template, [f'position[{joint}]' for joint in JOINTS])
+def _named(names: tuple[str, ...]) -> Codec:
+    template = JointState(name=list(names), position=[0.0] * len(names))
+    return Codec(template, [f'position[{name}]' for name in names])
 
 
 def _velocity() -> Codec:
@@ -55,16 +56,20 @@ def _velocity() -> Codec:
 
 CLOCK = Codec(Clock(), (), stamp='clock')
 ODOM = _odometry(BASE_LINK)
-JOINT_STATES = _joints()
+JOINT_STATES = _named(JOINTS)
 CURRENT_VELOCITY = _velocity()
 #: Its twist is expressed in `map`: desired velocity over ground and Euler angle rates.
 REFERENCE = _odometry(MAP)
 TRACKING_ERROR = Codec(_stamped(Vector3Stamped(), PATH_FRAME), [f'vector.{axis}' for axis in _XYZ])
 CURRENT_ESTIMATE = _velocity()
-COMMAND = _joints()
+COMMAND = _named(JOINTS)
 WRENCH = Codec(
     _stamped(WrenchStamped(), BASE_LINK), ('wrench.force.z', 'wrench.torque.x', 'wrench.torque.y')
 )
+
+
+#: Numbers with names and a stamp: a JointState, which every plotting tool shows by name.
+ADAPTATION = _named(Adaptation._fields)
 
 
 class Topic(NamedTuple):
@@ -126,6 +131,7 @@ TOPICS = {
         _per_tick('current_estimate', CURRENT_ESTIMATE, GUIDANCE),
         _per_tick('command', COMMAND, CONTROL, PLANT),
         _per_tick('wrench', WRENCH, CONTROL),
+        _per_tick('adaptation', ADAPTATION, CONTROL),
         Topic('path', Path, GUIDANCE, qos=qos.LATCHED),
         Topic('/diagnostics', DiagnosticArray, 'all', qos=qos.EVENTS),
         Topic('recorded', Header, RECORDER, (PLANT,), recorded=False),
