@@ -71,22 +71,22 @@ def run(
         ),
     ] = Engine.nodes,
     controller: Annotated[
-        Controller | None, typer.Option(help='Attitude law, instead of the scenario\'s.')
+        Controller | None, typer.Option(help="Attitude law, instead of the scenario's.")
     ] = None,
     guidance: Annotated[
-        Guidance | None, typer.Option(help='Line of sight, instead of the scenario\'s.')
+        Guidance | None, typer.Option(help="Line of sight, instead of the scenario's.")
     ] = None,
     duration: Annotated[
         str | None,
         typer.Option(
             metavar='S|full',
-            help='Simulated seconds, or the scenario\'s full duration. Default: its dives.',
+            help="Simulated seconds, or the scenario's full duration. Default: its dives.",
         ),
     ] = None,
     speed: Annotated[
         str, typer.Option(metavar='X|max', help='Times real time (nodes only).')
     ] = 'max',
-    seed: Annotated[int | None, typer.Option(help='Seed, instead of the scenario\'s.')] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed, instead of the scenario's.")] = None,
     changes: Annotated[
         list[str] | None,
         typer.Option(
@@ -94,7 +94,7 @@ def run(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help='Folder for the run\'s files. Default: runs/<time>-<name>.')
+        Path | None, typer.Option(help="Folder for the run's files. Default: runs/<time>-<name>.")
     ] = None,
     bag: Annotated[
         bool, typer.Option('--bag', help='Record a bag in a direct run too; nodes always do.')
@@ -258,7 +258,7 @@ def trim(
     else:
         _print_trim(vehicle, solution)
     if not solution.converged:
-        messages.print('no steady state found within the vehicle\'s ranges', style='red')
+        messages.print("no steady state found within the vehicle's ranges", style='red')
         raise typer.Exit(EXIT_FAILED)
 
 

@@ -76,9 +76,7 @@ def draw_run(record: Record, title: str, file: Path) -> None:
     )
     hours = record.time_s / 3600.0
     _draw_track(axes['track'], record)
-    _draw_curves(
-        axes['depth'], hours, 'Depth', 'depth (m)', (('depth', record.depth, _BLUE),)
-    )
+    _draw_curves(axes['depth'], hours, 'Depth', 'depth (m)', (('depth', record.depth, _BLUE),))
     axes['depth'].invert_yaxis()
     _draw_curves(
         axes['cross'],

@@ -34,10 +34,8 @@ ARGUMENTS = (
     Argument(
         'scenario', DEFAULT_SCENARIO, 'Scenario by name (./glider list) or path of its YAML file.'
     ),
-    Argument(
-        'controller', '', 'Attitude law; empty: the scenario\'s.', ('', 'adaptive', 'pid')
-    ),
-    Argument('guidance', '', 'Line of sight; empty: the scenario\'s.', ('', 'observer', 'paper')),
+    Argument('controller', '', "Attitude law; empty: the scenario's.", ('', 'adaptive', 'pid')),
+    Argument('guidance', '', "Line of sight; empty: the scenario's.", ('', 'observer', 'paper')),
     Argument('namespace', 'glider', 'Namespace of the nodes and their topics.'),
     Argument('record', '', 'New folder for the recording; empty: no recording.'),
     Argument('speed', '1.0', 'Times real time, or max. Free-running nodes keep real time: 1.0.'),
@@ -50,7 +48,7 @@ ARGUMENTS = (
     Argument(
         'duration',
         '',
-        'Simulated seconds, or full: the scenario\'s duration; empty: the scenario\'s dives.',
+        "Simulated seconds, or full: the scenario's duration; empty: the scenario's dives.",
     ),
 )
 

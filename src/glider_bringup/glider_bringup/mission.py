@@ -28,6 +28,8 @@ from glider_model.vehicle import load_vehicle, vehicle_path
 SCENARIO_FILE, VEHICLE_FILE, SCORE_FILE = 'scenario.yaml', 'vehicle.yaml', 'score.json'
 PARAMETERS_FILE, LOG_FILE = 'parameters.yaml', 'log.txt'
 
+#: Fields without which a score file is not a scorecard.
+CARD_FIELDS = {'scenario', 'engine', 'status', 'reason', 'wall_time_s', 'final_state'}
 #: Exit code of a node that refuses its parameters.
 EXIT_CONFIGURATION = 2
 
@@ -127,7 +129,11 @@ def _open_bag(scenario: Scenario, folder: Path) -> LogWriter:
 
 
 def fly_nodes(
-    scenario: Scenario, folder: Path, speed: float, progress: Progress, on_log: Callable[[str], None]
+    scenario: Scenario,
+    folder: Path,
+    speed: float,
+    progress: Progress,
+    on_log: Callable[[str], None],
 ) -> tuple[Flight, dict]:
     """Fly over node processes and topics; the score is read back from the bag.
 
@@ -135,9 +141,7 @@ def fly_nodes(
     a node prints.
     """
     attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)
-    parameters = node_parameters(
-        scenario, speed=speed, record_to=folder, attachments=attachments
-    )
+    parameters = node_parameters(scenario, speed=speed, record_to=folder, attachments=attachments)
     write_parameters(parameters, folder / PARAMETERS_FILE)
     result = run_nodes(
         node_commands(folder / PARAMETERS_FILE),
@@ -149,9 +153,11 @@ def fly_nodes(
         raise ConfigurationError(result.reason)
     completed = result.status == 'completed'
     scorer = Scorer()
-    for log in read_blocks(folder):
-        scorer.add(log)
-    recorded, lost = recorded_and_lost(folder, completed)
+    recorded, lost = 0, 0
+    if any(folder.glob('*.mcap')):  # else it ended before the recorder was up
+        for log in read_blocks(folder):
+            scorer.add(log)
+        recorded, lost = recorded_and_lost(folder, completed)
     status = 'completed' if completed else 'aborted'
     flight = Flight(status, result.reason, result.flight_s, recorded, lost)
     return flight, _score(scenario, scorer)
@@ -218,11 +224,14 @@ def score_again(folder: Path) -> dict:
 def _read_score(folder: Path) -> dict:
     path = folder / SCORE_FILE
     try:
-        return json.loads(path.read_text(encoding='utf-8'))
+        card = json.loads(path.read_text(encoding='utf-8'))
     except FileNotFoundError:
         raise ConfigurationError(f'{folder}: not a run folder, it has no {SCORE_FILE}') from None
     except (OSError, ValueError) as error:
         raise ConfigurationError(f'{path}: cannot be read: {error}') from None
+    if not isinstance(card, dict) or not CARD_FIELDS <= set(card):
+        raise ConfigurationError(f'{path}: not a scorecard of this program')
+    return card
 
 
 def draw(folder: Path, file: Path) -> None:
@@ -233,6 +242,7 @@ def draw(folder: Path, file: Path) -> None:
     ConfigurationError
         If the folder has no bag, or the image cannot be written.
     """
+    _read_score(folder)
     scenario = load_scenario(str(folder / SCENARIO_FILE))
     record = Record(read_blocks(folder, DRAWN))
     title = f'{scenario.name}: {scenario.description}'

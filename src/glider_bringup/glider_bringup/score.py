@@ -118,6 +118,7 @@ class Scorer:
         e2 = series[:, _E2]
         pitch_error = np.degrees(series[:, _PITCH] - series[:, _PITCH_REF])
         heading = _heading_fluctuation_deg(series[:, _HEADING])
+        whole = steady & _has_whole_mean(ticks)
         deepest = float(np.max(series[:, _DEPTH])) if ticks else None
         return {
             'ticks': ticks,
@@ -134,8 +135,8 @@ class Scorer:
                 'max_steady': _largest(pitch_error[steady]),
             },
             'heading_fluctuation_deg': {
-                'rms_steady': _rms(heading[steady]),
-                'max_steady': _largest(heading[steady]),
+                'rms_steady': _rms(heading[whole]),
+                'max_steady': _largest(heading[whole]),
             },
             'depth_m': {
                 'max': deepest,
@@ -143,8 +144,7 @@ class Scorer:
             },
             'final_state': self._final_state(),
             'infeasible': bool(
-                scored.any()
-                and np.mean(series[scored, _INFEASIBLE]) >= INFEASIBLE_SHARE
+                scored.any() and np.mean(series[scored, _INFEASIBLE]) >= INFEASIBLE_SHARE
             ),
         }
 
@@ -153,9 +153,7 @@ class Scorer:
         if self._last is None:
             return None
         odometry = odometry_from_wire(tuple(float(x) for x in self._last[_ODOM]))
-        attitude = euler_from_quaternion(
-            odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
-        )
+        attitude = euler_from_quaternion(odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z)
         return {
             'position_ned_m': [odometry.p_n, odometry.p_e, odometry.p_d],
             'attitude_rpy_rad': list(attitude),
@@ -189,6 +187,13 @@ def _heading_fluctuation_deg(heading: np.ndarray) -> np.ndarray:
     return np.degrees(unwrapped - unwrapped[0] - mean)
 
 
+def _has_whole_mean(ticks: int) -> np.ndarray:
+    """Mask of the ticks around which the log holds the whole time of the heading's mean."""
+    half = round(0.5 * HEADING_MEAN_S / TICK_S)
+    index = np.arange(ticks)
+    return (index >= half) & (index < ticks - half)
+
+
 def _count_dives(depth: np.ndarray) -> int:
     """Number of times that the vehicle went deep and came back, as the plant counts them."""
     zone = np.zeros(len(depth), dtype=np.int8)
@@ -199,7 +204,7 @@ def _count_dives(depth: np.ndarray) -> int:
 
 
 def _length(north: np.ndarray, east: np.ndarray) -> float:
-    """Way of the virtual target along the path (m)."""
+    """Horizontal way of the virtual target along the path (m)."""
     return float(np.sum(np.hypot(np.diff(north), np.diff(east))))
 
 

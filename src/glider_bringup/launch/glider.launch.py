@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """``ros2 launch glider_bringup glider.launch.py scenario:=current_8deg``."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import launch.logging
 from launch import LaunchContext, LaunchDescription
@@ -41,20 +43,25 @@ def start(context: LaunchContext) -> list:
 
 
 def node_action(node: LaunchedNode, plan: LaunchPlan) -> Node:
-    """Process of a node, and what its end means.
-
-    The plant ends the run, and says why. In lockstep nobody can go on without a peer that failed;
-    free-running nodes can.
-    """
-
-    def end_with_failure(event: ProcessExited, context: LaunchContext) -> Shutdown | None:
-        return Shutdown() if plan.lockstep and event.returncode else None
-
+    """Process of a node."""
     return Node(
         package=node.package,
         executable=node.executable,
         namespace=plan.namespace,
         parameters=[plan.parameters_file],
         output='screen',
-        on_exit=Shutdown() if node.executable == PLANT else end_with_failure,
+        on_exit=on_exit(node.executable, plan),
     )
+
+
+def on_exit(name: str, plan: LaunchPlan) -> Callable[[ProcessExited, LaunchContext], Any]:
+    """What the end of a node means.
+
+    The plant ends the run. In lockstep nobody can go on without a peer that failed; free-running
+    nodes can.
+    """
+
+    def end(event: ProcessExited, context: LaunchContext) -> Shutdown | None:
+        return Shutdown() if name == PLANT or (plan.lockstep and event.returncode) else None
+
+    return end

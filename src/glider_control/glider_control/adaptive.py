@@ -42,6 +42,8 @@ _TUNABLE = {'tunable': True}
 SCALE_ALPHA, SCALE_V2, SCALE_SIDE, SCALE_ROLL_RATE, SCALE_PITCH_RATE = 0.01, 0.25, 2.0, 0.05, 0.03
 #: Adaptation waits below this speed (m/s) and vertical rate (m/s), and this long after a turn (s).
 LEARN_SPEED, LEARN_VERTICAL_RATE, LEARN_AFTER_S = 0.15, 0.12, 20.0
+#: d_hat is held within this (rad/s).
+DISTURBANCE_MAX = 0.005
 #: Heading error at which the roll command may reach its limit (rad).
 SATURATING_ERROR = 0.2
 #: Natural frequency of the filter on the virtual rate command (rad/s), and its rate limit.
@@ -64,10 +66,40 @@ class ChannelSettings(Settings):
         0.3, ge=0.0, le=50.0, description='Gamma, adaptation (N m/rad)', json_schema_extra=_TUNABLE
     )
     sigma_per_s: float = Field(
-        1e-5, ge=0.0, le=1.0, description='sigma, leakage (rad/(N m s))', json_schema_extra=_TUNABLE
+        1e-5,
+        ge=0.0,
+        le=1.0,
+        description='sigma, leakage (rad/(N m s))',
+        json_schema_extra=_TUNABLE,
     )
-    bound: float = Field(
-        3.0, gt=0.0, le=100.0, description='projection: largest parameter (N m)'
+    dead_zone_radps: float = Field(
+        1e-4,
+        ge=0.0,
+        le=0.1,
+        description='rate error below which nothing is learnt (rad/s)',
+        json_schema_extra=_TUNABLE,
+    )
+    bound: float = Field(3.0, gt=0.0, le=100.0, description='projection: largest parameter (N m)')
+
+
+class RollChannelSettings(ChannelSettings):
+    """Gains of the roll channel."""
+
+    l1_per_s: float = Field(
+        0.3, gt=0.0, le=5.0, description='L1, angle error (1/s)', json_schema_extra=_TUNABLE
+    )
+    b1: float = Field(
+        8.0, gt=0.0, le=500.0, description='B1, angle (N m/rad)', json_schema_extra=_TUNABLE
+    )
+    b2: float = Field(
+        12.0, gt=0.0, le=500.0, description='B2, rate (N m s/rad)', json_schema_extra=_TUNABLE
+    )
+    dead_zone_radps: float = Field(
+        5e-4,
+        ge=0.0,
+        le=0.1,
+        description='rate error below which nothing is learnt (rad/s)',
+        json_schema_extra=_TUNABLE,
     )
 
 
@@ -75,11 +107,16 @@ class AdaptiveSettings(Settings):
     """Gains of the adaptive law."""
 
     pitch: ChannelSettings = Field(ChannelSettings(), description='pitch channel')
-    roll: ChannelSettings = Field(
-        ChannelSettings(l1_per_s=0.3, b1=6.0, b2=3.0, gamma=0.2), description='roll channel'
-    )
+    roll: RollChannelSettings = Field(RollChannelSettings(), description='roll channel')
     heading_kp_per_s: float = Field(
         0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=_TUNABLE
+    )
+    heading_ki_per_s2: float = Field(
+        2e-4,
+        ge=0.0,
+        le=0.1,
+        description='adaptation of the turn-rate disturbance (1/s^2)',
+        json_schema_extra=_TUNABLE,
     )
     heading_kd: float = Field(
         0.3, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=_TUNABLE
@@ -97,6 +134,7 @@ class ChannelParams(NamedTuple):
     b2: float
     gamma: float
     sigma: float
+    dead_zone: float
     bound: float
     inertia: float  #: rigid body and added (kg m^2)
 
@@ -107,6 +145,7 @@ class AdaptiveParams(NamedTuple):
     roll: ChannelParams
     pitch: ChannelParams
     heading_kp: float
+    heading_ki: float
     heading_kd: float
     steering: SteeringParams
     mass: float  #: of the vehicle (kg)
@@ -135,6 +174,8 @@ class AdaptiveState(NamedTuple):
     pitch_theta: tuple[float, float, float, float]  #: bias, V^2 alpha, V^2, pitch damping (N m)
     dive: SteeringState
     climb: SteeringState
+    disturbance_dive: float  #: d_hat, turn rate that roll does not explain (rad/s)
+    disturbance_climb: float
     lagged: float  #: regressor of the steering estimator
     steady_s: float  #: time since the last turn (s)
 
@@ -151,6 +192,7 @@ def make_adaptive(
             gains.b2,
             gains.gamma,
             gains.sigma_per_s,
+            gains.dead_zone_radps,
             gains.bound,
             inertia,
         )
@@ -159,6 +201,7 @@ def make_adaptive(
         channel(settings.roll, vehicle.i_xx + vehicle.a_44),
         channel(settings.pitch, vehicle.i_yy + vehicle.a_55),
         settings.heading_kp_per_s,
+        settings.heading_ki_per_s2,
         settings.heading_kd,
         settings.steering.params(),
         vehicle.m,
@@ -178,6 +221,8 @@ def initial_adaptive(settings: AdaptiveSettings) -> AdaptiveState:
         (0.0, 0.0, 0.0, 0.0),
         settings.steering.initial_state(1.0),
         settings.steering.initial_state(-1.0),
+        0.0,
+        0.0,
         0.0,
         0.0,
     )
@@ -223,10 +268,10 @@ def channel_step(state, error, command, rate, applied, coupling, params, dt):
 
 
 @kernel
-def bank_to_turn(state, measured, reference, speed, params, dt):
-    """Roll command (rad) that steers to the reference heading, and what it learnt of steering.
+def learn_phase(state, measured, speed, params, dt):
+    """Steering estimates of both phases, the lagged regressor, and the time since the last turn.
 
-    phi_s = asin sat((psi_s' + k_psi e + k_d (psi_s' - psi') - d_hat) / (b_hat V / V_0))
+    Only the phase that is flown learns, and only in a glide.
     """
     ratio = max(speed, LEARN_SPEED) / STEERING_SPEED
     share = dt / (params.steering.lag_s + dt)
@@ -234,35 +279,42 @@ def bank_to_turn(state, measured, reference, speed, params, dt):
     gliding = abs(measured.vertical_rate) > LEARN_VERTICAL_RATE and speed > LEARN_SPEED
     steady_s = state.steady_s + dt if gliding else 0.0
     dive, climb = state.dive, state.climb
-    if not gliding:
-        return 0.0, dive, climb, lagged, steady_s
-    diving = measured.vertical_rate > 0.0
-    now = dive if diving else climb
-    if steady_s > params.steering.lag_s:
-        now = learn_steering(now, lagged, measured.psi_dot, params.steering, dt)
-        if diving:
-            dive = now
+    if steady_s > params.steering.after_s:
+        if measured.vertical_rate > 0.0:
+            dive = learn_steering(dive, lagged, measured.psi_dot, params.steering, dt)
         else:
-            climb = now
+            climb = learn_steering(climb, lagged, measured.psi_dot, params.steering, dt)
+    return dive, climb, lagged, steady_s
+
+
+@kernel
+def bank_to_turn(steering, disturbance, measured, reference, speed, learning, params, dt):
+    """Roll command (rad) that steers to the reference heading, and the new d_hat.
+
+    phi_s = asin sat((psi_s' + k_psi e + k_d (psi_s' - psi') - d_hat) / (b_hat V / V_0)),
+    d_hat' = -k_i e. d_hat waits while the roll command is at its limit.
+    """
     error = wrap_angle(reference.psi - measured.psi)
     limit = math.sin(params.roll_limit)
-    authority = effective_steering(now, params.steering) * ratio
+    ratio = max(speed, LEARN_SPEED) / STEERING_SPEED
+    authority = effective_steering(steering, params.steering) * ratio
     # a vehicle that steers weakly is not asked for a bandwidth it does not have
     heading_kp = min(params.heading_kp, abs(authority) * limit / SATURATING_ERROR)
     turn = (
         reference.psi_dot
         + heading_kp * error
         + params.heading_kd * (reference.psi_dot - measured.psi_dot)
-        - now.d
+        - disturbance
     )
     demand = turn / authority
-    return math.asin(min(limit, max(-limit, demand))), dive, climb, lagged, steady_s
+    if learning and abs(demand) < limit:
+        moved = disturbance - dt * params.heading_ki * error
+        disturbance = min(DISTURBANCE_MAX, max(-DISTURBANCE_MAX, moved))
+    return math.asin(min(limit, max(-limit, demand))), disturbance
 
 
 @kernel
-def adaptive_step(
-    state, measured, reference, speed, alpha, m_b, applied, held, params, dt
-):
+def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, params, dt):
     """Roll and pitch moment (N m) of the adaptive law.
 
     Parameters
@@ -285,9 +337,18 @@ def adaptive_step(
     -------
     AdaptiveState, tau_p, tau_q
     """
-    roll_command, dive, climb, lagged, steady_s = bank_to_turn(
-        state, measured, reference, speed, params, dt
-    )
+    dive, climb, lagged, steady_s = learn_phase(state, measured, speed, params, dt)
+    learning = steady_s > LEARN_AFTER_S
+    d_dive, d_climb = state.disturbance_dive, state.disturbance_climb
+    roll_command = 0.0
+    if steady_s > 0.0 and measured.vertical_rate > 0.0:
+        roll_command, d_dive = bank_to_turn(
+            dive, d_dive, measured, reference, speed, learning, params, dt
+        )
+    elif steady_s > 0.0:
+        roll_command, d_climb = bank_to_turn(
+            climb, d_climb, measured, reference, speed, learning, params, dt
+        )
     roll = filter_command(state.roll, roll_command, params.roll_filter, dt)
 
     s_phi, c_phi = math.sin(measured.phi), math.cos(measured.phi)
@@ -332,15 +393,14 @@ def adaptive_step(
         - (phi_q[0] * th_q[0] + phi_q[1] * th_q[1] + phi_q[2] * th_q[2] + phi_q[3] * th_q[3])
     )
 
-    learning = steady_s > LEARN_AFTER_S
-    if learning and not held[0]:
+    if learning and not held[0] and abs(k2bar_p) > params.roll.dead_zone:
         s = params.roll.sigma
         th_p = (
             _project(th_p[0], phi_p[0] * k2bar_p, s, params.roll, dt),
             _project(th_p[1], phi_p[1] * k2bar_p, s, params.roll, dt),
             _project(th_p[2], phi_p[2] * k2bar_p, s, params.roll, dt),
         )
-    if learning and not held[1]:
+    if learning and not held[1] and abs(k2bar_q) > params.pitch.dead_zone:
         s = params.pitch.sigma
         th_q = (
             _project(th_q[0], phi_q[0] * k2bar_q, s, params.pitch, dt),
@@ -356,6 +416,8 @@ def adaptive_step(
         th_q,
         dive,
         climb,
+        d_dive,
+        d_climb,
         lagged,
         steady_s,
     )
@@ -384,9 +446,9 @@ def adaptation(state, params):
         th_q[2],
         th_q[3],
         state.dive.b,
-        state.dive.d,
+        state.disturbance_dive,
         state.climb.b,
-        state.climb.d,
+        state.disturbance_climb,
         v_1,
         v_2,
     )

@@ -94,9 +94,7 @@ class ControlLawSettings(Settings):
     """How to control, whatever the vehicle: the control section of a scenario."""
 
     law: Literal['adaptive', 'pid'] = Field('adaptive', description='attitude law')
-    adaptive: AdaptiveSettings = Field(
-        AdaptiveSettings(), description='gains of the adaptive law'
-    )
+    adaptive: AdaptiveSettings = Field(AdaptiveSettings(), description='gains of the adaptive law')
     pid: PidSettings = Field(PidSettings(), description='gains of the PID law')
     heading: HeadingSettings = Field(HeadingSettings(), description='bank to turn')
     buoyancy: BuoyancySettings = Field(BuoyancySettings(), description='vertical-rate law')
@@ -258,9 +256,7 @@ def control_step(state, odometry, joints, reference, params, dt):
         pid, tau_p, tau_q = pid_step(
             pid, measured, reference, speed, held[1], held[0], params.pid, dt
         )
-    m_b, trim = vertical_rate_law(
-        state.buoyancy_trim, measured, reference, joints, params, dt
-    )
+    m_b, trim = vertical_rate_law(state.buoyancy_trim, measured, reference, joints, params, dt)
     mu = allocate_roll(tau_p, measured.phi, measured.theta, limits)
     x_p = allocate_pitch(tau_q, joints.mu, measured.phi, measured.theta, limits)
 

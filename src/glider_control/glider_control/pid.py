@@ -149,9 +149,7 @@ def pid_step(state, measured, reference, speed, pitch_held, roll_held, params, d
     -------
     PidState, tau_p, tau_q
     """
-    roll_command, heading_integral = heading_to_roll(
-        state, measured, reference, speed, params, dt
-    )
+    roll_command, heading_integral = heading_to_roll(state, measured, reference, speed, params, dt)
     roll = filter_command(state.roll, roll_command, params.roll_filter, dt)
 
     e_phi = wrap_angle(roll.value - measured.phi)
@@ -165,9 +163,7 @@ def pid_step(state, measured, reference, speed, pitch_held, roll_held, params, d
     e_theta = reference.theta - measured.theta
     pitch_integral = state.pitch_integral
     if not pitch_held:
-        pitch_integral = _clip(
-            pitch_integral + dt * params.pitch_ki * e_theta, PITCH_INTEGRAL_MAX
-        )
+        pitch_integral = _clip(pitch_integral + dt * params.pitch_ki * e_theta, PITCH_INTEGRAL_MAX)
     tau_q = (
         params.pitch_kp * e_theta
         + params.pitch_kd * (reference.theta_dot - measured.theta_dot)

@@ -43,6 +43,9 @@ class SteeringLearningSettings(Settings):
     noise_radps: float = Field(
         0.002, gt=0.0, le=0.1, description='yaw rate that the model does not explain (rad/s)'
     )
+    after_s: float = Field(
+        30.0, ge=0.0, le=600.0, description='learning begins this long after a turn (s)'
+    )
     lag_s: float = Field(4.0, gt=0.0, le=60.0, description='lag of yaw rate behind roll (s)')
 
     def params(self) -> 'SteeringParams':
@@ -52,6 +55,7 @@ class SteeringLearningSettings(Settings):
             self.drift_radps**2 / 1000.0,
             self.disturbance_drift_radps**2 / 1000.0,
             self.noise_radps**2 * self.lag_s,
+            self.after_s,
             self.lag_s,
         )
 
@@ -73,6 +77,7 @@ class SteeringParams(NamedTuple):
     drift: float  #: variance growth of b (rad^2/s^3)
     disturbance_drift: float  #: variance growth of d (rad^2/s^3)
     noise: float  #: spectral density of the yaw-rate noise (rad^2/s)
+    after_s: float  #: time after a turn in which nothing is learnt (s)
     lag_s: float
 
 

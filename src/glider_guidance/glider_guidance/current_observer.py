@@ -5,10 +5,10 @@
     eta_hat'  = nu_model + v_c_hat + K3 (eta - eta_hat)
     v_c_hat'  = K4 (eta - eta_hat)
 
-The error obeys A = [-K3 I, ...; -K4 I, 0], stable for K3, K4 > 0. The vehicle does not measure its
+The error obeys A = [-K3 I, I; -K4 I, 0], stable for K3, K4 > 0. The vehicle does not measure its
 speed through the water: ``nu_model`` comes from pitch and vertical rate through the glide polar.
-That holds in a steady glide only. While it does not (inflections, surface), the prediction uses the
-velocity over ground instead, so that the innovation decays and the estimate stays what it was.
+That holds in a steady glide only. While it does not (inflections, surface), the prediction uses
+the velocity over ground instead, so that the innovation decays and the estimate stays what it was.
 """
 
 from typing import NamedTuple

@@ -5,11 +5,13 @@
 import math
 from typing import Literal, NamedTuple
 
+import pydantic
 from pydantic import Field
 
 from glider_guidance.current_observer import ObserverParams, ObserverState, observer_step
 from glider_guidance.los import (
     approach_angles,
+    approach_heading,
     crab_heading,
     desired_direction,
     target_rate,
@@ -49,7 +51,7 @@ from glider_model.polar import (
     steepen,
 )
 from glider_model.settings import Settings
-from glider_model.signals import TICK_S, Reference, TrackingError, Water
+from glider_model.signals import Reference, TrackingError, Water
 from glider_model.vehicle import load_vehicle
 
 #: The flight model is believed this long after a glide began (s).
@@ -127,6 +129,15 @@ class ObserverSettings(Settings):
         json_schema_extra={'tunable': True},
     )
 
+    @pydantic.model_validator(mode='after')
+    def _is_stable(self):
+        if self.k4_per_s2 > 5.0 * self.k3_per_s:
+            raise ValueError(
+                f'k4_per_s2 = {self.k4_per_s2} is unstable in steps of 0.1 s (allowed: at most '
+                f'5 k3_per_s = {5.0 * self.k3_per_s:g})'
+            )
+        return self
+
 
 class CommandFilterSettings(Settings):
     """Command filters of heading and pitch."""
@@ -150,9 +161,7 @@ class GuidanceLawSettings(Settings):
 
     los: LosSettings = Field(LosSettings(), description='line of sight')
     observer: ObserverSettings = Field(ObserverSettings(), description='current observer')
-    filters: CommandFilterSettings = Field(
-        CommandFilterSettings(), description='command filters'
-    )
+    filters: CommandFilterSettings = Field(CommandFilterSettings(), description='command filters')
 
 
 class GuidanceSettings(GuidanceLawSettings):
@@ -316,15 +325,11 @@ def guidance_step(state, odometry, params, dt):
 
     # what the vehicle is doing
     if follows_path and not state.profile.aborted:
-        profile = ProfileState(
-            GLIDING_DOWN, state.profile.ticks + 1, state.profile.dives, False
-        )
+        profile = ProfileState(GLIDING_DOWN, state.profile.ticks + 1, state.profile.dives, False)
     else:
         profile = profile_step(state.profile, odometry.p_d, ground_d, params.profile)
     stage = profile.stage
-    pitch_target, rate_target = profile_targets(
-        stage, ground_d, params.profile, params.polar
-    )
+    pitch_target, rate_target = profile_targets(stage, ground_d, params.profile, params.polar)
     if not follows_path:
         e3 = 0.0
 
@@ -359,18 +364,19 @@ def guidance_step(state, odometry, params, dt):
     if not follows_path:
         rho_r = 0.0
     chi_d, upsilon_d = desired_direction(gamma_d, rho_d, gamma_r, rho_r)
-    heading_command, _, feasible = crab_heading(
-        chi_d, speed, observer.current_n, observer.current_e
-    )
-    _, _, path_feasible = crab_heading(
-        gamma_d, speed, observer.current_n, observer.current_e
-    )
-    if not params.compensates:
-        heading_command = chi_d
-    infeasible_ticks = 0 if path_feasible else state.infeasible_ticks + 1
-    surfaced = (
-        stage == WAITING_ON_SURFACE or stage == SURFACE_PREPARATION or stage == SURFACING
-    )
+    _, progress, feasible = crab_heading(gamma_d, speed, observer.current_n, observer.current_e)
+    heading_command = chi_d
+    if params.compensates:
+        heading_command = approach_heading(
+            gamma_d,
+            wrap_angle(chi_d - gamma_d),
+            progress,
+            speed,
+            observer.current_n,
+            observer.current_e,
+        )
+    infeasible_ticks = 0 if feasible else state.infeasible_ticks + 1
+    surfaced = stage == WAITING_ON_SURFACE or stage == SURFACE_PREPARATION or stage == SURFACING
     if not is_gliding(stage) and not surfaced:
         heading_command = state.heading_command
 
@@ -378,17 +384,13 @@ def guidance_step(state, odometry, params, dt):
     if follows_path and not profile.aborted:
         pitch_target = steepen(upsilon_d)
         pitch_target += glide_alpha(pitch_target, params.polar)
-        rate_target = glide_vertical_rate(
-            pitch_target, params.profile.net_heaviness, params.polar
-        )
+        rate_target = glide_vertical_rate(pitch_target, params.profile.net_heaviness, params.polar)
     heading = filter_angle(state.heading, heading_command, params.heading_filter, dt)
     pitch = filter_angle(state.pitch, pitch_target, params.pitch_filter, dt)
 
     # virtual target
-    progress = (ground_n * d_n + ground_e * d_e + ground_d * d_d) / slope
-    s = state.s + dt * target_rate(
-        progress, e1, slope, params.target_gain, TARGET_SPEED_MAX
-    )
+    made_good = (ground_n * d_n + ground_e * d_e + ground_d * d_d) / slope
+    s = state.s + dt * target_rate(made_good, e1, slope, params.target_gain, TARGET_SPEED_MAX)
     t_n, t_e, t_d = path_point(state.s, params.path)
     if not follows_path:
         t_d = params.profile.depth if rate_target > 0.0 else 0.0

@@ -95,3 +95,33 @@ def crab_heading(course, speed, current_n, current_e):
     crab = math.asin(held)
     progress = speed * math.cos(crab) + along
     return wrap_angle(course - crab), progress, abs(ratio) <= 1.0 and progress > 0.0
+
+
+@kernel
+def approach_heading(course, approach, progress, speed, current_n, current_e):
+    """Heading through the water that closes in on a path while the current is balanced.
+
+    The vehicle is to move across the path at ``progress * sin(approach)``, which is what flying
+    the course ``course + approach`` means near the path. A course over ground is the wrong thing
+    to ask for far from it: where the current is faster than the vehicle, no heading makes good a
+    course across it, and the best crab for one would let the vehicle drift away.
+
+        psi = gamma_d - asin(sat((n . v_c - P sin(approach)) / U_h))
+
+    Parameters
+    ----------
+    course : float
+        Course of the path gamma_d (rad).
+    approach : float
+        Angle of the line of sight from it (rad, + to starboard).
+    progress : float
+        Speed made good along the path P (m/s).
+    speed : float
+        Horizontal speed through the water U_h (m/s).
+    current_n, current_e : float
+        Water velocity (m/s).
+    """
+    across = -math.sin(course) * current_n + math.cos(course) * current_e
+    wanted = max(0.0, progress) * math.sin(approach)
+    ratio = (across - wanted) / max(speed, 1e-3)
+    return wrap_angle(course - math.asin(min(1.0, max(-1.0, ratio))))

@@ -43,9 +43,7 @@ class ProfileSettings(Settings):
         'profile',
         description='profile: sawtooth at fixed pitch over the path; path: full 3-D line of sight',
     )
-    depth_m: float = Field(
-        1000.0, ge=10.0, le=12000.0, description='depth of the lower turn (m)'
-    )
+    depth_m: float = Field(1000.0, ge=10.0, le=12000.0, description='depth of the lower turn (m)')
     top_depth_m: float = Field(
         10.0, ge=2.0, le=1000.0, description='depth of the upper turn between dives (m)'
     )
@@ -61,8 +59,11 @@ class ProfileSettings(Settings):
     prepare_s: float = Field(
         60.0, ge=0.0, le=86400.0, description='surface preparation before a dive (s)'
     )
+    surface_every_dives: int = Field(
+        0, ge=0, le=100000, description='dives between waits on the surface; 0: after the last'
+    )
     wait_s: float = Field(
-        600.0, ge=0.0, le=864000.0, description='waiting on the surface after the last dive (s)'
+        600.0, ge=0.0, le=864000.0, description='waiting on the surface between dives (s)'
     )
 
     def params(self, dives: int, pump_rate_kgps: float) -> 'ProfileParams':
@@ -74,6 +75,7 @@ class ProfileSettings(Settings):
             math.radians(self.pitch_deg),
             self.net_heaviness_kg,
             dives,
+            self.surface_every_dives,
             round(self.prepare_s / TICK_S),
             round(self.wait_s / TICK_S),
             2.0 / 3.0 * self.net_heaviness_kg / pump_rate_kgps,
@@ -88,7 +90,8 @@ class ProfileParams(NamedTuple):
     top_depth: float  #: upper turn (m)
     pitch: float  #: magnitude (rad)
     net_heaviness: float  #: magnitude (kg)
-    dives: int
+    dives: int  #: 0: no end
+    surface_every: int  #: dives between waits on the surface; 0: after the last
     prepare_ticks: int
     wait_ticks: int
     lead_s: float  #: vertical way left once the pump starts, over the vertical rate (s)
@@ -120,8 +123,9 @@ def _next_stage(state, depth, vertical_rate, params):
     if stage == INFLECTING_UP and vertical_rate < -0.05:
         return GLIDING_UP
     if stage == GLIDING_UP:
-        last = params.dives > 0 and state.dives + 1 >= params.dives
-        if last:
+        done = state.dives + 1
+        last = params.dives > 0 and done >= params.dives
+        if last or (params.surface_every > 0 and done % params.surface_every == 0):
             return WAITING_ON_SURFACE if depth < AT_SURFACE_M else GLIDING_UP
         return INFLECTING_DOWN if depth - lead <= params.top_depth else GLIDING_UP
     if stage == INFLECTING_DOWN and vertical_rate > 0.05:
@@ -138,7 +142,7 @@ def profile_step(state, depth, vertical_rate, params):
     stage = _next_stage(state, depth, vertical_rate, params)
     if stage == state.stage:
         return ProfileState(stage, state.ticks + 1, state.dives, state.aborted)
-    climbed = state.stage == GLIDING_UP
+    climbed = state.stage == GLIDING_UP and not state.aborted
     return ProfileState(stage, 0, state.dives + (1 if climbed else 0), state.aborted)
 
 

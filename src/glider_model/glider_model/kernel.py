@@ -33,7 +33,7 @@ def _source_digest() -> str:
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled kernels: ``$GLIDER_CACHE`` or ``~/.cache/glider``, then the digest."""
+    """Folder of the compiled kernels, in ``$GLIDER_CACHE`` or ``~/.cache/glider``."""
     default = Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / 'glider'
     return Path(os.environ.get('GLIDER_CACHE') or default) / f'kernels-{_source_digest()}'
 

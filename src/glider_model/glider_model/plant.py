@@ -131,9 +131,7 @@ class PlantSettings(Settings):
             start.north_m, start.east_m, start.depth_m, *q, start.speed_mps, *(5 * (0.0,))
         )
         m_b = min(limit, max(-limit, start.net_heaviness_kg))
-        return PlantState(
-            motion, Joints(m_b, 0.0, 0.0), Water(0.0, 0.0, 0.0), 0, False, 0, 0
-        )
+        return PlantState(motion, Joints(m_b, 0.0, 0.0), Water(0.0, 0.0, 0.0), 0, False, 0, 0)
 
 
 @kernel
@@ -210,7 +208,7 @@ def derivative(motion, m_b, inertia, current, water_rate, vehicle, water):
 
 @kernel
 def _along(x, h, k):
-    """x + h k."""
+    """Point ``x + h k`` along a derivative."""
     return Motion(
         x.p_n + h * k.p_n,
         x.p_e + h * k.p_e,
@@ -310,9 +308,7 @@ def plant_step(state, command, water, params, dt):
             (water.v_e - state.water.v_e) / dt,
             (water.v_d - state.water.v_d) / dt,
         )
-    motion = integrate(
-        state.motion, state.joints, joints, water, water_rate, params, dt, SUBSTEPS
-    )
+    motion = integrate(state.motion, state.joints, joints, water, water_rate, params, dt, SUBSTEPS)
     deep = motion.p_d > DIVE_BELOW_M or (state.deep and motion.p_d >= DIVE_ABOVE_M)
     dives = state.dives + 1 if state.deep and not deep else state.dives
     surface_ticks = state.surface_ticks + 1 if motion.p_d < SURFACE_M else 0

@@ -158,8 +158,8 @@ class Vehicle(Settings):
                 smallest = float(np.linalg.eigvalsh(mass_matrix(x_p, mu, params))[0])
                 if not smallest > 0.0:
                     raise ValueError(
-                        f'rigid_body, moving_mass and added_mass make a mass matrix that is not '
-                        f'positive definite with pitch_mass = {x_p:g} m, roll_mass = {mu:.3g} rad: '
+                        f'rigid_body, moving_mass, added_mass: the mass matrix is not '
+                        f'positive definite at pitch_mass = {x_p:g} m, roll_mass = {mu:.3g} rad, '
                         f'its smallest eigenvalue is {smallest:.3g} (allowed: > 0)'
                     )
         return self
@@ -168,9 +168,7 @@ class Vehicle(Settings):
         """Kernel parameters, SI and radians."""
         body, mass, added = self.rigid_body, self.moving_mass, self.added_mass
         hydro, pump = self.hydrodynamics, self.buoyancy_engine
-        coefficients = (
-            'K_D0 K_D K_L0 K_L K_beta K_MR K_p K_M0 K_M K_q K_MY K_r'.split()
-        )
+        coefficients = 'K_D0 K_D K_L0 K_L K_beta K_MR K_p K_M0 K_M K_q K_MY K_r'.split()
         r_s = body.hull_center_of_mass.value
         return VehicleParams(
             m=body.hull_mass.value + mass.mass.value,

@@ -4,6 +4,7 @@
 
 import math
 
+import numba
 import numpy as np
 import pydantic
 import pytest
@@ -19,7 +20,6 @@ from glider_model.current import (
     current_step,
     splitmix64,
 )
-from glider_model.kernel import kernel
 
 DT = 0.1
 quick = settings(max_examples=50, deadline=None)

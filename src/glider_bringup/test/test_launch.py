@@ -1,0 +1,217 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The launch file: what it starts, with which parameters, and what it refuses."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+import yaml
+
+from glider_bringup.launching import ARGUMENTS, LaunchedNode, plan_launch
+from glider_bringup.runner import MODULES, PLANT, RECORDER
+from glider_control.control import ControlLawSettings
+from glider_guidance.guidance import LosSettings
+from glider_model.settings import ConfigurationError
+
+LAUNCH_FILE = Path(__file__).parents[1] / 'launch' / 'glider.launch.py'
+
+
+def parameters(plan) -> dict[str, dict]:
+    """Contents of the parameter file, by full name of the node."""
+    values = yaml.safe_load(plan.parameters_file.read_text())
+    return {name: entry['ros__parameters'] for name, entry in values.items()}
+
+
+# ---------------------------------------------------------------------- without the launch system
+
+
+def test_defaults_fly_the_default_scenario_in_lockstep_and_real_time(tmp_path):
+    plan = plan_launch({}, tmp_path)
+    assert plan.parameters_file.parent == tmp_path
+    assert plan.namespace == '/glider'
+    assert plan.lockstep
+    assert {node.executable for node in plan.nodes} == set(MODULES) - {RECORDER}
+    values = parameters(plan)
+    assert set(values) == {f'/glider/{node.executable}' for node in plan.nodes}
+    assert all(entry['lockstep'] and not entry['record'] for entry in values.values())
+    assert values['/glider/plant_node']['speed'] == 1.0
+    assert values['/glider/plant_node']['dives'] == plan.scenario.dives == 1
+
+
+def test_arguments_reach_the_parameters(tmp_path):
+    arguments = {
+        'scenario': 'helix',
+        'controller': 'pid',
+        'guidance': 'paper',
+        'namespace': '/sea/one/',
+        'speed': 'max',
+        'duration': '120',
+    }
+    values = parameters(plan_launch(arguments, tmp_path))
+    plant = values['/sea/one/plant_node']
+    assert (plant['speed'], plant['duration_s'], plant['dives']) == (0.0, 120.0, 0)
+    assert values['/sea/one/control_node']['law'] == 'pid'
+    assert values['/sea/one/guidance_node']['los']['method'] == 'paper'
+    assert '"kind":"helix"' in values['/sea/one/guidance_node']['path']
+
+
+def test_full_duration_is_the_scenarios(tmp_path):
+    plan = plan_launch({'duration': 'full'}, tmp_path)
+    assert plan.scenario.dives == 0
+    plant = parameters(plan)['/glider/plant_node']
+    assert plant['duration_s'] == plan.scenario.duration_s == 108000.0
+
+
+def test_free_running(tmp_path):
+    plan = plan_launch({'lockstep': 'false'}, tmp_path)
+    assert not plan.lockstep
+    assert not any(entry['lockstep'] for entry in parameters(plan).values())
+
+
+@pytest.mark.parametrize('namespace', ['', '/'])
+def test_root_namespace(tmp_path, namespace):
+    plan = plan_launch({'namespace': namespace}, tmp_path)
+    assert plan.namespace == '/'
+    assert '/plant_node' in parameters(plan)
+
+
+def test_recording_adds_the_recorder_and_makes_a_run_folder(tmp_path):
+    folder = tmp_path / 'flight'
+    plan = plan_launch({'record': str(folder)}, tmp_path / 'log')
+    assert plan.parameters_file.parent == folder
+    assert LaunchedNode('glider_bringup', RECORDER) in plan.nodes
+    assert {file.name for file in folder.iterdir()} == {
+        'parameters.yaml',
+        'scenario.yaml',
+        'vehicle.yaml',
+    }
+    values = parameters(plan)
+    assert all(entry['record'] for entry in values.values())
+    recorder = values['/glider/recorder_node']
+    assert recorder['folder'] == str(folder)
+    assert recorder['progress'] is False
+    assert yaml.safe_load(recorder['attachments']) == [
+        str(folder / 'scenario.yaml'),
+        str(folder / 'vehicle.yaml'),
+    ]
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        ({'scenario': 'nonsense'}, ['nonsense', 'current_8deg']),
+        ({'scenario': 'no/such.yaml'}, ['no/such.yaml']),
+        ({'controller': 'bang'}, ['controller:=bang', 'adaptive, pid']),
+        ({'lockstep': 'maybe'}, ['lockstep:=maybe', 'true, false']),
+        ({'speed': 'fast'}, ['speed:=fast', '0.01 to 1e+06, or max']),
+        ({'speed': 'nan'}, ['speed:=nan', 'max']),
+        ({'speed': '2', 'lockstep': 'false'}, ['speed:=2', '1.0 with lockstep:=false']),
+        ({'duration': '-5'}, ['duration:=-5', '0.1 to 1e+08, or full']),
+        ({'namespace': 'a b'}, ['namespace:=a b']),
+    ],
+)
+def test_what_cannot_be_used_is_refused_and_leaves_nothing(tmp_path, arguments, words):
+    with pytest.raises(ConfigurationError) as error:
+        plan_launch({'record': str(tmp_path / 'flight'), **arguments}, tmp_path)
+    assert not [word for word in words if word not in str(error.value)], error.value
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_choices_are_those_of_the_settings():
+    choices = {argument.name: argument.choices for argument in ARGUMENTS}
+    for name, model, field in (
+        ('controller', ControlLawSettings, 'law'),
+        ('guidance', LosSettings, 'method'),
+    ):
+        words = model.model_fields[field].annotation.__args__
+        assert set(choices[name]) == {'', *words}
+
+
+# ---------------------------------------------------------------------- with the launch system
+
+
+@pytest.fixture
+def launch_module():
+    """The launch file as a module."""
+    pytest.importorskip('launch_ros', reason='launch_ros is not installed: it comes with ROS 2')
+    spec = importlib.util.spec_from_file_location('glider_launch', LAUNCH_FILE)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def start(launch_module, tmp_path, monkeypatch):
+    """Give the nodes that the launch file starts for some arguments."""
+    import launch
+    from launch.actions import DeclareLaunchArgument, OpaqueFunction
+    from launch_ros.actions import Node
+
+    monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
+    launch.logging.launch_config.reset()
+
+    def run(**arguments) -> list:
+        context = launch.LaunchContext()
+        context.launch_configurations.update(arguments)
+        actions = launch_module.generate_launch_description().entities
+        for action in actions:
+            if isinstance(action, DeclareLaunchArgument):
+                action.execute(context)
+        (opaque,) = [action for action in actions if isinstance(action, OpaqueFunction)]
+        return [action for action in opaque.execute(context) if isinstance(action, Node)]
+
+    yield run
+    launch.logging.launch_config.reset()
+
+
+def test_arguments_are_described_and_have_defaults(launch_module):
+    declared = launch_module.generate_launch_description().get_launch_arguments()
+    assert [argument.name for argument in declared] == [argument.name for argument in ARGUMENTS]
+    for action, argument in zip(declared, ARGUMENTS, strict=True):
+        assert argument.description in action.description
+        assert ''.join(part.text for part in action.default_value) == argument.default
+
+
+def test_nodes_are_those_of_the_plan(start):
+    from launch import LaunchContext
+
+    nodes = {node.node_executable: node for node in start(namespace='sea')}
+    assert set(nodes) == set(MODULES) - {RECORDER}
+    for name, node in nodes.items():
+        assert node.node_package == MODULES[name].partition('.')[0]
+        node._perform_substitutions(LaunchContext())
+        assert node.expanded_node_namespace == '/sea'
+
+
+def test_recorder_is_started_for_a_recording(start, tmp_path):
+    names = {node.node_executable for node in start(record=str(tmp_path / 'flight'))}
+    assert names == set(MODULES)
+
+
+@pytest.mark.parametrize(
+    ('name', 'lockstep', 'code', 'ends'),
+    [
+        (PLANT, 'true', 0, True),
+        (PLANT, 'true', 3, True),
+        (PLANT, 'false', 0, True),
+        ('guidance_node', 'true', 0, False),
+        ('guidance_node', 'true', -9, True),
+        ('guidance_node', 'false', -9, False),
+    ],
+)
+def test_end_of_a_node_ends_the_launch_when_it_has_to(
+    launch_module, tmp_path, name, lockstep, code, ends
+):
+    import launch
+    from launch.actions import Shutdown
+
+    plan = plan_launch({'lockstep': lockstep}, tmp_path)
+    on_exit = launch_module.on_exit(name, plan)
+    result = on_exit(type('Exited', (), {'returncode': code})(), launch.LaunchContext())
+    assert isinstance(result, Shutdown) is ends
+
+
+def test_wrong_scenario_is_one_message(start):
+    with pytest.raises(ConfigurationError, match='nonsense.*current_8deg'):
+        start(scenario='nonsense')

@@ -1,0 +1,91 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command line as a person uses it: processes of its own, and two flights that tests share."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+GLIDER = [sys.executable, '-m', 'glider_bringup.cli']
+#: Longer than any command here takes (s), the compilation of all kernels included.
+DEADLINE_S = 300.0
+#: The flight that tests share: every kind of current, and long enough for a descent to 400 m.
+SCENARIO, DURATION_S = 'rough_water', 2000
+
+
+class Recorded(NamedTuple):
+    """A flight that is over."""
+
+    folder: Path
+    card: dict  #: what --json printed
+
+
+def _environment() -> dict[str, str]:
+    """Environment of a run: a ROS domain of its own, which the runner chooses."""
+    return {name: value for name, value in os.environ.items() if name != 'ROS_DOMAIN_ID'}
+
+
+@pytest.fixture(scope='session')
+def glider():
+    """Run a command to its end; gives the completed process."""
+
+    def run(*arguments) -> subprocess.CompletedProcess:
+        return subprocess.run(
+            [*GLIDER, *map(str, arguments)],
+            env=_environment(),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=DEADLINE_S,
+        )
+
+    return run
+
+
+@pytest.fixture
+def start_glider(tmp_path):
+    """Start a command; gives the process, whose output lies in files of tmp_path."""
+    processes = []
+
+    def start(*arguments) -> subprocess.Popen:
+        with (tmp_path / 'stdout').open('w') as out, (tmp_path / 'stderr').open('w') as error:
+            process = subprocess.Popen(
+                [*GLIDER, *map(str, arguments)],
+                env=_environment(),
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=error,
+            )
+        processes.append(process)
+        return process
+
+    yield start
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+
+
+def _fly(glider, folder: Path, *options) -> Recorded:
+    done = glider('run', SCENARIO, '--duration', DURATION_S, '--out', folder, '--json', *options)
+    assert done.returncode == 0, done.stderr
+    return Recorded(folder, json.loads(done.stdout))
+
+
+@pytest.fixture(scope='session')
+def over_nodes(glider, tmp_path_factory) -> Recorded:
+    """The shared flight, over ROS 2 topics."""
+    return _fly(glider, tmp_path_factory.mktemp('flight') / 'nodes', '--engine', 'nodes')
+
+
+@pytest.fixture(scope='session')
+def direct(glider, tmp_path_factory) -> Recorded:
+    """The shared flight, by the direct engine, which writes the same bag."""
+    return _fly(
+        glider, tmp_path_factory.mktemp('flight') / 'direct', '--engine', 'direct', '--bag'
+    )
