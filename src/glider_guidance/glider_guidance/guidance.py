@@ -25,6 +25,7 @@ from glider_guidance.path import (
     path_errors,
     path_point,
     path_tangent,
+    path_turn,
 )
 from glider_guidance.profile import (
     GLIDING_DOWN,
@@ -385,12 +386,14 @@ def guidance_step(state, odometry, params, dt):
         pitch_target = steepen(upsilon_d)
         pitch_target += glide_alpha(pitch_target, params.polar)
         rate_target = glide_vertical_rate(pitch_target, params.profile.net_heaviness, params.polar)
-    heading = filter_angle(state.heading, heading_command, params.heading_filter, dt)
-    pitch = filter_angle(state.pitch, pitch_target, params.pitch_filter, dt)
-
     # virtual target
     made_good = (ground_n * d_n + ground_e * d_e + ground_d * d_d) / slope
-    s = state.s + dt * target_rate(made_good, e1, slope, params.target_gain, TARGET_SPEED_MAX)
+    s_rate = target_rate(made_good, e1, slope, params.target_gain, TARGET_SPEED_MAX)
+    s = state.s + dt * s_rate
+
+    turn_rate = path_turn(state.s, params.path) * s_rate if is_gliding(stage) else 0.0
+    heading = filter_angle(state.heading, heading_command, turn_rate, params.heading_filter, dt)
+    pitch = filter_angle(state.pitch, pitch_target, 0.0, params.pitch_filter, dt)
     t_n, t_e, t_d = path_point(state.s, params.path)
     if not follows_path:
         t_d = params.profile.depth if rate_target > 0.0 else 0.0

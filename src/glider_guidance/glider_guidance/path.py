@@ -44,6 +44,10 @@ _CLOSER_M = 1e-6
 # ---------------------------------------------------------------------------------- what runs
 
 
+#: Step along the path over which its turn is measured (m); a larger turn in it is a corner (rad).
+_TURN_STEP_M, _CORNER_RAD = 1.0, 0.2
+
+
 class PathParams(NamedTuple):
     """A path as a chain of pieces: cubic polynomials, or half turns of a helix."""
 
@@ -168,6 +172,15 @@ def path_angles(dn, de, dd):
         both with the position in place of the tangent.
     """
     return math.atan2(de, dn), math.atan2(-dd, math.hypot(dn, de))
+
+
+@kernel
+def path_turn(s, params):
+    """Change of course per metre (rad/m, + to starboard) at ``s``; 0 across a corner."""
+    n_1, e_1, _ = path_tangent(s, params)
+    n_2, e_2, _ = path_tangent(s + _TURN_STEP_M, params)
+    turn = math.atan2(n_1 * e_2 - e_1 * n_2, n_1 * n_2 + e_1 * e_2)
+    return turn / _TURN_STEP_M if abs(turn) < _CORNER_RAD else 0.0
 
 
 @kernel

@@ -25,6 +25,7 @@ from glider_guidance.path import (
     path_length,
     path_point,
     path_tangent,
+    path_turn,
 )
 
 quick = settings(max_examples=50, deadline=None)
@@ -485,3 +486,19 @@ def test_every_field_says_what_it_is():
     for model in (StraightPath, WaypointPath, SplinePath, HelixPath):
         for name, entry in model.model_json_schema()['properties'].items():
             assert name == 'kind' or entry['description'].endswith('.'), name
+
+
+def test_turn_of_a_helix_is_its_curvature():
+    for direction, sign in (('cw', 1.0), ('ccw', -1.0)):
+        path = HelixPath(
+            kind='helix', centre=(0.0, 0.0), radius_m=150.0, direction=direction, slope_deg=30.0,
+            turns=2.0,
+        )  # fmt: skip
+        # horizontal way is cos(slope) of the way
+        expected = sign * np.cos(np.radians(30.0)) / 150.0
+        assert path_turn(200.0, path.params()) == pytest.approx(expected, rel=1e-9)
+
+
+def test_corner_of_a_survey_is_not_a_turn():
+    path = WaypointPath(kind='waypoints', waypoints=[(0.0, 0.0), (100.0, 0.0), (100.0, 100.0)])
+    assert [path_turn(s, path.params()) for s in (50.0, 99.5, 150.0)] == [0.0, 0.0, 0.0]

@@ -32,9 +32,12 @@ def _clip(number, limit):
 
 
 @kernel
-def filter_error(state, error, params, dt):
-    """One step of ``dt`` s toward a command that is ``error`` away from the filtered value."""
-    pull = _clip(0.5 * params.frequency * error, params.rate_limit)
+def filter_error(state, error, command_rate, params, dt):
+    """One step of ``dt`` s toward a command that is ``error`` away from the filtered value.
+
+    A command that moves at a known rate (1/s of its unit) is followed without lag.
+    """
+    pull = _clip(0.5 * params.frequency * error + command_rate, params.rate_limit)
     rate = state.rate + dt * 2.0 * params.frequency * (pull - state.rate)
     return Filtered(state.value + dt * rate, rate)
 
@@ -42,11 +45,11 @@ def filter_error(state, error, params, dt):
 @kernel
 def filter_command(state, command, params, dt):
     """One step toward ``command``."""
-    return filter_error(state, command - state.value, params, dt)
+    return filter_error(state, command - state.value, 0.0, params, dt)
 
 
 @kernel
-def filter_angle(state, command, params, dt):
+def filter_angle(state, command, command_rate, params, dt):
     """One step toward an angle (rad), the short way round; the value stays in [-pi, pi)."""
-    moved = filter_error(state, wrap_angle(command - state.value), params, dt)
+    moved = filter_error(state, wrap_angle(command - state.value), command_rate, params, dt)
     return Filtered(wrap_angle(moved.value), moved.rate)

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glider_model.command_filter import Filtered, FilterParams, filter_angle, filter_command
+from glider_model.frames import wrap_angle
 
 quick = settings(max_examples=40, deadline=None)
 DT = 0.1
@@ -22,6 +23,10 @@ def run(step, start, command, params, seconds):
     for _ in range(round(seconds / DT)):
         states.append(step(states[-1], command, params, DT))
     return np.array(states)
+
+
+def still_angle(state, command, params, dt):
+    return filter_angle(state, command, 0.0, params, dt)
 
 
 @quick
@@ -70,7 +75,7 @@ def test_a_step_is_not_overshot():
     ('start', 'command', 'sign'), [(3.0, -3.0, 1.0), (-3.0, 3.0, -1.0), (0.5, -0.5, -1.0)]
 )
 def test_angle_goes_the_short_way(start, command, sign):
-    states = run(filter_angle, start, command, FilterParams(0.5, 0.2), 20.0)
+    states = run(still_angle, start, command, FilterParams(0.5, 0.2), 20.0)
     assert np.all(sign * states[1:, 1] >= -1e-12)
 
 
@@ -78,14 +83,14 @@ def test_angle_goes_the_short_way(start, command, sign):
 @given(params, st.floats(-math.pi, 3.14), st.floats(-10.0, 10.0))
 def test_angle_converges_to_the_direction(params, start, command):
     seconds = math.pi / params.rate_limit + 30.0 / params.frequency
-    states = run(filter_angle, start, command, params, seconds)
+    states = run(still_angle, start, command, params, seconds)
     assert math.remainder(states[-1, 0] - command, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-6)
 
 
 @quick
 @given(params, st.floats(-math.pi, 3.14), st.floats(-10.0, 10.0))
 def test_angle_stays_in_range(params, start, command):
-    states = run(filter_angle, start, command, params, 20.0)
+    states = run(still_angle, start, command, params, 20.0)
     assert states[:, 0].min() >= -math.pi
     assert states[:, 0].max() < math.pi
 
@@ -93,8 +98,20 @@ def test_angle_stays_in_range(params, start, command):
 def test_angle_is_the_filtered_command_where_nothing_wraps():
     params = FilterParams(0.5, 0.2)
     np.testing.assert_allclose(
-        run(filter_angle, -1.0, 1.0, params, 20.0),
+        run(still_angle, -1.0, 1.0, params, 20.0),
         run(filter_command, -1.0, 1.0, params, 20.0),
         rtol=0,
         atol=1e-13,
     )
+
+
+@quick
+@given(st.floats(0.1, 1.0), st.floats(-0.05, 0.05))
+def test_a_turning_command_whose_rate_is_told_is_followed_without_lag(frequency, rate):
+    """Within the step's rounding (rate dt) after the start has died out, across +-180 deg too."""
+    params, state = FilterParams(frequency, 0.2), Filtered(0.0, 0.0)
+    steps = round(40.0 / frequency / DT)
+    for step in range(1, steps + 1):
+        state = filter_angle(state, wrap_angle(step * DT * rate), rate, params, DT)
+    assert abs(wrap_angle(state.value - steps * DT * rate)) <= abs(rate) * DT + 1e-9
+    assert state.rate == pytest.approx(rate, abs=1e-6)
