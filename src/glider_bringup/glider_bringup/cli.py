@@ -3,7 +3,9 @@
 """The command line: ``./glider COMMAND``, or ``glider COMMAND`` in a sourced workspace."""
 
 import json
+import os
 import sys
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict
 from enum import Enum
@@ -12,7 +14,14 @@ from typing import Annotated, Literal, get_args
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 
 from glider_bringup.scenario import (
@@ -228,6 +237,124 @@ def _print_card(card: dict, folder: Path) -> None:
         table.add_row(name, text)
     output.print(table)
     output.print(f'run folder: {folder}', soft_wrap=True)
+
+
+@app.command(epilog='Example: ./glider montecarlo current_12deg --plants 200 --seed 1000')
+def montecarlo(
+    scenario: Annotated[
+        str, typer.Argument(help='Scenario by name (./glider list) or path of its YAML file.')
+    ] = DEFAULT_SCENARIO,
+    plants: Annotated[int, typer.Option(min=1, max=1_000_000, help='Number of plants.')] = 100,
+    seed: Annotated[
+        int, typer.Option(min=0, max=2**62, help='Plant i is drawn from seed + i.')
+    ] = 0,
+    controller: Annotated[
+        list[Controller] | None,
+        typer.Option(help='Attitude law; can be repeated. Default: all of them.'),
+    ] = None,
+    duration: Annotated[
+        str,
+        typer.Option(metavar='S|full', help="Simulated seconds, or the scenario's full duration."),
+    ] = 'full',
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help='Processes. Default: one per processor.')
+    ] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--set', metavar='FIELD=VALUE', help='Change a scenario field; can be repeated.'
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help='Folder for montecarlo.json, which tells of every plant.')
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fly many plants that differ from their vehicle file, with noise, by the direct engine.
+
+    Each hydrodynamic coefficient differs by up to 30 %, added mass by 15 %, trim by 10 mm, roll at
+    rest by 10 deg, ballast by 50 g; water is stratified. Control knows the file only.
+    """
+    from glider_bringup import montecarlo as study
+
+    fields = dict(parse_assignment(text) for text in changes or [])
+    if duration != 'full':
+        fields['duration_s'] = _number('--duration', duration, 'full', TICK_S, 1e8)
+    laws = list(dict.fromkeys(one.value for one in controller or Controller))
+    scenarios = study.make_scenarios(scenario, fields, laws, plants, seed)
+    if out:
+        study.make_folder(out)
+    messages.print(f'{scenario}: {plants} plants, each by {" and by ".join(laws)}')
+    try:
+        with _counter('flying', len(scenarios)) as update:
+            flights, airframes = study.fly_plants(
+                scenarios, workers or os.cpu_count() or 1, update
+            )
+    except KeyboardInterrupt:
+        messages.print('stopped by SIGINT', style='red')
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    except BrokenProcessPool:
+        messages.print('a worker process was killed; give fewer --workers', style='red')
+        raise typer.Exit(EXIT_FAILED) from None
+    name = next(iter(scenarios.values())).name
+    summary = study.summarise(name, seed, flights, airframes)
+    whole = study.report(scenario, fields, summary, flights, airframes)
+    if out:
+        text = json.dumps(whole, indent=2) + '\n'
+        (out / study.RESULT_FILE).write_text(text, encoding='utf-8')
+    if as_json:
+        print(json.dumps(summary))
+    else:
+        _print_study(whole)
+
+
+@contextmanager
+def _counter(description: str, total: int):
+    """Progress bar that counts, with the time left; yields its update."""
+    bar = Progress(
+        TextColumn('{task.description}'),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=messages,
+        transient=True,
+    )
+    task = bar.add_task(description, total=total)
+    with bar:
+        yield lambda done: bar.update(task, completed=done)
+
+
+def _print_study(study: dict) -> None:
+    """Print the result of a Monte Carlo study for a person."""
+
+    def show(figure: dict) -> str:
+        return ' / '.join('-' if x is None else f'{x:,.3f}' for x in figure.values())
+
+    rows = study['rows']
+    table = Table(
+        title=f'{study["scenario"]}, {study["plants"]} plants from seed {study["seed"]}',
+        title_justify='left',
+    )
+    table.add_column('p50 / p95 / worst')
+    for row in rows:
+        table.add_column(row['controller'])
+    lines = (
+        ('diverged', lambda row: str(row['diverged'])),
+        ('max steady (m)', lambda row: show(row['max_steady_m'])),
+        ('max all (m)', lambda row: show(row['max_all_m'])),
+        ('heading rms (deg)', lambda row: show(row['heading_fluctuation_deg'])),
+        ('pitch rms (deg)', lambda row: show(row['pitch_error_deg'])),
+        ('plants statically unstable', lambda row: str(row['statically_unstable'])),
+        ('plants that steer weakly', lambda row: str(row['weak_steering'])),
+        ('worst', lambda row: f'plant {row["worst_plant"]}'),
+    )
+    for name, text in lines:
+        table.add_row(name, *map(text, rows))
+    output.print(table)
+    for row in study['rows']:
+        worst = study['flown'][row['worst_plant']]['commands'][row['controller']]
+        output.print(f'worst of {row["controller"]}:', worst, soft_wrap=True)
 
 
 @app.command(epilog='Example: ./glider trim zhang2021 --net-heaviness-kg 0.4 --pitch-deg -30')

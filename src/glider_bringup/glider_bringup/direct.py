@@ -29,7 +29,7 @@ from glider_model.plant import (
     PlantState,
     plant_finished,
     plant_joints,
-    plant_odometry,
+    plant_measurement,
     plant_step,
 )
 from glider_model.signals import TICK_S
@@ -102,7 +102,7 @@ def fly(state, params, log, dt):
     """
     plant, current, guidance, control = state
     for row in range(log.shape[0]):
-        odometry_wire = odometry_to_wire(plant_odometry(plant))
+        odometry_wire = odometry_to_wire(plant_measurement(plant, params.plant))
         odometry = odometry_from_wire(odometry_wire)
         joints = plant_joints(plant)
         position = (odometry.p_n, odometry.p_e, odometry.p_d)

@@ -104,7 +104,7 @@ def fly_direct(
 ) -> tuple[Flight, dict]:
     """Fly with the direct engine; Ctrl-C ends it as aborted with what was flown."""
     state, params = mission_of(scenario)
-    scorer = Scorer()
+    scorer = _scorer(scenario)
     bag = _open_bag(scenario, folder) if with_bag else None
     status, reason, ticks = 'completed', '', 0
     start = time.perf_counter()
@@ -152,7 +152,7 @@ def fly_nodes(
     if result.exit_code == EXIT_CONFIGURATION:
         raise ConfigurationError(result.reason)
     completed = result.status == 'completed'
-    scorer = Scorer()
+    scorer = _scorer(scenario)
     recorded, lost = 0, 0
     if any(folder.glob('*.mcap')):  # else it ended before the recorder was up
         for log in read_blocks(folder):
@@ -161,6 +161,11 @@ def fly_nodes(
     status = 'completed' if completed else 'aborted'
     flight = Flight(status, result.reason, result.flight_s, recorded, lost)
     return flight, _score(scenario, scorer)
+
+
+def _scorer(scenario: Scenario) -> Scorer:
+    """Scorer of a run of the scenario."""
+    return Scorer(scenario.sensors.params(scenario.seed))
 
 
 def _score(scenario: Scenario, scorer: Scorer) -> dict:
@@ -212,7 +217,7 @@ def score_again(folder: Path) -> dict:
     if not list(folder.glob('*.mcap')):
         return old
     scenario = load_scenario(str(folder / SCENARIO_FILE))
-    scorer = Scorer()
+    scorer = _scorer(scenario)
     for log in read_blocks(folder):
         scorer.add(log)
     status = 'aborted' if old['status'] == 'aborted' else 'completed'

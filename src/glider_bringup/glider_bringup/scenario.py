@@ -14,7 +14,9 @@ from glider_guidance.guidance import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.path import PathSettings, StraightPath
 from glider_guidance.profile import ProfileSettings
 from glider_model.current import CurrentSettings
+from glider_model.perturb import PerturbSettings, perturbed
 from glider_model.plant import InitialSettings, PlantSettings
+from glider_model.sensors import SensorSettings
 from glider_model.settings import ConfigurationError, Settings, read_yaml, validate
 from glider_model.vehicle import load_vehicle, vehicle_names, vehicle_path
 from glider_model.water import WaterSettings
@@ -60,6 +62,10 @@ class Scenario(Settings):
     )
     water: WaterSettings = Field(WaterSettings(), description='density of the water')
     current: CurrentSettings = Field(CurrentSettings(), description='current')
+    sensors: SensorSettings = Field(SensorSettings(), description='noise of the odometry')
+    perturb: PerturbSettings = Field(
+        PerturbSettings(), description='what the plant differs in from its vehicle file'
+    )
     path: PathSettings = Field(
         StraightPath(kind='straight', length_m=25000.0), description='path to follow'
     )
@@ -82,6 +88,9 @@ class Scenario(Settings):
             initial=self.initial,
             duration_s=self.duration_s,
             dives=self.dives,
+            seed=self.seed,
+            sensors=self.sensors,
+            perturb=self.perturb,
         )
 
     def current_settings(self) -> CurrentSettings:
@@ -170,7 +179,7 @@ def load_scenario(name: str = DEFAULT_SCENARIO, changes: dict[str, Any] | None =
 
 
 def _find_vehicle(scenario: Scenario, folder: Path, source: str) -> Scenario:
-    """Scenario whose vehicle file is known to be good, wherever nodes are started from."""
+    """Scenario whose vehicle is known to be good, wherever nodes are started from."""
     beside = folder / scenario.vehicle
     name = scenario.vehicle
     if name not in vehicle_names() and beside.suffix and beside.is_file():
@@ -179,7 +188,11 @@ def _find_vehicle(scenario: Scenario, folder: Path, source: str) -> Scenario:
         path = vehicle_path(name)
     except ConfigurationError as error:
         raise ConfigurationError(f'{source}: {error}') from None
-    load_vehicle(str(path))
+    vehicle = load_vehicle(str(path))
+    try:
+        perturbed(vehicle.params(), scenario.perturb)
+    except ConfigurationError as error:
+        raise ConfigurationError(f'{source}: {error}') from None
     return scenario.model_copy(
         update={'vehicle': name if name in vehicle_names() else str(path.resolve())}
     )

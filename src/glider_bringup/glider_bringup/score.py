@@ -5,6 +5,8 @@
 The same function scores a bag and a direct run. "Steady" counts what is after the settling time,
 more than 600 s away from every inflection on either side, and deeper than 30 m. "All" leaves out
 the settling time only. An inflection is where the desired vertical rate changes its sign.
+
+What was measured with noise is scored by the true motion, which the noise's seed gives back.
 """
 
 import math
@@ -12,9 +14,15 @@ import math
 import numpy as np
 
 from glider_bringup.direct import COLUMNS
-from glider_model.frames import euler_from_quaternion, odometry_from_wire, reference_from_wire
+from glider_model.frames import (
+    euler_from_quaternion,
+    odometry_from_wire,
+    odometry_to_wire,
+    reference_from_wire,
+)
 from glider_model.kernel import kernel
 from glider_model.plant import DIVE_ABOVE_M, DIVE_BELOW_M
+from glider_model.sensors import SensorParams, is_noisy, recover
 from glider_model.signals import TICK_S
 
 #: Around an inflection (s) and shallower than this (m) nothing counts as steady.
@@ -74,10 +82,41 @@ def _extract(log, series):
         series[row, _INFEASIBLE] = log[row, _INFEASIBLE_COLUMN]
 
 
-class Scorer:
-    """Collects log blocks, then gives the score."""
+@kernel
+def _to_truth(log, first_tick, sensors, offset):
+    """Put the true odometry in the place of the measured one.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    log : float64[n, ROW]
+        Changed in place.
+    first_tick : int
+        Tick of the first row.
+    sensors : SensorParams
+    offset : float64[n, 2]
+        Filled with the way from the measured to the true position, north and east (m).
+    """
+    for row in range(log.shape[0]):
+        measured = odometry_from_wire(_wire(log, row, _ODOM_START))
+        true = recover(measured, first_tick + row, sensors)
+        offset[row, 0] = true.p_n - measured.p_n
+        offset[row, 1] = true.p_e - measured.p_e
+        for i, value in enumerate(odometry_to_wire(true)):
+            log[row, _ODOM_START + i] = value
+
+
+class Scorer:
+    """Collects log blocks, then gives the score.
+
+    Parameters
+    ----------
+    sensors : SensorParams, optional
+        Noise of the odometry; without it the odometry is taken for the truth.
+    """
+
+    def __init__(self, sensors: SensorParams | None = None) -> None:
+        self._sensors = sensors if sensors is not None and is_noisy(sensors) else None
+        self._offsets: list[np.ndarray] = []
         self._blocks: list[np.ndarray] = []
         self._last: np.ndarray | None = None
 
@@ -85,6 +124,10 @@ class Scorer:
         """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
         if not len(log):
             return
+        if self._sensors is not None:
+            log = log.copy()
+            self._offsets.append(np.empty((len(log), 2)))
+            _to_truth(log, self.ticks, self._sensors, self._offsets[-1])
         series = np.empty((len(log), _SERIES))
         _extract(log, series)
         self._blocks.append(series)
@@ -116,6 +159,9 @@ class Scorer:
         ticks = len(series)
         steady, scored = _windows(series, settle_s)
         e2 = series[:, _E2]
+        if self._offsets:
+            target = series[:, [_TARGET_N, _TARGET_E]]
+            e2 = e2 + _across(np.concatenate(self._offsets), target)
         pitch_error = np.degrees(series[:, _PITCH] - series[:, _PITCH_REF])
         heading = _heading_fluctuation_deg(series[:, _HEADING])
         whole = steady & _has_whole_mean(ticks)
@@ -171,6 +217,20 @@ def _windows(series: np.ndarray, settle_s: float) -> tuple[np.ndarray, np.ndarra
     for turn in np.flatnonzero(down[1:] != down[:-1]) + 1:
         steady[max(0, turn - margin) : turn + margin + 1] = False
     return steady, scored
+
+
+def _across(offset: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Part of an offset (north, east) to starboard of the way of the virtual target (m).
+
+    While the target stands still its way is the last one it went.
+    """
+    way = np.diff(target, axis=0, append=target[-1:])
+    moves = np.any(way != 0.0, axis=1)
+    if not moves.any():
+        return np.zeros(len(offset))
+    last = np.maximum.accumulate(np.where(moves, np.arange(len(way)), np.argmax(moves)))
+    course = np.arctan2(way[last, 1], way[last, 0])
+    return np.cos(course) * offset[:, 1] - np.sin(course) * offset[:, 0]
 
 
 def _heading_fluctuation_deg(heading: np.ndarray) -> np.ndarray:

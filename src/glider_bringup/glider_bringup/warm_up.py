@@ -20,7 +20,8 @@ from glider_model.frames import (
     water_to_wire,
     wrench_to_wire,
 )
-from glider_model.plant import plant_finished, plant_joints, plant_odometry, plant_step
+from glider_model.plant import plant_finished, plant_joints, plant_measurement, plant_step
+from glider_model.sensors import SensorSettings
 from glider_model.signals import TICK_S
 from glider_model.trim import solve_trim
 
@@ -30,12 +31,12 @@ def main() -> None:
     state, params = mission_of(load_scenario())
     log = np.zeros((1, ROW))
     fly(state, params, log, TICK_S)
-    scorer = Scorer()
+    scorer = Scorer(SensorSettings(position_std_m=1.0).params(0))
     scorer.add(log)
     scorer.result(0.0, 0.0)
 
     plant, current, guidance, control = state
-    odometry = odometry_from_wire(odometry_to_wire(plant_odometry(plant)))
+    odometry = odometry_from_wire(odometry_to_wire(plant_measurement(plant, params.plant)))
     joints = plant_joints(plant)
     position = (odometry.p_n, odometry.p_e, odometry.p_d)
     _, water = current_step(current, position, 0.0, params.current, TICK_S)

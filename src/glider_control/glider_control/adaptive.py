@@ -176,8 +176,10 @@ class AdaptiveState(NamedTuple):
     climb: SteeringState
     disturbance_dive: float  #: d_hat, turn rate that roll does not explain (rad/s)
     disturbance_climb: float
-    lagged: float  #: regressor of the steering estimator
-    steady_s: float  #: time since the last turn (s)
+    bank: float  #: smoothed regressor of the steering estimator
+    roll_rate: float  #: smoothed roll rate (rad/s)
+    yaw_rate: float  #: smoothed yaw rate (rad/s)
+    steady_s: float  #: time since the last turn-over (s)
 
 
 def make_adaptive(
@@ -221,6 +223,8 @@ def initial_adaptive(settings: AdaptiveSettings) -> AdaptiveState:
         (0.0, 0.0, 0.0, 0.0),
         settings.steering.initial_state(1.0),
         settings.steering.initial_state(-1.0),
+        0.0,
+        0.0,
         0.0,
         0.0,
         0.0,
@@ -269,22 +273,24 @@ def channel_step(state, error, command, rate, applied, coupling, params, dt):
 
 @kernel
 def learn_phase(state, measured, speed, params, dt):
-    """Steering estimates of both phases, the lagged regressor, and the time since the last turn.
+    """Steering estimates of both phases, what they learn from, time since the last turn-over.
 
     Only the phase that is flown learns, and only in a glide.
     """
     ratio = max(speed, LEARN_SPEED) / STEERING_SPEED
-    share = dt / (params.steering.lag_s + dt)
-    lagged = state.lagged + share * (math.sin(measured.phi) * ratio - state.lagged)
     gliding = abs(measured.vertical_rate) > LEARN_VERTICAL_RATE and speed > LEARN_SPEED
     steady_s = state.steady_s + dt if gliding else 0.0
+    share = dt / (params.steering.smoothing_s + dt) if steady_s > dt else 1.0
+    bank = state.bank + share * (math.sin(measured.phi) * ratio - state.bank)
+    roll_rate = state.roll_rate + share * (measured.phi_dot - state.roll_rate)
+    yaw_rate = state.yaw_rate + share * (measured.psi_dot - state.yaw_rate)
     dive, climb = state.dive, state.climb
     if steady_s > params.steering.after_s:
         if measured.vertical_rate > 0.0:
-            dive = learn_steering(dive, lagged, measured.psi_dot, params.steering, dt)
+            dive = learn_steering(dive, bank, roll_rate, yaw_rate, params.steering, dt)
         else:
-            climb = learn_steering(climb, lagged, measured.psi_dot, params.steering, dt)
-    return dive, climb, lagged, steady_s
+            climb = learn_steering(climb, bank, roll_rate, yaw_rate, params.steering, dt)
+    return dive, climb, bank, roll_rate, yaw_rate, steady_s
 
 
 @kernel
@@ -294,16 +300,19 @@ def bank_to_turn(steering, disturbance, measured, reference, speed, learning, pa
     phi_s = asin sat((psi_s' + k_psi e + k_d (psi_s' - psi') - d_hat) / (b_hat V / V_0)),
     d_hat' = -k_i e. d_hat waits while the roll command is at its limit.
     """
-    error = wrap_angle(reference.psi - measured.psi)
     limit = math.sin(params.roll_limit)
     ratio = max(speed, LEARN_SPEED) / STEERING_SPEED
     authority = effective_steering(steering, params.steering) * ratio
+    # the heading that is left when the roll is gone, but for the roll of the turn asked for
+    turning = math.asin(min(limit, max(-limit, reference.psi_dot / authority)))
+    error = wrap_angle(reference.psi - measured.psi + steering.k * (measured.phi - turning))
+    psi_dot = measured.psi_dot - steering.k * measured.phi_dot
     # a vehicle that steers weakly is not asked for a bandwidth it does not have
-    heading_kp = min(params.heading_kp, abs(authority) * limit / SATURATING_ERROR)
+    share = min(1.0, abs(authority) * limit / (params.heading_kp * SATURATING_ERROR))
     turn = (
         reference.psi_dot
-        + heading_kp * error
-        + params.heading_kd * (reference.psi_dot - measured.psi_dot)
+        + share * params.heading_kp * error
+        + share * params.heading_kd * (reference.psi_dot - psi_dot)
         - disturbance
     )
     demand = turn / authority
@@ -337,7 +346,9 @@ def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, 
     -------
     AdaptiveState, tau_p, tau_q
     """
-    dive, climb, lagged, steady_s = learn_phase(state, measured, speed, params, dt)
+    dive, climb, bank, roll_rate, yaw_rate, steady_s = learn_phase(
+        state, measured, speed, params, dt
+    )
     learning = steady_s > LEARN_AFTER_S
     d_dive, d_climb = state.disturbance_dive, state.disturbance_climb
     roll_command = 0.0
@@ -418,7 +429,9 @@ def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, 
         climb,
         d_dive,
         d_climb,
-        lagged,
+        bank,
+        roll_rate,
+        yaw_rate,
         steady_s,
     )
     return new_state, tau_p, tau_q

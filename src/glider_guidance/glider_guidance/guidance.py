@@ -39,6 +39,8 @@ from glider_guidance.profile import (
     is_gliding,
     profile_step,
     profile_targets,
+    time_to_turn,
+    turn_offset,
 )
 from glider_model.command_filter import Filtered, FilterParams, filter_angle
 from glider_model.frames import euler_from_quaternion, rotate_to_ned, wrap_angle
@@ -88,6 +90,9 @@ class LosSettings(Settings):
         le=3600.0,
         description='lookahead of the observer method in time at the speed over ground (s)',
         json_schema_extra={'tunable': True},
+    )
+    lead_turns: bool = Field(
+        True, description='share the drift of a turn between before and after (observer method)'
     )
     delta1_m: float = Field(
         3.2,
@@ -186,6 +191,7 @@ class GuidanceSettings(GuidanceLawSettings):
             self.profile.params(self.dives, vehicle.m_b_rate),
             make_polar(vehicle),
             self.los.method == 'observer',
+            self.los.method == 'observer' and self.los.lead_turns,
             self.los.lookahead_m if self.los.method == 'observer' else self.los.delta1_m,
             self.los.lookahead_s if self.los.method == 'observer' else 0.0,
             self.los.delta1_per_s,
@@ -206,6 +212,7 @@ class GuidanceSettings(GuidanceLawSettings):
             Filtered(0.0, 0.0),
             0.0,
             0.0,
+            0.0,
             0,
         )
 
@@ -217,6 +224,7 @@ class GuidanceParams(NamedTuple):
     profile: ProfileParams
     polar: Polar
     compensates: bool  #: crab into the estimated current
+    leads: bool  #: share the drift of a turn between before and after
     lookahead: float  #: (m), at least
     lookahead_s: float  #: times the speed over ground, if that is more
     target_gain: float  #: delta1 (1/s)
@@ -237,6 +245,7 @@ class GuidanceState(NamedTuple):
     pitch: Filtered
     speed: float  #: filtered horizontal speed through the water (m/s)
     heading_command: float  #: held while the vehicle turns (rad)
+    drift: float  #: what the last turn was expected to cost across the path (m)
     infeasible_ticks: int
 
 
@@ -263,6 +272,7 @@ def guidance_abort(state):
         state.pitch,
         state.speed,
         state.heading_command,
+        state.drift,
         state.infeasible_ticks,
     )
 
@@ -284,6 +294,7 @@ def _start(state, odometry, psi, theta, params):
         Filtered(theta, 0.0),
         glide_horizontal_speed(pitch, rate, params.polar),
         psi,
+        0.0,
         0,
     )
 
@@ -358,10 +369,23 @@ def guidance_step(state, odometry, params, dt):
         speed += dt / SPEED_FILTER_S * (model_speed - speed)
 
     # direction to fly
+    surfaced = stage == WAITING_ON_SURFACE or stage == SURFACE_PREPARATION or stage == SURFACING
     lookahead = max(
         params.lookahead, params.lookahead_s * math.sqrt(ground_n * ground_n + ground_e * ground_e)
     )
-    gamma_r, rho_r = approach_angles(e2, e3, lookahead, params.vertical_ratio)
+    drift_past = state.drift
+    offset = 0.0
+    if params.leads and not follows_path:
+        across = observer.current_e * math.cos(gamma_d) - observer.current_n * math.sin(gamma_d)
+        coming = across * params.profile.lead_s
+        if surfaced:
+            drift_past = 0.0
+        elif is_gliding(state.profile.stage) and not is_gliding(stage):
+            drift_past = coming
+        if is_gliding(stage):
+            to_turn_s = time_to_turn(stage, profile.dives, odometry.p_d, ground_d, params.profile)
+            offset = turn_offset(to_turn_s, profile.ticks * dt, coming, drift_past)
+    gamma_r, rho_r = approach_angles(e2 - offset, e3, lookahead, params.vertical_ratio)
     if not follows_path:
         rho_r = 0.0
     chi_d, upsilon_d = desired_direction(gamma_d, rho_d, gamma_r, rho_r)
@@ -428,6 +452,7 @@ def guidance_step(state, odometry, params, dt):
         pitch,
         speed,
         heading_command,
+        drift_past,
         infeasible_ticks,
     )
     return new_state, output

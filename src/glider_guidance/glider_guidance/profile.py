@@ -34,6 +34,8 @@ STAGE_NAMES = (
 AT_SURFACE_M = 1.0
 #: Share of the glide's vertical rate at which the pitch goes over in a turn.
 PITCH_OVER = 0.5
+#: The desired track is led between these times before a turn, and comes back in this time (s).
+LEAD_FROM_S, LEAD_TO_S, RETURN_S = 400.0, 150.0, 240.0
 
 
 class ProfileSettings(Settings):
@@ -182,3 +184,37 @@ def mission_time_s(params: ProfileParams, polar: Polar, dives: int) -> float:
     _, rate = profile_targets(GLIDING_DOWN, 0.0, params, polar)
     legs = 2.0 * dives * params.depth / rate
     return params.prepare_ticks * TICK_S + legs + 2.0 * dives * params.lead_s
+
+
+@kernel
+def time_to_turn(stage, dives, depth, vertical_rate, params):
+    """Time (s) until the pump starts for the next turn; infinite where none is to come."""
+    rate = max(abs(vertical_rate), 0.01)
+    if stage == GLIDING_DOWN:
+        return (params.depth - depth) / rate - params.lead_s
+    surfacing = (params.dives > 0 and dives + 1 >= params.dives) or (
+        params.surface_every > 0 and (dives + 1) % params.surface_every == 0
+    )
+    if stage == GLIDING_UP and not surfacing:
+        return (depth - params.top_depth) / rate - params.lead_s
+    return math.inf
+
+
+@kernel
+def _smooth(share):
+    """Smooth step from 0 to 1."""
+    x = min(1.0, max(0.0, share))
+    return x * x * (3.0 - 2.0 * x)
+
+
+@kernel
+def turn_offset(to_turn_s, since_turn_s, coming, past):
+    """Offset (m) of the desired track that shares a turn's drift between before and after.
+
+    In a turn the vehicle is slow and the current takes it along by a drift that is known
+    beforehand. The desired track therefore moves up-current by half of the ``coming`` drift before
+    the turn, and from half of the ``past`` drift back to zero after it.
+    """
+    before = _smooth((LEAD_FROM_S - to_turn_s) / (LEAD_FROM_S - LEAD_TO_S))
+    after = 1.0 - _smooth(since_turn_s / RETURN_S)
+    return 0.5 * (past * after - coming * before)

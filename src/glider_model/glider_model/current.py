@@ -3,8 +3,7 @@
 """Velocity of the water: a sum of simple fields of depth and time.
 
 A person writes `CurrentSettings`; `CurrentSettings.params` flattens them into the arrays that
-`current_step` reads. The random part draws its numbers from a hash of (seed, component, tick), so
-that there is no generator to share or to reset: whoever steps tick 7 gets the numbers of tick 7.
+`current_step` reads. The random part draws its numbers from a hash of (seed, component, tick).
 """
 
 import csv
@@ -18,6 +17,7 @@ import pydantic
 from pydantic import Field
 
 from glider_model.kernel import kernel
+from glider_model.noise import normal_pair, random_stream
 from glider_model.settings import Settings
 from glider_model.signals import Water
 
@@ -60,36 +60,6 @@ class CurrentState(NamedTuple):
 
 
 @kernel
-def splitmix64(x):
-    """Hash a 64-bit number: output function of the SplitMix64 generator (Steele et al. 2014)."""
-    x += np.uint64(0x9E3779B97F4A7C15)
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return x ^ (x >> np.uint64(31))
-
-
-@kernel
-def _stream(seed, offset, ordinal):
-    """Start of the random stream that belongs to one component under one seed."""
-    x = splitmix64(np.uint64(seed))
-    x = splitmix64(x + np.uint64(offset))
-    return splitmix64(x + np.uint64(ordinal))
-
-
-@kernel
-def _normal_pair(stream, tick):
-    """Two independent standard normal numbers that belong to ``tick`` (Box and Muller 1958)."""
-    counter = np.uint64(2) * np.uint64(tick)
-    first = splitmix64(stream ^ splitmix64(counter))
-    second = splitmix64(stream ^ splitmix64(counter + np.uint64(1)))
-    # 53 random bits each, in (0, 1]: the logarithm stays finite
-    radius = (np.float64(first >> np.uint64(11)) + 0.5) * 2.0**-53
-    angle = (np.float64(second >> np.uint64(11)) + 0.5) * 2.0**-53
-    radius = math.sqrt(-2.0 * math.log(radius))
-    return radius * math.cos(2.0 * math.pi * angle), radius * math.sin(2.0 * math.pi * angle)
-
-
-@kernel
 def current_initial(params):
     """State before the first step, Gauss-Markov parts drawn from their stationary distribution.
 
@@ -108,7 +78,7 @@ def current_initial(params):
     values = np.zeros(count)
     for i in range(len(params.kind)):
         if params.kind[i] == _GAUSS_MARKOV:
-            north, east = _normal_pair(params.stream[i], 0)
+            north, east = normal_pair(params.stream[i], 0)
             values[params.first[i]] = params.numbers[i, 0] * north
             values[params.first[i] + 1] = params.numbers[i, 0] * east
     return CurrentState(0, values)
@@ -122,7 +92,7 @@ def _advance(state, params, dt):
         if params.kind[i] == _GAUSS_MARKOV:
             keep = math.exp(-dt / params.numbers[i, 1])
             fresh = params.numbers[i, 0] * math.sqrt(1.0 - keep * keep)
-            north, east = _normal_pair(params.stream[i], state.tick + 1)
+            north, east = normal_pair(params.stream[i], state.tick + 1)
             j = params.first[i]
             values[j] = keep * state.values[j] + fresh * north
             values[j + 1] = keep * state.values[j + 1] + fresh * east
@@ -610,7 +580,7 @@ class CurrentSettings(_Flow):
             numbers[i, : len(part.numbers)] = part.numbers
             if part.kind == _GAUSS_MARKOV:
                 first[i] = 2 * random
-                stream[i] = _stream(seed, part.seed_offset, random)
+                stream[i] = random_stream(seed, part.seed_offset, random)
                 random += 1
             else:
                 first[i], last[i] = row, row + len(part.rows)

@@ -24,7 +24,9 @@ from glider_model.frames import (
 )
 from glider_model.hydrodynamics import hydrodynamics
 from glider_model.kernel import kernel
+from glider_model.perturb import PerturbSettings, perturbed
 from glider_model.rigid_body import GRAVITY, coriolis, make_inertia, solve_mass
+from glider_model.sensors import SensorParams, SensorSettings, measure
 from glider_model.settings import Settings
 from glider_model.signals import TICK_S, Joints, Odometry, Water
 from glider_model.vehicle import VehicleParams, load_vehicle
@@ -71,13 +73,14 @@ class PlantState(NamedTuple):
 
 
 class PlantParams(NamedTuple):
-    """Vehicle, water and where the run ends."""
+    """Vehicle, water, where the run ends, and the noise of what is measured."""
 
     vehicle: VehicleParams
     water: WaterParams
     max_ticks: int
     stop_after_dives: int  #: 0: only max_ticks ends the run
     stop_surface_ticks: int
+    sensors: SensorParams
 
 
 class InitialSettings(Settings):
@@ -109,15 +112,21 @@ class PlantSettings(Settings):
     surface_s: float = Field(
         60.0, ge=0.0, le=86400.0, description='time at the surface after the last dive (s)'
     )
+    seed: int = Field(0, ge=0, le=2**63 - 1, description='seed of the noise')
+    sensors: SensorSettings = Field(SensorSettings(), description='noise of the odometry')
+    perturb: PerturbSettings = Field(
+        PerturbSettings(), description='what this vehicle differs in from its file'
+    )
 
     def params(self) -> PlantParams:
         """Kernel parameters."""
         return PlantParams(
-            load_vehicle(self.vehicle).params(),
+            perturbed(load_vehicle(self.vehicle).params(), self.perturb),
             self.water.params(),
             max(1, round(self.duration_s / TICK_S)),
             self.dives,
             round(self.surface_s / TICK_S),
+            self.sensors.params(self.seed),
         )
 
     def initial_state(self) -> PlantState:
@@ -149,7 +158,7 @@ def acceleration(motion, m_b, inertia, water_rate, vehicle, water):
     k_y = 2.0 * (q_y * q_z + q_w * q_x)
     k_z = 1.0 - 2.0 * (q_x * q_x + q_y * q_y)
     s_x, s_y, s_z = inertia.s_x, inertia.s_y, inertia.s_z
-    weight = (m_b - buoyancy_gain(motion.p_d, vehicle.m, water)) * GRAVITY
+    weight = (m_b + vehicle.ballast - buoyancy_gain(motion.p_d, vehicle.m, water)) * GRAVITY
     if motion.p_d < vehicle.hull_radius:
         weight += (
             vehicle.m * GRAVITY * emerged_fraction(motion.p_d, vehicle.hull_radius)
@@ -328,7 +337,7 @@ def plant_finished(state, params):
 
 @kernel
 def plant_odometry(state):
-    """What the vehicle would measure without error."""
+    """Where the vehicle is and how it moves: what it would measure without error."""
     x, water = state.motion, state.water
     u, v, w = rotate_to_body(x.q_w, x.q_x, x.q_y, x.q_z, water.v_n, water.v_e, water.v_d)
     return Odometry(
@@ -346,6 +355,12 @@ def plant_odometry(state):
         x.q,
         x.r,
     )
+
+
+@kernel
+def plant_measurement(state, params):
+    """What the vehicle measures: the odometry with the noise of this tick."""
+    return measure(plant_odometry(state), state.tick, params.sensors)
 
 
 @kernel

@@ -152,16 +152,9 @@ class Vehicle(Settings):
 
     @pydantic.model_validator(mode='after')
     def _mass_is_positive(self):
-        params = self.params()
-        for x_p in (-params.x_p_max, 0.0, params.x_p_max):
-            for mu in (0.0, 0.5 * params.mu_max, params.mu_max):
-                smallest = float(np.linalg.eigvalsh(mass_matrix(x_p, mu, params))[0])
-                if not smallest > 0.0:
-                    raise ValueError(
-                        f'rigid_body, moving_mass, added_mass: the mass matrix is not '
-                        f'positive definite at pitch_mass = {x_p:g} m, roll_mass = {mu:.3g} rad, '
-                        f'its smallest eigenvalue is {smallest:.3g} (allowed: > 0)'
-                    )
+        fault = mass_fault(self.params())
+        if fault:
+            raise ValueError(f'rigid_body, moving_mass, added_mass: {fault}')
         return self
 
     def params(self) -> 'VehicleParams':
@@ -212,6 +205,7 @@ class Vehicle(Settings):
             x_p_rate=mass.rate.value,
             mu_max=math.radians(mass.rotation.value),
             mu_rate=math.radians(mass.rotation_rate.value),
+            ballast=0.0,
         )
 
 
@@ -270,6 +264,22 @@ class VehicleParams(NamedTuple):
     x_p_rate: float
     mu_max: float
     mu_rate: float
+    ballast: float  #: net heaviness beside that of the buoyancy engine (kg, + sinks)
+
+
+def mass_fault(vehicle: VehicleParams) -> str:
+    """What is wrong with the mass matrix of a vehicle; empty if nothing is."""
+    for x_p in (-vehicle.x_p_max, 0.0, vehicle.x_p_max):
+        for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
+            mu = share * vehicle.mu_max
+            smallest = float(np.linalg.eigvalsh(mass_matrix(x_p, mu, vehicle))[0])
+            if not smallest > 0.0:
+                return (
+                    f'the mass matrix is not positive definite at pitch_mass = {x_p:g} m, '
+                    f'roll_mass = {mu:.3g} rad, its smallest eigenvalue is {smallest:.3g} '
+                    f'(allowed: > 0)'
+                )
+    return ''
 
 
 def vehicle_names() -> list[str]:

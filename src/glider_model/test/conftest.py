@@ -8,6 +8,7 @@ import pytest
 
 from glider_model.frames import quaternion_from_euler
 from glider_model.plant import Motion, PlantParams, PlantState, plant_step
+from glider_model.sensors import SensorSettings
 from glider_model.signals import TICK_S, Joints, Water
 from glider_model.vehicle import load_vehicle
 from glider_model.water import WaterSettings
@@ -70,7 +71,9 @@ class Flight:
 
 def _plant_params(vehicle='zhang2021', **water):
     params = load_vehicle(vehicle).params() if isinstance(vehicle, str) else vehicle
-    return PlantParams(params, WaterSettings(**water).params(), 10**9, 0, 0)
+    return PlantParams(
+        params, WaterSettings(**water).params(), 10**9, 0, 0, SensorSettings().params(0)
+    )
 
 
 def _start(position=(0.0, 0.0, 100.0), euler=(0.0, 0.0, 0.0), velocity=(), joints=(0.0, 0.0, 0.0)):

@@ -9,7 +9,7 @@ from glider_model.plant import (
     PlantSettings,
     plant_finished,
     plant_joints,
-    plant_odometry,
+    plant_measurement,
     plant_step,
 )
 from glider_model.ros import messages
@@ -41,7 +41,7 @@ class PlantNode(ClockNode):
         """Call every kernel once, so that no tick waits for the compiler."""
         state = plant_step(self.state, self.command, self.water, self.params, TICK_S)
         plant_finished(state, self.params)
-        odometry_to_wire(plant_odometry(state))
+        odometry_to_wire(plant_measurement(state, self.params))
         plant_joints(state)
         water_from_wire((0.0, 0.0, 0.0))
 
@@ -49,7 +49,8 @@ class PlantNode(ClockNode):
         """Publish the state of the vehicle."""
         self.publish_clock(stamp_ns)
         self.publish_joints(stamp_ns, plant_joints(self.state))
-        self.publish_odom(stamp_ns, odometry_to_wire(plant_odometry(self.state)))
+        measured = plant_measurement(self.state, self.params)
+        self.publish_odom(stamp_ns, odometry_to_wire(measured))
 
     def complete_tick(self, command, current_velocity) -> bool:
         """Integrate to the next tick; False at the end of the run."""
