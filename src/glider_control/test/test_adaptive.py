@@ -1,0 +1,192 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The adaptive law on plants that are known exactly, so that its Lyapunov function is too."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glider_control.adaptive import (
+    DISTURBANCE_MAX,
+    SCALE_ALPHA,
+    SCALE_PITCH_RATE,
+    SCALE_V2,
+    AdaptiveSettings,
+    adaptive_step,
+    initial_adaptive,
+    make_adaptive,
+)
+from glider_control.measurement import Measured
+from glider_model.command_filter import FilterParams
+from glider_model.signals import Reference
+from glider_model.vehicle import load_vehicle
+
+DT = 0.1
+SPEED, ALPHA = 0.5, 0.028
+SETTINGS = AdaptiveSettings()
+PARAMS = make_adaptive(
+    SETTINGS, load_vehicle('zhang2021').params(), math.radians(30.0), FilterParams(0.5, 0.08)
+)
+
+
+def measured(**changes) -> Measured:
+    """A steady dive, level and on its heading, but for the changes."""
+    return Measured(0.0, -0.5, 0.0, 0.0, 0.0, 0.0, 0.27)._replace(**changes)
+
+
+def reference(**changes) -> Reference:
+    return Reference(0, 0, 0, 0.0, -0.5, 0.0, 0.4, 0.0, 0.27, 0.0, 0.0, 0.0)._replace(**changes)
+
+
+def step(state, now, wanted, applied=(0.0, 0.0), held=(False, False)):
+    return adaptive_step(state, now, wanted, SPEED, ALPHA, 0.4, applied, held, PARAMS, DT)
+
+
+class PitchPlant:
+    """M q' = tau + Phi^T theta*: the plant that the law assumes, with an ideal actuator."""
+
+    def __init__(self, theta_star, error=0.0):
+        self.theta_star = np.array(theta_star)
+        self.theta, self.q = -0.5 + error, 0.0
+        self.tau = 0.0
+        self.state = initial_adaptive(SETTINGS)
+
+    def fly(self, seconds, wanted=None):
+        """Lyapunov function V2, parameters and pitch errors of every tick."""
+        values, errors = [], []
+        for tick in range(round(seconds / DT)):
+            target = wanted(tick * DT) if wanted else reference()
+            now = measured(theta=self.theta, theta_dot=self.q)
+            self.state, _, self.tau = step(self.state, now, target, (0.0, self.tau))
+            values.append(self.lyapunov())
+            errors.append(self.theta - target.theta)
+            phi = np.array(
+                [
+                    1.0,
+                    SPEED**2 * ALPHA / SCALE_ALPHA,
+                    SPEED**2 / SCALE_V2,
+                    self.state.pitch_channel.rate.value / SCALE_PITCH_RATE,
+                ]
+            )
+            for _ in range(20):
+                rate = (self.tau + phi @ self.theta_star) / PARAMS.pitch.inertia
+                self.theta += DT / 20 * self.q
+                self.q += DT / 20 * rate
+        return np.array(values), np.array(errors)
+
+    def lyapunov(self):
+        """V2 = 1/2 B1 K1bar^2 + 1/2 M K2bar^2 + 1/2 theta_tilde^2 / Gamma."""
+        channel = self.state.pitch_channel
+        wrong = self.theta_star - np.array(self.state.pitch_theta)
+        return (
+            0.5 * PARAMS.pitch.b1 * channel.k1**2
+            + 0.5 * PARAMS.pitch.inertia * channel.k2**2
+            + 0.5 * float(wrong @ wrong) / PARAMS.pitch.gamma
+        )
+
+
+parameters = st.tuples(*(st.floats(-1.0, 1.0) for _ in range(3)), st.floats(-1.5, 0.0))
+
+
+@settings(max_examples=15, deadline=None)
+@given(parameters, st.floats(-0.2, 0.2))
+def test_lyapunov_function_never_grows_on_an_unknown_plant(theta_star, error):
+    """But for leakage and the sampling: it never rises by more than 1e-4 of its start in a tick.
+
+    Adaptation begins after LEARN_AFTER_S; from then on V2 with the true parameter errors falls.
+    """
+    values, _ = PitchPlant(theta_star, error).fly(600.0)
+    learning = values[round(30.0 / DT) :]
+    assert np.max(np.diff(learning)) < 1e-4 * learning[0] + 1e-7
+    assert learning[-1] <= learning[0] + 1e-9
+
+
+@settings(max_examples=15, deadline=None)
+@given(parameters)
+def test_pitch_error_ends_inside_the_ultimate_bound(theta_star):
+    """0.1 deg after 30 min: the dead zone of learning over L1, doubled."""
+    _, errors = PitchPlant(theta_star).fly(1800.0)
+    bound = 2.0 * PARAMS.pitch.dead_zone / PARAMS.pitch.l1
+    assert np.max(np.abs(errors[-1000:])) < bound
+    assert bound < math.radians(0.1)
+
+
+def test_constant_moments_are_learnt_whatever_they_are_called():
+    """The sum Phi^T theta_hat cancels the plant's; single parameters are not told apart."""
+    plant = PitchPlant((0.3, -0.5, 0.2, 0.0))
+    plant.fly(1800.0)
+    phi = np.array([1.0, SPEED**2 * ALPHA / SCALE_ALPHA, SPEED**2 / SCALE_V2, 0.0])
+    assert phi @ plant.state.pitch_theta == pytest.approx(phi @ plant.theta_star, abs=0.01)
+
+
+def test_parameters_stay_within_the_projection():
+    plant = PitchPlant((50.0, 0.0, 0.0, 0.0))
+    plant.fly(600.0)
+    assert np.max(np.abs(plant.state.pitch_theta)) == PARAMS.pitch.bound
+
+
+@pytest.mark.parametrize('held', [(True, False), (False, True)])
+def test_held_actuator_teaches_nothing(held):
+    state = initial_adaptive(SETTINGS)
+    for _ in range(1000):
+        state, *_ = step(state, measured(phi=0.1, theta=-0.4), reference(), held=held)
+    assert (state.roll_theta == (0.0, 0.0, 0.0)) == held[0]
+    assert (state.pitch_theta == (0.0, 0.0, 0.0, 0.0)) == held[1]
+
+
+@pytest.mark.parametrize('change', [{'vertical_rate': 0.05}, {'vertical_rate': -0.05}])
+def test_nothing_is_learnt_while_the_vehicle_turns_over(change):
+    state = initial_adaptive(SETTINGS)
+    for _ in range(1000):
+        state, *_ = step(state, measured(theta=-0.3, phi=0.2, psi_dot=0.01, **change), reference())
+    assert state.pitch_theta == (0.0, 0.0, 0.0, 0.0)
+    assert state.dive == initial_adaptive(SETTINGS).dive
+    assert state.climb == initial_adaptive(SETTINGS).climb
+
+
+def test_nose_low_makes_a_nose_up_moment_and_the_other_way_round():
+    for theta, sign in ((-0.6, 1.0), (-0.4, -1.0)):
+        _, _, tau_q = step(initial_adaptive(SETTINGS), measured(theta=theta), reference())
+        assert np.sign(tau_q) == sign
+
+
+@pytest.mark.parametrize('rate', [0.27, -0.27])
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+def test_roll_goes_to_the_side_that_turns_the_right_way(rate, sign):
+    """Told that steering is reversed, the law rolls to the other side."""
+    state = initial_adaptive(SETTINGS)
+    known = state.dive._replace(b=0.03 * sign, sign=sign)
+    state = state._replace(dive=known, climb=known)
+    for _ in range(50):
+        now = measured(vertical_rate=rate, theta=-0.5 if rate > 0.0 else 0.5)
+        wanted = reference(psi=0.2, v_d=rate, theta=now.theta)
+        state, *_ = step(state, now, wanted)
+    assert np.sign(state.roll.value) == sign
+
+
+def test_disturbance_estimate_is_bounded():
+    state = initial_adaptive(SETTINGS)
+    state = state._replace(dive=state.dive._replace(b=0.5, sign=1.0))
+    for _ in range(20000):
+        state, *_ = step(state, measured(psi=-0.3), reference())
+    assert abs(state.disturbance_dive) == DISTURBANCE_MAX
+
+
+def test_mirror_image_gives_mirror_image():
+    """Port and starboard exchanged: roll moment, roll and disturbance change their sign only."""
+    port, starboard = initial_adaptive(SETTINGS), initial_adaptive(SETTINGS)
+    for tick in range(600):
+        swing = 0.1 * math.sin(0.05 * tick)
+        for side in (1.0, -1.0):
+            now = measured(phi=side * swing, psi=side * 0.05, psi_dot=side * 0.002)
+            result = step(port if side > 0 else starboard, now, reference())
+            if side > 0:
+                port, tau_port, pitch_port = result
+            else:
+                starboard, tau_starboard, pitch_starboard = result
+        assert tau_port == pytest.approx(-tau_starboard, abs=1e-15)
+        assert pitch_port == pytest.approx(pitch_starboard, abs=1e-15)
+    assert port.disturbance_dive == -starboard.disturbance_dive
