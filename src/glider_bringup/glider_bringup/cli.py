@@ -63,6 +63,15 @@ def _choices(name: str, model, field: str) -> type[Enum]:
 Engine = Enum('Engine', {text: text for text in get_args(Literal['nodes', 'direct'])})
 Controller = _choices('Controller', ControlLawSettings, 'law')
 Guidance = _choices('Guidance', LosSettings, 'method')
+Group = Enum(
+    'Group',
+    {
+        text: text
+        for text in get_args(
+            Literal['current', 'yaw', 'profile', 'robustness', 'paths', 'envelope']
+        )
+    },
+)
 Json = Annotated[
     bool, typer.Option('--json', help='Print one JSON object and nothing else on standard output.')
 ]
@@ -285,17 +294,8 @@ def montecarlo(
     if out:
         study.make_folder(out)
     messages.print(f'{scenario}: {plants} plants, each by {" and by ".join(laws)}')
-    try:
-        with _counter('flying', len(scenarios)) as update:
-            flights, airframes = study.fly_plants(
-                scenarios, workers or os.cpu_count() or 1, update
-            )
-    except KeyboardInterrupt:
-        messages.print('stopped by SIGINT', style='red')
-        raise typer.Exit(EXIT_INTERRUPTED) from None
-    except BrokenProcessPool:
-        messages.print('a worker process was killed; give fewer --workers', style='red')
-        raise typer.Exit(EXIT_FAILED) from None
+    with _workers_at_work(), _counter('flying', len(scenarios)) as update:
+        flights, airframes = study.fly_plants(scenarios, workers or os.cpu_count() or 1, update)
     name = next(iter(scenarios.values())).name
     summary = study.summarise(name, seed, flights, airframes)
     whole = study.report(scenario, fields, summary, flights, airframes)
@@ -306,6 +306,19 @@ def montecarlo(
         print(json.dumps(summary))
     else:
         _print_study(whole)
+
+
+@contextmanager
+def _workers_at_work():
+    """Say what ended the work of worker processes early, and leave with its exit code."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        messages.print('stopped by SIGINT', style='red')
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    except BrokenProcessPool:
+        messages.print('a worker process was killed; give fewer --workers', style='red')
+        raise typer.Exit(EXIT_FAILED) from None
 
 
 @contextmanager
@@ -355,6 +368,50 @@ def _print_study(study: dict) -> None:
     for row in study['rows']:
         worst = study['flown'][row['worst_plant']]['commands'][row['controller']]
         output.print(f'worst of {row["controller"]}:', worst, soft_wrap=True)
+
+
+@app.command(epilog='Example: ./glider experiments --only robustness --only paths')
+def experiments(
+    only: Annotated[
+        list[Group] | None, typer.Option(help='Group; can be repeated. Default: all of them.')
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help='Processes. Default: one per processor.')
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help='Folder for experiments.json and the figures.')
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fly the experiments of the paper and what goes beyond them; exit code 1 if one fails.
+
+    By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
+    engine: 135 flights, most of them of 30 hours.
+    """
+    from glider_bringup import experiment_tables, paper_figures
+    from glider_bringup import experiments as study
+
+    planned = study.make_experiments([one.value for one in only or Group])
+    flights = study.count_flights(planned)
+    if out:
+        study.make_folder(out)
+    messages.print(f'{len(planned)} experiments, {flights} flights')
+    with _workers_at_work(), _counter('flying', flights) as update:
+        rows, records = study.fly(planned, workers or os.cpu_count() or 1, update)
+    result = study.report(planned, rows)
+    if out:
+        with messages.status('drawing'):
+            drawn = paper_figures.draw(planned, rows, records, out)
+        text = json.dumps(result, indent=2) + '\n'
+        (out / study.RESULT_FILE).write_text(text, encoding='utf-8')
+        for file in drawn:
+            messages.print(f'drawn: {file}', soft_wrap=True)
+    if as_json:
+        print(json.dumps(result))
+    else:
+        experiment_tables.show(result, output)
+    if any(one['verdict'] == study.FAILED for one in result['experiments']):
+        raise typer.Exit(EXIT_FAILED)
 
 
 @app.command(epilog='Example: ./glider trim zhang2021 --net-heaviness-kg 0.4 --pitch-deg -30')

@@ -3,6 +3,7 @@
 """A picture of a run: where it went, how deep, how far off, and what the actuators did."""
 
 from collections.abc import Iterable
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -29,27 +30,35 @@ _BLUE, _ORANGE, _GREY, _GREEN = '#1f6fb4', '#e07b1a', '#8a8a8a', '#2f8f4e'
 
 
 class Record:
-    """A log thinned for drawing. Angles in deg, NED; attributes are arrays over time."""
+    """A log thinned to one row a second. Angles in deg, NED; attributes are arrays over time."""
 
     def __init__(self, blocks: Iterable[np.ndarray]) -> None:
-        thinned, first = [], 0
+        rows, first = round(1.0 / TICK_S), 0
+        thinned = []
         for block in blocks:
-            thinned.append(block[(-first) % 10 :: 10].copy())
+            thinned.append(block[(-first) % rows :: rows].copy())
             first += len(block)
         log = np.concatenate(thinned) if thinned else np.empty((0, ROW))
-        step = max(1, len(log) // POINTS)
-        self.time_s = (np.arange(len(log)) * 10 * TICK_S)[::step]
-        log = log[::step]
+        self.time_s = np.arange(len(log)) * rows * TICK_S
         odom, reference = log[:, COLUMNS['odom']], log[:, COLUMNS['reference']]
         self.east, self.north, self.depth = odom[:, 0], odom[:, 1], -odom[:, 2]
         self.target_east, self.target_north = reference[:, 0], reference[:, 1]
         self.roll, self.pitch, self.heading = _attitude_deg(odom[:, 3:7])
         _, self.pitch_ref, self.heading_ref = _attitude_deg(reference[:, 3:7])
-        self.cross_track = log[:, COLUMNS['tracking_error']][:, 1]
+        error = log[:, COLUMNS['tracking_error']]
+        self.cross_track, self.vertical_error = error[:, 1], error[:, 2]
         self.descending = reference[:, 9] < 0.0
         self.joints = log[:, COLUMNS['joint_states']]
         self.current = log[:, COLUMNS['current_velocity']]
         self.estimate = log[:, COLUMNS['current_estimate']]
+
+    def thinned(self, points: int = POINTS) -> 'Record':
+        """The same with about so many points."""
+        step = max(1, len(self.time_s) // points)
+        record = copy(self)
+        for name, values in vars(self).items():
+            setattr(record, name, values[::step].copy())
+        return record
 
 
 def _attitude_deg(q_el: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -74,6 +83,7 @@ def draw_run(record: Record, title: str, file: Path) -> None:
         height_ratios=[1.0, 1.0, 1.0, 1.0],
         layout='constrained',
     )
+    record = record.thinned()
     hours = record.time_s / 3600.0
     _draw_track(axes['track'], record)
     _draw_curves(axes['depth'], hours, 'Depth', 'depth (m)', (('depth', record.depth, _BLUE),))

@@ -9,20 +9,15 @@ number of plants and of worker processes.
 
 import json
 import math
-import multiprocessing
-import os
 import shlex
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from concurrent.futures import as_completed
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from glider_bringup.mission import fly_direct
+from glider_bringup.pool import Progress, check_stop, worker_pool
 from glider_bringup.scenario import Scenario, load_scenario
 from glider_model.perturb import (
     ADDED_MASS,
@@ -66,9 +61,6 @@ FIGURES = {
     'pitch_error_deg': ('pitch_error_deg', 'rms_steady'),
 }
 RESULT_FILE = 'montecarlo.json'
-
-#: Called with the number of flights that are done.
-Progress = Callable[[int], None]
 
 
 # ---------------------------------------------------------------------------------- plants
@@ -218,31 +210,11 @@ def judge(scores: dict) -> dict[str, Any]:
     return {'diverged': not finite or far or scores['infeasible'], **figures}
 
 
-class _StoppedError(Exception):
-    """The study was stopped."""
-
-
-_stop = None  #: in a worker: set when the study is stopped
-
-
-def _start_worker(stop) -> None:
-    """Prepare a worker, which does not outlive its parent."""
-    global _stop
-    _stop = stop
-
-    def end_with_parent() -> None:
-        multiprocessing.parent_process().join()
-        os._exit(1)
-
-    threading.Thread(target=end_with_parent, daemon=True).start()
-
-
 def _fly_plant(scenario: Scenario) -> dict[str, Any]:
     """Fly one scenario in a worker."""
 
     def check(ticks: int, depth_m: float) -> None:
-        if _stop.is_set():
-            raise _StoppedError
+        check_stop()
 
     _, scores = fly_direct(scenario, Path(), False, check)
     return judge(scores)
@@ -252,16 +224,6 @@ def _check_plant(scenario: Scenario) -> dict[str, Any]:
     """Airframe of one scenario in a worker."""
     vehicle = load_vehicle(scenario.vehicle).params()
     return airframe(vehicle, perturbed(vehicle, scenario.perturb))
-
-
-@contextmanager
-def _children_ignore_interrupts() -> Iterator[None]:
-    """Ctrl-C, which a terminal sends to all processes, is for the parent to deal with."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def fly_plants(
@@ -276,25 +238,17 @@ def fly_plants(
     airframes : dict
         What `airframe` says, by plant.
     """
-    context = multiprocessing.get_context('spawn')
-    stop = context.Event()
-    with ProcessPoolExecutor(workers, context, _start_worker, (stop,)) as pool:
-        try:
-            with _children_ignore_interrupts():
-                plants = {plant: scenario for (plant, _), scenario in scenarios.items()}
-                checks = {plant: pool.submit(_check_plant, one) for plant, one in plants.items()}
-                flights = {key: pool.submit(_fly_plant, one) for key, one in scenarios.items()}
-            for done, future in enumerate(as_completed(flights.values()), 1):
-                future.result()
-                progress(done)
-            return (
-                {key: future.result() for key, future in flights.items()},
-                {plant: future.result() for plant, future in checks.items()},
-            )
-        except BaseException:
-            stop.set()
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise
+    plants = {plant: scenario for (plant, _), scenario in scenarios.items()}
+    with worker_pool(workers) as submit:
+        checks = {plant: submit(_check_plant, one) for plant, one in plants.items()}
+        flights = {key: submit(_fly_plant, one) for key, one in scenarios.items()}
+        for done, future in enumerate(as_completed(flights.values()), 1):
+            future.result()
+            progress(done)
+        return (
+            {key: future.result() for key, future in flights.items()},
+            {plant: future.result() for plant, future in checks.items()},
+        )
 
 
 # ---------------------------------------------------------------------------------- results

@@ -157,7 +157,8 @@ class Scorer:
         """
         series = np.concatenate(self._blocks) if self._blocks else np.empty((0, _SERIES))
         ticks = len(series)
-        steady, scored = _windows(series, settle_s)
+        descending = series[:, _RATE_REF] > 0.0
+        steady, scored = windows(series[:, _DEPTH], descending, settle_s, TICK_S)
         e2 = series[:, _E2]
         if self._offsets:
             target = series[:, [_TARGET_N, _TARGET_E]]
@@ -207,14 +208,26 @@ class Scorer:
         }
 
 
-def _windows(series: np.ndarray, settle_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Masks of the steady and of all scored ticks."""
-    ticks = len(series)
-    scored = np.arange(ticks) * TICK_S > settle_s
-    steady = scored & (series[:, _DEPTH] > STEADY_DEPTH_M)
-    margin = round(INFLECTION_MARGIN_S / TICK_S)
-    down = series[:, _RATE_REF] > 0.0
-    for turn in np.flatnonzero(down[1:] != down[:-1]) + 1:
+def windows(
+    depth: np.ndarray, descending: np.ndarray, settle_s: float, step_s: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Masks of the steady and of all scored samples.
+
+    Parameters
+    ----------
+    depth : float64[n]
+        From the start of the run on (m).
+    descending : bool[n]
+        Whether the desired vertical rate points down.
+    settle_s : float
+        Settling time (s).
+    step_s : float
+        Time between two samples (s).
+    """
+    scored = np.arange(len(depth)) * step_s > settle_s
+    steady = scored & (depth > STEADY_DEPTH_M)
+    margin = round(INFLECTION_MARGIN_S / step_s)
+    for turn in np.flatnonzero(descending[1:] != descending[:-1]) + 1:
         steady[max(0, turn - margin) : turn + margin + 1] = False
     return steady, scored
 

@@ -6,7 +6,7 @@ Zhang et al. (2021), equations (12)-(29), made whole (docs/paper.md). For each o
 with the angle error K1 and the rate error K2 = omega - a_s:
 
     a     = J3^-1 (Omega_s' - L1 K1 - h r)                          (16)
-    tau   = M a_s' - B2 K2 - B1 J3^T K1bar - Phi^T theta_hat        (18)
+    tau   = M a_s' - B2 K2 - J3^T B1 K1bar - Phi^T theta_hat        (18)
     theta_hat' = Proj[Gamma (Phi K2bar - sigma theta_hat)]          (19)
 
 K1bar = K1 - xi and K2bar = K2 - zeta are the errors less what the command filter and the actuators
@@ -31,7 +31,7 @@ from glider_control.steering import (
 from glider_model.command_filter import Filtered, FilterParams, filter_command
 from glider_model.frames import wrap_angle
 from glider_model.kernel import kernel
-from glider_model.rigid_body import GRAVITY
+from glider_model.rigid_body import GRAVITY, rigid_body
 from glider_model.settings import Settings
 from glider_model.signals import Adaptation
 from glider_model.vehicle import VehicleParams
@@ -199,9 +199,10 @@ def make_adaptive(
             inertia,
         )
 
+    _, _, _, i_xx, i_yy, *_ = rigid_body(0.0, 0.0, vehicle)
     return AdaptiveParams(
-        channel(settings.roll, vehicle.i_xx + vehicle.a_44),
-        channel(settings.pitch, vehicle.i_yy + vehicle.a_55),
+        channel(settings.roll, i_xx + vehicle.a_44),
+        channel(settings.pitch, i_yy + vehicle.a_55),
         settings.heading_kp_per_s,
         settings.heading_ki_per_s2,
         settings.heading_kd,
@@ -400,7 +401,8 @@ def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, 
     tau_q = (
         params.pitch.inertia * rate_q.rate
         - params.pitch.b2 * k2_q
-        - params.pitch.b1 * (c_phi * k1_q + s_phi * t_theta * k1_p)
+        - params.pitch.b1 * c_phi * k1_q
+        - params.roll.b1 * s_phi * t_theta * k1_p
         - (phi_q[0] * th_q[0] + phi_q[1] * th_q[1] + phi_q[2] * th_q[2] + phi_q[3] * th_q[3])
     )
 

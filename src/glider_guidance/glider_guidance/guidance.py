@@ -407,12 +407,14 @@ def guidance_step(state, odometry, params, dt):
 
     # pitch and vertical rate
     if follows_path and not profile.aborted:
-        pitch_target = steepen(upsilon_d)
-        pitch_target += glide_alpha(pitch_target, params.polar)
+        elevation = steepen(upsilon_d)
+        pitch_target = elevation
+        for _ in range(3):
+            pitch_target = elevation + glide_alpha(pitch_target, params.polar)
         rate_target = glide_vertical_rate(pitch_target, params.profile.net_heaviness, params.polar)
     # virtual target
     made_good = (ground_n * d_n + ground_e * d_e + ground_d * d_d) / slope
-    s_rate = target_rate(made_good, e1, slope, params.target_gain, TARGET_SPEED_MAX)
+    s_rate = target_rate(made_good, e1, slope, params.target_gain, TARGET_SPEED_MAX / slope)
     s = state.s + dt * s_rate
 
     turn_rate = path_turn(state.s, params.path) * s_rate if is_gliding(stage) else 0.0
@@ -429,8 +431,8 @@ def guidance_step(state, odometry, params, dt):
         0.0,
         pitch.value,
         heading.value,
-        math.cos(chi_d) * speed,
-        math.sin(chi_d) * speed,
+        math.cos(heading_command) * speed + observer.current_n,
+        math.sin(heading_command) * speed + observer.current_e,
         rate_target,
         0.0,
         pitch.rate,

@@ -10,7 +10,8 @@ engine publish the same bits, and whoever knows the seed can take it off a recor
     omega  = omega + n_omega
 
 Heading noise turns about the vertical, roll and pitch noise about the body axes: no attitude is
-singular. The velocity over ground keeps its numbers in body axes.
+singular. The velocity over ground keeps its numbers in body axes. The current field is asked at
+the measured place, since its node knows no other.
 """
 
 import math

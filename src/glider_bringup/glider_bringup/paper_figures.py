@@ -1,0 +1,259 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Figures 4 to 12 of the paper, drawn again from our own flights.
+
+We know the paper's figures by their captions and by what its text says of them, not by their
+curves. Where what a figure shows is not known in detail, the sensible quantity is drawn, and the
+title says what that is.
+"""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from glider_bringup.experiments import Experiment
+from glider_bringup.figure import Record
+
+#: Flights by experiment, case, controller and guidance.
+Flights = dict[tuple[str, str, str, str], Record]
+
+_COLOURS = {'adaptive': '#1f6fb4', 'pid': '#e07b1a'}
+_NAMES = {'adaptive': 'adaptive', 'pid': 'tuned PID'}
+_GREY, _GREEN, _RED = '#8a8a8a', '#2f8f4e', '#c0392b'
+#: Figures 5 to 7 show this much of a flight (h).
+PROFILE_HOURS = 8.0
+#: How the current of the yaw experiments is read in figures 10 and 11.
+_READING = '8 deg from north'
+
+
+class Drawing(NamedTuple):
+    """One figure of the paper."""
+
+    number: int
+    experiment: str  #: whose flights it takes
+    draw: Callable[[Any, str, Flights, list[dict]], None]  #: figure, experiment, flights, rows
+
+
+def draw(
+    experiments: list[Experiment],
+    rows: list[list[dict]],
+    records: list[list[Record | None]],
+    folder: Path,
+) -> list[Path]:
+    """Draw what was flown into PNG files.
+
+    Returns
+    -------
+    list of Path
+        Files, by number of the figure.
+    """
+    import matplotlib
+
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+
+    flights = {
+        (one.name, case.case, case.controller, case.guidance): record
+        for one, kept in zip(experiments, records, strict=True)
+        for case, record in zip(one.cases, kept, strict=True)
+        if record is not None
+    }
+    told = {one.name: flown for one, flown in zip(experiments, rows, strict=True)}
+    files = []
+    for drawing in DRAWINGS:
+        if drawing.experiment not in told:
+            continue
+        figure = pyplot.figure(figsize=(11.0, 8.0), layout='constrained')
+        drawing.draw(figure, drawing.experiment, flights, told[drawing.experiment])
+        file = folder / f'figure_{drawing.number:02d}.png'
+        figure.savefig(file, dpi=100)
+        pyplot.close(figure)
+        files.append(file)
+    return files
+
+
+def _of(flights: Flights, name: str, guidance: str) -> Iterator[tuple[str, Record]]:
+    """Controllers and records of the flights of an experiment that has one case."""
+    for (experiment, _, controller, way), record in flights.items():
+        if (experiment, way) == (name, guidance):
+            yield controller, record
+
+
+def _dress(axis, title: str, x: str, y: str, legend: bool = True) -> None:
+    axis.set(title=title, xlabel=x, ylabel=y)
+    axis.grid(alpha=0.3)
+    if legend:
+        axis.legend(loc='upper right', fontsize='small')
+
+
+def _draw_current(figure, name: str, flights: Flights, rows: list[dict]) -> None:
+    """Track and cross-track error, with our guidance and with the paper's."""
+    angle = name.removeprefix('current_').removesuffix('deg')
+    axes = figure.subplot_mosaic([['track', 'ours'], ['track', 'paper']], width_ratios=[1.0, 2.0])
+    track = axes['track']
+    styles = {'observer': ('-', ''), 'paper': ('--', ", paper's LOS")}
+    for guidance, (style, suffix) in styles.items():
+        for controller, record in _of(flights, name, guidance):
+            label = _NAMES[controller] + suffix
+            colour = _COLOURS[controller]
+            track.plot(
+                record.east, record.north / 1e3, style, color=colour, linewidth=1.2, label=label
+            )
+            axis = axes['ours' if guidance == 'observer' else 'paper']
+            hours = record.time_s / 3600.0
+            axis.plot(hours, record.cross_track, color=colour, linewidth=0.8, label=label)
+    track.axvline(0.0, color=_GREY, linewidth=0.8, linestyle=':', label='desired path')
+    _dress(track, 'Track (scales differ)', 'off the path, + to starboard (m)', 'along (km)')
+    y = 'off the path (m)'
+    _dress(axes['ours'], 'Cross-track error, crab into the estimated current', 'time (h)', y)
+    _dress(axes['paper'], "Cross-track error, paper's line of sight", 'time (h)', y)
+    figure.suptitle(
+        f'Current of 1.0 kn at {angle} deg off the path: track and cross-track error\n'
+        'The peaks are turns of the dive'
+    )
+
+
+def _draw_depth(figure, name: str, flights: Flights, rows: list[dict]) -> None:
+    """Depth over time and along the path."""
+    over_time, along = figure.subplots(2, 1)
+    for controller, record in _of(flights, name, 'observer'):
+        part = record.time_s <= PROFILE_HOURS * 3600.0
+        label, colour = _NAMES[controller], _COLOURS[controller]
+        style = '-' if controller == 'adaptive' else '--'
+        hours = record.time_s[part] / 3600.0
+        over_time.plot(hours, record.depth[part], style, color=colour, label=label)
+        along.plot(record.north[part] / 1e3, record.depth[part], style, color=colour, label=label)
+    for axis in (over_time, along):
+        axis.axhline(1000.0, color=_GREY, linewidth=0.8, linestyle=':', label='target depth')
+        axis.invert_yaxis()
+    _dress(over_time, 'Depth over time', 'time (h)', 'depth (m)')
+    _dress(along, 'Depth along the path', 'along the path (km)', 'depth (m)')
+    figure.suptitle('Profile 0-1000 m, current of 1.0 kn at 8 deg off the path')
+
+
+def _draw_pitch(figure, name: str, flights: Flights, rows: list[dict]) -> None:
+    """Trim angle and what makes it."""
+    pitch, error, mass = figure.subplots(3, 1, sharex=True)
+    for controller, record in _of(flights, name, 'observer'):
+        part = record.time_s <= PROFILE_HOURS * 3600.0
+        hours = record.time_s[part] / 3600.0
+        label, colour = _NAMES[controller], _COLOURS[controller]
+        if controller == 'adaptive':
+            pitch.plot(hours, record.pitch_ref[part], color=_GREY, linewidth=2.5, label='desired')
+        pitch.plot(hours, record.pitch[part], color=colour, linewidth=1.0, label=label)
+        difference = (record.pitch - record.pitch_ref)[part]
+        error.plot(hours, difference, color=colour, linewidth=1.0, label=label)
+        mass.plot(hours, 1e3 * record.joints[part, 1], color=colour, linewidth=1.0, label=label)
+    _dress(pitch, 'Trim angle (pitch), + nose up', '', 'pitch (deg)')
+    _dress(error, 'Pitch less desired pitch', '', 'error (deg)')
+    _dress(mass, 'Pitch mass, + forward', 'time (h)', 'position (mm)')
+    figure.suptitle('Trim angle over dives to 1000 m, current of 1.0 kn at 8 deg off the path')
+
+
+def _draw_roll(figure, name: str, flights: Flights, rows: list[dict]) -> None:
+    """Roll and what makes it."""
+    roll, mass = figure.subplots(2, 1, sharex=True)
+    for controller, record in _of(flights, name, 'observer'):
+        part = record.time_s <= PROFILE_HOURS * 3600.0
+        hours = record.time_s[part] / 3600.0
+        label, colour = _NAMES[controller], _COLOURS[controller]
+        roll.plot(hours, record.roll[part], color=colour, linewidth=1.0, label=label)
+        mass.plot(
+            hours, np.degrees(record.joints[part, 2]), color=colour, linewidth=1.0, label=label
+        )
+    _dress(roll, 'Roll, + starboard side down', '', 'roll (deg)')
+    _dress(mass, 'Roll mass, + to starboard', 'time (h)', 'angle (deg)')
+    figure.suptitle('Roll over dives to 1000 m, current of 1.0 kn at 8 deg off the path')
+
+
+def _draw_yaw(figure, name: str, flights: Flights, rows: list[dict]) -> None:
+    """Heading and cross-track error with our guidance, heading with the paper's."""
+    controller = name.removeprefix('yaw_10deg_')
+    ours, across, paper = figure.subplots(3, 1, sharex=True)
+    colour, label = _COLOURS[controller], _NAMES[controller]
+    for guidance, axis in (('observer', ours), ('paper', paper)):
+        record = flights[name, _READING, controller, guidance]
+        hours = record.time_s / 3600.0
+        axis.plot(hours, record.heading, color=colour, linewidth=0.8, label=f'heading, {label}')
+        axis.plot(hours, record.heading_ref, color=_GREY, linewidth=0.8, label='desired heading')
+        axis.axhline(10.0, color=_GREEN, linewidth=1.2, linestyle=':', label='desired yaw')
+        part = record.time_s > 7200.0
+        low, high = np.percentile(record.heading[part], [0.1, 99.9])
+        axis.set_ylim(min(low, 8.0) - 4.0, max(high, 12.0) + 4.0)
+        line = "paper's line of sight" if guidance == 'paper' else 'crab into the current'
+        across.plot(
+            hours,
+            record.cross_track,
+            color=_RED if guidance == 'paper' else colour,
+            linewidth=0.8,
+            label=f'{label}, {line}',
+        )
+    _dress(ours, 'Heading, crab into the estimated current', '', 'heading (deg from north)')
+    _dress(across, 'Cross-track error', '', 'off the path (m)')
+    _dress(paper, "Heading, paper's line of sight", 'time (h)', 'heading (deg from north)')
+    figure.suptitle(
+        f'Desired yaw of 10 deg, {label}: 1.0 kn to {_READING}\n'
+        'Heading differs from the desired yaw by the crab angle'
+    )
+
+
+def _draw_envelope(figure, name: str, flights: Flights, rows: list[dict]) -> None:
+    """Error with turns over speed and angle of the current, and the limit of physics."""
+    axis = figure.subplots()
+    held = [row for row in rows if row['status'] != 'infeasible']
+    lost = [row for row in rows if row['status'] == 'infeasible']
+    dots = axis.scatter(
+        [row['angle_deg'] for row in held],
+        [row['speed_kn'] for row in held],
+        c=[row['cross_track_m']['max_all'] for row in held],
+        s=260.0,
+        cmap='viridis_r',
+        label='course held',
+    )
+    axis.scatter(
+        [row['angle_deg'] for row in lost],
+        [row['speed_kn'] for row in lost],
+        marker='x',
+        color=_RED,
+        s=80.0,
+        label='flagged infeasible',
+    )
+    for row in held:
+        axis.annotate(
+            f'{row["cross_track_m"]["max_all"]:.0f}',
+            (row['angle_deg'], row['speed_kn']),
+            textcoords='offset points',
+            xytext=(0, 11),
+            ha='center',
+            fontsize='small',
+        )
+    angle = np.linspace(0.5, 180.0, 400)
+    # U_h in knots: that of a row, from its cross current and that over U_h
+    row = max(rows, key=lambda one: one['cross_share'])
+    across = row['speed_kn'] * np.sin(np.radians(row['angle_deg']))
+    speed = across / row['cross_share']
+    limit = np.where(angle < 90.0, speed / np.sin(np.radians(angle)), speed)
+    axis.plot(angle, limit, color=_GREY, label='limit of physics')
+    axis.plot([10.0], [1.0], '*', color='black', markersize=14.0, label="paper's limit")
+    axis.set_ylim(0.0, 1.75)
+    axis.set_xlim(-5.0, 185.0)
+    figure.colorbar(dots, label='largest cross-track error with turns (m)')
+    _dress(axis, '', 'angle of the current off the path (deg)', 'current (kn)', legend=False)
+    figure.legend(loc='outside lower center', ncols=4)
+    figure.suptitle('Where the adaptive law holds the course (m: largest error with turns)')
+
+
+#: The print swaps the captions of figures 10 and 11; these follow the text.
+DRAWINGS = (
+    Drawing(4, 'current_8deg', _draw_current),
+    Drawing(5, 'profile', _draw_depth),
+    Drawing(6, 'profile', _draw_pitch),
+    Drawing(7, 'profile', _draw_roll),
+    Drawing(8, 'current_10deg', _draw_current),
+    Drawing(9, 'current_12deg', _draw_current),
+    Drawing(10, 'yaw_10deg_pid', _draw_yaw),
+    Drawing(11, 'yaw_10deg_adaptive', _draw_yaw),
+    Drawing(12, 'envelope', _draw_envelope),
+)
