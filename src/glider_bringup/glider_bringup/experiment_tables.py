@@ -20,7 +20,9 @@ _LAW_NAMES = {'adaptive': 'adaptive', 'pid': 'tuned PID'}
 def _number(value: float | str | None, digits: int = 2) -> str:
     if value is None:
         return '-'
-    return value if isinstance(value, str) else f'{value:,.{digits}f}'
+    if isinstance(value, str):
+        return value
+    return f'{value:,.{digits if abs(value) < 100.0 else 0}f}'
 
 
 def _table(names: list[str], figures: list[str]) -> Table:
@@ -35,8 +37,7 @@ def _table(names: list[str], figures: list[str]) -> Table:
 
 def _flown_by(row: dict) -> str:
     """Who flew a row."""
-    paper = ", paper's LOS" if row['guidance'] == 'paper' else ''
-    return _LAW_NAMES[row['controller']] + paper
+    return _LAW_NAMES[row['controller']]
 
 
 def _by_flight(figures: dict[str, str]) -> Callable[[list[dict]], Table]:
@@ -45,14 +46,16 @@ def _by_flight(figures: dict[str, str]) -> Callable[[list[dict]], Table]:
     def make(rows: list[dict]) -> Table:
         cases = any(row['case'] for row in rows)
         flagged = any(row['status'] != 'completed' for row in rows)
-        names = ['case'] * cases + ['flown by'] + ['status'] * flagged
+        ways = len({row['guidance'] for row in rows}) > 1
+        names = ['case'] * cases + ['flown by'] + ['LOS'] * ways + ['status'] * flagged
         table = _table(names, list(figures.values()))
         adaptive = {
             (row['case'], row['guidance']): row for row in rows if row['controller'] == 'adaptive'
         }
         for row in rows:
             rival = adaptive.get((row['case'], row['guidance']))
-            texts = [row['case']] * cases + [_flown_by(row)] + [row['status']] * flagged
+            texts = [row['case']] * cases + [_flown_by(row)]
+            texts += [row['guidance']] * ways + [row['status']] * flagged
             table.add_row(*texts, *(_marked(row, rival, name) for name in figures))
         return table
 
@@ -75,7 +78,7 @@ def _marked(row: dict | None, rival: dict | None, name: str) -> str:
 
 def _side_by_side(rows: list[dict]) -> Table:
     """One line for each case; in every column adaptive | tuned PID."""
-    figures = compared(rows)
+    figures = dict(list(compared(rows).items())[:4])
     table = _table(['adaptive | tuned PID'], list(figures.values()))
     for case in dict.fromkeys(row['case'] for row in rows):
         adaptive, pid = (
@@ -85,16 +88,18 @@ def _side_by_side(rows: list[dict]) -> Table:
         cells = (
             f'{_marked(adaptive, None, name)} | {_marked(pid, adaptive, name)}' for name in figures
         )
-        table.add_row(case + _steering(adaptive), *cells)
+        table.add_row(case, *cells)
     return table
 
 
-def _steering(row: dict | None) -> str:
-    """How a vehicle whose steering is changed steers, relative to what its file says."""
-    if row is None or 'steering' not in row:
-        return ''
-    steering = row['steering']
-    return f'\n  dive x{steering["dive"]:.2f}, climb x{steering["climb"]:.2f}'
+def _steering(rows: list[dict]) -> list[str]:
+    """How vehicles whose steering is changed steer, relative to what their file says."""
+    return [
+        f'{row["case"]}: turn rate per roll x{row["steering"]["dive"]:.2f} in the dive, '
+        f'x{row["steering"]["climb"]:.2f} in the climb (K_MY x{row["changes"]["perturb.K_MY"]:g})'
+        for row in rows
+        if 'steering' in row and row['controller'] == 'adaptive'
+    ]
 
 
 def _survey(rows: list[dict]) -> Table:
@@ -125,9 +130,8 @@ def _envelope(rows: list[dict]) -> Table:
 
 def _envelope_cell(row: dict) -> str:
     if row['status'] == 'infeasible':
-        return 'infeasible'
-    limit = f' / {row["limit_m"]:.1f}' if row['expected'] == 'feasible' else ''
-    return _number(row['cross_track_m']['max_all'], 1) + limit
+        return 'x'
+    return _number(row['cross_track_m']['max_all'], 1)
 
 
 _YAW = _by_flight(
@@ -161,13 +165,14 @@ _TABLES: dict[str, Callable[[list[dict]], Table]] = {
 }
 _REMARKS = {
     'robustness': (
-        'The PID is told the steering of the vehicle file, also where the plant differs from it. '
+        'The PID is told the steering of the vehicle file, also where the plant differs from it; '
+        'PID of zhang2021: that of another vehicle. '
         'A roll mass that is stuck altogether leaves a glider without steering: it keeps a third '
         'of its travel.'
     ),
     'envelope': (
-        'Largest cross-track error with turns / what is allowed (m). Infeasible: the run was '
-        'flagged so, and held the best crab.'
+        'Largest cross-track error with turns (m). x: no heading can hold the course; the run was '
+        'flagged infeasible, and held the best crab.'
     ),
 }
 
@@ -181,9 +186,13 @@ def show(result: dict[str, Any], output: Console) -> None:
         output.print(make(one['rows']))
         if one['pid_better'] and make is not _survey:
             output.print(f'{BETTER} the tuned PID is better than the adaptive law')
+        for line in _steering(one['rows']):
+            output.print(line)
         if one['name'] in _REMARKS:
             output.print(_REMARKS[one['name']])
         _show_verdict(one, output)
+    verdicts = [one['verdict'] for one in result['experiments']]
+    output.print(f'\n{verdicts.count(PASSED)} of {len(verdicts)} experiments passed')
 
 
 def _show_verdict(one: dict[str, Any], output: Console) -> None:

@@ -73,7 +73,7 @@ HEADING_SPREAD_LIMIT_DEG, OFF_COURSE_LIMIT_DEG = 45.0, 90.0
 #: Envelope: cross current over U_h up to which a course must be held; error allowed with turns.
 HELD_SHARE, TURN_S, TURN_MARGIN_M = 0.95, 111.0, 1.0
 #: Mean distance of the heading from the best crab where no course can be held (deg).
-CRAB_LIMIT_DEG = 5.0
+CRAB_LIMIT_DEG = 2.0
 
 
 class Check(NamedTuple):
@@ -584,16 +584,16 @@ def steering_share(scenario: Scenario) -> dict[str, float]:
 
 
 #: Factors on K_MY that change the steering effectiveness, by what they make of it in the dive.
-K_MY_FACTORS = {'x0.4': 0.76, 'x2': 1.74, 'reversed in the dive': 0.56}
+K_MY_FACTORS = {'x0.4': 0.76, 'x2': 1.74, 'reversed': 0.56}
 #: One controller, no retuning: what is wrong with the vehicle.
 FAULTS = {
     'nominal': {},
-    'vehicle seawing': {'vehicle': 'seawing'},
+    'seawing': {'vehicle': 'seawing'},
     'static roll 10 deg': {'perturb.roll_bias_deg': 10.0},
     **{f'steering {what}': {'perturb.K_MY': factor} for what, factor in K_MY_FACTORS.items()},
     'pitch trim 10 mm off': {'perturb.pitch_trim_m': 0.010},
-    'pump at 1/3 of its rate': {'perturb.pump_rate': 0.3333},
-    'roll mass at 1/3 of its travel': {'perturb.roll_range': 0.3333},
+    'pump at 1/3 rate': {'perturb.pump_rate': 0.3333},
+    'roll mass at 1/3 travel': {'perturb.roll_range': 0.3333},
 }
 
 
@@ -605,8 +605,7 @@ def _robustness_experiments() -> list[Experiment]:
             facts['steering'] = steering_share(load_scenario('current_8deg', changes))
         cases += _both_laws('current_8deg', case, changes, facts=facts)
         if 'vehicle' in changes:
-            case += ", told zhang2021's steering"
-            pid = Case(case, 'pid', 'observer', 'current_8deg', changes)
+            pid = Case(f'{case}, PID of zhang2021', 'pid', 'observer', 'current_8deg', changes)
             cases.append(pid._replace(told='zhang2021', facts=facts))
     return [
         Experiment(
@@ -648,7 +647,7 @@ def _paths_experiments() -> list[Experiment]:
             measures=(measure_attitude, measure_path),
         )
     ]
-    spline = _both_laws('spline', '', {}, measures=(measure_attitude, measure_path))
+    spline = _both_laws('spline', 'spline', {}, measures=(measure_attitude, measure_path))
     survey = _both_laws('survey', '', {}, measures=(measure_attitude, measure_survey))
     judge = judge_limits(PATH_LIMITS)
     return [

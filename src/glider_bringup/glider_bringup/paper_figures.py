@@ -24,6 +24,11 @@ _NAMES = {'adaptive': 'adaptive', 'pid': 'tuned PID'}
 _GREY, _GREEN, _RED = '#8a8a8a', '#2f8f4e', '#c0392b'
 #: Figures 5 to 7 show this much of a flight (h).
 PROFILE_HOURS = 8.0
+#: Limit cycles are shown in this part of a flight (h).
+DETAIL_HOURS = (4.5, 5.1)
+#: Scales fit what comes after this time (h).
+SETTLED_HOURS = 2.0
+_CRAB, _PAPER = 'crab into the estimated current', "paper's line of sight"
 #: How the current of the yaw experiments is read in figures 10 and 11.
 _READING = '8 deg from north'
 
@@ -81,11 +86,11 @@ def _of(flights: Flights, name: str, guidance: str) -> Iterator[tuple[str, Recor
             yield controller, record
 
 
-def _dress(axis, title: str, x: str, y: str, legend: bool = True) -> None:
+def _dress(axis, title: str, x: str, y: str, where: str = 'upper right') -> None:
     axis.set(title=title, xlabel=x, ylabel=y)
     axis.grid(alpha=0.3)
-    if legend:
-        axis.legend(loc='upper right', fontsize='small')
+    if where:
+        axis.legend(loc=where, fontsize='small')
 
 
 def _draw_current(figure, name: str, flights: Flights, rows: list[dict]) -> None:
@@ -93,26 +98,37 @@ def _draw_current(figure, name: str, flights: Flights, rows: list[dict]) -> None
     angle = name.removeprefix('current_').removesuffix('deg')
     axes = figure.subplot_mosaic([['track', 'ours'], ['track', 'paper']], width_ratios=[1.0, 2.0])
     track = axes['track']
-    styles = {'observer': ('-', ''), 'paper': ('--', ", paper's LOS")}
-    for guidance, (style, suffix) in styles.items():
+    for guidance, record in (
+        ('paper', flights[name, '', 'adaptive', 'paper']),
+        ('observer', flights[name, '', 'adaptive', 'observer']),
+    ):
+        own = guidance == 'observer'
+        colour, label = (_COLOURS['adaptive'], _CRAB) if own else (_RED, _PAPER)
+        across, along = record.east, record.north / 1e3
+        track.plot(across, along, color=colour, linewidth=1.5 if own else 0.4, label=label)
+    for guidance, axis in (('observer', axes['ours']), ('paper', axes['paper'])):
         for controller, record in _of(flights, name, guidance):
-            label = _NAMES[controller] + suffix
-            colour = _COLOURS[controller]
-            track.plot(
-                record.east, record.north / 1e3, style, color=colour, linewidth=1.2, label=label
-            )
-            axis = axes['ours' if guidance == 'observer' else 'paper']
-            hours = record.time_s / 3600.0
-            axis.plot(hours, record.cross_track, color=colour, linewidth=0.8, label=label)
+            hours, error = record.time_s / 3600.0, record.cross_track
+            part = hours >= 0.0 if guidance == 'observer' else _in_detail(hours)
+            colour, label = _COLOURS[controller], _NAMES[controller]
+            style = '-' if controller == 'adaptive' else '--'
+            axis.plot(hours[part], error[part], style, color=colour, linewidth=1.0, label=label)
     track.axvline(0.0, color=_GREY, linewidth=0.8, linestyle=':', label='desired path')
-    _dress(track, 'Track (scales differ)', 'off the path, + to starboard (m)', 'along (km)')
-    y = 'off the path (m)'
-    _dress(axes['ours'], 'Cross-track error, crab into the estimated current', 'time (h)', y)
-    _dress(axes['paper'], "Cross-track error, paper's line of sight", 'time (h)', y)
+    _dress(track, 'Track, adaptive (scales differ)', 'east of the path (m)', 'north (km)')
+    _dress(axes['ours'], f'Cross-track error, {_CRAB}', 'time (h)', 'off the path (m)')
+    title = f'Cross-track error, {_PAPER}: part of a dive'
+    _dress(axes['paper'], title, 'time (h)', 'off the path (m)')
+    number = next(drawing.number for drawing in DRAWINGS if drawing.experiment == name)
     figure.suptitle(
-        f'Current of 1.0 kn at {angle} deg off the path: track and cross-track error\n'
-        'The peaks are turns of the dive'
+        f'After figure {number} of the paper: 1.0 kn at {angle} deg off the path\n'
+        'The peaks are the start and the turns of the dives'
     )
+
+
+def _in_detail(hours: np.ndarray) -> np.ndarray:
+    """Mask of the part of a flight in which a limit cycle can be seen."""
+    first, last = DETAIL_HOURS
+    return (hours >= first) & (hours <= last)
 
 
 def _draw_depth(figure, name: str, flights: Flights, rows: list[dict]) -> None:
@@ -130,7 +146,9 @@ def _draw_depth(figure, name: str, flights: Flights, rows: list[dict]) -> None:
         axis.invert_yaxis()
     _dress(over_time, 'Depth over time', 'time (h)', 'depth (m)')
     _dress(along, 'Depth along the path', 'along the path (km)', 'depth (m)')
-    figure.suptitle('Profile 0-1000 m, current of 1.0 kn at 8 deg off the path')
+    figure.suptitle(
+        'After figure 5 of the paper: profile 0-1000 m, current of 1.0 kn at 8 deg off the path'
+    )
 
 
 def _draw_pitch(figure, name: str, flights: Flights, rows: list[dict]) -> None:
@@ -146,10 +164,12 @@ def _draw_pitch(figure, name: str, flights: Flights, rows: list[dict]) -> None:
         difference = (record.pitch - record.pitch_ref)[part]
         error.plot(hours, difference, color=colour, linewidth=1.0, label=label)
         mass.plot(hours, 1e3 * record.joints[part, 1], color=colour, linewidth=1.0, label=label)
-    _dress(pitch, 'Trim angle (pitch), + nose up', '', 'pitch (deg)')
+    _dress(pitch, 'Trim angle (pitch), positive nose up', '', 'pitch (deg)', 'center right')
     _dress(error, 'Pitch less desired pitch', '', 'error (deg)')
-    _dress(mass, 'Pitch mass, + forward', 'time (h)', 'position (mm)')
-    figure.suptitle('Trim angle over dives to 1000 m, current of 1.0 kn at 8 deg off the path')
+    _dress(mass, 'Pitch mass, positive forward', 'time (h)', 'position (mm)')
+    figure.suptitle(
+        'After figure 6 of the paper: trim angle, current of 1.0 kn at 8 deg off the path'
+    )
 
 
 def _draw_roll(figure, name: str, flights: Flights, rows: list[dict]) -> None:
@@ -163,39 +183,35 @@ def _draw_roll(figure, name: str, flights: Flights, rows: list[dict]) -> None:
         mass.plot(
             hours, np.degrees(record.joints[part, 2]), color=colour, linewidth=1.0, label=label
         )
-    _dress(roll, 'Roll, + starboard side down', '', 'roll (deg)')
-    _dress(mass, 'Roll mass, + to starboard', 'time (h)', 'angle (deg)')
-    figure.suptitle('Roll over dives to 1000 m, current of 1.0 kn at 8 deg off the path')
+    _dress(roll, 'Roll, positive starboard side down', '', 'roll (deg)')
+    _dress(mass, 'Roll mass, positive to starboard', 'time (h)', 'angle (deg)')
+    figure.suptitle('After figure 7 of the paper: roll, current of 1.0 kn at 8 deg off the path')
 
 
 def _draw_yaw(figure, name: str, flights: Flights, rows: list[dict]) -> None:
     """Heading and cross-track error with our guidance, heading with the paper's."""
     controller = name.removeprefix('yaw_10deg_')
-    ours, across, paper = figure.subplots(3, 1, sharex=True)
     colour, label = _COLOURS[controller], _NAMES[controller]
+    ours, across, paper = figure.subplots(3, 1)
     for guidance, axis in (('observer', ours), ('paper', paper)):
         record = flights[name, _READING, controller, guidance]
         hours = record.time_s / 3600.0
-        axis.plot(hours, record.heading, color=colour, linewidth=0.8, label=f'heading, {label}')
-        axis.plot(hours, record.heading_ref, color=_GREY, linewidth=0.8, label='desired heading')
-        axis.axhline(10.0, color=_GREEN, linewidth=1.2, linestyle=':', label='desired yaw')
-        part = record.time_s > 7200.0
-        low, high = np.percentile(record.heading[part], [0.1, 99.9])
-        axis.set_ylim(min(low, 8.0) - 4.0, max(high, 12.0) + 4.0)
-        line = "paper's line of sight" if guidance == 'paper' else 'crab into the current'
-        across.plot(
-            hours,
-            record.cross_track,
-            color=_RED if guidance == 'paper' else colour,
-            linewidth=0.8,
-            label=f'{label}, {line}',
-        )
-    _dress(ours, 'Heading, crab into the estimated current', '', 'heading (deg from north)')
-    _dress(across, 'Cross-track error', '', 'off the path (m)')
-    _dress(paper, "Heading, paper's line of sight", 'time (h)', 'heading (deg from north)')
+        part = hours >= 0.0 if guidance == 'observer' else _in_detail(hours)
+        axis.plot(hours[part], record.heading[part], color=colour, label='heading')
+        axis.plot(hours[part], record.heading_ref[part], '--', color=_GREY, label='desired')
+        axis.axhline(10.0, color=_GREEN, linestyle=':', label='desired yaw (course)')
+    record = flights[name, _READING, controller, 'observer']
+    across.plot(record.time_s / 3600.0, record.cross_track, color=colour, linewidth=1.0)
+    steady = record.heading[record.time_s > SETTLED_HOURS * 3600.0]
+    ours.set_ylim(min(np.min(steady), 8.0) - 1.0, max(np.max(steady), 12.0) + 4.0)
+    y = 'heading\n(deg from north)'
+    _dress(ours, f'Heading, {_CRAB}', '', y)
+    _dress(across, f'Cross-track error, {_CRAB}', '', 'off the path (m)', where='')
+    _dress(paper, f'Heading, {_PAPER}: part of a dive', 'time (h)', y)
+    number = next(drawing.number for drawing in DRAWINGS if drawing.experiment == name)
     figure.suptitle(
-        f'Desired yaw of 10 deg, {label}: 1.0 kn to {_READING}\n'
-        'Heading differs from the desired yaw by the crab angle'
+        f'After figure {number} of the paper (its print swaps the captions of 10 and 11):\n'
+        f'{label} at a desired yaw of 10 deg, current of 1.0 kn to {_READING}'
     )
 
 
@@ -240,9 +256,12 @@ def _draw_envelope(figure, name: str, flights: Flights, rows: list[dict]) -> Non
     axis.set_ylim(0.0, 1.75)
     axis.set_xlim(-5.0, 185.0)
     figure.colorbar(dots, label='largest cross-track error with turns (m)')
-    _dress(axis, '', 'angle of the current off the path (deg)', 'current (kn)', legend=False)
+    _dress(axis, '', 'angle of the current off the path (deg)', 'current (kn)', where='')
     figure.legend(loc='outside lower center', ncols=4)
-    figure.suptitle('Where the adaptive law holds the course (m: largest error with turns)')
+    figure.suptitle(
+        'After figure 12 of the paper: where the adaptive law holds the course\n'
+        'Numbers: largest cross-track error with turns (m)'
+    )
 
 
 #: The print swaps the captions of figures 10 and 11; these follow the text.

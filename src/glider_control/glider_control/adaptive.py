@@ -45,7 +45,7 @@ LEARN_SPEED, LEARN_VERTICAL_RATE, LEARN_AFTER_S = 0.15, 0.12, 20.0
 #: d_hat is held within this (rad/s).
 DISTURBANCE_MAX = 0.005
 #: Heading error at which the roll command may reach its limit (rad).
-SATURATING_ERROR = 0.2
+SATURATING_ERROR = 0.4
 #: Natural frequency of the filter on the virtual rate command (rad/s), and its rate limit.
 RATE_FILTER = FilterParams(2.0, 10.0)
 
@@ -318,7 +318,7 @@ def bank_to_turn(steering, disturbance, measured, reference, speed, learning, pa
     )
     demand = turn / authority
     if learning and abs(demand) < limit:
-        moved = disturbance - dt * params.heading_ki * error
+        moved = disturbance - dt * share * share * params.heading_ki * error
         disturbance = min(DISTURBANCE_MAX, max(-DISTURBANCE_MAX, moved))
     return math.asin(min(limit, max(-limit, demand))), disturbance
 

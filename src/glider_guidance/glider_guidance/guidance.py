@@ -85,7 +85,7 @@ class LosSettings(Settings):
         json_schema_extra={'tunable': True},
     )
     lookahead_s: float = Field(
-        100.0,
+        150.0,
         ge=0.0,
         le=3600.0,
         description='lookahead of the observer method in time at the speed over ground (s)',
