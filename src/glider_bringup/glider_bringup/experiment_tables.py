@@ -136,8 +136,8 @@ def _envelope_cell(row: dict) -> str:
 
 _YAW = _by_flight(
     {
-        'heading_error_deg.rms_steady': 'heading error\nrms (deg)',
-        'heading_fluctuation_deg.rms_steady': 'fluctuation\nrms (deg)',
+        'heading_error_deg.rms_steady': 'error\nrms (deg)',
+        'heading_fluctuation_deg.rms_steady': 'fluct.\nrms (deg)',
         'cross_track_m.max_steady': 'max\nsteady (m)',
         'cross_track_m.max_all': 'max\nall (m)',
     }

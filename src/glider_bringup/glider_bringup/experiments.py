@@ -538,7 +538,7 @@ def _current_experiments() -> list[Experiment]:
 def _yaw_experiments() -> list[Experiment]:
     readings = {
         '8 deg from north': {},
-        '8 deg off the path': {'current.angle_deg': 8.0},
+        '8 deg off path': {'current.angle_deg': 8.0},
     }
     papers = {
         'pid': ('5.2.1', 'gives up at 8 deg', judge_limits(OPPONENT_LIMITS, 'pid')),

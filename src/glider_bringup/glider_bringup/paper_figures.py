@@ -114,6 +114,7 @@ def _draw_current(figure, name: str, flights: Flights, rows: list[dict]) -> None
             style = '-' if controller == 'adaptive' else '--'
             axis.plot(hours[part], error[part], style, color=colour, linewidth=1.0, label=label)
     track.axvline(0.0, color=_GREY, linewidth=0.8, linestyle=':', label='desired path')
+    track.margins(y=0.15)
     _dress(track, 'Track, adaptive (scales differ)', 'east of the path (m)', 'north (km)')
     _dress(axes['ours'], f'Cross-track error, {_CRAB}', 'time (h)', 'off the path (m)')
     title = f'Cross-track error, {_PAPER}: part of a dive'
@@ -205,8 +206,8 @@ def _draw_yaw(figure, name: str, flights: Flights, rows: list[dict]) -> None:
     steady = record.heading[record.time_s > SETTLED_HOURS * 3600.0]
     ours.set_ylim(min(np.min(steady), 8.0) - 1.0, max(np.max(steady), 12.0) + 4.0)
     y = 'heading\n(deg from north)'
-    _dress(ours, f'Heading, {_CRAB}', '', y)
-    _dress(across, f'Cross-track error, {_CRAB}', '', 'off the path (m)', where='')
+    _dress(ours, f'Heading, {_CRAB}', 'time (h)', y)
+    _dress(across, f'Cross-track error, {_CRAB}', 'time (h)', 'off the path (m)', where='')
     _dress(paper, f'Heading, {_PAPER}: part of a dive', 'time (h)', y)
     number = next(drawing.number for drawing in DRAWINGS if drawing.experiment == name)
     figure.suptitle(

@@ -105,6 +105,7 @@ class Scenario(Settings):
             path=self.path,
             profile=self.profile,
             dives=self.dives,
+            duration_s=self.duration_s,
             **dict(self.guidance),
         )
 

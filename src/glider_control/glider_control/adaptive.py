@@ -45,7 +45,7 @@ LEARN_SPEED, LEARN_VERTICAL_RATE, LEARN_AFTER_S = 0.15, 0.12, 20.0
 #: d_hat is held within this (rad/s).
 DISTURBANCE_MAX = 0.005
 #: Heading error at which the roll command may reach its limit (rad).
-SATURATING_ERROR = 0.4
+SATURATING_ERROR = 0.5
 #: Natural frequency of the filter on the virtual rate command (rad/s), and its rate limit.
 RATE_FILTER = FilterParams(2.0, 10.0)
 
@@ -119,7 +119,7 @@ class AdaptiveSettings(Settings):
         json_schema_extra=_TUNABLE,
     )
     heading_kd: float = Field(
-        0.3, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=_TUNABLE
+        0.1, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=_TUNABLE
     )
     steering: SteeringLearningSettings = Field(
         SteeringLearningSettings(), description='estimator of the steering effectiveness'

@@ -48,7 +48,7 @@ def learn(state, bank, roll_rate, yaw_rate):
 @settings(max_examples=30, deadline=None)
 @given(effectiveness, kicks, offsets, st.integers(0, 1000), st.sampled_from([-1.0, 1.0]))
 def test_estimate_comes_to_the_truth_from_either_sign(b, k, d, seed, first_guess):
-    """b within 10 % after 20 min of turning, whatever it began with; k within its own deviation."""
+    """b within 10 % after 20 min of turning, from any start; k within its own deviation."""
     bank, roll_rate = turns(1200.0, seed)
     state = learn(
         SETTINGS.initial_state(first_guess), bank, roll_rate, b * bank + k * roll_rate + d

@@ -181,6 +181,12 @@ class GuidanceSettings(GuidanceLawSettings):
     dives: int = Field(
         0, ge=0, le=100000, description='dives before waiting on the surface; 0: no end'
     )
+    duration_s: float = Field(
+        0.0,
+        ge=0.0,
+        le=1e8,
+        description='time at which the mission ends (s), no later turn is led; 0.0: never',
+    )
 
     def params(self) -> 'GuidanceParams':
         """Kernel parameters."""
@@ -192,6 +198,7 @@ class GuidanceSettings(GuidanceLawSettings):
             make_polar(vehicle),
             self.los.method == 'observer',
             self.los.method == 'observer' and self.los.lead_turns,
+            self.duration_s if self.duration_s > 0.0 else math.inf,
             self.los.lookahead_m if self.los.method == 'observer' else self.los.delta1_m,
             self.los.lookahead_s if self.los.method == 'observer' else 0.0,
             self.los.delta1_per_s,
@@ -225,6 +232,7 @@ class GuidanceParams(NamedTuple):
     polar: Polar
     compensates: bool  #: crab into the estimated current
     leads: bool  #: share the drift of a turn between before and after
+    end_s: float  #: when the mission ends (s)
     lookahead: float  #: (m), at least
     lookahead_s: float  #: times the speed over ground, if that is more
     target_gain: float  #: delta1 (1/s)
@@ -384,6 +392,8 @@ def guidance_step(state, odometry, params, dt):
             drift_past = coming
         if is_gliding(stage):
             to_turn_s = time_to_turn(stage, profile.dives, odometry.p_d, ground_d, params.profile)
+            if state.tick * dt + to_turn_s > params.end_s:
+                to_turn_s = math.inf
             offset = turn_offset(to_turn_s, profile.ticks * dt, coming, drift_past)
     gamma_r, rho_r = approach_angles(e2 - offset, e3, lookahead, params.vertical_ratio)
     if not follows_path:
@@ -391,7 +401,9 @@ def guidance_step(state, odometry, params, dt):
     chi_d, upsilon_d = desired_direction(gamma_d, rho_d, gamma_r, rho_r)
     _, progress, feasible = crab_heading(gamma_d, speed, observer.current_n, observer.current_e)
     heading_command = chi_d
+    current_n, current_e = 0.0, 0.0
     if params.compensates:
+        current_n, current_e = observer.current_n, observer.current_e
         heading_command = approach_heading(
             gamma_d,
             wrap_angle(chi_d - gamma_d),
@@ -431,8 +443,8 @@ def guidance_step(state, odometry, params, dt):
         0.0,
         pitch.value,
         heading.value,
-        math.cos(heading_command) * speed + observer.current_n,
-        math.sin(heading_command) * speed + observer.current_e,
+        math.cos(heading_command) * speed + current_n,
+        math.sin(heading_command) * speed + current_e,
         rate_target,
         0.0,
         pitch.rate,
