@@ -40,6 +40,7 @@ from glider_guidance.profile import (
     profile_step,
     profile_targets,
     time_to_turn,
+    turn_lead_s,
     turn_offset,
 )
 from glider_model.command_filter import Filtered, FilterParams, filter_angle
@@ -273,7 +274,14 @@ def guidance_abort(state):
     profile = state.profile
     return GuidanceState(
         state.tick,
-        ProfileState(profile.stage, profile.ticks, profile.dives, True),
+        ProfileState(
+            profile.stage,
+            profile.ticks,
+            profile.dives,
+            True,
+            profile.lead_up_s,
+            profile.lead_down_s,
+        ),
         state.s,
         state.observer,
         state.heading,
@@ -295,7 +303,7 @@ def _start(state, odometry, psi, theta, params):
     stage = GLIDING_DOWN if params.profile.follows_path else SURFACE_PREPARATION
     return GuidanceState(
         state.tick,
-        ProfileState(stage, 0, state.profile.dives, state.profile.aborted),
+        ProfileState(stage, 0, state.profile.dives, state.profile.aborted, 0.0, 0.0),
         s,
         state.observer,
         Filtered(psi, 0.0),
@@ -345,9 +353,14 @@ def guidance_step(state, odometry, params, dt):
 
     # what the vehicle is doing
     if follows_path and not state.profile.aborted:
-        profile = ProfileState(GLIDING_DOWN, state.profile.ticks + 1, state.profile.dives, False)
+        profile = ProfileState(
+            GLIDING_DOWN, state.profile.ticks + 1, state.profile.dives, False, 0.0, 0.0
+        )
     else:
-        profile = profile_step(state.profile, odometry.p_d, ground_d, params.profile)
+        glide_rate = glide_vertical_rate(
+            -params.profile.pitch, params.profile.net_heaviness, params.polar
+        )
+        profile = profile_step(state.profile, odometry.p_d, ground_d, glide_rate, params.profile)
     stage = profile.stage
     pitch_target, rate_target = profile_targets(stage, ground_d, params.profile, params.polar)
     if not follows_path:
@@ -385,13 +398,13 @@ def guidance_step(state, odometry, params, dt):
     offset = 0.0
     if params.leads and not follows_path:
         across = observer.current_e * math.cos(gamma_d) - observer.current_n * math.sin(gamma_d)
-        coming = across * params.profile.lead_s
+        coming = across * turn_lead_s(profile, params.profile)
         if surfaced:
             drift_past = 0.0
         elif is_gliding(state.profile.stage) and not is_gliding(stage):
-            drift_past = coming
+            drift_past = across * turn_lead_s(state.profile, params.profile)
         if is_gliding(stage):
-            to_turn_s = time_to_turn(stage, profile.dives, odometry.p_d, ground_d, params.profile)
+            to_turn_s = time_to_turn(profile, odometry.p_d, ground_d, params.profile)
             if state.tick * dt + to_turn_s > params.end_s:
                 to_turn_s = math.inf
             offset = turn_offset(to_turn_s, profile.ticks * dt, coming, drift_past)

@@ -34,6 +34,8 @@ STAGE_NAMES = (
 AT_SURFACE_M = 1.0
 #: Share of the glide's vertical rate at which the pitch goes over in a turn.
 PITCH_OVER = 0.5
+#: Largest lead that is believed, in leads by the vehicle's file.
+LEAD_RANGE = 6.0
 #: The desired track is led between these times before a turn, and comes back in this time (s).
 LEAD_FROM_S, LEAD_TO_S, RETURN_S = 400.0, 150.0, 240.0
 
@@ -96,7 +98,7 @@ class ProfileParams(NamedTuple):
     surface_every: int  #: dives between waits on the surface; 0: after the last
     prepare_ticks: int
     wait_ticks: int
-    lead_s: float  #: vertical way left once the pump starts, over the vertical rate (s)
+    lead_s: float  #: way left once the pump starts, over the speed, by the file's pump (s)
 
 
 class ProfileState(NamedTuple):
@@ -106,16 +108,18 @@ class ProfileState(NamedTuple):
     ticks: int  #: ticks in this stage
     dives: int  #: dives completed
     aborted: bool
+    lead_up_s: float  #: lead of the turn at depth, as learnt from the last one; 0: none yet (s)
+    lead_down_s: float  #: lead of the upper turn
 
 
-INITIAL_PROFILE = ProfileState(SURFACE_PREPARATION, 0, 0, False)
+INITIAL_PROFILE = ProfileState(SURFACE_PREPARATION, 0, 0, False, 0.0, 0.0)
 
 
 @kernel
 def _next_stage(state, depth, vertical_rate, params):
     """Stage that follows from where the vehicle is."""
     stage = state.stage
-    lead = abs(vertical_rate) * params.lead_s
+    lead = abs(vertical_rate) * turn_lead_s(state, params)
     if state.aborted:
         return WAITING_ON_SURFACE if depth < AT_SURFACE_M else SURFACING
     if stage == SURFACE_PREPARATION and state.ticks >= params.prepare_ticks:
@@ -130,7 +134,8 @@ def _next_stage(state, depth, vertical_rate, params):
         if last or (params.surface_every > 0 and done % params.surface_every == 0):
             return WAITING_ON_SURFACE if depth < AT_SURFACE_M else GLIDING_UP
         return INFLECTING_DOWN if depth - lead <= params.top_depth else GLIDING_UP
-    if stage == INFLECTING_DOWN and vertical_rate > 0.05:
+    # a vehicle that came up to the surface bobs there before it sinks
+    if stage == INFLECTING_DOWN and vertical_rate > 0.05 and depth > 2.0 * AT_SURFACE_M:
         return GLIDING_DOWN
     finished = params.dives > 0 and state.dives >= params.dives
     if stage == WAITING_ON_SURFACE and state.ticks >= params.wait_ticks and not finished:
@@ -139,13 +144,48 @@ def _next_stage(state, depth, vertical_rate, params):
 
 
 @kernel
-def profile_step(state, depth, vertical_rate, params):
-    """Advance the stage by one tick, from depth (m) and vertical rate (m/s, + down)."""
+def profile_step(state, depth, vertical_rate, glide_rate, params):
+    """Advance the stage by one tick.
+
+    Parameters
+    ----------
+    state : ProfileState
+    depth, vertical_rate : float
+        Measured (m, m/s, + down).
+    glide_rate : float
+        Vertical rate of the steady dive (m/s).
+    params : ProfileParams
+    """
     stage = _next_stage(state, depth, vertical_rate, params)
+    up_s, down_s = state.lead_up_s, state.lead_down_s
     if stage == state.stage:
-        return ProfileState(stage, state.ticks + 1, state.dives, state.aborted)
+        # the rate falls as the root of the weight: to PITCH_OVER after 1 - PITCH_OVER^2 of the
+        # pump's time to neutral, two thirds of which are lost
+        took_s = 2.0 / 3.0 * state.ticks * TICK_S / (1.0 - PITCH_OVER * PITCH_OVER)
+        took_s = min(LEAD_RANGE * params.lead_s, took_s)
+        if stage == INFLECTING_UP and vertical_rate > PITCH_OVER * glide_rate:
+            up_s = took_s
+        elif stage == INFLECTING_DOWN and vertical_rate < -PITCH_OVER * glide_rate:
+            down_s = took_s
+        return ProfileState(stage, state.ticks + 1, state.dives, state.aborted, up_s, down_s)
     climbed = state.stage == GLIDING_UP and not state.aborted
-    return ProfileState(stage, 0, state.dives + (1 if climbed else 0), state.aborted)
+    dives = state.dives + (1 if climbed else 0)
+    return ProfileState(stage, 0, dives, state.aborted, up_s, down_s)
+
+
+@kernel
+def turn_lead_s(state, params):
+    """Time (s) by which the coming turn is led: a turn costs the way of so much straight glide.
+
+    The first turn goes by the pump of the vehicle's file, later ones by how long the last one, if
+    there was one of the same kind, took, so that a slow pump or a wrong ballast is led too.
+    """
+    same_s, other_s = state.lead_down_s, state.lead_up_s
+    if is_descending(state.stage):
+        same_s, other_s = other_s, same_s
+    if same_s > 0.0:
+        return same_s
+    return other_s if other_s > 0.0 else params.lead_s
 
 
 @kernel
@@ -187,16 +227,17 @@ def mission_time_s(params: ProfileParams, polar: Polar, dives: int) -> float:
 
 
 @kernel
-def time_to_turn(stage, dives, depth, vertical_rate, params):
+def time_to_turn(state, depth, vertical_rate, params):
     """Time (s) until the pump starts for the next turn; infinite where none is to come."""
     rate = max(abs(vertical_rate), 0.01)
-    if stage == GLIDING_DOWN:
-        return (params.depth - depth) / rate - params.lead_s
-    surfacing = (params.dives > 0 and dives + 1 >= params.dives) or (
-        params.surface_every > 0 and (dives + 1) % params.surface_every == 0
+    if state.stage == GLIDING_DOWN:
+        return (params.depth - depth) / rate - turn_lead_s(state, params)
+    done = state.dives + 1
+    surfacing = (params.dives > 0 and done >= params.dives) or (
+        params.surface_every > 0 and done % params.surface_every == 0
     )
-    if stage == GLIDING_UP and not surfacing:
-        return (depth - params.top_depth) / rate - params.lead_s
+    if state.stage == GLIDING_UP and not surfacing:
+        return (depth - params.top_depth) / rate - turn_lead_s(state, params)
     return math.inf
 
 

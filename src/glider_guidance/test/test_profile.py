@@ -4,6 +4,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -58,7 +59,9 @@ class Point:
         self.stages, self.depths = [self.state.stage], [0.0]
 
     def tick(self):
-        self.state = profile_step(self.state, self.depth, self.rate, self.params)
+        self.state = profile_step(
+            self.state, self.depth, self.rate, glide_rate(self.params), self.params
+        )
         full = self.settings.net_heaviness_kg
         wanted = math.copysign(
             full, profile_targets(self.state.stage, self.rate, self.params, POLAR)[1]
@@ -115,6 +118,18 @@ def test_lead_puts_the_upper_turn_on_the_top_depth():
     assert min(below) == pytest.approx(40.0, abs=0.2)
 
 
+def test_second_turn_is_led_by_the_pump_as_it_is():
+    """A pump at a third of its rate: 24 m too deep the first time, within 0.5 m after that."""
+    point = Point(dives=0, pump=PUMP / 3.0, depth_m=300.0)
+    point.params = point.settings.params(0, PUMP)
+    point.fly(12000.0)
+    depths = np.array(point.depths)
+    peaks = depths[1:-1][(depths[1:-1] > depths[:-2]) & (depths[1:-1] >= depths[2:])]
+    assert peaks[0] > 315.0
+    assert peaks[1:] == pytest.approx(300.0, abs=0.5)
+    assert len(peaks) > 2
+
+
 @quick
 @given(st.floats(10.0, 1000.0), st.floats(2.0, 1000.0))
 def test_upper_turn_is_never_below_half_of_the_lower(depth_m, top_depth_m):
@@ -132,16 +147,16 @@ def test_preparation_lasts_as_long_as_asked():
 @pytest.mark.parametrize('stage', ALL_STAGES)
 def test_abort_leads_to_surfacing_from_every_stage(stage):
     params = ProfileSettings().params(1, PUMP)
-    state = profile_step(ProfileState(stage, 100, 0, True), 200.0, 0.2, params)
+    state = profile_step(ProfileState(stage, 100, 0, True, 0.0, 0.0), 200.0, 0.2, 0.27, params)
     assert state.stage == SURFACING
 
 
 @pytest.mark.parametrize('stage', ALL_STAGES)
 def test_abort_at_the_surface_stays_there(stage):
     params = ProfileSettings(wait_s=0.0, prepare_s=0.0).params(5, PUMP)
-    state = ProfileState(stage, 10**6, 0, True)
+    state = ProfileState(stage, 10**6, 0, True, 0.0, 0.0)
     for _ in range(100):
-        state = profile_step(state, 0.2, 0.0, params)
+        state = profile_step(state, 0.2, 0.0, 0.27, params)
     assert state.stage == WAITING_ON_SURFACE
 
 
