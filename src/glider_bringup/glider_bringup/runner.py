@@ -37,6 +37,8 @@ _LIBC = ctypes.CDLL(None)
 _ESCALATION = ((signal.SIGINT, 2.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 2.0))
 #: Nodes have this long (s) to leave by themselves after a completed run.
 _LEAVE_S = 3.0
+#: The recorder hears the last messages within this time (s) after the plant has stopped.
+_HEAR_S = 0.5
 #: A failure is seen within this time (s) after nodes left because of it.
 _AFTERMATH_S = 1.0
 
@@ -240,17 +242,28 @@ class _Run:
     # ------------------------------------------------------------------ the end
 
     def stop(self) -> None:
-        """End every process; the recorder last, so that it has everything."""
-        recorder = [p for p in self.processes.values() if p.name == RECORDER]
-        others = [p for p in self.processes.values() if p.name != RECORDER]
+        """End every process.
+
+        The plant goes first, so that ticks cease while all are there to be heard, and the recorder
+        last, so that it has everything.
+        """
+        by_name = self.processes.values()
+        groups = (
+            [p for p in by_name if p.name == PLANT],
+            [p for p in by_name if p.name not in (PLANT, RECORDER)],
+            [p for p in by_name if p.name == RECORDER],
+        )
         first = 0 if self.first_tick_s is not None else 1
-        for group in (others, recorder):
+        for group in groups:
+            running = [p for p in group if p.code is None]
             for number, patience_s in _ESCALATION[first:]:
                 if all(p.code is not None for p in group):
                     break
                 for process in group:
                     process.send(number)
                 self._wait_for(group, patience_s)
+            if running and group is groups[0] and first == 0:
+                self._wait_for(groups[2], _HEAR_S)
         while self._selector.get_map():
             before = len(self._selector.get_map())
             self.pump(0.2)
