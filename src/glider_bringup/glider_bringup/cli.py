@@ -219,6 +219,7 @@ def _print_card(card: dict, folder: Path) -> None:
 
     track, pitch = card['cross_track_m'], card['pitch_error_deg']
     heading, depth = card['heading_fluctuation_deg'], card['depth_m']
+    travel = card['actuator_travel']
     rows = (
         ('status', card['status'] + (f' ({card["reason"]})' if card['reason'] else '')),
         ('flown', f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}'),
@@ -240,6 +241,9 @@ def _print_card(card: dict, folder: Path) -> None:
          f'{show(heading["max_steady"], "deg", 3)}'),
         ('depth', f'max {show(depth["max"], "m", 1)}, overshoot '
          f'{show(depth["overshoot"], "m", 1)}'),
+        ('actuator travel', f'pump {show(travel["buoyancy_engine_kg"], "kg", 1)}, pitch mass '
+         f'{show(travel["pitch_mass_m"], "m")}, roll mass '
+         f'{show(travel["roll_mass_deg"], "deg", 0)}'),
     )  # fmt: skip
     table = Table(title=card['scenario'], show_header=False, title_justify='left')
     for name, text in rows:

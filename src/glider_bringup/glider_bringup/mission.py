@@ -29,7 +29,7 @@ SCENARIO_FILE, VEHICLE_FILE, SCORE_FILE = 'scenario.yaml', 'vehicle.yaml', 'scor
 PARAMETERS_FILE, LOG_FILE = 'parameters.yaml', 'log.txt'
 
 #: Fields without which a score file is not a scorecard.
-CARD_FIELDS = {'scenario', 'engine', 'status', 'reason', 'wall_time_s', 'final_state'}
+CARD_FIELDS = {'scenario', 'engine', 'status', 'reason', 'wall_time_s', 'actuator_travel'}
 #: Exit code of a node that refuses its parameters.
 EXIT_CONFIGURATION = 2
 

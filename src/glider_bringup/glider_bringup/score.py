@@ -33,13 +33,15 @@ HEADING_MEAN_S = 300.0
 #: A run is infeasible if the course could not be held for this share of the scored time.
 INFEASIBLE_SHARE = 0.5
 
-_SERIES = 9
-_DEPTH, _E2, _PITCH, _PITCH_REF, _HEADING, _RATE_REF, _TARGET_N, _TARGET_E, _INFEASIBLE = range(9)
+_SERIES = 12
+_DEPTH, _E2, _PITCH, _PITCH_REF, _HEADING, _RATE_REF = range(6)
+_TARGET_N, _TARGET_E, _INFEASIBLE, _NET_HEAVINESS, _PITCH_MASS, _ROLL_MASS = range(6, 12)
 
 _ODOM, _REFERENCE = COLUMNS['odom'], COLUMNS['reference']
 _E2_COLUMN = COLUMNS['tracking_error'].start + 1
 _INFEASIBLE_COLUMN = COLUMNS['infeasible']
 _ODOM_START, _REFERENCE_START = _ODOM.start, _REFERENCE.start
+_JOINTS_START = COLUMNS['joint_states'].start
 
 
 @kernel
@@ -80,6 +82,9 @@ def _extract(log, series):
         series[row, _TARGET_N] = reference.p_n
         series[row, _TARGET_E] = reference.p_e
         series[row, _INFEASIBLE] = log[row, _INFEASIBLE_COLUMN]
+        series[row, _NET_HEAVINESS] = log[row, _JOINTS_START]
+        series[row, _PITCH_MASS] = log[row, _JOINTS_START + 1]
+        series[row, _ROLL_MASS] = log[row, _JOINTS_START + 2]
 
 
 @kernel
@@ -152,7 +157,8 @@ class Scorer:
         -------
         dict
             The run's part of ``score.json``: ticks, dives, distance_along_path_m, cross_track_m,
-            pitch_error_deg, heading_fluctuation_deg, depth_m, final_state, and ``infeasible``.
+            pitch_error_deg, heading_fluctuation_deg, depth_m, actuator_travel, final_state, and
+            ``infeasible``.
             A figure without data is None.
         """
         series = np.concatenate(self._blocks) if self._blocks else np.empty((0, _SERIES))
@@ -188,6 +194,11 @@ class Scorer:
             'depth_m': {
                 'max': deepest,
                 'overshoot': None if deepest is None else max(0.0, deepest - target_depth_m),
+            },
+            'actuator_travel': {
+                'buoyancy_engine_kg': _travel(series[:, _NET_HEAVINESS]),
+                'pitch_mass_m': _travel(series[:, _PITCH_MASS]),
+                'roll_mass_deg': math.degrees(_travel(series[:, _ROLL_MASS])),
             },
             'final_state': self._final_state(),
             'infeasible': bool(
@@ -279,6 +290,11 @@ def _count_dives(depth: np.ndarray) -> int:
 def _length(north: np.ndarray, east: np.ndarray) -> float:
     """Horizontal way of the virtual target along the path (m)."""
     return float(np.sum(np.hypot(np.diff(north), np.diff(east))))
+
+
+def _travel(position: np.ndarray) -> float:
+    """Way that an actuator has gone, to and fro."""
+    return float(np.sum(np.abs(np.diff(position))))
 
 
 def _rms(values: np.ndarray) -> float | None:

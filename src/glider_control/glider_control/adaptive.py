@@ -60,7 +60,7 @@ class ChannelSettings(Settings):
         6.0, gt=0.0, le=500.0, description='B1, angle (N m/rad)', json_schema_extra=_TUNABLE
     )
     b2: float = Field(
-        20.0, gt=0.0, le=500.0, description='B2, rate (N m s/rad)', json_schema_extra=_TUNABLE
+        14.0, gt=0.0, le=500.0, description='B2, rate (N m s/rad)', json_schema_extra=_TUNABLE
     )
     gamma: float = Field(
         0.3, ge=0.0, le=50.0, description='Gamma, adaptation (N m/rad)', json_schema_extra=_TUNABLE
@@ -73,7 +73,7 @@ class ChannelSettings(Settings):
         json_schema_extra=_TUNABLE,
     )
     dead_zone_radps: float = Field(
-        1e-4,
+        5e-5,
         ge=0.0,
         le=0.1,
         description='rate error below which nothing is learnt (rad/s)',

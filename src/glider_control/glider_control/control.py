@@ -77,7 +77,7 @@ class FilterSettings(Settings):
     """What keeps noise from moving the motors."""
 
     attitude_s: float = Field(
-        2.0, gt=0.0, le=60.0, description='time constant of the attitude filter (s)'
+        3.0, gt=0.0, le=60.0, description='time constant of the attitude filter (s)'
     )
     buoyancy_dead_band_kg: float = Field(
         0.005, ge=0.0, le=1.0, description='change of command that the pump ignores (kg)'

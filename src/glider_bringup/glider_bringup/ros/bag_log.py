@@ -23,7 +23,7 @@ from glider_model.signals import TICK_NS
 _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 
 #: Topics that the score is computed from.
-SCORED = ('odom', 'reference', 'tracking_error')
+SCORED = ('odom', 'joint_states', 'reference', 'tracking_error')
 
 
 class LogWriter:
