@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from glider_bringup.direct import COLUMNS, ROW
+from glider_model.frames import poses_from_wire
 from glider_model.signals import TICK_S
 
 #: Topics that a picture is drawn from.
@@ -40,14 +41,17 @@ class Record:
             first += len(block)
         log = np.concatenate(thinned) if thinned else np.empty((0, ROW))
         self.time_s = np.arange(len(log)) * rows * TICK_S
-        odom, reference = log[:, COLUMNS['odom']], log[:, COLUMNS['reference']]
-        self.east, self.north, self.depth = odom[:, 0], odom[:, 1], -odom[:, 2]
-        self.target_east, self.target_north = reference[:, 0], reference[:, 1]
-        self.roll, self.pitch, self.heading = _attitude_deg(odom[:, 3:7])
-        _, self.pitch_ref, self.heading_ref = _attitude_deg(reference[:, 3:7])
+        odom = poses_from_wire(log[:, COLUMNS['odom']])
+        reference = poses_from_wire(log[:, COLUMNS['reference']])
+        self.north, self.east, self.depth = odom[:, 0], odom[:, 1], odom[:, 2]
+        self.target_north, self.target_east = reference[:, 0], reference[:, 1]
+        self.roll, self.pitch = np.degrees(odom[:, 3]), np.degrees(odom[:, 4])
+        self.heading = np.degrees(np.unwrap(odom[:, 5]))
+        self.pitch_ref = np.degrees(reference[:, 4])
+        self.heading_ref = np.degrees(np.unwrap(reference[:, 5]))
         error = log[:, COLUMNS['tracking_error']]
         self.cross_track, self.vertical_error = error[:, 1], error[:, 2]
-        self.descending = reference[:, 9] < 0.0
+        self.descending = log[:, COLUMNS['reference']][:, 9] < 0.0
         self.joints = log[:, COLUMNS['joint_states']]
         self.current = log[:, COLUMNS['current_velocity']]
         self.estimate = log[:, COLUMNS['current_estimate']]
@@ -59,15 +63,6 @@ class Record:
         for name, values in vars(self).items():
             setattr(record, name, values[::step].copy())
         return record
-
-
-def _attitude_deg(q_el: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Roll, pitch, heading (deg, NED / FRD) of quaternions w x y z in ENU / FLU."""
-    w, x, y, z = q_el.T
-    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
-    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return np.degrees(roll), -np.degrees(pitch), np.degrees(np.unwrap(0.5 * np.pi - yaw))
 
 
 def draw_run(record: Record, title: str, file: Path) -> None:

@@ -12,6 +12,8 @@ World vectors swap x and y and negate z. Body vectors negate y and z.
 
 import math
 
+import numpy as np
+
 from glider_model.kernel import kernel
 from glider_model.signals import Odometry, Reference, Water, Wrench
 
@@ -124,6 +126,23 @@ def odometry_from_wire(wire):
         -wire[11],
         -wire[12],
     )
+
+
+@kernel
+def poses_from_wire(wire):
+    """Poses of many messages, float64[n, >= 7] laid out as by ``odometry_to_wire``.
+
+    Returns
+    -------
+    float64[n, 6]
+        North, east, depth (m), roll, pitch, heading (rad).
+    """
+    poses = np.empty((wire.shape[0], 6))
+    for i in range(wire.shape[0]):
+        q_w, q_x, q_y, q_z = swap_world(wire[i, 3], wire[i, 4], wire[i, 5], wire[i, 6])
+        poses[i, 0], poses[i, 1], poses[i, 2] = wire[i, 1], wire[i, 0], -wire[i, 2]
+        poses[i, 3], poses[i, 4], poses[i, 5] = euler_from_quaternion(q_w, q_x, q_y, q_z)
+    return poses
 
 
 @kernel

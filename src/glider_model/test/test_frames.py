@@ -14,6 +14,7 @@ from glider_model.frames import (
     euler_from_quaternion,
     odometry_from_wire,
     odometry_to_wire,
+    poses_from_wire,
     quaternion_from_euler,
     reference_from_wire,
     reference_to_wire,
@@ -254,3 +255,17 @@ def test_wrench_comes_back_exactly(wrench):
 def test_wrench_in_flu():
     """Heave up and pitch nose-down positive, roll unchanged."""
     assert wrench_to_wire(Wrench(1.0, 2.0, 3.0)) == (-1.0, 2.0, -3.0)
+
+
+def test_poses_of_many_messages_are_those_of_each():
+    """North, east, depth and attitude, in the order given, against the single conversions."""
+    rng = np.random.default_rng(3)
+    angles = rng.uniform((-3.0, -1.5, -3.1), (3.0, 1.5, 3.1), (20, 3))
+    places = rng.uniform(-100.0, 100.0, (20, 3))
+    wire = [
+        odometry_to_wire(Odometry(*place, *quaternion_from_euler(*angle), *(6 * (0.0,))))
+        for place, angle in zip(places, angles, strict=True)
+    ]
+    poses = poses_from_wire(np.array(wire))
+    np.testing.assert_array_equal(poses[:, :3], places)
+    np.testing.assert_allclose(poses[:, 3:], angles, rtol=0.0, atol=1e-12)
