@@ -288,6 +288,7 @@ def montecarlo(
     Each hydrodynamic coefficient differs by up to 30 %, added mass by 15 %, trim by 10 mm, roll at
     rest by 10 deg, ballast by 50 g; water is stratified. Control knows the file only.
     """
+    from glider_bringup import mission
     from glider_bringup import montecarlo as study
 
     fields = dict(parse_assignment(text) for text in changes or [])
@@ -296,7 +297,7 @@ def montecarlo(
     laws = list(dict.fromkeys(one.value for one in controller or Controller))
     scenarios = study.make_scenarios(scenario, fields, laws, plants, seed)
     if out:
-        study.make_folder(out)
+        mission.make_result_folder(out, study.RESULT_FILE)
     messages.print(f'{scenario}: {plants} plants, each by {" and by ".join(laws)}')
     with _workers_at_work(), _counter('flying', len(scenarios)) as update:
         flights, airframes = study.fly_plants(scenarios, workers or os.cpu_count() or 1, update)
@@ -392,13 +393,13 @@ def experiments(
     By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
     engine: 135 flights, most of them of 30 hours.
     """
-    from glider_bringup import experiment_tables, paper_figures
+    from glider_bringup import experiment_tables, mission, paper_figures
     from glider_bringup import experiments as study
 
     planned = study.make_experiments([one.value for one in only or Group])
     flights = study.count_flights(planned)
     if out:
-        study.make_folder(out)
+        mission.make_result_folder(out, study.RESULT_FILE)
     messages.print(f'{len(planned)} experiments, {flights} flights')
     with _workers_at_work(), _counter('flying', flights) as update:
         rows, records = study.fly(planned, workers or os.cpu_count() or 1, update)

@@ -12,7 +12,6 @@ import math
 import shlex
 from collections.abc import Callable, Iterator
 from concurrent.futures import as_completed
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,7 +27,6 @@ from glider_guidance.los import crab_heading
 from glider_model.current import KNOT_MPS
 from glider_model.perturb import perturbed
 from glider_model.polar import glide_horizontal_speed, glide_vertical_rate, make_polar
-from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
 from glider_model.vehicle import load_vehicle
 
@@ -480,25 +478,6 @@ def report(experiments: list[Experiment], rows: list[list[dict]]) -> dict[str, A
             }
         )
     return {'experiments': told}
-
-
-def make_folder(folder: Path) -> None:
-    """Folder for results and figures.
-
-    Raises
-    ------
-    ConfigurationError
-        If it cannot be made, or already holds a result.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigurationError(f'--out {folder}: {error.strerror}') from None
-    if (folder / RESULT_FILE).exists():
-        raise ConfigurationError(
-            f'--out {folder}: it has a {RESULT_FILE} already; a result is never written over '
-            f'another (allowed: another folder)'
-        )
 
 
 # ---------------------------------------------------------------------------------- experiments

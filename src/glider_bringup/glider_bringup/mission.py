@@ -87,6 +87,25 @@ def make_run_folder(scenario: Scenario, out: Path | None) -> Path:
     return folder
 
 
+def make_result_folder(folder: Path, result: str) -> None:
+    """Folder for a study whose result is the file ``result``.
+
+    Raises
+    ------
+    ConfigurationError
+        If it cannot be made, or already holds a result.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigurationError(f'--out {folder}: {error.strerror}') from None
+    if (folder / result).exists():
+        raise ConfigurationError(
+            f'--out {folder}: it has a {result} already; a result is never written over '
+            f'another (allowed: another folder)'
+        )
+
+
 def mission_of(scenario: Scenario) -> tuple[MissionState, MissionParams]:
     """State at tick 0 and parameters of the four blocks."""
     blocks = (

@@ -28,7 +28,6 @@ from glider_model.perturb import (
     perturbed,
 )
 from glider_model.sensors import SensorSettings
-from glider_model.settings import ConfigurationError
 from glider_model.trim import solve_trim
 from glider_model.vehicle import VehicleParams, load_vehicle
 from glider_model.water import WaterSettings
@@ -329,22 +328,3 @@ def report(
             }
         )
     return {**summary, 'flown': plants}
-
-
-def make_folder(folder: Path) -> None:
-    """Folder for a study's result.
-
-    Raises
-    ------
-    ConfigurationError
-        If it cannot be made, or already holds a result.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigurationError(f'--out {folder}: {error.strerror}') from None
-    if (folder / RESULT_FILE).exists():
-        raise ConfigurationError(
-            f'--out {folder}: it has a {RESULT_FILE} already; a result is never written over '
-            f'another (allowed: another folder)'
-        )

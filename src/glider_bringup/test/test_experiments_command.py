@@ -36,6 +36,7 @@ from glider_bringup.experiments import (
     steering_share,
 )
 from glider_bringup.figure import Record
+from glider_bringup.mission import make_result_folder
 from glider_bringup.scenario import load_scenario, parse_assignment
 from glider_model.settings import ConfigurationError
 from glider_model.trim import solve_trim
@@ -406,7 +407,7 @@ def test_wrong_options_are_refused(options, message):
 def test_a_result_is_never_written_over(tmp_path):
     (tmp_path / RESULT_FILE).write_text('{}')
     with pytest.raises(ConfigurationError, match='never written over'):
-        experiments.make_folder(tmp_path)
+        make_result_folder(tmp_path, experiments.RESULT_FILE)
 
 
 def test_a_failed_verdict_is_exit_code_one(tmp_path, monkeypatch):

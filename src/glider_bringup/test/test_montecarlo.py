@@ -16,7 +16,7 @@ import pytest
 
 from glider_bringup import montecarlo
 from glider_bringup.direct import COLUMNS, ROW, fly
-from glider_bringup.mission import mission_of, score_again
+from glider_bringup.mission import make_result_folder, mission_of, score_again
 from glider_bringup.montecarlo import (
     RESULT_FILE,
     airframe,
@@ -268,7 +268,7 @@ def test_wrong_options_are_refused(options, message):
 def test_a_result_is_never_written_over(tmp_path):
     (tmp_path / RESULT_FILE).write_text('{}')
     with pytest.raises(ConfigurationError, match='never written over'):
-        montecarlo.make_folder(tmp_path)
+        make_result_folder(tmp_path, montecarlo.RESULT_FILE)
 
 
 def _descendants(pid):

@@ -17,7 +17,6 @@ from pydantic import Field
 
 from glider_model.actuators import actuators_step
 from glider_model.frames import (
-    euler_from_quaternion,
     quaternion_from_euler,
     rotate_to_body,
     rotate_to_ned,
@@ -367,9 +366,3 @@ def plant_measurement(state, params):
 def plant_joints(state):
     """Where the actuators are."""
     return state.joints
-
-
-@kernel
-def attitude(odometry):
-    """Roll, pitch, heading (rad) of an odometry."""
-    return euler_from_quaternion(odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z)

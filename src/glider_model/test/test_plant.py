@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from glider_model.actuators import actuators_step
+from glider_model.frames import euler_from_quaternion
 from glider_model.plant import (
     PlantSettings,
     acceleration,
-    attitude,
     plant_finished,
     plant_joints,
     plant_odometry,
@@ -32,6 +32,11 @@ quick = settings(max_examples=60, deadline=None)
 GLIDERS = ['zhang2021', 'seawing']
 names = st.sampled_from(GLIDERS)
 STILL = Water(0.0, 0.0, 0.0)
+
+
+def attitude(odometry):
+    """Roll, pitch, heading (rad) of an odometry."""
+    return euler_from_quaternion(odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z)
 
 
 @st.composite
