@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from glider_bringup import cli, experiments
+from glider_bringup.commands.studies import Group
 from glider_bringup.experiments import (
     FAILED,
     GROUPS,
@@ -65,7 +66,7 @@ def planned():
 
 
 def test_command_line_knows_every_group():
-    assert [group.value for group in cli.Group] == list(GROUPS)
+    assert [group.value for group in Group] == list(GROUPS)
 
 
 def test_every_experiment_can_be_flown(planned):

@@ -1,0 +1,46 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider score`` and ``./glider figure``: what was recorded."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from glider_bringup.console import Json, messages, output
+from glider_bringup.scorecard import print_card
+
+app = typer.Typer()
+
+
+@app.command(epilog='Example: ./glider score runs/20260101-120000-current_8deg --json')
+def score(
+    folder: Annotated[Path, typer.Argument(metavar='RUN', help='Folder of a run.')],
+    as_json: Json = False,
+) -> None:
+    """Score a run again, from its bag; a run without a bag shows the score it was given."""
+    from glider_bringup import mission
+
+    with messages.status('reading the bag'):
+        card = mission.score_again(folder)
+    if as_json:
+        print(json.dumps(card))
+    else:
+        print_card(card, folder)
+
+
+@app.command(epilog='Example: ./glider figure runs/20260101-120000-current_8deg --out run.png')
+def figure(
+    folder: Annotated[Path, typer.Argument(metavar='RUN', help='Folder of a run with a bag.')],
+    out: Annotated[
+        Path | None, typer.Option(help='Image file: png, svg or pdf. Default: RUN/run.png.')
+    ] = None,
+) -> None:
+    """Draw a run: track, depth, errors, attitude, current and actuators."""
+    from glider_bringup import mission
+
+    file = out or folder / 'run.png'
+    with messages.status('reading the bag'):
+        mission.draw(folder, file)
+    output.print(f'drawn: {file}', soft_wrap=True)

@@ -1,0 +1,122 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider run``."""
+
+import json
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Literal, get_args
+
+import typer
+
+from glider_bringup.console import (
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    Controller,
+    Json,
+    choices,
+    messages,
+    number,
+    progress,
+)
+from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, parse_assignment
+from glider_bringup.scorecard import print_card
+from glider_guidance.guidance import LosSettings
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_S
+
+app = typer.Typer()
+Engine = Enum('Engine', {text: text for text in get_args(Literal['nodes', 'direct'])})
+Guidance = choices('Guidance', LosSettings, 'method')
+
+
+@app.command(epilog='Example: ./glider run current_8deg --engine direct --duration full --json')
+def run(
+    scenario: Annotated[
+        str, typer.Argument(help='Scenario by name (./glider list) or path of its YAML file.')
+    ] = DEFAULT_SCENARIO,
+    engine: Annotated[
+        Engine,
+        typer.Option(
+            help='nodes: ROS 2 processes over topics; direct: one compiled loop. Same results.'
+        ),
+    ] = Engine.nodes,
+    controller: Annotated[
+        Controller | None, typer.Option(help="Attitude law, instead of the scenario's.")
+    ] = None,
+    guidance: Annotated[
+        Guidance | None, typer.Option(help="Line of sight, instead of the scenario's.")
+    ] = None,
+    duration: Annotated[
+        str | None,
+        typer.Option(
+            metavar='S|full',
+            help="Simulated seconds, or the scenario's full duration. Default: its dives.",
+        ),
+    ] = None,
+    speed: Annotated[
+        str, typer.Option(metavar='X|max', help='Times real time (nodes only).')
+    ] = 'max',
+    seed: Annotated[int | None, typer.Option(help="Seed, instead of the scenario's.")] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--set', metavar='FIELD=VALUE', help='Change a scenario field; can be repeated.'
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the run's files. Default: runs/<time>-<name>.")
+    ] = None,
+    bag: Annotated[
+        bool, typer.Option('--bag', help='Record a bag in a direct run too; nodes always do.')
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Fly a scenario; record it and print the scorecard."""
+    fields = dict(parse_assignment(text) for text in changes or [])
+    if controller:
+        fields['control.law'] = controller.value
+    if guidance:
+        fields['guidance.los.method'] = guidance.value
+    if seed is not None:
+        fields['seed'] = seed
+    if duration is not None:
+        fields['dives'] = 0
+        if duration != 'full':
+            fields['duration_s'] = number('--duration', duration, 'full', TICK_S, 1e8)
+    rate = 0.0 if speed == 'max' else number('--speed', speed, 'max', 0.01, 1e6)
+    if rate and engine is Engine.direct:
+        raise ConfigurationError('--speed: the direct engine knows only max')
+    flown = load_scenario(scenario, fields)
+    card, folder = _fly(flown, engine, rate, out, bag)
+    if as_json:
+        print(json.dumps(card))
+    else:
+        print_card(card, folder)
+    if card['status'] == 'aborted':
+        raise typer.Exit(
+            EXIT_INTERRUPTED if card['reason'].startswith('stopped by') else EXIT_FAILED
+        )
+
+
+def _fly(scenario: Scenario, engine: Engine, rate: float, out: Path | None, bag: bool):
+    """Fly and score a scenario with a progress bar; the scorecard and the run folder."""
+    from glider_bringup import mission
+
+    folder = mission.make_run_folder(scenario, out)
+    messages.print(f'{scenario.name}: {scenario.description}')
+    with progress(scenario, mission.planned_ticks(scenario)) as update:
+        if engine is Engine.nodes:
+            flight, scores = mission.fly_nodes(scenario, folder, rate, update, _print_log)
+        else:
+            flight, scores = mission.fly_direct(scenario, folder, bag, update)
+    card = mission.scorecard(scenario, engine.value, flight, scores)
+    mission.write_score(folder, card)
+    if flight.reason:
+        messages.print(f'{flight.status}: {flight.reason}', style='red')
+    return card, folder
+
+
+def _print_log(line: str) -> None:
+    """Show a line that a node printed."""
+    messages.print(line, soft_wrap=True)

@@ -1,0 +1,173 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider montecarlo`` and ``./glider experiments``: many flights."""
+
+import json
+import os
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Literal, get_args
+
+import typer
+from rich.table import Table
+
+from glider_bringup.console import (
+    EXIT_FAILED,
+    Controller,
+    Json,
+    counter,
+    messages,
+    number,
+    output,
+    workers_at_work,
+)
+from glider_bringup.scenario import DEFAULT_SCENARIO, parse_assignment
+from glider_model.signals import TICK_S
+
+app = typer.Typer()
+Group = Enum(
+    'Group',
+    {
+        text: text
+        for text in get_args(
+            Literal['current', 'yaw', 'profile', 'robustness', 'paths', 'envelope']
+        )
+    },
+)
+
+
+@app.command(epilog='Example: ./glider montecarlo current_12deg --plants 200 --seed 1000')
+def montecarlo(
+    scenario: Annotated[
+        str, typer.Argument(help='Scenario by name (./glider list) or path of its YAML file.')
+    ] = DEFAULT_SCENARIO,
+    plants: Annotated[int, typer.Option(min=1, max=1_000_000, help='Number of plants.')] = 100,
+    seed: Annotated[
+        int, typer.Option(min=0, max=2**62, help='Plant i is drawn from seed + i.')
+    ] = 0,
+    controller: Annotated[
+        list[Controller] | None,
+        typer.Option(help='Attitude law; can be repeated. Default: all of them.'),
+    ] = None,
+    duration: Annotated[
+        str,
+        typer.Option(metavar='S|full', help="Simulated seconds, or the scenario's full duration."),
+    ] = 'full',
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help='Processes. Default: one per processor.')
+    ] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--set', metavar='FIELD=VALUE', help='Change a scenario field; can be repeated.'
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help='Folder for montecarlo.json, which tells of every plant.')
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fly many plants that differ from their vehicle file, with noise, by the direct engine.
+
+    Each hydrodynamic coefficient differs by up to 30 %, added mass by 15 %, trim by 10 mm, roll at
+    rest by 10 deg, ballast by 50 g; water is stratified. Control knows the file only.
+    """
+    from glider_bringup import mission
+    from glider_bringup import montecarlo as study
+
+    fields = dict(parse_assignment(text) for text in changes or [])
+    if duration != 'full':
+        fields['duration_s'] = number('--duration', duration, 'full', TICK_S, 1e8)
+    laws = list(dict.fromkeys(one.value for one in controller or Controller))
+    scenarios = study.make_scenarios(scenario, fields, laws, plants, seed)
+    if out:
+        mission.make_result_folder(out, study.RESULT_FILE)
+    messages.print(f'{scenario}: {plants} plants, each by {" and by ".join(laws)}')
+    with workers_at_work(), counter('flying', len(scenarios)) as update:
+        flights, airframes = study.fly_plants(scenarios, workers or os.cpu_count() or 1, update)
+    name = next(iter(scenarios.values())).name
+    summary = study.summarise(name, seed, flights, airframes)
+    whole = study.report(scenario, fields, summary, flights, airframes)
+    if out:
+        text = json.dumps(whole, indent=2) + '\n'
+        (out / study.RESULT_FILE).write_text(text, encoding='utf-8')
+    if as_json:
+        print(json.dumps(summary))
+    else:
+        _print_study(whole)
+
+
+def _print_study(study: dict) -> None:
+    """Print the result of a Monte Carlo study for a person."""
+
+    def show(figure: dict) -> str:
+        return ' / '.join('-' if x is None else f'{x:,.3f}' for x in figure.values())
+
+    rows = study['rows']
+    table = Table(
+        title=f'{study["scenario"]}, {study["plants"]} plants from seed {study["seed"]}',
+        title_justify='left',
+    )
+    table.add_column('p50 / p95 / worst')
+    for row in rows:
+        table.add_column(row['controller'])
+    lines = (
+        ('diverged', lambda row: str(row['diverged'])),
+        ('max steady (m)', lambda row: show(row['max_steady_m'])),
+        ('max all (m)', lambda row: show(row['max_all_m'])),
+        ('heading rms (deg)', lambda row: show(row['heading_fluctuation_deg'])),
+        ('pitch rms (deg)', lambda row: show(row['pitch_error_deg'])),
+        ('plants statically unstable', lambda row: str(row['statically_unstable'])),
+        ('plants that steer weakly', lambda row: str(row['weak_steering'])),
+        ('worst', lambda row: f'plant {row["worst_plant"]}'),
+    )
+    for name, text in lines:
+        table.add_row(name, *map(text, rows))
+    output.print(table)
+    for row in study['rows']:
+        worst = study['flown'][row['worst_plant']]['commands'][row['controller']]
+        output.print(f'worst of {row["controller"]}:', worst, soft_wrap=True)
+
+
+@app.command(epilog='Example: ./glider experiments --only robustness --only paths')
+def experiments(
+    only: Annotated[
+        list[Group] | None, typer.Option(help='Group; can be repeated. Default: all of them.')
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help='Processes. Default: one per processor.')
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help='Folder for experiments.json and the figures.')
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fly the experiments of the paper and what goes beyond them; exit code 1 if one fails.
+
+    By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
+    engine: 135 flights, most of them of 30 hours.
+    """
+    from glider_bringup import experiment_tables, mission, paper_figures
+    from glider_bringup import experiments as study
+
+    planned = study.make_experiments([one.value for one in only or Group])
+    flights = study.count_flights(planned)
+    if out:
+        mission.make_result_folder(out, study.RESULT_FILE)
+    messages.print(f'{len(planned)} experiments, {flights} flights')
+    with workers_at_work(), counter('flying', flights) as update:
+        rows, records = study.fly(planned, workers or os.cpu_count() or 1, update)
+    result = study.report(planned, rows)
+    if out:
+        with messages.status('drawing'):
+            drawn = paper_figures.draw(planned, rows, records, out)
+        text = json.dumps(result, indent=2) + '\n'
+        (out / study.RESULT_FILE).write_text(text, encoding='utf-8')
+        for file in drawn:
+            messages.print(f'drawn: {file}', soft_wrap=True)
+    if as_json:
+        print(json.dumps(result))
+    else:
+        experiment_tables.show(result, output)
+    if any(one['verdict'] == study.FAILED for one in result['experiments']):
+        raise typer.Exit(EXIT_FAILED)

@@ -1,0 +1,80 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider trim`` and ``./glider list``: scenarios and vehicles."""
+
+import json
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from glider_bringup.console import EXIT_FAILED, Json, messages, output
+from glider_bringup.scenario import load_scenario, scenario_names
+from glider_model.settings import ConfigurationError
+from glider_model.trim import Trim, solve_trim
+from glider_model.vehicle import load_vehicle, vehicle_names
+
+app = typer.Typer()
+
+
+@app.command(epilog='Example: ./glider trim zhang2021 --net-heaviness-kg 0.4 --pitch-deg -30')
+def trim(
+    vehicle: Annotated[str, typer.Argument(help='Vehicle by name or path of its YAML file.')],
+    net_heaviness_kg: Annotated[
+        float, typer.Option('--net-heaviness-kg', help='Net heaviness, + sinks (kg).')
+    ],
+    pitch_deg: Annotated[
+        float | None, typer.Option('--pitch-deg', help='Pitch, + nose up (deg).')
+    ] = None,
+    pitch_mass_m: Annotated[
+        float | None,
+        typer.Option('--pitch-mass-m', help='Pitch mass from its neutral position (m).'),
+    ] = None,
+    roll_mass_deg: Annotated[
+        float, typer.Option('--roll-mass-deg', help='Roll mass, + to starboard (deg).')
+    ] = 0.0,
+    as_json: Json = False,
+) -> None:
+    """Solve the steady glide or spiral of a vehicle."""
+    solution = solve_trim(
+        load_vehicle(vehicle).params(), net_heaviness_kg, pitch_deg, pitch_mass_m, roll_mass_deg
+    )
+    values = asdict(solution)
+    if as_json:
+        print(json.dumps(values))
+    else:
+        _print_trim(vehicle, solution)
+    if not solution.converged:
+        messages.print("no steady state found within the vehicle's ranges", style='red')
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _print_trim(vehicle: str, solution: Trim) -> None:
+    table = Table(title=vehicle, show_header=False, title_justify='left')
+    for name, value in asdict(solution).items():
+        if value is None:
+            value = 'straight'
+        table.add_row(name, f'{value:.5g}' if isinstance(value, float) else str(value))
+    output.print(table)
+
+
+@app.command('list', epilog='Example: ./glider list --json')
+def list_all(as_json: Json = False) -> None:
+    """List the scenarios and vehicles that come with the stack."""
+    scenarios = {name: load_scenario(name).description for name in scenario_names()}
+    vehicles = {name: load_vehicle(name).description for name in vehicle_names()}
+    if as_json:
+        print(json.dumps({'scenarios': scenarios, 'vehicles': vehicles}))
+        return
+    for title, entries in (('Scenarios', scenarios), ('Vehicles', vehicles)):
+        table = Table(title=title, show_header=False, title_justify='left')
+        for name, description in entries.items():
+            table.add_row(name, description)
+        output.print(table)
+
+
+@app.command(epilog='Example: ./glider test')
+def test() -> None:
+    """Run all tests: each package's, then those of the whole system."""
+    raise ConfigurationError('test: run it through the ./glider script of the workspace')

@@ -1,0 +1,114 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the commands share: consoles, exit codes, options, progress bars."""
+
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from enum import Enum
+from typing import Annotated, get_args
+
+import typer
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from glider_bringup.scenario import Scenario
+from glider_control.control import ControlLawSettings
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_S
+
+EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
+
+# Standard output carries results only; progress and messages go to standard error.
+# Names, descriptions and folders come from people: brackets in them are no markup.
+output = Console(highlight=False, markup=False)
+messages = Console(stderr=True, highlight=False, markup=False)
+
+
+def choices(name: str, model, field: str) -> type[Enum]:
+    """Choices of an option, from the settings field that it sets."""
+    return Enum(name, {text: text for text in get_args(model.model_fields[field].annotation)})
+
+
+Controller = choices('Controller', ControlLawSettings, 'law')
+Json = Annotated[
+    bool, typer.Option('--json', help='Print one JSON object and nothing else on standard output.')
+]
+
+
+def number(option: str, text: str, word: str, low: float, high: float) -> float:
+    """Number of an option that also takes a word."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = float('nan')
+    if not low <= number <= high:
+        raise ConfigurationError(
+            f'{option} {text}: not usable (allowed: {low:g} to {high:g}, or {word})'
+        )
+    return number
+
+
+@contextmanager
+def progress(scenario: Scenario, ticks: int):
+    """Progress bar with simulated time, real-time factor and depth; yields its update."""
+    bar = Progress(
+        TextColumn('{task.description}'),
+        BarColumn(),
+        TextColumn('{task.percentage:3.0f} %'),
+        TextColumn('{task.fields[state]}'),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=messages,
+        transient=True,
+    )
+    task = bar.add_task('starting', total=ticks, state='')
+
+    def update(flown: int, depth_m: float) -> None:
+        elapsed = bar.tasks[0].elapsed or 0.0
+        factor = flown * TICK_S / elapsed if elapsed > 0.0 else 0.0
+        bar.update(
+            task,
+            completed=min(flown, ticks),
+            description='flying',
+            state=f'{flown * TICK_S:,.0f} s  x{factor:,.0f}  depth {depth_m:6.1f} m',
+        )
+
+    with bar:
+        yield update
+
+
+@contextmanager
+def workers_at_work():
+    """Say what ended the work of worker processes early, and leave with its exit code."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        messages.print('stopped by SIGINT', style='red')
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    except BrokenProcessPool:
+        messages.print('a worker process was killed; give fewer --workers', style='red')
+        raise typer.Exit(EXIT_FAILED) from None
+
+
+@contextmanager
+def counter(description: str, total: int):
+    """Progress bar that counts, with the time left; yields its update."""
+    bar = Progress(
+        TextColumn('{task.description}'),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=messages,
+        transient=True,
+    )
+    task = bar.add_task(description, total=total)
+    with bar:
+        yield lambda done: bar.update(task, completed=done)
