@@ -25,8 +25,8 @@ from glider_control.steering import (
     SteeringLearningSettings,
     SteeringParams,
     SteeringState,
-    effective_steering,
     learn_steering,
+    roll_to_turn,
 )
 from glider_model.command_filter import Filtered, FilterParams, filter_command
 from glider_model.frames import wrap_angle
@@ -45,7 +45,7 @@ LEARN_SPEED, LEARN_VERTICAL_RATE, LEARN_AFTER_S = 0.15, 0.12, 20.0
 #: d_hat is held within this (rad/s).
 DISTURBANCE_MAX = 0.005
 #: Heading error at which the roll command may reach its limit (rad).
-SATURATING_ERROR = 0.5
+SATURATING_ERROR = 0.35
 #: Natural frequency of the filter on the virtual rate command (rad/s), and its rate limit.
 RATE_FILTER = FilterParams(2.0, 10.0)
 
@@ -176,7 +176,8 @@ class AdaptiveState(NamedTuple):
     climb: SteeringState
     disturbance_dive: float  #: d_hat, turn rate that roll does not explain (rad/s)
     disturbance_climb: float
-    bank: float  #: smoothed regressor of the steering estimator
+    bank: float  #: smoothed regressors of the steering estimator
+    bend: float
     roll_rate: float  #: smoothed roll rate (rad/s)
     yaw_rate: float  #: smoothed yaw rate (rad/s)
     steady_s: float  #: time since the last turn-over (s)
@@ -224,6 +225,7 @@ def initial_adaptive(settings: AdaptiveSettings) -> AdaptiveState:
         (0.0, 0.0, 0.0, 0.0),
         settings.steering.initial_state(1.0),
         settings.steering.initial_state(-1.0),
+        0.0,
         0.0,
         0.0,
         0.0,
@@ -282,16 +284,18 @@ def learn_phase(state, measured, speed, params, dt):
     gliding = abs(measured.vertical_rate) > LEARN_VERTICAL_RATE and speed > LEARN_SPEED
     steady_s = state.steady_s + dt if gliding else 0.0
     share = dt / (params.steering.smoothing_s + dt) if steady_s > dt else 1.0
-    bank = state.bank + share * (math.sin(measured.phi) * ratio - state.bank)
+    sine = math.sin(measured.phi)
+    bank = state.bank + share * (sine * ratio - state.bank)
+    bend = state.bend + share * (sine * sine * sine * ratio - state.bend)
     roll_rate = state.roll_rate + share * (measured.phi_dot - state.roll_rate)
     yaw_rate = state.yaw_rate + share * (measured.psi_dot - state.yaw_rate)
     dive, climb = state.dive, state.climb
     if steady_s > params.steering.after_s:
         if measured.vertical_rate > 0.0:
-            dive = learn_steering(dive, bank, roll_rate, yaw_rate, params.steering, dt)
+            dive = learn_steering(dive, bank, bend, roll_rate, yaw_rate, params.steering, dt)
         else:
-            climb = learn_steering(climb, bank, roll_rate, yaw_rate, params.steering, dt)
-    return dive, climb, bank, roll_rate, yaw_rate, steady_s
+            climb = learn_steering(climb, bank, bend, roll_rate, yaw_rate, params.steering, dt)
+    return dive, climb, bank, bend, roll_rate, yaw_rate, steady_s
 
 
 @kernel
@@ -303,24 +307,24 @@ def bank_to_turn(steering, disturbance, measured, reference, speed, learning, pa
     """
     limit = math.sin(params.roll_limit)
     ratio = max(speed, LEARN_SPEED) / STEERING_SPEED
-    authority = effective_steering(steering, params.steering) * ratio
     # the heading that is left when the roll is gone, but for the roll of the turn asked for
-    turning = math.asin(min(limit, max(-limit, reference.psi_dot / authority)))
-    error = wrap_angle(reference.psi - measured.psi + steering.k * (measured.phi - turning))
+    turning, _ = roll_to_turn(steering, reference.psi_dot - steering.d, ratio, limit)
+    roll_left = measured.phi - math.asin(turning)
+    error = wrap_angle(reference.psi - measured.psi + steering.k * roll_left)
     psi_dot = measured.psi_dot - steering.k * measured.phi_dot
     # a vehicle that steers weakly is not asked for a bandwidth it does not have
-    share = min(1.0, abs(authority) * limit / (params.heading_kp * SATURATING_ERROR))
+    share = min(1.0, abs(steering.b) * ratio * limit / (params.heading_kp * SATURATING_ERROR))
     turn = (
         reference.psi_dot
         + share * params.heading_kp * error
         + share * params.heading_kd * (reference.psi_dot - psi_dot)
         - disturbance
     )
-    demand = turn / authority
-    if learning and abs(demand) < limit:
+    sine, most = roll_to_turn(steering, turn, ratio, limit)
+    if learning and abs(sine) < most:
         moved = disturbance - dt * share * share * params.heading_ki * error
         disturbance = min(DISTURBANCE_MAX, max(-DISTURBANCE_MAX, moved))
-    return math.asin(min(limit, max(-limit, demand))), disturbance
+    return math.asin(sine), disturbance
 
 
 @kernel
@@ -347,7 +351,7 @@ def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, 
     -------
     AdaptiveState, tau_p, tau_q
     """
-    dive, climb, bank, roll_rate, yaw_rate, steady_s = learn_phase(
+    dive, climb, bank, bend, roll_rate, yaw_rate, steady_s = learn_phase(
         state, measured, speed, params, dt
     )
     learning = steady_s > LEARN_AFTER_S
@@ -432,6 +436,7 @@ def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, 
         d_dive,
         d_climb,
         bank,
+        bend,
         roll_rate,
         yaw_rate,
         steady_s,

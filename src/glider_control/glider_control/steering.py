@@ -1,10 +1,14 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""How the vehicle steers, learnt in flight: yaw rate = b sin(phi) V / V_0 + k phi' + d.
+"""How the vehicle steers, learnt in flight: yaw rate = (b s + c s^3) V / V_0 + k phi' + d.
 
-Both the effectiveness b and its sign belong to vehicle and phase (Seaglider: -0.040 in the dive,
-+0.018 in the climb), so a Kalman filter estimates (b, k, d) for each phase from the measured yaw
-rate. It starts knowing nothing: the first turn that the path asks for tells the sign.
+s is sin(phi). Both the effectiveness b and its sign belong to vehicle and phase (Seaglider: -0.040
+in the dive, +0.018 in the climb), so a Kalman filter estimates (b, c, k, d) for each phase from
+the measured yaw rate. It starts knowing nothing: the first turn that the path asks for tells the
+sign.
+
+The bend c: steering fades, or grows, with roll. A vehicle that steers weakly turns fastest at some
+20 deg of roll and beyond 35 deg the other way; rolling it further is the way to lose it.
 
 The kick k: while the vehicle rolls, the roll mass makes more moment than gravity takes back, and
 on a pitched vehicle the excess turns the nose, by about (damping in roll / damping in yaw)
@@ -22,6 +26,12 @@ from glider_model.settings import Settings
 
 #: Speed through the water at which steering effectiveness is given (m/s).
 STEERING_SPEED = 0.5
+#: A vehicle that steers less is not steered at all (rad/s).
+SMALLEST_STEERING = 1e-6
+#: A standard deviation of this share of b is no doubt.
+SURE_SHARE = 0.3
+#: The vehicle rolls to this share of the roll at which it turns fastest.
+SHARE_OF_PEAK = 0.9
 
 
 class SteeringLearningSettings(Settings):
@@ -31,13 +41,16 @@ class SteeringLearningSettings(Settings):
         0.02, gt=0.0, le=1.0, description='b before anything is known, - in the climb (rad/s)'
     )
     prior_std_radps: float = Field(
-        0.05, gt=0.0, le=1.0, description='its standard deviation (rad/s)'
-    )
-    smallest_radps: float = Field(
-        0.003, gt=0.0, le=1.0, description='smallest b that is steered with (rad/s)'
+        0.02, gt=0.0, le=1.0, description='its standard deviation (rad/s)'
     )
     drift_radps: float = Field(
-        0.005, ge=0.0, le=0.1, description='change of b to be expected in 1000 s (rad/s)'
+        0.002, ge=0.0, le=0.1, description='change of b to be expected in 1000 s (rad/s)'
+    )
+    bend_std_radps: float = Field(
+        0.01, gt=0.0, le=1.0, description='standard deviation of c before it is known (rad/s)'
+    )
+    bend_drift_radps: float = Field(
+        0.001, ge=0.0, le=0.1, description='change of c to be expected in 1000 s (rad/s)'
     )
     kick_std: float = Field(
         0.3, ge=0.0, le=5.0, description='standard deviation of k before it is known (-)'
@@ -52,7 +65,7 @@ class SteeringLearningSettings(Settings):
         0.0003, ge=0.0, le=0.1, description='change of d to be expected in 1000 s (rad/s)'
     )
     noise_radps: float = Field(
-        0.002, gt=0.0, le=0.1, description='yaw rate that the model does not explain (rad/s)'
+        0.0004, gt=0.0, le=0.1, description='yaw rate that the model does not explain (rad/s)'
     )
     correlation_s: float = Field(
         60.0, gt=0.0, le=600.0, description='time over which that is one and the same error (s)'
@@ -70,8 +83,8 @@ class SteeringLearningSettings(Settings):
     def params(self) -> 'SteeringParams':
         """Kernel parameters."""
         return SteeringParams(
-            self.smallest_radps,
             self.drift_radps**2 / 1000.0,
+            self.bend_drift_radps**2 / 1000.0,
             self.kick_drift**2 / 1000.0,
             self.disturbance_drift_radps**2 / 1000.0,
             self.noise_radps**2 * self.correlation_s,
@@ -83,23 +96,23 @@ class SteeringLearningSettings(Settings):
         """Estimate before the first turn."""
         return SteeringState(
             sign * self.prior_radps,
-            sign,
             0.0,
             0.0,
-            self.prior_std_radps**2,
             0.0,
-            0.0,
-            self.kick_std**2,
-            0.0,
-            self.disturbance_std_radps**2,
+            (
+                *(self.prior_std_radps**2, 0.0, 0.0, 0.0),
+                *(self.bend_std_radps**2, 0.0, 0.0),
+                *(self.kick_std**2, 0.0),
+                self.disturbance_std_radps**2,
+            ),
         )
 
 
 class SteeringParams(NamedTuple):
     """Estimator as the kernels see it."""
 
-    smallest: float  #: (rad/s)
     drift: float  #: variance growth of b (rad^2/s^3)
+    bend_drift: float  #: variance growth of c (rad^2/s^3)
     kick_drift: float  #: variance growth of k (1/s)
     disturbance_drift: float  #: variance growth of d (rad^2/s^3)
     noise: float  #: spectral density of the yaw-rate noise (rad^2/s)
@@ -111,53 +124,84 @@ class SteeringState(NamedTuple):
     """Estimate and covariance for one phase."""
 
     b: float  #: effectiveness (rad/s)
-    sign: float  #: sign that is steered with; it changes when the other one is clear
+    c: float  #: how it bends with the cube of sin(roll) (rad/s)
     k: float  #: heading per roll angle while the vehicle rolls (-)
     d: float  #: turn-rate disturbance (rad/s)
-    p_bb: float  #: covariance
-    p_bk: float
-    p_bd: float
-    p_kk: float
-    p_kd: float
-    p_dd: float
+    p: tuple[float, float, float, float, float, float, float, float, float, float]
+    #: upper triangle of the covariance of (b, c, k, d), row by row
 
 
 @kernel
-def learn_steering(state, bank, roll_rate, yaw_rate, params, dt):
-    """One Kalman step of ``dt`` s on yaw_rate = b bank + k roll_rate + d.
+def learn_steering(state, bank, bend, roll_rate, yaw_rate, params, dt):
+    """One Kalman step of ``dt`` s on yaw_rate = b bank + c bend + k roll_rate + d.
 
     Parameters
     ----------
-    bank : float
-        sin(phi) V / V_0, smoothed as the rates are (-).
+    bank, bend : float
+        sin(phi) V / V_0 and sin(phi)^3 V / V_0, smoothed as the rates are (-).
     roll_rate, yaw_rate : float
         Measured and smoothed (rad/s).
     """
-    p_bb = state.p_bb + params.drift * dt
-    p_kk = state.p_kk + params.kick_drift * dt
-    p_dd = state.p_dd + params.disturbance_drift * dt
-    g_b = p_bb * bank + state.p_bk * roll_rate + state.p_bd
-    g_k = state.p_bk * bank + p_kk * roll_rate + state.p_kd
-    g_d = state.p_bd * bank + state.p_kd * roll_rate + p_dd
-    spread = g_b * bank + g_k * roll_rate + g_d + params.noise / dt
-    innovation = yaw_rate - state.b * bank - state.k * roll_rate - state.d
-    b = state.b + g_b / spread * innovation
-    sign = math.copysign(1.0, b) if abs(b) > 0.5 * params.smallest else state.sign
+    bb, bc, bk, bd, cc, ck, cd, kk, kd, dd = state.p
+    bb += params.drift * dt
+    cc += params.bend_drift * dt
+    kk += params.kick_drift * dt
+    dd += params.disturbance_drift * dt
+    g_b = bb * bank + bc * bend + bk * roll_rate + bd
+    g_c = bc * bank + cc * bend + ck * roll_rate + cd
+    g_k = bk * bank + ck * bend + kk * roll_rate + kd
+    g_d = bd * bank + cd * bend + kd * roll_rate + dd
+    spread = g_b * bank + g_c * bend + g_k * roll_rate + g_d + params.noise / dt
+    gain = (yaw_rate - state.b * bank - state.c * bend - state.k * roll_rate - state.d) / spread
     return SteeringState(
-        b,
-        sign,
-        state.k + g_k / spread * innovation,
-        state.d + g_d / spread * innovation,
-        p_bb - g_b * g_b / spread,
-        state.p_bk - g_b * g_k / spread,
-        state.p_bd - g_b * g_d / spread,
-        p_kk - g_k * g_k / spread,
-        state.p_kd - g_k * g_d / spread,
-        p_dd - g_d * g_d / spread,
+        state.b + g_b * gain,
+        state.c + g_c * gain,
+        state.k + g_k * gain,
+        state.d + g_d * gain,
+        (
+            bb - g_b * g_b / spread,
+            bc - g_b * g_c / spread,
+            bk - g_b * g_k / spread,
+            bd - g_b * g_d / spread,
+            cc - g_c * g_c / spread,
+            ck - g_c * g_k / spread,
+            cd - g_c * g_d / spread,
+            kk - g_k * g_k / spread,
+            kd - g_k * g_d / spread,
+            dd - g_d * g_d / spread,
+        ),
     )
 
 
 @kernel
-def effective_steering(state, params):
-    """Effectiveness to steer with (rad/s): never so small that a command would be unbounded."""
-    return state.sign * max(state.sign * state.b, params.smallest)
+def roll_to_turn(state, turn, ratio, limit):
+    """Sine of the roll that turns at ``turn``, and the largest sine that is of use.
+
+    The less is known of b, the more cautiously it is used: the roll is made for the share
+    b^2 / (b^2 + var b) of the turn, which minimises the expected squared error of the turn rate
+    (cautious control: Astrom and Wittenmark, Adaptive Control, 1995, chapter 7). A vehicle whose
+    sign is in doubt is hardly rolled; a deviation that leaves no doubt about it is no reason.
+    Where steering fades with roll, b s + c s^3 has a peak; beyond it a vehicle turns the less,
+    and at last the other way, the more it rolls.
+
+    Parameters
+    ----------
+    state : SteeringState
+    turn : float
+        Turn rate that roll shall make (rad/s).
+    ratio : float
+        V / V_0 (-).
+    limit : float
+        Largest sine of roll (-).
+    """
+    b, c = state.b, state.c
+    if b * c < 0.0:
+        limit = min(limit, SHARE_OF_PEAK * math.sqrt(-b / (3.0 * c)))
+    doubt = max(0.0, state.p[0] - SURE_SHARE * SURE_SHARE * b * b)
+    part = turn / ratio * b * b / (b * b + doubt)
+    sine = 0.0
+    if abs(b) > SMALLEST_STEERING:
+        for _ in range(4):
+            sine += (part - (b + c * sine * sine) * sine) / (b + 3.0 * c * sine * sine)
+            sine = min(limit, max(-limit, sine))
+    return sine, limit

@@ -158,7 +158,7 @@ def test_nose_low_makes_a_nose_up_moment_and_the_other_way_round():
 def test_roll_goes_to_the_side_that_turns_the_right_way(rate, sign):
     """Told that steering is reversed, the law rolls to the other side."""
     state = initial_adaptive(SETTINGS)
-    known = state.dive._replace(b=0.03 * sign, sign=sign)
+    known = state.dive._replace(b=0.03 * sign)
     state = state._replace(dive=known, climb=known)
     for _ in range(50):
         now = measured(vertical_rate=rate, theta=-0.5 if rate > 0.0 else 0.5)
@@ -169,7 +169,7 @@ def test_roll_goes_to_the_side_that_turns_the_right_way(rate, sign):
 
 def test_disturbance_estimate_is_bounded():
     state = initial_adaptive(SETTINGS)
-    state = state._replace(dive=state.dive._replace(b=0.5, sign=1.0))
+    state = state._replace(dive=state.dive._replace(b=0.5))
     for _ in range(20000):
         state, *_ = step(state, measured(psi=-0.3), reference())
     assert abs(state.disturbance_dive) == DISTURBANCE_MAX
