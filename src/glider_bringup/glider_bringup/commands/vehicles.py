@@ -78,3 +78,9 @@ def list_all(as_json: Json = False) -> None:
 def test() -> None:
     """Run all tests: each package's, then those of the whole system."""
     raise ConfigurationError('test: run it through the ./glider script of the workspace')
+
+
+@app.command(epilog='Example: ./glider bench --only compute --json')
+def bench() -> None:
+    """Measure how fast this machine flies, as ratios to floors measured in the same run."""
+    raise ConfigurationError('bench: run it through the ./glider script of the workspace')

@@ -1,0 +1,102 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider bench``: how fast the stack is, as ratios to floors measured in the same run.
+
+A section is a module of this folder with
+
+    measure(progress) -> dict     figures by name; None where one cannot be measured here
+    MEANING                       what each of them says, by name
+
+``progress(text)`` tells the person what is being measured. Names carry units and belong to one
+section only: ``--json`` prints all figures in one flat object.
+"""
+
+import importlib
+import json
+import os
+import platform
+import sys
+from enum import Enum
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from glider_bringup.console import EXIT_INTERRUPTED, Json, messages, output
+
+#: Modules of this folder, in the order in which they are measured.
+SECTIONS = ('compute', 'memory')
+
+Section = Enum('Section', {name: name for name in SECTIONS})
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+
+
+@app.command(
+    epilog='Example: ./glider bench --only compute --json',
+    context_settings={'help_option_names': ['-h', '--help']},
+)
+def bench(
+    only: Annotated[
+        list[Section] | None, typer.Option(help='Section; can be repeated. Default: all of them.')
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Measure how fast this machine flies.
+
+    Every time stands beside its ratio to a floor, which is measured in the same run: what the
+    same work costs without this stack. Use an idle machine.
+    """
+    figures = machine()
+    for name in dict.fromkeys(one.value for one in only or Section):
+        section = importlib.import_module(name)
+        with messages.status(name) as status:
+
+            def progress(text: str, name=name, status=status) -> None:
+                status.update(f'{name}: {text}')
+                if not messages.is_terminal:
+                    messages.print(f'{name}: {text}')
+
+            measured = section.measure(progress)
+        figures |= measured
+        if not as_json:
+            output.print(make_table(name, measured, section.MEANING))
+    if as_json:
+        print(json.dumps(figures))
+
+
+def machine() -> dict:
+    """What the figures were measured on."""
+    model = platform.processor() or platform.machine()
+    try:
+        with open('/proc/cpuinfo', encoding='utf-8') as file:
+            model = next(
+                line.partition(':')[2].strip() for line in file if line.startswith('model name')
+            )
+    except (OSError, StopIteration):
+        pass
+    return {
+        'processor': model,
+        'processors': len(os.sched_getaffinity(0)),
+        'load_average': os.getloadavg()[0],
+        'python': platform.python_version(),
+    }
+
+
+def make_table(title: str, figures: dict, meaning: dict[str, str]) -> Table:
+    """Figures of a section for a person."""
+    table = Table(title=title, title_justify='left', show_header=False)
+    table.add_column(justify='left')
+    table.add_column(justify='right')
+    for name, value in figures.items():
+        shown = f'{value:,.4g}' if isinstance(value, float) else '-' if value is None else value
+        table.add_row(name, str(shown), meaning[name])
+    return table
+
+
+if __name__ == '__main__':
+    try:
+        app(prog_name='./glider bench')
+    except KeyboardInterrupt:
+        messages.print('stopped by SIGINT', style='red')
+        sys.exit(EXIT_INTERRUPTED)

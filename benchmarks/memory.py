@@ -1,0 +1,52 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Memory of a direct run of 30 h, beside that of a Python that has only imported the stack."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+
+MEANING = {
+    'imported_rss_mb': 'resident memory with everything imported, the floor (MB)',
+    'mission_30h_peak_rss_mb': 'most resident memory of a direct run of 30 h with its score (MB)',
+    'mission_30h_rss_over_imported': 'ratio of the two',
+}
+
+_IMPORT = 'from glider_bringup import mission\n'
+_FLY = """
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from glider_bringup import mission
+from glider_bringup.scenario import load_scenario
+
+scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 108000.0})
+with TemporaryDirectory() as folder:
+    mission.fly_direct(scenario, Path(folder), False, lambda ticks, depth_m: None)
+"""
+#: VmHWM, and not ru_maxrss: a child starts with the largest that its parent ever was.
+_PEAK = """
+for line in open('/proc/self/status'):
+    if line.startswith('VmHWM'):
+        print(line.split()[1])
+"""
+
+
+def measure(progress: Callable[[str], None]) -> dict:
+    """Peak memory of processes of their own."""
+    progress('imports')
+    imported = _peak_mb(_IMPORT)
+    progress('30 h by the direct engine')
+    flown = _peak_mb(_FLY)
+    return {
+        'imported_rss_mb': imported,
+        'mission_30h_peak_rss_mb': flown,
+        'mission_30h_rss_over_imported': flown / imported,
+    }
+
+
+def _peak_mb(program: str) -> float:
+    """Most resident memory (MB) of a Python that runs ``program``."""
+    done = subprocess.run(
+        [sys.executable, '-c', program + _PEAK], stdout=subprocess.PIPE, check=True, text=True
+    )
+    return int(done.stdout) / 1024.0
