@@ -43,4 +43,4 @@ if not os.environ.get('NUMBA_CACHE_DIR'):
 
 #: Compiles a pure function. No fastmath: IEEE arithmetic in source order is what makes a run over
 #: topics and a direct run agree to the last bit.
-kernel = numba.njit(cache=True, error_model='numpy')
+kernel = numba.njit(cache=True, error_model='numpy', forceinline=True)
