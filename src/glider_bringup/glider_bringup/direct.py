@@ -13,7 +13,7 @@ import numpy as np
 
 from glider_control.control import ControlParams, ControlState, control_step
 from glider_guidance.guidance import GuidanceParams, GuidanceState, guidance_step
-from glider_model.current import CurrentParams, CurrentState, current_step
+from glider_model.current import CurrentParams, CurrentState, current_step_in_place
 from glider_model.frames import (
     odometry_from_wire,
     odometry_to_wire,
@@ -85,6 +85,7 @@ def fly(state, params, log, dt):
     Parameters
     ----------
     state : MissionState
+        Used up: the values of its current are changed where they lie.
     params : MissionParams
     log : float64[n, ROW]
         One row is filled for each tick.
@@ -106,7 +107,9 @@ def fly(state, params, log, dt):
         odometry = odometry_from_wire(odometry_wire)
         joints = plant_joints(plant)
         position = (odometry.p_n, odometry.p_e, odometry.p_d)
-        current, water = current_step(current, position, plant.tick * dt, params.current, dt)
+        current, water = current_step_in_place(
+            current, position, plant.tick * dt, params.current, dt
+        )
         water_wire = water_to_wire(water)
         guidance, guided = guidance_step(guidance, odometry, params.guidance, dt)
         reference_wire = reference_to_wire(guided.reference)
@@ -144,6 +147,8 @@ def fly_blocks(state: MissionState, params: MissionParams) -> Iterator[np.ndarra
         Log rows, n <= BLOCK_TICKS. The array is used again for the next block.
     """
     log = np.empty((BLOCK_TICKS, ROW))
+    current = CurrentState(state.current.tick, state.current.values.copy())
+    state = state._replace(current=current)
     finished = False
     while not finished:
         state, rows, finished = fly(state, params, log, TICK_S)

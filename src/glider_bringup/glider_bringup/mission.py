@@ -51,8 +51,8 @@ def planned_ticks(scenario: Scenario) -> int:
     """Ticks that a run of the scenario takes; an estimate where dives end it."""
     duration_s = scenario.duration_s
     if scenario.dives:
-        guidance = scenario.guidance_settings().params()
-        dives_s = mission_time_s(guidance.profile, guidance.polar, scenario.dives)
+        profile = scenario.guidance_settings().params().profile
+        dives_s = mission_time_s(profile, scenario.dives)
         duration_s = min(duration_s, dives_s + scenario.plant_settings().surface_s)
     return max(1, round(duration_s / TICK_S))
 

@@ -86,6 +86,13 @@ def test_blocks_are_those_of_one_long_flight(rough):
     assert np.array_equal(np.concatenate(blocks), rough)
 
 
+def test_flight_leaves_its_initial_state_as_it_was(rough):
+    state, params = mission('rough_water')
+    assert len(state.current.values) > 0
+    for _ in range(2):
+        assert np.array_equal(np.concatenate([b.copy() for b in fly_blocks(state, params)]), rough)
+
+
 def test_flight_lasts_as_many_ticks_as_asked(rough):
     assert len(rough) == round(SHALLOW['duration_s'] / TICK_S)
     assert np.all(np.isfinite(rough))

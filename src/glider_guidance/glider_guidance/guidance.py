@@ -192,11 +192,12 @@ class GuidanceSettings(GuidanceLawSettings):
     def params(self) -> 'GuidanceParams':
         """Kernel parameters."""
         vehicle = load_vehicle(self.vehicle).params()
+        polar = make_polar(vehicle)
         filters = self.filters
         return GuidanceParams(
             self.path.params(),
-            self.profile.params(self.dives, vehicle.m_b_rate),
-            make_polar(vehicle),
+            self.profile.params(self.dives, vehicle.m_b_rate, polar),
+            polar,
             self.los.method == 'observer',
             self.los.method == 'observer' and self.los.lead_turns,
             self.duration_s if self.duration_s > 0.0 else math.inf,
@@ -299,7 +300,7 @@ def _start(state, odometry, psi, theta, params):
     flat = not params.profile.follows_path
     s = path_closest(odometry.p_n, odometry.p_e, odometry.p_d, flat, params.path)
     pitch = -params.profile.pitch
-    rate = glide_vertical_rate(pitch, params.profile.net_heaviness, params.polar)
+    rate = params.profile.glide_rate
     stage = GLIDING_DOWN if params.profile.follows_path else SURFACE_PREPARATION
     return GuidanceState(
         state.tick,
@@ -357,12 +358,9 @@ def guidance_step(state, odometry, params, dt):
             GLIDING_DOWN, state.profile.ticks + 1, state.profile.dives, False, 0.0, 0.0
         )
     else:
-        glide_rate = glide_vertical_rate(
-            -params.profile.pitch, params.profile.net_heaviness, params.polar
-        )
-        profile = profile_step(state.profile, odometry.p_d, ground_d, glide_rate, params.profile)
+        profile = profile_step(state.profile, odometry.p_d, ground_d, params.profile)
     stage = profile.stage
-    pitch_target, rate_target = profile_targets(stage, ground_d, params.profile, params.polar)
+    pitch_target, rate_target = profile_targets(stage, ground_d, params.profile)
     if not follows_path:
         e3 = 0.0
 

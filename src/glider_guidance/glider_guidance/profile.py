@@ -70,14 +70,16 @@ class ProfileSettings(Settings):
         600.0, ge=0.0, le=864000.0, description='waiting on the surface between dives (s)'
     )
 
-    def params(self, dives: int, pump_rate_kgps: float) -> 'ProfileParams':
+    def params(self, dives: int, pump_rate_kgps: float, polar: Polar) -> 'ProfileParams':
         """Kernel parameters for so many dives (0: no end) with this pump: turns are led."""
+        pitch = math.radians(self.pitch_deg)
         return ProfileParams(
             self.mode == 'path',
             self.depth_m,
             min(self.top_depth_m, 0.5 * self.depth_m),
-            math.radians(self.pitch_deg),
+            pitch,
             self.net_heaviness_kg,
+            glide_vertical_rate(-pitch, self.net_heaviness_kg, polar),
             dives,
             self.surface_every_dives,
             round(self.prepare_s / TICK_S),
@@ -94,6 +96,7 @@ class ProfileParams(NamedTuple):
     top_depth: float  #: upper turn (m)
     pitch: float  #: magnitude (rad)
     net_heaviness: float  #: magnitude (kg)
+    glide_rate: float  #: vertical rate of the steady glide, by the polar, magnitude (m/s)
     dives: int  #: 0: no end
     surface_every: int  #: dives between waits on the surface; 0: after the last
     prepare_ticks: int
@@ -144,7 +147,7 @@ def _next_stage(state, depth, vertical_rate, params):
 
 
 @kernel
-def profile_step(state, depth, vertical_rate, glide_rate, params):
+def profile_step(state, depth, vertical_rate, params):
     """Advance the stage by one tick.
 
     Parameters
@@ -152,8 +155,6 @@ def profile_step(state, depth, vertical_rate, glide_rate, params):
     state : ProfileState
     depth, vertical_rate : float
         Measured (m, m/s, + down).
-    glide_rate : float
-        Vertical rate of the steady dive (m/s).
     params : ProfileParams
     """
     stage = _next_stage(state, depth, vertical_rate, params)
@@ -163,9 +164,9 @@ def profile_step(state, depth, vertical_rate, glide_rate, params):
         # pump's time to neutral, two thirds of which are lost
         took_s = 2.0 / 3.0 * state.ticks * TICK_S / (1.0 - PITCH_OVER * PITCH_OVER)
         took_s = min(LEAD_RANGE * params.lead_s, took_s)
-        if stage == INFLECTING_UP and vertical_rate > PITCH_OVER * glide_rate:
+        if stage == INFLECTING_UP and vertical_rate > PITCH_OVER * params.glide_rate:
             up_s = took_s
-        elif stage == INFLECTING_DOWN and vertical_rate < -PITCH_OVER * glide_rate:
+        elif stage == INFLECTING_DOWN and vertical_rate < -PITCH_OVER * params.glide_rate:
             down_s = took_s
         return ProfileState(stage, state.ticks + 1, state.dives, state.aborted, up_s, down_s)
     climbed = state.stage == GLIDING_UP and not state.aborted
@@ -201,7 +202,7 @@ def is_gliding(stage):
 
 
 @kernel
-def profile_targets(stage, vertical_rate, params, polar):
+def profile_targets(stage, vertical_rate, params):
     """Pitch (rad) and vertical rate (m/s, + down) that a stage asks for.
 
     In a turn the pump needs minutes, the pitch half a minute. Pitched over at once, a vehicle
@@ -209,7 +210,7 @@ def profile_targets(stage, vertical_rate, params, polar):
     to ``PITCH_OVER`` of the glide's. In preparation the nose is already turned down while the
     buoyancy keeps the vehicle up.
     """
-    rate = glide_vertical_rate(-params.pitch, params.net_heaviness, polar)
+    rate = params.glide_rate
     down = is_descending(stage)
     nose_down = down or stage == SURFACE_PREPARATION
     if stage == INFLECTING_UP:
@@ -219,10 +220,9 @@ def profile_targets(stage, vertical_rate, params, polar):
     return -params.pitch if nose_down else params.pitch, rate if down else -rate
 
 
-def mission_time_s(params: ProfileParams, polar: Polar, dives: int) -> float:
+def mission_time_s(params: ProfileParams, dives: int) -> float:
     """Estimated time (s) of so many dives, from surface preparation to surfacing."""
-    _, rate = profile_targets(GLIDING_DOWN, 0.0, params, polar)
-    legs = 2.0 * dives * params.depth / rate
+    legs = 2.0 * dives * params.depth / params.glide_rate
     return params.prepare_ticks * TICK_S + legs + 2.0 * dives * params.lead_s
 
 

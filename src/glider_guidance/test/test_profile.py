@@ -43,7 +43,7 @@ ROUND = [SURFACE_PREPARATION, GLIDING_DOWN, INFLECTING_UP, GLIDING_UP]
 
 def glide_rate(params):
     """Vertical rate of the steady dive (m/s)."""
-    return profile_targets(GLIDING_DOWN, 0.0, params, POLAR)[1]
+    return profile_targets(GLIDING_DOWN, 0.0, params)[1]
 
 
 class Point:
@@ -51,7 +51,7 @@ class Point:
 
     def __init__(self, dives=1, pump=PUMP, **fields):
         self.settings = ProfileSettings(**fields)
-        self.params = self.settings.params(dives, pump)
+        self.params = self.settings.params(dives, pump, POLAR)
         self.pump = pump
         self.state = INITIAL_PROFILE
         self.depth, self.rate = 0.0, 0.0
@@ -59,13 +59,9 @@ class Point:
         self.stages, self.depths = [self.state.stage], [0.0]
 
     def tick(self):
-        self.state = profile_step(
-            self.state, self.depth, self.rate, glide_rate(self.params), self.params
-        )
+        self.state = profile_step(self.state, self.depth, self.rate, self.params)
         full = self.settings.net_heaviness_kg
-        wanted = math.copysign(
-            full, profile_targets(self.state.stage, self.rate, self.params, POLAR)[1]
-        )
+        wanted = math.copysign(full, profile_targets(self.state.stage, self.rate, self.params)[1])
         step = self.pump * TICK_S
         self.net += min(step, max(-step, wanted - self.net))
         self.rate = math.copysign(
@@ -121,7 +117,7 @@ def test_lead_puts_the_upper_turn_on_the_top_depth():
 def test_second_turn_is_led_by_the_pump_as_it_is():
     """A pump at a third of its rate: 24 m too deep the first time, within 0.5 m after that."""
     point = Point(dives=0, pump=PUMP / 3.0, depth_m=300.0)
-    point.params = point.settings.params(0, PUMP)
+    point.params = point.settings.params(0, PUMP, POLAR)
     point.fly(12000.0)
     depths = np.array(point.depths)
     peaks = depths[1:-1][(depths[1:-1] > depths[:-2]) & (depths[1:-1] >= depths[2:])]
@@ -133,7 +129,7 @@ def test_second_turn_is_led_by_the_pump_as_it_is():
 @quick
 @given(st.floats(10.0, 1000.0), st.floats(2.0, 1000.0))
 def test_upper_turn_is_never_below_half_of_the_lower(depth_m, top_depth_m):
-    params = ProfileSettings(depth_m=depth_m, top_depth_m=top_depth_m).params(0, PUMP)
+    params = ProfileSettings(depth_m=depth_m, top_depth_m=top_depth_m).params(0, PUMP, POLAR)
     assert params.top_depth == min(top_depth_m, 0.5 * depth_m)
 
 
@@ -146,17 +142,17 @@ def test_preparation_lasts_as_long_as_asked():
 
 @pytest.mark.parametrize('stage', ALL_STAGES)
 def test_abort_leads_to_surfacing_from_every_stage(stage):
-    params = ProfileSettings().params(1, PUMP)
-    state = profile_step(ProfileState(stage, 100, 0, True, 0.0, 0.0), 200.0, 0.2, 0.27, params)
+    params = ProfileSettings().params(1, PUMP, POLAR)
+    state = profile_step(ProfileState(stage, 100, 0, True, 0.0, 0.0), 200.0, 0.2, params)
     assert state.stage == SURFACING
 
 
 @pytest.mark.parametrize('stage', ALL_STAGES)
 def test_abort_at_the_surface_stays_there(stage):
-    params = ProfileSettings(wait_s=0.0, prepare_s=0.0).params(5, PUMP)
+    params = ProfileSettings(wait_s=0.0, prepare_s=0.0).params(5, PUMP, POLAR)
     state = ProfileState(stage, 10**6, 0, True, 0.0, 0.0)
     for _ in range(100):
-        state = profile_step(state, 0.2, 0.0, 0.27, params)
+        state = profile_step(state, 0.2, 0.0, params)
     assert state.stage == WAITING_ON_SURFACE
 
 
@@ -171,15 +167,15 @@ def test_aborted_vehicle_comes_up_and_waits(after_s):
 
 @pytest.mark.parametrize('stage', [SURFACE_PREPARATION, GLIDING_UP, WAITING_ON_SURFACE, SURFACING])
 def test_stages_that_lead_up_ask_for_a_rate_upward(stage):
-    params = ProfileSettings().params(1, PUMP)
-    assert profile_targets(stage, 0.0, params, POLAR)[1] == -glide_rate(params)
+    params = ProfileSettings().params(1, PUMP, POLAR)
+    assert profile_targets(stage, 0.0, params)[1] == -glide_rate(params)
 
 
 @quick
 @given(st.sampled_from(ALL_STAGES), st.floats(-1.0, 1.0), st.floats(13.0, 60.0))
 def test_targets_are_always_the_glide_or_its_mirror_image(stage, vertical_rate, pitch_deg):
-    params = ProfileSettings(pitch_deg=pitch_deg).params(1, PUMP)
-    pitch, rate = profile_targets(stage, vertical_rate, params, POLAR)
+    params = ProfileSettings(pitch_deg=pitch_deg).params(1, PUMP, POLAR)
+    pitch, rate = profile_targets(stage, vertical_rate, params)
     assert abs(pitch) == math.radians(pitch_deg)
     assert abs(rate) == pytest.approx(glide_rate(params), rel=1e-12)
     assert (rate > 0.0) == is_descending(stage)
@@ -187,8 +183,8 @@ def test_targets_are_always_the_glide_or_its_mirror_image(stage, vertical_rate, 
 
 @pytest.mark.parametrize('stage', [GLIDING_DOWN, GLIDING_UP])
 def test_in_a_glide_the_nose_points_where_the_vehicle_goes(stage):
-    params = ProfileSettings().params(1, PUMP)
-    pitch, rate = profile_targets(stage, 0.0, params, POLAR)
+    params = ProfileSettings().params(1, PUMP, POLAR)
+    pitch, rate = profile_targets(stage, 0.0, params)
     assert pitch * rate < 0.0
     assert is_gliding(stage)
 
@@ -199,16 +195,16 @@ def test_in_a_glide_the_nose_points_where_the_vehicle_goes(stage):
 def test_pitch_goes_over_once_the_vertical_rate_has_halved(stage, sign, share):
     """The nose stays in the old direction until the rate is ``PITCH_OVER`` of the glide's."""
     assume(abs(share - PITCH_OVER) > 1e-9)
-    params = ProfileSettings().params(1, PUMP)
+    params = ProfileSettings().params(1, PUMP, POLAR)
     vertical_rate = sign * share * glide_rate(params)
-    pitch, _ = profile_targets(stage, vertical_rate, params, POLAR)
+    pitch, _ = profile_targets(stage, vertical_rate, params)
     old = share > PITCH_OVER
     assert math.copysign(1.0, pitch) == (-sign if old else sign)
 
 
 def test_nose_is_down_before_the_dive_begins():
-    params = ProfileSettings().params(1, PUMP)
-    assert profile_targets(SURFACE_PREPARATION, 0.0, params, POLAR)[0] < 0.0
+    params = ProfileSettings().params(1, PUMP, POLAR)
+    assert profile_targets(SURFACE_PREPARATION, 0.0, params)[0] < 0.0
 
 
 def test_pitch_goes_over_once_in_a_turn():
@@ -217,7 +213,7 @@ def test_pitch_goes_over_once_in_a_turn():
     while point.state.stage != GLIDING_UP:
         point.tick()
         if point.state.stage == INFLECTING_UP:
-            pitches.append(profile_targets(point.state.stage, point.rate, point.params, POLAR)[0])
+            pitches.append(profile_targets(point.state.stage, point.rate, point.params)[0])
             rates.append(point.rate)
     changes = [i for i in range(1, len(pitches)) if pitches[i] != pitches[i - 1]]
     assert len(changes) == 1
@@ -232,5 +228,5 @@ def test_estimated_time_is_that_of_the_flight(dives):
     while point.state.stage != WAITING_ON_SURFACE:
         point.tick()
         ticks += 1
-    estimate = mission_time_s(point.params, POLAR, dives)
+    estimate = mission_time_s(point.params, dives)
     assert estimate == pytest.approx(ticks * TICK_S, rel=0.05)

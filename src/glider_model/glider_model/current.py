@@ -85,21 +85,6 @@ def current_initial(params):
 
 
 @kernel
-def _advance(state, params, dt):
-    """Gauss-Markov values one step later; exact, so the statistics do not depend on dt."""
-    values = np.empty_like(state.values)
-    for i in range(len(params.kind)):
-        if params.kind[i] == _GAUSS_MARKOV:
-            keep = math.exp(-dt / params.numbers[i, 1])
-            fresh = params.numbers[i, 0] * math.sqrt(1.0 - keep * keep)
-            north, east = normal_pair(params.stream[i], state.tick + 1)
-            j = params.first[i]
-            values[j] = keep * state.values[j] + fresh * north
-            values[j + 1] = keep * state.values[j + 1] + fresh * east
-    return values
-
-
-@kernel
 def _profile(depth, table, first, last):
     """Velocity at ``depth`` by linear interpolation in rows [first, last), held at both ends."""
     if depth <= table[first, 0]:
@@ -155,7 +140,18 @@ def current_step(state, position, t_s, params, dt):
     water : Water
         Velocity of the water over ground at ``t_s`` (m/s, NED).
     """
+    fresh = CurrentState(state.tick, state.values.copy())
+    return current_step_in_place(fresh, position, t_s, params, dt)
+
+
+@kernel
+def current_step_in_place(state, position, t_s, params, dt):
+    """`current_step` for a loop that owns its state: the values are changed where they lie.
+
+    A loop over it allocates nothing and counts no references, which takes longer than the rest.
+    """
     depth = max(position[2], 0.0)
+    values = state.values
     v_n, v_e, v_d = 0.0, 0.0, 0.0
     for i in range(len(params.kind)):
         kind = params.kind[i]
@@ -183,15 +179,18 @@ def current_step(state, position, t_s, params, dt):
             v_n += along * numbers[0] + across * numbers[2]
             v_e += along * numbers[1] + across * numbers[3]
         elif kind == _GAUSS_MARKOV:
-            v_n += state.values[first]
-            v_e += state.values[first + 1]
+            v_n += values[first]
+            v_e += values[first + 1]
+            # exact for any dt, so that the statistics do not depend on it
+            keep = math.exp(-dt / numbers[1])
+            fresh = numbers[0] * math.sqrt(1.0 - keep * keep)
+            north, east = normal_pair(params.stream[i], state.tick + 1)
+            values[first] = keep * values[first] + fresh * north
+            values[first + 1] = keep * values[first + 1] + fresh * east
         elif kind == _STEPS:
             north, east = _latest_step(t_s, params.table, first, last)
             v_n += north
             v_e += east
-    values = state.values
-    if len(values) > 0:
-        values = _advance(state, params, dt)
     return CurrentState(state.tick + 1, values), Water(v_n, v_e, v_d)
 
 
