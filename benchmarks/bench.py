@@ -22,7 +22,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from glider_bringup.console import EXIT_INTERRUPTED, Json, messages, output
+from glider_bringup.console import EXIT_FAILED, EXIT_INTERRUPTED, Json, messages, output
 
 #: Modules of this folder, in the order in which they are measured.
 SECTIONS = ('compute', 'memory')
@@ -97,6 +97,9 @@ def make_table(title: str, figures: dict, meaning: dict[str, str]) -> Table:
 if __name__ == '__main__':
     try:
         app(prog_name='./glider bench')
+    except RuntimeError as error:
+        messages.print(str(error), style='red')
+        sys.exit(EXIT_FAILED)
     except KeyboardInterrupt:
         messages.print('stopped by SIGINT', style='red')
         sys.exit(EXIT_INTERRUPTED)
