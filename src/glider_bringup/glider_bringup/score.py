@@ -66,25 +66,25 @@ def _wire(log, row, start):
 
 @kernel
 def _extract(log, series):
-    """Fill ``series`` (float64[n, 9]) with what the score needs of ``log`` (float64[n, ROW])."""
+    """Fill ``series``, float64[_SERIES, n], from what the score needs of a ``log``."""
     for row in range(log.shape[0]):
         odometry = odometry_from_wire(_wire(log, row, _ODOM_START))
         reference = reference_from_wire(_wire(log, row, _REFERENCE_START))
         _, theta, psi = euler_from_quaternion(
             odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
         )
-        series[row, _DEPTH] = odometry.p_d
-        series[row, _E2] = log[row, _E2_COLUMN]
-        series[row, _PITCH] = theta
-        series[row, _PITCH_REF] = reference.theta
-        series[row, _HEADING] = psi
-        series[row, _RATE_REF] = reference.v_d
-        series[row, _TARGET_N] = reference.p_n
-        series[row, _TARGET_E] = reference.p_e
-        series[row, _INFEASIBLE] = log[row, _INFEASIBLE_COLUMN]
-        series[row, _NET_HEAVINESS] = log[row, _JOINTS_START]
-        series[row, _PITCH_MASS] = log[row, _JOINTS_START + 1]
-        series[row, _ROLL_MASS] = log[row, _JOINTS_START + 2]
+        series[_DEPTH, row] = odometry.p_d
+        series[_E2, row] = log[row, _E2_COLUMN]
+        series[_PITCH, row] = theta
+        series[_PITCH_REF, row] = reference.theta
+        series[_HEADING, row] = psi
+        series[_RATE_REF, row] = reference.v_d
+        series[_TARGET_N, row] = reference.p_n
+        series[_TARGET_E, row] = reference.p_e
+        series[_INFEASIBLE, row] = log[row, _INFEASIBLE_COLUMN]
+        series[_NET_HEAVINESS, row] = log[row, _JOINTS_START]
+        series[_PITCH_MASS, row] = log[row, _JOINTS_START + 1]
+        series[_ROLL_MASS, row] = log[row, _JOINTS_START + 2]
 
 
 @kernel
@@ -133,7 +133,7 @@ class Scorer:
             log = log.copy()
             self._offsets.append(np.empty((len(log), 2)))
             _to_truth(log, self.ticks, self._sensors, self._offsets[-1])
-        series = np.empty((len(log), _SERIES))
+        series = np.empty((_SERIES, len(log)))
         _extract(log, series)
         self._blocks.append(series)
         self._last = log[-1].copy()
@@ -141,7 +141,7 @@ class Scorer:
     @property
     def ticks(self) -> int:
         """Ticks taken in."""
-        return sum(len(block) for block in self._blocks)
+        return sum(block.shape[1] for block in self._blocks)
 
     def result(self, settle_s: float, target_depth_m: float) -> dict:
         """Scores of everything taken in.
@@ -161,23 +161,23 @@ class Scorer:
             ``infeasible``.
             A figure without data is None.
         """
-        series = np.concatenate(self._blocks) if self._blocks else np.empty((0, _SERIES))
-        ticks = len(series)
-        descending = series[:, _RATE_REF] > 0.0
-        steady, scored = windows(series[:, _DEPTH], descending, settle_s, TICK_S)
-        e2 = series[:, _E2]
+        series = np.concatenate(self._blocks or [np.empty((_SERIES, 0))], axis=1)
+        ticks = series.shape[1]
+        descending = series[_RATE_REF] > 0.0
+        steady, scored = windows(series[_DEPTH], descending, settle_s, TICK_S)
+        e2 = series[_E2]
         if self._offsets:
-            target = series[:, [_TARGET_N, _TARGET_E]]
+            target = series[[_TARGET_N, _TARGET_E]].T
             e2 = e2 + _across(np.concatenate(self._offsets), target)
-        pitch_error = np.degrees(series[:, _PITCH] - series[:, _PITCH_REF])
-        heading = _heading_fluctuation_deg(series[:, _HEADING])
+        pitch_error = np.degrees(series[_PITCH] - series[_PITCH_REF])
+        heading = _heading_fluctuation_deg(series[_HEADING])
         whole = steady & _has_whole_mean(ticks)
-        deepest = float(np.max(series[:, _DEPTH])) if ticks else None
+        deepest = float(np.max(series[_DEPTH])) if ticks else None
         return {
             'ticks': ticks,
             'sim_time_s': _round(ticks * TICK_S),
-            'dives': _count_dives(series[:, _DEPTH]),
-            'distance_along_path_m': _length(series[:, _TARGET_N], series[:, _TARGET_E]),
+            'dives': _count_dives(series[_DEPTH]),
+            'distance_along_path_m': _length(series[_TARGET_N], series[_TARGET_E]),
             'cross_track_m': {
                 'rms_steady': _rms(e2[steady]),
                 'max_steady': _largest(e2[steady]),
@@ -196,13 +196,13 @@ class Scorer:
                 'overshoot': None if deepest is None else max(0.0, deepest - target_depth_m),
             },
             'actuator_travel': {
-                'buoyancy_engine_kg': _travel(series[:, _NET_HEAVINESS]),
-                'pitch_mass_m': _travel(series[:, _PITCH_MASS]),
-                'roll_mass_deg': math.degrees(_travel(series[:, _ROLL_MASS])),
+                'buoyancy_engine_kg': _travel(series[_NET_HEAVINESS]),
+                'pitch_mass_m': _travel(series[_PITCH_MASS]),
+                'roll_mass_deg': math.degrees(_travel(series[_ROLL_MASS])),
             },
             'final_state': self._final_state(),
             'infeasible': bool(
-                scored.any() and np.mean(series[scored, _INFEASIBLE]) >= INFEASIBLE_SHARE
+                scored.any() and np.mean(series[_INFEASIBLE, scored]) >= INFEASIBLE_SHARE
             ),
         }
 
