@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Direct engine: the same bits however it is run, and the symmetries of the world."""
 
+import json
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -91,6 +94,39 @@ def test_flight_leaves_its_initial_state_as_it_was(rough):
     assert len(state.current.values) > 0
     for _ in range(2):
         assert np.array_equal(np.concatenate([b.copy() for b in fly_blocks(state, params)]), rough)
+
+
+#: Flies missions one after another and prints a digest of each one's log.
+BATCH = """
+import hashlib, json, sys
+from glider_bringup.direct import fly_blocks
+from glider_bringup.mission import mission_of
+from glider_bringup.scenario import load_scenario
+digests = {}
+for name in sys.argv[2:]:
+    log = hashlib.sha256()
+    for block in fly_blocks(*mission_of(load_scenario(name, json.loads(sys.argv[1])))):
+        log.update(block.tobytes())
+    digests[name] = log.hexdigest()
+print(json.dumps(digests))
+"""
+
+
+def test_one_mission_is_the_same_bits_as_in_a_batch_in_any_process():
+    batches = [
+        ('rough_water', 'noisy_sensors', 'spline'),
+        ('spline', 'noisy_sensors', 'rough_water'),
+        ('rough_water',),
+    ]
+    command = [sys.executable, '-c', BATCH, json.dumps(SHALLOW)]
+    processes = [
+        subprocess.Popen([*command, *names], stdout=subprocess.PIPE, text=True)
+        for names in batches
+    ]
+    printed = [json.loads(process.communicate(timeout=300)[0]) for process in processes]
+    assert len(set(printed[0].values())) == 3
+    assert printed[0] == printed[1]
+    assert printed[2]['rough_water'] == printed[0]['rough_water']
 
 
 def test_flight_lasts_as_many_ticks_as_asked(rough):
