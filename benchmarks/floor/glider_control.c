@@ -316,12 +316,12 @@ static inline ControlOutput control_step(
     Joints last = first ? *joints : state->command;
     const AllocationParams *limits = &params->allocation;
     Measured measured = measure(state->measured, odometry, first, params->attitude_s, dt);
-    double speed = glide_speed(measured.theta, measured.vertical_rate, &params->polar);
+    double alpha;
+    double speed = glide_speed(measured.theta, measured.vertical_rate, &params->polar, &alpha);
 
-    double steep = steepen(measured.theta);
     Moments tau = adaptive_step(
-        &state->adaptive, &measured, reference, speed, glide_alpha(steep, &params->polar),
-        joints->m_b, moments(joints->x_p, joints->mu, measured.phi, measured.theta, limits),
+        &state->adaptive, &measured, reference, speed, alpha, joints->m_b,
+        moments(joints->x_p, joints->mu, measured.phi, measured.theta, limits),
         fabs(last.mu) >= limits->mu_max, fabs(last.x_p) >= limits->x_p_max,
         &params->adaptive, dt);
     double m_b

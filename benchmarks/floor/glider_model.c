@@ -184,11 +184,13 @@ static inline Filtered filter_angle(
 
 static inline double glide_alpha(double theta, const Polar *polar)
 {
+    double drag = polar->K_D0 / polar->K_D, offset = polar->K_L0 / polar->K_D;
+    double lift = 0.5 * polar->K_L / polar->K_D;
     double alpha = 0.0;
     for (int i = 0; i < 4; i++) {
         double slope = tan(theta - alpha);
-        double half = 0.5 * polar->K_L * slope / polar->K_D;
-        double root = half * half - (polar->K_D0 + polar->K_L0 * slope) / polar->K_D;
+        double half = lift * slope;
+        double root = half * half - (drag + offset * slope);
         alpha = -half;
         if (root > 0.0)
             alpha += half > 0.0 ? sqrt(root) : -sqrt(root);
@@ -228,10 +230,13 @@ static inline double glide_horizontal_speed(
     return fabs(vertical_rate / tan(steep - glide_alpha(steep, polar)));
 }
 
-static inline double glide_speed(double theta, double vertical_rate, const Polar *polar)
+/* Returns the speed; the angle of attack goes to alpha. */
+static inline double glide_speed(
+    double theta, double vertical_rate, const Polar *polar, double *alpha)
 {
     double steep = steepen(theta);
-    return fabs(vertical_rate / sin(steep - glide_alpha(steep, polar)));
+    *alpha = glide_alpha(steep, polar);
+    return fabs(vertical_rate / sin(steep - *alpha));
 }
 
 /* --------------------------------------------------------------------------------- current */
@@ -463,8 +468,10 @@ static inline Force acceleration(
     if (motion->p_d < vehicle->hull_radius)
         weight += (vehicle->m * GRAVITY * emerged_fraction(motion->p_d, vehicle->hull_radius))
             - surface_damping(motion, vehicle);
-    Vector a = rotate_to_body(
-        q_w, q_x, q_y, q_z, water_rate->v_n, water_rate->v_e, water_rate->v_d);
+    Vector a = {0.0, 0.0, 0.0};
+    if (water_rate->v_n != 0.0 || water_rate->v_e != 0.0 || water_rate->v_d != 0.0)
+        a = rotate_to_body(
+            q_w, q_x, q_y, q_z, water_rate->v_n, water_rate->v_e, water_rate->v_d);
     double m = vehicle->m;
     return solve_mass(
         h.f_x - c.f_x + weight * k_x - m * a.x,

@@ -37,14 +37,7 @@ from glider_control.pid import (
 )
 from glider_model.command_filter import Filtered, FilterParams
 from glider_model.kernel import kernel
-from glider_model.polar import (
-    Polar,
-    glide_alpha,
-    glide_net_heaviness,
-    glide_speed,
-    make_polar,
-    steepen,
-)
+from glider_model.polar import Polar, glide_net_heaviness, glide_speed, make_polar
 from glider_model.rigid_body import GRAVITY
 from glider_model.settings import Settings
 from glider_model.signals import Adaptation, Joints, Wrench
@@ -232,19 +225,18 @@ def control_step(state, odometry, joints, reference, params, dt):
     last = joints if first else state.command
     limits = params.allocation
     measured = measure(state.measured, odometry, first, params.attitude_s, dt)
-    speed = glide_speed(measured.theta, measured.vertical_rate, params.polar)
+    speed, alpha = glide_speed(measured.theta, measured.vertical_rate, params.polar)
 
     held = (abs(last.mu) >= limits.mu_max, abs(last.x_p) >= limits.x_p_max)
     adaptive, pid = state.adaptive, state.pid
     learnt = Adaptation(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if params.adapts:
-        steep = steepen(measured.theta)
         adaptive, tau_p, tau_q = adaptive_step(
             adaptive,
             measured,
             reference,
             speed,
-            glide_alpha(steep, params.polar),
+            alpha,
             joints.m_b,
             moments(joints.x_p, joints.mu, measured.phi, measured.theta, limits),
             held,

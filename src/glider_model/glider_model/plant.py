@@ -162,9 +162,11 @@ def acceleration(motion, m_b, inertia, water_rate, vehicle, water):
         weight += (
             vehicle.m * GRAVITY * emerged_fraction(motion.p_d, vehicle.hull_radius)
         ) - _surface_damping(motion, vehicle)
-    a_x, a_y, a_z = rotate_to_body(
-        q_w, q_x, q_y, q_z, water_rate.v_n, water_rate.v_e, water_rate.v_d
-    )
+    a_x, a_y, a_z = 0.0, 0.0, 0.0
+    if water_rate.v_n != 0.0 or water_rate.v_e != 0.0 or water_rate.v_d != 0.0:
+        a_x, a_y, a_z = rotate_to_body(
+            q_w, q_x, q_y, q_z, water_rate.v_n, water_rate.v_e, water_rate.v_d
+        )
     m = vehicle.m
     return solve_mass(
         h_x - c_x + weight * k_x - m * a_x,

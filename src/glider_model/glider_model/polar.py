@@ -46,11 +46,13 @@ def glide_alpha(theta, polar):
     Lift and drag balance a vertical weight: K_D0 + K_D a^2 + (K_L0 + K_L a) tan(theta - a) = 0.
     Shallower than the polar allows, the angle of the best glide is given, 15 deg at most.
     """
+    drag, offset = polar.K_D0 / polar.K_D, polar.K_L0 / polar.K_D
+    lift = 0.5 * polar.K_L / polar.K_D
     alpha = 0.0
     for _ in range(4):
         slope = math.tan(theta - alpha)
-        half = 0.5 * polar.K_L * slope / polar.K_D
-        root = half * half - (polar.K_D0 + polar.K_L0 * slope) / polar.K_D
+        half = lift * slope
+        root = half * half - (drag + offset * slope)
         alpha = -half
         if root > 0.0:
             alpha += math.sqrt(root) if half > 0.0 else -math.sqrt(root)
@@ -102,6 +104,7 @@ def glide_horizontal_speed(theta, vertical_rate, polar):
 
 @kernel
 def glide_speed(theta, vertical_rate, polar):
-    """Speed through the water (m/s) from pitch (rad) and vertical rate (m/s)."""
+    """Speed through the water (m/s) and angle of attack (rad) from pitch and vertical rate."""
     steep = steepen(theta)
-    return abs(vertical_rate / math.sin(steep - glide_alpha(steep, polar)))
+    alpha = glide_alpha(steep, polar)
+    return abs(vertical_rate / math.sin(steep - alpha)), alpha
