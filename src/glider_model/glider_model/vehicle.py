@@ -3,7 +3,7 @@
 """Vehicles: a validated YAML file, every number with unit and source, to kernel parameters."""
 
 import math
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
@@ -318,4 +318,11 @@ def load_vehicle(name: str) -> Vehicle:
         Naming file, field, value and allowed range.
     """
     path = vehicle_path(name)
+    status = path.stat()
+    return _read_vehicle(path, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=16)
+def _read_vehicle(path: Path, mtime_ns: int, size: int) -> Vehicle:
+    """Vehicle of a file in this version: every block of a mission asks for it."""
     return validate(Vehicle, read_yaml(path), str(path))
