@@ -14,7 +14,7 @@ from collections.abc import Callable
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from floor import Floor, compare, compiler, ticks_compared
+from floor import Floor, compare, compiler, compiler_version, ticks_compared
 
 from glider_bringup.direct import COLUMNS, fly_blocks
 from glider_bringup.mission import mission_of
@@ -34,6 +34,7 @@ REPEATS = 5
 MEANING = {
     'compile_s': 'compiling all kernels, once after a change of the sources (s)',
     'load_s': 'loading them compiled, once in each process (s)',
+    'c_compiler': 'what makes the floor (cc); without one there is nothing to compare with',
     'mission_30h_s': 'mission of 30 h, 1 080 000 ticks (s)',
     'mission_30h_floor_s': 'the same mission in C (s)',
     'mission_over_c': 'their ratio',
@@ -58,7 +59,7 @@ def measure(progress: Callable[[str], None]) -> dict:
     with TemporaryDirectory() as empty:
         compilation = {'compile_s': _warm_up_s(empty), 'load_s': _warm_up_s(empty)}
     floor = Floor(*mission_of(load_mission())) if compiler() else None
-    progress('comparing engine and C' if floor else 'no C compiler (cc): no floor')
+    progress('comparing engine and C')
     compared = ticks_compared(floor, *mission_of(load_mission(**SHALLOW))) if floor else None
     progress('plant')
     plant_s, plant_floor_s = _plant_s(floor)
@@ -69,6 +70,7 @@ def measure(progress: Callable[[str], None]) -> dict:
     mission_s, score_s, mission_floor_s = map(_least, zip(*missions, strict=True))
     return {
         **compilation,
+        'c_compiler': compiler_version(),
         'mission_30h_s': mission_s,
         'mission_30h_floor_s': mission_floor_s,
         'mission_over_c': _ratio(mission_s, mission_floor_s),

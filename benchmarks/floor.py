@@ -57,6 +57,14 @@ def compiler() -> str | None:
     return shutil.which('cc')
 
 
+def compiler_version() -> str | None:
+    """What the C compiler says it is, if there is one."""
+    if not compiler():
+        return None
+    done = subprocess.run([compiler(), '--version'], capture_output=True, text=True)
+    return done.stdout.partition('\n')[0]
+
+
 class Structs:
     """C structs of the NamedTuples that are met."""
 
