@@ -25,7 +25,7 @@ from glider_model import command_filter, frames, plant, polar, rigid_body, signa
 SOURCES = Path(__file__).parent / 'floor'
 #: As fast as IEEE arithmetic in source order allows: no -ffast-math, no fused multiply-add. With
 #: -fno-math-errno gcc would put another formula in the place of sin(atan(x)).
-FLAGS = ['-std=c99', '-O3', '-march=native', '-finline-limit=100000', '-ffp-contract=off']
+FLAGS = ['-std=c99', '-O3', '-march=native', '-ffp-contract=off']
 
 _MODULES = (
     *(signals, frames, command_filter, polar, rigid_body, plant),

@@ -13,6 +13,9 @@
 #include <stdint.h>
 #include <string.h>
 
+/* As the kernels are. */
+#define inline inline __attribute__((always_inline))
+
 #include "names.h"
 
 #include "glider_model.c"
