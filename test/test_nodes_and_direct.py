@@ -4,11 +4,15 @@
 
 import hashlib
 import json
+import sys
 from pathlib import Path
 
 import pytest
+import yaml
 from mcap.reader import make_reader
 
+from glider_bringup.mission import PARAMETERS_FILE
+from glider_bringup.runner import MODULES, node_commands, run_nodes
 from glider_model.ros.messages import TOPICS
 from glider_model.signals import TICK_S
 
@@ -16,6 +20,18 @@ PER_TICK = [topic.full_name('/glider') for topic in TOPICS.values() if topic.per
 
 #: What tells how a result came about, not what it is.
 HOW = {'engine', 'wall_time_s', 'real_time_factor', 'messages_recorded'}
+
+#: Runs the module that is named with the internals of rclpy hidden from ours, and only from ours.
+WITHOUT_INTERNALS = """
+import runpy, sys
+import rclpy.executors, rclpy.node
+name = 'rclpy.impl.implementation_singleton'
+internals, sys.modules[name] = sys.modules[name], None
+from glider_model.ros import executor
+sys.modules[name] = internals
+assert not executor.can_take() and not executor.can_wait()
+runpy.run_module(sys.argv.pop(1), run_name='__main__', alter_sys=True)
+"""
 
 
 def digests(folder: Path) -> dict[str, tuple[int, str]]:
@@ -61,3 +77,28 @@ def test_score_from_the_bag_is_the_score_of_the_run(glider, request, flight):
     done = glider('score', recorded.folder, '--json')
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == recorded.card
+
+
+def test_payloads_are_the_same_without_the_internals_of_rclpy(glider, over_nodes, tmp_path):
+    done = glider(
+        *('run', over_nodes.folder / 'scenario.yaml', '--engine', 'direct', '--bag'),
+        *('--duration', 100, '--out', tmp_path / 'direct'),
+    )
+    assert done.returncode == 0, done.stderr
+    public = tmp_path / 'public'
+    public.mkdir()
+    parameters = yaml.safe_load((over_nodes.folder / PARAMETERS_FILE).read_text())
+    parameters['/glider/plant_node']['ros__parameters']['duration_s'] = 100.0
+    parameters['/glider/guidance_node']['ros__parameters']['duration_s'] = 100.0
+    parameters['/glider/recorder_node']['ros__parameters']['folder'] = str(public)
+    (public / PARAMETERS_FILE).write_text(yaml.safe_dump(parameters))
+    commands = {
+        name: [sys.executable, '-c', WITHOUT_INTERNALS, MODULES[name], *command[3:]]
+        for name, command in node_commands(public / PARAMETERS_FILE).items()
+    }
+    result = run_nodes(commands, public / 'log.txt')
+    assert (result.status, result.reason) == ('completed', '')
+    assert result.progress['lost'] == 0
+    flown = digests(public)
+    assert flown == digests(tmp_path / 'direct')
+    assert all(count == 1000 for count, _ in flown.values())

@@ -61,6 +61,17 @@ def node_commands(params_file: Path, namespace: str = '/glider') -> dict[str, li
     return {name: [sys.executable, '-m', module, *ros] for name, module in MODULES.items()}
 
 
+def node_environment(domain: int) -> dict[str, str]:
+    """Environment of every node of a run in a ROS domain."""
+    return {
+        **os.environ,
+        'ROS_DOMAIN_ID': str(domain),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        'RCUTILS_COLORIZED_OUTPUT': '0',
+        'PYTHONUNBUFFERED': '1',
+    }
+
+
 @contextmanager
 def domain_id() -> Iterator[int]:
     """ROS domain of a run: $ROS_DOMAIN_ID, or one that no other run on this machine uses.
@@ -306,20 +317,13 @@ def run_nodes(
         No process is left when it comes back. SIGINT and SIGTERM to this process abort the run.
     """
     with domain_id() as domain, log_file.open('w', encoding='utf-8') as log:
-        environment = {
-            **os.environ,
-            'ROS_DOMAIN_ID': str(domain),
-            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-            'RCUTILS_COLORIZED_OUTPUT': '0',
-            'PYTHONUNBUFFERED': '1',
-        }
 
         def tell(line: str) -> None:
             log.write(line + '\n')
             log.flush()
             on_log(line)
 
-        run = _Run(commands, environment, on_progress, tell)
+        run = _Run(commands, node_environment(domain), on_progress, tell)
         with _signals(run):
             try:
                 status, culprit = run.watch()

@@ -16,8 +16,9 @@ from std_srvs.srv import SetBool
 
 from glider_model.ros import health
 from glider_model.ros.clock import ClockNode
+from glider_model.ros.executor import make_executor
 from glider_model.ros.messages import CONTROL, CURRENT, GUIDANCE, PLANT, TOPICS
-from glider_model.ros.tick import BlockNode, Stop, TickExecutor
+from glider_model.ros.tick import BlockNode, Stop
 from glider_model.signals import TICK_NS
 
 TIMEOUT_S = 30.0
@@ -108,7 +109,7 @@ class Graph:
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         shared = {'context': context, 'namespace': '/glider', 'use_global_arguments': False}
         common = [p for p in overrides if p.name != 'speed']
-        self.executor = TickExecutor(context=context)
+        self.executor = make_executor(context=context)
         self.blocks = {
             name: Block(
                 name,

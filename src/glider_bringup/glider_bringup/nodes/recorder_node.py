@@ -16,9 +16,10 @@ from glider_bringup.ros.bag import BagWriter
 from glider_bringup.tick_order import TickOrder
 from glider_model.ros import health, messages, qos
 from glider_model.ros.codec import to_cdr
-from glider_model.ros.messages import TOPICS
+from glider_model.ros.executor import take
+from glider_model.ros.messages import TOPICS, Topic
 from glider_model.ros.parameters import declare_settings
-from glider_model.ros.tick import FAREWELL_S, Input, Stop, TickNode, run, take
+from glider_model.ros.tick import FAREWELL_S, Input, Stop, TickNode, run
 from glider_model.settings import ConfigurationError, Settings
 from glider_model.signals import TICK_NS
 
@@ -72,7 +73,9 @@ class RecorderNode(TickNode):
         """Subscribe without waiting for messages: `drain` takes them all."""
         item = Input(TOPICS[name])
         profile = None if self.ticks.lockstep else qos.EVERYTHING
-        item.subscription = self._subscription(item.topic, lambda raw: None, profile=profile)
+        item.subscription = self._subscription(
+            item.topic, lambda raw: self.keep(item.topic, raw), profile=profile
+        )
         self.inputs.append(item)
         return item
 
@@ -107,12 +110,15 @@ class RecorderNode(TickNode):
             self.over_since_s = time.monotonic()
             self.final_ns = report.stamp_ns if report.phase == health.FINISHED else -1
 
+    def keep(self, topic: Topic, raw: bytes) -> None:
+        """Keep a message until its tick is complete."""
+        self.order.add(topic.name, topic.codec.decode_stamp(raw), raw)
+
     def drain(self) -> None:
         """Take and write whatever has come; end when the run is over and all of it is here."""
         for item in self.inputs:
-            name, stamp_of = item.topic.name, item.topic.codec.decode_stamp
             while (raw := take(item.subscription)) is not None:
-                self.order.add(name, stamp_of(raw), raw)
+                self.keep(item.topic, raw)
         while (array := take(self._events_in)) is not None:
             self._on_event(array)
         if not self.ticks.lockstep:

@@ -58,11 +58,11 @@ class ControlNode(BlockNode):
             self.params,
             TICK_S,
         )
-        self.publish_wrench(stamp_ns, wrench_to_wire(out.wrench))
-        self.publish_adaptation(stamp_ns, out.adaptation)
         if out.saturation != self.told and stamp_ns - self.told_ns >= TELL_EVERY_NS:
             self.tell(stamp_ns, out.saturation)
         self.publish_command(stamp_ns, out.command)
+        self.publish_wrench(stamp_ns, wrench_to_wire(out.wrench))
+        self.publish_adaptation(stamp_ns, out.adaptation)
 
     def tell(self, stamp_ns: int, saturation: int) -> None:
         """Put a change of saturation on /diagnostics."""

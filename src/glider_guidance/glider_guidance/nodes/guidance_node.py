@@ -57,11 +57,11 @@ class GuidanceNode(BlockNode):
         """Answer one tick."""
         odometry = odometry_from_wire(odom)
         self.state, out = guidance_step(self.state, odometry, self.params, TICK_S)
-        self.publish_error(stamp_ns, out.error)
-        self.publish_estimate(stamp_ns, water_to_wire(out.current))
         if (out.stage, out.infeasible) != self.told:
             self.tell(stamp_ns, out.stage, out.infeasible)
         self.publish_reference(stamp_ns, reference_to_wire(out.reference))
+        self.publish_error(stamp_ns, out.error)
+        self.publish_estimate(stamp_ns, water_to_wire(out.current))
 
     def tell(self, stamp_ns: int, stage: int, infeasible: bool) -> None:
         """Put a change of stage or feasibility on /diagnostics."""

@@ -48,9 +48,9 @@ class PlantNode(ClockNode):
     def publish_tick(self, stamp_ns: int) -> None:
         """Publish the state of the vehicle."""
         self.publish_clock(stamp_ns)
-        self.publish_joints(stamp_ns, plant_joints(self.state))
         measured = plant_measurement(self.state, self.params)
         self.publish_odom(stamp_ns, odometry_to_wire(measured))
+        self.publish_joints(stamp_ns, plant_joints(self.state))
 
     def complete_tick(self, command, current_velocity) -> bool:
         """Integrate to the next tick; False at the end of the run."""

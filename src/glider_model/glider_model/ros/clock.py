@@ -13,6 +13,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from glider_model.ros import health, messages
+from glider_model.ros.executor import take
 from glider_model.ros.health import Report
 from glider_model.ros.messages import TOPICS
 from glider_model.ros.tick import (
@@ -22,7 +23,6 @@ from glider_model.ros.tick import (
     TickNode,
     TickSettings,
     seconds,
-    take,
 )
 from glider_model.signals import TICK_NS, TICK_S
 

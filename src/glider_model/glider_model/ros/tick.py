@@ -5,12 +5,9 @@
 The header stamp is the identity of a tick. In lockstep a node acts on a tick once every input
 carries that tick's stamp, so there is no timer in the loop, nothing drifts, and a run gives the
 same result every time. Free-running nodes act at 10 Hz on the newest inputs and watch their age.
-
-The executor of rclpy pays for every entity that it waits for and for every message it dispatches.
-A node therefore waits for one input only, the one that comes last in a tick (`Gate`), and takes
-the others by hand when that one is there.
 """
 
+import gc
 import signal
 import sys
 import time
@@ -18,14 +15,14 @@ from collections.abc import Callable
 
 import rclpy
 from pydantic import Field
-from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
 from glider_model.ros import health, messages, qos
 from glider_model.ros.codec import MessageError, to_cdr
+from glider_model.ros.executor import Gate, make_executor, take
 from glider_model.ros.health import Report
 from glider_model.ros.messages import TOPICS, Topic
 from glider_model.ros.parameters import declare_settings
@@ -74,37 +71,6 @@ class TickSettings(Settings):
     input_max_age_s: float = Field(
         1.0, ge=0.05, le=3600.0, description='free-running: older input counts as stale (s)'
     )
-
-
-class Gate(CallbackGroup):
-    """Lets the executor wait for the subscriptions in ``awaited`` only."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.awaited: set = set()
-
-    def can_execute(self, entity) -> bool:
-        """Whether the executor shall wait for this subscription."""
-        return entity in self.awaited
-
-    def beginning_execution(self, entity) -> bool:
-        """Nothing to hold back: there is one thread."""
-        return True
-
-    def ending_execution(self, entity) -> None:
-        """Nothing to let go."""
-
-    def replace(self, old, new) -> None:
-        """Await ``new`` instead of ``old``."""
-        self.awaited.discard(old)
-        self.awaited.add(new)
-
-
-def take(subscription):
-    """Oldest message of a subscription that has not been taken yet, or None."""
-    with subscription.handle:
-        taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
-    return None if taken is None else taken[0]
 
 
 class Input:
@@ -440,29 +406,6 @@ class BlockNode(TickNode):
         """Act in free-running mode while an input is stale; nothing by default."""
 
 
-class _NoGuard:
-    """Stands in for the guard condition that a handler triggers when it is done."""
-
-    def trigger(self) -> None:
-        pass
-
-
-class TickExecutor(SingleThreadedExecutor):
-    """A SingleThreadedExecutor that waits once per message instead of twice.
-
-    rclpy wakes its executor after every callback, for the sake of other threads that might wait
-    for the same callback group. Here there are none, and the wake-up only makes the next wait
-    return empty-handed.
-    """
-
-    def _make_handler(self, *args):
-        guard, self._guard = self._guard, _NoGuard()
-        try:
-            return super()._make_handler(*args)
-        finally:
-            self._guard = guard
-
-
 def seconds(stamp_ns: int) -> str:
     """Simulated time, for a message."""
     return f't = {stamp_ns / 1e9:.1f} s'
@@ -484,9 +427,10 @@ def run(node_type: Callable[[], TickNode], args=None) -> int:
     node, stop = None, Stop(0)
     try:
         node = node_type()
-        executor = TickExecutor()
-        executor.add_node(node)
-        executor.spin()
+        gc.freeze()  # compilers and libraries, which stay: else every full collection visits them
+        with make_executor() as executor:
+            executor.add_node(node)
+            executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except Stop as reason:

@@ -1,0 +1,79 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Resident memory of each node process in a long flight over topics, and whether it stays.
+
+``python benchmarks/nodes_memory.py 5`` measures five simulated hours instead of one.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from nodes import fly_over_topics
+
+from glider_bringup.runner import MODULES
+from glider_model.signals import TICK_S
+
+HOURS, MISSION_HOURS = 1.0, 30.0
+#: Part of the flight before which memory may still grow: buffers fill, caches warm up.
+_SETTLED = 0.2
+
+MEANING = {
+    'nodes_memory_h': 'simulated time of the flight (h)',
+    **{f'{name}_rss_mb': f'resident memory of {name} at the end (MB)' for name in MODULES},
+    'nodes_rss_growth_mb_per_h': 'growth of the process that grows most (MB per simulated hour)',
+    'nodes_30h_rss_mb': 'largest process after 30 h, if it goes on like this (MB)',
+}
+
+
+def measure(progress: Callable[[str], None], hours: float = HOURS) -> dict:
+    """Figures of one flight."""
+    samples = {name: [] for name in MODULES}
+
+    def sample(tick: int) -> None:
+        for name, megabytes in resident_mb().items():
+            samples[name].append((tick * TICK_S / 3600.0, megabytes))
+
+    progress(f'{hours:g} h over topics')
+    fly_over_topics(hours * 3600.0, sample)
+    growth = {name: _growth(np.array(taken), hours) for name, taken in samples.items()}
+    last = {name: taken[-1][1] for name, taken in samples.items()}
+    return {
+        'nodes_memory_h': hours,
+        **{f'{name}_rss_mb': megabytes for name, megabytes in last.items()},
+        'nodes_rss_growth_mb_per_h': max(growth.values()),
+        'nodes_30h_rss_mb': max(
+            last[name] + max(0.0, growth[name]) * (MISSION_HOURS - hours) for name in MODULES
+        ),
+    }
+
+
+def resident_mb() -> dict[str, float]:
+    """Resident memory (MB) of the nodes that this process has started."""
+    found = {}
+    for folder in Path('/proc').glob('[0-9]*'):
+        try:
+            status = dict(
+                line.split(':', 1) for line in (folder / 'status').read_text().splitlines()
+            )
+            command = (folder / 'cmdline').read_text().split('\0')
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if int(status['PPid']) == os.getpid() and 'VmRSS' in status:
+            for name, module in MODULES.items():
+                if module in command:
+                    found[name] = int(status['VmRSS'].split()[0]) / 1024.0
+    return found
+
+
+def _growth(taken: np.ndarray, hours: float) -> float:
+    """Slope (MB per simulated hour) of samples (h, MB), once settled."""
+    settled = taken[taken[:, 0] > _SETTLED * hours]
+    return float(np.polyfit(settled[:, 0], settled[:, 1], 1)[0])
+
+
+if __name__ == '__main__':
+    print(json.dumps(measure(lambda text: None, float(sys.argv[1])), indent=2))
