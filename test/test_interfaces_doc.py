@@ -373,7 +373,9 @@ def test_example_driver_flies(context, followers, driver_module):
 
     def has_said(text: str, level: bytes) -> bool:
         return any(
-            status.name == 'control_node' and text in status.message and status.level == level
+            status.name == '/glider/control_node'
+            and text in status.message
+            and status.level == level
             for status in said
         )
 

@@ -6,18 +6,22 @@ The launch file itself only turns this into launch actions, so that everything h
 tested where the launch system is not installed.
 """
 
-import re
 from pathlib import Path
 from typing import NamedTuple
 
 from glider_bringup.mission import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE, make_run_folder
 from glider_bringup.ros.node_parameters import node_parameters, write_parameters
-from glider_bringup.runner import MODULES, RECORDER
+from glider_bringup.runner import (
+    MODULES,
+    NAMESPACE_ALLOWED,
+    OWN_CLOCK,
+    RECORDER,
+    absolute_namespace,
+)
 from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
 
-_NAMESPACE = re.compile(r'(/?[A-Za-z_][A-Za-z0-9_]*)*/?')
 _TRUTH = {'true': True, 'false': False}
 
 
@@ -37,6 +41,12 @@ ARGUMENTS = (
     Argument('controller', '', "Attitude law; empty: the scenario's.", ('', 'adaptive', 'pid')),
     Argument('guidance', '', "Line of sight; empty: the scenario's.", ('', 'observer', 'paper')),
     Argument('namespace', 'glider', 'Namespace of the nodes and their topics.'),
+    Argument(
+        'clock',
+        '/clock',
+        'clock: in the namespace, so that several gliders can share a ROS domain.',
+        OWN_CLOCK,
+    ),
     Argument('record', '', 'New folder for the recording; empty: no recording.'),
     Argument('speed', '1.0', 'Times real time, or max. Free-running nodes keep real time: 1.0.'),
     Argument(
@@ -66,6 +76,7 @@ class LaunchPlan(NamedTuple):
     scenario: Scenario
     parameters_file: Path  #: one file for all nodes
     namespace: str  #: absolute
+    remappings: tuple[tuple[str, str], ...]
     lockstep: bool
     nodes: tuple[LaunchedNode, ...]
 
@@ -98,9 +109,9 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     speed = 0.0 if text['speed'] == 'max' else _number('speed', text, 0.01, 1e6, 'max')
     if not lockstep and speed != 1.0:
         _refuse('speed', text, '1.0 with lockstep:=false')
-    if not _NAMESPACE.fullmatch(text['namespace']):
-        _refuse('namespace', text, 'names of letters, digits and _, with / between them')
-    namespace = '/' + text['namespace'].strip('/')
+    namespace = absolute_namespace(text['namespace'])
+    if namespace is None:
+        _refuse('namespace', text, NAMESPACE_ALLOWED)
     scenario = load_scenario(text['scenario'], _changes(text))
     record_to = None
     if text['record']:
@@ -118,7 +129,8 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
         for name, module in MODULES.items()
         if name in parameters
     )
-    return LaunchPlan(scenario, folder / PARAMETERS_FILE, namespace, lockstep, nodes)
+    remappings = (OWN_CLOCK,) if text['clock'] == OWN_CLOCK[1] else ()
+    return LaunchPlan(scenario, folder / PARAMETERS_FILE, namespace, remappings, lockstep, nodes)
 
 
 def _changes(text: dict[str, str]) -> dict:

@@ -17,7 +17,7 @@ from glider_bringup.figure import DRAWN, Record, draw_run
 from glider_bringup.ros.bag import BagWriter
 from glider_bringup.ros.bag_log import LogWriter, read_blocks, recorded_and_lost
 from glider_bringup.ros.node_parameters import node_parameters, write_parameters
-from glider_bringup.runner import node_commands, run_nodes
+from glider_bringup.runner import NAMESPACE, node_commands, run_nodes
 from glider_bringup.scenario import Scenario, load_scenario
 from glider_bringup.score import Scorer
 from glider_guidance.profile import mission_time_s
@@ -153,17 +153,19 @@ def fly_nodes(
     speed: float,
     progress: Progress,
     on_log: Callable[[str], None],
+    namespace: str | None = None,
 ) -> tuple[Flight, dict]:
     """Fly over node processes and topics; the score is read back from the bag.
 
     ``speed`` is in times real time, 0.0 being as fast as possible; ``on_log`` gets each line that
-    a node prints.
+    a node prints. Nodes in a ``namespace`` of their own have their clock in it.
     """
     attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)
     parameters = node_parameters(scenario, speed=speed, record_to=folder, attachments=attachments)
-    write_parameters(parameters, folder / PARAMETERS_FILE)
+    place = namespace or NAMESPACE
+    write_parameters(parameters, folder / PARAMETERS_FILE, place)
     result = run_nodes(
-        node_commands(folder / PARAMETERS_FILE),
+        node_commands(folder / PARAMETERS_FILE, place, own_clock=namespace is not None),
         folder / LOG_FILE,
         on_progress=lambda said: progress(said['tick'], said['depth_m']),
         on_log=on_log,

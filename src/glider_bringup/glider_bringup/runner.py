@@ -6,6 +6,7 @@ import ctypes
 import fcntl
 import json
 import os
+import re
 import selectors
 import signal
 import subprocess
@@ -29,6 +30,13 @@ MODULES = {
     PLANT: 'glider_model.nodes.plant_node',
 }
 
+#: Where the nodes of a glider live, if nobody says otherwise.
+NAMESPACE = '/glider'
+#: Remapping that brings the clock into the namespace: docs/adr/0013.
+OWN_CLOCK = ('/clock', 'clock')
+NAMESPACE_ALLOWED = 'names of letters, digits and _, with / between them'
+
+_NAMESPACE = re.compile(r'(/?[A-Za-z_][A-Za-z0-9_]*)*/?')
 _DOMAINS = range(1, 102)
 _FATAL = 'fatal: '
 _PR_SET_PDEATHSIG = 1
@@ -55,9 +63,21 @@ class RunnerResult(NamedTuple):
     progress: Mapping[str, Any] = {}  #: last word of the recorder
 
 
-def node_commands(params_file: Path, namespace: str = '/glider') -> dict[str, list[str]]:
-    """Command line of every node."""
+def absolute_namespace(text: str) -> str | None:
+    """Namespace as ROS writes it, or None if ``text`` is none."""
+    return '/' + text.strip('/') if _NAMESPACE.fullmatch(text) else None
+
+
+def node_commands(
+    params_file: Path, namespace: str = NAMESPACE, own_clock: bool = False
+) -> dict[str, list[str]]:
+    """Command line of every node.
+
+    With ``own_clock`` the clock lies in the namespace, so that gliders can share a ROS domain.
+    """
     ros = ['--ros-args', '--params-file', str(params_file), '-r', f'__ns:={namespace}']
+    if own_clock:
+        ros += ['-r', ':='.join(OWN_CLOCK)]
     return {name: [sys.executable, '-m', module, *ros] for name, module in MODULES.items()}
 
 

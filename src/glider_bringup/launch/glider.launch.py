@@ -48,6 +48,7 @@ def node_action(node: LaunchedNode, plan: LaunchPlan) -> Node:
         package=node.package,
         executable=node.executable,
         namespace=plan.namespace,
+        remappings=plan.remappings,
         parameters=[plan.parameters_file],
         output='screen',
         on_exit=on_exit(node.executable, plan),

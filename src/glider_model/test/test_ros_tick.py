@@ -14,7 +14,7 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
-from glider_model.ros import health
+from glider_model.ros import clock, health
 from glider_model.ros.clock import ClockNode
 from glider_model.ros.executor import make_executor
 from glider_model.ros.messages import CONTROL, CURRENT, GUIDANCE, PLANT, TOPICS
@@ -55,9 +55,9 @@ class Clock(ClockNode):
         self.start_up()
 
     def publish_tick(self, stamp_ns: int) -> None:
-        clock, odom, joints = self.publish
+        publish_clock, odom, joints = self.publish
         value = float(self.tick)
-        clock(stamp_ns)
+        publish_clock(stamp_ns)
         odom(stamp_ns, 13 * (value,))
         joints(stamp_ns, 3 * (-value,))
 
@@ -201,6 +201,18 @@ def test_missing_recorder_is_named(make_graph):
     assert 'recorder_node has not appeared' in str(graph.spin())
 
 
+def test_second_source_of_time_is_refused_and_named(make_graph, context, monkeypatch):
+    monkeypatch.setattr(clock, '_RIVALS_LEAVE_S', 0.5)
+    graph = make_graph()
+    other = rclpy.create_node('plant_node', namespace='/beta', context=context)
+    graph.nodes.append(other)
+    other.create_publisher(TOPICS['/clock'].message_type, '/clock', 10)
+    stop = graph.spin()
+    assert stop.code == 3
+    assert str(stop).startswith('/clock is published by /beta/plant_node too')
+    assert graph.plant.log == []
+
+
 @pytest.mark.parametrize(
     ('culprit', 'topic'),
     [(CURRENT, 'current_velocity'), (GUIDANCE, 'reference'), (CONTROL, 'command')],
@@ -270,14 +282,25 @@ def test_free_running_node_notices_stale_input_and_recovers(make_graph):
     assert graph.spin(lambda: len(control.steps) > before + 2) is None
 
 
-def test_reports_survive_the_way_over_diagnostics():
+def test_reports_survive_the_way_over_a_topic():
     report = health.Report(
         'guidance_node', health.WAITING, 'waits', 300_000_000, PLANT, 'odom', health.WARN
     )
     array = health.report_array(report)
     assert health.reports_in(array) == [report]
-    assert not health.is_routine(array)
-    assert health.is_routine(health.report_array(report._replace(level=health.OK)))
-    event = health.status_array(0, 'guidance_node', health.OK, 'gliding down', {'stage': 1})
-    assert health.reports_in(event) == []
-    assert not health.is_routine(event)
+
+
+@pytest.mark.parametrize(
+    ('name', 'namespace', 'expected'),
+    [
+        ('/alpha/guidance_node', '/alpha', True),
+        ('/alpha/guidance_node', '/beta', False),
+        ('/alpha/guidance_node', '/alp', False),
+        ('/alpha/guidance_node', '/', False),
+        ('/guidance_node', '/', True),
+        ('battery', '/alpha', True),
+    ],
+)
+def test_diagnostics_of_another_namespace_do_not_concern_a_glider(name, namespace, expected):
+    event = health.status_array(0, name, health.OK, 'gliding down', {'stage': 1})
+    assert health.concerns(event, namespace) is expected

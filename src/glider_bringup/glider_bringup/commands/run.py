@@ -19,6 +19,7 @@ from glider_bringup.console import (
     number,
     progress,
 )
+from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace
 from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, parse_assignment
 from glider_bringup.scorecard import print_card
 from glider_guidance.guidance import LosSettings
@@ -57,6 +58,13 @@ def run(
     speed: Annotated[
         str, typer.Option(metavar='X|max', help='Times real time (nodes only).')
     ] = 'max',
+    namespace: Annotated[
+        str | None,
+        typer.Option(
+            help='Namespace of nodes and topics, /clock included, so that several gliders can '
+            'share one ROS_DOMAIN_ID (nodes only). Default: /glider, and /clock itself.'
+        ),
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed, instead of the scenario's.")] = None,
     changes: Annotated[
         list[str] | None,
@@ -87,8 +95,12 @@ def run(
     rate = 0.0 if speed == 'max' else number('--speed', speed, 'max', 0.01, 1e6)
     if rate and engine is Engine.direct:
         raise ConfigurationError('--speed: the direct engine knows only max')
+    place = absolute_namespace(namespace) if namespace else None
+    if namespace and (place is None or engine is Engine.direct):
+        allowed = 'nothing, with the direct engine' if place else NAMESPACE_ALLOWED
+        raise ConfigurationError(f'--namespace {namespace}: not usable (allowed: {allowed})')
     flown = load_scenario(scenario, fields)
-    card, folder = _fly(flown, engine, rate, out, bag)
+    card, folder = _fly(flown, engine, rate, place, out, bag)
     if as_json:
         print(json.dumps(card))
     else:
@@ -99,7 +111,14 @@ def run(
         )
 
 
-def _fly(scenario: Scenario, engine: Engine, rate: float, out: Path | None, bag: bool):
+def _fly(
+    scenario: Scenario,
+    engine: Engine,
+    rate: float,
+    namespace: str | None,
+    out: Path | None,
+    bag: bool,
+) -> tuple[dict, Path]:
     """Fly and score a scenario with a progress bar; the scorecard and the run folder."""
     from glider_bringup import mission
 
@@ -107,7 +126,9 @@ def _fly(scenario: Scenario, engine: Engine, rate: float, out: Path | None, bag:
     messages.print(f'{scenario.name}: {scenario.description}')
     with progress(scenario, mission.planned_ticks(scenario)) as update:
         if engine is Engine.nodes:
-            flight, scores = mission.fly_nodes(scenario, folder, rate, update, _print_log)
+            flight, scores = mission.fly_nodes(
+                scenario, folder, rate, update, _print_log, namespace
+            )
         else:
             flight, scores = mission.fly_direct(scenario, folder, bag, update)
     card = mission.scorecard(scenario, engine.value, flight, scores)

@@ -17,7 +17,7 @@ from glider_bringup.tick_order import TickOrder
 from glider_model.ros import health, messages, qos
 from glider_model.ros.codec import to_cdr
 from glider_model.ros.executor import take
-from glider_model.ros.messages import TOPICS, Topic
+from glider_model.ros.messages import TOPICS
 from glider_model.ros.parameters import declare_settings
 from glider_model.ros.tick import FAREWELL_S, Input, Stop, TickNode, run
 from glider_model.settings import ConfigurationError, Settings
@@ -26,6 +26,7 @@ from glider_model.signals import TICK_NS
 _DRAIN_S = 0.02
 _PROGRESS_S = 0.25
 
+RECORDED = [topic.name for topic in TOPICS.values() if topic.recorded]
 PER_TICK = [topic.name for topic in TOPICS.values() if topic.per_tick]
 
 
@@ -48,7 +49,7 @@ class RecorderNode(TickNode):
             self.bag = BagWriter(
                 Path(self.settings.folder),
                 self.settings.name,
-                self.get_namespace(),
+                {name: self.resolve_topic_name(name) for name in RECORDED},
                 self.settings.attachments,
             )
         except OSError as error:
@@ -62,6 +63,7 @@ class RecorderNode(TickNode):
         for name in PER_TICK:
             self.add_input(name)
         self._subscription(TOPICS['path'], self.on_path, gated=False)
+        self.events = self._subscription(TOPICS['/diagnostics'], self.on_event, raw=False)
         self.recorded = self._publisher(TOPICS['recorded'])
         self.outputs['recorded'] = (TOPICS['recorded'], self.recorded)
         signal.signal(signal.SIGINT, self.on_signal)
@@ -74,7 +76,7 @@ class RecorderNode(TickNode):
         item = Input(TOPICS[name])
         profile = None if self.ticks.lockstep else qos.EVERYTHING
         item.subscription = self._subscription(
-            item.topic, lambda raw: self.keep(item.topic, raw), profile=profile
+            item.topic, lambda raw: self.keep(item, raw), profile=profile
         )
         self.inputs.append(item)
         return item
@@ -94,15 +96,16 @@ class RecorderNode(TickNode):
         self.order.add_event('path', sec * 1_000_000_000 + nanosec, raw)
         self.has_path = True
 
-    def _on_event(self, array) -> None:
-        super()._on_event(array)
+    def on_event(self, array) -> None:
+        """Keep what happens to this glider."""
+        if not health.concerns(array, self.get_namespace()):
+            return
         for status in array.status:
             for pair in status.values:
                 if pair.key == 'stage':
                     self.stage = pair.value
-        if not health.is_routine(array):
-            stamp_ns = array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec
-            self.order.add_event('/diagnostics', stamp_ns, to_cdr(array))
+        stamp_ns = array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec
+        self.order.add_event('/diagnostics', stamp_ns, to_cdr(array))
 
     def on_report(self, report: health.Report) -> None:
         """Learn the last tick from the plant."""
@@ -110,17 +113,22 @@ class RecorderNode(TickNode):
             self.over_since_s = time.monotonic()
             self.final_ns = report.stamp_ns if report.phase == health.FINISHED else -1
 
-    def keep(self, topic: Topic, raw: bytes) -> None:
-        """Keep a message until its tick is complete."""
-        self.order.add(topic.name, topic.codec.decode_stamp(raw), raw)
+    def keep(self, item: Input, raw: bytes) -> None:
+        """Keep a message until its tick is complete. In lockstep an old one is passed over."""
+        if not self.running:  # it comes from somebody else's run
+            return
+        stamp_ns = item.topic.codec.decode_stamp(raw)
+        if stamp_ns > item.stamp_ns or not self.ticks.lockstep:
+            item.stamp_ns = stamp_ns
+            self.order.add(item.topic.name, stamp_ns, raw)
 
     def drain(self) -> None:
         """Take and write whatever has come; end when the run is over and all of it is here."""
         for item in self.inputs:
             while (raw := take(item.subscription)) is not None:
-                self.keep(item.topic, raw)
-        while (array := take(self._events_in)) is not None:
-            self._on_event(array)
+                self.keep(item, raw)
+        while (array := take(self.events)) is not None:
+            self.on_event(array)
         if not self.ticks.lockstep:
             self.order.write_rest()
             self.bag.flush()

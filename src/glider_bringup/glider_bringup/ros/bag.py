@@ -95,8 +95,8 @@ class BagWriter:
     folder : Path
         Made if it is missing.
     name : str
-    namespace : str
-        Namespace of the topics.
+    names : mapping, optional
+        Absolute names by topic; else those that the topics have in the namespace `/glider`.
     attachments : iterable of Path
         Files stored in the MCAP under their own names.
     topics : iterable of Topic
@@ -107,7 +107,7 @@ class BagWriter:
         self,
         folder: Path,
         name: str,
-        namespace: str = '/glider',
+        names: Mapping[str, str] | None = None,
         attachments: Iterable[Path] = (),
         topics: Iterable[Topic] = tuple(t for t in TOPICS.values() if t.recorded),
     ) -> None:
@@ -115,8 +115,8 @@ class BagWriter:
         self._folder.mkdir(parents=True, exist_ok=True)
         (self._folder / 'metadata.yaml').unlink(missing_ok=True)
         self._file_name = f'{name}_0.mcap'
-        self._names = {topic.name: topic.full_name(namespace) for topic in topics}
         self._topics = list(topics)
+        self._names = names or {topic.name: topic.full_name('/glider') for topic in self._topics}
         self._mcap = McapWriter(self._folder / self._file_name, profile='ros2')
         schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}

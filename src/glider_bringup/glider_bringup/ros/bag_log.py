@@ -15,11 +15,13 @@ from rclpy.serialization import deserialize_message
 from glider_bringup.direct import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.ros.bag import BagWriter
 from glider_guidance.nodes.guidance_node import path_message, stage_event
+from glider_model.ros import messages
 from glider_model.ros.codec import to_cdr
 from glider_model.ros.messages import TOPICS
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS
 
+_GUIDANCE = f'/glider/{messages.GUIDANCE}'
 _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 
 #: Topics that the score is computed from.
@@ -55,7 +57,7 @@ class LogWriter:
             if now != self._told:
                 self._told = now
                 stamp = int(stamps[row])
-                self._bag.write('/diagnostics', stamp, to_cdr(stage_event(stamp, *now)))
+                self._bag.write('/diagnostics', stamp, to_cdr(stage_event(stamp, *now, _GUIDANCE)))
 
     def close(self) -> int:
         """Complete the bag; the number of messages in it."""
@@ -74,7 +76,7 @@ def _file(folder: Path) -> Path:
 def _known_name(topic: str) -> str | None:
     """Our name of a recorded topic, whatever its namespace."""
     for name in TOPICS:
-        if topic == name or topic.endswith('/' + name):
+        if topic == name or topic.endswith('/' + name.lstrip('/')):
             return name
     return None
 

@@ -66,7 +66,8 @@ class GuidanceNode(BlockNode):
     def tell(self, stamp_ns: int, stage: int, infeasible: bool) -> None:
         """Put a change of stage or feasibility on /diagnostics."""
         self.told = (stage, infeasible)
-        self.publish_event(stage_event(stamp_ns, stage, infeasible, self.get_name()))
+        name = self.get_fully_qualified_name()
+        self.publish_event(stage_event(stamp_ns, stage, infeasible, name))
 
     def on_abort(self, request, response):
         """Serve ``abort``."""
@@ -76,10 +77,11 @@ class GuidanceNode(BlockNode):
         return response
 
 
-def stage_event(
-    stamp_ns: int, stage: int, infeasible: bool, node: str = messages.GUIDANCE
-) -> DiagnosticArray:
-    """Diagnostics that say which stage began, or whether the course can be held."""
+def stage_event(stamp_ns: int, stage: int, infeasible: bool, node: str) -> DiagnosticArray:
+    """Diagnostics that say which stage began, or whether the course can be held.
+
+    ``node`` is the full name of the node that says it.
+    """
     name = STAGE_NAMES[stage]
     message = f'{name}; the course cannot be held against this current' if infeasible else name
     values = {

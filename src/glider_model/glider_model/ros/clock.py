@@ -26,6 +26,10 @@ from glider_model.ros.tick import (
 )
 from glider_model.signals import TICK_NS, TICK_S
 
+#: Nodes of a run that is just over are out of sight within this time (s).
+_RIVALS_LEAVE_S = 5.0
+_ALONE = 'each glider in a ROS domain needs a namespace and a clock of its own'
+
 
 class ClockSettings(TickSettings):
     """How the node that makes time keeps step."""
@@ -113,8 +117,13 @@ class ClockNode(TickNode):
         ]
 
     def _on_startup_watch(self) -> None:
+        if self.running:
+            return
         waited_s = time.monotonic() - self._clock_started_s
-        if not self.running and waited_s > self.ticks.startup_timeout_s:
+        if waited_s > _RIVALS_LEAVE_S and (rivals := self.rivals()):
+            # No report: in one namespace it would end the other run too.
+            raise Stop(EXIT_PEER, f'{rivals[0]}; {_ALONE}')
+        if waited_s > self.ticks.startup_timeout_s:
             missing = '; '.join(self.unmatched())
             self._fail(f'not ready after {self.ticks.startup_timeout_s:g} s: {missing}')
 

@@ -1,9 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What nodes say about themselves on /diagnostics.
+"""What nodes say about themselves, as DiagnosticArrays.
 
-Two kinds of status: events of the flight (stage, saturation, failsafe), which are recorded, and
-the state of a node as a member of the lockstep (`Report`), by which peers find each other.
+Two kinds of status: events of the flight (stage, saturation, failsafe) on /diagnostics, which are
+recorded, and the state of a node as a member of the lockstep (`Report`) on ``lockstep``, by which
+the peers of one namespace find each other.
 """
 
 from typing import NamedTuple
@@ -13,8 +14,6 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 STARTING, READY, WAITING, FINISHED, FAILED = 'starting', 'ready', 'waiting', 'finished', 'failed'
-
-_SUFFIX = ': lockstep'
 
 
 class Report(NamedTuple):
@@ -41,32 +40,27 @@ def status_array(stamp_ns: int, name: str, level: bytes, message: str, values: d
 def report_array(report: Report) -> DiagnosticArray:
     """Message that carries ``report``."""
     values = {'phase': report.phase, 'peer': report.peer, 'topic': report.topic}
-    return status_array(
-        report.stamp_ns, report.node + _SUFFIX, report.level, report.message, values
-    )
+    return status_array(report.stamp_ns, report.node, report.level, report.message, values)
 
 
 def reports_in(array: DiagnosticArray) -> list[Report]:
-    """Lockstep reports among the statuses of a message."""
+    """Reports that a message carries."""
     stamp_ns = array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec
-    found = []
-    for status in array.status:
-        if status.name.endswith(_SUFFIX):
-            values = {pair.key: pair.value for pair in status.values}
-            found.append(
-                Report(
-                    status.name.removesuffix(_SUFFIX),
-                    values.get('phase', ''),
-                    status.message,
-                    stamp_ns,
-                    values.get('peer', ''),
-                    values.get('topic', ''),
-                    status.level,
-                )
-            )
-    return found
+    return [_report(status, stamp_ns) for status in array.status]
 
 
-def is_routine(array: DiagnosticArray) -> bool:
-    """Whether a message holds nothing but lockstep reports that all is well."""
-    return all(status.name.endswith(_SUFFIX) and status.level == OK for status in array.status)
+def _report(status: DiagnosticStatus, stamp_ns: int) -> Report:
+    values = {pair.key: pair.value for pair in status.values}
+    phase, peer, topic = (values.get(key, '') for key in ('phase', 'peer', 'topic'))
+    return Report(status.name, phase, status.message, stamp_ns, peer, topic, status.level)
+
+
+def concerns(array: DiagnosticArray, namespace: str) -> bool:
+    """Whether a message on /diagnostics is about something in a namespace, or in none.
+
+    Nodes of this stack give their full names there.
+    """
+    return any(
+        not status.name.startswith('/') or status.name.rpartition('/')[0] == namespace.rstrip('/')
+        for status in array.status
+    )

@@ -134,6 +134,7 @@ TOPICS = {
         _per_tick('adaptation', ADAPTATION, CONTROL),
         Topic('path', Path, GUIDANCE, qos=qos.LATCHED),
         Topic('/diagnostics', DiagnosticArray, 'all', qos=qos.EVENTS),
+        Topic('lockstep', DiagnosticArray, 'all', qos=qos.EVENTS, recorded=False),
         Topic('recorded', Header, RECORDER, (PLANT,), recorded=False),
     )
 }

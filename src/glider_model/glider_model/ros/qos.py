@@ -29,7 +29,7 @@ LATCHED = QoSProfile(
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
 
-#: /diagnostics: few messages, each of which matters, also to those who come later.
+#: /diagnostics, lockstep: few messages, each of which matters, also to those who come later.
 EVENTS = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=256,

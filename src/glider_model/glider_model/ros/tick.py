@@ -114,11 +114,11 @@ class TickNode(Node):
         self.inputs: list[Input] = []
         self.outputs: dict[str, tuple[Topic, object]] = {}
         self.reports: dict[str, Report] = {}
-        events = TOPICS['/diagnostics']
-        self._events = self._publisher(events)
+        events, reports = TOPICS['/diagnostics'], TOPICS['lockstep']
+        self._events, self._reports = self._publisher(events), self._publisher(reports)
         self.outputs[events.name] = (events, self._events)
-        self._events_in = self._subscription(events, self._on_event, raw=False)
-        self.gate.awaited.add(self._events_in)
+        self._reports_in = self._subscription(reports, self._on_reports, raw=False)
+        self.gate.awaited.add(self._reports_in)
         self._awaited = None
         self._due_ns: int | None = None
         self._watched_ns: int | None = None
@@ -179,18 +179,22 @@ class TickNode(Node):
         """Put an event of the flight on /diagnostics, and in the log if it is an error."""
         if level == health.ERROR:
             self.get_logger().error(message)
-        self.publish_event(health.status_array(stamp_ns, self.get_name(), level, message, values))
+        name = self.get_fully_qualified_name()
+        self.publish_event(health.status_array(stamp_ns, name, level, message, values))
 
     def publish_event(self, array) -> None:
         """Put a DiagnosticArray on /diagnostics."""
         self._events.publish(to_cdr(array))
 
     def report(self, phase: str, message: str = '', **fields) -> None:
-        """Tell the peers how this node is."""
+        """Tell the peers how this node is, and everybody if it is not well."""
         report = Report(self.get_name(), phase, message, **fields)
-        self._events.publish(to_cdr(health.report_array(report)))
+        if report.level != health.OK:
+            named = report._replace(node=self.get_fully_qualified_name())
+            self.publish_event(health.report_array(named))
+        self._reports.publish(to_cdr(health.report_array(report)))
 
-    def _on_event(self, array) -> None:
+    def _on_reports(self, array) -> None:
         """Keep the newest report of every node."""
         for report in health.reports_in(array):
             self.reports[report.node] = report
@@ -226,23 +230,44 @@ class TickNode(Node):
         self.report(health.STARTING, 'looking for its peers')
         self._startup_timer = self.wall_timer(_STARTUP_PERIOD_S, self._on_startup)
 
+    def _peers_among(self, endpoints) -> set[str]:
+        """Names of the nodes of this namespace that have some of these endpoints."""
+        own = self.get_namespace()
+        return {info.node_name for info in endpoints if info.node_namespace == own}
+
+    def rivals(self) -> list[str]:
+        """Who else publishes what only this node may publish, in words."""
+        rivals = []
+        for topic, _ in self.outputs.values():
+            if topic.publisher != self.get_name():
+                continue
+            infos = self.get_publishers_info_by_topic(topic.name)
+            names = [f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in infos]
+            if self.get_fully_qualified_name() in names:
+                names.remove(self.get_fully_qualified_name())
+            rivals += [
+                f'{self.resolve_topic_name(topic.name)} is published by {name} too'
+                for name in names
+            ]
+        return rivals
+
     def unmatched(self) -> list[str]:
         """What is missing between this node and its peers, in words; empty if all is matched."""
-        missing = []
+        missing = self.rivals()
         for topic, publisher in self.outputs.values():
             readers = list(topic.readers) if self.ticks.lockstep else []
             if self.ticks.record and topic.recorded and self.get_name() != messages.RECORDER:
                 readers.append(messages.RECORDER)
             if not readers:
                 continue
-            names = {info.node_name for info in self.get_subscriptions_info_by_topic(topic.name)}
+            names = self._peers_among(self.get_subscriptions_info_by_topic(topic.name))
             absent = [reader for reader in readers if reader not in names]
             missing += [f'{reader} does not subscribe to {topic.name}' for reader in absent]
             if not absent and publisher.get_subscription_count() < len(readers):
                 missing.append(f'{topic.name} is not connected to {" and ".join(readers)}')
         for item in self.inputs:
             infos = self.get_publishers_info_by_topic(item.topic.name)
-            if item.topic.publisher not in {info.node_name for info in infos}:
+            if item.topic.publisher not in self._peers_among(infos):
                 missing.append(f'{item.topic.publisher} does not publish {item.topic.name}')
             elif item.subscription.get_publisher_count() < 1:
                 missing.append(f'{item.topic.name} of {item.topic.publisher} is not connected')
@@ -275,8 +300,9 @@ class TickNode(Node):
         raise NotImplementedError
 
     def _on_message(self, item: Input, raw: bytes) -> None:
-        self._accept(item, raw)
-        self._fire()
+        if self.running:  # else it comes from somebody else's run
+            self._accept(item, raw)
+            self._fire()
 
     def _accept(self, item: Input, raw: bytes) -> None:
         try:

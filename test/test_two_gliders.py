@@ -1,0 +1,119 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Several gliders in one ROS domain: each flies as if it were alone, or says why it cannot."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from mcap.reader import make_reader
+from rclpy.serialization import deserialize_message
+
+from glider_bringup.runner import domain_id, node_environment
+from glider_model.ros.messages import TOPICS
+
+GLIDER = [sys.executable, '-m', 'glider_bringup.cli']
+DEADLINE_S = 300.0
+DURATION_S = 1000
+FLOWN_BYTES = 300_000  #: of recording: several chunks are on disk
+#: Scenario by namespace.
+GLIDERS = {'alpha': 'rough_water', 'beta': 'current_8deg'}
+PER_TICK = [topic.name.strip('/') for topic in TOPICS.values() if topic.per_tick]
+
+
+def start(domain: int, scenario: str, out: Path, *options) -> subprocess.Popen:
+    """A run in a domain that is not its own."""
+    return subprocess.Popen(
+        [*GLIDER, 'run', scenario, '--out', out, '--json', *map(str, options)],
+        env=node_environment(domain),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.fixture(scope='module')
+def together(tmp_path_factory):
+    """Folders and scorecards of the gliders, flown at the same time."""
+    folders = {name: tmp_path_factory.mktemp('two') / name for name in GLIDERS}
+    with domain_id() as domain:
+        runs = {
+            name: start(
+                *(domain, scenario, folders[name]),
+                *('--namespace', name, '--duration', DURATION_S),
+            )
+            for name, scenario in GLIDERS.items()
+        }
+        said = {name: run.communicate(timeout=DEADLINE_S) for name, run in runs.items()}
+    assert {name: run.returncode for name, run in runs.items()} == dict.fromkeys(GLIDERS, 0), said
+    return {name: (folders[name], json.loads(said[name][0])) for name in GLIDERS}
+
+
+def wait_for_recording(folder: Path, run: subprocess.Popen) -> None:
+    """Return once some of a flight is on disk."""
+    end = time.monotonic() + DEADLINE_S
+    while not any(file.stat().st_size > FLOWN_BYTES for file in folder.glob('*.mcap')):
+        assert run.poll() is None, run.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def recorded(folder: Path, prefix: str) -> dict[str, list[tuple[int, bytes]]]:
+    """Stamps and payloads by topic, named without the namespace."""
+    found = {}
+    (file,) = folder.glob('*.mcap')
+    with file.open('rb') as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            name = channel.topic.removeprefix(prefix).strip('/')
+            found.setdefault(name, []).append((message.log_time, message.data))
+    return found
+
+
+@pytest.mark.parametrize('name', GLIDERS)
+def test_a_glider_flies_as_if_it_were_alone(glider, together, tmp_path, name):
+    folder, card = together[name]
+    assert (card['status'], card['messages_lost']) == ('completed', 0)
+    done = glider(
+        *('run', GLIDERS[name], '--duration', DURATION_S, '--out', tmp_path / 'alone'),
+        *('--engine', 'direct', '--bag'),
+    )
+    assert done.returncode == 0, done.stderr
+    flown, alone = recorded(folder, f'/{name}/'), recorded(tmp_path / 'alone', '/glider/')
+    assert len(flown['odom']) == 10 * DURATION_S
+    assert {topic: flown[topic] for topic in PER_TICK} == {
+        topic: alone[topic] for topic in PER_TICK
+    }
+    assert flown['path'] == alone['path']
+
+
+@pytest.mark.parametrize('name', GLIDERS)
+def test_a_bag_has_the_diagnostics_of_its_own_glider_only(together, name):
+    folder, _ = together[name]
+    said = {
+        status.name
+        for _, payload in recorded(folder, f'/{name}/')['diagnostics']
+        for status in deserialize_message(payload, DiagnosticArray).status
+    }
+    assert f'/{name}/guidance_node' in said
+    assert {full.rpartition('/')[0] for full in said} == {f'/{name}'}
+
+
+def test_a_second_glider_in_the_namespace_of_the_first_does_not_disturb_it(tmp_path):
+    with domain_id() as domain:
+        first = start(domain, 'current_8deg', tmp_path / 'first', '--duration', 'full')
+        try:
+            wait_for_recording(tmp_path / 'first', first)
+            second = start(domain, 'rough_water', tmp_path / 'second')
+            _, message = second.communicate(timeout=DEADLINE_S)
+        finally:
+            first.terminate()
+            out, _ = first.communicate(timeout=DEADLINE_S)
+    assert second.returncode == 1
+    assert '/clock is published by /glider/plant_node too' in message
+    card = json.loads(out)
+    assert (card['reason'], card['messages_lost']) == ('stopped by SIGTERM', 0)
