@@ -7,15 +7,24 @@ A run is a folder: a bag in rosbag2 layout, the scenario and vehicle that made i
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from glider_bringup.direct import MissionParams, MissionState, fly_blocks
 from glider_bringup.figure import DRAWN, Record, draw_run
 from glider_bringup.ros.bag import BagWriter
-from glider_bringup.ros.bag_log import LogWriter, read_blocks, recorded_and_lost
+from glider_bringup.ros.bag_log import (
+    LogWriter,
+    attachments,
+    end_of_run,
+    has_bag,
+    read_blocks,
+    recorded_and_lost,
+)
 from glider_bringup.ros.node_parameters import node_parameters, write_parameters
 from glider_bringup.runner import NAMESPACE, node_commands, run_nodes
 from glider_bringup.scenario import Scenario, load_scenario
@@ -42,7 +51,7 @@ class Flight(NamedTuple):
 
     status: str  #: completed or aborted
     reason: str  #: why it was aborted
-    wall_time_s: float
+    wall_time_s: float | None  #: None if nobody measured it
     messages_recorded: int
     messages_lost: int
 
@@ -137,6 +146,8 @@ def fly_direct(
     except KeyboardInterrupt:
         status, reason = 'aborted', 'stopped by SIGINT'
     wall_time_s = time.perf_counter() - start
+    if bag and status == 'completed':
+        bag.finish()
     recorded = bag.close() if bag else 0
     return Flight(status, reason, wall_time_s, recorded, 0), _score(scenario, scorer)
 
@@ -175,7 +186,7 @@ def fly_nodes(
     completed = result.status == 'completed'
     scorer = _scorer(scenario)
     recorded, lost = 0, 0
-    if any(folder.glob('*.mcap')):  # else it ended before the recorder was up
+    if has_bag(folder):  # else it ended before the recorder was up
         for log in read_blocks(folder):
             scorer.add(log)
         recorded, lost = recorded_and_lost(folder, completed)
@@ -194,7 +205,7 @@ def _score(scenario: Scenario, scorer: Scorer) -> dict:
     return scorer.result(settle_s, scenario.profile.depth_m)
 
 
-def scorecard(scenario: Scenario, engine: str, flight: Flight, scores: dict) -> dict:
+def scorecard(scenario: Scenario, engine: str | None, flight: Flight, scores: dict) -> dict:
     """Contents of ``score.json``."""
     scores = dict(scores)
     infeasible = scores.pop('infeasible')
@@ -226,33 +237,53 @@ def write_score(folder: Path, card: dict) -> None:
     (folder / SCORE_FILE).write_text(json.dumps(card, indent=2) + '\n', encoding='utf-8')
 
 
-def score_again(folder: Path) -> dict:
+def score_again(run: Path) -> dict:
     """Scorecard of a run, computed afresh from its bag if it has one.
+
+    How the run ended is what its `SCORE_FILE` says, or the bag where there is none: a recording
+    made by the launch file, or the MCAP file alone.
+
+    Parameters
+    ----------
+    run : Path
+        Run folder, or its MCAP file.
 
     Raises
     ------
     ConfigurationError
-        If the folder does not hold a run.
+        If it holds no run.
     """
-    old = _read_score(folder)
-    if not list(folder.glob('*.mcap')):
+    old = _read_score(run)
+    if not has_bag(run):
         return old
-    scenario = load_scenario(str(folder / SCENARIO_FILE))
-    scorer = _scorer(scenario)
-    for log in read_blocks(folder):
-        scorer.add(log)
-    status = 'aborted' if old['status'] == 'aborted' else 'completed'
-    recorded, lost = recorded_and_lost(folder, status == 'completed')
-    flight = Flight(status, old['reason'], old['wall_time_s'], recorded, lost)
-    return scorecard(scenario, old['engine'], flight, _score(scenario, scorer))
+    with _flown(run) as scenario:
+        scorer = _scorer(scenario)
+        for log in read_blocks(run):
+            scorer.add(log)
+        if old:
+            complete, reason = old['status'] != 'aborted', old['reason']
+        else:
+            complete, reason = end_of_run(run)
+        recorded, lost = recorded_and_lost(run, complete)
+        status = 'completed' if complete else 'aborted'
+        flight = Flight(status, reason, old.get('wall_time_s'), recorded, lost)
+        engine = old.get('engine') or ('nodes' if (run / PARAMETERS_FILE).exists() else None)
+        return scorecard(scenario, engine, flight, _score(scenario, scorer))
 
 
-def _read_score(folder: Path) -> dict:
-    path = folder / SCORE_FILE
+def _read_score(run: Path) -> dict:
+    """Contents of a run's score file; empty if it has none, but a bag."""
+    path = run / SCORE_FILE
     try:
         card = json.loads(path.read_text(encoding='utf-8'))
-    except FileNotFoundError:
-        raise ConfigurationError(f'{folder}: not a run folder, it has no {SCORE_FILE}') from None
+    except (FileNotFoundError, NotADirectoryError):
+        if not run.exists():
+            raise ConfigurationError(f'{run}: no such run folder or .mcap file') from None
+        if not has_bag(run):
+            raise ConfigurationError(
+                f'{run}: not a run folder, it has neither a bag (.mcap) nor a {SCORE_FILE}'
+            ) from None
+        return {}
     except (OSError, ValueError) as error:
         raise ConfigurationError(f'{path}: cannot be read: {error}') from None
     if not isinstance(card, dict) or not CARD_FIELDS <= set(card):
@@ -260,18 +291,40 @@ def _read_score(folder: Path) -> dict:
     return card
 
 
-def draw(folder: Path, file: Path) -> None:
+@contextmanager
+def _flown(run: Path) -> Iterator[Scenario]:
+    """Scenario of a run: the file beside its bag or, if there is none, the one stored in it."""
+    if (run / SCENARIO_FILE).is_file():
+        yield load_scenario(str(run / SCENARIO_FILE))
+        return
+    stored = attachments(run)
+    if SCENARIO_FILE not in stored:
+        raise ConfigurationError(
+            f'{run}: no {SCENARIO_FILE} beside the bag, and none stored in it: put the one that '
+            f'was flown beside it'
+        )
+    with TemporaryDirectory() as folder:
+        for name in {SCENARIO_FILE, VEHICLE_FILE} & set(stored):
+            (Path(folder) / name).write_bytes(stored[name])
+        try:
+            scenario = load_scenario(str(Path(folder) / SCENARIO_FILE))
+        except ConfigurationError as error:
+            raise ConfigurationError(str(error).replace(folder, f'{run}: stored')) from None
+        yield scenario
+
+
+def draw(run: Path, file: Path) -> None:
     """Draw a run's bag into an image file.
 
     Raises
     ------
     ConfigurationError
-        If the folder has no bag, or the image cannot be written.
+        If there is no bag, or the image cannot be written.
     """
-    _read_score(folder)
-    scenario = load_scenario(str(folder / SCENARIO_FILE))
-    record = Record(read_blocks(folder, DRAWN))
-    title = f'{scenario.name}: {scenario.description}'
+    _read_score(run)
+    record = Record(read_blocks(run, DRAWN))
+    with _flown(run) as scenario:
+        title = f'{scenario.name}: {scenario.description}'
     try:
         draw_run(record, title, file)
     except (OSError, ValueError) as error:

@@ -21,7 +21,7 @@ def print_card(card: dict, folder: Path) -> None:
     rows = (
         ('status', card['status'] + (f' ({card["reason"]})' if card['reason'] else '')),
         ('flown', f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}'),
-        ('engine', f'{card["engine"]}, seed {card["seed"]}'),
+        ('engine', f'{card["engine"] or "not known"}, seed {card["seed"]}'),
         ('simulated time', show(card['sim_time_s'], 's', 1)),
         ('real-time factor', show(card['real_time_factor'], '', 0)),
         (

@@ -14,33 +14,37 @@ from glider_bringup.scorecard import print_card
 app = typer.Typer()
 
 
+Run = Annotated[Path, typer.Argument(metavar='RUN', help='Folder of a run, or its .mcap file.')]
+
+
 @app.command(epilog='Example: ./glider score runs/20260101-120000-current_8deg --json')
 def score(
-    folder: Annotated[Path, typer.Argument(metavar='RUN', help='Folder of a run.')],
+    run: Run,
     as_json: Json = False,
 ) -> None:
     """Score a run again, from its bag; a run without a bag shows the score it was given."""
     from glider_bringup import mission
 
     with messages.status('reading the bag'):
-        card = mission.score_again(folder)
+        card = mission.score_again(run)
     if as_json:
         print(json.dumps(card))
     else:
-        print_card(card, folder)
+        print_card(card, run)
 
 
 @app.command(epilog='Example: ./glider figure runs/20260101-120000-current_8deg --out run.png')
 def figure(
-    folder: Annotated[Path, typer.Argument(metavar='RUN', help='Folder of a run with a bag.')],
+    run: Run,
     out: Annotated[
-        Path | None, typer.Option(help='Image file: png, svg or pdf. Default: RUN/run.png.')
+        Path | None,
+        typer.Option(help='Image file: png, svg or pdf. Default: run.png beside the bag.'),
     ] = None,
 ) -> None:
     """Draw a run: track, depth, errors, attitude, current and actuators."""
     from glider_bringup import mission
 
-    file = out or folder / 'run.png'
+    file = out or (run if run.is_dir() else run.parent) / 'run.png'
     with messages.status('reading the bag'):
-        mission.draw(folder, file)
+        mission.draw(run, file)
     output.print(f'drawn: {file}', soft_wrap=True)

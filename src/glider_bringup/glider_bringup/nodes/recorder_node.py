@@ -97,21 +97,23 @@ class RecorderNode(TickNode):
         self.has_path = True
 
     def on_event(self, array) -> None:
-        """Keep what happens to this glider."""
-        if not health.concerns(array, self.get_namespace()):
+        """Keep what happens to this glider; its end is kept by `on_report`."""
+        if not health.concerns(array, self.get_namespace()) or health.end_of_run(array):
             return
         for status in array.status:
             for pair in status.values:
                 if pair.key == 'stage':
                     self.stage = pair.value
-        stamp_ns = array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec
-        self.order.add_event('/diagnostics', stamp_ns, to_cdr(array))
+        self.order.add_event('/diagnostics', health.stamp_of(array), to_cdr(array))
 
     def on_report(self, report: health.Report) -> None:
-        """Learn the last tick from the plant."""
+        """Learn the last tick from the plant, and keep what it says about the end."""
         if report.node == messages.PLANT and report.phase in (health.FINISHED, health.FAILED):
             self.over_since_s = time.monotonic()
             self.final_ns = report.stamp_ns if report.phase == health.FINISHED else -1
+            named = report._replace(node=f'{self.get_namespace().rstrip("/")}/{report.node}')
+            array = to_cdr(health.report_array(named))
+            self.order.add_event('/diagnostics', report.stamp_ns, array)
 
     def keep(self, item: Input, raw: bytes) -> None:
         """Keep a message until its tick is complete. In lockstep an old one is passed over."""

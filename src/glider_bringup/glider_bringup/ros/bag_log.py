@@ -4,25 +4,31 @@
 
 import struct
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from mcap.exceptions import McapError
 from mcap.reader import McapReader, NonSeekingReader, SeekingReader
+from mcap.summary import Summary
 from rclpy.serialization import deserialize_message
 
 from glider_bringup.direct import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.ros.bag import BagWriter
 from glider_guidance.nodes.guidance_node import path_message, stage_event
-from glider_model.ros import messages
+from glider_model.ros import health, messages
 from glider_model.ros.codec import to_cdr
 from glider_model.ros.messages import TOPICS
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS
 
-_GUIDANCE = f'/glider/{messages.GUIDANCE}'
+_GUIDANCE, _PLANT = f'/glider/{messages.GUIDANCE}', f'/glider/{messages.PLANT}'
 _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
+
+#: What readers raise where a file ends too early.
+_CUT = (McapError, struct.error, EOFError)
 
 #: Topics that the score is computed from.
 SCORED = ('odom', 'joint_states', 'reference', 'tracking_error')
@@ -59,17 +65,28 @@ class LogWriter:
                 stamp = int(stamps[row])
                 self._bag.write('/diagnostics', stamp, to_cdr(stage_event(stamp, *now, _GUIDANCE)))
 
+    def finish(self) -> None:
+        """Write that the run is complete, as the plant says it after the last tick."""
+        stamp_ns = (self._tick - 1) * TICK_NS
+        report = health.Report(_PLANT, health.FINISHED, health.COMPLETE, stamp_ns)
+        self._bag.write('/diagnostics', stamp_ns, to_cdr(health.report_array(report)))
+
     def close(self) -> int:
         """Complete the bag; the number of messages in it."""
         self._bag.close()
         return sum(self._bag.counts.values())
 
 
-def _file(folder: Path) -> Path:
-    """The one MCAP file of a run folder."""
-    files = sorted(folder.glob('*.mcap'))
+def has_bag(run: Path) -> bool:
+    """Whether a run folder holds a bag, or is one: a single MCAP file."""
+    return run.is_file() or any(run.glob('*.mcap'))
+
+
+def _file(run: Path) -> Path:
+    """The one MCAP file of a run folder, or the file that was given in its place."""
+    files = [run] if run.is_file() else sorted(run.glob('*.mcap'))
     if len(files) != 1:
-        raise ConfigurationError(f'{folder}: expected one .mcap file, found {len(files)}')
+        raise ConfigurationError(f'{run}: expected one .mcap file, found {len(files)}')
     return files[0]
 
 
@@ -81,6 +98,16 @@ def _known_name(topic: str) -> str | None:
     return None
 
 
+def _summary(stream: IO[bytes]) -> Summary | None:
+    """Summary at the end of a file, if its writer got so far; the stream is at its start again."""
+    try:
+        return SeekingReader(stream).get_summary()
+    except (*_CUT, OSError):
+        return None
+    finally:
+        stream.seek(0)
+
+
 def _messages(file: Path, names: Iterable[str]) -> Iterator[tuple[str, int, bytes]]:
     """Name, log time (ns) and payload of the messages on some topics, in file order.
 
@@ -89,11 +116,7 @@ def _messages(file: Path, names: Iterable[str]) -> Iterator[tuple[str, int, byte
     """
     wanted = set(names)
     with file.open('rb') as stream:
-        try:
-            summary = SeekingReader(stream).get_summary()
-        except (McapError, struct.error, EOFError):
-            summary = None
-        stream.seek(0)
+        summary = _summary(stream)
         topics = None
         reader: McapReader = NonSeekingReader(stream)
         if summary is not None:
@@ -108,20 +131,48 @@ def _messages(file: Path, names: Iterable[str]) -> Iterator[tuple[str, int, byte
                 name = _known_name(channel.topic)
                 if name in wanted:
                     yield name, message.log_time, message.data
-        except (McapError, struct.error, EOFError) as error:
+        except _CUT as error:
             if summary is not None:
                 raise ConfigurationError(f'{file}: damaged: {error}') from None
+
+
+def _diagnostics(file: Path) -> Iterator[DiagnosticArray]:
+    """Messages on /diagnostics."""
+    for _, _, payload in _messages(file, ['/diagnostics']):
+        yield deserialize_message(payload, DiagnosticArray)
 
 
 def _infeasible_changes(file: Path) -> list[tuple[int, bool]]:
     """Ticks at which the course became infeasible or feasible, from /diagnostics."""
     changes = []
-    for _, log_time, payload in _messages(file, ['/diagnostics']):
-        for status in deserialize_message(payload, DiagnosticArray).status:
+    for array in _diagnostics(file):
+        for status in array.status:
             for pair in status.values:
                 if pair.key == 'infeasible':
-                    changes.append((log_time // TICK_NS, pair.value == 'true'))
+                    changes.append((health.stamp_of(array) // TICK_NS, pair.value == 'true'))
     return changes
+
+
+def end_of_run(run: Path) -> tuple[bool, str]:
+    """Whether the plant said in a bag that the run is complete; if not, what it said instead."""
+    for array in _diagnostics(_file(run)):
+        report = health.end_of_run(array)
+        if report:
+            complete = report.phase == health.FINISHED
+            return complete, '' if complete else report.message
+    return False, 'the recording was stopped before the run was complete'
+
+
+def attachments(run: Path) -> dict[str, bytes]:
+    """Files that are stored in a bag, by name."""
+    with _file(run).open('rb') as stream:
+        whole = _summary(stream) is not None
+        reader: McapReader = SeekingReader(stream) if whole else NonSeekingReader(stream)
+        found = {}
+        with suppress(*_CUT):  # of a file that was cut short, whatever comes before its end
+            for attachment in reader.iter_attachments():
+                found[attachment.name] = attachment.data
+    return found
 
 
 def read_blocks(folder: Path, topics: Iterable[str] = SCORED) -> Iterator[np.ndarray]:
@@ -130,7 +181,7 @@ def read_blocks(folder: Path, topics: Iterable[str] = SCORED) -> Iterator[np.nda
     Parameters
     ----------
     folder : Path
-        Run folder.
+        Run folder, or its MCAP file.
     topics : iterable of str
         Topics to read; the columns of the others, stage and saturation are NaN.
 
@@ -184,10 +235,7 @@ def recorded_and_lost(folder: Path, complete: bool) -> tuple[int, int]:
     """
     file = _file(folder)
     with file.open('rb') as stream:
-        try:
-            summary = SeekingReader(stream).get_summary()
-        except (McapError, struct.error, EOFError):
-            summary = None
+        summary = _summary(stream)
     counts = dict.fromkeys((topic.name for topic in _PER_TICK), 0)
     if summary is None:
         for name, _, _ in _messages(file, TOPICS):

@@ -147,7 +147,11 @@ class ClockNode(TickNode):
             self._release()
         else:
             self.over_since_s = time.monotonic()
-            self.report(health.FINISHED, 'the run is complete', stamp_ns=stamp_ns)
+            report = Report(
+                self.get_fully_qualified_name(), health.FINISHED, health.COMPLETE, stamp_ns
+            )
+            self.publish_event(health.report_array(report))
+            self.report(health.FINISHED, health.COMPLETE, stamp_ns=stamp_ns)
 
     def _on_cycle(self) -> None:
         """One free-running tick, with whatever inputs came last."""

@@ -11,9 +11,14 @@ from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from glider_model.ros.messages import PLANT
+
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 STARTING, READY, WAITING, FINISHED, FAILED = 'starting', 'ready', 'waiting', 'finished', 'failed'
+
+#: What the plant says about a run that is finished.
+COMPLETE = 'the run is complete'
 
 
 class Report(NamedTuple):
@@ -43,9 +48,14 @@ def report_array(report: Report) -> DiagnosticArray:
     return status_array(report.stamp_ns, report.node, report.level, report.message, values)
 
 
+def stamp_of(array: DiagnosticArray) -> int:
+    """Stamp (ns) of the tick that a message is about."""
+    return array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec
+
+
 def reports_in(array: DiagnosticArray) -> list[Report]:
     """Reports that a message carries."""
-    stamp_ns = array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec
+    stamp_ns = stamp_of(array)
     return [_report(status, stamp_ns) for status in array.status]
 
 
@@ -53,6 +63,14 @@ def _report(status: DiagnosticStatus, stamp_ns: int) -> Report:
     values = {pair.key: pair.value for pair in status.values}
     phase, peer, topic = (values.get(key, '') for key in ('phase', 'peer', 'topic'))
     return Report(status.name, phase, status.message, stamp_ns, peer, topic, status.level)
+
+
+def end_of_run(array: DiagnosticArray) -> Report | None:
+    """What the plant says about the end of the run, if that is what a message is about."""
+    for report in reports_in(array):
+        if report.node.rpartition('/')[2] == PLANT and report.phase in (FINISHED, FAILED):
+            return report
+    return None
 
 
 def concerns(array: DiagnosticArray, namespace: str) -> bool:

@@ -1,0 +1,150 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A bag is scored and drawn without anything that ``./glider run`` adds to it."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from glider_bringup import mission
+from glider_bringup.ros.bag import BagWriter
+from glider_bringup.scenario import load_scenario
+from glider_model.ros import health
+from glider_model.ros.codec import to_cdr
+from glider_model.ros.messages import PLANT, TOPICS
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_NS
+
+#: What a score file knows and a bag does not.
+ONLY_IN_THE_FILE = {'engine', 'wall_time_s', 'real_time_factor'}
+ATTACHED = ('scenario.yaml', 'vehicle.yaml')
+
+
+@pytest.fixture(scope='module')
+def run(tmp_path_factory) -> Path:
+    """Run folder with bag and score file."""
+    scenario = load_scenario('noisy_sensors', {'dives': 0, 'duration_s': 300.0, 'settle_s': 0.0})
+    folder = mission.make_run_folder(scenario, tmp_path_factory.mktemp('run') / 'flight')
+    flight, scores = mission.fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
+    mission.write_score(folder, mission.scorecard(scenario, 'direct', flight, scores))
+    return folder
+
+
+@pytest.fixture
+def bag_only(run, tmp_path) -> Path:
+    """Folder with nothing but the MCAP file of the run."""
+    (file,) = run.glob('*.mcap')
+    shutil.copy(file, tmp_path)
+    return tmp_path
+
+
+def said(phase: str, stamp_ns: int, message: str = '') -> bytes:
+    """Report of the plant."""
+    report = health.Report(PLANT, phase, message, stamp_ns, level=health.ERROR)
+    return to_cdr(health.report_array(report))
+
+
+def write_bag(folder: Path, *reports: bytes) -> Path:
+    """Run folder, as a launch makes it, with three ticks in its bag."""
+    scenario = load_scenario('helix')
+    mission.make_run_folder(scenario, folder)
+    bag = BagWriter(folder, 'helix', attachments=[folder / name for name in ATTACHED])
+    for tick in range(3):
+        for topic in TOPICS.values():
+            if topic.per_tick:
+                row = [0.0] * len(topic.codec.fields)
+                bag.write(topic.name, tick * TICK_NS, topic.codec.encode(tick * TICK_NS, row))
+    for report in reports:
+        bag.write('/diagnostics', 2 * TICK_NS, report)
+    bag.close()
+    return folder
+
+
+def test_scored_from_the_bag_as_it_was_in_flight(run, bag_only):
+    card = mission.score_again(run)
+    assert (card['status'], card['engine']) == ('completed', 'direct')
+    (file,) = bag_only.glob('*.mcap')
+    for source in (bag_only, file):
+        again = mission.score_again(source)
+        assert again.keys() == card.keys()
+        assert {name for name in card if again[name] != card[name]} == ONLY_IN_THE_FILE
+        assert [again[name] for name in sorted(ONLY_IN_THE_FILE)] == [None, None, None]
+
+
+def test_launched_run_has_parameters_and_no_score_file(run, tmp_path):
+    folder = tmp_path / 'launched'
+    shutil.copytree(run, folder)
+    (folder / 'score.json').unlink()
+    (folder / 'parameters.yaml').touch()
+    again = mission.score_again(folder)
+    assert (again['engine'], again['status'], again['reason']) == ('nodes', 'completed', '')
+
+
+def test_drawn_from_the_bag_alone(bag_only):
+    mission.draw(bag_only, bag_only / 'run.png')
+    assert (bag_only / 'run.png').read_bytes().startswith(b'\x89PNG')
+
+
+@pytest.mark.parametrize(
+    ('reports', 'status', 'words'),
+    [
+        ([said(health.FINISHED, 2 * TICK_NS)], 'completed', ''),
+        ([said(health.FAILED, 2 * TICK_NS, 'control_node is late')], 'aborted', 'control_node is'),
+        ([], 'aborted', 'stopped before'),
+    ],
+)
+def test_status_is_what_the_plant_said_last(tmp_path, reports, status, words):
+    card = mission.score_again(write_bag(tmp_path / 'flight', *reports))
+    assert card['status'] == status
+    assert words in card['reason']
+    assert bool(card['reason']) is bool(words)
+    assert (card['ticks'], card['messages_lost']) == (3, 0)
+
+
+def test_score_file_knows_more_than_the_bag(run, tmp_path):
+    """A run stopped by hand leaves no word of it in the bag."""
+    folder = tmp_path / 'stopped'
+    shutil.copytree(run, folder)
+    text = (folder / 'score.json').read_text()
+    (folder / 'score.json').write_text(
+        text.replace('"completed"', '"aborted"').replace(
+            '"reason": ""', '"reason": "stopped by SIGINT"'
+        )
+    )
+    card = mission.score_again(folder)
+    assert (card['status'], card['reason']) == ('aborted', 'stopped by SIGINT')
+
+
+@pytest.mark.parametrize('keep', [0, 5000])
+def test_file_cut_before_its_attachments_tells_what_is_missing(bag_only, keep):
+    (file,) = bag_only.glob('*.mcap')
+    file.write_bytes(file.read_bytes()[:keep])
+    with pytest.raises(ConfigurationError, match=r'no scenario\.yaml beside'):
+        mission.score_again(bag_only)
+
+
+def test_file_cut_short_is_scored_as_far_as_it_goes(bag_only):
+    (file,) = bag_only.glob('*.mcap')
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    card = mission.score_again(bag_only)
+    assert card['status'] == 'aborted'
+    assert 500 < card['ticks'] < 2500
+
+
+def test_stored_scenario_that_cannot_be_used_is_named(tmp_path):
+    (tmp_path / 'scenario.yaml').write_text('profile: {depth_m: 1.0}\n')
+    bag = BagWriter(tmp_path / 'flight', 'x', attachments=[tmp_path / 'scenario.yaml'])
+    bag.close()
+    with pytest.raises(ConfigurationError, match=r'flight: stored/scenario\.yaml.*depth_m'):
+        mission.score_again(tmp_path / 'flight')
+
+
+@pytest.mark.parametrize(
+    ('name', 'words'), [('nothing', 'no such run folder'), ('', 'not a run folder')]
+)
+def test_what_holds_no_run_is_refused(tmp_path, name, words):
+    for use in (mission.score_again, lambda run: mission.draw(run, tmp_path / 'run.png')):
+        with pytest.raises(ConfigurationError, match=words):
+            use(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
