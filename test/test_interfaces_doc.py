@@ -39,6 +39,7 @@ from glider_model import frames
 from glider_model.current import CurrentComponent, CurrentSettings
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
+from glider_model.nodes.tf_node import TfSettings
 from glider_model.plant import PlantSettings, plant_joints, plant_odometry, plant_step
 from glider_model.ros import health, qos
 from glider_model.ros.clock import ClockSettings
@@ -184,6 +185,7 @@ def tables() -> dict[str, str]:
         'clock': table(parameters, parameter_rows(ClockSettings, CLOCK_FIELDS)),
         'paths': table(fields, member_rows(PathSettings)),
         'currents': table(fields, member_rows(CurrentComponent)),
+        'tf_node': table(parameters, parameter_rows(TfSettings)),
         'launch': table(
             ('argument', 'default', 'meaning'),
             (

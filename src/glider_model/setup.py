@@ -25,6 +25,7 @@ setup(
         'console_scripts': [
             'plant_node = glider_model.nodes.plant_node:main',
             'current_node = glider_model.nodes.current_node:main',
+            'tf_node = glider_model.nodes.tf_node:main',
         ],
     },
 )

@@ -6,6 +6,8 @@ The launch file itself only turns this into launch actions, so that everything h
 tested where the launch system is not installed.
 """
 
+from collections.abc import Iterable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,12 +17,17 @@ from glider_bringup.runner import (
     MODULES,
     NAMESPACE_ALLOWED,
     OWN_CLOCK,
+    PLANT,
     RECORDER,
     absolute_namespace,
 )
-from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
+from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, scenario_names
+from glider_model.ros.messages import CURRENT
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
+
+#: The node that `ros2 launch` starts and `./glider run`, which nobody can watch, does not.
+TF, TF_MODULE = 'tf_node', 'glider_model.nodes.tf_node'
 
 _TRUTH = {'true': True, 'false': False}
 
@@ -36,10 +43,17 @@ class Argument(NamedTuple):
 
 ARGUMENTS = (
     Argument(
-        'scenario', DEFAULT_SCENARIO, 'Scenario by name (./glider list) or path of its YAML file.'
+        'scenario',
+        DEFAULT_SCENARIO,
+        f'Scenario: {", ".join(scenario_names())}; or path of a YAML file.',
     ),
     Argument('controller', '', "Attitude law; empty: the scenario's.", ('', 'adaptive', 'pid')),
     Argument('guidance', '', "Line of sight; empty: the scenario's.", ('', 'observer', 'paper')),
+    Argument(
+        'duration',
+        '',
+        "Simulated seconds, or full: the scenario's duration; empty: the scenario's dives.",
+    ),
     Argument('namespace', 'glider', 'Namespace of the nodes and their topics.'),
     Argument(
         'clock',
@@ -48,7 +62,9 @@ ARGUMENTS = (
         OWN_CLOCK,
     ),
     Argument('record', '', 'New folder for the recording; empty: no recording.'),
-    Argument('speed', '1.0', 'Times real time, or max. Free-running nodes keep real time: 1.0.'),
+    Argument(
+        'speed', '1.0', 'Times real time (0.01 to 1e6), or max. With lockstep:=false only 1.0.'
+    ),
     Argument(
         'lockstep',
         'true',
@@ -56,11 +72,25 @@ ARGUMENTS = (
         tuple(_TRUTH),
     ),
     Argument(
-        'duration',
-        '',
-        "Simulated seconds, or full: the scenario's duration; empty: the scenario's dives.",
+        'simulate',
+        'true',
+        'true: with plant and current; false: guidance and control alone, for a vehicle of yours '
+        'that publishes odom and joint_states. Needs lockstep:=false.',
+        tuple(_TRUTH),
+    ),
+    Argument(
+        'tf',
+        'auto',
+        'Publish odom as map -> base_link on /tf; auto: if tf2_msgs is installed.',
+        ('auto', *_TRUTH),
+    ),
+    Argument(
+        'frame_prefix', '', 'Put before base_link on /tf, such as one/, where gliders are several.'
     ),
 )
+
+#: What the launch system itself takes in the form of an argument.
+_LAUNCH_OPTIONS = {'launch-prefix', 'launch-prefix-filter'}
 
 
 class LaunchedNode(NamedTuple):
@@ -79,6 +109,23 @@ class LaunchPlan(NamedTuple):
     remappings: tuple[tuple[str, str], ...]
     lockstep: bool
     nodes: tuple[LaunchedNode, ...]
+
+
+def check_names(words: Iterable[str]) -> None:
+    """Refuse ``name:=value`` words of a command line whose name is not that of an argument.
+
+    The launch system would take them without a word.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming it, and those that there are.
+    """
+    names = [argument.name for argument in ARGUMENTS]
+    for word in words:
+        name, sign, _ = word.partition(':=')
+        if sign and name not in {*names, *_LAUNCH_OPTIONS}:
+            raise ConfigurationError(f'{word}: no such argument (allowed: {", ".join(names)})')
 
 
 def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
@@ -108,7 +155,13 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     lockstep = _TRUTH[text['lockstep']]
     speed = 0.0 if text['speed'] == 'max' else _number('speed', text, 0.01, 1e6, 'max')
     if not lockstep and speed != 1.0:
-        _refuse('speed', text, '1.0 with lockstep:=false')
+        _refuse('speed', text, '1.0 with lockstep:=false, whose nodes act in wall time')
+    simulate = _TRUTH[text['simulate']]
+    if lockstep and not simulate:
+        _refuse('lockstep', text, 'false with simulate:=false, a vehicle has its own clock')
+    with_tf = _TRUTH.get(text['tf'], find_spec('tf2_msgs') is not None)
+    if with_tf and not find_spec('tf2_msgs'):
+        _refuse('tf', text, 'false; tf2_msgs is not installed (Debian: ros-jazzy-tf2-msgs)')
     namespace = absolute_namespace(text['namespace'])
     if namespace is None:
         _refuse('namespace', text, NAMESPACE_ALLOWED)
@@ -123,10 +176,16 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     )
     if record_to:
         parameters[RECORDER]['progress'] = False
+    modules = dict(MODULES)
+    if not simulate:
+        del modules[PLANT], modules[CURRENT]
+    if with_tf:
+        modules[TF] = TF_MODULE
+        parameters[TF] = {'frame_prefix': text['frame_prefix']}
     write_parameters(parameters, folder / PARAMETERS_FILE, namespace)
     nodes = tuple(
         LaunchedNode(module.partition('.')[0], name)
-        for name, module in MODULES.items()
+        for name, module in modules.items()
         if name in parameters
     )
     remappings = (OWN_CLOCK,) if text['clock'] == OWN_CLOCK[1] else ()

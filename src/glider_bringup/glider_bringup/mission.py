@@ -84,8 +84,8 @@ def make_run_folder(scenario: Scenario, out: Path | None) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
             raise ConfigurationError(
-                f'--out {folder}: not empty; a run is never written over another (allowed: a new '
-                f'or empty folder)'
+                f'{folder}: not empty; a run is never written over another (allowed: a new or '
+                f'empty folder)'
             )
         vehicle = vehicle_path(scenario.vehicle)
         (folder / VEHICLE_FILE).write_bytes(vehicle.read_bytes())

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """``ros2 launch glider_bringup glider.launch.py scenario:=current_8deg``."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,14 @@ from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from glider_bringup.launching import ARGUMENTS, LaunchedNode, LaunchPlan, plan_launch
+from glider_bringup.launching import (
+    ARGUMENTS,
+    TF,
+    LaunchedNode,
+    LaunchPlan,
+    check_names,
+    plan_launch,
+)
 from glider_bringup.runner import PLANT
 
 
@@ -33,6 +41,8 @@ def generate_launch_description() -> LaunchDescription:
 
 def start(context: LaunchContext) -> list:
     """Nodes for the values that the arguments have."""
+    if Path(__file__).name in (Path(word).name for word in sys.argv):  # else another includes it
+        check_names(context.argv)
     values = {
         argument.name: LaunchConfiguration(argument.name).perform(context)
         for argument in ARGUMENTS
@@ -59,10 +69,15 @@ def on_exit(name: str, plan: LaunchPlan) -> Callable[[ProcessExited, LaunchConte
     """What the end of a node means.
 
     The plant ends the run. In lockstep nobody can go on without a peer that failed; free-running
-    nodes can.
+    nodes can, and nobody needs the node for transforms.
     """
 
     def end(event: ProcessExited, context: LaunchContext) -> Shutdown | None:
-        return Shutdown() if name == PLANT or (plan.lockstep and event.returncode) else None
+        if context.is_shutdown:
+            return None
+        if event.returncode and (name == PLANT or (plan.lockstep and name != TF)):
+            # Only an exception gives `ros2 launch` an exit code, 1; a Shutdown would be a success.
+            raise RuntimeError(f'{name} ended with exit code {event.returncode}; the run is over')
+        return Shutdown(reason='the run is complete') if name == PLANT else None
 
     return end

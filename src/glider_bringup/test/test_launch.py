@@ -3,13 +3,16 @@
 """The launch file: what it starts, with which parameters, and what it refuses."""
 
 import importlib.util
+import sys
 from pathlib import Path
 
 import pytest
 import yaml
 
-from glider_bringup.launching import ARGUMENTS, LaunchedNode, plan_launch
+from glider_bringup import launching
+from glider_bringup.launching import ARGUMENTS, TF, LaunchedNode, check_names, plan_launch
 from glider_bringup.runner import MODULES, PLANT, RECORDER
+from glider_bringup.scenario import scenario_names
 from glider_control.control import ControlLawSettings
 from glider_guidance.guidance import LosSettings
 from glider_model.settings import ConfigurationError
@@ -21,6 +24,14 @@ def parameters(plan) -> dict[str, dict]:
     """Contents of the parameter file, by full name of the node."""
     values = yaml.safe_load(plan.parameters_file.read_text())
     return {name: entry['ros__parameters'] for name, entry in values.items()}
+
+
+@pytest.fixture(autouse=True)
+def tf2(monkeypatch):
+    """tf2_msgs is not there, wherever this runs; tests say where it is."""
+    there = []
+    monkeypatch.setattr(launching, 'find_spec', lambda name: there or None)
+    return there
 
 
 # ---------------------------------------------------------------------- without the launch system
@@ -69,6 +80,35 @@ def test_free_running(tmp_path):
     assert not any(entry['lockstep'] for entry in parameters(plan).values())
 
 
+def test_vehicle_of_ones_own_has_guidance_and_control_alone(tmp_path):
+    arguments = {'simulate': 'false', 'lockstep': 'false', 'record': str(tmp_path / 'flight')}
+    plan = plan_launch(arguments, tmp_path)
+    names = {node.executable for node in plan.nodes}
+    assert names == {'guidance_node', 'control_node', RECORDER}
+    assert not any(entry['lockstep'] for entry in parameters(plan).values())
+
+
+@pytest.mark.parametrize(
+    ('tf', 'is_installed', 'starts'),
+    [('auto', False, False), ('auto', True, True), ('true', True, True), ('false', True, False)],
+)
+def test_transforms_are_published_where_they_can_be(tmp_path, tf2, tf, is_installed, starts):
+    tf2.extend([True] * is_installed)
+    plan = plan_launch({'tf': tf, 'frame_prefix': 'one/'}, tmp_path)
+    assert (LaunchedNode('glider_model', TF) in plan.nodes) is starts
+    values = parameters(plan)
+    assert (f'/glider/{TF}' in values) is starts
+    if starts:
+        assert values[f'/glider/{TF}'] == {'frame_prefix': 'one/'}
+
+
+def test_names_of_arguments_are_checked():
+    check_names([f'{argument.name}:=x' for argument in ARGUMENTS])
+    check_names(['launch-prefix:=nice', '--noninteractive'])
+    with pytest.raises(ConfigurationError, match='sped:=max.*speed'):
+        check_names(['scenario:=helix', 'sped:=max'])
+
+
 @pytest.mark.parametrize('namespace', ['', '/'])
 def test_root_namespace(tmp_path, namespace):
     plan = plan_launch({'namespace': namespace}, tmp_path)
@@ -107,6 +147,8 @@ def test_recording_adds_the_recorder_and_makes_a_run_folder(tmp_path):
         ({'speed': 'fast'}, ['speed:=fast', '0.01 to 1e+06, or max']),
         ({'speed': 'nan'}, ['speed:=nan', 'max']),
         ({'speed': '2', 'lockstep': 'false'}, ['speed:=2', '1.0 with lockstep:=false']),
+        ({'simulate': 'false'}, ['lockstep:=true', 'false with simulate:=false']),
+        ({'tf': 'true'}, ['tf:=true', 'tf2_msgs is not installed']),
         ({'duration': '-5'}, ['duration:=-5', '0.1 to 1e+08, or full']),
         ({'namespace': 'a b'}, ['namespace:=a b']),
     ],
@@ -126,6 +168,8 @@ def test_choices_are_those_of_the_settings():
     ):
         words = model.model_fields[field].annotation.__args__
         assert set(choices[name]) == {'', *words}
+    described = {argument.name: argument.description for argument in ARGUMENTS}
+    assert all(name in described['scenario'] for name in scenario_names())
 
 
 # ---------------------------------------------------------------------- with the launch system
@@ -192,24 +236,66 @@ def test_recorder_is_started_for_a_recording(start, tmp_path):
 @pytest.mark.parametrize(
     ('name', 'lockstep', 'code', 'ends'),
     [
-        (PLANT, 'true', 0, True),
-        (PLANT, 'true', 3, True),
-        (PLANT, 'false', 0, True),
-        ('guidance_node', 'true', 0, False),
-        ('guidance_node', 'true', -9, True),
-        ('guidance_node', 'false', -9, False),
+        (PLANT, 'true', 0, 'well'),
+        (PLANT, 'true', 3, 'badly'),
+        (PLANT, 'false', 0, 'well'),
+        (PLANT, 'false', -9, 'badly'),
+        ('guidance_node', 'true', 0, None),
+        ('guidance_node', 'true', -9, 'badly'),
+        ('guidance_node', 'false', -9, None),
+        (TF, 'true', 1, None),
     ],
 )
 def test_end_of_a_node_ends_the_launch_when_it_has_to(
     launch_module, tmp_path, name, lockstep, code, ends
 ):
+    """A launch service exits with 1 after an exception, and with 0 after a Shutdown."""
     import launch
     from launch.actions import Shutdown
 
     plan = plan_launch({'lockstep': lockstep}, tmp_path)
     on_exit = launch_module.on_exit(name, plan)
-    result = on_exit(type('Exited', (), {'returncode': code})(), launch.LaunchContext())
-    assert isinstance(result, Shutdown) is ends
+    event, context = type('Exited', (), {'returncode': code})(), launch.LaunchContext()
+    if ends == 'badly':
+        with pytest.raises(RuntimeError, match=f'{name} ended with exit code {code}'):
+            on_exit(event, context)
+    else:
+        assert isinstance(on_exit(event, context), Shutdown) is (ends == 'well')
+    context._set_is_shutdown(True)
+    assert on_exit(event, context) is None
+
+
+@pytest.mark.parametrize(('code', 'expected'), [(0, 0), (3, 1)])
+def test_exit_code_of_a_launch_is_that_of_the_run(launch_module, tmp_path, code, expected):
+    import launch
+    from launch.actions import ExecuteProcess
+
+    plan = plan_launch({}, tmp_path)
+    process = ExecuteProcess(
+        cmd=[sys.executable, '-c', f'raise SystemExit({code})'],
+        on_exit=launch_module.on_exit(PLANT, plan),
+    )
+    other = ExecuteProcess(cmd=['sleep', '300'])
+    service = launch.LaunchService()
+    service.include_launch_description(launch.LaunchDescription([other, process]))
+    assert service.run() == expected
+
+
+def test_misspelt_argument_is_refused_unless_another_file_includes_this_one(
+    launch_module, tmp_path, monkeypatch
+):
+    import launch
+
+    monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
+    launch.logging.launch_config.reset()
+    context = launch.LaunchContext(argv=['sped:=max'])
+    context.launch_configurations.update({item.name: item.default for item in ARGUMENTS})
+    monkeypatch.setattr(sys, 'argv', ['ros2', 'launch', 'mine', 'mine.launch.py', 'sped:=max'])
+    assert launch_module.start(context)
+    monkeypatch.setattr(sys, 'argv', ['ros2', 'launch', 'glider_bringup', LAUNCH_FILE.name])
+    with pytest.raises(ConfigurationError, match='sped:=max'):
+        launch_module.start(context)
+    launch.logging.launch_config.reset()
 
 
 def test_wrong_scenario_is_one_message(start):

@@ -1,10 +1,17 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Flights of the plant for all tests of the model: the tick loop compiled, rows as arrays."""
+"""Flights of the plant: the tick loop compiled, rows as arrays. A ROS domain of a test's own."""
+
+import fcntl
+import os
+import tempfile
+from pathlib import Path
 
 import numba
 import numpy as np
 import pytest
+import rclpy
+from rclpy.context import Context
 
 from glider_model.frames import quaternion_from_euler
 from glider_model.plant import Motion, PlantParams, PlantState, plant_step
@@ -114,3 +121,22 @@ def fly():
     Commands (default: actuators stay) and waters are one row, or one row per tick.
     """
     return _flight
+
+
+@pytest.fixture
+def context():
+    """A context in a ROS domain that no other test or run on this machine uses."""
+    for offset in range(101):
+        domain = 1 + (os.getpid() + offset) % 101
+        path = Path(tempfile.gettempdir()) / f'glider-ros-domain-{domain}.lock'
+        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            break
+        except OSError:
+            os.close(lock)
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    yield context
+    rclpy.try_shutdown(context=context)
+    os.close(lock)

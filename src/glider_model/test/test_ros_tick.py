@@ -2,15 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes in step: order, exactness, readiness, blame, pause, pace, and the free-running mode."""
 
-import fcntl
-import os
-import tempfile
 import time
-from pathlib import Path
 
 import pytest
 import rclpy
-from rclpy.context import Context
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
@@ -22,25 +17,6 @@ from glider_model.ros.tick import BlockNode, Stop
 from glider_model.signals import TICK_NS
 
 TIMEOUT_S = 30.0
-
-
-@pytest.fixture
-def context():
-    """A context in a ROS domain that no other test or run on this machine uses."""
-    for offset in range(101):
-        domain = 1 + (os.getpid() + offset) % 101
-        path = Path(tempfile.gettempdir()) / f'glider-ros-domain-{domain}.lock'
-        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            break
-        except OSError:
-            os.close(lock)
-    context = Context()
-    rclpy.init(context=context, domain_id=domain)
-    yield context
-    rclpy.try_shutdown(context=context)
-    os.close(lock)
 
 
 class Clock(ClockNode):
