@@ -111,6 +111,18 @@ def test_checksums_summary_and_attachments(folder):
         assert len(list(reader.iter_messages())) == statistics.message_count
 
 
+def test_recording_is_never_written_over_another(tmp_path):
+    """Started once more with the parameters of a run, a recorder must not destroy it."""
+    write_one_by_one(tmp_path, ticks=3)
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    assert set(before) == {'run_0.mcap', 'metadata.yaml'}
+    for name, exists in (('run', 'run_0.mcap'), ('other', 'metadata.yaml')):
+        with pytest.raises(FileExistsError, match='never written over') as error:
+            BagWriter(tmp_path, name)
+        assert error.value.filename == str(tmp_path / exists)
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
 def test_metadata_has_the_shape_of_jazzy(folder):
     information = yaml.safe_load((folder / 'metadata.yaml').read_text())
     assert list(information) == ['rosbag2_bagfile_information']
@@ -163,9 +175,9 @@ def test_writing_at_once_gives_the_same_file(tmp_path, ticks):
 
 @pytest.mark.parametrize(('share', 'chunks'), [(0.02, 1), (0.2, 1), (0.98, 2)])
 def test_torn_file_reads_up_to_the_last_whole_chunk(tmp_path, share, chunks):
-    write_one_by_one(tmp_path, CHUNK_TICKS, close=False)
+    write_one_by_one(tmp_path / 'one', CHUNK_TICKS, close=False)
     file = tmp_path / 'run_0.mcap'
-    whole = file.stat().st_size
+    whole = (tmp_path / 'one' / 'run_0.mcap').stat().st_size
     write_one_by_one(tmp_path, TICKS, close=False)
     assert not (tmp_path / 'metadata.yaml').exists()
     data = file.read_bytes()
@@ -177,13 +189,6 @@ def test_torn_file_reads_up_to_the_last_whole_chunk(tmp_path, share, chunks):
                 stamps.append(record.log_time)
     ticks = range(chunks * CHUNK_TICKS)
     assert stamps == [tick * TICK_NS for tick in ticks for _ in PER_TICK]
-
-
-def test_folder_of_an_earlier_run_does_not_pass_for_this_one(tmp_path):
-    write_one_by_one(tmp_path, 3)
-    assert (tmp_path / 'metadata.yaml').exists()
-    BagWriter(tmp_path, 'run')
-    assert not (tmp_path / 'metadata.yaml').exists()
 
 
 def test_empty_recording_is_valid(tmp_path):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run's folder as rosbag2 (Jazzy) would have written it, with MCAP storage."""
 
+import errno
 import json
 import os
 import re
@@ -101,6 +102,11 @@ class BagWriter:
         Files stored in the MCAP under their own names.
     topics : iterable of Topic
         In the order in which a tick is written; names given to `write` are theirs.
+
+    Raises
+    ------
+    OSError
+        If a recording is there already, or the file cannot be made.
     """
 
     def __init__(
@@ -113,11 +119,15 @@ class BagWriter:
     ) -> None:
         self._folder = Path(folder)
         self._folder.mkdir(parents=True, exist_ok=True)
-        (self._folder / 'metadata.yaml').unlink(missing_ok=True)
         self._file_name = f'{name}_0.mcap'
+        file = self._folder / self._file_name
+        for path in (file, self._folder / 'metadata.yaml'):
+            if path.exists():
+                reason = 'exists; a recording is never written over another'
+                raise FileExistsError(errno.EEXIST, reason, str(path))
         self._topics = list(topics)
         self._names = names or {topic.name: topic.full_name('/glider') for topic in self._topics}
-        self._mcap = McapWriter(self._folder / self._file_name, profile='ros2')
+        self._mcap = McapWriter(file, profile='ros2')
         schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         for topic in self._topics:

@@ -42,6 +42,8 @@ EXIT_CONFIGURATION, EXIT_PEER = 2, 3
 _LINGER_S = 0.2
 
 _STARTUP_PERIOD_S = 0.03
+#: Who starts a node by hand is told what it waits for, after this time and then this often (s).
+_PATIENCE_S, _REMIND_S = 5.0, 20.0
 _REPORT_AFTER = 0.4
 _QUIET_PUBLISHER = PublisherEventCallbacks(use_default_callbacks=False)
 _QUIET_SUBSCRIPTION = SubscriptionEventCallbacks(use_default_callbacks=False)
@@ -125,6 +127,7 @@ class TickNode(Node):
         self._watched_since_s = 0.0
         self._startup_timer = None
         self._said = ''
+        self._created_s = time.monotonic()
         self.running = False
         self.over_since_s: float | None = None
 
@@ -279,6 +282,10 @@ class TickNode(Node):
             if self._said != missing[0]:
                 self._said = missing[0]
                 self.report(health.STARTING, missing[0])
+            if time.monotonic() - self._created_s > _PATIENCE_S:
+                self.get_logger().warning(
+                    f'waits for its peers: {"; ".join(missing)}', throttle_duration_sec=_REMIND_S
+                )
             return
         self.destroy_timer(self._startup_timer)
         self.running = True
