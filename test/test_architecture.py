@@ -1,8 +1,11 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The architecture, checked by reading every import in the source tree."""
+"""The architecture and the dependencies, checked by reading every import in the source tree."""
 
 import ast
+import re
+import sys
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
@@ -15,6 +18,31 @@ MAY_IMPORT = {
     'glider_guidance': {'glider_model'},
     'glider_control': {'glider_model'},
     'glider_bringup': {'glider_model', 'glider_guidance', 'glider_control'},
+}
+
+#: rosdep keys of modules that are no ROS packages. Each was looked up in rosdep/python.yaml of
+#: ros/rosdistro, where it names an Ubuntu package for noble.
+ROSDEP_KEYS = {
+    'hypothesis': 'python3-hypothesis',
+    'matplotlib': 'python3-matplotlib',
+    'numba': 'python3-numba',
+    'numpy': 'python3-numpy',
+    'pydantic': 'python3-pydantic',
+    'pytest': 'python3-pytest',
+    'rich': 'python3-rich',
+    'scipy': 'python3-scipy',
+    'typer': 'python3-typer',
+    'yaml': 'python3-yaml',
+}
+
+#: Modules for which rosdep has no key; pip brings them, from requirements.txt.
+ONLY_PIP = {'mcap', 'plotly', 'rosbags', 'zstandard'}
+
+#: Packages of ROS 2 Jazzy, of which rosdep takes the name as a key.
+JAZZY = {
+    *('ament_index_python', 'launch', 'launch_ros', 'rclpy', 'tf2_msgs'),
+    *('builtin_interfaces', 'rcl_interfaces', 'rosgraph_msgs', 'std_srvs'),
+    *(f'{kind}_msgs' for kind in ('diagnostic', 'geometry', 'nav', 'sensor', 'std')),
 }
 
 #: Folders of a package whose modules may speak ROS.
@@ -141,3 +169,41 @@ def test_what_the_architecture_allows_is_accepted(tmp_path, path, source):
     file.parent.mkdir(parents=True)
     file.write_text(source + '\n')
     assert violations(tmp_path) == []
+
+
+# ---------------------------------------------------------------------- dependencies
+
+
+def declared(package: str) -> set[str]:
+    """Keys that a package.xml asks rosdep for, those of tests left out."""
+    root = ElementTree.parse(SOURCES / package / 'package.xml').getroot()
+    return {item.text for item in root if item.tag in ('depend', 'exec_depend')}
+
+
+def needed(package: str) -> set[str]:
+    """Top-level modules that a package and its launch files import, less the standard library."""
+    root = SOURCES / package
+    paths = [*(root / package).rglob('*.py'), *(root / 'launch').glob('*.py')]
+    return set().union(*(imports(path, root) for path in paths)) - sys.stdlib_module_names
+
+
+@pytest.mark.parametrize('package', MAY_IMPORT)
+def test_package_declares_what_it_imports(package):
+    modules = needed(package) - {package}
+    keys = {ROSDEP_KEYS.get(module, module) for module in modules - ONLY_PIP}
+    assert keys - declared(package) == set(), 'missing in package.xml'
+
+
+@pytest.mark.parametrize('package', MAY_IMPORT)
+def test_rosdep_knows_what_a_package_declares(package):
+    root = ElementTree.parse(SOURCES / package / 'package.xml').getroot()
+    keys = {item.text for item in root if item.tag.endswith('depend')}
+    assert keys - {*ROSDEP_KEYS.values(), *JAZZY, *MAY_IMPORT} == set(), 'look it up, note it here'
+
+
+def test_what_only_pip_has_is_pinned():
+    text = (SOURCES.parent / 'requirements.txt').read_text(encoding='utf-8')
+    pinned = set(re.findall(r'^(\w[\w-]*)==', text, re.MULTILINE))
+    used = set().union(*(needed(package) for package in MAY_IMPORT))
+    assert used & ONLY_PIP <= pinned
+    assert {'pydantic', 'numba'} <= pinned  # noble has 1.10 and 0.58
