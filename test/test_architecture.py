@@ -206,4 +206,4 @@ def test_what_only_pip_has_is_pinned():
     pinned = set(re.findall(r'^(\w[\w-]*)==', text, re.MULTILINE))
     used = set().union(*(needed(package) for package in MAY_IMPORT))
     assert used & ONLY_PIP <= pinned
-    assert {'pydantic', 'numba'} <= pinned  # noble has 1.10 and 0.58
+    assert 'pydantic' in pinned  # noble has 1.10, this needs 2
