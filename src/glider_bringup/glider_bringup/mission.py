@@ -265,6 +265,11 @@ def score_again(run: Path) -> dict:
         else:
             complete, reason = end_of_run(run)
         recorded, lost = recorded_and_lost(run, complete)
+        if lost and not scorer.ticks:
+            raise ConfigurationError(
+                f'{run}: cannot be scored: its first tick is not complete, as in a free-running '
+                f'recording (allowed: runs in lockstep, with every message of every tick)'
+            )
         status = 'completed' if complete else 'aborted'
         flight = Flight(status, reason, old.get('wall_time_s'), recorded, lost)
         engine = old.get('engine') or ('nodes' if (run / PARAMETERS_FILE).exists() else None)

@@ -45,14 +45,14 @@ def said(phase: str, stamp_ns: int, message: str = '') -> bytes:
     return to_cdr(health.report_array(report))
 
 
-def write_bag(folder: Path, *reports: bytes) -> Path:
-    """Run folder, as a launch makes it, with three ticks in its bag."""
+def write_bag(folder: Path, *reports: bytes, but: str = '') -> Path:
+    """Run folder, as a launch makes it, with three ticks in its bag, ``but`` in the last only."""
     scenario = load_scenario('helix')
     mission.make_run_folder(scenario, folder)
     bag = BagWriter(folder, 'helix', attachments=[folder / name for name in ATTACHED])
     for tick in range(3):
         for topic in TOPICS.values():
-            if topic.per_tick:
+            if topic.per_tick and (tick == 2 or topic.name != but):
                 row = [0.0] * len(topic.codec.fields)
                 bag.write(topic.name, tick * TICK_NS, topic.codec.encode(tick * TICK_NS, row))
     for report in reports:
@@ -130,6 +130,12 @@ def test_file_cut_short_is_scored_as_far_as_it_goes(bag_only):
     card = mission.score_again(bag_only)
     assert card['status'] == 'aborted'
     assert 500 < card['ticks'] < 2500
+
+
+def test_free_running_recording_is_no_scorecard_of_nothing(tmp_path):
+    folder = write_bag(tmp_path / 'flight', said(health.FINISHED, 2 * TICK_NS), but='reference')
+    with pytest.raises(ConfigurationError, match='flight: cannot be scored.*free-running'):
+        mission.score_again(folder)
 
 
 def test_stored_scenario_that_cannot_be_used_is_named(tmp_path):
