@@ -43,7 +43,7 @@ _LINGER_S = 0.2
 
 _STARTUP_PERIOD_S = 0.03
 #: Who starts a node by hand is told what it waits for, after this time and then this often (s).
-_PATIENCE_S, _REMIND_S = 5.0, 20.0
+_PATIENCE_S, _REMIND_S = 10.0, 20.0
 _REPORT_AFTER = 0.4
 _QUIET_PUBLISHER = PublisherEventCallbacks(use_default_callbacks=False)
 _QUIET_SUBSCRIPTION = SubscriptionEventCallbacks(use_default_callbacks=False)
