@@ -17,8 +17,9 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 
 from glider_model.ros import qos
+from glider_model.ros.executor import Gate, take
 from glider_model.ros.parameters import declare_settings
-from glider_model.ros.tick import Gate, run, take
+from glider_model.ros.tick import run
 from glider_model.settings import ConfigurationError, Settings
 
 #: What tf2's own broadcasters offer.
