@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the commands share: consoles, exit codes, options, progress bars."""
 
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable
 from contextlib import contextmanager
 from enum import Enum
 from typing import Annotated, get_args
@@ -37,6 +37,16 @@ def choices(name: str, model, field: str) -> type[Enum]:
 
 
 Controller = choices('Controller', ControlLawSettings, 'law')
+Workers = Annotated[
+    int | None, typer.Option(min=1, max=1024, help='Processes. Default: one per processor.')
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar='ADDRESS',
+        help='Fly on the Dask cluster with this scheduler, such as tcp://127.0.0.1:8786.',
+    ),
+]
 Json = Annotated[
     bool, typer.Option('--json', help='Print one JSON object and nothing else on standard output.')
 ]
@@ -85,16 +95,29 @@ def progress(scenario: Scenario, ticks: int):
 
 
 @contextmanager
-def workers_at_work():
-    """Say what ended the work of worker processes early, and leave with its exit code."""
+def workers_at_work(
+    workers: int | None, scheduler: str | None, advice: Callable[[], str] = lambda: ''
+):
+    """Workers that fly; yields their pool.
+
+    What ends their work early is told, with what ``advice`` adds, and is the exit code.
+    """
+    from glider_bringup.pool import WorkError, worker_pool
+
+    if workers and scheduler:
+        raise ConfigurationError(
+            f'--workers {workers}: not with --scheduler, whose cluster has workers of its own'
+        )
     try:
-        yield
+        with worker_pool(workers, scheduler) as pool:
+            yield pool
+        return
     except KeyboardInterrupt:
-        messages.print('stopped by SIGINT', style='red')
-        raise typer.Exit(EXIT_INTERRUPTED) from None
-    except BrokenProcessPool:
-        messages.print('a worker process was killed; give fewer --workers', style='red')
-        raise typer.Exit(EXIT_FAILED) from None
+        reason, code = 'stopped by SIGINT', EXIT_INTERRUPTED
+    except WorkError as error:
+        reason, code = str(error), EXIT_FAILED
+    messages.print(reason + advice(), style='red', soft_wrap=True)
+    raise typer.Exit(code)
 
 
 @contextmanager

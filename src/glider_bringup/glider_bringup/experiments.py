@@ -11,7 +11,6 @@ import json
 import math
 import shlex
 from collections.abc import Callable, Iterator
-from concurrent.futures import as_completed
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +19,7 @@ from glider_bringup.direct import fly_blocks
 from glider_bringup.figure import Record
 from glider_bringup.mission import mission_of
 from glider_bringup.montecarlo import airframe
-from glider_bringup.pool import Progress, check_stop, worker_pool
+from glider_bringup.pool import Pool, Progress
 from glider_bringup.scenario import Scenario, load_scenario
 from glider_bringup.score import Scorer, windows
 from glider_guidance.los import crab_heading
@@ -332,7 +331,6 @@ def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
 
     def blocks() -> Iterator[np.ndarray]:
         for log in fly_blocks(state, params):
-            check_stop()
             scorer.add(log)
             yield log
 
@@ -363,7 +361,7 @@ def _clean(value: Any) -> Any:
 
 
 def fly(
-    experiments: list[Experiment], workers: int, progress: Progress
+    experiments: list[Experiment], pool: Pool, progress: Progress
 ) -> tuple[list[list[dict]], list[list[Record | None]]]:
     """Fly every case, in worker processes; what two experiments share is flown once.
 
@@ -378,12 +376,7 @@ def fly(
     for case in (case for one in experiments for case in one.cases):
         if case.drawn or case.key() not in cases:
             cases[case.key()] = case
-    with worker_pool(workers) as submit:
-        futures = {key: submit(_fly_case, case) for key, case in cases.items()}
-        for done, future in enumerate(as_completed(futures.values()), 1):
-            future.result()
-            progress(done)
-    flown = {key: future.result() for key, future in futures.items()}
+    flown = pool.results(_fly_case, cases, progress)
     rows = [
         [
             {

@@ -10,14 +10,13 @@ number of plants and of worker processes.
 import json
 import math
 import shlex
-from concurrent.futures import as_completed
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from glider_bringup.mission import fly_direct
-from glider_bringup.pool import Progress, check_stop, worker_pool
+from glider_bringup.pool import Pool, Progress
 from glider_bringup.scenario import Scenario, load_scenario
 from glider_model.perturb import (
     ADDED_MASS,
@@ -211,11 +210,7 @@ def judge(scores: dict) -> dict[str, Any]:
 
 def _fly_plant(scenario: Scenario) -> dict[str, Any]:
     """Fly one scenario in a worker."""
-
-    def check(ticks: int, depth_m: float) -> None:
-        check_stop()
-
-    _, scores = fly_direct(scenario, Path(), False, check)
+    _, scores = fly_direct(scenario, Path(), False, lambda ticks, depth_m: None)
     return judge(scores)
 
 
@@ -226,7 +221,7 @@ def _check_plant(scenario: Scenario) -> dict[str, Any]:
 
 
 def fly_plants(
-    scenarios: dict[tuple[int, str], Scenario], workers: int, progress: Progress
+    scenarios: dict[tuple[int, str], Scenario], pool: Pool, progress: Progress
 ) -> tuple[dict[tuple[int, str], dict], dict[int, dict]]:
     """Fly every scenario, in worker processes.
 
@@ -238,16 +233,8 @@ def fly_plants(
         What `airframe` says, by plant.
     """
     plants = {plant: scenario for (plant, _), scenario in scenarios.items()}
-    with worker_pool(workers) as submit:
-        checks = {plant: submit(_check_plant, one) for plant, one in plants.items()}
-        flights = {key: submit(_fly_plant, one) for key, one in scenarios.items()}
-        for done, future in enumerate(as_completed(flights.values()), 1):
-            future.result()
-            progress(done)
-        return (
-            {key: future.result() for key, future in flights.items()},
-            {plant: future.result() for plant, future in checks.items()},
-        )
+    airframes = pool.results(_check_plant, plants, lambda done: None)
+    return pool.results(_fly_plant, scenarios, progress), airframes
 
 
 # ---------------------------------------------------------------------------------- results

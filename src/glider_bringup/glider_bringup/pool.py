@@ -1,78 +1,241 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Worker processes that fly many missions at once, and stop cleanly on Ctrl-C."""
+"""Worker processes that fly many missions at once: of this machine, or of a Dask cluster.
 
-import multiprocessing
+Workers may die at any moment. What they were doing is done again by others; only a task that kills
+its worker time and again, flown with nothing else beside it, is given up.
+"""
+
+import logging
 import os
 import signal
-import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import contextmanager
-from typing import Any
+import tempfile
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import islice
+from socket import gethostname
+from typing import Any, NamedTuple
+
+import dask
+from distributed import Client, Future, LocalCluster, TimeoutError, wait
+from distributed.diagnostics.plugin import WorkerPlugin
+from distributed.scheduler import KilledWorker
+
+from glider_model.kernel import source_digest
+from glider_model.settings import ConfigurationError
+
+#: Tasks that are handed out ahead, for each thread of the workers.
+TASKS_AHEAD = 2
+#: How long a scheduler may take to answer, and how often it is looked at (s).
+CONNECT_S, LOOK_S = 10.0, 2.0
+#: Makes the workers of this machine log nothing: what matters is told by the commands.
+_QUIET = {'distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED': 'critical'}
+
+WORKER_DIED = 'the worker process died each time it flew this'
+SCHEDULER_GONE = 'the scheduler of the workers is gone'
 
 #: Called with the number of flights that are done.
 Progress = Callable[[int], None]
 
 
-class StoppedError(Exception):
-    """The work was stopped."""
+class WorkError(Exception):
+    """Workers could not do what they were given; the message is meant for the person."""
 
 
-_stop = None  #: in a worker: set when the work is stopped
+class Outcome(NamedTuple):
+    """What became of a task."""
+
+    task: Any
+    future: Future | None  #: None: it killed its workers
+
+    def result(self) -> Any:
+        """What the function returned.
+
+        Raises
+        ------
+        WorkError
+            If the task killed its workers.
+        """
+        if self.future is None:
+            raise WorkError(WORKER_DIED)
+        return self.future.result()
 
 
-def check_stop() -> None:
-    """Give up, in a worker whose parent was stopped; to be called now and then.
-
-    Raises
-    ------
-    StoppedError
-        If the parent was stopped.
-    """
-    if _stop is not None and _stop.is_set():
-        raise StoppedError
+def _call(code: str, function: Callable, task: Any) -> Any:
+    """What a function returns for a task, in a worker with the same program."""
+    if code != source_digest():
+        raise WorkError(f'the worker on {gethostname()} has another version of the program')
+    return function(task)
 
 
-def _start_worker(stop) -> None:
-    """Prepare a worker, which does not outlive its parent."""
-    global _stop
-    _stop = stop
-
-    def end_with_parent() -> None:
-        multiprocessing.parent_process().join()
-        os._exit(1)
-
-    threading.Thread(target=end_with_parent, daemon=True).start()
+def _keyed(task: tuple[Callable, Hashable, Any]) -> tuple[Hashable, Any]:
+    """Key of a task, and what its function returns."""
+    function, key, argument = task
+    return key, function(argument)
 
 
-@contextmanager
-def _children_ignore_interrupts() -> Iterator[None]:
+class _IgnoreInterrupts(WorkerPlugin):
     """Ctrl-C, which a terminal sends to all processes, is for the parent to deal with."""
+
+    def setup(self, worker) -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+class Pool:
+    """Workers that are connected.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    """
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+
+    def threads(self) -> int:
+        """Number of tasks that the workers can do at once; 0 if none is connected."""
+        return sum(self._client.nthreads().values())
+
+    def outcomes(
+        self,
+        function: Callable,
+        tasks: Iterable,
+        apart: Callable[[Any], list] = lambda task: [task],
+        on_wait: Callable[[], None] = lambda: None,
+    ) -> Iterator[Outcome]:
+        """Do tasks; yields each as it is done, in any order.
+
+        Parameters
+        ----------
+        function : callable
+            Called in a worker with the task.
+        tasks : iterable
+            Taken as workers become free, so that there may be many.
+        apart : callable
+            Splits a task that may kill workers into smaller ones.
+        on_wait : callable
+            Called every few seconds while no worker is connected.
+
+        Raises
+        ------
+        WorkError
+            If the scheduler is gone, or a worker has another version of the program.
+        """
+        suspects = []
+        for outcome in self._together(function, iter(tasks), TASKS_AHEAD, on_wait):
+            if outcome.future is None:
+                suspects.append(outcome.task)
+            else:
+                yield outcome
+        # Dask blames all that waited in a worker that died: each is tried again by itself.
+        for task in (part for suspect in suspects for part in apart(suspect)):
+            yield from self._together(function, iter([task]), 1, on_wait)
+
+    def results(
+        self, function: Callable, tasks: dict[Hashable, Any], progress: Progress
+    ) -> dict[Hashable, Any]:
+        """What a function returns for each task, by its key, in the order of the keys.
+
+        Raises
+        ------
+        WorkError
+            If a task killed its workers, and as `outcomes`.
+        """
+        results = {}
+        for outcome in self.outcomes(_keyed, ((function, *task) for task in tasks.items())):
+            key, result = outcome.result()
+            results[key] = result
+            progress(len(results))
+        return {key: results[key] for key in tasks}
+
+    def _together(self, function, tasks: Iterator, ahead: int, on_wait) -> Iterator[Outcome]:
+        """Do tasks without a second chance for those that were there when workers died."""
+        flying: dict[Future, Any] = {}
+        try:
+            while True:
+                threads = self.threads()
+                for task in islice(tasks, max(0, ahead * max(threads, 1) - len(flying))):
+                    future = self._client.submit(
+                        _call, source_digest(), function, task, pure=False
+                    )
+                    flying[future] = task
+                if not flying:
+                    return
+                if not threads:
+                    on_wait()
+                for future in self._ended(flying):
+                    task = flying.pop(future)
+                    if future.status in ('cancelled', 'lost'):
+                        raise WorkError(SCHEDULER_GONE)
+                    died = isinstance(future.exception(), KilledWorker)
+                    yield Outcome(task, None if died else future)
+        except (OSError, TimeoutError):
+            raise WorkError(SCHEDULER_GONE) from None
+        finally:
+            if flying and self._client.status == 'running':
+                self._client.cancel(list(flying), force=True)
+
+    def _ended(self, flying: dict[Future, Any]) -> list[Future]:
+        """Tasks that have ended, after a short wait for the first of them."""
+        try:
+            wait(list(flying), LOOK_S, 'FIRST_COMPLETED')
+        except TimeoutError:
+            pass
+        if self._client.status != 'running':
+            raise WorkError(SCHEDULER_GONE)
+        return [future for future in flying if future.done()]
+
+
+def _local_cluster(workers: int, folder: str) -> LocalCluster:
+    """Workers of this machine, which do not outlive this process."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        yield
+        return LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            host='127.0.0.1',
+            dashboard_address=None,
+            local_directory=folder,
+        )
     finally:
         signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
-def worker_pool(workers: int) -> Iterator[Callable[[Callable, Any], Future]]:
-    """Worker processes; yields ``submit(function, argument)``.
+def worker_pool(workers: int | None = None, scheduler: str | None = None) -> Iterator[Pool]:
+    """Start worker processes, or connect to those of a cluster.
 
-    Whatever ends the block early stops the workers: those that call `check_stop` at once.
+    Whatever ends the block ends the workers that were started for it, at once.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Processes on this machine; by default one per processor.
+    scheduler : str, optional
+        Address of the scheduler of a cluster, such as ``tcp://10.0.0.1:8786``, instead.
+
+    Raises
+    ------
+    ConfigurationError
+        If no scheduler answers at the address.
     """
-    context = multiprocessing.get_context('spawn')
-    stop = context.Event()
-    with ProcessPoolExecutor(workers, context, _start_worker, (stop,)) as pool:
+    logging.getLogger('distributed').setLevel(logging.CRITICAL)
+    with ExitStack() as stack:
+        stack.enter_context(dask.config.set(_QUIET))
+        if scheduler is None:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='glider-'))
+            scheduler = stack.enter_context(_local_cluster(workers or os.cpu_count() or 1, folder))
+        client = stack.enter_context(_connect(scheduler))
+        if not isinstance(scheduler, str):
+            client.register_plugin(_IgnoreInterrupts())
+        yield Pool(client)
 
-        def submit(function: Callable, argument: Any) -> Future:
-            with _children_ignore_interrupts():  # the first ones start the processes
-                return pool.submit(function, argument)
 
-        try:
-            yield submit
-        except BaseException:
-            stop.set()
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise
+def _connect(scheduler: str | LocalCluster) -> Client:
+    try:
+        return Client(scheduler, timeout=CONNECT_S)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise ConfigurationError(
+            f'--scheduler {scheduler}: no Dask scheduler answers there ({error}) '
+            f'(allowed: the address that dask scheduler prints, such as tcp://127.0.0.1:8786)'
+        ) from None

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenarios: one validated YAML file that says everything about a mission."""
 
+from copy import deepcopy
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pydantic
 import yaml
@@ -17,7 +18,14 @@ from glider_model.current import CurrentSettings
 from glider_model.perturb import PerturbSettings, perturbed
 from glider_model.plant import InitialSettings, PlantSettings
 from glider_model.sensors import SensorSettings
-from glider_model.settings import ConfigurationError, Settings, read_yaml, validate
+from glider_model.settings import (
+    ConfigurationError,
+    Settings,
+    file_names,
+    find_file,
+    read_yaml,
+    validate,
+)
 from glider_model.vehicle import load_vehicle, vehicle_names, vehicle_path
 from glider_model.water import WaterSettings
 
@@ -127,7 +135,7 @@ class Scenario(Settings):
 
 def scenario_names() -> list[str]:
     """Names of the scenarios that come with the package."""
-    return sorted(path.stem for path in SCENARIO_FOLDER.glob('*.yaml'))
+    return file_names(SCENARIO_FOLDER)
 
 
 def scenario_path(name: str) -> Path:
@@ -138,27 +146,36 @@ def scenario_path(name: str) -> Path:
     ConfigurationError
         If there is neither a scenario of that name nor such a file.
     """
-    known = SCENARIO_FOLDER / f'{name}.yaml'
-    if known.is_file():
-        return known
-    path = Path(name)
-    if path.suffix not in ('.yaml', '.yml'):
-        raise ConfigurationError(
-            f'scenario = {name!r}: no such scenario '
-            f'(allowed: {", ".join(scenario_names())}, or a path to a .yaml file)'
-        )
-    if not path.is_file():
-        raise ConfigurationError(f'{path}: no such scenario file')
-    return path
+    return find_file('scenario', name, SCENARIO_FOLDER)
 
 
-def load_scenario(name: str = DEFAULT_SCENARIO, changes: dict[str, Any] | None = None) -> Scenario:
-    """Load a scenario and change some of its fields.
+class ScenarioSource(NamedTuple):
+    """A scenario file as it was read."""
+
+    path: Path
+    values: dict[str, Any]
+
+
+def read_scenario(name: str = DEFAULT_SCENARIO) -> ScenarioSource:
+    """Read the file of a scenario given by name or by path; `make_scenario` validates it.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no such file, or it is not a YAML mapping.
+    """
+    path = scenario_path(name)
+    values = read_yaml(path)
+    values.setdefault('name', path.stem)
+    return ScenarioSource(path, values)
+
+
+def make_scenario(source: ScenarioSource, changes: dict[str, Any] | None = None) -> Scenario:
+    """Scenario of a file with some of its fields changed.
 
     Parameters
     ----------
-    name : str
-        Name of a scenario that comes with the package, or path of a file.
+    source : ScenarioSource
     changes : dict
         Values by dotted field name, such as ``{'current.speed_kn': 0.5}``.
 
@@ -167,16 +184,19 @@ def load_scenario(name: str = DEFAULT_SCENARIO, changes: dict[str, Any] | None =
     ConfigurationError
         Naming file, field, value and allowed range.
     """
-    path = scenario_path(name)
-    values = read_yaml(path)
-    values.setdefault('name', path.stem)
+    path, values = source.path, deepcopy(source.values)
     for field, value in (changes or {}).items():
         _set_field(values, field, value)
-    source = str(path)
+    told = str(path)
     if changes:
-        source += ' with ' + ', '.join(f'{field}={value}' for field, value in changes.items())
-    scenario = validate(Scenario, values, source, path.parent)
-    return _find_vehicle(scenario, path.parent, source)
+        told += ' with ' + ', '.join(f'{field}={value}' for field, value in changes.items())
+    scenario = validate(Scenario, values, told, path.parent)
+    return _find_vehicle(scenario, path.parent, told)
+
+
+def load_scenario(name: str = DEFAULT_SCENARIO, changes: dict[str, Any] | None = None) -> Scenario:
+    """Scenario by name or path, with some of its fields changed; see `make_scenario`."""
+    return make_scenario(read_scenario(name), changes)
 
 
 def _find_vehicle(scenario: Scenario, folder: Path, source: str) -> Scenario:
@@ -199,6 +219,18 @@ def _find_vehicle(scenario: Scenario, folder: Path, source: str) -> Scenario:
     )
 
 
+def _alternatives(name: str) -> tuple[str, ...]:
+    """Names of the fields of which only one can be given, this one among them."""
+    return next((pair for pair in _ALTERNATIVES if name in pair), (name,))
+
+
+def overlap(field: str, other: str) -> bool:
+    """Whether setting one field, given by its dotted name, undoes what set the other."""
+    *parents, last = field.split('.')
+    names = ['.'.join((*parents, name)) + '.' for name in _alternatives(last)]
+    return any(name.startswith(f'{other}.') or f'{other}.'.startswith(name) for name in names)
+
+
 def _set_field(values: dict, field: str, value) -> None:
     """Set a field by its dotted name, making the mappings on the way."""
     *parents, last = field.split('.')
@@ -206,10 +238,8 @@ def _set_field(values: dict, field: str, value) -> None:
         values = values.setdefault(parent, {})
         if not isinstance(values, dict):
             raise ConfigurationError(f'--set {field}: {parent} is not a group of fields')
-    for pair in _ALTERNATIVES:
-        if last in pair:
-            for other in pair:
-                values.pop(other, None)
+    for other in _alternatives(last):
+        values.pop(other, None)
     values[last] = value
 
 

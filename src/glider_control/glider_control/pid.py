@@ -24,22 +24,22 @@ class PidSettings(Settings):
     """Gains of the PID law. Moments in N m, angles in rad."""
 
     pitch_kp: float = Field(
-        8.0, ge=0.0, le=1000.0, description='pitch, N m/rad', json_schema_extra=_TUNABLE
+        8.0, ge=0.0, le=1000.0, description='pitch (N m/rad)', json_schema_extra=_TUNABLE
     )
     pitch_ki: float = Field(
-        0.08, ge=0.0, le=100.0, description='pitch, N m/(rad s)', json_schema_extra=_TUNABLE
+        0.08, ge=0.0, le=100.0, description='pitch (N m/(rad s))', json_schema_extra=_TUNABLE
     )
     pitch_kd: float = Field(
-        10.0, ge=0.0, le=1000.0, description='pitch rate, N m s/rad', json_schema_extra=_TUNABLE
+        10.0, ge=0.0, le=1000.0, description='pitch rate (N m s/rad)', json_schema_extra=_TUNABLE
     )
     roll_kp: float = Field(
-        8.0, ge=0.0, le=1000.0, description='roll, N m/rad', json_schema_extra=_TUNABLE
+        8.0, ge=0.0, le=1000.0, description='roll (N m/rad)', json_schema_extra=_TUNABLE
     )
     roll_ki: float = Field(
-        0.4, ge=0.0, le=100.0, description='roll, N m/(rad s)', json_schema_extra=_TUNABLE
+        0.4, ge=0.0, le=100.0, description='roll (N m/(rad s))', json_schema_extra=_TUNABLE
     )
     roll_kd: float = Field(
-        2.0, ge=0.0, le=1000.0, description='roll rate, N m s/rad', json_schema_extra=_TUNABLE
+        2.0, ge=0.0, le=1000.0, description='roll rate (N m s/rad)', json_schema_extra=_TUNABLE
     )
     heading_kp_per_s: float = Field(
         0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=_TUNABLE

@@ -11,6 +11,7 @@ whose kernels call each other: change any of them and everything is compiled afr
 import hashlib
 import importlib.util
 import os
+from functools import cache
 from pathlib import Path
 
 import numba
@@ -18,7 +19,8 @@ import numba
 _PACKAGES = ('glider_model', 'glider_guidance', 'glider_control', 'glider_bringup')
 
 
-def _source_digest() -> str:
+@cache
+def source_digest() -> str:
     """Digest of every Python source of the packages that are importable here."""
     digest = hashlib.sha256(numba.__version__.encode())
     for name in _PACKAGES:
@@ -35,7 +37,7 @@ def _source_digest() -> str:
 def cache_folder() -> Path:
     """Folder of the compiled kernels, in ``$GLIDER_CACHE`` or ``~/.cache/glider``."""
     default = Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / 'glider'
-    return Path(os.environ.get('GLIDER_CACHE') or default) / f'kernels-{_source_digest()}'
+    return Path(os.environ.get('GLIDER_CACHE') or default) / f'kernels-{source_digest()}'
 
 
 if not os.environ.get('NUMBA_CACHE_DIR'):

@@ -3,6 +3,8 @@
 """Base of everything a person configures, and how its errors read."""
 
 import re
+from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
@@ -89,6 +91,23 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
     return f'allowed: {" and ".join(limits)}' if limits else ''
 
 
+def find_field(model: type[Settings], name: str) -> pydantic.fields.FieldInfo | None:
+    """Field by its dotted name; None if there is none."""
+    inside, field = [model], None
+    for part in name.split('.'):
+        field = next((m.model_fields[part] for m in inside if part in m.model_fields), None)
+        if field is None:
+            return None
+        inside = _models(field.annotation)
+    return field
+
+
+def unit_of(field: pydantic.fields.FieldInfo) -> str:
+    """Unit of a field, from the first brackets of its description; empty without."""
+    brackets = re.search(r'\(((?:[^()]|\([^()]*\))+)\)', field.description or '')
+    return brackets[1].partition(',')[0] if brackets else ''
+
+
 def error_lines(error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> list[str]:
     """One line per mistake: field, value, what is wrong, what is allowed."""
     lines = []
@@ -130,6 +149,33 @@ def validate(
         raise ConfigurationError('\n'.join(f'{source}: {line}' for line in lines)) from None
 
 
+def file_names(folder: Path) -> list[str]:
+    """Names of the YAML files that come with a package in ``folder``."""
+    return sorted(path.stem for path in folder.glob('*.yaml'))
+
+
+def find_file(what: str, name: str, folder: Path) -> Path:
+    """File of a scenario, vehicle or the like, given by name or by path.
+
+    Raises
+    ------
+    ConfigurationError
+        If neither ``folder`` has a file of that name nor there is such a file.
+    """
+    known = folder / f'{name}.yaml'
+    if known.is_file():
+        return known
+    path = Path(name)
+    if path.suffix not in ('.yaml', '.yml'):
+        raise ConfigurationError(
+            f'{what} = {name!r}: no such {what} '
+            f'(allowed: {", ".join(file_names(folder))}, or a path to a .yaml file)'
+        )
+    if not path.is_file():
+        raise ConfigurationError(f'{path}: no such {what} file')
+    return path
+
+
 def read_yaml(path: Path) -> dict:
     """Read a YAML mapping.
 
@@ -139,7 +185,7 @@ def read_yaml(path: Path) -> dict:
         If the file is missing, unreadable, not YAML, or not a mapping.
     """
     try:
-        values = yaml.load(path.read_text(encoding='utf-8'), Loader=_Loader)
+        values = deepcopy(_parse(path.read_text(encoding='utf-8')))
     except OSError as error:
         raise ConfigurationError(f'{path}: {error.strerror or error}') from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
@@ -147,6 +193,12 @@ def read_yaml(path: Path) -> dict:
     if not isinstance(values, dict):
         raise ConfigurationError(f'{path}: expected a mapping of fields, found {values!r}')
     return values
+
+
+@lru_cache(maxsize=16)
+def _parse(text: str) -> Any:
+    """What a YAML text says; the same few files are read for each of many missions."""
+    return yaml.load(text, Loader=_Loader)
 
 
 class _Loader(yaml.SafeLoader):

@@ -12,7 +12,13 @@ import pydantic
 from pydantic import Field
 
 from glider_model.rigid_body import mass_matrix
-from glider_model.settings import ConfigurationError, Settings, read_yaml, validate
+from glider_model.settings import (
+    Settings,
+    file_names,
+    find_file,
+    read_yaml,
+    validate,
+)
 
 VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
 
@@ -284,7 +290,7 @@ def mass_fault(vehicle: VehicleParams) -> str:
 
 def vehicle_names() -> list[str]:
     """Names of the vehicles that come with the package."""
-    return sorted(path.stem for path in VEHICLE_FOLDER.glob('*.yaml'))
+    return file_names(VEHICLE_FOLDER)
 
 
 def vehicle_path(name: str) -> Path:
@@ -295,18 +301,7 @@ def vehicle_path(name: str) -> Path:
     ConfigurationError
         If there is neither a vehicle of that name nor such a file.
     """
-    known = VEHICLE_FOLDER / f'{name}.yaml'
-    if known.is_file():
-        return known
-    path = Path(name)
-    if path.suffix not in ('.yaml', '.yml'):
-        raise ConfigurationError(
-            f'vehicle = {name!r}: no such vehicle '
-            f'(allowed: {", ".join(vehicle_names())}, or a path to a .yaml file)'
-        )
-    if not path.is_file():
-        raise ConfigurationError(f'{path}: no such vehicle file')
-    return path
+    return find_file('vehicle', name, VEHICLE_FOLDER)
 
 
 def load_vehicle(name: str) -> Vehicle:

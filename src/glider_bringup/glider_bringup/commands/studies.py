@@ -3,7 +3,6 @@
 """``./glider montecarlo`` and ``./glider experiments``: many flights."""
 
 import json
-import os
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Literal, get_args
@@ -15,6 +14,8 @@ from glider_bringup.console import (
     EXIT_FAILED,
     Controller,
     Json,
+    Scheduler,
+    Workers,
     counter,
     messages,
     number,
@@ -53,9 +54,8 @@ def montecarlo(
         str,
         typer.Option(metavar='S|full', help="Simulated seconds, or the scenario's full duration."),
     ] = 'full',
-    workers: Annotated[
-        int | None, typer.Option(min=1, max=1024, help='Processes. Default: one per processor.')
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     changes: Annotated[
         list[str] | None,
         typer.Option(
@@ -83,8 +83,8 @@ def montecarlo(
     if out:
         mission.make_result_folder(out, study.RESULT_FILE)
     messages.print(f'{scenario}: {plants} plants, each by {" and by ".join(laws)}')
-    with workers_at_work(), counter('flying', len(scenarios)) as update:
-        flights, airframes = study.fly_plants(scenarios, workers or os.cpu_count() or 1, update)
+    with workers_at_work(workers, scheduler) as pool, counter('flying', len(scenarios)) as update:
+        flights, airframes = study.fly_plants(scenarios, pool, update)
     name = next(iter(scenarios.values())).name
     summary = study.summarise(name, seed, flights, airframes)
     whole = study.report(scenario, fields, summary, flights, airframes)
@@ -134,9 +134,8 @@ def experiments(
     only: Annotated[
         list[Group] | None, typer.Option(help='Group; can be repeated. Default: all of them.')
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, max=1024, help='Processes. Default: one per processor.')
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     out: Annotated[
         Path | None, typer.Option(help='Folder for experiments.json and the figures.')
     ] = None,
@@ -155,8 +154,8 @@ def experiments(
     if out:
         mission.make_result_folder(out, study.RESULT_FILE)
     messages.print(f'{len(planned)} experiments, {flights} flights')
-    with workers_at_work(), counter('flying', flights) as update:
-        rows, records = study.fly(planned, workers or os.cpu_count() or 1, update)
+    with workers_at_work(workers, scheduler) as pool, counter('flying', flights) as update:
+        rows, records = study.fly(planned, pool, update)
     result = study.report(planned, rows)
     if out:
         with messages.status('drawing'):

@@ -1,0 +1,106 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider sweep`` and ``./glider map``: what happens over whole ranges of settings."""
+
+import json
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from glider_bringup.console import (
+    EXIT_FAILED,
+    Json,
+    Scheduler,
+    Workers,
+    counter,
+    messages,
+    output,
+    workers_at_work,
+)
+
+app = typer.Typer()
+#: So many of the cells that failed are told one by one.
+FAILURES_TOLD = 5
+
+
+@app.command(epilog='Example: ./glider sweep small --workers 2 --out sweeps/small')
+def sweep(
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar='SWEEP', help='Sweep by name (./glider list) or path of its YAML file.'
+        ),
+    ],
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    out: Annotated[
+        Path | None, typer.Option(help='Folder of journal and result. Default: sweeps/<name>.')
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option('--resume', help='Go on where an interrupted sweep has stopped.')
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Fly every combination of the values in a sweep file; write one NetCDF file.
+
+    Each cell has the numbers that ./glider run gives for it. The file is the same to the last byte
+    whatever the number of workers and of interruptions. Exit code 1 if a cell failed.
+    """
+    from glider_bringup import sweep as study
+    from glider_bringup.sweep_file import load_sweep
+
+    with messages.status('checking every value of the sweep'):
+        plan = load_sweep(name)
+    folder = out or Path('sweeps') / plan.sweep.name
+    product = ' x '.join(f'{len(axis.values)} {axis.name}' for axis in plan.axes)
+    messages.print(f'{plan.sweep.name}: {product} = {plan.cells} cells', soft_wrap=True)
+    again = f'./glider sweep {shlex.quote(name)} --out {shlex.quote(str(folder))} --resume'
+    with study.open_journal(plan, folder, resume) as journal:
+        known = study.flown_cells(plan, journal)
+        if not all(known):
+            _fly(plan, journal, known, workers, scheduler, again)
+        with messages.status('writing the result'):
+            summary = study.write_result(plan, journal, folder / study.RESULT_FILE)
+            failures = study.failures(plan, journal)
+    if as_json:
+        print(json.dumps({**summary, 'failures': failures}))
+    else:
+        _print_summary(summary)
+    for failure in failures[:FAILURES_TOLD]:
+        messages.print(f'failed: {failure["reason"]}\n  {failure["command"]}', soft_wrap=True)
+    if len(failures) > FAILURES_TOLD:
+        messages.print(f'and {len(failures) - FAILURES_TOLD} more, see "reason" in the result')
+    if failures:
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _fly(plan, journal, known, workers, scheduler, again: str) -> None:
+    """Fly what is missing, with a progress bar; say how to go on if something ends it early."""
+    from glider_bringup import sweep as study
+
+    def advice() -> str:
+        flown = sum(study.flown_cells(plan, journal))
+        return f'; {flown} of {plan.cells} cells are kept, go on with\n  {again}'
+
+    with (
+        workers_at_work(workers, scheduler, advice) as pool,
+        counter('flying', plan.cells) as update,
+    ):
+        study.fly_sweep(plan, journal, known, pool, update, _tell_waiting)
+
+
+def _tell_waiting() -> None:
+    messages.print('no worker is connected: waiting for one')
+
+
+def _print_summary(summary: dict) -> None:
+    """Print the result of a sweep for a person."""
+    table = Table(title=summary['sweep'], show_header=False, title_justify='left')
+    for field, value in summary.items():
+        if field not in ('sweep', 'file'):
+            table.add_row(field, f'{value:,}')
+    output.print(table)
+    output.print(f'result: {summary["file"]}', soft_wrap=True)

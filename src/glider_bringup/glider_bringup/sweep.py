@@ -1,0 +1,272 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flying a sweep: cells in worker processes, each scored as ``./glider run`` does.
+
+What is known of a cell goes into a journal as it comes, and from there into one NetCDF file that
+depends on the inputs alone: not on the workers, their order, or interruptions.
+"""
+
+import hashlib
+import math
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from socket import gethostname
+from typing import Any, NamedTuple
+
+from glider_bringup.journal import Journal
+from glider_bringup.mission import fly_direct, planned_ticks, scorecard
+from glider_bringup.pool import WORKER_DIED, Pool, Progress, WorkError
+from glider_bringup.scenario import ScenarioSource, make_scenario
+from glider_bringup.sweep_file import Plan, vehicle_text
+from glider_bringup.sweep_result import make_dataset, write_dataset
+from glider_model.kernel import source_digest
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_S
+
+JOURNAL_FILE, RESULT_FILE = 'journal.jsonl', 'sweep.nc'
+COMPLETED, INFEASIBLE, FAILED = STATUSES = ('completed', 'infeasible', 'failed')
+
+#: A worker is given so much simulated time at once (s): seconds of work, milliseconds of overhead.
+CHUNK_S = 100_000.0
+#: No more cells than this are given at once.
+CHUNK_CELLS = 200
+#: Longest reason of a failure that is kept (characters).
+REASON_LENGTH = 500
+
+#: What a scorecard has that is no result: it belongs to the machine, the engine or the inputs.
+NOT_RESULTS = {
+    'wall_time_s',
+    'real_time_factor',
+    'messages_recorded',
+    'messages_lost',
+    'seed',
+}
+
+
+class Inputs(NamedTuple):
+    """What all cells have in common; a worker on another machine must have the same."""
+
+    source: ScenarioSource
+    vehicles: frozenset[str]  #: digests of vehicle files
+
+
+class Chunk(NamedTuple):
+    """Cells that a worker flies one after the other."""
+
+    inputs: Inputs
+    cells: list[tuple[int, dict[str, Any]]]  #: number and scenario fields
+
+    def apart(self) -> list['Chunk']:
+        """Each cell by itself."""
+        return [Chunk(self.inputs, [cell]) for cell in self.cells]
+
+
+# ---------------------------------------------------------------------------------- in a worker
+
+
+def fly_chunk(chunk: Chunk) -> list[dict[str, Any]]:
+    """Fly cells.
+
+    Returns
+    -------
+    list of dict
+        For each its number ``cell``, ``status``, ``reason``, and ``figures`` by name.
+
+    Raises
+    ------
+    WorkError
+        If this worker would fly another vehicle.
+    """
+    return [{'cell': cell, **_fly_cell(chunk.inputs, changes)} for cell, changes in chunk.cells]
+
+
+def _fly_cell(inputs: Inputs, changes: dict[str, Any]) -> dict[str, Any]:
+    try:
+        scenario = make_scenario(inputs.source, changes)
+        if digest(vehicle_text(scenario.vehicle)) not in inputs.vehicles:
+            raise WorkError(f'{gethostname()} has another file of {scenario.vehicle}')
+        flight, scores = fly_direct(scenario, Path(), False, lambda ticks, depth_m: None)
+        card = scorecard(scenario, 'direct', flight, scores)
+    except WorkError:
+        raise
+    except Exception as error:  # whatever it is, it is the end of this cell only
+        text = str(error).replace(str(inputs.source.path), inputs.source.path.name)
+        if not isinstance(error, ConfigurationError):
+            text = f'{type(error).__name__}: {text}'
+        return failure(text)
+    return judge(card)
+
+
+def digest(text: str) -> str:
+    """Digest of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def failure(reason: str) -> dict[str, Any]:
+    """Record of a cell that has no figures."""
+    return {'status': FAILED, 'reason': reason[:REASON_LENGTH], 'figures': {}}
+
+
+def judge(card: dict[str, Any]) -> dict[str, Any]:
+    """Record of a cell from its scorecard; figures that are not finite make it a failure."""
+    figures = dict(_figures(card))
+    wrong = [name for name, figure in figures.items() if not _is_finite(figure)]
+    status, reason = card['status'], card['reason']
+    if wrong:
+        status, reason = FAILED, f'not finite: {", ".join(wrong)}'
+    elif status not in STATUSES:
+        status, reason = FAILED, f'{status}: {reason}'
+    return {'status': status, 'reason': reason[:REASON_LENGTH], 'figures': figures}
+
+
+def _figures(card: dict[str, Any], before: str = '') -> Iterator[tuple[str, Any]]:
+    """Numbers of a scorecard by dotted name; None where one has no data."""
+    for name, value in card.items():
+        if isinstance(value, dict):
+            yield from _figures(value, f'{before}{name}.')
+        elif not isinstance(value, str) and name not in NOT_RESULTS:
+            yield before + name, value
+
+
+def _is_finite(figure: Any) -> bool:
+    numbers = figure if isinstance(figure, list) else [figure]
+    return all(number is None or math.isfinite(number) for number in numbers)
+
+
+# ---------------------------------------------------------------------------------- here
+
+
+def open_journal(plan: Plan, folder: Path, resume: bool) -> Journal:
+    """Journal of a sweep in its folder, which is made.
+
+    Raises
+    ------
+    ConfigurationError
+        If the folder cannot be used, or holds something else.
+    """
+    try:
+        if not resume:
+            folder.mkdir(parents=True, exist_ok=True)
+            if any(folder.iterdir()) and not (folder / JOURNAL_FILE).exists():
+                raise ConfigurationError(f'--out {folder}: not empty (allowed: an empty folder)')
+    except OSError as error:
+        raise ConfigurationError(f'--out {folder}: {error.strerror}') from None
+    head = {
+        'sweep': plan.sweep.name,
+        'cells': plan.cells,
+        'code': source_digest(),
+        'inputs': plan.digest,
+    }
+    return Journal(folder / JOURNAL_FILE, head, resume)
+
+
+def flown_cells(plan: Plan, journal: Journal) -> bytearray:
+    """For each cell whether the journal knows it."""
+    known = bytearray(plan.cells)
+    for record in journal.records():
+        known[record['cell']] = 1
+    return known
+
+
+def make_chunks(plan: Plan, known: bytearray) -> Iterator[Chunk]:
+    """Chunks of all cells that are not known yet, in order."""
+    vehicles = frozenset(digest(text) for _, text in plan.vehicles)
+    inputs = Inputs(plan.source, vehicles)
+    cell_s = planned_ticks(plan.first()) * TICK_S
+    size = min(CHUNK_CELLS, max(1, int(CHUNK_S / cell_s)))
+    cells: list[tuple[int, dict[str, Any]]] = []
+    for cell in range(plan.cells):
+        if not known[cell]:
+            cells.append((cell, plan.changes(cell)))
+        if len(cells) == size:
+            yield Chunk(inputs, cells)
+            cells = []
+    if cells:
+        yield Chunk(inputs, cells)
+
+
+def fly_sweep(
+    plan: Plan,
+    journal: Journal,
+    known: bytearray,
+    pool: Pool,
+    progress: Progress,
+    on_wait: Callable[[], None],
+) -> None:
+    """Fly all cells that the journal does not know yet, into the journal.
+
+    Parameters
+    ----------
+    plan : Plan
+    journal : Journal
+    known : bytearray
+        What `flown_cells` says.
+    pool : Pool
+    progress : callable
+        Called with the number of cells that are known.
+    on_wait : callable
+        Called every few seconds while there is no worker.
+
+    Raises
+    ------
+    WorkError
+        If the scheduler is gone, or a worker has another program or other files.
+    """
+    done = sum(known)
+    progress(done)
+    chunks = make_chunks(plan, known)
+    for outcome in pool.outcomes(fly_chunk, chunks, Chunk.apart, on_wait):
+        if outcome.future is None:
+            records = [{'cell': cell, **failure(WORKER_DIED)} for cell, _ in outcome.task.cells]
+        else:
+            records = outcome.result()
+        journal.append(records)
+        done += len(records)
+        progress(done)
+
+
+def write_result(plan: Plan, journal: Journal, file: Path) -> dict[str, Any]:
+    """Write the NetCDF file of a sweep whose cells are all known.
+
+    Returns
+    -------
+    dict
+        Summary: ``sweep``, ``file``, ``cells``, and how many of each status.
+
+    Raises
+    ------
+    ConfigurationError
+        If the file cannot be written.
+    """
+    dataset = make_dataset(plan, journal.records(), STATUSES)
+    part = file.with_suffix('.part')
+    try:
+        write_dataset(dataset, part)
+        os.replace(part, file)
+    except OSError as error:
+        raise ConfigurationError(f'{file}: {error.strerror or error}') from None
+    status = dataset['status'].values.ravel()
+    return {
+        'sweep': plan.sweep.name,
+        'file': str(file),
+        'cells': plan.cells,
+        **{name: int((status == code).sum()) for code, name in enumerate(STATUSES)},
+    }
+
+
+def failures(plan: Plan, journal: Journal) -> list[dict[str, Any]]:
+    """Coordinates of every cell that failed, why, and the command that flies it again."""
+    failed = {
+        record['cell']: record['reason']
+        for record in journal.records()
+        if record['status'] == FAILED
+    }
+    return [
+        {
+            'coordinates': plan.coordinates(cell),
+            'reason': failed[cell],
+            'command': plan.command(cell),
+        }
+        for cell in sorted(failed)
+    ]
