@@ -25,7 +25,7 @@ from glider_bringup.score import Scorer, windows
 from glider_guidance.los import crab_heading
 from glider_model.current import KNOT_MPS
 from glider_model.perturb import perturbed
-from glider_model.polar import glide_horizontal_speed, glide_vertical_rate, make_polar
+from glider_model.polar import make_polar, steady_horizontal_speed
 from glider_model.signals import TICK_S
 from glider_model.vehicle import load_vehicle
 
@@ -645,8 +645,7 @@ def horizontal_speed(scenario: Scenario) -> float:
     """U_h (m/s) that the vehicle's polar gives for the scenario's pitch and net heaviness."""
     polar = make_polar(load_vehicle(scenario.vehicle).params())
     pitch = -math.radians(scenario.profile.pitch_deg)
-    rate = glide_vertical_rate(pitch, scenario.profile.net_heaviness_kg, polar)
-    return glide_horizontal_speed(pitch, rate, polar)
+    return steady_horizontal_speed(pitch, scenario.profile.net_heaviness_kg, polar)
 
 
 def _current(scenario: Scenario) -> tuple[float, float]:

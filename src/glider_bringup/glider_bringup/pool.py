@@ -28,8 +28,12 @@ from glider_model.settings import ConfigurationError
 TASKS_AHEAD = 2
 #: How long a scheduler may take to answer, and how often it is looked at (s).
 CONNECT_S, LOOK_S = 10.0, 2.0
-#: Makes the workers of this machine log nothing: what matters is told by the commands.
-_QUIET = {'distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED': 'critical'}
+#: Workers of this machine log nothing: what matters is told by the commands. A task whose worker
+#: died is given to one more before it is tried by itself.
+_CONFIG = {
+    'distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED': 'critical',
+    'distributed.scheduler.allowed-failures': 1,
+}
 
 WORKER_DIED = 'the worker process died each time it flew this'
 SCHEDULER_GONE = 'the scheduler of the workers is gone'
@@ -194,7 +198,8 @@ def _local_cluster(workers: int, folder: str) -> LocalCluster:
             n_workers=workers,
             threads_per_worker=1,
             host='127.0.0.1',
-            dashboard_address=None,
+            dashboard_address='127.0.0.1:0',
+            memory_limit=0,  # a worker that nears a limit would pause for good
             local_directory=folder,
         )
     finally:
@@ -221,7 +226,7 @@ def worker_pool(workers: int | None = None, scheduler: str | None = None) -> Ite
     """
     logging.getLogger('distributed').setLevel(logging.CRITICAL)
     with ExitStack() as stack:
-        stack.enter_context(dask.config.set(_QUIET))
+        stack.enter_context(dask.config.set(_CONFIG))
         if scheduler is None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='glider-'))
             scheduler = stack.enter_context(_local_cluster(workers or os.cpu_count() or 1, folder))

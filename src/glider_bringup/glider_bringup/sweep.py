@@ -15,11 +15,12 @@ from socket import gethostname
 from typing import Any, NamedTuple
 
 from glider_bringup.journal import Journal
-from glider_bringup.mission import fly_direct, planned_ticks, scorecard
+from glider_bringup.mission import Flight, fly_direct, planned_ticks, scorecard
 from glider_bringup.pool import WORKER_DIED, Pool, Progress, WorkError
-from glider_bringup.scenario import ScenarioSource, make_scenario
+from glider_bringup.scenario import Scenario, ScenarioSource, make_scenario
+from glider_bringup.score import Scorer
 from glider_bringup.sweep_file import Plan, vehicle_text
-from glider_bringup.sweep_result import make_dataset, write_dataset
+from glider_bringup.sweep_result import NOT_FIGURES, make_dataset, variable_name, write_dataset
 from glider_model.kernel import source_digest
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
@@ -137,14 +138,29 @@ def _is_finite(figure: Any) -> bool:
 # ---------------------------------------------------------------------------------- here
 
 
+def result_names(scenario: Scenario) -> set[str]:
+    """Names in a result, apart from its dimensions; a scorecard without a flight has them too."""
+    empty = Scorer().result(0.0, scenario.profile.depth_m)
+    card = scorecard(scenario, 'direct', Flight('completed', '', 0.0, 0, 0), empty)
+    return NOT_FIGURES | {variable_name(figure) for figure, _ in _figures(card)}
+
+
 def open_journal(plan: Plan, folder: Path, resume: bool) -> Journal:
     """Journal of a sweep in its folder, which is made.
 
     Raises
     ------
     ConfigurationError
-        If the folder cannot be used, or holds something else.
+        If the folder cannot be used or holds something else, or a dimension is called like what a
+        result has.
     """
+    taken = result_names(plan.first())
+    for axis in plan.axes:
+        if axis.name in taken:
+            raise ConfigurationError(
+                f'{plan.path}: dimensions.{axis.name}: a result has something of this name '
+                f'(allowed: names other than {", ".join(sorted(taken))})'
+            )
     try:
         if not resume:
             folder.mkdir(parents=True, exist_ok=True)

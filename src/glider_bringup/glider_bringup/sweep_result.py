@@ -35,6 +35,13 @@ _VECTORS = {
     'final_state.attitude_rpy_rad': ('rpy', ('roll', 'pitch', 'yaw')),
     'final_state.velocity_mps': ('frd', ('forward', 'starboard', 'down')),
 }
+#: Names in a result that are no figures, apart from its dimensions.
+NOT_FIGURES = {'status', 'reason', *(dimension for dimension, _ in _VECTORS.values())}
+
+
+def variable_name(figure: str) -> str:
+    """Name of the variable of a figure, which is given by its dotted name."""
+    return figure.replace('.', '_')
 
 
 def _unit_and_name(figure: str) -> tuple[str, str]:
@@ -121,7 +128,7 @@ def make_dataset(
             dimension, labels = _VECTORS[name]
             over = [*dimensions, dimension]
             dataset = dataset.assign_coords({dimension: np.array(labels, dtype=object)})
-        dataset[name.replace('.', '_')] = (over, values, attributes)
+        dataset[variable_name(name)] = (over, values, attributes)
     return dataset
 
 

@@ -103,6 +103,12 @@ def glide_horizontal_speed(theta, vertical_rate, polar):
 
 
 @kernel
+def steady_horizontal_speed(theta, net_heaviness, polar):
+    """Horizontal speed U_h (m/s) of the steady glide at a pitch (rad) with so much weight (kg)."""
+    return glide_horizontal_speed(theta, glide_vertical_rate(theta, net_heaviness, polar), polar)
+
+
+@kernel
 def glide_speed(theta, vertical_rate, polar):
     """Speed through the water (m/s) and angle of attack (rad) from pitch and vertical rate."""
     steep = steepen(theta)

@@ -104,3 +104,41 @@ def _print_summary(summary: dict) -> None:
             table.add_row(field, f'{value:,}')
     output.print(table)
     output.print(f'result: {summary["file"]}', soft_wrap=True)
+
+
+@app.command('map', epilog='Example: ./glider map sweeps/stability_map/sweep.nc --out map.png')
+def draw(
+    file: Annotated[
+        Path, typer.Argument(metavar='FILE', help='Result of a sweep over speed and angle.')
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help='Image file: png, svg or pdf. Default: FILE with .png.')
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Draw in which currents a path is held, and the limit of physics; print the shares.
+
+    FILE is the result of ./glider sweep over current.speed_kn, current.angle_deg and at most one
+    more dimension, such as stability_map.
+    """
+    from glider_bringup import stability_map as study
+
+    image = out or file.with_suffix('.png')
+    stability = study.load_map(file)
+    with messages.status('drawing'):
+        study.draw_map(stability, image)
+    rows = study.shares(stability)
+    if as_json:
+        print(
+            json.dumps(
+                {'image': str(image), 'horizontal_kn': stability.horizontal_kn, 'panels': rows}
+            )
+        )
+        return
+    table = Table(title=stability.title, title_justify='left')
+    for name in rows[0]:
+        table.add_column(name.replace('_', ' '))
+    for row in rows:
+        table.add_row(*(f'{x:.1%}' if isinstance(x, float) else str(x) for x in row.values()))
+    output.print(table)
+    output.print(f'drawn: {image}', soft_wrap=True)
