@@ -216,18 +216,19 @@ def draw_map(stability: StabilityMap, file: Path) -> None:
         sharey=True,
         layout='constrained',
     )
-    for axis, name, classes in zip(axes.flat, stability.panels, stability.classes, strict=False):
+    panels = zip(axes.flat, stability.panels, stability.classes, shares(stability), strict=False)
+    for axis, name, classes, share in panels:
         _draw_panel(axis, stability, classes)
-        axis.set_title(name.replace('_', ' '), fontweight='bold')
+        axis.set_title(f'{name.replace("_", " ")}: {share[STABLE]:.0%} stable'.lstrip(': '))
     for axis in axes.flat[count:]:
         axis.set_visible(False)
     for axis in axes[:, 0]:
-        axis.set_ylabel('current along the path (kn)\nagainst it  <    > with it')
+        axis.set_ylabel('current along the path (kn), + with the vehicle')
     for axis in axes[-1]:
         axis.set_xlabel('current across the path (kn)')
     figure.suptitle(
         f'{stability.title}\n'
-        f'Each cell: one flight of {stability.vehicle}, placed at the tip of its current'
+        f'Each cell is one flight of {stability.vehicle}, at the tip of the arrow of its current'
     )
     figure.legend(handles=_legend(stability), loc='outside lower center', ncols=2)
     try:
@@ -256,13 +257,16 @@ def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray) -> None:
         vmax=len(CLASSES) - 0.5,
         rasterized=True,
     )
-    rim = radius[-1]
-    _draw_rose(axis, rim, stability)
-    _draw_limits(axis, rim, stability.horizontal_kn)
+    _draw_rose(axis, radius[-1], stability)
+    _draw_limits(axis, radius[-1], stability.horizontal_kn)
     for degrees, _, marker in PAPER_POINTS:
         across, along = _tip(PAPER_KN, degrees)
         axis.plot(across, along, marker, color='white', markeredgecolor='black', markersize=6.5)
+    rim = radius[-1]
+    axis.set_xlim(min(0.0, 1.14 * np.min(rim * np.sin(angle))), 1.14 * rim)
+    axis.set_ylim(1.1 * np.min(rim * np.cos(angle)), 1.1 * rim)
     axis.set_aspect('equal')
+    axis.spines[['top', 'right']].set_visible(False)
 
 
 def _tip(speed: float, angle_deg: float) -> tuple[float, float]:
@@ -279,8 +283,8 @@ def _draw_rose(axis, rim: float, stability: StabilityMap) -> None:
         axis.plot([0.0, across], [0.0, along], color='black', linewidth=0.4, alpha=0.4)
         axis.annotate(
             f'{degrees:.0f}°',
-            (1.02 * across, 1.05 * along),
-            ha='left' if across > 0.01 else 'right' if across < -0.01 else 'center',
+            (1.06 * across, 1.06 * along) if abs(across) > 0.01 else (0.03, 1.06 * along),
+            ha='center' if abs(across) > 0.01 else 'left',
             va='center',
             fontsize='small',
         )
@@ -311,14 +315,17 @@ def _legend(stability: StabilityMap) -> list:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    present = [name for i, name in enumerate(CLASSES) if np.any(stability.classes == i)]
+    failed = np.any(stability.classes == CLASSES.index(FAILED))
     handles = [
         Patch(facecolor=_COLOURS[name], edgecolor='black', linewidth=0.5, label=_MEANING[name])
-        for name in present
+        for name in (CLASSES if failed else CLASSES[:-1])
     ]
-    speed = f'U_h = {stability.horizontal_kn:.2f} kn'
-    handles.append(Line2D([], [], color='black', label=f'cross current = {speed}: none can hold'))
-    handles.append(Line2D([], [], color='black', linestyle='--', label='no progress left'))
+    speed = f'{stability.horizontal_kn:.2f} kn'
+    for style, what in (
+        ('-', f'limit: cross current = speed of the glide U_h = {speed}'),
+        ('--', 'limit: no progress along the path is left'),
+    ):
+        handles.append(Line2D([], [], color='black', linewidth=2.0, linestyle=style, label=what))
     handles += [
         Line2D(
             *([], []),
