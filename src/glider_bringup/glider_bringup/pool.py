@@ -11,13 +11,15 @@ import os
 import signal
 import tempfile
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from concurrent.futures import CancelledError
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
 from socket import gethostname
 from typing import Any, NamedTuple
 
 import dask
 from distributed import Client, Future, LocalCluster, TimeoutError, wait
+from distributed.client import ClosedClientError
 from distributed.diagnostics.plugin import WorkerPlugin
 from distributed.scheduler import KilledWorker
 
@@ -50,19 +52,8 @@ class Outcome(NamedTuple):
     """What became of a task."""
 
     task: Any
-    future: Future | None  #: None: it killed its workers
-
-    def result(self) -> Any:
-        """What the function returned.
-
-        Raises
-        ------
-        WorkError
-            If the task killed its workers.
-        """
-        if self.future is None:
-            raise WorkError(WORKER_DIED)
-        return self.future.result()
+    died: bool  #: whether it killed every worker that was given it
+    result: Any = None  #: what the function returned
 
 
 def _call(code: str, function: Callable, task: Any) -> Any:
@@ -127,7 +118,7 @@ class Pool:
         """
         suspects = []
         for outcome in self._together(function, iter(tasks), TASKS_AHEAD, on_wait):
-            if outcome.future is None:
+            if outcome.died:
                 suspects.append(outcome.task)
             else:
                 yield outcome
@@ -147,7 +138,9 @@ class Pool:
         """
         results = {}
         for outcome in self.outcomes(_keyed, ((function, *task) for task in tasks.items())):
-            key, result = outcome.result()
+            if outcome.died:
+                raise WorkError(WORKER_DIED)
+            key, result = outcome.result
             results[key] = result
             progress(len(results))
         return {key: results[key] for key in tasks}
@@ -157,37 +150,50 @@ class Pool:
         flying: dict[Future, Any] = {}
         try:
             while True:
-                threads = self.threads()
-                for task in islice(tasks, max(0, ahead * max(threads, 1) - len(flying))):
-                    future = self._client.submit(
-                        _call, source_digest(), function, task, pure=False
-                    )
-                    flying[future] = task
+                with _scheduler_answers():
+                    threads = self.threads()
+                    for task in islice(tasks, max(0, ahead * max(threads, 1) - len(flying))):
+                        call = _call, source_digest(), function, task
+                        flying[self._client.submit(*call, pure=False)] = task
                 if not flying:
                     return
                 if not threads:
                     on_wait()
                 for future in self._ended(flying):
-                    task = flying.pop(future)
-                    if future.status in ('cancelled', 'lost'):
-                        raise WorkError(SCHEDULER_GONE)
-                    died = isinstance(future.exception(), KilledWorker)
-                    yield Outcome(task, None if died else future)
-        except (OSError, TimeoutError):
-            raise WorkError(SCHEDULER_GONE) from None
+                    yield _outcome(future, flying.pop(future))
         finally:
             if flying and self._client.status == 'running':
                 self._client.cancel(list(flying), force=True)
 
     def _ended(self, flying: dict[Future, Any]) -> list[Future]:
         """Tasks that have ended, after a short wait for the first of them."""
-        try:
-            wait(list(flying), LOOK_S, 'FIRST_COMPLETED')
-        except TimeoutError:
-            pass
-        if self._client.status != 'running':
-            raise WorkError(SCHEDULER_GONE)
-        return [future for future in flying if future.done()]
+        with _scheduler_answers():
+            with suppress(TimeoutError):
+                wait(list(flying), LOOK_S, 'FIRST_COMPLETED')
+            if self._client.status != 'running':
+                raise WorkError(SCHEDULER_GONE)
+            return [future for future in flying if future.done()]
+
+
+def _outcome(future: Future, task: Any) -> Outcome:
+    """Outcome of a task that has ended; what its function raised is raised here."""
+    with _scheduler_answers():
+        error = future.exception()
+        result = future.result() if error is None else None
+    if isinstance(error, KilledWorker):
+        return Outcome(task, died=True)
+    if error is not None:
+        raise error
+    return Outcome(task, died=False, result=result)
+
+
+@contextmanager
+def _scheduler_answers() -> Iterator[None]:
+    """Whatever Dask raises when its scheduler is gone, as one error."""
+    try:
+        yield
+    except (OSError, TimeoutError, CancelledError, ClosedClientError):
+        raise WorkError(SCHEDULER_GONE) from None
 
 
 def _local_cluster(workers: int, folder: str) -> LocalCluster:
@@ -224,7 +230,8 @@ def worker_pool(workers: int | None = None, scheduler: str | None = None) -> Ite
     ConfigurationError
         If no scheduler answers at the address.
     """
-    logging.getLogger('distributed').setLevel(logging.CRITICAL)
+    for name in ('distributed', 'distributed.client', 'tornado.application'):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(_CONFIG))
         if scheduler is None:

@@ -233,10 +233,10 @@ def fly_sweep(
     progress(done)
     chunks = make_chunks(plan, known)
     for outcome in pool.outcomes(fly_chunk, chunks, Chunk.apart, on_wait):
-        if outcome.future is None:
+        if outcome.died:
             records = [{'cell': cell, **failure(WORKER_DIED)} for cell, _ in outcome.task.cells]
         else:
-            records = outcome.result()
+            records = outcome.result
         journal.append(records)
         done += len(records)
         progress(done)
