@@ -14,13 +14,13 @@ from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
+from multiprocessing import resource_tracker
 from socket import gethostname
 from typing import Any, NamedTuple
 
 import dask
 from distributed import Client, Future, LocalCluster, TimeoutError, wait
 from distributed.client import ClosedClientError
-from distributed.diagnostics.plugin import WorkerPlugin
 from distributed.scheduler import KilledWorker
 
 from glider_model.kernel import source_digest
@@ -67,13 +67,6 @@ def _keyed(task: tuple[Callable, Hashable, Any]) -> tuple[Hashable, Any]:
     """Key of a task, and what its function returns."""
     function, key, argument = task
     return key, function(argument)
-
-
-class _IgnoreInterrupts(WorkerPlugin):
-    """Ctrl-C, which a terminal sends to all processes, is for the parent to deal with."""
-
-    def setup(self, worker) -> None:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 class Pool:
@@ -196,20 +189,36 @@ def _scheduler_answers() -> Iterator[None]:
         raise WorkError(SCHEDULER_GONE) from None
 
 
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Ctrl-C is dealt with after the block; processes that are started in it never see it.
+
+    A terminal sends it to all of them. Threads, and through them processes that are started later,
+    inherit that it is blocked; only multiprocessing's tracker would unblock it, when it starts.
+    """
+    resource_tracker.ensure_running()
+    interrupts = []
+    handler = signal.signal(signal.SIGINT, lambda *_: interrupts.append(True))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, handler)
+    if interrupts:
+        raise KeyboardInterrupt
+
+
 def _local_cluster(workers: int, folder: str) -> LocalCluster:
     """Workers of this machine, which do not outlive this process."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        return LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            host='127.0.0.1',
-            dashboard_address='127.0.0.1:0',
-            memory_limit=0,  # a worker that nears a limit would pause for good
-            local_directory=folder,
-        )
-    finally:
-        signal.signal(signal.SIGINT, before)
+    return LocalCluster(
+        n_workers=workers,
+        threads_per_worker=1,
+        host='127.0.0.1',
+        dashboard_address='127.0.0.1:0',
+        memory_limit=0,  # a worker that nears a limit would pause for good
+        local_directory=folder,
+    )
 
 
 @contextmanager
@@ -236,11 +245,10 @@ def worker_pool(workers: int | None = None, scheduler: str | None = None) -> Ite
         stack.enter_context(dask.config.set(_CONFIG))
         if scheduler is None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='glider-'))
-            scheduler = stack.enter_context(_local_cluster(workers or os.cpu_count() or 1, folder))
-        client = stack.enter_context(_connect(scheduler))
-        if not isinstance(scheduler, str):
-            client.register_plugin(_IgnoreInterrupts())
-        yield Pool(client)
+            with _interrupts_held_back():
+                cluster = _local_cluster(workers or os.cpu_count() or 1, folder)
+                scheduler = stack.enter_context(cluster)
+        yield Pool(stack.enter_context(_connect(scheduler)))
 
 
 def _connect(scheduler: str | LocalCluster) -> Client:

@@ -57,7 +57,8 @@ def sweep(
     folder = out or Path('sweeps') / plan.sweep.name
     product = ' x '.join(f'{len(axis.values)} {axis.name}' for axis in plan.axes)
     messages.print(f'{plan.sweep.name}: {product} = {plan.cells} cells', soft_wrap=True)
-    again = f'./glider sweep {shlex.quote(name)} --out {shlex.quote(str(folder))} --resume'
+    words = ['./glider', 'sweep', name, '--out', str(folder), '--resume']
+    again = shlex.join([*words, *(['--scheduler', scheduler] if scheduler else [])])
     with study.open_journal(plan, folder, resume) as journal:
         known = study.flown_cells(plan, journal)
         if not all(known):
