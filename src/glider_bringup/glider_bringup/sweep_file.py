@@ -243,9 +243,7 @@ class Plan:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        values = read_yaml(path)
-        values.setdefault('name', path.stem)
-        self.sweep = validate(Sweep, values, str(path))
+        self.sweep = _validate(path)
         self.text = path.read_text(encoding='utf-8')
         self.axes = [_axis(name, one) for name, one in self.sweep.dimensions.items()]
         self.shape = tuple(len(axis.values) for axis in self.axes)
@@ -365,6 +363,23 @@ def _axis(name: str, dimension: Dimension) -> Axis:
 def sweep_names() -> list[str]:
     """Names of the sweeps that come with the package."""
     return file_names(SWEEP_FOLDER)
+
+
+def _validate(path: Path) -> Sweep:
+    values = read_yaml(path)
+    values.setdefault('name', path.stem)
+    return validate(Sweep, values, str(path))
+
+
+def read_sweep(name: str) -> Sweep:
+    """Sweep given by name or by path, as its file says it.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming file, field, value and what is allowed.
+    """
+    return _validate(find_file('sweep', name, SWEEP_FOLDER))
 
 
 def load_sweep(name: str) -> Plan:

@@ -12,6 +12,7 @@ import yaml
 
 from glider_bringup import cli
 from glider_bringup.scenario import scenario_names
+from glider_bringup.sweep_file import sweep_names
 from glider_model.vehicle import vehicle_names, vehicle_path
 
 SHORT = ('--engine', 'direct', '--controller', 'pid', '--duration', '300')
@@ -134,6 +135,7 @@ def test_list_names_everything_that_is_shipped():
     listed = json.loads(glider('list', '--json').stdout)
     assert sorted(listed['scenarios']) == scenario_names()
     assert sorted(listed['vehicles']) == vehicle_names()
+    assert sorted(listed['sweeps']) == sweep_names()
 
 
 def test_trim_prints_the_steady_glide():

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""``./glider trim`` and ``./glider list``: scenarios and vehicles."""
+"""``./glider trim`` and ``./glider list``: vehicles, scenarios and sweeps."""
 
 import json
 from dataclasses import asdict
@@ -11,6 +11,7 @@ from rich.table import Table
 
 from glider_bringup.console import EXIT_FAILED, Json, messages, output
 from glider_bringup.scenario import load_scenario, scenario_names
+from glider_bringup.sweep_file import read_sweep, sweep_names
 from glider_model.settings import ConfigurationError
 from glider_model.trim import Trim, solve_trim
 from glider_model.vehicle import load_vehicle, vehicle_names
@@ -61,14 +62,17 @@ def _print_trim(vehicle: str, solution: Trim) -> None:
 
 @app.command('list', epilog='Example: ./glider list --json')
 def list_all(as_json: Json = False) -> None:
-    """List the scenarios and vehicles that come with the stack."""
-    scenarios = {name: load_scenario(name).description for name in scenario_names()}
-    vehicles = {name: load_vehicle(name).description for name in vehicle_names()}
+    """List the scenarios, vehicles and sweeps that come with the stack."""
+    listed = {
+        'scenarios': {name: load_scenario(name).description for name in scenario_names()},
+        'vehicles': {name: load_vehicle(name).description for name in vehicle_names()},
+        'sweeps': {name: read_sweep(name).description for name in sweep_names()},
+    }
     if as_json:
-        print(json.dumps({'scenarios': scenarios, 'vehicles': vehicles}))
+        print(json.dumps(listed))
         return
-    for title, entries in (('Scenarios', scenarios), ('Vehicles', vehicles)):
-        table = Table(title=title, show_header=False, title_justify='left')
+    for title, entries in listed.items():
+        table = Table(title=title.capitalize(), show_header=False, title_justify='left')
         for name, description in entries.items():
             table.add_row(name, description)
         output.print(table)
