@@ -1,0 +1,69 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Cells of the stability map by worker processes, beside the same cells in one plain loop."""
+
+import time
+from collections.abc import Callable, Iterable
+from itertools import islice
+
+from glider_bringup.pool import Pool, worker_pool
+from glider_bringup.sweep import Chunk, fly_chunk, make_chunks
+from glider_bringup.sweep_file import load_sweep
+
+MEANING = {
+    'sweep_cell_direct_s': 'one cell of 50,000 s in a plain loop, the floor (s)',
+    'sweep_cell_one_worker_s': 'one cell by one worker (s)',
+    'sweep_cell_two_workers_s': 'one cell by two workers, time over all cells (s)',
+    'sweep_one_worker_over_direct': 'what the worker and Dask cost: ratio to the floor',
+    'sweep_two_workers_over_one': 'cells in the same time, two workers to one',
+    'sweep_worker_peak_rss_mb': 'most resident memory of a worker at the end (MB)',
+    'sweep_worker_growth_mb': 'of that, what came after its first chunk (MB)',
+}
+#: Chunks that are timed, and how often: the fastest counts, as others use the machine too.
+CHUNKS, TIMES = 4, 2
+
+
+def measure(progress: Callable[[str], None]) -> dict:
+    """Times per cell, without the start of the workers, and the memory of the workers."""
+    plan = load_sweep('stability_map')
+    chunks = list(islice(make_chunks(plan, bytearray(plan.cells)), CHUNKS))
+    cells = sum(len(chunk.cells) for chunk in chunks)
+    progress('a plain loop')
+    fly_chunk(chunks[0])
+    seconds = {'direct': _fastest(lambda: [fly_chunk(chunk) for chunk in chunks])}
+    for workers, name in ((1, 'one_worker'), (2, 'two_workers')):
+        progress(name.replace('_', ' '))
+        with worker_pool(workers) as pool:
+            first = _fly(pool, chunks[:1] * 2 * workers)
+            seconds[name] = _fastest(lambda pool=pool: _fly(pool, chunks))
+            last = _fly(pool, chunks)
+    per_cell = {f'sweep_cell_{name}_s': value / cells for name, value in seconds.items()}
+    return {
+        **per_cell,
+        'sweep_one_worker_over_direct': seconds['one_worker'] / seconds['direct'],
+        'sweep_two_workers_over_one': seconds['one_worker'] / seconds['two_workers'],
+        'sweep_worker_peak_rss_mb': last,
+        'sweep_worker_growth_mb': last - first,
+    }
+
+
+def _fastest(work: Callable) -> float:
+    """Shortest time (s) that some work takes."""
+    times = []
+    for _ in range(TIMES):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def _fly(pool: Pool, chunks: Iterable[Chunk]) -> float:
+    """Fly chunks; most resident memory (MB) that a worker has had by then."""
+    return max(outcome.result for outcome in pool.outcomes(fly_and_weigh, chunks))
+
+
+def fly_and_weigh(chunk: Chunk) -> float:
+    """Fly a chunk in a worker; most resident memory (MB) that this process has had."""
+    fly_chunk(chunk)
+    with open('/proc/self/status', encoding='utf-8') as file:
+        return next(int(line.split()[1]) for line in file if line.startswith('VmHWM')) / 1024.0
