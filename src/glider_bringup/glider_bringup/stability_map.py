@@ -35,6 +35,7 @@ CLASSES = STABLE, CRITICAL, LOST, INFEASIBLE, FAILED = (
 PAPER_KN = 1.0
 PAPER_POINTS = ((8.0, STABLE, 'o'), (10.0, CRITICAL, '^'), (12.0, LOST, 'X'))
 
+_ERROR = 'cross_track_m_max_steady'
 SPEED, ANGLE = 'current.speed_kn', 'current.angle_deg'
 #: More panels than this cannot be read on one page.
 MAX_PANELS = 9
@@ -86,6 +87,8 @@ def load_map(file: Path) -> StabilityMap:
     needed = {'scenario_yaml', 'vehicle_yaml', 'sweep'}
     if not needed <= set(data.attrs) or 'status' not in data:
         raise ConfigurationError(f'{file}: not a result of ./glider sweep')
+    if _ERROR not in data:
+        raise ConfigurationError(f'{file}: every cell failed, there is nothing to draw')
     speed, angle, others = _dimensions(file, data)
     for name in (speed, angle):
         if data.sizes[name] < 2:
@@ -135,7 +138,7 @@ def _horizontal_speed(file: Path, data: xarray.Dataset) -> tuple[float, str]:
 
 def _classify(data: xarray.Dataset) -> np.ndarray:
     """Class of every cell, an index of `CLASSES`."""
-    error = data['cross_track_m_max_steady'].values
+    error = data[_ERROR].values
     statuses = data['status'].attrs['flag_meanings'].split()
     status = data['status'].values
     classes = np.full(error.shape, CLASSES.index(LOST))

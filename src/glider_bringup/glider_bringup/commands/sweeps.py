@@ -24,6 +24,8 @@ from glider_bringup.console import (
 app = typer.Typer()
 #: So many of the cells that failed are told one by one.
 FAILURES_TOLD = 5
+#: Fields over which a sweep can be drawn as a map.
+MAPPED = {'current.speed_kn', 'current.angle_deg'}
 
 
 @app.command(epilog='Example: ./glider sweep small --workers 2 --out sweeps/small')
@@ -70,6 +72,8 @@ def sweep(
         print(json.dumps({**summary, 'failures': failures}))
     else:
         _print_summary(summary)
+        if MAPPED <= {axis.field for axis in plan.axes}:
+            messages.print(f'draw it: {shlex.join(["./glider", "map", summary["file"]])}')
     for failure in failures[:FAILURES_TOLD]:
         messages.print(f'failed: {failure["reason"]}\n  {failure["command"]}', soft_wrap=True)
     if len(failures) > FAILURES_TOLD:
