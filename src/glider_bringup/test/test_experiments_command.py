@@ -38,6 +38,7 @@ from glider_bringup.experiments import (
 )
 from glider_bringup.figure import Record
 from glider_bringup.mission import make_result_folder
+from glider_bringup.pool import worker_pool
 from glider_bringup.scenario import load_scenario, parse_assignment
 from glider_model.settings import ConfigurationError
 from glider_model.trim import solve_trim
@@ -336,7 +337,8 @@ def test_results_do_not_depend_on_workers():
     one = Experiment('current', 'short', '', '', '', cases, judge_limits({}))
     counts, results = [], []
     for workers in (1, 2):
-        rows, records = fly([one], workers, counts.append)
+        with worker_pool(workers) as pool:
+            rows, records = fly([one], pool, counts.append)
         assert records == [[None] * 4]
         results.append(json.dumps(report([one], rows), allow_nan=False))
     assert results[0] == results[1]
