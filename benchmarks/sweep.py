@@ -26,7 +26,7 @@ CHUNKS, TIMES = 4, 2
 def measure(progress: Callable[[str], None]) -> dict:
     """Times per cell, without the start of the workers, and the memory of the workers."""
     plan = load_sweep('stability_map')
-    chunks = list(islice(make_chunks(plan, bytearray(plan.cells)), CHUNKS))
+    chunks = list(islice(make_chunks(plan, bytearray(plan.cells), 2), CHUNKS))
     cells = sum(len(chunk.cells) for chunk in chunks)
     progress('a plain loop')
     fly_chunk(chunks[0])

@@ -30,8 +30,8 @@ COMPLETED, INFEASIBLE, FAILED = STATUSES = ('completed', 'infeasible', 'failed')
 
 #: A worker is given so much simulated time at once (s): seconds of work, milliseconds of overhead.
 CHUNK_S = 100_000.0
-#: No more cells than this are given at once.
-CHUNK_CELLS = 200
+#: No more cells than this are given at once, and each thread gets this many chunks if it can.
+CHUNK_CELLS, CHUNKS_EACH = 200, 8
 #: Longest reason of a failure that is kept (characters).
 REASON_LENGTH = 500
 
@@ -185,12 +185,13 @@ def flown_cells(plan: Plan, journal: Journal) -> bytearray:
     return known
 
 
-def make_chunks(plan: Plan, known: bytearray) -> Iterator[Chunk]:
-    """Chunks of all cells that are not known yet, in order."""
+def make_chunks(plan: Plan, known: bytearray, threads: int) -> Iterator[Chunk]:
+    """Chunks of all cells that are not known yet, in order, for so many threads at once."""
     vehicles = frozenset(digest(text) for _, text in plan.vehicles)
     inputs = Inputs(plan.source, vehicles)
     cell_s = planned_ticks(plan.first()) * TICK_S
-    size = min(CHUNK_CELLS, max(1, int(CHUNK_S / cell_s)))
+    share = known.count(0) // (CHUNKS_EACH * max(1, threads))
+    size = max(1, min(CHUNK_CELLS, share, int(CHUNK_S / cell_s)))
     cells: list[tuple[int, dict[str, Any]]] = []
     for cell in range(plan.cells):
         if not known[cell]:
@@ -231,7 +232,7 @@ def fly_sweep(
     """
     done = sum(known)
     progress(done)
-    chunks = make_chunks(plan, known)
+    chunks = make_chunks(plan, known, pool.threads())
     for outcome in pool.outcomes(fly_chunk, chunks, Chunk.apart, on_wait):
         if outcome.died:
             records = [{'cell': cell, **failure(WORKER_DIED)} for cell, _ in outcome.task.cells]

@@ -45,7 +45,7 @@ MINE = {
     'name': 'mine',
     'description': 'Strömung [/red]',
     'scenario': 'current_8deg',
-    'set': {'dives': 0, 'settle_s': 60.0, 'profile.depth_m': 600.0, 'duration_s': 4000.0},
+    'set': {'dives': 0, 'settle_s': 60.0, 'profile.depth_m': 600.0, 'duration_s': 12000.0},
     'dimensions': {
         'who': {
             'kind': 'variants',
@@ -205,6 +205,7 @@ def test_interrupted_and_half_a_line_later_the_file_is_the_same(flown, result, t
         os.killpg(process.pid, signal.SIGINT)
         printed, error = process.communicate(timeout=DEADLINE_S)
     kept = lines(out / JOURNAL_FILE) - 1
+    assert 1 <= kept < 12, 'interrupted in the middle'
     assert (process.returncode, printed) == (130, '')
     assert 'stopped by SIGINT' in error and 'Traceback' not in error
     assert f'{kept} of 12 cells are kept' in error
@@ -245,6 +246,7 @@ def test_worker_of_a_cluster_is_killed_and_the_file_is_the_same(flown, result, t
         ) as process:
             wait_for(lambda: lines(out / JOURNAL_FILE) > 1, process)
             workers[0].kill()
+            assert lines(out / JOURNAL_FILE) < 13, 'killed in the middle'
             _, error = process.communicate(timeout=DEADLINE_S)
     assert process.returncode == 0, error
     assert (out / RESULT_FILE).read_bytes() == result
@@ -281,7 +283,7 @@ def test_worker_with_another_program_is_refused():
 
 
 def test_worker_with_another_vehicle_file_is_refused(flown):
-    chunk = next(make_chunks(load_sweep(str(flown.file)), bytearray(12)))
+    chunk = next(make_chunks(load_sweep(str(flown.file)), bytearray(12), 2))
     with pytest.raises(WorkError, match='another file of zhang2021'):
         fly_chunk(chunk._replace(inputs=chunk.inputs._replace(vehicles=frozenset())))
 
@@ -292,7 +294,7 @@ def test_worker_with_another_vehicle_file_is_refused(flown):
 @pytest.mark.parametrize(
     ('change', 'words'),
     [
-        (lambda path: path.write_text(path.read_text().replace('4000', '4001')), ['inputs']),
+        (lambda path: path.write_text(path.read_text().replace('12000', '12001')), ['inputs']),
         (lambda path: path.write_text(path.read_text() + '# a remark\n'), ['inputs']),
         (lambda path: path.write_text(path.read_text().replace('name: mine', 'name: x')), 'sweep'),
     ],
@@ -376,7 +378,7 @@ def test_flight_that_went_wrong_is_a_failure_with_a_reason(change, reason):
 
 def test_cell_that_cannot_be_flown_does_not_stop_the_others(flown):
     """Values that are good one by one may not go together: that is found in flight."""
-    (chunk, *_) = make_chunks(load_sweep(str(flown.file)), bytearray(12))
+    chunk = next(make_chunks(load_sweep(str(flown.file)), bytearray(12), 2))
     short = {'duration_s': 20.0}
     cells = [(0, short), (1, {'initial.depth_m': -5.0}), (2, {**short, 'seed': 3})]
     records = fly_chunk(chunk._replace(cells=cells))
@@ -430,10 +432,10 @@ def test_a_million_cells_fit_into_memory(tmp_path, monkeypatch):
     monkeypatch.setattr(sweep_file.Plan, '_check_values', lambda plan: [('a', 'text')])
     plan = load_sweep(str(path))
     assert plan.cells == sweep_file.MAX_CELLS
-    chunks = make_chunks(plan, bytearray(plan.cells))
+    chunks = make_chunks(plan, bytearray(plan.cells), 2)
     first = next(chunks)
     assert [cell for cell, _ in first.cells] == list(range(len(first.cells)))
     known = bytearray(b'\1') * plan.cells
     known[987_654] = 0
-    (chunk,) = make_chunks(plan, known)
+    (chunk,) = make_chunks(plan, known, 2)
     assert chunk.cells == [(987_654, {'initial.north_m': 987.0, 'initial.east_m': 654.0})]
