@@ -41,8 +41,8 @@ from glider_model.settings import (
 from glider_model.vehicle import vehicle_path
 
 SWEEP_FOLDER = Path(__file__).parent / 'sweeps'
-#: No sweep has more cells: at a second each these take twelve days of a processor.
-MAX_CELLS = 1_000_000
+#: No sweep has more cells: these take days, and 0.5 GB of memory when the result is written.
+MAX_CELLS = 500_000
 #: No dimension has more values: each of them is checked before anything is flown.
 MAX_VALUES = 10_000
 
@@ -254,7 +254,10 @@ class Plan:
                 f'{path}: dimensions: {product} = {self.cells} cells (allowed: <= {MAX_CELLS})'
             )
         self._check_overlaps()
-        self.source = read_scenario(self._scenario_name())
+        try:
+            self.source = read_scenario(self._scenario_name())
+        except ConfigurationError as error:
+            raise ConfigurationError(f'{path}: {error}') from None
         self.vehicles = self._check_values()
 
     def _scenario_name(self) -> str:
