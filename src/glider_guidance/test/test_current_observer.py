@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.linalg import expm
+from scipy.linalg import expm, solve_continuous_lyapunov
 
 from glider_guidance.current_observer import ObserverParams, ObserverState, observer_step
 from glider_guidance.guidance import ObserverSettings
@@ -49,6 +49,25 @@ def test_step_is_the_linear_equation(k, start, drift):
         z = np.array([start[axis], start[axis + 2]])
         expected = z + dt * (error_matrix(*k) @ z + np.array([drift[axis], 0.0]))
         assert (after[axis], after[axis + 2]) == pytest.approx(expected, abs=1e-12)
+
+
+@quick
+@given(gains, velocities, velocities)
+def test_lyapunov_function_of_the_observer_falls(k, error, current_error):
+    """V = x^T P x with A^T P + P A = -1 falls at every step from any error, as V' = -x^T x says."""
+    A = error_matrix(*k)
+    P = solve_continuous_lyapunov(A.T, -np.eye(2))
+    k3, k4 = k
+    p_3 = (1.0 + k4 + k3 * k3) / (2.0 * k3 * k4)
+    assert P == pytest.approx(np.array([[(1.0 + k4) / (2.0 * k3), 0.5], [0.5, p_3]]), rel=1e-6)
+    assert np.linalg.eigvalsh(P)[0] > 0.0
+    dt = 1e-3
+    x = np.array([100.0 * error, current_error])
+    state = ObserverState(x[0], 0.0, x[1], 0.0)
+    after = observer_step(state, 0.0, 0.0, 0.0, 0.0, True, ObserverParams(*k), dt)
+    y = np.array([after.error_n, after.current_n])
+    change = (y @ P @ y - x @ P @ x) / dt
+    assert change == pytest.approx(-(x @ x) + dt * (A @ x) @ P @ (A @ x), rel=1e-6, abs=1e-9)
 
 
 def test_response_converges_to_the_exponential_with_slope_one():
