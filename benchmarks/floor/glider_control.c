@@ -85,37 +85,62 @@ static inline Moments moments(
 /* -------------------------------------------------------------------------------- steering */
 
 static inline SteeringState learn_steering(
-    const SteeringState *state, double bank, double roll_rate, double yaw_rate,
+    const SteeringState *state, double bank, double bend, double roll_rate, double yaw_rate,
     const SteeringParams *params, double dt)
 {
-    double p_bb = state->p_bb + params->drift * dt;
-    double p_kk = state->p_kk + params->kick_drift * dt;
-    double p_dd = state->p_dd + params->disturbance_drift * dt;
-    double g_b = p_bb * bank + state->p_bk * roll_rate + state->p_bd;
-    double g_k = state->p_bk * bank + p_kk * roll_rate + state->p_kd;
-    double g_d = state->p_bd * bank + state->p_kd * roll_rate + p_dd;
-    double spread = g_b * bank + g_k * roll_rate + g_d + params->noise / dt;
-    double innovation = yaw_rate - state->b * bank - state->k * roll_rate - state->d;
-    double b = state->b + g_b / spread * innovation;
-    double sign = fabs(b) > 0.5 * params->smallest ? copysign(1.0, b) : state->sign;
+    const double *p = state->p;
+    double bb = p[0], bc = p[1], bk = p[2], bd = p[3];
+    double cc = p[4], ck = p[5], cd = p[6], kk = p[7], kd = p[8], dd = p[9];
+    bb += params->drift * dt;
+    cc += params->bend_drift * dt;
+    kk += params->kick_drift * dt;
+    dd += params->disturbance_drift * dt;
+    double g_b = bb * bank + bc * bend + bk * roll_rate + bd;
+    double g_c = bc * bank + cc * bend + ck * roll_rate + cd;
+    double g_k = bk * bank + ck * bend + kk * roll_rate + kd;
+    double g_d = bd * bank + cd * bend + kd * roll_rate + dd;
+    double spread = g_b * bank + g_c * bend + g_k * roll_rate + g_d + params->noise / dt;
+    double gain
+        = (yaw_rate - state->b * bank - state->c * bend - state->k * roll_rate - state->d)
+        / spread;
     return (SteeringState){
-        b,
-        sign,
-        state->k + g_k / spread * innovation,
-        state->d + g_d / spread * innovation,
-        p_bb - g_b * g_b / spread,
-        state->p_bk - g_b * g_k / spread,
-        state->p_bd - g_b * g_d / spread,
-        p_kk - g_k * g_k / spread,
-        state->p_kd - g_k * g_d / spread,
-        p_dd - g_d * g_d / spread,
+        state->b + g_b * gain,
+        state->c + g_c * gain,
+        state->k + g_k * gain,
+        state->d + g_d * gain,
+        {
+            bb - g_b * g_b / spread,
+            bc - g_b * g_c / spread,
+            bk - g_b * g_k / spread,
+            bd - g_b * g_d / spread,
+            cc - g_c * g_c / spread,
+            ck - g_c * g_k / spread,
+            cd - g_c * g_d / spread,
+            kk - g_k * g_k / spread,
+            kd - g_k * g_d / spread,
+            dd - g_d * g_d / spread,
+        },
     };
 }
 
-static inline double effective_steering(
-    const SteeringState *state, const SteeringParams *params)
+/* Returns the sine of roll; the largest one of use goes to most. */
+static inline double roll_to_turn(
+    const SteeringState *state, double turn, double ratio, double limit, double *most)
 {
-    return state->sign * max(state->sign * state->b, params->smallest);
+    double b = state->b, c = state->c;
+    if (b * c < 0.0)
+        limit = min(limit, SHARE_OF_PEAK * sqrt(-b / (3.0 * c)));
+    double doubt = max(0.0, state->p[0] - SURE_SHARE * SURE_SHARE * b * b);
+    double part = turn / ratio * b * b / (b * b + doubt);
+    double sine = 0.0;
+    if (fabs(b) > SMALLEST_STEERING) {
+        for (int i = 0; i < 4; i++) {
+            sine += (part - (b + c * sine * sine) * sine) / (b + 3.0 * c * sine * sine);
+            sine = min(limit, max(-limit, sine));
+        }
+    }
+    *most = limit;
+    return sine;
 }
 
 /* ------------------------------------------------------------------------------- adaptive */
@@ -145,7 +170,7 @@ static inline Channel channel_step(
     return (Channel){filtered, xi, zeta, error - xi, k2, k2 - zeta};
 }
 
-/* Changes dive or climb, bank, both rates and steady_s of the state. */
+/* Changes dive or climb, bank, bend, both rates and steady_s of the state. */
 static inline void learn_phase(
     AdaptiveState *state, const Measured *measured, double speed, const AdaptiveParams *params,
     double dt)
@@ -155,14 +180,17 @@ static inline void learn_phase(
     bool gliding = fabs(measured->vertical_rate) > LEARN_VERTICAL_RATE && speed > LEARN_SPEED;
     double steady_s = gliding ? state->steady_s + dt : 0.0;
     double share = steady_s > dt ? dt / (steering->smoothing_s + dt) : 1.0;
-    double bank = state->bank + share * (sin(measured->phi) * ratio - state->bank);
+    double sine = sin(measured->phi);
+    double bank = state->bank + share * (sine * ratio - state->bank);
+    double bend = state->bend + share * (sine * sine * sine * ratio - state->bend);
     double roll_rate = state->roll_rate + share * (measured->phi_dot - state->roll_rate);
     double yaw_rate = state->yaw_rate + share * (measured->psi_dot - state->yaw_rate);
     if (steady_s > steering->after_s) {
         SteeringState *phase = measured->vertical_rate > 0.0 ? &state->dive : &state->climb;
-        *phase = learn_steering(phase, bank, roll_rate, yaw_rate, steering, dt);
+        *phase = learn_steering(phase, bank, bend, roll_rate, yaw_rate, steering, dt);
     }
     state->bank = bank;
+    state->bend = bend;
     state->roll_rate = roll_rate;
     state->yaw_rate = yaw_rate;
     state->steady_s = steady_s;
@@ -176,20 +204,22 @@ static inline double bank_to_turn(
 {
     double limit = sin(params->roll_limit);
     double ratio = max(speed, LEARN_SPEED) / STEERING_SPEED;
-    double authority = effective_steering(steering, &params->steering) * ratio;
-    double turning = asin(min(limit, max(-limit, reference->psi_dot / authority)));
-    double error = wrap_angle(
-        reference->psi - measured->psi + steering->k * (measured->phi - turning));
+    double most;
+    double turning
+        = roll_to_turn(steering, reference->psi_dot - steering->d, ratio, limit, &most);
+    double roll_left = measured->phi - asin(turning);
+    double error = wrap_angle(reference->psi - measured->psi + steering->k * roll_left);
     double psi_dot = measured->psi_dot - steering->k * measured->phi_dot;
-    double share = min(1.0, fabs(authority) * limit / (params->heading_kp * SATURATING_ERROR));
+    double share
+        = min(1.0, fabs(steering->b) * ratio * limit / (params->heading_kp * SATURATING_ERROR));
     double turn = reference->psi_dot + share * params->heading_kp * error
         + share * params->heading_kd * (reference->psi_dot - psi_dot) - *disturbance;
-    double demand = turn / authority;
-    if (learning && fabs(demand) < limit) {
+    double sine = roll_to_turn(steering, turn, ratio, limit, &most);
+    if (learning && fabs(sine) < most) {
         double moved = *disturbance - dt * share * share * params->heading_ki * error;
         *disturbance = min(DISTURBANCE_MAX, max(-DISTURBANCE_MAX, moved));
     }
-    return asin(min(limit, max(-limit, demand)));
+    return asin(sine);
 }
 
 static inline Moments adaptive_step(
