@@ -31,7 +31,7 @@ from glider_control.adaptive import (
 )
 from glider_control.allocation import moments
 from glider_model.plant import plant_joints
-from glider_model.polar import glide_alpha, glide_speed, steepen
+from glider_model.polar import glide_speed
 from glider_model.rigid_body import GRAVITY
 from glider_model.signals import TICK_S
 
@@ -65,8 +65,8 @@ def record(state, params, out):
         p = measured.phi_dot - math.sin(theta) * measured.psi_dot
         q = c_phi * measured.theta_dot + s_phi * c_theta * measured.psi_dot
         r = c_phi * c_theta * measured.psi_dot - s_phi * measured.theta_dot
-        speed = glide_speed(theta, measured.vertical_rate, polar)
-        v2, alpha = speed * speed, glide_alpha(steepen(theta), polar)
+        speed, alpha = glide_speed(theta, measured.vertical_rate, polar)
+        v2 = speed * speed
         mass = params.control.adaptive.mass
         side = mass * speed * r - joints.m_b * GRAVITY * c_theta * s_phi
         model_p = (
