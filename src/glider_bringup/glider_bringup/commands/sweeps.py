@@ -141,9 +141,10 @@ def draw(
         )
         return
     table = Table(title=stability.title, title_justify='left')
-    for name in rows[0]:
-        table.add_column(name.replace('_', ' '))
-    for row in rows:
-        table.add_row(*(f'{x:.1%}' if isinstance(x, float) else str(x) for x in row.values()))
+    for heading in ('share of the cells', *(row['panel'] or 'flights' for row in rows)):
+        table.add_column(heading)
+    for name in [name for name in rows[0] if name != 'panel']:
+        shown = (f'{row[name]:.1%}' if name != 'cells' else str(row[name]) for row in rows)
+        table.add_row(name.replace('_', ' '), *shown)
     output.print(table)
     output.print(f'drawn: {image}', soft_wrap=True)
