@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from contextlib import contextmanager
 from enum import Enum
+from pathlib import Path
 from typing import Annotated, get_args
 
 import typer
@@ -47,9 +48,15 @@ Scheduler = Annotated[
         help='Fly on the Dask cluster with this scheduler, such as tcp://127.0.0.1:8786.',
     ),
 ]
+Run = Annotated[Path, typer.Argument(metavar='RUN', help='Folder of a run, or its .mcap file.')]
 Json = Annotated[
     bool, typer.Option('--json', help='Print one JSON object and nothing else on standard output.')
 ]
+
+
+def beside(run: Path, name: str) -> Path:
+    """File in a run's folder or, if the run is an MCAP file alone, beside it."""
+    return (run if run.is_dir() else run.parent) / name
 
 
 def number(option: str, text: str, word: str, low: float, high: float) -> float:
@@ -121,8 +128,8 @@ def workers_at_work(
 
 
 @contextmanager
-def counter(description: str, total: int):
-    """Progress bar that counts, with the time left; yields its update."""
+def counter(description: str, total: int | None):
+    """Progress bar that counts, with the time left; yields its update, which may give a total."""
     bar = Progress(
         TextColumn('{task.description}'),
         BarColumn(),
@@ -134,4 +141,4 @@ def counter(description: str, total: int):
     )
     task = bar.add_task(description, total=total)
     with bar:
-        yield lambda done: bar.update(task, completed=done)
+        yield lambda done, total=total: bar.update(task, completed=done, total=total)

@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from glider_bringup.direct import fly_blocks
-from glider_bringup.figure import Record
 from glider_bringup.mission import mission_of
 from glider_bringup.montecarlo import airframe
 from glider_bringup.pool import Pool, Progress
+from glider_bringup.record import Record
 from glider_bringup.scenario import Scenario, load_scenario
 from glider_bringup.score import Scorer, windows
 from glider_guidance.los import crab_heading

@@ -2,70 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """A picture of a run: where it went, how deep, how far off, and what the actuators did."""
 
-from collections.abc import Iterable
-from copy import copy
 from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.direct import COLUMNS, ROW
-from glider_model.frames import poses_from_wire
-from glider_model.signals import TICK_S
+from glider_bringup.traces import Traces
 
-#: Topics that a picture is drawn from.
-DRAWN = (
-    'odom',
-    'joint_states',
-    'current_velocity',
-    'reference',
-    'tracking_error',
-    'current_estimate',
-)
-#: A picture shows about this many points of each curve.
-POINTS = 4000
+#: A picture shows at most this many values of each curve.
+POINTS = 8192
 #: Arrows that show the current along the track.
 ARROWS = 12
 
-_KNOT = 1852.0 / 3600.0
 _BLUE, _ORANGE, _GREY, _GREEN = '#1f6fb4', '#e07b1a', '#8a8a8a', '#2f8f4e'
 
 
-class Record:
-    """A log thinned to one row a second. Angles in deg, NED; attributes are arrays over time."""
-
-    def __init__(self, blocks: Iterable[np.ndarray]) -> None:
-        rows, first = round(1.0 / TICK_S), 0
-        thinned = []
-        for block in blocks:
-            thinned.append(block[(-first) % rows :: rows].copy())
-            first += len(block)
-        log = np.concatenate(thinned) if thinned else np.empty((0, ROW))
-        self.time_s = np.arange(len(log)) * rows * TICK_S
-        odom = poses_from_wire(log[:, COLUMNS['odom']])
-        reference = poses_from_wire(log[:, COLUMNS['reference']])
-        self.north, self.east, self.depth = odom[:, 0], odom[:, 1], odom[:, 2]
-        self.target_north, self.target_east = reference[:, 0], reference[:, 1]
-        self.roll, self.pitch = np.degrees(odom[:, 3]), np.degrees(odom[:, 4])
-        self.heading = np.degrees(np.unwrap(odom[:, 5]))
-        self.pitch_ref = np.degrees(reference[:, 4])
-        self.heading_ref = np.degrees(np.unwrap(reference[:, 5]))
-        error = log[:, COLUMNS['tracking_error']]
-        self.cross_track, self.vertical_error = error[:, 1], error[:, 2]
-        self.descending = log[:, COLUMNS['reference']][:, 9] < 0.0
-        self.joints = log[:, COLUMNS['joint_states']]
-        self.current = log[:, COLUMNS['current_velocity']]
-        self.estimate = log[:, COLUMNS['current_estimate']]
-
-    def thinned(self, points: int = POINTS) -> 'Record':
-        """The same with about so many points."""
-        step = max(1, len(self.time_s) // points)
-        record = copy(self)
-        for name, values in vars(self).items():
-            setattr(record, name, values[::step].copy())
-        return record
-
-
-def draw_run(record: Record, title: str, file: Path) -> None:
+def draw_run(traces: Traces, title: str, file: Path) -> None:
     """Draw a run into an image file; the suffix of ``file`` says which kind (png, svg, pdf)."""
     import matplotlib
 
@@ -78,20 +29,23 @@ def draw_run(record: Record, title: str, file: Path) -> None:
         height_ratios=[1.0, 1.0, 1.0, 1.0],
         layout='constrained',
     )
-    record = record.thinned()
-    hours = record.time_s / 3600.0
-    _draw_track(axes['track'], record)
-    _draw_curves(axes['depth'], hours, 'Depth', 'depth (m)', (('depth', record.depth, _BLUE),))
+    traces = traces.thinned(POINTS)
+    curves = traces.curves
+    hours = traces.time_s() / 3600.0
+    _draw_track(axes['track'], traces.samples)
+    _draw_curves(
+        axes['depth'], hours, 'Depth', 'depth (m)', (('depth', curves['depth_m'], _BLUE),)
+    )
     axes['depth'].invert_yaxis()
     _draw_curves(
         axes['cross'],
         hours,
         'Cross-track error',
         'off the path, + to starboard (m)',
-        (('cross-track error', record.cross_track, _BLUE),),
+        (('cross-track error', curves['cross_track_m'], _BLUE),),
     )
-    for turn in np.flatnonzero(record.descending[1:] != record.descending[:-1]) + 1:
-        axes['cross'].axvline(hours[turn], color=_GREY, linewidth=0.8, linestyle=':')
+    for turn_s in traces.inflections_s():
+        axes['cross'].axvline(turn_s / 3600.0, color=_GREY, linewidth=0.8, linestyle=':')
     if len(hours):
         axes['cross'].plot([], [], color=_GREY, linestyle=':', label='inflection')
     axes['cross'].legend(loc='upper right', fontsize='small')
@@ -100,14 +54,17 @@ def draw_run(record: Record, title: str, file: Path) -> None:
         hours,
         'Heading',
         'heading (deg from north)',
-        (('desired', record.heading_ref, _ORANGE), ('heading', record.heading, _BLUE)),
+        (
+            ('desired', curves['heading_ref_deg'], _ORANGE),
+            ('heading', curves['heading_deg'], _BLUE),
+        ),
     )
     _draw_curves(
         axes['pitch'],
         hours,
         'Pitch',
         'pitch, + nose up (deg)',
-        (('desired', record.pitch_ref, _ORANGE), ('pitch', record.pitch, _BLUE)),
+        (('desired', curves['pitch_ref_deg'], _ORANGE), ('pitch', curves['pitch_deg'], _BLUE)),
     )
     _draw_curves(
         axes['current'],
@@ -115,10 +72,10 @@ def draw_run(record: Record, title: str, file: Path) -> None:
         'Current',
         'water velocity (kn)',
         (
-            ('north', record.current[:, 1] / _KNOT, _BLUE),
-            ('north, estimated', record.estimate[:, 1] / _KNOT, _ORANGE),
-            ('east', record.current[:, 0] / _KNOT, _GREEN),
-            ('east, estimated', record.estimate[:, 0] / _KNOT, _GREY),
+            ('north', curves['current_north_kn'], _BLUE),
+            ('north, estimated', curves['estimate_north_kn'], _ORANGE),
+            ('east', curves['current_east_kn'], _GREEN),
+            ('east, estimated', curves['estimate_east_kn'], _GREY),
         ),
     )
     _draw_curves(
@@ -127,9 +84,9 @@ def draw_run(record: Record, title: str, file: Path) -> None:
         'Actuators',
         'share of 1 kg, 100 mm, 100 deg',
         (
-            ('net heaviness / 1 kg', record.joints[:, 0], _BLUE),
-            ('pitch mass / 100 mm', 10.0 * record.joints[:, 1], _ORANGE),
-            ('roll mass / 100 deg', np.degrees(record.joints[:, 2]) / 100.0, _GREEN),
+            ('net heaviness / 1 kg', curves['buoyancy_engine_kg'], _BLUE),
+            ('pitch mass / 100 mm', curves['pitch_mass_mm'] / 100.0, _ORANGE),
+            ('roll mass / 100 deg', curves['roll_mass_deg'] / 100.0, _GREEN),
         ),
     )
     figure.suptitle(title)
@@ -137,20 +94,20 @@ def draw_run(record: Record, title: str, file: Path) -> None:
     pyplot.close(figure)
 
 
-def _draw_track(axis, record: Record) -> None:
+def _draw_track(axis, samples: dict[str, np.ndarray]) -> None:
     """Plan view with the path and arrows of the current."""
-    axis.plot(
-        record.target_east / 1e3, record.target_north / 1e3, color=_ORANGE, label='desired path'
-    )
-    axis.plot(record.east / 1e3, record.north / 1e3, color=_BLUE, label='track')
-    if len(record.east):
-        axis.plot(record.east[0] / 1e3, record.north[0] / 1e3, 'o', color=_BLUE, label='start')
-        pick = np.linspace(0, len(record.east) - 1, ARROWS).astype(int)
+    north, east = samples['track_north_m'] / 1e3, samples['track_east_m'] / 1e3
+    target_north, target_east = samples['target_north_m'] / 1e3, samples['target_east_m'] / 1e3
+    axis.plot(target_east, target_north, color=_ORANGE, label='desired path')
+    axis.plot(east, north, color=_BLUE, label='track')
+    if len(east):
+        axis.plot(east[0], north[0], 'o', color=_BLUE, label='start')
+        pick = np.linspace(0, len(east) - 1, ARROWS).astype(int)
         axis.quiver(
-            record.east[pick] / 1e3,
-            record.north[pick] / 1e3,
-            record.current[pick, 0],
-            record.current[pick, 1],
+            east[pick],
+            north[pick],
+            samples['water_east_kn'][pick],
+            samples['water_north_kn'][pick],
             color=_GREY,
             width=0.004,
             label='current',

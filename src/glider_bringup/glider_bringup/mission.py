@@ -15,7 +15,9 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from glider_bringup.direct import MissionParams, MissionState, fly_blocks
-from glider_bringup.figure import DRAWN, Record, draw_run
+from glider_bringup.figure import draw_run
+from glider_bringup.page import FlownRun, write_page
+from glider_bringup.report import report_page
 from glider_bringup.ros.bag import BagWriter
 from glider_bringup.ros.bag_log import (
     LogWriter,
@@ -29,6 +31,7 @@ from glider_bringup.ros.node_parameters import node_parameters, write_parameters
 from glider_bringup.runner import NAMESPACE, node_commands, run_nodes
 from glider_bringup.scenario import Scenario, load_scenario
 from glider_bringup.score import Scorer
+from glider_bringup.traces import TRACED, Tracer, Traces, load_traces
 from glider_guidance.profile import mission_time_s
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
@@ -36,14 +39,22 @@ from glider_model.vehicle import load_vehicle, vehicle_path
 
 SCENARIO_FILE, VEHICLE_FILE, SCORE_FILE = 'scenario.yaml', 'vehicle.yaml', 'score.json'
 PARAMETERS_FILE, LOG_FILE = 'parameters.yaml', 'log.txt'
+TRACES_FILE, REPORT_FILE = 'traces.npz', 'report.html'
 
 #: Fields without which a score file is not a scorecard.
-CARD_FIELDS = {'scenario', 'engine', 'status', 'reason', 'wall_time_s', 'actuator_travel'}
+CARD_FIELDS = {
+    *('scenario', 'vehicle', 'controller', 'guidance', 'engine', 'seed', 'status', 'reason'),
+    *('ticks', 'sim_time_s', 'wall_time_s', 'real_time_factor', 'messages_recorded'),
+    *('messages_lost', 'dives', 'distance_along_path_m', 'cross_track_m', 'pitch_error_deg'),
+    *('heading_fluctuation_deg', 'depth_m', 'actuator_travel', 'final_state'),
+}
 #: Exit code of a node that refuses its parameters.
 EXIT_CONFIGURATION = 2
 
 #: Called now and then with the ticks flown and the depth (m).
 Progress = Callable[[int, float], None]
+#: Gets the ticks read from a bag, and about how many there are.
+Reading = Callable[[int, int], None]
 
 
 class Flight(NamedTuple):
@@ -127,20 +138,30 @@ def mission_of(scenario: Scenario) -> tuple[MissionState, MissionParams]:
     return state, MissionParams(*(block.params() for block in blocks))
 
 
+def make_tracer(scenario: Scenario) -> Tracer:
+    """Tracer of a run of the scenario."""
+    vehicle = load_vehicle(scenario.vehicle).params()
+    return Tracer(vehicle, scenario.sensors.params(scenario.seed))
+
+
 def fly_direct(
-    scenario: Scenario, folder: Path, with_bag: bool, progress: Progress
+    scenario: Scenario,
+    folder: Path,
+    with_bag: bool,
+    progress: Progress,
+    tracer: Tracer | None = None,
 ) -> tuple[Flight, dict]:
     """Fly with the direct engine; Ctrl-C ends it as aborted with what was flown."""
     state, params = mission_of(scenario)
     scorer = _scorer(scenario)
     bag = _open_bag(scenario, folder) if with_bag else None
+    takers = [taker for taker in (scorer, tracer, bag) if taker is not None]
     status, reason, ticks = 'completed', '', 0
     start = time.perf_counter()
     try:
         for log in fly_blocks(state, params):
-            scorer.add(log)
-            if bag:
-                bag.add(log)
+            for taker in takers:
+                taker.add(log)
             ticks += len(log)
             progress(ticks, float(-log[-1, 2]))
     except KeyboardInterrupt:
@@ -165,6 +186,7 @@ def fly_nodes(
     progress: Progress,
     on_log: Callable[[str], None],
     namespace: str | None = None,
+    tracer: Tracer | None = None,
 ) -> tuple[Flight, dict]:
     """Fly over node processes and topics; the score is read back from the bag.
 
@@ -187,8 +209,7 @@ def fly_nodes(
     scorer = _scorer(scenario)
     recorded, lost = 0, 0
     if has_bag(folder):  # else it ended before the recorder was up
-        for log in read_blocks(folder):
-            scorer.add(log)
+        _replay(folder, scorer, tracer)
         recorded, lost = recorded_and_lost(folder, completed)
     status = 'completed' if completed else 'aborted'
     flight = Flight(status, result.reason, result.flight_s, recorded, lost)
@@ -237,7 +258,7 @@ def write_score(folder: Path, card: dict) -> None:
     (folder / SCORE_FILE).write_text(json.dumps(card, indent=2) + '\n', encoding='utf-8')
 
 
-def score_again(run: Path) -> dict:
+def score_again(run: Path, progress: Reading = lambda ticks, total: None) -> dict:
     """Scorecard of a run, computed afresh from its bag if it has one.
 
     How the run ended is what its `SCORE_FILE` says, or the bag where there is none: a recording
@@ -247,6 +268,7 @@ def score_again(run: Path) -> dict:
     ----------
     run : Path
         Run folder, or its MCAP file.
+    progress : callable, optional
 
     Raises
     ------
@@ -256,24 +278,47 @@ def score_again(run: Path) -> dict:
     old = _read_score(run)
     if not has_bag(run):
         return old
-    with _flown(run) as scenario:
-        scorer = _scorer(scenario)
-        for log in read_blocks(run):
-            scorer.add(log)
-        if old:
-            complete, reason = old['status'] != 'aborted', old['reason']
-        else:
-            complete, reason = end_of_run(run)
-        recorded, lost = recorded_and_lost(run, complete)
-        if lost and not scorer.ticks:
-            raise ConfigurationError(
-                f'{run}: cannot be scored: its first tick is not complete, as in a free-running '
-                f'recording (allowed: runs in lockstep, with every message of every tick)'
-            )
-        status = 'completed' if complete else 'aborted'
-        flight = Flight(status, reason, old.get('wall_time_s'), recorded, lost)
-        engine = old.get('engine') or ('nodes' if (run / PARAMETERS_FILE).exists() else None)
-        return scorecard(scenario, engine, flight, _score(scenario, scorer))
+    with _flown(run) as (scenario, _):
+        return _score_bag(run, scenario, old, progress)
+
+
+def _score_bag(
+    run: Path, scenario: Scenario, old: dict, progress: Reading, tracer: Tracer | None = None
+) -> dict:
+    """Scorecard of a bag, which a tracer may follow; ``old`` is the one the run has, or empty."""
+    scorer = _scorer(scenario)
+    total = old.get('ticks') or planned_ticks(scenario)
+    _replay(run, scorer, tracer, lambda ticks: progress(ticks, max(ticks, total)))
+    if old:
+        complete, reason = old['status'] != 'aborted', old['reason']
+    else:
+        complete, reason = end_of_run(run)
+    recorded, lost = recorded_and_lost(run, complete)
+    if lost and not scorer.ticks:
+        raise ConfigurationError(
+            f'{run}: cannot be scored: its first tick is not complete, as in a free-running '
+            f'recording (allowed: runs in lockstep, with every message of every tick)'
+        )
+    status = 'completed' if complete else 'aborted'
+    flight = Flight(status, reason, old.get('wall_time_s'), recorded, lost)
+    engine = old.get('engine') or ('nodes' if (run / PARAMETERS_FILE).exists() else None)
+    return scorecard(scenario, engine, flight, _score(scenario, scorer))
+
+
+def _replay(
+    run: Path,
+    scorer: Scorer | None,
+    tracer: Tracer | None,
+    progress: Callable[[int], None] = lambda ticks: None,
+) -> None:
+    """Give the rows of a bag to those who want them; ``progress`` gets the ticks read."""
+    takers = [taker for taker in (scorer, tracer) if taker is not None]
+    ticks = 0
+    for log in read_blocks(run, TRACED if tracer else ()):
+        for taker in takers:
+            taker.add(log)
+        ticks += len(log)
+        progress(ticks)
 
 
 def _read_score(run: Path) -> dict:
@@ -297,12 +342,16 @@ def _read_score(run: Path) -> dict:
 
 
 @contextmanager
-def _flown(run: Path) -> Iterator[Scenario]:
-    """Scenario of a run: the file beside its bag or, if there is none, the one stored in it."""
-    if (run / SCENARIO_FILE).is_file():
-        yield load_scenario(str(run / SCENARIO_FILE))
+def _flown(run: Path) -> Iterator[tuple[Scenario, str]]:
+    """Scenario of a run, and the text of its file.
+
+    It is the file beside the bag or, if there is none, the one stored in it.
+    """
+    file = run / SCENARIO_FILE
+    if file.is_file():
+        yield load_scenario(str(file)), file.read_text(encoding='utf-8')
         return
-    stored = attachments(run)
+    stored = attachments(run) if has_bag(run) else {}
     if SCENARIO_FILE not in stored:
         raise ConfigurationError(
             f'{run}: no {SCENARIO_FILE} beside the bag, and none stored in it: put the one that '
@@ -315,22 +364,99 @@ def _flown(run: Path) -> Iterator[Scenario]:
             scenario = load_scenario(str(Path(folder) / SCENARIO_FILE))
         except ConfigurationError as error:
             raise ConfigurationError(str(error).replace(folder, f'{run}: stored')) from None
-        yield scenario
+        yield scenario, stored[SCENARIO_FILE].decode()
 
 
-def draw(run: Path, file: Path) -> None:
-    """Draw a run's bag into an image file.
+def read_run(
+    run: Path, progress: Reading = lambda ticks, total: None, traced: bool = True
+) -> FlownRun:
+    """A run as pages and figures show it: as it was kept when it was flown, else from its bag.
+
+    Parameters
+    ----------
+    run : Path
+        Run folder, or its MCAP file.
+    progress : callable, optional
+    traced : bool
+        Whether its traces are wanted; if not, and it has a scorecard, its bag is not read.
 
     Raises
     ------
     ConfigurationError
-        If there is no bag, or the image cannot be written.
+        If it holds no run, or nothing that could be drawn.
     """
-    _read_score(run)
-    record = Record(read_blocks(run, DRAWN))
-    with _flown(run) as scenario:
-        title = f'{scenario.name}: {scenario.description}'
+    card, kept = _read_score(run), run / TRACES_FILE
+    with _flown(run) as (scenario, as_flown):
+        traces = None
+        if card and traced and kept.is_file():
+            traces = load_traces(kept)
+        elif traced or not card:
+            if not has_bag(run):
+                raise ConfigurationError(
+                    f'{run}: nothing to draw, it has neither {TRACES_FILE} nor a bag (allowed: a '
+                    f'run flown without --no-report, or with a bag)'
+                )
+            tracer = make_tracer(scenario) if traced else None
+            afresh = _score_bag(run, scenario, card, progress, tracer)
+            card, traces = card or afresh, tracer.result() if tracer else None
+        return _flown_run(run, scenario, as_flown, card, traces)
+
+
+def _flown_run(
+    run: Path, scenario: Scenario, as_flown: str, card: dict, traces: Traces | None
+) -> FlownRun:
+    """A run with its name and vehicle."""
+    vehicle = load_vehicle(scenario.vehicle)
+    return FlownRun(run.resolve().name, scenario, as_flown, vehicle, card, traces)
+
+
+def keep_traces(scenario: Scenario, folder: Path, card: dict, tracer: Tracer) -> FlownRun:
+    """Keep what was traced of a flight in its run folder.
+
+    Raises
+    ------
+    ConfigurationError
+        If it cannot be written.
+    """
+    file, traces = folder / TRACES_FILE, tracer.result()
     try:
-        draw_run(record, title, file)
+        traces.save(file)
+    except OSError as error:
+        raise ConfigurationError(f'{file}: cannot be written: {error.strerror}') from None
+    as_flown = (folder / SCENARIO_FILE).read_text(encoding='utf-8')
+    return _flown_run(folder, scenario, as_flown, card, traces)
+
+
+def write_report(run: FlownRun, file: Path) -> None:
+    """Write the report of a run; see `save_page`."""
+    save_page(file, report_page(run))
+
+
+def save_page(file: Path, text: str) -> None:
+    """Write a page.
+
+    Raises
+    ------
+    ConfigurationError
+        If the file cannot be written.
+    """
+    try:
+        write_page(file, text)
+    except OSError as error:
+        raise ConfigurationError(f'{file}: cannot be written: {error.strerror}') from None
+
+
+def draw(run: Path, file: Path, progress: Reading = lambda ticks, total: None) -> None:
+    """Draw a run into an image file.
+
+    Raises
+    ------
+    ConfigurationError
+        If it holds no run, or the image cannot be written.
+    """
+    flown = read_run(run, progress)
+    title = f'{flown.scenario.name}: {flown.scenario.description}'
+    try:
+        draw_run(flown.traces, title, file)
     except (OSError, ValueError) as error:
         raise ConfigurationError(f'{file}: cannot be written: {error}') from None

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from glider_bringup.experiments import Experiment
-from glider_bringup.figure import Record
+from glider_bringup.record import Record
 
 #: Flights by experiment, case, controller and guidance.
 Flights = dict[tuple[str, str, str, str], Record]

@@ -14,15 +14,11 @@ import math
 import numpy as np
 
 from glider_bringup.direct import COLUMNS
-from glider_model.frames import (
-    euler_from_quaternion,
-    odometry_from_wire,
-    odometry_to_wire,
-    reference_from_wire,
-)
+from glider_bringup.truth import TrueMotion, wire_of
+from glider_model.frames import euler_from_quaternion, odometry_from_wire, reference_from_wire
 from glider_model.kernel import kernel
 from glider_model.plant import DIVE_ABOVE_M, DIVE_BELOW_M
-from glider_model.sensors import SensorParams, is_noisy, recover
+from glider_model.sensors import SensorParams
 from glider_model.signals import TICK_S
 
 #: Around an inflection (s) and shallower than this (m) nothing counts as steady.
@@ -45,31 +41,11 @@ _JOINTS_START = COLUMNS['joint_states'].start
 
 
 @kernel
-def _wire(log, row, start):
-    """Thirteen numbers of a log row as a tuple."""
-    return (
-        log[row, start],
-        log[row, start + 1],
-        log[row, start + 2],
-        log[row, start + 3],
-        log[row, start + 4],
-        log[row, start + 5],
-        log[row, start + 6],
-        log[row, start + 7],
-        log[row, start + 8],
-        log[row, start + 9],
-        log[row, start + 10],
-        log[row, start + 11],
-        log[row, start + 12],
-    )
-
-
-@kernel
 def _extract(log, series):
     """Fill ``series``, float64[_SERIES, n], from what the score needs of a ``log``."""
     for row in range(log.shape[0]):
-        odometry = odometry_from_wire(_wire(log, row, _ODOM_START))
-        reference = reference_from_wire(_wire(log, row, _REFERENCE_START))
+        odometry = odometry_from_wire(wire_of(log, row, _ODOM_START))
+        reference = reference_from_wire(wire_of(log, row, _REFERENCE_START))
         _, theta, psi = euler_from_quaternion(
             odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
         )
@@ -87,29 +63,6 @@ def _extract(log, series):
         series[_ROLL_MASS, row] = log[row, _JOINTS_START + 2]
 
 
-@kernel
-def _to_truth(log, first_tick, sensors, offset):
-    """Put the true odometry in the place of the measured one.
-
-    Parameters
-    ----------
-    log : float64[n, ROW]
-        Changed in place.
-    first_tick : int
-        Tick of the first row.
-    sensors : SensorParams
-    offset : float64[n, 2]
-        Filled with the way from the measured to the true position, north and east (m).
-    """
-    for row in range(log.shape[0]):
-        measured = odometry_from_wire(_wire(log, row, _ODOM_START))
-        true = recover(measured, first_tick + row, sensors)
-        offset[row, 0] = true.p_n - measured.p_n
-        offset[row, 1] = true.p_e - measured.p_e
-        for i, value in enumerate(odometry_to_wire(true)):
-            log[row, _ODOM_START + i] = value
-
-
 class Scorer:
     """Collects log blocks, then gives the score.
 
@@ -120,8 +73,7 @@ class Scorer:
     """
 
     def __init__(self, sensors: SensorParams | None = None) -> None:
-        self._sensors = sensors if sensors is not None and is_noisy(sensors) else None
-        self._offsets: list[np.ndarray] = []
+        self._truth = TrueMotion(sensors)
         self._blocks: list[np.ndarray] = []
         self._last: np.ndarray | None = None
 
@@ -129,10 +81,7 @@ class Scorer:
         """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
         if not len(log):
             return
-        if self._sensors is not None:
-            log = log.copy()
-            self._offsets.append(np.empty((len(log), 2)))
-            _to_truth(log, self.ticks, self._sensors, self._offsets[-1])
+        log = self._truth.of(log)
         series = np.empty((_SERIES, len(log)))
         _extract(log, series)
         self._blocks.append(series)
@@ -166,9 +115,6 @@ class Scorer:
         descending = series[_RATE_REF] > 0.0
         steady, scored = windows(series[_DEPTH], descending, settle_s, TICK_S)
         e2 = series[_E2]
-        if self._offsets:
-            target = series[[_TARGET_N, _TARGET_E]].T
-            e2 = e2 + _across(np.concatenate(self._offsets), target)
         pitch_error = np.degrees(series[_PITCH] - series[_PITCH_REF])
         heading = _heading_fluctuation_deg(series[_HEADING])
         whole = steady & _has_whole_mean(ticks)
@@ -241,20 +187,6 @@ def windows(
     for turn in np.flatnonzero(descending[1:] != descending[:-1]) + 1:
         steady[max(0, turn - margin) : turn + margin + 1] = False
     return steady, scored
-
-
-def _across(offset: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Part of an offset (north, east) to starboard of the way of the virtual target (m).
-
-    While the target stands still its way is the last one it went.
-    """
-    way = np.diff(target, axis=0, append=target[-1:])
-    moves = np.any(way != 0.0, axis=1)
-    if not moves.any():
-        return np.zeros(len(offset))
-    last = np.maximum.accumulate(np.where(moves, np.arange(len(way)), np.argmax(moves)))
-    course = np.arctan2(way[last, 1], way[last, 0])
-    return np.cos(course) * offset[:, 1] - np.sin(course) * offset[:, 0]
 
 
 def _heading_fluctuation_deg(heading: np.ndarray) -> np.ndarray:

@@ -5,9 +5,10 @@
 import numpy as np
 
 from glider_bringup.direct import ROW, fly
-from glider_bringup.mission import mission_of
+from glider_bringup.mission import make_tracer, mission_of
 from glider_bringup.scenario import load_scenario
 from glider_bringup.score import Scorer
+from glider_bringup.traces import halve
 from glider_control.control import control_step
 from glider_guidance.guidance import guidance_abort, guidance_step
 from glider_model.current import current_step
@@ -28,12 +29,16 @@ from glider_model.trim import solve_trim
 
 def main() -> None:
     """One tick by the direct engine, one by the steps as the nodes call them, and a trim."""
-    state, params = mission_of(load_scenario())
+    scenario = load_scenario()
+    state, params = mission_of(scenario)
     log = np.zeros((1, ROW))
     fly(state, params, log, TICK_S)
     scorer = Scorer(SensorSettings(position_std_m=1.0).params(0))
     scorer.add(log)
     scorer.result(0.0, 0.0)
+    tracer = make_tracer(scenario)
+    tracer.add(log)
+    halve(np.zeros(4, np.float32))
 
     plant, current, guidance, control = state
     odometry = odometry_from_wire(odometry_to_wire(plant_measurement(plant, params.plant)))

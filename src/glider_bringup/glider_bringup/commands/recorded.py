@@ -8,13 +8,10 @@ from typing import Annotated
 
 import typer
 
-from glider_bringup.console import Json, messages, output
+from glider_bringup.console import Json, Run, beside, counter, output
 from glider_bringup.scorecard import print_card
 
 app = typer.Typer()
-
-
-Run = Annotated[Path, typer.Argument(metavar='RUN', help='Folder of a run, or its .mcap file.')]
 
 
 @app.command(epilog='Example: ./glider score runs/20260101-120000-current_8deg --json')
@@ -25,8 +22,8 @@ def score(
     """Score a run again, from its bag; a run without a bag shows the score it was given."""
     from glider_bringup import mission
 
-    with messages.status('reading the bag'):
-        card = mission.score_again(run)
+    with counter('reading the bag', None) as update:
+        card = mission.score_again(run, update)
     if as_json:
         print(json.dumps(card))
     else:
@@ -44,7 +41,7 @@ def figure(
     """Draw a run: track, depth, errors, attitude, current and actuators."""
     from glider_bringup import mission
 
-    file = out or (run if run.is_dir() else run.parent) / 'run.png'
-    with messages.status('reading the bag'):
-        mission.draw(run, file)
+    file = out or beside(run, 'run.png')
+    with counter('reading the bag', None) as update:
+        mission.draw(run, file, update)
     output.print(f'drawn: {file}', soft_wrap=True)

@@ -78,9 +78,13 @@ def run(
     bag: Annotated[
         bool, typer.Option('--bag', help='Record a bag in a direct run too; nodes always do.')
     ] = False,
+    report: Annotated[
+        bool,
+        typer.Option('--report/--no-report', help='Write report.html, and what it is drawn from.'),
+    ] = True,
     as_json: Json = False,
 ) -> None:
-    """Fly a scenario; record it and print the scorecard."""
+    """Fly a scenario; record it, write its report and print the scorecard."""
     fields = dict(parse_assignment(text) for text in changes or [])
     if controller:
         fields['control.law'] = controller.value
@@ -100,7 +104,7 @@ def run(
         allowed = 'nothing, with the direct engine' if place else NAMESPACE_ALLOWED
         raise ConfigurationError(f'--namespace {namespace}: not usable (allowed: {allowed})')
     flown = load_scenario(scenario, fields)
-    card, folder = _fly(flown, engine, rate, place, out, bag)
+    card, folder = _fly(flown, engine, rate, place, out, bag, report)
     if as_json:
         print(json.dumps(card))
     else:
@@ -118,24 +122,44 @@ def _fly(
     namespace: str | None,
     out: Path | None,
     bag: bool,
+    report: bool,
 ) -> tuple[dict, Path]:
     """Fly and score a scenario with a progress bar; the scorecard and the run folder."""
     from glider_bringup import mission
 
     folder = mission.make_run_folder(scenario, out)
     messages.print(f'{scenario.name}: {scenario.description}')
+    tracer = mission.make_tracer(scenario) if report else None
     with progress(scenario, mission.planned_ticks(scenario)) as update:
         if engine is Engine.nodes:
             flight, scores = mission.fly_nodes(
-                scenario, folder, rate, update, _print_log, namespace
+                scenario, folder, rate, update, _print_log, namespace, tracer
             )
         else:
-            flight, scores = mission.fly_direct(scenario, folder, bag, update)
+            flight, scores = mission.fly_direct(scenario, folder, bag, update, tracer)
     card = mission.scorecard(scenario, engine.value, flight, scores)
     mission.write_score(folder, card)
+    if tracer:
+        _write_report(scenario, folder, card, tracer)
     if flight.reason:
         messages.print(f'{flight.status}: {flight.reason}', style='red')
     return card, folder
+
+
+def _write_report(scenario: Scenario, folder: Path, card: dict, tracer) -> None:
+    """Write the report of a run that has its score already: whatever happens, that is kept."""
+    from glider_bringup import mission
+
+    file = folder / mission.REPORT_FILE
+    try:
+        with messages.status('writing the report'):
+            run = mission.keep_traces(scenario, folder, card, tracer)
+            mission.write_report(run, file)
+    except (Exception, KeyboardInterrupt) as error:
+        cause = str(error) or type(error).__name__
+        messages.print(f'no report: {cause}', style='red', soft_wrap=True)
+    else:
+        messages.print(f'report: {file}', soft_wrap=True)
 
 
 def _print_log(line: str) -> None:

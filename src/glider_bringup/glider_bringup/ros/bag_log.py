@@ -175,56 +175,62 @@ def attachments(run: Path) -> dict[str, bytes]:
     return found
 
 
-def read_blocks(folder: Path, topics: Iterable[str] = SCORED) -> Iterator[np.ndarray]:
+def read_blocks(run: Path, also: Iterable[str] = ()) -> Iterator[np.ndarray]:
     """Log rows of a bag, as the direct engine would have given them.
 
     Parameters
     ----------
-    folder : Path
+    run : Path
         Run folder, or its MCAP file.
-    topics : iterable of str
-        Topics to read; the columns of the others, stage and saturation are NaN.
+    also : iterable of str
+        Topics to read beside `SCORED`, NaN in ticks that lack them. The columns of all other
+        topics, stage and saturation are NaN.
 
     Yields
     ------
     float64[n, ROW]
-        Rows of consecutive ticks, until the first tick that lacks one of the topics.
+        Rows of consecutive ticks, until the first tick that lacks one of `SCORED`.
 
     Raises
     ------
     ConfigurationError
         If there is no bag, or it is damaged.
     """
-    file = _file(folder)
-    wanted = {name: (TOPICS[name].codec, COLUMNS[name]) for name in topics}
+    file = _file(run)
+    wanted = {
+        name: (TOPICS[name].codec, COLUMNS[name], name in SCORED) for name in (*SCORED, *also)
+    }
     infeasible = _infeasible_changes(file)
     log = np.full((BLOCK_TICKS, ROW), np.nan)
     seen = np.zeros(BLOCK_TICKS, dtype=np.int64)
     start = 0
 
-    def finish(rows: int) -> np.ndarray:
+    def finish() -> np.ndarray:
+        """Rows up to the first tick that lacks something."""
+        missing = np.flatnonzero(seen != len(SCORED))
+        rows = int(missing[0]) if len(missing) else BLOCK_TICKS
         log[:rows, COLUMNS['infeasible']] = 0.0
         for tick, flag in infeasible:
             log[max(0, tick - start) : rows, COLUMNS['infeasible']] = flag
         return log[:rows]
 
     for name, _, payload in _messages(file, wanted):
-        codec, columns = wanted[name]
+        codec, columns, is_scored = wanted[name]
         stamp_ns, values = codec.decode(payload)
         row = stamp_ns // TICK_NS - start
         if row >= BLOCK_TICKS:
-            complete = int(np.count_nonzero(seen == len(wanted)))
-            yield finish(complete)
-            if complete < BLOCK_TICKS:
+            block = finish()
+            yield block
+            if len(block) < BLOCK_TICKS:
                 return
             start += BLOCK_TICKS
             row -= BLOCK_TICKS
             log[:] = np.nan
             seen[:] = 0
-        log[row, columns] = values
-        seen[row] += 1
-    missing = np.flatnonzero(seen != len(wanted))
-    yield finish(int(missing[0]) if len(missing) else BLOCK_TICKS)
+        if 0 <= row < BLOCK_TICKS:  # else it is late, or ticks are missing before it
+            log[row, columns] = values
+            seen[row] += is_scored
+    yield finish()
 
 
 def recorded_and_lost(folder: Path, complete: bool) -> tuple[int, int]:

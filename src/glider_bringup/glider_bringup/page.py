@@ -1,0 +1,194 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Web pages that are one file and need no network: plotly.js, curves and text in one."""
+
+import base64
+import json
+import os
+import zlib
+from html import escape
+from pathlib import Path
+from string import Template
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from glider_bringup.scenario import Scenario
+from glider_bringup.traces import SAMPLES, Traces
+from glider_model.vehicle import Vehicle
+
+_FOLDER = Path(__file__).parent / 'page'
+#: Compression: 1 is fast, and close to what more would give.
+_LEVEL = 1
+#: A path is drawn with so many points.
+_PATH_POINTS = 500
+#: Units of a time axis: from which duration on, name, length (s).
+_TIME_UNITS = ((7200.0, 'h', 3600.0), (600.0, 'min', 60.0), (0.0, 's', 1.0))
+
+
+class Curve(NamedTuple):
+    """One line of a panel."""
+
+    name: str  #: of the curve in `Traces`
+    label: str
+    role: str  #: colour, as page.css names it
+    dashed: bool = False
+    flag: str = ''  #: name of the curve that says where to draw it; empty: everywhere
+    run: int = 0
+
+
+class Panel(NamedTuple):
+    """One picture of a page."""
+
+    id: str
+    title: str
+    caption: str
+    axis: str = ''  #: name and unit of the vertical axis
+    curves: tuple[Curve, ...] = ()
+    limits: tuple[float, ...] = ()  #: horizontal lines
+    kind: str = 'time'  #: time, track or space
+    inflections: int = -1  #: run whose inflections are marked
+    inverted: bool = False
+    log: bool = False
+
+    def html(self) -> str:
+        """Place of the panel in the page."""
+        size = 'low' if self.id.startswith('learnt') else 'map' if self.kind != 'time' else ''
+        return (
+            f'<figure class="panel {size}"><h3>{escape(self.title)}</h3>'
+            f'<figcaption>{escape(self.caption)}</figcaption>'
+            f'<div class="plot" id="{self.id}"></div></figure>'
+        )
+
+
+def pack(data: bytes) -> str:
+    """Bytes, deflated, as text."""
+    return base64.b64encode(zlib.compress(data, _LEVEL)).decode('ascii')
+
+
+def pack_arrays(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Arrays as text: float32, all first bytes of them first, which packs tighter."""
+    numbers = np.concatenate([np.asarray(values, '<f4') for values in arrays.values()])
+    data = numbers.view(np.uint8).reshape(-1, 4).T.tobytes()
+    return {
+        'lengths': {name: len(values) for name, values in arrays.items()},
+        'data': pack(data),
+    }
+
+
+class FlownRun(NamedTuple):
+    """A run as pages show it."""
+
+    label: str
+    scenario: Scenario
+    as_flown: str  #: text of the scenario's file
+    vehicle: Vehicle
+    card: dict[str, Any]
+    traces: Traces | None  #: None if only the score is wanted
+
+    def data(self, names: set[str], own_path: bool) -> dict[str, Any]:
+        """What the page's script needs of it: the curves of these names, track and path."""
+        traces = self.traces
+        arrays = {name: traces.curves[name] for name in sorted(names)} | {
+            name: traces.samples[name] for name in SAMPLES
+        }
+        points = self.scenario.path.points(_PATH_POINTS)
+        return {
+            'label': self.label,
+            'spacing': traces.spacing_s,
+            'packed': pack_arrays(arrays),
+            'inflections': [round(float(time), 3) for time in traces.inflections_s()],
+            'path': np.round(points, 2).tolist(),
+            'own_path': own_path,
+        }
+
+
+def time_unit(duration_s: float) -> tuple[str, float]:
+    """Name and length (s) of the unit in which a person counts so much time."""
+    return next((name, unit) for least, name, unit in _TIME_UNITS if duration_s >= least)
+
+
+def page_data(runs: list[FlownRun], panels: list[Panel]) -> dict[str, Any]:
+    """What the page's script needs to draw these panels."""
+    duration_s = max(run.card['sim_time_s'] for run in runs)
+    unit, seconds = time_unit(duration_s)
+    paths = [run.scenario.path for run in runs]
+    names: list[set[str]] = [set() for _ in runs]
+    for curve in (curve for panel in panels for curve in panel.curves):
+        names[curve.run] |= {curve.name, curve.flag} - {''}
+    return {
+        'duration': duration_s,
+        'unit': {'name': unit, 'seconds': seconds},
+        'panels': [
+            panel._asdict() | {'curves': [curve._asdict() for curve in panel.curves]}
+            for panel in panels
+        ],
+        'runs': [
+            run.data(names[i], run.scenario.path not in paths[:i]) for i, run in enumerate(runs)
+        ],
+    }
+
+
+def make_page(title: str, body: str, data: dict[str, Any]) -> str:
+    """Whole text of a page; ``body`` is HTML, ``title`` is not."""
+    from plotly.offline import get_plotlyjs
+
+    def read(name: str) -> str:
+        return (_FOLDER / name).read_text(encoding='utf-8')
+
+    text = json.dumps(data, allow_nan=False, separators=(',', ':'))
+    return Template(read('page.html')).substitute(
+        title=escape(title),
+        style=read('page.css'),
+        body=body,
+        data=text.replace('<', '\\u003c'),
+        library=pack(get_plotlyjs().encode()) if data['panels'] else '',
+        script=read('page.js'),
+    )
+
+
+def write_page(file: Path, text: str) -> None:
+    """Write a page whole, or not at all.
+
+    Raises
+    ------
+    OSError
+    """
+    draft = file.with_name(f'.{file.name}.part')
+    try:
+        draft.write_text(text, encoding='utf-8')
+        os.replace(draft, file)
+    except OSError:
+        draft.unlink(missing_ok=True)
+        raise
+
+
+def table(rows, header=()) -> str:
+    """HTML table whose first column names what the others hold."""
+    head = ''.join(f'<th scope="col">{cell}</th>' for cell in header)
+    lines = ''.join(
+        f'<tr><th scope="row">{escape(first)}</th>'
+        + ''.join(f'<td>{escape(cell)}</td>' for cell in others)
+        + '</tr>'
+        for first, *others in rows
+    )
+    head = f'<thead><tr>{head}</tr></thead>' if head else ''
+    return f'<div class="table"><table>{head}<tbody>{lines}</tbody></table></div>'
+
+
+ZOOM_BAR = (
+    '<div class="bar">Shown: <output id="shown"></output>'
+    '<button id="whole" disabled>whole run</button>'
+    '<span>Drag across a time panel to zoom into all of them; double-click to go back.</span>'
+    '</div>'
+)
+
+
+def section(title: str, panels: list[Panel]) -> str:
+    """Panels under a heading; maps stand side by side."""
+    if not panels:
+        return ''
+    html = ''.join(panel.html() for panel in panels)
+    is_map = all(panel.kind != 'time' for panel in panels)
+    html = f'<div class="maps">{html}</div>' if is_map else html
+    return f'<h2>{escape(title)}</h2>{html}'

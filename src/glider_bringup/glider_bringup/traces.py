@@ -1,0 +1,355 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run in bounded memory, with every peak in it: what reports, comparisons and figures show.
+
+Time is cut into at most `BUCKETS` buckets of equal length, and of each quantity the smallest and
+the largest value in a bucket are kept, in the order in which they came. When the buckets are used
+up, neighbours are joined, so that a run of any length takes the same memory, and what is kept of a
+run does not depend on the blocks in which it came. Buckets begin with two ticks: a run of up to
+2 `BUCKETS` ticks is kept whole.
+"""
+
+import math
+import os
+import zipfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from glider_bringup.direct import COLUMNS
+from glider_bringup.truth import TrueMotion
+from glider_model.current import KNOT_MPS
+from glider_model.frames import poses_from_wire, wrap_angle
+from glider_model.kernel import kernel
+from glider_model.sensors import SensorParams
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_S, Adaptation
+from glider_model.vehicle import VehicleParams
+
+#: Most buckets that are kept of a run.
+BUCKETS = 2**15
+#: Topics that traces are made from, beside those that the score needs.
+TRACED = ('current_velocity', 'current_estimate', 'command', 'adaptation')
+#: Of what is kept: changes with names and meaning.
+VERSION = 1
+
+_FLAGS = ('buoyancy_engine_at_limit', 'pitch_mass_at_limit', 'roll_mass_at_limit', 'infeasible')
+_MEASURED = ('depth_m', 'cross_track_m', 'roll_deg', 'pitch_deg', 'heading_deg')
+#: Quantities of which extremes are kept.
+CURVES = (
+    *('depth_m', 'depth_ref_m', 'cross_track_m', 'vertical_error_m'),
+    *('roll_deg', 'pitch_deg', 'pitch_ref_deg', 'heading_deg', 'heading_ref_deg'),
+    *('current_north_kn', 'current_east_kn', 'estimate_north_kn', 'estimate_east_kn'),
+    *('buoyancy_engine_kg', 'pitch_mass_mm', 'roll_mass_deg'),
+    *('buoyancy_engine_ref_kg', 'pitch_mass_ref_mm', 'roll_mass_ref_deg'),
+    *('descending', *_FLAGS),
+    *Adaptation._fields,
+    *(f'measured_{name}' for name in _MEASURED),
+)
+#: Quantities that are sampled at the beginning of each bucket, all at the same time.
+SAMPLES = (
+    *('track_north_m', 'track_east_m', 'track_depth_m'),
+    *('target_north_m', 'target_east_m', 'target_depth_m'),
+    *('water_north_kn', 'water_east_kn'),
+)
+
+
+@dataclass(frozen=True)
+class Traces:
+    """What was kept of a run."""
+
+    ticks: int
+    spacing_s: float  #: time between two values of a curve: half a bucket (s)
+    curves: dict[str, np.ndarray]  #: float32[2 n] by name: extremes; NaN where there was no value
+    samples: dict[str, np.ndarray]  #: float32[n + 1]: beginning of each bucket, and the last tick
+    missing: dict[str, int]  #: ticks without a finite value, by name of the curve
+    flagged: dict[str, int]  #: ticks in which a flag was set, by its name
+
+    def has(self, name: str) -> bool:
+        """Whether there is any value of a curve."""
+        return bool(np.any(np.isfinite(self.curves[name])))
+
+    def largest(self, name: str) -> float:
+        """Largest magnitude of a curve; 0 if it has no value."""
+        values = self.curves[name]
+        return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+
+    def time_s(self) -> np.ndarray:
+        """Times (s) of the values of every curve."""
+        return self.spacing_s * np.arange(len(self.curves['depth_m']))
+
+    def first_s(self, flag: str) -> float | None:
+        """When a flag was set first (s, to half a bucket); None if it never was."""
+        at = np.flatnonzero(self.curves[flag] > 0.0)
+        return float(at[0]) * self.spacing_s if len(at) else None
+
+    def inflections_s(self) -> np.ndarray:
+        """Times (s, to half a bucket) at which the desired vertical rate changes its sign."""
+        descending = self.curves['descending']
+        known = np.flatnonzero(np.isfinite(descending))
+        turns = np.flatnonzero(np.diff(descending[known])) + 1
+        return known[turns] * self.spacing_s
+
+    def thinned(self, most: int) -> 'Traces':
+        """The same in fewer, longer buckets, so that a curve has at most so many values."""
+        thin = self
+        while len(thin.curves['depth_m']) > max(2, most):
+            thin = replace(
+                thin,
+                spacing_s=2.0 * thin.spacing_s,
+                curves={name: halve(values.copy()) for name, values in thin.curves.items()},
+                samples={
+                    name: np.append(values[:-1:2], values[-1:])
+                    for name, values in thin.samples.items()
+                },
+            )
+        return thin
+
+    def save(self, file: Path) -> None:
+        """Write everything into a NumPy archive, whole or not at all.
+
+        Raises
+        ------
+        OSError
+        """
+        draft = file.with_name(f'.{file.name}')
+        try:
+            with draft.open('wb') as stream:
+                np.savez_compressed(
+                    stream,
+                    version=VERSION,
+                    ticks=self.ticks,
+                    spacing_s=self.spacing_s,
+                    missing=np.array([self.missing[name] for name in CURVES]),
+                    flagged=np.array([self.flagged[name] for name in _FLAGS]),
+                    **self.curves,
+                    **self.samples,
+                )
+            os.replace(draft, file)
+        except OSError:
+            draft.unlink(missing_ok=True)
+            raise
+
+
+def load_traces(file: Path) -> Traces:
+    """Read what `Traces.save` wrote.
+
+    Raises
+    ------
+    ConfigurationError
+        If the file cannot be read, or is of another version of this program.
+    """
+    try:
+        with np.load(file) as archive:
+            if int(archive['version']) != VERSION:
+                raise ConfigurationError(f'{file}: made by another version of this program')
+            return Traces(
+                int(archive['ticks']),
+                float(archive['spacing_s']),
+                {name: archive[name] for name in CURVES},
+                {name: archive[name] for name in SAMPLES},
+                dict(zip(CURVES, archive['missing'].tolist(), strict=True)),
+                dict(zip(_FLAGS, archive['flagged'].tolist(), strict=True)),
+            )
+    except OSError as error:
+        raise ConfigurationError(f'{file}: {error.strerror or error}') from None
+    except (ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        if isinstance(error, ConfigurationError):
+            raise
+        raise ConfigurationError(f'{file}: damaged: {error}') from None
+
+
+class Tracer:
+    """Takes log blocks as they come and keeps `Traces` of them.
+
+    Parameters
+    ----------
+    vehicle : VehicleParams
+        Whose actuators have limits.
+    sensors : SensorParams, optional
+        Noise of the odometry; what was measured is then kept beside the truth.
+    """
+
+    def __init__(self, vehicle: VehicleParams, sensors: SensorParams | None = None) -> None:
+        self._limits = np.array([vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max])
+        self._truth = TrueMotion(sensors)
+        self._ticks, self._size, self._heading = 0, 2, np.nan
+        self._points = {name: np.full(2 * BUCKETS, np.nan, np.float32) for name in CURVES}
+        self._samples = np.full((BUCKETS, len(SAMPLES)), np.nan, np.float32)
+        self._last = np.empty((0, len(SAMPLES)), np.float32)
+        self._missing = dict.fromkeys(CURVES, 0)
+        self._flagged = dict.fromkeys(_FLAGS, 0)
+
+    def add(self, log: np.ndarray) -> None:
+        """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
+        if not len(log):
+            return
+        true = self._truth.of(log)
+        curves = _curves(true, self._limits, self._heading)
+        if self._truth.differs:
+            measured = _curves(log, self._limits, self._heading)
+            curves.update({f'measured_{name}': measured[name] for name in _MEASURED})
+        samples = _samples(true)
+        for name in _FLAGS:
+            self._flagged[name] += int(np.count_nonzero(curves[name] > 0.0))
+        known = curves['heading_deg'][np.isfinite(curves['heading_deg'])]
+        self._heading = np.radians(known[-1]) if len(known) else self._heading
+        self._last = samples[-1:].astype(np.float32)
+        start = 0
+        while start < len(log):
+            if self._ticks == BUCKETS * self._size:
+                self._join()
+            end = min(len(log), start + BUCKETS * self._size - self._ticks)
+            for name, values in curves.items():
+                points = self._points[name]
+                self._missing[name] += _fold(values[start:end], self._ticks, self._size, points)
+            first = -(-self._ticks // self._size)
+            begins = samples[start + first * self._size - self._ticks : end : self._size]
+            self._samples[first : first + len(begins)] = begins
+            self._ticks += end - start
+            start = end
+
+    def result(self) -> Traces:
+        """What was kept of everything taken in so far."""
+        buckets = -(-self._ticks // self._size)
+        samples = np.concatenate((self._samples[:buckets], self._last)).T.copy()
+        return Traces(
+            self._ticks,
+            0.5 * self._size * TICK_S,
+            {name: points[: 2 * buckets].copy() for name, points in self._points.items()},
+            dict(zip(SAMPLES, samples, strict=True)),
+            dict(self._missing),
+            dict(self._flagged),
+        )
+
+    def _join(self) -> None:
+        """Join neighbouring buckets, which must all be full."""
+        for points in self._points.values():
+            halve(points)
+        self._samples[: BUCKETS // 2] = self._samples[::2]
+        self._size *= 2
+
+
+def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[str, np.ndarray]:
+    """Quantities of log rows by their names, float64[n] each.
+
+    Headings go on through +-180 deg from ``heading_before`` (rad), NaN if there was none.
+    """
+    odom = poses_from_wire(log[:, COLUMNS['odom']])
+    reference = poses_from_wire(log[:, COLUMNS['reference']])
+    rising = log[:, COLUMNS['reference']][:, 9]
+    error, joints = log[:, COLUMNS['tracking_error']], log[:, COLUMNS['joint_states']]
+    current = log[:, COLUMNS['current_velocity']] / KNOT_MPS
+    estimate = log[:, COLUMNS['current_estimate']] / KNOT_MPS
+    command = log[:, COLUMNS['command']]
+    held = (np.abs(command) >= limits).astype(float).T
+    _unwrap(odom[:, 5], reference[:, 5], heading_before)
+    return {
+        'depth_m': odom[:, 2],
+        'depth_ref_m': reference[:, 2],
+        'cross_track_m': error[:, 1],
+        'vertical_error_m': error[:, 2],
+        'roll_deg': np.degrees(odom[:, 3]),
+        'pitch_deg': np.degrees(odom[:, 4]),
+        'pitch_ref_deg': np.degrees(reference[:, 4]),
+        'heading_deg': np.degrees(odom[:, 5]),
+        'heading_ref_deg': np.degrees(reference[:, 5]),
+        'current_north_kn': current[:, 1],
+        'current_east_kn': current[:, 0],
+        'estimate_north_kn': estimate[:, 1],
+        'estimate_east_kn': estimate[:, 0],
+        'buoyancy_engine_kg': joints[:, 0],
+        'pitch_mass_mm': 1e3 * joints[:, 1],
+        'roll_mass_deg': np.degrees(joints[:, 2]),
+        'buoyancy_engine_ref_kg': command[:, 0],
+        'pitch_mass_ref_mm': 1e3 * command[:, 1],
+        'roll_mass_ref_deg': np.degrees(command[:, 2]),
+        'descending': np.where(np.isfinite(rising), rising < 0.0, np.nan),
+        'buoyancy_engine_at_limit': held[0],
+        'pitch_mass_at_limit': held[1],
+        'roll_mass_at_limit': held[2],
+        'infeasible': log[:, COLUMNS['infeasible']],
+        **dict(zip(Adaptation._fields, log[:, COLUMNS['adaptation']].T, strict=True)),
+    }
+
+
+def _samples(log: np.ndarray) -> np.ndarray:
+    """What is sampled of log rows, float64[n, len(SAMPLES)]."""
+    position, target = log[:, COLUMNS['odom']], log[:, COLUMNS['reference']]
+    current = log[:, COLUMNS['current_velocity']] / KNOT_MPS
+    return np.stack(
+        (
+            *(position[:, 1], position[:, 0], -position[:, 2]),
+            *(target[:, 1], target[:, 0], -target[:, 2]),
+            *(current[:, 1], current[:, 0]),
+        ),
+        axis=1,
+    )
+
+
+@kernel
+def _unwrap(heading, reference, before):
+    """Make headings (rad) go on from ``before``, and references be near them; in place."""
+    for i in range(len(heading)):
+        if math.isfinite(heading[i]):
+            if math.isfinite(before):
+                heading[i] = before + wrap_angle(heading[i] - before)
+            before = heading[i]
+        reference[i] = heading[i] + wrap_angle(reference[i] - heading[i])
+
+
+@kernel
+def _widen(first, second, value):
+    """Extremes in the order in which they came, with one more: a new extreme is the last."""
+    if math.isnan(first):
+        return value, value
+    if value > max(first, second):
+        return min(first, second), value
+    if value < min(first, second):
+        return max(first, second), value
+    return first, second
+
+
+@kernel
+def _fold(values, tick, size, points):
+    """Take values into buckets of ``size`` ticks; returns how many are not finite.
+
+    Parameters
+    ----------
+    values : float64[n]
+    tick : int
+        Of the first value.
+    size : int
+    points : float32[2 b]
+        Extremes of every bucket, NaN where there is none yet.
+    """
+    missing, start = 0, 0
+    while start < len(values):
+        bucket = (tick + start) // size
+        end = min(len(values), (bucket + 1) * size - tick)
+        first, second = points[2 * bucket], points[2 * bucket + 1]
+        for i in range(start, end):
+            value = np.float32(values[i])
+            if math.isfinite(value):
+                first, second = _widen(first, second, value)
+            else:
+                missing += 1
+        points[2 * bucket], points[2 * bucket + 1] = first, second
+        start = end
+    return missing
+
+
+@kernel
+def halve(points):
+    """Join neighbouring buckets of float32[2 b]; the first half, float32[b], holds the result."""
+    joined = 0
+    for at in range(0, len(points), 4):
+        first, second = points[at], points[at + 1]
+        for i in range(at + 2, min(at + 4, len(points))):
+            if math.isfinite(points[i]):
+                first, second = _widen(first, second, points[i])
+        points[joined], points[joined + 1] = first, second
+        joined += 2
+    points[joined:] = np.nan
+    return points[:joined]

@@ -1,0 +1,421 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reports and comparisons: what they say, what they take, and what a failed one leaves behind."""
+
+import base64
+import json
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import zlib
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from glider_bringup import cli, mission
+from glider_bringup.direct import COLUMNS, fly_blocks
+from glider_bringup.mission import Flight, make_run_folder, read_run, write_report, write_score
+from glider_bringup.report import LOST_M, findings, lost_since_s, span, verdict
+from glider_bringup.scenario import load_scenario
+from glider_bringup.score import Scorer
+
+E2 = COLUMNS['tracking_error'].start + 1
+SHORT = {'dives': 0, 'duration_s': 300.0, 'settle_s': 0.0}
+
+
+class Text(HTMLParser):
+    """Tags of a page, and its text outside of scripts and styles."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.tags, self.text, self._inside = [], '', []
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag in ('script', 'style'):
+            self._inside.append(tag)
+
+    def handle_endtag(self, tag):
+        if self._inside and tag == self._inside[-1]:
+            self._inside.pop()
+
+    def handle_data(self, data):
+        if not self._inside:
+            self.text += data
+
+
+def read_page(file):
+    """Text of a page, and the data in it with its curves unpacked."""
+    page = file.read_text(encoding='utf-8')
+    text = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)
+    data = json.loads(text[1], parse_constant=lambda name: pytest.fail(f'{name} is no JSON'))
+    for run in data['runs']:
+        packed = run['packed']
+        raw = np.frombuffer(zlib.decompress(base64.b64decode(packed['data'])), np.uint8)
+        numbers = np.ascontiguousarray(raw.reshape(4, -1).T).view('<f4').ravel()
+        ends = np.cumsum(list(packed['lengths'].values()))
+        assert ends[-1] == len(numbers)
+        run['arrays'] = dict(zip(packed['lengths'], np.split(numbers, ends[:-1]), strict=True))
+    return Text(page), data
+
+
+def fly(tmp_path, change=None, stop=False, name='flight', **fields):
+    """Fly in this process; ``change`` alters each block of the log, ``stop`` is a Ctrl-C."""
+    scenario = load_scenario('current_8deg', {**SHORT, **fields})
+    folder = make_run_folder(scenario, tmp_path / name)
+    tracer, scorer = mission.make_tracer(scenario), Scorer()
+    for log in fly_blocks(*mission.mission_of(scenario)):
+        log = log if change is None else change(log.copy())
+        tracer.add(log)
+        scorer.add(log)
+    flight = Flight('aborted' if stop else 'completed', 'stopped' if stop else '', 1.0, 0, 0)
+    settle_s = scenario.settle_time_s(scorer.ticks * 0.1)
+    scores = scorer.result(settle_s, scenario.profile.depth_m)
+    card = mission.scorecard(scenario, 'direct', flight, scores)
+    write_score(folder, card)
+    mission.keep_traces(scenario, folder, card, tracer)
+    return folder
+
+
+def report_of(folder):
+    file = folder / 'report.html'
+    write_report(read_run(folder), file)
+    return read_page(file)
+
+
+def glider(*arguments, **options):
+    return subprocess.run(
+        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        env={**os.environ, 'COLUMNS': '160', 'PYTHONUTF8': '1'},
+        timeout=300,
+        check=False,
+        **options,
+    )
+
+
+@pytest.fixture
+def call(monkeypatch, capsys):
+    """Call the command line in this process: exit code, output, messages."""
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, 'argv', ['glider', *map(str, arguments)])
+        try:
+            code = cli.main()
+        except SystemExit as end:
+            code = end.code
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return run
+
+
+@pytest.fixture(scope='module')
+def flown(tmp_path_factory):
+    """Folder of a run with bag and report, as the command leaves it."""
+    folder = tmp_path_factory.mktemp('report') / 'flight'
+    fields = ('--set', 'settle_s=0', '--duration', 300)
+    done = glider('run', 'rough_water', '--engine', 'direct', '--bag', *fields, '--out', folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+# ---------------------------------------------------------------------------------- one run
+
+
+def test_report_holds_the_run_and_needs_nothing_else(flown):
+    """Every panel has its curves, and no tag of the page asks for another file."""
+    text, data = read_page(flown / 'report.html')
+    card = json.loads((flown / 'score.json').read_text())
+    (run,) = data['runs']
+    assert np.max(np.abs(run['arrays']['cross_track_m'])) == np.float32(
+        card['cross_track_m']['max_all']
+    )
+    assert np.max(run['arrays']['depth_m']) == np.float32(card['depth_m']['max'])
+    for panel in data['panels']:
+        for curve in panel['curves']:
+            assert np.all(np.isfinite(run['arrays'][curve['name']])), curve['name']
+    for tag, attributes in text.tags:
+        assert tag not in ('iframe', 'img', 'object'), tag
+        for name in ('src', 'href'):
+            assert attributes.get(name, 'data:,') == 'data:,', (tag, attributes)
+
+
+def test_report_from_the_bag_is_that_of_the_flight(flown, tmp_path, call):
+    """Two feeds, one page: the same bytes, with what was kept of the run gone."""
+    folder = tmp_path / 'flight'
+    shutil.copytree(flown, folder)
+    first = (folder / 'report.html').read_bytes()
+    (folder / 'report.html').unlink()
+    (folder / 'traces.npz').unlink()
+    code, out, _ = call('report', folder)
+    assert code == 0
+    assert str(folder / 'report.html') in out.replace('\n', '')
+    assert (folder / 'report.html').read_bytes() == first
+
+
+def test_report_without_a_bag_is_made_of_what_was_kept(tmp_path, call):
+    folder = fly(tmp_path)
+    assert call('report', folder, '--out', tmp_path / 'page.html')[0] == 0
+    _, data = read_page(tmp_path / 'page.html')
+    assert data['duration'] == 300.0
+
+
+def test_run_without_report_leaves_none_and_says_what_is_missing(tmp_path, call):
+    folder = tmp_path / 'flight'
+    assert (
+        call('run', '--engine', 'direct', '--duration', 5, '--no-report', '--out', folder)[0] == 0
+    )
+    assert {path.name for path in folder.iterdir()} == {
+        'score.json',
+        'scenario.yaml',
+        'vehicle.yaml',
+    }
+    code, out, err = call('report', folder)
+    assert (code, out) == (2, '')
+    for word in ('flight', 'traces.npz', 'bag', '--no-report'):
+        assert word in err
+
+
+def test_script_in_a_description_is_only_text(tmp_path):
+    evil = '</script><script>alert(1)</script><img src=x onerror=alert(2)> & "quotes"'
+    text, _ = report_of(fly(tmp_path, description=evil))
+    assert evil in text.text
+    assert 'img' not in [tag for tag, _ in text.tags]
+    scripts = [attributes for tag, attributes in text.tags if tag == 'script']
+    assert len(scripts) == 3
+
+
+@pytest.mark.parametrize('seconds', [0.1, 0.2, 0.3])
+def test_run_of_a_few_ticks_has_a_report(tmp_path, seconds):
+    text, data = report_of(fly(tmp_path, duration_s=seconds))
+    assert data['duration'] == seconds
+    assert f'{seconds:g} s' in text.text
+    assert {panel['id'] for panel in data['panels']} >= {'track', 'space', 'depth', 'pitch'}
+
+
+def test_run_that_ended_before_its_first_tick_has_a_report(tmp_path):
+    scenario = load_scenario('current_8deg')
+    folder = make_run_folder(scenario, tmp_path / 'flight')
+    flight = Flight('aborted', 'plant_node was killed by SIGKILL', 0.0, 0, 0)
+    card = mission.scorecard(scenario, 'nodes', flight, Scorer().result(0.0, 1000.0))
+    write_score(folder, card)
+    mission.keep_traces(scenario, folder, card, mission.make_tracer(scenario))
+    text, data = report_of(folder)
+    assert data['panels'] == []
+    assert 'before the first tick: plant_node was killed by SIGKILL' in text.text
+
+
+def test_not_a_number_in_the_data_is_a_gap_that_is_told(tmp_path):
+    def spoil(log):
+        log[1000:1500, E2] = np.nan
+        log[100, COLUMNS['adaptation']] = np.inf
+        return log
+
+    text, data = report_of(fly(tmp_path, spoil))
+    assert 'cross_track_m (500)' in text.text
+    assert 'lyapunov_1 (1)' in text.text
+    curve = data['runs'][0]['arrays']['cross_track_m']
+    assert np.count_nonzero(np.isnan(curve)) == 500
+    assert not np.any(np.isinf(data['runs'][0]['arrays']['lyapunov_1']))
+
+
+def test_topic_that_is_not_in_the_bag_has_no_panel(tmp_path):
+    """A vehicle at sea tells nothing of the true current."""
+
+    def at_sea(log):
+        log[:, COLUMNS['current_velocity']] = np.nan
+        return log
+
+    text, data = report_of(fly(tmp_path, at_sea))
+    curves = [curve['name'] for panel in data['panels'] for curve in panel['curves']]
+    assert 'estimate_north_kn' in curves
+    assert 'current_north_kn' not in curves
+    assert 'current_north_kn (3,000)' in text.text
+
+
+def test_pid_shows_nothing_learnt(tmp_path):
+    _, data = report_of(fly(tmp_path, **{'control.law': 'pid'}))
+    assert not [panel['id'] for panel in data['panels'] if panel['id'].startswith('learnt')]
+
+
+# ---------------------------------------------------------------------------------- in words
+
+
+def drift(log, speed_mps=1.0, from_s=100.0, depth_m=100.0):
+    """The vehicle is carried off its path from some time on."""
+    time_s = 0.1 * np.arange(len(log))
+    log[:, 2] = -depth_m
+    log[:, E2] = speed_mps * np.clip(time_s - from_s, 0.0, None)
+    return log
+
+
+def test_lost_track_is_told_with_its_time(tmp_path):
+    run = read_run(fly(tmp_path, drift))
+    assert lost_since_s(run.traces) == pytest.approx(100.0 + LOST_M, abs=0.2)
+    assert (
+        'problem',
+        'Track lost: more than 100 m off the path from 200 s to the end.',
+    ) in findings(run)
+
+
+@pytest.mark.parametrize(
+    'flight',
+    [
+        lambda log: drift(log, depth_m=1.0),  # adrift on the surface
+        lambda log: drift(log, speed_mps=0.4),  # never so far
+        lambda log: drift(log, speed_mps=2.0)[::-1].copy(),  # comes back
+    ],
+)
+def test_track_is_not_lost_by_less(tmp_path, flight):
+    assert lost_since_s(read_run(fly(tmp_path, flight)).traces) is None
+
+
+def test_trouble_comes_before_notes_and_none_is_called_none(tmp_path):
+    good = findings(read_run(fly(tmp_path, name='good')))
+    assert good[0][0] == 'fine'
+    assert [kind for kind, _ in good[1:]] == ['note'] * (len(good) - 1)
+    bad = findings(read_run(fly(tmp_path, drift, stop=True, name='bad')))
+    kinds = [kind for kind, _ in bad]
+    assert kinds == sorted(kinds, reverse=True)
+    assert 'fine' not in kinds
+    assert bad[0] == ('problem', 'The run was aborted at 300 s: stopped.')
+
+
+def test_verdict_of_a_flight_into_a_current_that_is_too_strong(tmp_path):
+    fields = {'duration_s': 4000.0, 'current.speed_kn': 1.5, 'current.angle_deg': 90.0}
+    folder = fly(tmp_path, settle_s=1000.0, **fields)
+    run = read_run(folder)
+    assert run.card['status'] == 'infeasible'
+    assert 'too strong' in verdict(run.card, 1000.0)
+    assert any('could not be held' in text for kind, text in findings(run) if kind == 'problem')
+
+
+@pytest.mark.parametrize(
+    ('seconds', 'text'),
+    [(0.1, '0.1 s'), (119.9, '119.9 s'), (120.0, '2 min'), (7199.0, '2 h'), (7721.0, '2 h 9 min')],
+)
+def test_times_are_said_as_people_say_them(seconds, text):
+    assert span(seconds) == text
+
+
+# ---------------------------------------------------------------------------------- mistakes
+
+
+def limit_files():
+    """Let no file grow beyond 100 kB: a disk that is full."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+
+def test_report_that_cannot_be_written_loses_no_run(tmp_path):
+    folder = tmp_path / 'flight'
+    done = glider(
+        *('run', '--engine', 'direct', '--duration', 900, '--json', '--out', folder),
+        preexec_fn=limit_files,
+    )
+    assert done.returncode == 0, done.stderr
+    assert 'Traceback' not in done.stderr
+    assert 'no report' in done.stderr
+    assert 'traces.npz' in done.stderr
+    assert json.loads((folder / 'score.json').read_text()) == json.loads(done.stdout)
+    assert {path.name for path in folder.iterdir()} == {
+        'score.json',
+        'scenario.yaml',
+        'vehicle.yaml',
+    }
+
+
+def test_mistakes_end_with_one_message_and_exit_code_2(tmp_path, call):
+    folder, other = fly(tmp_path), fly(tmp_path, name='other')
+    broken = fly(tmp_path, name='broken')
+    (broken / 'traces.npz').write_bytes(b'PK\x03\x04 and no more')
+    half = fly(tmp_path, name='half')
+    (half / 'score.json').write_text('{"scenario": "x", "status": "completed"}')
+    before = (folder / 'score.json').read_bytes()
+    mistakes = (
+        (('report', tmp_path), ['not a run folder', 'score.json']),
+        (('report', tmp_path / 'nowhere'), ['nowhere', 'no such run folder']),
+        (('report', broken), ['traces.npz', 'damaged']),
+        (('report', half), ['score.json', 'not a scorecard']),
+        (('report', folder, '--out', tmp_path), [str(tmp_path), 'cannot be written']),
+        (('report', folder, '--out', '/sys/report.html'), ['/sys/report.html', 'cannot be']),
+        (('report', folder, '--out', tmp_path / 'no' / 'x.html'), ['x.html', 'cannot be written']),
+        (('compare', folder), ['two or more']),
+        (('compare', folder, other, folder), ['given twice']),
+        (('compare', folder, tmp_path), ['not a run folder']),
+        (('compare', folder, other, '--out', tmp_path), ['cannot be written']),
+        (('figure', folder, '--out', tmp_path / 'x.doc'), ['x.doc', 'cannot be written']),
+    )
+    for arguments, words in mistakes:
+        code, out, err = call(*arguments)
+        assert (code, out) == (2, ''), arguments
+        for word in words:
+            assert word in err.replace('\n', ''), arguments
+    assert (folder / 'score.json').read_bytes() == before
+    assert not list(tmp_path.rglob('*.part'))
+
+
+def test_figure_needs_no_bag(tmp_path, call):
+    folder = fly(tmp_path)
+    for suffix, magic in (('png', b'\x89PNG'), ('pdf', b'%PDF'), ('svg', b'<?xml')):
+        code, _, err = call('figure', folder, '--out', tmp_path / f'run.{suffix}')
+        assert code == 0, err
+        assert (tmp_path / f'run.{suffix}').read_bytes().startswith(magic)
+
+
+# ---------------------------------------------------------------------------------- several
+
+
+def test_comparison_tells_scores_and_differences(tmp_path, call):
+    one = fly(tmp_path, name='one')
+    two = fly(tmp_path, name='two', duration_s=200.0, **{'control.law': 'pid'})
+    code, out, _ = call('compare', one, two, '--json', '--out', tmp_path / 'both.html')
+    assert code == 0
+    told = json.loads(out)
+    assert [run['run'] for run in told['runs']] == ['one', 'two']
+    for run, folder in zip(told['runs'], (one, two), strict=True):
+        assert run['score'] == json.loads((folder / 'score.json').read_text())
+    assert {row['field']: row['values'] for row in told['differences']} == {
+        'duration_s': [300.0, 200.0],
+        'control.law': ['adaptive', 'pid'],
+    }
+    text, data = read_page(tmp_path / 'both.html')
+    assert data['duration'] == 300.0
+    assert 'control.law' in text.text
+    for panel in data['panels']:
+        if panel['kind'] == 'time':
+            assert [curve['run'] for curve in panel['curves']] == [0, 1], panel['id']
+    lengths = [len(run['arrays']['depth_m']) * run['spacing'] for run in data['runs']]
+    assert lengths == pytest.approx([300.0, 200.0])
+
+
+def test_comparison_names_what_only_one_scenario_has(tmp_path, call):
+    one = fly(tmp_path, name='one')
+    path = {'kind': 'waypoints', 'waypoints': [[0, 0], [500, 0]]}
+    two = fly(tmp_path, name='two', path=path, vehicle='zhang2021_table1')
+    rows = json.loads(call('compare', one, two, '--json')[1])['differences']
+    found = {row['field']: row['values'] for row in rows}
+    assert found['path.kind'] == ['straight', 'waypoints']
+    assert found['path.length_m'] == [25000.0, None]
+    assert found['vehicle.name'] == ['zhang2021', 'zhang2021_table1']
+
+
+def test_comparison_of_runs_with_one_name_shows_where_they_are(tmp_path, call):
+    folders = [fly(tmp_path / name, name='same') for name in ('a', 'b')]
+    told = json.loads(call('compare', *folders, '--json')[1])
+    assert [run['run'] for run in told['runs']] == list(map(str, folders))
+    assert told['differences'] == []
+
+
+def test_comparison_for_a_person_lists_each_run(tmp_path, call):
+    one, two = fly(tmp_path, name='one'), fly(tmp_path, name='two', stop=True)
+    code, out, _ = call('compare', one, two)
+    assert code == 0
+    for word in ('one', 'two', 'completed', 'aborted', 'cross-track', 'the same'):
+        assert word in out
