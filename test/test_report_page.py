@@ -1,0 +1,318 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reports and comparisons in a real browser: drawn, linked, offline, and with the score's numbers.
+
+Needs Chromium, on Debian and Ubuntu the package ``chromium``. ``python test/test_report_page.py``
+flies the default scenario and writes docs/images/report.png anew.
+"""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import sync_playwright
+
+PICTURE = Path(__file__).resolve().parents[1] / 'docs' / 'images' / 'report.png'
+BROWSERS = ('chromium', 'chromium-browser', 'google-chrome-stable', 'google-chrome')
+#: 3-D views are drawn without a graphics card.
+OPTIONS = ['--no-sandbox', '--enable-unsafe-swiftshader']
+DEADLINE_MS = 60_000
+
+IS_READY = "document.documentElement.dataset.state === 'ready'"
+#: Traces that have nothing to show in some spans of time.
+SOMETIMES = ('zoomed in', 'at its limit', 'course cannot be held')
+#: What is drawn of every panel.
+DRAWN = """() => page.panels.map(({ id, kind }) => {
+  const element = document.getElementById(id);
+  const box = element.querySelector('.main-svg, canvas').getBoundingClientRect();
+  const layout = element._fullLayout;
+  return {
+    id, kind, width: box.width, height: box.height,
+    ranges: kind === 'time' ? layout.xaxis.range : null,
+    lines: element.querySelectorAll('.scatterlayer path.js-line').length,
+    canvas: element.querySelectorAll('canvas').length,
+    traces: element.data.map((trace) => ({
+      name: trace.name, x: Array.from(trace.x), y: Array.from(trace.y), z: trace.z || null,
+    })),
+  };
+})"""
+
+
+@contextmanager
+def browser_at(executable):
+    """Chromium, driven from here."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=executable, args=OPTIONS)
+        yield browser
+        browser.close()
+
+
+def open_page(browser, file, **options):
+    """Page of a file when everything is drawn, and what it said and asked for meanwhile."""
+    page = browser.new_page(**options)
+    said, asked = [], []
+    page.on('console', lambda message: said.append(message.text) if _is_bad(message) else None)
+    page.on('pageerror', lambda error: said.append(str(error)))
+    page.on('request', lambda request: asked.append(request.url))
+    page.goto(file.as_uri())
+    page.wait_for_function(IS_READY, timeout=DEADLINE_MS)
+    return page, said, asked
+
+
+def _is_bad(message):
+    """Tell whether a line of the console is an error, or a warning of the page's own."""
+    return message.type == 'error' or (message.type == 'warning' and 'WARN' in message.text)
+
+
+# ---------------------------------------------------------------------------------- fixtures
+
+
+@pytest.fixture(scope='module')
+def browser():
+    executable = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if executable is None:
+        missing = 'no Chromium here; on Debian or Ubuntu: apt-get install chromium'
+        if os.environ.get('CI') == 'true':
+            pytest.fail(missing)
+        pytest.skip(missing)
+    with browser_at(executable) as running:
+        yield running
+
+
+@pytest.fixture(scope='module')
+def default_run(glider, tmp_path_factory):
+    """Folder of the default scenario, flown whole."""
+    folder = tmp_path_factory.mktemp('report') / 'default'
+    done = glider('run', '--engine', 'direct', '--out', folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope='module')
+def pid_run(glider, tmp_path_factory):
+    """The same by the PID law, cut short."""
+    folder = tmp_path_factory.mktemp('report') / 'pid'
+    options = ('--controller', 'pid', '--duration', 6000, '--out', folder)
+    done = glider('run', '--engine', 'direct', *options)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def finite(values):
+    return [value for value in values if isinstance(value, (int, float))]
+
+
+def check_drawn(panels):
+    """Every panel has a size, every curve of it a line with numbers in it."""
+    for panel in panels:
+        assert panel['width'] > 200, panel['id']
+        assert panel['height'] > 100, panel['id']
+        if panel['kind'] == 'space':
+            assert panel['canvas'] > 0
+            track = panel['traces'][-1]
+            assert min(map(len, map(finite, (track['x'], track['y'], track['z'])))) > 1
+            continue
+        drawn = [trace for trace in panel['traces'] if len(finite(trace['y'])) > 1]
+        assert drawn, panel['id']
+        assert panel['lines'] >= len(drawn) - (panel['kind'] == 'track'), panel['id']
+        for trace in panel['traces']:
+            assert len(trace['x']) == len(trace['y']), (panel['id'], trace['name'])
+            assert trace['name'] in SOMETIMES or finite(trace['y']), (panel['id'], trace['name'])
+
+
+def drag(page, panel, begin, end):
+    """Drag with the mouse over a panel, between two shares of its width."""
+    area = page.locator(f'#{panel} .nsewdrag').first
+    area.scroll_into_view_if_needed()
+    box = area.bounding_box()
+    middle = box['y'] + 0.5 * box['height']
+    page.mouse.move(box['x'] + begin * box['width'], middle)
+    page.mouse.down()
+    page.mouse.move(box['x'] + end * box['width'], middle, steps=4)
+    page.mouse.up()
+
+
+# ---------------------------------------------------------------------------------- tests
+
+
+def test_report_of_the_default_run(browser, default_run):
+    """Drawn whole, no request, no complaint; numbers are those of score.json."""
+    file = default_run / 'report.html'
+    page, said, asked = open_page(browser, file)
+    panels = page.evaluate(DRAWN)
+    check_drawn(panels)
+    assert {panel['id'] for panel in panels} == {
+        *('track', 'space', 'depth', 'cross_track', 'pitch', 'heading', 'roll'),
+        *('buoyancy_engine', 'pitch_mass', 'roll_mass', 'current_north', 'current_east'),
+        *('learnt_pitch', 'learnt_roll', 'learnt_steering', 'learnt_disturbance'),
+        'learnt_lyapunov',
+    }
+
+    card = json.loads((default_run / 'score.json').read_text())
+    tiles = dict(zip(page.locator('.tile dt').all_inner_texts(), _numbers(page), strict=True))
+    track, pitch = card['cross_track_m'], card['pitch_error_deg']
+    assert tiles['cross-track error, steady'] == pytest.approx(track['max_steady'], abs=0.005)
+    assert tiles['deepest point'] == pytest.approx(card['depth_m']['max'], abs=0.05)
+    assert tiles['pitch error, steady'] == pytest.approx(pitch['rms_steady'], abs=0.005)
+    table = page.locator('.table').inner_text()
+    assert f'{track["max_steady"]:.3f} m' in table
+    assert f'{card["actuator_travel"]["roll_mass_deg"]:.0f} deg' in table
+
+    # no peak is lost between the log and the screen
+    settle_s = 1800.0
+    largest = page.evaluate(
+        """(settle) => Math.max(...page.runs[0].arrays.cross_track_m
+            .filter((_, i) => i * page.runs[0].spacing > settle).map(Math.abs))""",
+        settle_s,
+    )
+    assert largest == pytest.approx(track['max_all'], rel=1e-6)
+    depth = next(panel for panel in panels if panel['id'] == 'depth')['traces'][0]
+    assert len(depth['y']) < 3000
+    assert max(depth['y']) == pytest.approx(card['depth_m']['max'], rel=1e-6)
+
+    assert asked == [file.as_uri()]
+    assert said == []
+    page.close()
+
+
+def _numbers(page):
+    """First number of every tile."""
+    texts = page.locator('.tile dd').all_inner_texts()
+    return [float(re.search(r'-?[\d,.]+', text)[0].replace(',', '')) for text in texts]
+
+
+def test_zoom_by_the_mouse_is_linked_and_refines(browser, default_run):
+    page, said, asked = open_page(browser, default_run / 'report.html')
+    before = page.evaluate(DRAWN)
+    drag(page, 'cross_track', 0.4, 0.5)
+    page.wait_for_function("document.getElementById('whole').disabled === false")
+    page.wait_for_function(IS_READY, timeout=DEADLINE_MS)
+    after = page.evaluate(DRAWN)
+    check_drawn(after)
+    timed = [panel for panel in after if panel['kind'] == 'time']
+    begin, end = timed[0]['ranges']
+    hours = json.loads((default_run / 'score.json').read_text())['sim_time_s'] / 3600.0
+    assert [begin, end] == pytest.approx([0.4 * hours, 0.5 * hours], rel=0.02)
+    for panel in timed:
+        assert panel['ranges'] == pytest.approx([begin, end]), panel['id']
+    for old, new in zip(before, after, strict=True):
+        if old['kind'] == 'time':
+            assert _in_view(new, begin, end) > 3 * _in_view(old, begin, end), old['id']
+        if old['kind'] == 'track':
+            assert not _zoomed_in(old)
+            assert len(_zoomed_in(new)) > 10
+
+    page.click('#whole')
+    page.wait_for_function("document.getElementById('whole').disabled === true")
+    page.wait_for_function(IS_READY, timeout=DEADLINE_MS)
+    whole = page.evaluate(DRAWN)
+    assert [panel['ranges'] for panel in whole] == [panel['ranges'] for panel in before]
+    assert len(asked) == 1
+    assert said == []
+    page.close()
+
+
+def _zoomed_in(panel):
+    """What is drawn bold of a track."""
+    return next(trace['x'] for trace in panel['traces'] if trace['name'] == 'zoomed in')
+
+
+def _in_view(panel, begin, end):
+    """Points of the first curve of a panel within a span of time."""
+    return sum(begin <= x <= end for x in panel['traces'][0]['x'])
+
+
+def test_report_of_a_run_over_nodes_in_a_narrow_dark_window(browser, over_nodes):
+    page, said, asked = open_page(
+        *(browser, over_nodes.folder / 'report.html'),
+        viewport={'width': 390, 'height': 844},
+        color_scheme='dark',
+    )
+    check_drawn(page.evaluate(DRAWN))
+    assert page.evaluate('document.documentElement.scrollWidth') == 390, 'nothing sticks out'
+    ink = page.evaluate("document.getElementById('depth')._fullLayout.font.color")
+    assert int(ink[1:3], 16) > 0xC0, 'light ink on a dark page'
+    assert (said, len(asked)) == ([], 1)
+    page.close()
+
+
+def test_report_of_an_aborted_run(browser, start_glider, tmp_path):
+    """Interrupted in flight: the page says so, and shows what was flown until then."""
+    folder = tmp_path / 'run'
+    options = ('--duration', 1e8, '--bag', '--out', folder)
+    process = start_glider('run', '--engine', 'direct', *options)
+    _interrupt_in_flight(process, folder)
+    assert process.wait(60.0) == 130
+    page, said, asked = open_page(browser, folder / 'report.html')
+    assert 'Aborted' in page.locator('.badge').inner_text()
+    assert 'stopped by SIGINT' in page.locator('.verdict').inner_text()
+    assert 'stopped by SIGINT' in page.locator('.findings .problem').first.inner_text()
+    check_drawn(page.evaluate(DRAWN))
+    assert (said, len(asked)) == ([], 1)
+    page.close()
+
+
+def _interrupt_in_flight(process, folder):
+    """Send SIGINT once some of the flight is in the bag."""
+    deadline = time.monotonic() + 200.0
+    while not any(file.stat().st_size > 1_000_000 for file in folder.glob('*.mcap')):
+        assert process.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+
+
+def test_comparison(browser, glider, default_run, pid_run, tmp_path):
+    """Runs of different length over each other, each with its line, zoomed together."""
+    file = tmp_path / 'compared.html'
+    done = glider('compare', default_run, pid_run, '--out', file, '--json')
+    assert done.returncode == 0, done.stderr
+    page, said, asked = open_page(browser, file)
+    panels = page.evaluate(DRAWN)
+    check_drawn(panels)
+    for panel in panels:
+        names = [trace['name'] for trace in panel['traces']]
+        assert {'default', 'pid'} <= set(names), panel['id']
+    rows = page.locator('table').nth(0).inner_text()
+    for run in json.loads(done.stdout)['runs']:
+        assert f'{run["score"]["cross_track_m"]["max_steady"]:.3f} m' in rows
+    assert 'control.law' in page.locator('table').nth(1).inner_text()
+    drag(page, 'pitch', 0.2, 0.4)
+    page.wait_for_function("document.getElementById('whole').disabled === false")
+    page.wait_for_function(IS_READY, timeout=DEADLINE_MS)
+    ranges = [panel['ranges'] for panel in page.evaluate(DRAWN) if panel['kind'] == 'time']
+    assert all(one == ranges[0] for one in ranges)
+    assert ranges[0][0] > 0.0
+    assert (said, len(asked)) == ([], 1)
+    page.close()
+
+
+# ---------------------------------------------------------------------------------- picture
+
+
+def write_picture():
+    """Fly the default scenario and draw the head of its report into `PICTURE`."""
+    with tempfile.TemporaryDirectory() as folder:
+        run = Path(folder) / 'run'
+        command = [sys.executable, '-m', 'glider_bringup.cli', 'run', '--engine', 'direct']
+        subprocess.run([*command, '--out', run], check=True)
+        executable = next(filter(None, map(shutil.which, BROWSERS)))
+        with browser_at(executable) as browser:
+            page, _, _ = open_page(
+                browser, run / 'report.html', viewport={'width': 1180, 'height': 1560}
+            )
+            page.screenshot(path=PICTURE)
+    print(f'written: {PICTURE}')
+
+
+if __name__ == '__main__':
+    write_picture()
