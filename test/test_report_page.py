@@ -160,7 +160,7 @@ def test_report_of_the_default_run(browser, default_run):
     card = json.loads((default_run / 'score.json').read_text())
     tiles = dict(zip(page.locator('.tile dt').all_inner_texts(), _numbers(page), strict=True))
     track, pitch = card['cross_track_m'], card['pitch_error_deg']
-    assert tiles['cross-track error, steady'] == pytest.approx(track['max_steady'], abs=0.005)
+    assert tiles['cross-track, steady'] == pytest.approx(track['max_steady'], abs=0.005)
     assert tiles['deepest point'] == pytest.approx(card['depth_m']['max'], abs=0.05)
     assert tiles['pitch error, steady'] == pytest.approx(pitch['rms_steady'], abs=0.005)
     table = page.locator('.table').inner_text()
@@ -308,7 +308,7 @@ def write_picture():
         executable = next(filter(None, map(shutil.which, BROWSERS)))
         with browser_at(executable) as browser:
             page, _, _ = open_page(
-                browser, run / 'report.html', viewport={'width': 1180, 'height': 1560}
+                browser, run / 'report.html', viewport={'width': 1180, 'height': 1900}
             )
             page.screenshot(path=PICTURE)
     print(f'written: {PICTURE}')

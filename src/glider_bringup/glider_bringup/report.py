@@ -18,7 +18,6 @@ from glider_bringup.page import (
     page_data,
     section,
     table,
-    time_unit,
 )
 from glider_bringup.score import STEADY_DEPTH_M
 from glider_bringup.scorecard import card_rows
@@ -172,10 +171,9 @@ def lost_since_s(traces: Traces) -> float | None:
 def findings(run: FlownRun) -> list[tuple[str, str]]:
     """What went wrong, and what is worth a look: kind (problem, note, fine) and sentence."""
     card, traces = run.card, run.traces
-    unit, seconds = time_unit(card['sim_time_s'])
 
     def at(time_s: float | None) -> str:
-        return f'{time_s / seconds:.3g} {unit}' if time_s else 'the start'
+        return span(time_s) if time_s else 'the start'
 
     def share(ticks: int) -> str:
         return f'{span(ticks * TICK_S)} ({100.0 * ticks / traces.ticks:.2g} % of the time)'
@@ -227,7 +225,7 @@ def _tiles(run: FlownRun) -> str:
     """The figures that a person asks for first."""
 
     def number(value: float | None, digits: int, unit: str) -> str:
-        return '-' if value is None else f'{value:,.{digits}f} {unit}'
+        return '-' if value is None else f'{value:,.{digits}f}\N{NO-BREAK SPACE}{unit}'
 
     card, depth_m = run.card, run.scenario.profile.depth_m
     track, pitch = card['cross_track_m'], card['pitch_error_deg']
@@ -237,14 +235,16 @@ def _tiles(run: FlownRun) -> str:
         ('simulated time', span(card['sim_time_s']), f'{card["ticks"]:,} ticks of 0.1 s'),
         ('along the path', way(card['distance_along_path_m']), _count(card['dives'], 'dive')),
         (
-            'cross-track error, steady',
+            'cross-track, steady',
             number(track['max_steady'], 2, 'm'),
             f'largest; rms {number(track["rms_steady"], 3, "m")}',
         ),
         (
             'deepest point',
             number(depth['max'], 1, 'm'),
-            f'{number(depth["overshoot"], 1, "m")} beyond {depth_m:,g} m' if dives else '',
+            f'{number(depth["overshoot"], 1, "m")} beyond {number(depth_m, 0, "m")}'
+            if dives
+            else '',
         ),
         (
             'pitch error, steady',
@@ -252,9 +252,9 @@ def _tiles(run: FlownRun) -> str:
             f'rms; largest {number(pitch["max_steady"], 2, "deg")}',
         ),
         (
-            'heading fluctuation, steady',
+            'heading, steady',
             number(heading['rms_steady'], 3, 'deg'),
-            f'rms; largest {number(heading["max_steady"], 3, "deg")}',
+            f'fluctuation, rms; largest {number(heading["max_steady"], 3, "deg")}',
         ),
     )
     html = ''.join(

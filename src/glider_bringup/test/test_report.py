@@ -261,7 +261,7 @@ def test_lost_track_is_told_with_its_time(tmp_path):
     assert lost_since_s(run.traces) == pytest.approx(100.0 + LOST_M, abs=0.2)
     assert (
         'problem',
-        'Track lost: more than 100 m off the path from 200 s to the end.',
+        'Track lost: more than 100 m off the path from 3 min to the end.',
     ) in findings(run)
 
 
@@ -285,7 +285,7 @@ def test_trouble_comes_before_notes_and_none_is_called_none(tmp_path):
     kinds = [kind for kind, _ in bad]
     assert kinds == sorted(kinds, reverse=True)
     assert 'fine' not in kinds
-    assert bad[0] == ('problem', 'The run was aborted at 300 s: stopped.')
+    assert bad[0] == ('problem', 'The run was aborted at 5 min: stopped.')
 
 
 def test_verdict_of_a_flight_into_a_current_that_is_too_strong(tmp_path):

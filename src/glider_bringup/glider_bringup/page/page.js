@@ -296,7 +296,7 @@ function drawSpace(panel, element) {
   const height = Math.max(frame.north[1] - frame.north[0], 0.45 * frame.span) * 1.05;
   const side = 1.25 / Math.max(width, height);
   const km = ([low, high], span) => spread([low * frame.scale, high * frame.scale], span * frame.scale);
-  const far = element.clientWidth < 480 ? 1.4 : 1;
+  const far = element.clientWidth < 480 ? 1.5 : 1.15;
   const paint = { backgroundcolor: values('--card'), showbackground: false };
   return Plotly.react(element, traces, {
     ...look(),
