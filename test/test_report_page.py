@@ -25,7 +25,7 @@ PICTURE = Path(__file__).resolve().parents[1] / 'docs' / 'images' / 'report.png'
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome-stable', 'google-chrome')
 #: 3-D views are drawn without a graphics card.
 OPTIONS = ['--no-sandbox', '--enable-unsafe-swiftshader']
-DEADLINE_MS = 60_000
+DEADLINE_MS = 120_000
 
 IS_READY = "document.documentElement.dataset.state === 'ready'"
 #: Traces that have nothing to show in some spans of time.
@@ -63,8 +63,9 @@ def open_page(browser, file, **options):
     page.on('console', lambda message: said.append(message.text) if _is_bad(message) else None)
     page.on('pageerror', lambda error: said.append(str(error)))
     page.on('request', lambda request: asked.append(request.url))
+    page.set_default_timeout(DEADLINE_MS)
     page.goto(file.as_uri())
-    page.wait_for_function(IS_READY, timeout=DEADLINE_MS)
+    page.wait_for_function(IS_READY)
     return page, said, asked
 
 
@@ -195,7 +196,7 @@ def test_zoom_by_the_mouse_is_linked_and_refines(browser, default_run):
     before = page.evaluate(DRAWN)
     drag(page, 'cross_track', 0.4, 0.5)
     page.wait_for_function("document.getElementById('whole').disabled === false")
-    page.wait_for_function(IS_READY, timeout=DEADLINE_MS)
+    page.wait_for_function(IS_READY)
     after = page.evaluate(DRAWN)
     check_drawn(after)
     timed = [panel for panel in after if panel['kind'] == 'time']
@@ -213,7 +214,7 @@ def test_zoom_by_the_mouse_is_linked_and_refines(browser, default_run):
 
     page.click('#whole')
     page.wait_for_function("document.getElementById('whole').disabled === true")
-    page.wait_for_function(IS_READY, timeout=DEADLINE_MS)
+    page.wait_for_function(IS_READY)
     whole = page.evaluate(DRAWN)
     assert [panel['ranges'] for panel in whole] == [panel['ranges'] for panel in before]
     assert len(asked) == 1
@@ -288,7 +289,7 @@ def test_comparison(browser, glider, default_run, pid_run, tmp_path):
     assert 'control.law' in page.locator('table').nth(1).inner_text()
     drag(page, 'pitch', 0.2, 0.4)
     page.wait_for_function("document.getElementById('whole').disabled === false")
-    page.wait_for_function(IS_READY, timeout=DEADLINE_MS)
+    page.wait_for_function(IS_READY)
     ranges = [panel['ranges'] for panel in page.evaluate(DRAWN) if panel['kind'] == 'time']
     assert all(one == ranges[0] for one in ranges)
     assert ranges[0][0] > 0.0

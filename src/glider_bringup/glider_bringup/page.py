@@ -158,9 +158,8 @@ def write_page(file: Path, text: str) -> None:
     try:
         draft.write_text(text, encoding='utf-8')
         os.replace(draft, file)
-    except OSError:
+    finally:
         draft.unlink(missing_ok=True)
-        raise
 
 
 def table(rows, header=()) -> str:

@@ -127,9 +127,8 @@ class Traces:
                     **self.samples,
                 )
             os.replace(draft, file)
-        except OSError:
+        finally:
             draft.unlink(missing_ok=True)
-            raise
 
 
 def load_traces(file: Path) -> Traces:

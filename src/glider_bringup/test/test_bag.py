@@ -18,8 +18,12 @@ from nav_msgs.msg import Path as PathMessage
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from glider_bringup.direct import BLOCK_TICKS, COLUMNS
+from glider_bringup.ros import bag_log
 from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter, message_definition, type_hash
+from glider_bringup.ros.bag_log import SCORED, read_blocks
 from glider_bringup.tick_order import TickOrder
+from glider_bringup.traces import TRACED
 from glider_model.ros.codec import to_cdr
 from glider_model.ros.messages import TOPICS
 from glider_model.signals import TICK_NS
@@ -245,3 +249,33 @@ def test_incomplete_ticks_are_written_at_the_end_and_gaps_are_counted():
     assert written[2:] == [('a', 10, b'a'), ('a', 40, b'a')]
     assert order.lost == 2
     assert order.written_ns == 40
+
+
+def write_with_gaps(folder, ticks, lost):
+    """Bag of per-tick messages without the lost (topic, tick); all numbers are the tick."""
+    bag = BagWriter(folder, 'gaps')
+    for tick in ticks:
+        for name in (*SCORED, *TRACED):
+            if (name, tick) not in lost:
+                codec = TOPICS[name].codec
+                row = np.full(len(codec.fields), float(tick))
+                bag.write(name, tick * TICK_NS, codec.encode(tick * TICK_NS, row))
+    bag.close()
+
+
+@pytest.mark.parametrize('block_ticks', [20, BLOCK_TICKS])
+def test_rows_end_at_the_first_gap_of_what_is_scored(tmp_path, monkeypatch, block_ticks):
+    """Ticks after the gap are whole, but not consecutive; what is only drawn may have gaps."""
+    monkeypatch.setattr(bag_log, 'BLOCK_TICKS', block_ticks)
+    write_with_gaps(tmp_path, range(100), {('odom', 50), ('adaptation', 20)})
+    rows = np.concatenate([block.copy() for block in read_blocks(tmp_path, TRACED)])
+    assert rows[:, COLUMNS['odom'].start].tolist() == list(range(50))
+    learnt = rows[:, COLUMNS['adaptation'].start]
+    assert np.flatnonzero(np.isnan(learnt)).tolist() == [20]
+
+
+@pytest.mark.parametrize('last', [100, BLOCK_TICKS, 5 * BLOCK_TICKS])
+def test_gap_of_any_length_ends_the_rows(tmp_path, last):
+    write_with_gaps(tmp_path, [*range(10), last], ())
+    rows = np.concatenate([block.copy() for block in read_blocks(tmp_path)])
+    assert rows[:, COLUMNS['odom'].start].tolist() == list(range(10))

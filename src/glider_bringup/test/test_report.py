@@ -88,15 +88,15 @@ def report_of(folder):
     return read_page(file)
 
 
-def glider(*arguments, **options):
+def glider(*arguments, preexec_fn=None, **variables):
     return subprocess.run(
         [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
         capture_output=True,
         text=True,
-        env={**os.environ, 'COLUMNS': '160', 'PYTHONUTF8': '1'},
+        env={**os.environ, 'COLUMNS': '160', 'PYTHONUTF8': '1', **variables},
         timeout=300,
         check=False,
-        **options,
+        preexec_fn=preexec_fn,
     )
 
 
@@ -167,6 +167,16 @@ def test_report_without_a_bag_is_made_of_what_was_kept(tmp_path, call):
     assert data['duration'] == 300.0
 
 
+def test_open_hands_the_page_to_the_browser(flown, tmp_path):
+    opened, browser = tmp_path / 'opened', tmp_path / 'browser'
+    browser.write_text(f'#!/bin/sh\necho "$1" > {opened}\n')
+    browser.chmod(0o755)
+    page = tmp_path / 'a page.html'
+    done = glider('report', flown, '--out', page, '--open', BROWSER=f'{browser} %s')
+    assert done.returncode == 0, done.stderr
+    assert opened.read_text().strip() == page.as_uri()
+
+
 def test_run_without_report_leaves_none_and_says_what_is_missing(tmp_path, call):
     folder = tmp_path / 'flight'
     assert (
@@ -200,14 +210,19 @@ def test_run_of_a_few_ticks_has_a_report(tmp_path, seconds):
     assert {panel['id'] for panel in data['panels']} >= {'track', 'space', 'depth', 'pitch'}
 
 
-def test_run_that_ended_before_its_first_tick_has_a_report(tmp_path):
+def never_flown(folder):
+    """Run that was aborted before its first tick."""
     scenario = load_scenario('current_8deg')
-    folder = make_run_folder(scenario, tmp_path / 'flight')
+    folder = make_run_folder(scenario, folder)
     flight = Flight('aborted', 'plant_node was killed by SIGKILL', 0.0, 0, 0)
     card = mission.scorecard(scenario, 'nodes', flight, Scorer().result(0.0, 1000.0))
     write_score(folder, card)
     mission.keep_traces(scenario, folder, card, mission.make_tracer(scenario))
-    text, data = report_of(folder)
+    return folder
+
+
+def test_run_that_ended_before_its_first_tick_has_a_report(tmp_path):
+    text, data = report_of(never_flown(tmp_path / 'flight'))
     assert data['panels'] == []
     assert 'before the first tick: plant_node was killed by SIGKILL' in text.text
 
@@ -419,3 +434,13 @@ def test_comparison_for_a_person_lists_each_run(tmp_path, call):
     assert code == 0
     for word in ('one', 'two', 'completed', 'aborted', 'cross-track', 'the same'):
         assert word in out
+
+
+def test_comparison_with_a_run_that_never_flew(tmp_path, call):
+    folders = fly(tmp_path, name='flown'), never_flown(tmp_path / 'never')
+    assert call('compare', *folders, '--out', tmp_path / 'both.html')[0] == 0
+    text, data = read_page(tmp_path / 'both.html')
+    assert 'Aborted before its end: 1 of 2 runs' in text.text
+    timed = [panel for panel in data['panels'] if panel['kind'] == 'time']
+    assert timed
+    assert all([curve['run'] for curve in panel['curves']] == [0] for panel in timed)
