@@ -32,7 +32,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-_MAGIC = b'\x89MCAP0\r\n'
+MAGIC = b'\x89MCAP0\r\n'
 _MESSAGE = struct.Struct('<BQHIQQ')
 _INDEX_ENTRY = struct.Struct('<QQ')
 _LIBRARY = 'glider_bringup'
@@ -43,7 +43,7 @@ class McapWriter:
 
     def __init__(self, path: Path, profile: str) -> None:
         self._file = path.open('wb')
-        self._file.write(_MAGIC)
+        self._file.write(MAGIC)
         self._compressor = zstandard.ZstdCompressor(level=3)
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
@@ -228,7 +228,7 @@ class McapWriter:
         head = struct.pack('<BQQQ', Opcode.FOOTER, 20, summary_start, offsets_start)
         self._file.write(data)
         self._put(Footer(summary_start, offsets_start, zlib.crc32(head, zlib.crc32(data))))
-        self._file.write(_MAGIC)
+        self._file.write(MAGIC)
         self._file.close()
 
     def _summary(self) -> dict[Opcode, list]:

@@ -15,7 +15,14 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from glider_model.ros.parameters import declare_settings, parameters_yaml, to_parameters
+from glider_model.ros.parameters import (
+    changed_parameters,
+    declare_settings,
+    from_parameters,
+    parameters_yaml,
+    to_parameters,
+    with_parameters,
+)
 from glider_model.settings import ConfigurationError, Settings
 
 TUNABLE = {'tunable': True}
@@ -115,6 +122,53 @@ def test_parameter_file_gives_back_the_same_settings(make_node, tmp_path, exampl
     assert float_bits(read.gain) == float_bits(example.gain)
     assert float_bits(read.speed) == float_bits(example.speed)
     assert read.legs == example.legs
+
+
+@given(
+    example=st.builds(
+        Example,
+        gain=st.floats(-1e9, 1e9),
+        speed=st.none() | FLOATS,
+        law=st.sampled_from(['pid', 'adaptive']),
+        legs=st.lists(st.tuples(FLOATS, FLOATS), max_size=3),
+    )
+)
+@settings(max_examples=40, deadline=None)
+def test_settings_come_back_from_parameters_and_from_what_was_changed(example):
+    assert from_parameters(Example, {**to_parameters(example), 'other': 1}, 'file') == example
+    changed = changed_parameters(Example(), example)
+    assert with_parameters(Example(), changed) == example
+    assert float_bits(with_parameters(Example(), changed).gain) == float_bits(example.gain)
+    assert changed_parameters(example, example) == {}
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        ({'gain': '2e9'}, ['gain', '2000000000.0', '1000000000.0']),
+        ({'gain': 'fast'}, ['gain', 'not JSON']),
+        ({'no.such': '1'}, ['no', 'unknown field']),
+    ],
+)
+def test_change_that_cannot_be_is_refused_by_name(values, words):
+    with pytest.raises(ConfigurationError) as error:
+        with_parameters(Example(), values)
+    for word in words:
+        assert word in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        ({'gain': 2e9}, ['file: gain', '2000000000.0', '1000000000.0']),
+        ({'legs': '[[1.0'}, ['file: legs', 'not JSON or YAML']),
+    ],
+)
+def test_parameter_of_a_file_that_cannot_be_is_refused_by_name(values, words):
+    with pytest.raises(ConfigurationError) as error:
+        from_parameters(Example, values, 'file')
+    for word in words:
+        assert word in str(error.value)
 
 
 def test_defaults_are_those_of_the_model(make_node):

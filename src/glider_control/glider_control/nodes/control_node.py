@@ -4,10 +4,13 @@
 
 import sys
 
+from diagnostic_msgs.msg import DiagnosticArray
+
 from glider_control.control import ControlSettings, control_step
 from glider_model.frames import odometry_from_wire, reference_from_wire, wrench_to_wire
 from glider_model.ros import health, messages
-from glider_model.ros.parameters import declare_settings
+from glider_model.ros.orders import PARAMETERS_SET, Orders
+from glider_model.ros.parameters import changed_parameters, declare_settings
 from glider_model.ros.tick import BlockNode, run
 from glider_model.signals import TICK_S, Joints
 
@@ -23,10 +26,11 @@ class ControlNode(BlockNode):
 
     def __init__(self, **kwargs) -> None:
         super().__init__(messages.CONTROL, **kwargs)
-        settings = declare_settings(self, ControlSettings, self.on_settings)
-        self.params = settings.params()
-        self.state = settings.initial_state()
+        self.settings = declare_settings(self, ControlSettings, self.on_settings)
+        self.params = self.settings.params()
+        self.state = self.settings.initial_state()
         self.told, self.told_ns = 0, -TELL_EVERY_NS
+        self.orders = Orders(self)
         self.publish_wrench = self.add_output('wrench')
         self.publish_adaptation = self.add_output('adaptation')
         self.publish_command = self.add_output('command')
@@ -38,6 +42,8 @@ class ControlNode(BlockNode):
 
     def on_settings(self, settings: ControlSettings) -> None:
         """Fly on with tunable parameters that were set at run time."""
+        self.orders.add(PARAMETERS_SET, changed_parameters(self.settings, settings))
+        self.settings = settings
         self.params = settings.params()
 
     def compile_kernels(self) -> None:
@@ -50,6 +56,7 @@ class ControlNode(BlockNode):
 
     def step(self, stamp_ns: int, reference, odom, joint_states) -> None:
         """Answer one tick."""
+        self.orders.tell(stamp_ns)
         self.state, out = control_step(
             self.state,
             odometry_from_wire(odom),
@@ -67,14 +74,22 @@ class ControlNode(BlockNode):
     def tell(self, stamp_ns: int, saturation: int) -> None:
         """Put a change of saturation on /diagnostics."""
         self.told, self.told_ns = saturation, stamp_ns
-        names = [name for bit, name in ACTUATORS.items() if saturation & bit]
-        level = health.WARN if names else health.OK
-        message = f'at its limit: {", ".join(names)}' if names else 'no actuator at its limit'
-        self.event(stamp_ns, level, message, saturation=saturation, t_s=stamp_ns / 1e9)
+        self.publish_event(saturation_event(stamp_ns, saturation, self.get_name()))
 
     def on_stale(self, stamp_ns: int) -> None:
         """Command maximum buoyancy and level roll."""
         self.publish_command(stamp_ns, self.params.safe_command)
+
+
+def saturation_event(
+    stamp_ns: int, saturation: int, node: str = messages.CONTROL
+) -> DiagnosticArray:
+    """Diagnostics that say which actuators are at their limits."""
+    names = [name for bit, name in ACTUATORS.items() if saturation & bit]
+    level = health.WARN if names else health.OK
+    message = f'at its limit: {", ".join(names)}' if names else 'no actuator at its limit'
+    values = {'saturation': saturation, 't_s': stamp_ns / 1e9}
+    return health.status_array(stamp_ns, node, level, message, values)
 
 
 def main(args=None) -> int:

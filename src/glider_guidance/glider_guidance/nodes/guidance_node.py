@@ -13,7 +13,8 @@ from glider_guidance.guidance import GuidanceSettings, guidance_abort, guidance_
 from glider_guidance.profile import STAGE_NAMES
 from glider_model.frames import odometry_from_wire, reference_to_wire, water_to_wire
 from glider_model.ros import health, messages
-from glider_model.ros.parameters import declare_settings
+from glider_model.ros.orders import ABORT, PARAMETERS_SET, Orders
+from glider_model.ros.parameters import changed_parameters, declare_settings
 from glider_model.ros.tick import BlockNode, run
 from glider_model.signals import TICK_S, Water
 
@@ -34,6 +35,7 @@ class GuidanceNode(BlockNode):
         self.params = self.settings.params()
         self.state = self.settings.initial_state()
         self.told = None
+        self.orders = Orders(self)
         self.add_input('odom')
         self.create_service(Trigger, 'abort', self.on_abort)
         self.compile_kernels()
@@ -42,6 +44,7 @@ class GuidanceNode(BlockNode):
 
     def on_settings(self, settings: GuidanceSettings) -> None:
         """Fly on with tunable parameters that were set at run time."""
+        self.orders.add(PARAMETERS_SET, changed_parameters(self.settings, settings))
         self.settings = settings
         self.params = settings.params()
 
@@ -55,6 +58,7 @@ class GuidanceNode(BlockNode):
 
     def step(self, stamp_ns: int, odom) -> None:
         """Answer one tick."""
+        self.orders.tell(stamp_ns)
         odometry = odometry_from_wire(odom)
         self.state, out = guidance_step(self.state, odometry, self.params, TICK_S)
         if (out.stage, out.infeasible) != self.told:
@@ -72,6 +76,7 @@ class GuidanceNode(BlockNode):
     def on_abort(self, request, response):
         """Serve ``abort``."""
         self.state = guidance_abort(self.state)
+        self.orders.add(ABORT)
         response.success = True
         response.message = 'surfacing'
         return response

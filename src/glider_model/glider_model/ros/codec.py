@@ -13,6 +13,7 @@ covariances filled) is deserialized and its fields are read by name: slower, sam
 import math
 import operator
 import struct
+from typing import NamedTuple
 
 import numpy as np
 from rclpy.serialization import deserialize_message
@@ -39,45 +40,66 @@ class MessageError(ValueError):
     """A message that cannot be used: a field is missing or is not a finite number."""
 
 
+class Place(NamedTuple):
+    """Where a field of primitive type, or the length of a sequence, lies in CDR bytes."""
+
+    path: str  #: such as 'status[0].values[1].key'; 'len(status)' for the length of a sequence
+    code: str  #: of `struct`; 's' for a string, which begins with its length (4 bytes)
+    start: int
+    end: int
+
+
 def to_cdr(message) -> bytes:
     """Serialize any message as little-endian CDR whose padding is always zero.
 
     The middleware leaves whatever was in memory between aligned fields, so the bytes of one
     message differ from process to process. These do not, and readers take them all the same.
     """
-    body = bytearray()
-    _write_fields(body, message)
-    return b'\x00\x01\x00\x00' + bytes(body)
+    return _serialize(message)[0]
 
 
-def _write_fields(body: bytearray, message) -> None:
+def cdr_places(message) -> list[Place]:
+    """Places of all fields in `to_cdr` of a message, in their order."""
+    return _serialize(message)[1]
+
+
+def _serialize(message) -> tuple[bytes, list[Place]]:
+    body, places = bytearray(), []
+    _write_fields(body, places, message, '')
+    shifted = [place._replace(start=place.start + 4, end=place.end + 4) for place in places]
+    return b'\x00\x01\x00\x00' + bytes(body), shifted
+
+
+def _write_fields(body: bytearray, places: list[Place], message, owner: str) -> None:
     for name, kind in message.get_fields_and_field_types().items():
-        _write(body, getattr(message, name), kind)
+        _write(body, places, getattr(message, name), kind, owner + name)
 
 
-def _write(body: bytearray, value, kind: str) -> None:
-    if kind.startswith('sequence<'):
+def _write(body: bytearray, places: list[Place], value, kind: str, path: str) -> None:
+    if kind.endswith(('>', ']')):
         item = kind[len('sequence<') : -1].split(',')[0]
-        _pack(body, 'I', len(value))
-        for element in value:
-            _write(body, element, item)
-    elif kind.endswith(']'):
-        item = kind[: kind.rindex('[')]
-        for element in value:
-            _write(body, element, item)
+        if kind.endswith(']'):
+            item = kind[: kind.rindex('[')]
+        else:
+            _pack(body, places, 'I', len(value), f'len({path})')
+        for index, element in enumerate(value):
+            _write(body, places, element, item, f'{path}[{index}]')
     elif kind.startswith('string'):
         text = value.encode() + b'\0'
-        _pack(body, 'I', len(text))
+        _pack(body, places, 'I', len(text), path)
         body += text
+        places[-1] = places[-1]._replace(code='s', end=len(body))
     elif kind in _PRIMITIVES:
-        _pack(body, _PRIMITIVES[kind], value)
+        _pack(body, places, _PRIMITIVES[kind], value, path)
     else:
-        _write_fields(body, value)
+        _write_fields(body, places, value, path + '.')
 
 
-def _pack(body: bytearray, code: str, value) -> None:
+def _pack(body: bytearray, places: list[Place], code: str, value, path: str) -> None:
     body += bytes(-len(body) % struct.calcsize(code))
+    start = len(body)
     body += struct.pack('<' + code, value)
+    places.append(Place(path, code, start, len(body)))
 
 
 class Codec:
@@ -203,6 +225,37 @@ class Codec:
         self._refuse_non_finite(values)
         sec, nanosec = self._stamp_format.unpack_from(raw, self._stamp_at)
         return sec * _SECOND_NS + nanosec, values
+
+    def decode_many(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Stamps and numbers of n messages at once.
+
+        Parameters
+        ----------
+        rows : uint8[n, size]
+            Serialized messages.
+
+        Returns
+        -------
+        stamps : int64[n]
+            In ns.
+        values : float64[n, m]
+            NaN and infinities included.
+        own : bool[n]
+            Whether all other bytes are those that `encode_many` writes: then, and only then,
+            stamp and numbers are the whole message. Else they may be anything.
+        """
+        own = np.ones(len(rows), bool)
+        for start, end, constant in self._constants:
+            own &= np.all(rows[:, start:end] == np.frombuffer(constant, np.uint8), axis=1)
+        at = self._stamp_at
+        stamps = np.ascontiguousarray(rows[:, at : at + 8]).view('<u4').astype(np.int64)
+        own &= stamps[:, 1] < _SECOND_NS
+        seconds = stamps[:, 0].astype(np.int32).astype(np.int64)
+        values = np.empty((len(rows), len(self.fields)))
+        for _, at, picked in self._runs:
+            block = np.ascontiguousarray(rows[:, at : at + 8 * len(picked)])
+            values[:, list(picked)] = block.view('<f8')
+        return seconds * _SECOND_NS + stamps[:, 1], values, own
 
     def decode_stamp(self, raw: bytes) -> int:
         """Stamp (ns) of a serialized message; its numbers are not looked at."""

@@ -30,7 +30,7 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from glider_model.settings import ConfigurationError, Settings, error_lines
+from glider_model.settings import ConfigurationError, Settings, error_lines, validate
 
 SettingsT = TypeVar('SettingsT', bound=Settings)
 
@@ -40,6 +40,7 @@ _TYPES = {
     float: Parameter.Type.DOUBLE,
     str: Parameter.Type.STRING,
 }
+_MISSING = object()
 _LARGEST = {float: sys.float_info.max, int: 2**63 - 1}
 
 
@@ -244,6 +245,56 @@ def to_parameters(settings: Settings) -> dict[str, Any]:
             for leaf in _leaves(type(settings), settings)
         }
     )
+
+
+def changed_parameters(before: Settings, after: Settings) -> dict[str, str]:
+    """Parameters in which two settings of one kind differ: the later values, as JSON, by name."""
+
+    def texts(settings: Settings) -> dict[str, str]:
+        leaves = _leaves(type(settings), settings)
+        return {leaf.name: _text(leaf.field, leaf.default) for leaf in leaves}
+
+    old = texts(before)
+    return {name: text for name, text in texts(after).items() if text != old[name]}
+
+
+def with_parameters(settings: SettingsT, values: dict[str, str]) -> SettingsT:
+    """Settings with some parameters changed, given as JSON by dotted name.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the parameter, its value and what is allowed.
+    """
+    kept = {leaf.name: leaf.default for leaf in _leaves(type(settings), settings)}
+    try:
+        given = {name: json.loads(text) for name, text in values.items()}
+    except json.JSONDecodeError:
+        raise ConfigurationError(f'parameters {values}: not JSON') from None
+    return validate(type(settings), _nested({**kept, **given}), 'parameter')
+
+
+def from_parameters(model: type[SettingsT], values: dict[str, Any], source: str) -> SettingsT:
+    """Settings from nested parameters as of `to_parameters`; parameters of others are left out.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming ``source``, the parameter, its value and what is allowed.
+    """
+    tree = {}
+    for leaf in _leaves(model, None):
+        branch: Any = values
+        for part in leaf.name.split('.'):
+            branch = branch.get(part, _MISSING) if isinstance(branch, dict) else _MISSING
+        if branch is not _MISSING:
+            try:
+                tree[leaf.name] = _parse(leaf, branch)
+            except yaml.YAMLError:
+                raise ConfigurationError(
+                    f'{source}: {leaf.name} = {branch!r}: not JSON or YAML'
+                ) from None
+    return validate(model, _nested(tree), source)
 
 
 class _ParameterDumper(yaml.SafeDumper):
