@@ -142,3 +142,19 @@ def counter(description: str, total: int | None):
     task = bar.add_task(description, total=total)
     with bar:
         yield lambda done, total=total: bar.update(task, completed=done, total=total)
+
+
+@contextmanager
+def shares():
+    """Progress bar of several pieces of work; yields its update (what, share that is done)."""
+    bar = Progress(
+        TextColumn('{task.description}'),
+        BarColumn(),
+        TextColumn('{task.percentage:3.0f} %'),
+        TimeElapsedColumn(),
+        console=messages,
+        transient=True,
+    )
+    task = bar.add_task('opening', total=1.0)
+    with bar:
+        yield lambda what, share: bar.update(task, description=what, completed=share)

@@ -73,7 +73,8 @@ class MissionState(NamedTuple):
 
 
 @kernel
-def _put(log, row, start, values):
+def put(log, row, start, values):
+    """Write numbers into a row, from a column on."""
     for i, value in enumerate(values):
         log[row, start + i] = value
 
@@ -117,15 +118,15 @@ def fly(state, params, log, dt):
         control, controlled = control_step(
             control, odometry, joints, reference, params.control, dt
         )
-        _put(log, row, 0, odometry_wire)
-        _put(log, row, 13, joints)
-        _put(log, row, 16, water_wire)
-        _put(log, row, 19, reference_wire)
-        _put(log, row, 32, guided.error)
-        _put(log, row, 35, water_to_wire(guided.current))
-        _put(log, row, 38, controlled.command)
-        _put(log, row, 41, wrench_to_wire(controlled.wrench))
-        _put(log, row, 44, controlled.adaptation)
+        put(log, row, 0, odometry_wire)
+        put(log, row, 13, joints)
+        put(log, row, 16, water_wire)
+        put(log, row, 19, reference_wire)
+        put(log, row, 32, guided.error)
+        put(log, row, 35, water_to_wire(guided.current))
+        put(log, row, 38, controlled.command)
+        put(log, row, 41, wrench_to_wire(controlled.wrench))
+        put(log, row, 44, controlled.adaptation)
         log[row, 57] = guided.stage
         log[row, 58] = guided.infeasible
         log[row, 59] = controlled.saturation

@@ -15,8 +15,10 @@ from mcap.reader import McapReader, NonSeekingReader, SeekingReader
 from mcap.summary import Summary
 from rclpy.serialization import deserialize_message
 
+from glider_bringup.blocks import changes_to_tell
 from glider_bringup.direct import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.ros.bag import BagWriter
+from glider_control.nodes.control_node import TELL_EVERY_NS, saturation_event
 from glider_guidance.nodes.guidance_node import path_message, stage_event
 from glider_model.ros import health, messages
 from glider_model.ros.codec import to_cdr
@@ -24,7 +26,9 @@ from glider_model.ros.messages import TOPICS
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS
 
-_GUIDANCE, _PLANT = f'/glider/{messages.GUIDANCE}', f'/glider/{messages.PLANT}'
+_GUIDANCE, _CONTROL, _PLANT = (
+    f'/glider/{node}' for node in (messages.GUIDANCE, messages.CONTROL, messages.PLANT)
+)
 _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 
 #: What readers raise where a file ends too early.
@@ -41,6 +45,7 @@ class LogWriter:
         self._bag = bag
         self._tick = 0
         self._told: tuple[int, bool] | None = None
+        self._saturation, self._saturation_ns = 0, -TELL_EVERY_NS
         bag.write('path', 0, to_cdr(path_message(path_points)))
 
     def add(self, log: np.ndarray) -> None:
@@ -55,7 +60,7 @@ class LogWriter:
         self._tick += len(log)
 
     def _tell(self, stamps: np.ndarray, log: np.ndarray) -> None:
-        """Write the diagnostics of each change of stage or feasibility."""
+        """Write the diagnostics of each change of stage, feasibility or saturation."""
         flags = log[:, [COLUMNS['stage'], COLUMNS['infeasible']]]
         changed = np.flatnonzero(np.any(flags[1:] != flags[:-1], axis=1)) + 1
         for row in (0, *changed):
@@ -64,6 +69,13 @@ class LogWriter:
                 self._told = now
                 stamp = int(stamps[row])
                 self._bag.write('/diagnostics', stamp, to_cdr(stage_event(stamp, *now, _GUIDANCE)))
+        saturation = log[:, COLUMNS['saturation']].astype(np.int64)
+        for row in changes_to_tell(
+            saturation, stamps, TELL_EVERY_NS, self._saturation, self._saturation_ns
+        ):
+            self._saturation, self._saturation_ns = int(saturation[row]), int(stamps[row])
+            event = saturation_event(self._saturation_ns, self._saturation, _CONTROL)
+            self._bag.write('/diagnostics', self._saturation_ns, to_cdr(event))
 
     def finish(self) -> None:
         """Write that the run is complete, as the plant says it after the last tick."""

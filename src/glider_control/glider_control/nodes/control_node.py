@@ -74,17 +74,19 @@ class ControlNode(BlockNode):
     def tell(self, stamp_ns: int, saturation: int) -> None:
         """Put a change of saturation on /diagnostics."""
         self.told, self.told_ns = saturation, stamp_ns
-        self.publish_event(saturation_event(stamp_ns, saturation, self.get_name()))
+        name = self.get_fully_qualified_name()
+        self.publish_event(saturation_event(stamp_ns, saturation, name))
 
     def on_stale(self, stamp_ns: int) -> None:
         """Command maximum buoyancy and level roll."""
         self.publish_command(stamp_ns, self.params.safe_command)
 
 
-def saturation_event(
-    stamp_ns: int, saturation: int, node: str = messages.CONTROL
-) -> DiagnosticArray:
-    """Diagnostics that say which actuators are at their limits."""
+def saturation_event(stamp_ns: int, saturation: int, node: str) -> DiagnosticArray:
+    """Diagnostics that say which actuators are at their limits.
+
+    ``node`` is the full name of the node that says it.
+    """
     names = [name for bit, name in ACTUATORS.items() if saturation & bit]
     level = health.WARN if names else health.OK
     message = f'at its limit: {", ".join(names)}' if names else 'no actuator at its limit'

@@ -35,6 +35,8 @@ class Orders:
         """Put them on /diagnostics: they hold from this tick on."""
         for message, values in self._waiting.items():
             self._node.publish_event(
-                health.status_array(stamp_ns, self._node.get_name(), health.OK, message, values)
+                health.status_array(
+                    stamp_ns, self._node.get_fully_qualified_name(), health.OK, message, values
+                )
             )
         self._waiting.clear()

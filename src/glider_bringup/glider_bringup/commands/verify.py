@@ -1,0 +1,93 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider verify``: whether today's code does what is recorded."""
+
+import json
+import tempfile
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from glider_bringup.console import EXIT_FAILED, EXIT_INTERRUPTED, Json, messages, output, shares
+
+app = typer.Typer()
+BlockName = Enum('BlockName', {name: name for name in 'plant current guidance control'.split()})
+
+
+@app.command(epilog='Example: ./glider verify runs/20260101-120000-current_8deg')
+def verify(
+    run: Annotated[
+        Path, typer.Argument(metavar='RUN', help='Folder of a run or a bag, or an .mcap file.')
+    ],
+    settings: Annotated[
+        Path | None,
+        typer.Option(help="Scenario or parameter file, instead of the recording's own."),
+    ] = None,
+    only: Annotated[
+        list[BlockName] | None, typer.Option(help='Block; can be repeated. Default: all of them.')
+    ] = None,
+    namespace: Annotated[
+        str | None, typer.Option(help='Of the nodes; needed if several are recorded.')
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Feed recorded inputs to today's code; compare its outputs byte by byte.
+
+    Exit code 1, and the first tick, topic and field that differ, unless all of them are identical.
+    """
+    from glider_bringup.mcap_reader import Bag
+    from glider_bringup.ros import verify as work
+    from glider_bringup.ros.recording import Recording, read_told
+
+    wanted = [one.value for one in only or ()]
+    try:
+        with tempfile.TemporaryDirectory() as scratch, shares() as update:
+            bag = Bag(run)
+            told = read_told(bag, run, settings, Path(scratch))
+            recording = Recording(bag, namespace, lambda share: update('reading', share))
+            verdicts = list(work.verify(recording, told, wanted, update))
+    except KeyboardInterrupt:
+        messages.print('stopped by SIGINT', style='red')
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    report = work.report(bag, recording, told, verdicts)
+    if as_json:
+        print(json.dumps({'run': str(run), **report}))
+    else:
+        _print(report)
+    if not report['identical']:
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _print(report: dict) -> None:
+    """Print what came out for a person."""
+    table = Table(title=f'settings: {report["settings"]}', title_justify='left')
+    for name in ('block', 'result', 'ticks', 'messages', 'differ'):
+        table.add_column(name, justify='left' if name in ('block', 'result') else 'right')
+    for one in report['blocks']:
+        compared, differing = (sum(one[key].values()) for key in ('compared', 'differing'))
+        numbers = [f'{n:,}' for n in (one['ticks'], compared, differing)]
+        table.add_row(one['block'], one['result'], *numbers)
+    output.print(table)
+    for one in report['blocks']:
+        for line in _lines(one):
+            output.print(f'{one["block"]}: {line}', soft_wrap=True)
+    for note in report['notes']:
+        output.print(note, soft_wrap=True)
+
+
+def _lines(one: dict) -> list[str]:
+    """What is to be said about a block."""
+    lines = [f'skipped: {one["reason"]}'] if one['reason'] else []
+    first = one['first']
+    if first:
+        lines.append(
+            f'first difference at tick {first["tick"]:,} (t = {first["t_s"]:.1f} s), '
+            f'{first["topic"]}, {first["field"]}: computed {first["computed"]}, '
+            f'recorded {first["recorded"]}'
+        )
+        counts = ', '.join(f'{name} {count:,}' for name, count in one['differing'].items())
+        lines.append(f'messages that differ: {counts}')
+    return lines + one['notes']
