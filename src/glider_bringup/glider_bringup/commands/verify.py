@@ -72,22 +72,24 @@ def _print(report: dict) -> None:
         table.add_row(one['block'], one['result'], *numbers)
     output.print(table)
     for one in report['blocks']:
-        for line in _lines(one):
+        for line in _lines(one, report['lockstep']):
             output.print(f'{one["block"]}: {line}', soft_wrap=True)
     for note in report['notes']:
         output.print(note, soft_wrap=True)
 
 
-def _lines(one: dict) -> list[str]:
+def _lines(one: dict, lockstep: bool) -> list[str]:
     """What is to be said about a block."""
     lines = [f'skipped: {one["reason"]}'] if one['reason'] else []
     first = one['first']
     if first:
-        lines.append(
-            f'first difference at tick {first["tick"]:,} (t = {first["t_s"]:.1f} s), '
-            f'{first["topic"]}, {first["field"]}: computed {first["computed"]}, '
-            f'recorded {first["recorded"]}'
-        )
+        at = f'tick {first["tick"]:,} (t = {first["t_s"]:.1f} s)'
+        if not lockstep:
+            at = f't = {first["t_s"]:.3f} s'
+        what = f'{first["field"]}: computed {first["computed"]}, recorded {first["recorded"]}'
+        if first['field'] == '(message)':
+            what = f'{first["computed"]}: {first["recorded"]}'
+        lines.append(f'first difference at {at}, {first["topic"]}, {what}')
         counts = ', '.join(f'{name} {count:,}' for name, count in one['differing'].items())
         lines.append(f'messages that differ: {counts}')
     return lines + one['notes']

@@ -39,8 +39,8 @@ _TICKS_AT_ONCE = 8192
 _TICKS_OF_THE_END = 10
 #: Bytes in which an event may differ from what is expected, and still be taken for it.
 _BYTES_ALIKE = 16
-#: Free-running: an input may be this many messages older than the newest that fits.
-_LAGS = {'reference': (0, 1, 2), 'odom': (0, 1), 'joint_states': (0, 1)}
+#: Free-running: an input goes on by one message from step to step, or by one of these.
+_ADVANCES = (1, 0, 2, 3, 4, 5, 6, 7, 8)
 
 _NODES = {'plant': messages.PLANT, 'current': messages.CURRENT}
 _NODES |= {'guidance': messages.GUIDANCE, 'control': messages.CONTROL}
@@ -221,12 +221,10 @@ class _Check:
             except ConfigurationError as error:
                 self.notes.append(f'parameters set at {_time(order.stamp_ns)}: {error}')
 
-    def run(self, start: int, end: int, tracks: dict[str, _Track]) -> dict[str, np.ndarray]:
-        """Outputs of the steps from start to end."""
-        inputs = {
-            name: track.series.values[track.index[start : min(end, track.gap)]]
-            for name, track in tracks.items()
-        }
+    def run(self, start: int, end: int, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Outputs of the steps from start to end; rows are the messages of the inputs."""
+        series = self.recording.series
+        inputs = {name: series[name].values[index] for name, index in rows.items()}
         computed = self.block.run(self.stamps_ns[start:end], inputs)
         if 'flags' in computed:
             self.flags[start:end] = computed.pop('flags')
@@ -315,7 +313,9 @@ class _Check:
         for event in rest:
             if is_ours(event) and event.stamp_ns <= end_ns:
                 text = event.message
-                found = Difference(event.stamp_ns, '/diagnostics', _WHOLE, 'none', repr(text))
+                found = Difference(
+                    event.stamp_ns, '/diagnostics', _WHOLE, repr(text), 'not computed'
+                )
                 self.add(found)
 
     def verdict(self) -> Verdict:
@@ -404,11 +404,12 @@ def _in_lockstep(block: Block, recording: Recording, progress) -> Verdict:
         for i in strays:
             stamp_ns = int(series[name].stamps_ns[i])
             text = f'message {i} of the topic, out of place or there twice'
-            check.add(Difference(stamp_ns, name, _WHOLE, 'none', text))
+            check.add(Difference(stamp_ns, name, _WHOLE, text, 'not computed'))
     edges = {0, count, *range(0, count, _TICKS_AT_ONCE), *check.cuts(count)}
     for start, end in itertools.pairwise(sorted(edges)):
         check.follow_orders(start)
-        for name, values in check.run(start, end, inputs).items():
+        rows = {name: track.index[start : min(end, track.gap)] for name, track in inputs.items()}
+        for name, values in check.run(start, end, rows).items():
             if name in outputs:
                 check.compare(name, outputs[name], start, values)
         progress(end / count)
@@ -467,27 +468,25 @@ def _free_running(block: Block, recording: Recording, progress) -> Verdict:
             if name != 'command' or not np.array_equal(series[name].values[i], safe):
                 text = f'message {i} of the topic, which belongs to no step'
                 stamp_ns = int(series[name].stamps_ns[i])
-                check.add(Difference(stamp_ns, name, _WHOLE, 'none', text))
-    newest = {
-        name: np.searchsorted(series[name].stamps_ns, stamps_ns, 'right') - 1
-        for name in block.inputs
-    }
-    start, lags, cuts = 0, dict.fromkeys(block.inputs, 0), check.cuts(len(stamps_ns))
+                check.add(Difference(stamp_ns, name, _WHOLE, text, 'not computed'))
+    start, cuts = 0, check.cuts(len(stamps_ns))
+    first = {name: _newest(series[name], stamps_ns[0]) for name in block.inputs}
+    options = _options({name: [n, n - 1, n - 2, n - 3] for name, n in first.items()})
     while start < len(stamps_ns):
         check.follow_orders(start)
         end = min([start + 1024, len(stamps_ns), *(cut for cut in cuts if cut > start)])
-        good = _reach(check, start, end, newest, lags, outputs)
-        if not good:
-            found = _other_lags(check, start, newest, outputs)
-            if found is None:
+        for begin in options:
+            rows = _consecutive(check, start, end, begin)
+            good = _identical(check, start, rows, outputs)
+            if good:
                 break
-            lags, good = found, 1
+        else:
+            _keep_difference(check, start, options[0], outputs)
+            break
         start += good
+        last = {name: int(index[good - 1]) for name, index in rows.items()}
+        options = _options({name: [n + more for more in _ADVANCES] for name, n in last.items()})
         progress(start / len(stamps_ns))
-    if start < len(stamps_ns) and not check.found:
-        check.add(
-            Difference(int(stamps_ns[start]), marker, _WHOLE, 'inputs of this step', _NOT_RECORDED)
-        )
     if check.found:
         check.notes.append('free-running: compared up to the first difference')
     elif check.ticks:
@@ -495,48 +494,64 @@ def _free_running(block: Block, recording: Recording, progress) -> Verdict:
     return check.verdict()
 
 
-def _tracks(check: _Check, newest, lags) -> dict[str, _Track]:
-    return {
-        name: _Track(check.recording.series[name], np.maximum(newest[name] - lags[name], -1))
-        for name in check.block.inputs
-    }
+def _newest(series: Series, stamp_ns: int) -> int:
+    return int(np.searchsorted(series.stamps_ns, stamp_ns, 'right')) - 1
 
 
-def _reach(check: _Check, start: int, end: int, newest, lags, outputs) -> int:
-    """Steps from ``start`` on that are identical with these lags; the block is left after them."""
-    tracks = _tracks(check, newest, lags)
-    end = min(end, *(track.gap for track in tracks.values()))
-    if end <= start:
+def _options(choices: dict[str, list[int]]) -> list[dict[str, int]]:
+    """Choices of one message of each input, the likely ones first."""
+    ranked = itertools.product(*(enumerate(places) for places in choices.values()))
+    in_order = sorted(ranked, key=lambda option: sum(rank for rank, _ in option))
+    return [dict(zip(choices, (place for _, place in one), strict=True)) for one in in_order]
+
+
+def _consecutive(check: _Check, start: int, end: int, begin: dict[str, int]):
+    """Messages of the inputs for the steps from ``start`` on, as long as their stamps fit."""
+    wanted_ns = check.stamps_ns[start:end]
+    fits = np.ones(end - start, bool)
+    newest_ns = np.full(end - start, -1)
+    rows = {}
+    for name, place in begin.items():
+        series = check.recording.series[name]
+        rows[name] = place + np.arange(end - start)
+        inside = np.clip(rows[name], 0, len(series) - 1)
+        fits &= (rows[name] == inside) & ~np.isin(inside, list(series.unusable))
+        newest_ns = np.maximum(newest_ns, series.stamps_ns[inside])
+    misfits = np.flatnonzero(~fits | (newest_ns != wanted_ns))
+    count = int(misfits[0]) if len(misfits) else end - start
+    return {name: index[:count] for name, index in rows.items()}
+
+
+def _identical(check: _Check, start: int, rows, outputs) -> int:
+    """Steps from ``start`` on that are identical; the block is left after the last of them."""
+    count = min(len(index) for index in rows.values())
+    if not count:
         return 0
     before = check.block.state
-    computed = check.run(start, end, tracks)
+    computed = check.run(start, start + count, rows)
     wrong = [np.flatnonzero(check.differs(outputs[n], start, computed[n])) for n in outputs]
-    first = min((int(rows[0]) for rows in wrong if len(rows)), default=end - start)
-    if first < end - start:
+    good = min((int(steps[0]) for steps in wrong if len(steps)), default=count)
+    if good < count:
         check.block.state = before
-        if first:
-            check.run(start, start + first, tracks)
+        if good:
+            check.run(start, start + good, {name: index[:good] for name, index in rows.items()})
     for name, track in outputs.items():
-        check.compare(name, track, start, computed[name][:first])
-    return first
+        check.compare(name, track, start, computed[name][:good])
+    return good
 
 
-def _other_lags(check: _Check, start: int, newest, outputs):
-    """Lags with which a step is identical; None, and a difference on record, if there are none."""
-    names = check.block.inputs
-    options = [
-        dict(zip(names, lags, strict=True))
-        for lags in itertools.product(*(_LAGS[name] for name in names))
-    ]
-    for lags in options:
-        if _reach(check, start, start + 1, newest, lags, outputs):
-            return lags
-    tracks = _tracks(check, newest, options[0])
-    if min(track.gap for track in tracks.values()) > start:
-        computed = check.run(start, start + 1, tracks)
+def _keep_difference(check: _Check, step: int, begin: dict[str, int], outputs) -> None:
+    """Put on record that no choice of inputs gives the outputs of a step."""
+    rows = _consecutive(check, step, step + 1, begin)
+    if min(len(index) for index in rows.values()):
+        computed = check.run(step, step + 1, rows)
         for name, track in outputs.items():
-            check.compare(name, track, start, computed[name])
-    return None
+            check.compare(name, track, step, computed[name])
+        return
+    topic = next(iter(outputs))
+    wanted = f'{" and ".join(check.block.inputs)} of this step'
+    stamp_ns = int(check.stamps_ns[step])
+    check.add(Difference(stamp_ns, topic, _WHOLE, wanted, _NOT_RECORDED))
 
 
 # ---------------------------------------------------------------------- a recording
@@ -545,10 +560,8 @@ def _other_lags(check: _Check, start: int, newest, outputs):
 def keeps_step(recording: Recording) -> bool:
     """Whether a recording looks like lockstep: each output has every tick of its inputs once."""
     odom = recording.series.get('odom')
-    if odom is None or np.count_nonzero(np.diff(place_ticks(odom.stamps_ns)) == 1) < 0.5 * len(
-        odom
-    ):
-        return len(odom or ()) == 1
+    if odom is None or np.mean(odom.stamps_ns % TICK_NS == 0) < 0.5:
+        return False
     outputs = [recording.series[n] for n in ('tracking_error', 'wrench') if n in recording.series]
     repeated = sum(int(np.count_nonzero(np.diff(one.stamps_ns) == 0)) for one in outputs)
     return repeated <= 1

@@ -1,0 +1,480 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is recorded is what the code does; every bit that is not is named."""
+
+import json
+import shutil
+import struct
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.writer import CompressionType
+from rosbags.typesys import Stores, get_typestore
+from typer.testing import CliRunner
+
+from glider_bringup.cli import app
+from glider_bringup.mcap_reader import Bag
+from glider_bringup.mission import fly_direct, make_run_folder
+from glider_bringup.ros.recording import Recording, read_told
+from glider_bringup.ros.verify import IDENTICAL, place_ticks, report, verify
+from glider_bringup.scenario import load_scenario
+from glider_model.ros.messages import TOPICS
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_NS
+
+PER_TICK = {t.full_name('/glider'): t for t in TOPICS.values() if t.per_tick}
+BLOCK_OF = {
+    name: topic.publisher.removesuffix('_node')
+    for name, topic in {**PER_TICK, '/glider/path': TOPICS['path']}.items()
+}
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+def verified(path, scratch, namespace=None, **options) -> dict:
+    """Report on a bag."""
+    bag = Bag(path)
+    told = read_told(bag, path, options.get('settings'), scratch)
+    recording = Recording(bag, namespace, lambda share: None)
+    only = options.get('only', [])
+    return report(bag, recording, told, list(verify(recording, told, only, lambda *_: None)))
+
+
+def results(path, scratch, **options) -> dict[str, dict]:
+    """What is said about each block."""
+    return {one['block']: one for one in verified(path, scratch, **options)['blocks']}
+
+
+def different(blocks: dict[str, dict]) -> set[str]:
+    return {name for name, one in blocks.items() if one['result'] == 'different'}
+
+
+@pytest.fixture(scope='module')
+def recorded(short_run, read_bag):
+    """Messages of the short run, by topic and in order."""
+    (file,) = short_run.glob('*.mcap')
+    return read_bag(file)
+
+
+@pytest.fixture
+def altered(short_run, write_bag, tmp_path):
+    """Function that writes a run folder with other messages in it."""
+
+    def write(messages, **options):
+        folder = tmp_path / 'altered'
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        for name in ('scenario.yaml', 'vehicle.yaml'):
+            shutil.copy(short_run / name, folder)
+        (like,) = short_run.glob('*.mcap')
+        write_bag(folder / 'bag_0.mcap', like, messages, **options)
+        return folder
+
+    return write
+
+
+def flip(data: bytes, bit: int) -> bytes:
+    changed = bytearray(data)
+    changed[bit // 8] ^= 1 << bit % 8
+    return bytes(changed)
+
+
+# ---------------------------------------------------------------------- identical
+
+
+def test_every_message_of_a_run_is_compared_and_identical(short_run, recorded, tmp_path):
+    report = verified(short_run, tmp_path)
+    assert report['identical']
+    assert report['lockstep']
+    compared = {}
+    for one in report['blocks']:
+        assert (one['result'], one['first'], one['notes']) == (IDENTICAL, None, [])
+        assert one['ticks'] == 1200
+        for name, count in one['compared'].items():
+            compared[name] = compared.get(name, 0) + count
+    expected = {}
+    for message in recorded:
+        name = message.topic.removeprefix('/glider/')
+        expected[name] = expected.get(name, 0) + 1
+    assert compared == expected
+    assert expected['/diagnostics'] > 5
+
+
+@pytest.mark.parametrize('compression', list(CompressionType))
+@pytest.mark.parametrize('chunked', [True, False])
+def test_bag_by_another_writer_is_identical(altered, recorded, tmp_path, compression, chunked):
+    folder = altered(recorded, compression=compression, chunked=chunked)
+    assert verified(folder, tmp_path)['identical']
+
+
+def test_settings_attached_to_the_bag_are_enough(short_run, tmp_path):
+    (file,) = short_run.glob('*.mcap')
+    alone = tmp_path / 'alone.mcap'
+    shutil.copy(file, alone)
+    report = verified(alone, tmp_path)
+    assert report['identical']
+    assert 'attached' in report['settings']
+
+
+def test_messages_in_any_order_of_the_file_are_identical(altered, recorded, tmp_path):
+    """Readers go by log time; at one log time the order of topics says nothing."""
+    shuffled = list(recorded)
+    np.random.default_rng(7).shuffle(shuffled)
+    assert verified(altered([type(recorded[0])(*m) for m in shuffled]), tmp_path)['identical']
+
+
+def test_split_bag_is_read_as_one(altered, recorded, short_run, write_bag, tmp_path):
+    folder = altered(recorded[:4000])
+    (like,) = short_run.glob('*.mcap')
+    write_bag(folder / 'bag_1.mcap', like, recorded[4000:])
+    names = ['bag_0.mcap', 'bag_1.mcap']
+    information = {'storage_identifier': 'mcap', 'relative_file_paths': names}
+    text = yaml.safe_dump({'rosbag2_bagfile_information': information})
+    (folder / 'metadata.yaml').write_text(text)
+    assert verified(folder, tmp_path)['identical']
+    (folder / 'bag_1.mcap').unlink()
+    with pytest.raises(ConfigurationError, match='bag_1.mcap: missing'):
+        verified(folder, tmp_path)
+
+
+@pytest.mark.parametrize('share', [0.3, 0.6, 0.85])
+def test_bag_whose_writer_was_killed_is_compared_as_far_as_it_goes(short_run, tmp_path, share):
+    (file,) = short_run.glob('*.mcap')
+    data = file.read_bytes()
+    (tmp_path / 'torn.mcap').write_bytes(data[: int(share * len(data))])
+    report = verified(tmp_path / 'torn.mcap', tmp_path)
+    assert report['identical']
+    assert 'ends early' in report['notes'][0]
+    assert 0 < report['blocks'][0]['ticks'] < 1200
+
+
+# ---------------------------------------------------------------------- one bit
+
+
+def leaves(value, path='') -> dict[str, object]:
+    """Every field of a message of the rosbags package, by its path."""
+    if hasattr(value, '__dataclass_fields__'):
+        found = {}
+        for name in value.__dataclass_fields__:
+            if name != '__msgtype__':
+                found.update(leaves(getattr(value, name), f'{path}.{name}' if path else name))
+        return found
+    if isinstance(value, list | np.ndarray):
+        found = {f'len({path})': len(value)}
+        for index, one in enumerate(value):
+            found.update(leaves(one, f'{path}[{index}]'))
+        return found
+    if isinstance(value, float):
+        value = struct.pack('<d', value)
+    return {path: value}
+
+
+def fields_that_differ(topic, one: bytes, other: bytes) -> list[str] | None:
+    """By an independent decoder, in the order of the message; None if it cannot read them."""
+    try:
+        both = [leaves(STORE.deserialize_cdr(data, topic.type_name)) for data in (one, other)]
+    except Exception:
+        return None
+    return [path for path in both[0] if both[0][path] != both[1].get(path)]
+
+
+@given(data=st.data())
+@settings(
+    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_any_flipped_bit_is_named(altered, recorded, tmp_path, data):
+    """Whatever bit of whatever per-tick message: block, topic and tick; the field as well."""
+    name = data.draw(st.sampled_from(sorted(PER_TICK)))
+    of_topic = [i for i, message in enumerate(recorded) if message.topic == name]
+    tick = data.draw(st.sampled_from([0, 1, 1198, 1199]) | st.integers(0, 1199))
+    place = of_topic[tick]
+    good = recorded[place].data
+    bit = data.draw(st.integers(0, 8 * len(good) - 1))
+    messages = list(recorded)
+    messages[place] = messages[place]._replace(data=flip(good, bit))
+    blocks = results(altered(messages), tmp_path)
+    first = blocks[BLOCK_OF[name]]['first']
+    assert (first['topic'], first['tick']) == (name.removeprefix('/glider/'), tick)
+    assert first['computed'] != first['recorded']
+    assert blocks[BLOCK_OF[name]]['differing'] == {first['topic']: 1}
+    changed = fields_that_differ(PER_TICK[name], good, messages[place].data)
+    if changed and not changed[0].startswith('len('):
+        assert first['field'] == changed[0]
+
+
+@pytest.mark.parametrize('topic', ['/glider/path', '/diagnostics'])
+@pytest.mark.parametrize('share', [0.0, 0.03, 0.2, 0.5, 0.8, 0.999])
+def test_flipped_bit_of_an_event_is_named(altered, recorded, tmp_path, topic, share):
+    place = [i for i, message in enumerate(recorded) if message.topic == topic][-1]
+    messages, good = list(recorded), recorded[place]
+    changed = flip(good.data, int(share * 8 * len(good.data)))
+    messages[place] = good._replace(data=changed)
+    report = verified(altered(messages), tmp_path)
+    firsts = [one['first'] for one in report['blocks'] if one['first']]
+    assert [(one['topic'], one['tick']) for one in firsts] == [
+        (topic.removeprefix('/glider/'), good.log_ns // TICK_NS)
+    ]
+    assert firsts[0]['field'] != '(message)'
+
+
+def test_numbers_that_print_alike_are_told_apart(altered, recorded, tmp_path):
+    place = next(i for i, m in enumerate(recorded) if m.topic == '/glider/wrench')
+    messages = list(recorded)
+    nan = struct.pack('<d', float('nan'))
+    good = recorded[place].data
+    at = PER_TICK['/glider/wrench'].codec.size - 8
+    messages[place] = messages[place]._replace(data=good[:at] + nan)
+    first = results(altered(messages), tmp_path)['control']['first']
+    assert (first['field'], first['recorded']) == ('wrench.torque.z', 'nan')
+
+
+def test_damage_to_an_input_leads_to_its_source(altered, recorded, tmp_path):
+    """Guidance fed with a damaged odom differs too; the report says where that comes from."""
+    place = [i for i, m in enumerate(recorded) if m.topic == '/glider/odom'][500]
+    messages = list(recorded)
+    at = recorded[place].data.index(b'base_link') + 16  # position, high bits of x
+    messages[place] = messages[place]._replace(data=flip(recorded[place].data, 8 * at + 50))
+    blocks = results(altered(messages), tmp_path)
+    assert blocks['plant']['differing'] == {'odom': 1}
+    assert blocks['guidance']['first']['tick'] == 500
+    assert any('odom differs at t = 50.0 s' in note for note in blocks['guidance']['notes'])
+
+
+def test_input_that_is_not_finite_ends_what_can_be_computed(altered, recorded, tmp_path):
+    topic = PER_TICK['/glider/odom']
+    place = [i for i, m in enumerate(recorded) if m.topic == '/glider/odom'][300]
+    messages = list(recorded)
+    numbers = list(topic.codec.decode(recorded[place].data)[1])
+    numbers[2] = float('inf')
+    raw = topic.codec.encode(300 * TICK_NS, numbers)
+    messages[place] = messages[place]._replace(data=raw)
+    blocks = results(altered(messages), tmp_path)
+    assert blocks['plant']['first']['field'] == 'pose.pose.position.z'
+    for name in ('current', 'guidance', 'control'):
+        assert (blocks[name]['first']['topic'], blocks[name]['first']['tick']) == ('odom', 300)
+        assert 'not finite' in blocks[name]['first']['recorded']
+
+
+@pytest.mark.parametrize('compression', list(CompressionType))
+@pytest.mark.parametrize('share', [0.2, 0.5, 0.9])
+def test_bit_that_rots_in_a_chunk_is_named_with_file_and_chunk(
+    altered, recorded, tmp_path, compression, share
+):
+    file = altered(recorded, compression=compression) / 'bag_0.mcap'
+    with file.open('rb') as stream:
+        chunk = make_reader(stream).get_summary().chunk_indexes[3]
+    data = bytearray(file.read_bytes())
+    data[chunk.chunk_start_offset + 50 + int(share * (chunk.chunk_length - 50))] ^= 16
+    file.write_bytes(data)
+    with pytest.raises(ConfigurationError, match=r'bag_0\.mcap: chunk 4 is damaged: '):
+        verified(file.parent, tmp_path)
+
+
+# ---------------------------------------------------------------------- other code
+
+CHANGES = {
+    'gain': ('control', {'control.adaptive.pitch.b1': 6.000001}),
+    'law': ('control', {'control.law': 'pid'}),
+    'guidance': ('guidance', {'guidance.los.method': 'paper'}),
+    'filter': ('guidance', {'guidance.filters.pitch_frequency_radps': 0.120001}),
+    'current': ('current', {'current.speed_kn': 0.71, 'current.angle_deg': 60.0}),
+    'coefficient': ('plant', {'perturb.K_L': 1e-9}),
+    'noise': ('plant', {'seed': 12}),
+}
+
+
+@pytest.mark.parametrize('change', CHANGES)
+def test_change_is_found_where_the_run_itself_would_have_changed(
+    short_run, read_bag, tmp_path, change
+):
+    """Until the first tick that differs, a run with the change has the same inputs."""
+    block, fields = CHANGES[change]
+    told = load_scenario(str(short_run / 'scenario.yaml'), fields)
+    flown = make_run_folder(told, tmp_path / 'flown')
+    fly_direct(told, flown, True, lambda ticks, depth_m: None)
+    (one,), (other,) = short_run.glob('*.mcap'), flown.glob('*.mcap')
+    outputs = [name for name in PER_TICK if BLOCK_OF[name] == block]
+    pairs = [
+        (a.log_ns // TICK_NS, a.topic.removeprefix('/glider/'))
+        for a, b in zip(
+            *([m for m in read_bag(file) if m.topic in outputs] for file in (one, other)),
+            strict=True,
+        )
+        if a.data != b.data
+    ]
+    blocks = results(short_run, tmp_path, settings=flown / 'scenario.yaml')
+    assert block in different(blocks)
+    if change != 'noise':
+        assert different(blocks) == {block}
+    first = blocks[block]['first']
+    assert first['tick'] == pairs[0][0]
+    assert first['topic'] in [topic for tick, topic in pairs if tick == pairs[0][0]]
+
+
+def test_edited_scenario_of_the_folder_counts_and_is_pointed_out(altered, recorded, tmp_path):
+    folder = altered(recorded)
+    text = (folder / 'scenario.yaml').read_text()
+    assert 'b1: 6.0' in text
+    (folder / 'scenario.yaml').write_text(text.replace('b1: 6.0', 'b1: 6.1'))
+    report = verified(folder, tmp_path)
+    assert different({one['block']: one for one in report['blocks']}) == {'control'}
+    assert 'not the scenario that is attached' in report['notes'][0]
+
+
+# ---------------------------------------------------------------------- what is not there
+
+
+def without(recorded, *topics):
+    return [message for message in recorded if message.topic not in topics]
+
+
+def test_blocks_without_their_inputs_are_skipped_and_say_why(altered, recorded, tmp_path):
+    names = ('/clock', '/glider/current_velocity', '/glider/wrench', '/diagnostics')
+    folder = altered(without(recorded, *names))
+    report = verified(folder, tmp_path)
+    blocks = {one['block']: one for one in report['blocks']}
+    assert report['identical']
+    assert {name: one['result'] for name, one in blocks.items()} == {
+        'plant': 'skipped',
+        'current': 'skipped',
+        'guidance': IDENTICAL,
+        'control': IDENTICAL,
+    }
+    assert 'current_velocity' in blocks['plant']['reason']
+    assert 'wrench is not recorded' in blocks['control']['notes']
+
+
+@pytest.mark.parametrize('tick', [0, 400, 1150])
+def test_lost_input_is_a_difference(altered, recorded, tmp_path, tick):
+    place = [i for i, m in enumerate(recorded) if m.topic == '/glider/reference'][tick]
+    blocks = results(altered(recorded[:place] + recorded[place + 1 :]), tmp_path)
+    first = blocks['guidance']['first']
+    assert (first['topic'], first['tick'], first['recorded']) == (
+        'reference',
+        tick,
+        'not recorded',
+    )
+    assert blocks['control']['result'] == ('different' if tick else 'skipped')
+    assert blocks['control']['ticks'] == tick
+    assert blocks['plant']['result'] == blocks['current']['result'] == IDENTICAL
+
+
+def test_message_that_is_there_twice_is_a_difference(altered, recorded, tmp_path):
+    place = [i for i, m in enumerate(recorded) if m.topic == '/glider/command'][600]
+    blocks = results(altered([*recorded[: place + 1], *recorded[place:]]), tmp_path)
+    assert blocks['control']['first']['topic'] == 'command'
+    assert 'twice' in blocks['control']['first']['computed']
+
+
+def test_recording_that_begins_late_cannot_be_compared(altered, recorded, tmp_path):
+    folder = altered([m for m in recorded if m.log_ns >= 10_000_000_000])
+    report = verified(folder, tmp_path)
+    assert not report['identical']
+    assert {one['result'] for one in report['blocks']} == {'skipped'}
+    assert 'nothing could be compared' in report['notes']
+    assert all('from t = 10.0 s on' in one['reason'] for one in report['blocks'])
+
+
+def test_half_a_topic_is_a_difference(altered, recorded, tmp_path):
+    cut = [m for m in recorded if m.topic != '/glider/wrench' or m.log_ns < 60_000_000_000]
+    first = results(altered(cut), tmp_path)['control']['first']
+    assert (first['topic'], first['tick']) == ('wrench', 600)
+    cut = [m for m in recorded if m.topic != '/glider/odom' or m.log_ns < 60_000_000_000]
+    blocks = results(altered(cut), tmp_path)
+    assert different(blocks) == {'plant', 'current', 'guidance', 'control'}
+
+
+def test_event_that_is_not_recorded_or_made_up_is_a_difference(altered, recorded, tmp_path):
+    events = [i for i, m in enumerate(recorded) if m.topic == '/diagnostics']
+    place = events[2]
+    lost = recorded[:place] + recorded[place + 1 :]
+    report = verified(altered(lost), tmp_path)
+    firsts = [one['first'] for one in report['blocks'] if one['first']]
+    assert [(one['topic'], one['recorded']) for one in firsts] == [
+        ('/diagnostics', 'not recorded')
+    ]
+    report = verified(altered([*recorded, recorded[place]]), tmp_path)
+    firsts = [one['first'] for one in report['blocks'] if one['first']]
+    assert [(one['topic'], one['recorded']) for one in firsts] == [
+        ('/diagnostics', 'not computed')
+    ]
+
+
+def test_stamps_alone_name_the_tick():
+    stamps = np.arange(8) * TICK_NS
+    for place in range(8):
+        wrong = stamps.copy()
+        wrong[place] ^= 1 << 33
+        assert list(place_ticks(wrong)) == list(range(8))
+    assert list(place_ticks(np.delete(stamps, 3))) == [0, 1, 2, 4, 5, 6, 7]
+
+
+# ---------------------------------------------------------------------- the command
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ['verify', *map(str, arguments)])
+
+
+def test_command_says_identical(short_run):
+    done = run(short_run, '--json')
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)['identical']
+    done = run(short_run, '--only', 'control')
+    assert done.exit_code == 0
+    assert 'control' in done.stdout
+    assert 'guidance' not in done.stdout
+
+
+def test_command_names_a_difference(altered, recorded):
+    place = [i for i, m in enumerate(recorded) if m.topic == '/glider/wrench'][77]
+    messages = list(recorded)
+    messages[place] = messages[place]._replace(data=flip(recorded[place].data, 8 * 40 + 4))
+    done = run(altered(messages))
+    assert done.exit_code == 1
+    assert 'first difference at tick 77 (t = 7.7 s), wrench' in done.stdout
+
+
+@pytest.mark.parametrize(
+    ('name', 'content', 'words'),
+    [
+        ('nothing', None, 'no such run'),
+        ('empty', {}, 'no .mcap file'),
+        ('text', {'a.mcap': b'not a bag at all'}, 'a.mcap: not an MCAP file'),
+        ('hollow', {'a.mcap': b''}, 'a.mcap: not an MCAP file'),
+        (
+            'sqlite',
+            {
+                'metadata.yaml': b'rosbag2_bagfile_information: '
+                b'{storage_identifier: sqlite3, relative_file_paths: [a.db3]}'
+            },
+            'storage sqlite3',
+        ),
+        ('garbled', {'metadata.yaml': b'[1, 2'}, 'metadata.yaml: not metadata of rosbag2'),
+    ],
+)
+def test_what_is_no_bag_is_refused_in_one_message(tmp_path, name, content, words):
+    folder = tmp_path / name
+    if content is not None:
+        folder.mkdir()
+        for file, data in content.items():
+            (folder / file).write_bytes(data)
+    with pytest.raises(ConfigurationError) as error:
+        Bag(folder)
+    assert words in str(error.value)
+
+
+def test_bag_of_others_needs_settings_and_a_topic_of_ours(
+    short_run, recorded, write_bag, tmp_path
+):
+    (like,) = short_run.glob('*.mcap')
+    file = tmp_path / 'theirs.mcap'
+    write_bag(file, like, recorded, attachments=False)
+    with pytest.raises(ConfigurationError, match='give --settings'):
+        verified(file, tmp_path)
+    assert verified(file, tmp_path, settings=short_run / 'scenario.yaml')['identical']
+    with pytest.raises(ConfigurationError, match=r'allowed: /glider'):
+        verified(file, tmp_path, 'other', settings=short_run / 'scenario.yaml')
