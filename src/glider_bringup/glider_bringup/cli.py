@@ -6,7 +6,16 @@ import sys
 
 import typer
 
-from glider_bringup.commands import recorded, report, run, studies, sweeps, vehicles, verify
+from glider_bringup.commands import (
+    recorded,
+    replay,
+    report,
+    run,
+    studies,
+    sweeps,
+    vehicles,
+    verify,
+)
 from glider_bringup.console import EXIT_USAGE, messages
 from glider_model.settings import ConfigurationError
 
@@ -20,7 +29,7 @@ app = typer.Typer(
     context_settings={'help_option_names': ['-h', '--help']},
 )
 # Commands in the order in which --help lists them.
-for _module in (run, studies, sweeps, recorded, report, verify, vehicles):
+for _module in (run, studies, sweeps, recorded, report, replay, verify, vehicles):
     app.add_typer(_module.app)
 
 

@@ -1,0 +1,94 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider replay``."""
+
+import json
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from glider_bringup.console import EXIT_INTERRUPTED, Json, messages, number, output
+
+app = typer.Typer()
+
+
+@app.command(epilog='Example: ./glider replay runs/20260101-120000-current_8deg --rate 20')
+def replay(
+    run: Annotated[
+        Path, typer.Argument(metavar='RUN', help='Folder of a run or a bag, or an .mcap file.')
+    ],
+    rate: Annotated[
+        str, typer.Option(metavar='X|max', help='Times the speed of the recording.')
+    ] = '1',
+    topics: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar='NAME,...',
+            help='Topics, by name or as in the namespace; /clock always comes. Default: all.',
+        ),
+    ] = None,
+    start: Annotated[
+        float, typer.Option(min=0.0, metavar='S', help='Begin this far into the recording (s).')
+    ] = 0.0,
+    duration: Annotated[
+        float | None, typer.Option(min=0.0, metavar='S', help='Recorded time to replay (s).')
+    ] = None,
+    loop: Annotated[
+        bool, typer.Option('--loop', help='Begin again at the end, until Ctrl-C; time jumps back.')
+    ] = False,
+    namespace: Annotated[
+        str | None, typer.Option(help="Namespace of the nodes' topics, instead of the recorded.")
+    ] = None,
+    wait_for: Annotated[
+        int,
+        typer.Option(min=0, metavar='N', help='Begin when every topic has this many subscribers.'),
+    ] = 0,
+    as_json: Json = False,
+) -> None:
+    """Publish a recording: the same bytes and stamps, with their quality of service and /clock."""
+    from glider_bringup.mcap_reader import Bag
+    from glider_bringup.ros import replay as work
+
+    factor = float('inf') if rate == 'max' else number('--rate', rate, 'max', 0.001, 1e6)
+    names = [name for text in topics or () for name in text.split(',') if name]
+    bag = Bag(run)
+    plan = work.plan_replay(bag, names, start, duration, namespace)
+    work.check_not_empty(plan)
+    if bag.cut:
+        messages.print(bag.cut, soft_wrap=True)
+    span_s = (plan.end_ns - plan.start_ns) / 1e9
+    try:
+        with work.Replay(plan, factor) as player, _progress(span_s) as update:
+            player.wait_for(wait_for, lambda text: messages.print(text, soft_wrap=True))
+            played = player.run(update)
+            while loop:
+                played = player.run(update)
+    except KeyboardInterrupt:
+        messages.print('stopped by SIGINT', style='red')
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    if as_json:
+        print(json.dumps({'run': str(run), 'recorded_s': span_s, **played._asdict()}))
+    else:
+        count = sum(played.counts.values())
+        output.print(f'{count:,} messages, {span_s:,.1f} s in {played.wall_s:,.1f} s')
+
+
+@contextmanager
+def _progress(span_s: float):
+    """Progress bar in recorded time; yields its update."""
+    bar = Progress(
+        TextColumn('{task.description}'),
+        BarColumn(),
+        TextColumn('{task.fields[state]}'),
+        TimeRemainingColumn(),
+        console=messages,
+        transient=True,
+    )
+    task = bar.add_task('replaying', total=max(span_s, 1e-9), state='')
+    with bar:
+        yield lambda passed_s: bar.update(
+            task, completed=passed_s, state=f'{passed_s:,.1f} of {span_s:,.1f} s'
+        )
