@@ -1,0 +1,325 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A replay is the recording: every message once, in order, byte by byte, at any speed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import defaultdict
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from typer.testing import CliRunner
+
+from glider_bringup.cli import app
+from glider_bringup.mcap_reader import Bag, BagTopic
+from glider_bringup.ros.node_parameters import node_parameters, write_parameters
+from glider_bringup.ros.replay import plan_replay, qos_of
+from glider_bringup.runner import RECORDER, domain_id, node_commands
+from glider_bringup.scenario import load_scenario
+from glider_model.ros.messages import TOPICS
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_NS
+
+DEADLINE_S = 120.0
+RECORDED = {topic.full_name('/glider'): topic for topic in TOPICS.values() if topic.recorded}
+
+
+@pytest.fixture
+def context(monkeypatch):
+    """ROS context in a domain of its own, which the processes of the test share."""
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
+    context = Context()
+    with domain_id() as domain:
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+        rclpy.init(context=context, domain_id=domain)
+        yield context
+        rclpy.try_shutdown(context=context)
+
+
+@pytest.fixture
+def start(context):
+    """Start a process; it does not outlive the test."""
+    processes = []
+
+    def run(*command) -> subprocess.Popen:
+        pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
+        processes.append(subprocess.Popen([*map(str, command)], env={**os.environ}, **pipes))
+        return processes[-1]
+
+    yield run
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def replay(start):
+    """Start a replay."""
+    return lambda *arguments: start(
+        sys.executable, '-m', 'glider_bringup.cli', 'replay', *arguments
+    )
+
+
+class Listener:
+    """Subscribes to topics, with a queue without end, and keeps what comes."""
+
+    def __init__(self, context, names, durability=DurabilityPolicy.VOLATILE) -> None:
+        self.node = Node('listener', context=context)
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(self.node)
+        self.got: dict[str, list[bytes]] = defaultdict(list)
+        qos = QoSProfile(
+            history=HistoryPolicy.KEEP_ALL,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=durability,
+        )
+        for name in names:
+            kind, take = RECORDED[name].message_type, self.got[name].append
+            self.node.create_subscription(kind, name, take, qos, raw=True)
+
+    def listen_until(self, condition, process) -> None:
+        end = time.monotonic() + DEADLINE_S
+        while not condition():
+            assert time.monotonic() < end, {name: len(got) for name, got in self.got.items()}
+            assert process.poll() in (None, 0), process.communicate()
+            self.executor.spin_once(timeout_sec=0.1)
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+
+
+@pytest.fixture
+def listen(context):
+    """Make listeners."""
+    made = []
+
+    def make(*names, **options) -> Listener:
+        made.append(Listener(context, names, **options))
+        return made[-1]
+
+    yield make
+    for listener in made:
+        listener.close()
+
+
+@pytest.fixture(scope='module')
+def recorded(short_run, read_bag):
+    """Payloads of the short run by topic."""
+    (file,) = short_run.glob('*.mcap')
+    payloads = defaultdict(list)
+    for message in read_bag(file):
+        payloads[message.topic].append(message)
+    return payloads
+
+
+def data(messages) -> list[bytes]:
+    return [message.data for message in messages]
+
+
+# ---------------------------------------------------------------------- every message
+
+
+@pytest.mark.parametrize(('rate', 'seconds'), [('1', 3), ('50', 120), ('max', 120)])
+def test_subscriber_gets_every_message_once_and_in_order(
+    short_run, recorded, replay, listen, rate, seconds
+):
+    names = ['/glider/odom', '/glider/adaptation', '/glider/command']
+    listener = listen(*names)
+    options = ('--topics', 'odom,adaptation', '--topics', '/glider/command')
+    process = replay(
+        short_run, '--rate', rate, '--duration', seconds, *options, '--wait-for', 1, '--json'
+    )
+    expected = {
+        name: data(m for m in recorded[name] if m.log_ns <= seconds * 1e9) for name in names
+    }
+    total = sum(map(len, expected.values()))
+    listener.listen_until(lambda: sum(map(len, listener.got.values())) >= total, process)
+    out, error = process.communicate(timeout=DEADLINE_S)
+    assert process.returncode == 0, error
+    for name in names:
+        assert listener.got[name] == expected[name], name
+    report = json.loads(out)
+    count = len(expected['/glider/odom'])
+    assert report['counts'] == {**dict.fromkeys(names, count), '/clock': count}
+    if rate != 'max':
+        assert report['wall_s'] >= seconds / float(rate)
+
+
+def test_second_recording_at_full_speed_is_byte_identical(
+    short_run, recorded, read_bag, start, replay, tmp_path
+):
+    parameters = node_parameters(load_scenario(), record_to=tmp_path / 'again')
+    write_parameters(parameters, tmp_path / 'parameters.yaml')
+    recorder = start(*node_commands(tmp_path / 'parameters.yaml')[RECORDER])
+    process = replay(short_run, '--rate', 'max', '--wait-for', 1)
+    _, error = process.communicate(timeout=DEADLINE_S)
+    assert process.returncode == 0, error
+    recorder.send_signal(signal.SIGINT)
+    assert recorder.wait(DEADLINE_S) == 0
+    (file,) = (tmp_path / 'again').glob('*.mcap')
+    again = defaultdict(list)
+    for message in read_bag(file):
+        again[message.topic].append(message)
+    assert again == recorded
+
+
+def test_latched_topic_is_there_for_who_comes_late_and_for_who_starts_late(
+    short_run, recorded, replay, listen
+):
+    process = replay(short_run, '--start', 110, '--topics', 'path,odom')
+    early = listen('/glider/odom')
+    early.listen_until(lambda: early.got['/glider/odom'], process)
+    late = listen('/glider/path', durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    late.listen_until(lambda: late.got['/glider/path'], process)
+    assert late.got['/glider/path'] == data(recorded['/glider/path'])
+    assert early.got['/glider/odom'][0] in data(recorded['/glider/odom'][1100:])
+
+
+def test_publishers_offer_what_was_recorded(short_run, replay, listen):
+    process = replay(short_run, '--namespace', 'a/b', '--wait-for', 1, '--start', 60)
+    names = {name: name.replace('/glider/', '/a/b/') for name in RECORDED}
+    listener = listen()
+    found = {}
+
+    def all_there() -> bool:
+        for name, published in names.items():
+            for info in listener.node.get_publishers_info_by_topic(published):
+                found[name] = info
+        return set(found) == set(names)
+
+    listener.listen_until(all_there, process)
+    for name, info in found.items():
+        topic = RECORDED[name]
+        assert info.node_name == 'replay_node'
+        assert info.topic_type == topic.type_name
+        assert info.qos_profile.reliability == topic.qos.reliability
+        assert info.qos_profile.durability == topic.qos.durability
+    process.send_signal(signal.SIGINT)
+    out, error = process.communicate(timeout=DEADLINE_S)
+    assert process.returncode == 130
+    assert 'stopped by SIGINT' in error
+    assert 'Traceback' not in error + out
+
+
+def test_loop_begins_again_with_the_recorded_stamps(short_run, recorded, replay, listen):
+    listener = listen('/clock')
+    process = replay(
+        short_run,
+        '--loop',
+        '--rate',
+        'max',
+        '--duration',
+        2,
+        '--topics',
+        '/clock',
+        '--wait-for',
+        1,
+    )
+    once = data(recorded['/clock'][:21])
+    listener.listen_until(lambda: len(listener.got['/clock']) >= 63, process)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(DEADLINE_S) == 130
+    assert listener.got['/clock'][:63] == 3 * once
+
+
+def test_recording_without_clock_gets_one_by_its_log_times(
+    short_run, read_bag, write_bag, replay, listen, tmp_path
+):
+    (like,) = short_run.glob('*.mcap')
+    kept = [m for m in read_bag(like) if m.topic == '/glider/odom' and m.log_ns < 3_000_000_000]
+    moved = [m._replace(log_ns=m.log_ns + 1_700_000_000_000_000_000) for m in kept]
+    write_bag(tmp_path / 'vehicle.mcap', like, moved)
+    listener = listen('/glider/odom', '/clock')
+    process = replay(tmp_path / 'vehicle.mcap', '--rate', 'max', '--wait-for', 1)
+    listener.listen_until(lambda: len(listener.got['/glider/odom']) >= 30, process)
+    assert process.wait(DEADLINE_S) == 0
+    listener.listen_until(lambda: listener.got['/clock'], process)
+    codec = TOPICS['/clock'].codec
+    times = [codec.decode(raw)[0] for raw in listener.got['/clock']]
+    assert set(times) <= {m.log_ns for m in moved}
+    assert times == sorted(set(times))
+    assert listener.got['/glider/odom'] == data(kept)
+
+
+# ---------------------------------------------------------------------- what cannot be
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['--topics', 'odom,depth'], ['--topics depth', '/glider/odom', '/clock']),
+        (['--start', '121'], ['--start 121', '119.9']),
+        (['--start', '1.01', '--duration', '0.01', '--topics', 'odom'], ['nothing to replay']),
+        (['--rate', 'fast'], ['--rate', 'max']),
+        (['--rate', '0'], ['--rate', '0.001']),
+    ],
+)
+def test_what_cannot_be_replayed_is_refused(short_run, arguments, words):
+    done = CliRunner().invoke(app, ['replay', str(short_run), *arguments])
+    assert isinstance(done.exception, ConfigurationError)
+    for word in words:
+        assert word in str(done.exception)
+
+
+def test_topic_whose_type_is_not_installed_is_named(short_run, replay, tmp_path):
+    (like,) = short_run.glob('*.mcap')
+    name = b'geometry_msgs/msg/WrenchStamped'
+    text = like.read_bytes().replace(name, name.replace(b'msgs', b'msgz'))
+    (tmp_path / 'theirs.mcap').write_bytes(text)
+    process = replay(tmp_path / 'theirs.mcap', '--rate', 'max')
+    _, error = process.communicate(timeout=DEADLINE_S)
+    assert process.returncode == 2
+    assert '/glider/wrench' in error
+    assert 'geometry_msgz/msg/WrenchStamped' in error
+    assert 'Traceback' not in error
+
+
+def test_plan_of_a_part(short_run):
+    plan = plan_replay(Bag(short_run), ['odom'], 10.0, 5.0, 'other')
+    assert (plan.start_ns, plan.end_ns) == (100 * TICK_NS, 150 * TICK_NS)
+    assert sorted(plan.names.values()) == ['/clock', '/other/odom']
+
+
+@pytest.mark.parametrize(
+    ('text', 'expected'),
+    [
+        ('', ('RELIABLE', 'VOLATILE', 1024)),
+        (
+            '- {history: keep_last, depth: 7, reliability: best_effort, durability: volatile}',
+            ('BEST_EFFORT', 'VOLATILE', 7),
+        ),
+        (
+            '- {history: 1, depth: 1, reliability: 1, durability: 1}',
+            ('RELIABLE', 'TRANSIENT_LOCAL', 1),
+        ),
+        (
+            '- {history: 3, depth: 0, reliability: 2, durability: 2}',
+            ('BEST_EFFORT', 'VOLATILE', 1024),
+        ),
+        (
+            '[{history: 2, depth: 0, reliability: 2, durability: 2}, {history: keep_last, '
+            'depth: 5, reliability: reliable, durability: transient_local}]',
+            ('RELIABLE', 'TRANSIENT_LOCAL', 1024),
+        ),
+    ],
+)
+def test_quality_of_service_in_words_and_in_the_numbers_of_older_bags(text, expected):
+    qos = qos_of(BagTopic('/a', 'std_msgs/msg/String', 'cdr', 'ros2msg', b'', text))
+    assert (qos.reliability.name, qos.durability.name, qos.depth) == expected
+
+
+@pytest.mark.parametrize('text', ['[1]', '- history: [', 'word'])
+def test_quality_of_service_that_is_garbled_is_named(text):
+    with pytest.raises(ConfigurationError, match='/a: quality of service not readable'):
+        qos_of(BagTopic('/a', 'std_msgs/msg/String', 'cdr', 'ros2msg', b'', text))
