@@ -28,6 +28,7 @@ setup(
     entry_points={
         'console_scripts': [
             'recorder_node = glider_bringup.nodes.recorder_node:main',
+            'viewer_node = glider_bringup.nodes.viewer_node:main',
             'glider = glider_bringup.cli:main',
         ],
     },

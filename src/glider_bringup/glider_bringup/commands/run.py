@@ -3,6 +3,8 @@
 """``./glider run``."""
 
 import json
+from collections.abc import Callable
+from contextlib import contextmanager, nullcontext
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Literal, get_args
@@ -82,6 +84,12 @@ def run(
         bool,
         typer.Option('--report/--no-report', help='Write report.html, and what it is drawn from.'),
     ] = True,
+    view: Annotated[
+        bool, typer.Option('--view', help='Show the flight live in Foxglove (nodes only).')
+    ] = False,
+    view_port: Annotated[
+        int, typer.Option(min=1, max=65535, help='Port of the live view.')
+    ] = 8765,
     as_json: Json = False,
 ) -> None:
     """Fly a scenario; record it, write its report and print the scorecard."""
@@ -103,8 +111,11 @@ def run(
     if namespace and (place is None or engine is Engine.direct):
         allowed = 'nothing, with the direct engine' if place else NAMESPACE_ALLOWED
         raise ConfigurationError(f'--namespace {namespace}: not usable (allowed: {allowed})')
+    if view and engine is Engine.direct:
+        raise ConfigurationError('--view: the direct engine has no topics to show; use nodes')
     flown = load_scenario(scenario, fields)
-    card, folder = _fly(flown, engine, rate, place, out, bag, report)
+    with _view(view_port) if view else nullcontext() as begin_view:
+        card, folder = _fly(flown, engine, rate, place, out, bag, report, begin_view)
     if as_json:
         print(json.dumps(card))
     else:
@@ -115,6 +126,20 @@ def run(
         )
 
 
+@contextmanager
+def _view(port: int):
+    """Live view, and the word how to open it; yields what lets it begin."""
+    from glider_bringup.viewing import live_view
+
+    with live_view(port) as (address, begin):
+        messages.print(
+            f'live view: in Foxglove choose Open connection, Foxglove WebSocket, '
+            f'ws://localhost:{port}, or open {address}',
+            soft_wrap=True,
+        )
+        yield begin
+
+
 def _fly(
     scenario: Scenario,
     engine: Engine,
@@ -123,6 +148,7 @@ def _fly(
     out: Path | None,
     bag: bool,
     report: bool,
+    begin_view: Callable[[], None] | None,
 ) -> tuple[dict, Path]:
     """Fly and score a scenario with a progress bar; the scorecard and the run folder."""
     from glider_bringup import mission
@@ -132,6 +158,8 @@ def _fly(
     tracer = mission.make_tracer(scenario) if report else None
     with progress(scenario, mission.planned_ticks(scenario)) as update:
         if engine is Engine.nodes:
+            if begin_view:
+                update = _after_first(begin_view, update)
             flight, scores = mission.fly_nodes(
                 scenario, folder, rate, update, _print_log, namespace, tracer
             )
@@ -160,6 +188,18 @@ def _write_report(scenario: Scenario, folder: Path, card: dict, tracer) -> None:
         messages.print(f'no report: {cause}', style='red', soft_wrap=True)
     else:
         messages.print(f'report: {file}', soft_wrap=True)
+
+
+def _after_first(begin: Callable[[], None], update: Callable) -> Callable:
+    """Progress that lets something begin when it is called for the first time."""
+    waiting = [begin]
+
+    def call(*flown) -> None:
+        if waiting:
+            waiting.pop()()
+        update(*flown)
+
+    return call
 
 
 def _print_log(line: str) -> None:

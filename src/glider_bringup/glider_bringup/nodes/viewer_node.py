@@ -1,0 +1,167 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Shows a run in Foxglove while it flies: a WebSocket server with every topic that is recorded.
+
+Nothing waits for it. It asks for best-effort delivery of the newest message of each per-tick
+topic, looks at them 50 times a second of wall time, and passes on what is new: all of a run at up
+to 5 times real time, samples of a faster one.
+"""
+
+import select
+import struct
+import sys
+import time
+from collections import deque
+
+import rclpy
+from pydantic import Field
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy
+
+from glider_bringup.ros.bag import message_definition
+from glider_model.ros import qos
+from glider_model.ros.messages import TOPICS
+from glider_model.ros.parameters import declare_settings
+from glider_model.ros.tick import EXIT_CONFIGURATION, take
+from glider_model.settings import ConfigurationError, Settings
+
+NAME = 'viewer_node'
+_PERIOD_S = 0.02
+#: Every recorded message begins with its stamp, behind the four bytes of the CDR header.
+_STAMP = struct.Struct('<4xiI')
+
+
+class ViewerSettings(Settings):
+    """Where the run is shown."""
+
+    port: int = Field(8765, ge=1, le=65535, description='port of the WebSocket server')
+    host: str = Field('127.0.0.1', description='address that it listens on')
+    led: bool = Field(
+        False, description='standard input leads: look at topics after a line, leave at its end'
+    )
+
+
+class _Listener:
+    """Learns from the server which topics are looked at anew."""
+
+    def __init__(self) -> None:
+        self.asked: deque[str] = deque()
+
+    def on_subscribe(self, client, channel) -> None:
+        """Remember a topic that a client has just subscribed to; called in another thread."""
+        self.asked.append(channel.topic)
+
+
+class ViewerNode(Node):
+    """Takes all topics raw, and passes them on to Foxglove."""
+
+    def __init__(self, **kwargs) -> None:
+        super().__init__(NAME, **kwargs)
+        self.settings = declare_settings(self, ViewerSettings)
+        try:
+            import foxglove
+        except ImportError as error:
+            raise ConfigurationError(
+                f'the live view needs the Python package foxglove-sdk, which does not load here '
+                f'({error}); everything else works without it'
+            ) from None
+        foxglove.set_log_level('ERROR')
+        self.listener = _Listener()
+        context = foxglove.Context()
+        self.channels = {}
+        self.topics = {
+            topic.full_name(self.get_namespace()): topic
+            for topic in TOPICS.values()
+            if topic.recorded
+        }
+        self.held = {
+            name: deque(maxlen=topic.qos.depth)
+            for name, topic in self.topics.items()
+            if topic.qos.durability is DurabilityPolicy.TRANSIENT_LOCAL
+        }
+        for name, topic in self.topics.items():
+            text = message_definition(topic.type_name).encode()
+            schema = foxglove.Schema(name=topic.type_name, encoding='ros2msg', data=text)
+            self.channels[name] = foxglove.Channel(
+                name, schema=schema, message_encoding='cdr', context=context
+            )
+        try:
+            self.server = foxglove.start_server(
+                name='glider',
+                host=self.settings.host,
+                port=self.settings.port,
+                capabilities=[foxglove.Capability.Time],
+                server_listener=self.listener,
+                context=context,
+            )
+        except RuntimeError as error:
+            raise ConfigurationError(
+                f'port {self.settings.port} of {self.settings.host} cannot be used for the live '
+                f'view: {error}'
+            ) from None
+        self.incoming = {}
+        print(f'ready {self.server.app_url()}', flush=True)
+
+    def look(self) -> None:
+        """Subscribe to all topics."""
+        for name, topic in self.topics.items():
+            profile = qos.NEWEST if topic.per_tick else topic.qos
+            self.incoming[name] = self.create_subscription(
+                topic.message_type, name, lambda raw: None, profile, raw=True
+            )
+
+    def pass_on(self) -> None:
+        """Send what is new, and what a client has missed of topics that are latched."""
+        while self.listener.asked:
+            name = self.listener.asked.popleft()
+            for raw in self.held.get(name, ()):
+                self.send(name, raw)
+        for name, subscription in self.incoming.items():
+            while (raw := take(subscription)) is not None:
+                if name in self.held:
+                    self.held[name].append(raw)
+                self.send(name, raw)
+
+    def send(self, name: str, raw: bytes) -> None:
+        """Send a message under the simulated time that it carries."""
+        sec, nanosec = _STAMP.unpack_from(raw)
+        stamp_ns = max(0, sec) * 1_000_000_000 + nanosec
+        self.channels[name].log(raw, log_time=stamp_ns)
+        if name == '/clock':
+            self.server.broadcast_time(stamp_ns)
+
+    def run(self) -> None:
+        """Pass on messages until told to leave."""
+        if not self.settings.led:
+            self.look()
+        while rclpy.ok():
+            if not self.settings.led:
+                time.sleep(_PERIOD_S)
+            elif select.select([sys.stdin], [], [], _PERIOD_S)[0]:
+                if not sys.stdin.readline():
+                    return
+                self.look()
+            self.pass_on()
+
+
+def main(args=None) -> int:
+    """Run the node; returns its exit code."""
+    rclpy.init(args=args)
+    try:
+        node = ViewerNode()
+        node.run()
+        node.pass_on()
+        node.server.stop()
+    except ConfigurationError as error:
+        print(f'fatal: {error}', file=sys.stderr, flush=True)
+        return EXIT_CONFIGURATION
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
