@@ -68,7 +68,7 @@ class ViewerNode(Node):
             ) from None
         foxglove.set_log_level('ERROR')
         self.listener = _Listener()
-        context = foxglove.Context()
+        self.shown = foxglove.Context()  # the server serves it for as long as it is held
         self.channels = {}
         self.topics = {
             topic.full_name(self.get_namespace()): topic
@@ -84,7 +84,7 @@ class ViewerNode(Node):
             text = message_definition(topic.type_name).encode()
             schema = foxglove.Schema(name=topic.type_name, encoding='ros2msg', data=text)
             self.channels[name] = foxglove.Channel(
-                name, schema=schema, message_encoding='cdr', context=context
+                name, schema=schema, message_encoding='cdr', context=self.shown
             )
         try:
             self.server = foxglove.start_server(
@@ -93,7 +93,7 @@ class ViewerNode(Node):
                 port=self.settings.port,
                 capabilities=[foxglove.Capability.Time],
                 server_listener=self.listener,
-                context=context,
+                context=self.shown,
             )
         except RuntimeError as error:
             raise ConfigurationError(

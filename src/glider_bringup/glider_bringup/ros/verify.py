@@ -481,7 +481,7 @@ def _free_running(block: Block, recording: Recording, progress) -> Verdict:
             if good:
                 break
         else:
-            _keep_difference(check, start, options[0], outputs)
+            _keep_difference(check, start, options, outputs)
             break
         start += good
         last = {name: int(index[good - 1]) for name, index in rows.items()}
@@ -540,11 +540,18 @@ def _identical(check: _Check, start: int, rows, outputs) -> int:
     return good
 
 
-def _keep_difference(check: _Check, step: int, begin: dict[str, int], outputs) -> None:
-    """Put on record that no choice of inputs gives the outputs of a step."""
-    rows = _consecutive(check, step, step + 1, begin)
-    if min(len(index) for index in rows.values()):
-        computed = check.run(step, step + 1, rows)
+def _keep_difference(check: _Check, step: int, options, outputs) -> None:
+    """Put on record that no choice of inputs gives the outputs of a step, by the closest one."""
+    before, tried = check.block.state, []
+    for begin in options:
+        rows = _consecutive(check, step, step + 1, begin)
+        if min(len(index) for index in rows.values()):
+            check.block.state = before
+            computed = check.run(step, step + 1, rows)
+            wrong = sum(int(check.differs(outputs[n], step, computed[n])[0]) for n in outputs)
+            tried.append((wrong, len(tried), computed))
+    if tried:
+        _, _, computed = min(tried)
         for name, track in outputs.items():
             check.compare(name, track, step, computed[name])
         return
