@@ -21,7 +21,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from glider_bringup.mission import mission_of
 from glider_bringup.ros.bag import BagWriter
-from glider_bringup.runner import domain_id
+from glider_bringup.runner import NAMESPACE, domain_id
 from glider_bringup.scenario import load_scenario
 from glider_control.control import control_step
 from glider_control.nodes.control_node import saturation_event
@@ -192,14 +192,17 @@ class Vehicle:
         self.publish('current_estimate', stamp_ns, water_to_wire(out.current))
         if (out.stage, out.infeasible) != self.told:
             self.told = (out.stage, out.infeasible)
-            self.put('/diagnostics', to_cdr(stage_event(stamp_ns, *self.told)))
+            self.put(
+                '/diagnostics',
+                to_cdr(stage_event(stamp_ns, *self.told, f'{NAMESPACE}/guidance_node')),
+            )
         self.reference = (stamp_ns, reference_to_wire(out.reference))
         self.publish('reference', *self.reference)
 
     def abort(self) -> None:
         self.guidance = guidance_abort(self.guidance)
         stamp_ns = self.odom[0]
-        event = health.status_array(stamp_ns, 'guidance_node', health.OK, ABORT, {})
+        event = health.status_array(stamp_ns, f'{NAMESPACE}/guidance_node', health.OK, ABORT, {})
         self.put('/diagnostics', to_cdr(event))
 
     def steer(self) -> None:
@@ -218,7 +221,10 @@ class Vehicle:
         told, told_ns = self.saturation
         if out.saturation != told and stamp_ns - told_ns >= 1_000_000_000:
             self.saturation = (out.saturation, stamp_ns)
-            self.put('/diagnostics', to_cdr(saturation_event(stamp_ns, out.saturation)))
+            self.put(
+                '/diagnostics',
+                to_cdr(saturation_event(stamp_ns, out.saturation, f'{NAMESPACE}/control_node')),
+            )
         self.publish('command', stamp_ns, out.command)
         self.command = out.command
 

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from glider_bringup.runner import domain_id
+from glider_bringup.runner import NAMESPACE, OWN_CLOCK, domain_id
 from glider_model.settings import ConfigurationError
 
 #: The view has this long (s) to leave.
@@ -17,7 +17,7 @@ _READY, _FATAL = 'ready ', 'fatal: '
 
 
 @contextmanager
-def live_view(port: int, namespace: str = '/glider') -> Iterator[tuple[str, Callable[[], None]]]:
+def live_view(port: int, namespace: str | None = None) -> Iterator[tuple[str, Callable[[], None]]]:
     """Serve a run that is about to fly.
 
     Everything that is started inside shares its ROS domain.
@@ -25,8 +25,8 @@ def live_view(port: int, namespace: str = '/glider') -> Iterator[tuple[str, Call
     Parameters
     ----------
     port : int
-    namespace : str
-        Of the nodes.
+    namespace : str, optional
+        Of the nodes, whose clock is then in it too.
 
     Yields
     ------
@@ -42,7 +42,10 @@ def live_view(port: int, namespace: str = '/glider') -> Iterator[tuple[str, Call
         If the port cannot be used, or the server is not installed.
     """
     with domain_id() as domain, _in_domain(domain):
-        ros = ['--ros-args', '-r', f'__ns:={namespace}', '-p', f'port:={port}', '-p', 'led:=true']
+        ros = ['--ros-args', '-r', f'__ns:={namespace or NAMESPACE}']
+        ros += ['-p', f'port:={port}', '-p', 'led:=true']
+        if namespace:
+            ros += ['-r', ':='.join(OWN_CLOCK)]
         process = subprocess.Popen(
             [sys.executable, '-m', 'glider_bringup.nodes.viewer_node', *ros],
             stdin=subprocess.PIPE,

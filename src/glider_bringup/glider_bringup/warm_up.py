@@ -2,10 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiles every kernel once, so that the first run does not have to: set-up calls this."""
 
+import tempfile
+from pathlib import Path
+
 import numpy as np
 
 from glider_bringup.direct import ROW, fly
-from glider_bringup.mission import make_tracer, mission_of
+from glider_bringup.mcap_reader import Bag
+from glider_bringup.mission import fly_direct, make_run_folder, make_tracer, mission_of
+from glider_bringup.ros.recording import Recording, read_told
+from glider_bringup.ros.verify import verify
 from glider_bringup.scenario import load_scenario
 from glider_bringup.score import Scorer
 from glider_bringup.traces import halve
@@ -53,7 +59,20 @@ def main() -> None:
     wrench_to_wire(controlled.wrench)
     plant = plant_step(plant, controlled.command, water, params.plant, TICK_S)
     plant_finished(plant, params.plant)
+    verify_one_tick()
     solve_trim(params.plant.vehicle, 0.4, pitch_deg=-30.0)
+
+
+def verify_one_tick() -> None:
+    """Record a run of one tick, and verify it."""
+    scenario = load_scenario(changes={'dives': 0, 'duration_s': TICK_S})
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = make_run_folder(scenario, Path(scratch) / 'run')
+        fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
+        bag = Bag(folder)
+        told = read_told(bag, folder, None, Path(scratch))
+        recording = Recording(bag, None, lambda share: None)
+        list(verify(recording, told, [], lambda what, share: None))
 
 
 if __name__ == '__main__':

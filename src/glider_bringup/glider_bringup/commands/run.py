@@ -114,7 +114,7 @@ def run(
     if view and engine is Engine.direct:
         raise ConfigurationError('--view: the direct engine has no topics to show; use nodes')
     flown = load_scenario(scenario, fields)
-    with _view(view_port) if view else nullcontext() as begin_view:
+    with _view(view_port, place) if view else nullcontext() as begin_view:
         card, folder = _fly(flown, engine, rate, place, out, bag, report, begin_view)
     if as_json:
         print(json.dumps(card))
@@ -127,11 +127,11 @@ def run(
 
 
 @contextmanager
-def _view(port: int):
+def _view(port: int, namespace: str | None):
     """Live view, and the word how to open it; yields what lets it begin."""
     from glider_bringup.viewing import live_view
 
-    with live_view(port) as (address, begin):
+    with live_view(port, namespace) as (address, begin):
         messages.print(
             f'live view: in Foxglove choose Open connection, Foxglove WebSocket, '
             f'ws://localhost:{port}, or open {address}',

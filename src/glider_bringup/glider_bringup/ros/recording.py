@@ -132,6 +132,7 @@ class Recording:
     def __init__(self, bag: Bag, namespace: str | None, progress: Callable[[float], None]) -> None:
         self.namespace = choose_namespace(bag, namespace)
         known = {topic.full_name(self.namespace): topic for topic in TOPICS.values()}
+        known[self.node('clock')] = TOPICS['/clock']  # several gliders have a clock each
         self.series: dict[str, Series] = {}
         self.paths: list[bytes] = []
         self.events: list[Event] = []
@@ -162,7 +163,7 @@ class Recording:
             series.close()
 
     def node(self, name: str) -> str:
-        """Full name of a node, as it stands on /diagnostics."""
+        """Full name of a node, as it stands on /diagnostics, or of a topic."""
         return f'{self.namespace.rstrip("/")}/{name}'
 
     def _add_paths(self, batch, chosen) -> None:
