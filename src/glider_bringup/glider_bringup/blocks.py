@@ -24,7 +24,13 @@ from glider_model.frames import (
     wrench_to_wire,
 )
 from glider_model.kernel import kernel
-from glider_model.plant import PlantSettings, plant_joints, plant_measurement, plant_step
+from glider_model.plant import (
+    PlantSettings,
+    plant_finished,
+    plant_joints,
+    plant_measurement,
+    plant_step,
+)
 from glider_model.signals import TICK_NS, TICK_S, Joints
 
 #: Numbers on a topic.
@@ -41,11 +47,12 @@ class BlockSettings(NamedTuple):
 
 
 @kernel
-def _plant(state, params, command, water, odom, joints, dt):
-    """Fill in all rows of ``odom`` and ``joints``; the inputs may have one row less."""
+def _plant(state, params, command, water, odom, joints, flags, dt):
+    """Fill in all rows of ``odom``, ``joints`` and flags; the inputs may have one row less."""
     for k in range(len(odom)):
         put(odom, k, 0, odometry_to_wire(plant_measurement(state, params)))
         put(joints, k, 0, plant_joints(state))
+        flags[k, 0] = plant_finished(state, params)
         if k < len(command):
             target = Joints(command[k, 0], command[k, 1], command[k, 2])
             state = plant_step(state, target, water_from_wire(water[k]), params, dt)
@@ -161,19 +168,24 @@ class Block:
 
 
 class PlantBlock(Block):
-    """The plant. Its outputs of a tick are there before the inputs, which may lack at the end."""
+    """The plant. Its outputs of a tick are there before the inputs, which may lack at the end.
+
+    The first flag says whether the run ends with the tick.
+    """
 
     name = 'plant'
     inputs = ('command', 'current_velocity')
     outputs = ('/clock', 'odom', 'joint_states')
 
     def run(self, stamps_ns, inputs):
-        """Odometry and joints of each tick."""
+        """Odometry, joints and flags of each tick."""
         count = len(stamps_ns)
         odom, joints = np.empty((count, _ODOMETRY)), np.empty((count, _JOINTS))
+        flags = np.zeros((count, 2), np.int64)
         command, water = (inputs[name] for name in self.inputs)
-        self.state = _plant(self.state, self.params, command, water, odom, joints, TICK_S)
-        return {'/clock': np.empty((count, 0)), 'odom': odom, 'joint_states': joints}
+        self.state = _plant(self.state, self.params, command, water, odom, joints, flags, TICK_S)
+        clock = np.empty((count, 0))
+        return {'/clock': clock, 'odom': odom, 'joint_states': joints, 'flags': flags}
 
 
 class CurrentBlock(Block):

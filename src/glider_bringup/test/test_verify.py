@@ -201,7 +201,9 @@ def test_any_flipped_bit_is_named(altered, recorded, tmp_path, data):
     assert first['computed'] != first['recorded']
     assert blocks[BLOCK_OF[name]]['differing'] == {first['topic']: 1}
     changed = fields_that_differ(PER_TICK[name], good, messages[place].data)
-    if changed and not changed[0].startswith('len('):
+    if bit < 32:  # by the byte order that is in there, every field would be another
+        assert first['field'] == 'CDR header'
+    elif changed and not changed[0].startswith('len('):
         assert first['field'] == changed[0]
 
 

@@ -23,7 +23,7 @@ from glider_bringup.ros.recording import Event, Recording, Series, Told
 from glider_control.nodes.control_node import TELL_EVERY_NS, saturation_event
 from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message, stage_event
 from glider_guidance.profile import STAGE_NAMES, SURFACING
-from glider_model.ros import messages
+from glider_model.ros import health, messages
 from glider_model.ros.codec import cdr_places, to_cdr
 from glider_model.ros.messages import TOPICS
 from glider_model.ros.orders import ABORT, PARAMETERS_SET
@@ -353,7 +353,7 @@ def _orders(events: list[Event], node: str) -> list[Event]:
 
 
 def _finish_events(check: _Check) -> None:
-    """Compare what guidance and control tell on /diagnostics, and the path."""
+    """Compare what the block tells on /diagnostics, and the path."""
     stamps_ns, flags = check.stamps_ns[: check.ticks], check.flags[: check.ticks]
     node = check.recording.node(_NODES[check.block.name])
     if check.block.name == 'guidance':
@@ -369,6 +369,13 @@ def _finish_events(check: _Check) -> None:
         told = changes_to_tell(flags[:, 0].copy(), stamps_ns, TELL_EVERY_NS, 0, long_ago_ns)
         arrays = [saturation_event(int(stamps_ns[i]), int(flags[i, 0]), node) for i in told]
         check.compare_events(arrays, lambda e: e.node == node and 'saturation' in e.values)
+    elif check.block.name == 'plant':
+        ends = [int(stamp_ns) for stamp_ns in stamps_ns[flags[:, 0] > 0]]
+        arrays = [
+            health.report_array(health.Report(node, health.FINISHED, health.COMPLETE, stamp_ns))
+            for stamp_ns in ends
+        ]
+        check.compare_events(arrays, lambda e: e.node == node and e.message == health.COMPLETE)
 
 
 # ---------------------------------------------------------------------- lockstep
