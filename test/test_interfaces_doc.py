@@ -5,49 +5,36 @@
 ``python test/test_interfaces_doc.py`` writes the tables anew.
 """
 
-import os
 import re
 import signal
-import subprocess
-import textwrap
-import time
-import types
 from pathlib import Path
 from typing import Annotated, Literal, get_args, get_origin
 
 import pydantic
 import pytest
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from std_srvs.srv import Trigger
 
 from glider_bringup.launching import ARGUMENTS
 from glider_bringup.nodes.recorder_node import RecorderNode, RecorderSettings
-from glider_bringup.ros.node_parameters import node_parameters, write_parameters
-from glider_bringup.runner import domain_id, node_commands
-from glider_bringup.scenario import load_scenario
+from glider_bringup.runner import domain_id
 from glider_control.control import ControlSettings
 from glider_control.nodes.control_node import ControlNode
 from glider_guidance.guidance import GuidanceSettings
 from glider_guidance.nodes.guidance_node import GuidanceNode
 from glider_guidance.path import PathSettings
 from glider_guidance.profile import STAGE_NAMES
-from glider_model import frames
 from glider_model.current import CurrentComponent, CurrentSettings
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
 from glider_model.nodes.tf_node import TfSettings
-from glider_model.plant import PlantSettings, plant_joints, plant_odometry, plant_step
+from glider_model.plant import PlantSettings
 from glider_model.ros import health, qos
 from glider_model.ros.clock import ClockSettings
 from glider_model.ros.messages import JOINTS, TOPICS
-from glider_model.ros.qos import EVENTS
 from glider_model.ros.tick import TickSettings
 from glider_model.settings import Settings
-from glider_model.signals import TICK_S, Joints, Water
 
 DOCUMENT = Path(__file__).resolve().parents[1] / 'docs' / 'interfaces.md'
 
@@ -296,118 +283,6 @@ def test_every_number_on_a_topic_is_explained(document, name):
 )
 def test_word_is_explained(document, word):
     assert word in document
-
-
-# ---------------------------------------------------------------------- the example driver
-
-
-class Vehicle:
-    """Stands in for a vehicle in still water: the plant, one tick at each reading."""
-
-    def __init__(self) -> None:
-        settings = PlantSettings(initial={'depth_m': 50.0, 'pitch_deg': -20.0, 'speed_mps': 0.4})
-        self.params, self.state = settings.params(), settings.initial_state()
-        self.target: dict[str, float] = {}
-
-    def navigation(self):
-        target = Joints(*[self.target.get(joint, 0.0) for joint in JOINTS])
-        water = Water(0.0, 0.0, 0.0)
-        self.state = plant_step(self.state, target, water, self.params, TICK_S)
-        wire = frames.odometry_to_wire(plant_odometry(self.state))
-        return wire[:3], wire[3:7], wire[7:10], wire[10:]
-
-    def actuators(self):
-        return list(plant_joints(self.state))
-
-    def move(self, target):
-        self.target = target
-
-
-@pytest.fixture
-def driver_module(document) -> types.ModuleType:
-    """The example of the document, as a module."""
-    (source,) = re.findall(r' *```python\n(.*?)```', document, re.DOTALL)
-    module = types.ModuleType('driver')
-    exec(compile(textwrap.dedent(source), f'{DOCUMENT}: example', 'exec'), module.__dict__)
-    return module
-
-
-@pytest.fixture
-def followers(context, tmp_path):
-    """Guidance and control, free-running, as processes of their own."""
-    changes = {'profile.prepare_s': 0.0, 'profile.depth_m': 1000.0}
-    scenario = load_scenario('current_8deg', changes)
-    file = tmp_path / 'parameters.yaml'
-    write_parameters(node_parameters(scenario, lockstep=False), file)
-    environment = {**os.environ, 'ROS_DOMAIN_ID': str(context.get_domain_id())}
-    processes = [
-        subprocess.Popen(node_commands(file)[name], env=environment)
-        for name in ('guidance_node', 'control_node')
-    ]
-    yield processes
-    for process in processes:
-        process.kill()
-        process.wait()
-
-
-def test_example_driver_flies(context, followers, driver_module):
-    """Commands follow the vehicle, are safe when it is silent, and follow again after that."""
-    vehicle = Vehicle()
-    driver = driver_module.Driver(vehicle, namespace='/glider', context=context)
-    said = []
-    driver.create_subscription(
-        DiagnosticArray, '/diagnostics', lambda array: said.extend(array.status), EVENTS
-    )
-    abort = driver.create_client(Trigger, 'abort')
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(driver)
-    (timer,) = driver.timers
-
-    def wait_for(condition, what: str) -> None:
-        end = time.monotonic() + DEADLINE_S
-        while not condition():
-            assert time.monotonic() < end, what
-            assert [process.poll() for process in followers] == [None, None]
-            executor.spin_once(timeout_sec=0.05)
-
-    def is_diving() -> bool:
-        return vehicle.target.get('buoyancy_engine', 0.0) > 0.2
-
-    def has_said(text: str, level: bytes) -> bool:
-        return any(
-            status.name == '/glider/control_node'
-            and text in status.message
-            and status.level == level
-            for status in said
-        )
-
-    try:
-        wait_for(is_diving, 'no command to dive')
-        depth = vehicle.state.motion.p_d
-        wait_for(lambda: vehicle.state.motion.p_d > depth + 0.5, 'the vehicle does not sink')
-        assert not has_said('stale: odom, joint_states', health.ERROR)
-
-        timer.cancel()
-        safe = {'buoyancy_engine': -1.0, 'pitch_mass': 0.0, 'roll_mass': 0.0}
-        wait_for(lambda: vehicle.target == safe, 'no safe command')
-        wait_for(
-            lambda: has_said('odom, joint_states', health.ERROR), 'no word about stale inputs'
-        )
-
-        timer.reset()
-        wait_for(is_diving, 'no command after the silence')
-        assert has_said('inputs are fresh again', health.OK)
-
-        answer = abort.call_async(Trigger.Request())
-        wait_for(answer.done, 'abort has not been answered')
-        assert answer.result().success
-        wait_for(lambda: vehicle.target['buoyancy_engine'] < -0.2, 'abort does not surface')
-        for process in followers:
-            process.terminate()
-        assert [process.wait(10.0) for process in followers] == [0, 0]
-    finally:
-        executor.shutdown()
-        driver.destroy_node()
 
 
 if __name__ == '__main__':

@@ -24,6 +24,8 @@ TELL_EVERY_NS = 1_000_000_000
 class ControlNode(BlockNode):
     """How to get there. Free-running, it surfaces the vehicle when an input is stale."""
 
+    when_stale = 'commanding the safe state until then'
+
     def __init__(self, **kwargs) -> None:
         super().__init__(messages.CONTROL, **kwargs)
         self.settings = declare_settings(self, ControlSettings, self.on_settings)

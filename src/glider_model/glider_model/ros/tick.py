@@ -45,6 +45,8 @@ _STARTUP_PERIOD_S = 0.03
 #: Who starts a node by hand is told what it waits for, after this time and then this often (s).
 _PATIENCE_S, _REMIND_S = 10.0, 20.0
 _REPORT_AFTER = 0.4
+_COUNTED = ('lost', 'late')
+_TELL_EVERY_S = 10.0
 _QUIET_PUBLISHER = PublisherEventCallbacks(use_default_callbacks=False)
 _QUIET_SUBSCRIPTION = SubscriptionEventCallbacks(use_default_callbacks=False)
 
@@ -83,7 +85,10 @@ class Input:
         self.subscription = None
         self.stamp_ns = -1
         self.values: tuple[float, ...] = ()
-        self.arrived_s = -float('inf')
+        self.arrived_s = -float('inf')  #: on the clock of the cycles
+        self.lost = 0  #: messages that lack between those that came
+        self.late = 0  #: cycles that had to do with the input of the one before
+        self.used_ns = -1
 
     def accept(self, raw: bytes) -> None:
         """Keep a message.
@@ -112,6 +117,8 @@ class TickNode(Node):
         super().__init__(name, **kwargs)
         self.ticks = declare_settings(self, self.tick_settings)
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
+        is_simulated = self.get_parameter('use_sim_time').value
+        self.cycle_clock = self.get_clock() if is_simulated else self.steady_clock
         self.gate = Gate()
         self.inputs: list[Input] = []
         self.outputs: dict[str, tuple[Topic, object]] = {}
@@ -394,32 +401,52 @@ class TickNode(Node):
 
     # ------------------------------------------------------------------ free-running
 
+    def now_s(self) -> float:
+        """Time (s) on the clock of the free-running cycles."""
+        return self.cycle_clock.now().nanoseconds / 1e9
+
     def _on_newest(self, item: Input, raw: bytes) -> None:
-        """Keep an input in free-running mode. A stamp that stands still does not refresh it."""
+        """Keep an input in free-running mode.
+
+        A stamp that stands still does not refresh it, and a message that was overtaken on its way
+        is passed over. One that is older than any input may be means that the clock of the vehicle
+        has been set back.
+        """
         before = item.stamp_ns
+        since_ns = item.topic.codec.decode_stamp(raw) - before
+        if before >= 0 and -self.ticks.input_max_age_s * 1e9 <= since_ns < 0:
+            return
         try:
             item.accept(raw)
         except MessageError as error:
             self.get_logger().error(str(error), throttle_duration_sec=1.0)
             return
-        if item.stamp_ns != before:
-            item.arrived_s = time.monotonic()
+        if since_ns:
+            item.arrived_s = self.now_s()
+        if before >= 0 and since_ns <= self.ticks.input_max_age_s * 1e9:
+            item.lost += max(0, round(since_ns / TICK_NS) - 1)
 
 
 class BlockNode(TickNode):
     """Guidance, control, current: a step per tick, and the free-running timer around it."""
 
+    #: What the node does while an input is stale.
+    when_stale = 'silent until then'
+
     def __init__(self, name: str, **kwargs) -> None:
         super().__init__(name, **kwargs)
         self._stale: list[str] = []
+        self._told = (0, 0)
+        self._tell_s = -float('inf')
 
     def on_ready(self) -> None:
-        """Start the timer of the free-running mode."""
+        """Start the timer of the free-running mode, on simulated time if that is used."""
         if not self.ticks.lockstep:
-            self.wall_timer(TICK_S, self._on_cycle)
+            self.create_timer(TICK_S, self._on_cycle, clock=self.cycle_clock)
 
     def _on_cycle(self) -> None:
-        oldest = time.monotonic() - self.ticks.input_max_age_s
+        self._count()
+        oldest = self.now_s() - self.ticks.input_max_age_s
         stale = [item.topic.name for item in self.inputs if item.arrived_s < oldest]
         stamp_ns = max(item.stamp_ns for item in self.inputs)
         if stamp_ns < 0:
@@ -427,13 +454,32 @@ class BlockNode(TickNode):
         if stale != self._stale:
             self._stale = stale
             if stale:
-                self.event(stamp_ns, health.ERROR, f'missing or stale: {", ".join(stale)}')
+                said = f'missing or stale: {", ".join(stale)}; {self.when_stale}'
+                self.event(stamp_ns, health.ERROR, said)
             else:
                 self.event(stamp_ns, health.OK, 'inputs are fresh again')
         if stale:
             self.on_stale(stamp_ns)
         else:
             self.step(stamp_ns, *[item.values for item in self.inputs])
+
+    def _count(self) -> None:
+        """Count what came late, and tell now and then what was lost or late."""
+        for item in self.inputs:
+            item.late += item.stamp_ns == item.used_ns >= 0
+            item.used_ns = item.stamp_ns
+        lost, late = (sum(getattr(item, kind) for item in self.inputs) for kind in _COUNTED)
+        if (lost, late) == self._told or self.now_s() < self._tell_s:
+            return
+        level = health.WARN if lost > self._told[0] else health.OK
+        self._told, self._tell_s = (lost, late), self.now_s() + _TELL_EVERY_S
+        counts = {
+            f'{item.topic.name}_{kind}': getattr(item, kind)
+            for item in self.inputs
+            for kind in _COUNTED
+        }
+        stamp_ns = max(item.stamp_ns for item in self.inputs)
+        self.event(stamp_ns, level, f'inputs: {lost} lost, {late} late', **counts)
 
     def on_stale(self, stamp_ns: int) -> None:
         """Act in free-running mode while an input is stale; nothing by default."""
