@@ -258,6 +258,27 @@ def test_free_running_node_notices_stale_input_and_recovers(make_graph):
     assert graph.spin(lambda: len(control.steps) > before + 2) is None
 
 
+@pytest.mark.parametrize(
+    ('stamps', 'kept', 'lost'),
+    [
+        ([0.1, 0.2, 0.3], 0.3, 0),
+        ([0.1, 0.2, 0.5], 0.5, 2),
+        ([0.1, 0.3, 0.2], 0.3, 1),  # overtaken on its way
+        ([0.1, 5.0], 5.0, 0),  # a silence
+        ([5.0, 0.1], 0.1, 0),  # the clock of the vehicle was set back
+    ],
+)
+def test_free_running_input_keeps_the_newest_and_counts_what_lacks(make_graph, stamps, kept, lost):
+    graph = make_graph(lockstep=False, input_max_age_s=1.0)
+    (item,) = graph.blocks[GUIDANCE].inputs
+    for stamp_s in stamps:
+        raw = item.topic.codec.encode(round(stamp_s * 1e9), 13 * (stamp_s,))
+        item.subscription.callback(raw)
+    assert item.stamp_ns == round(kept * 1e9)
+    assert item.values == 13 * (kept,)
+    assert item.lost == lost
+
+
 def test_reports_survive_the_way_over_a_topic():
     report = health.Report(
         'guidance_node', health.WAITING, 'waits', 300_000_000, PLANT, 'odom', health.WARN
