@@ -159,6 +159,8 @@ MISTAKES = [
     (['run', '--duration', 'nan'], ['--duration nan', 'full']),
     (['run', '--speed', '0'], ['--speed 0', 'max']),
     (['run', '--engine', 'direct', '--speed', '2'], ['--speed', 'max']),
+    (['run', '--namespace', 'a b'], ['--namespace a b', 'letters']),
+    (['run', '--engine', 'direct', '--namespace', 'sea'], ['--namespace sea', 'direct']),
     (['run', '--seed', '-1'], ['seed = -1', '>= 0']),
     (['run', '--engine', 'warp'], ['warp', 'nodes', 'direct']),
     (['run', '--controller', 'magic'], ['magic', 'pid']),

@@ -116,6 +116,11 @@ def test_root_namespace(tmp_path, namespace):
     assert '/plant_node' in parameters(plan)
 
 
+def test_clock_can_lie_in_the_namespace(tmp_path):
+    assert plan_launch({}, tmp_path).remappings == ()
+    assert plan_launch({'clock': 'clock'}, tmp_path).remappings == (('/clock', 'clock'),)
+
+
 def test_recording_adds_the_recorder_and_makes_a_run_folder(tmp_path):
     folder = tmp_path / 'flight'
     plan = plan_launch({'record': str(folder)}, tmp_path / 'log')
@@ -151,6 +156,7 @@ def test_recording_adds_the_recorder_and_makes_a_run_folder(tmp_path):
         ({'tf': 'true'}, ['tf:=true', 'tf2_msgs is not installed']),
         ({'duration': '-5'}, ['duration:=-5', '0.1 to 1e+08, or full']),
         ({'namespace': 'a b'}, ['namespace:=a b']),
+        ({'clock': '/time'}, ['clock:=/time', '/clock, clock']),
     ],
 )
 def test_what_cannot_be_used_is_refused_and_leaves_nothing(tmp_path, arguments, words):
