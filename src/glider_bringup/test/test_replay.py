@@ -174,6 +174,17 @@ def test_second_recording_at_full_speed_is_byte_identical(
     assert again == recorded
 
 
+def test_recorder_that_does_not_keep_step_does_not_hold_a_replay_up(
+    short_run, start, replay, tmp_path
+):
+    parameters = node_parameters(load_scenario(), lockstep=False, record_to=tmp_path / 'again')
+    write_parameters(parameters, tmp_path / 'parameters.yaml')
+    start(*node_commands(tmp_path / 'parameters.yaml')[RECORDER])
+    process = replay(short_run, '--rate', 'max', '--wait-for', 1)
+    _, error = process.communicate(timeout=DEADLINE_S)
+    assert process.returncode == 0, error
+
+
 def test_latched_topic_is_there_for_who_comes_late_and_for_who_starts_late(
     short_run, recorded, replay, listen
 ):

@@ -18,6 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from glider_bringup.mcap_reader import Bag, BagTopic
 from glider_bringup.ros.recording import choose_namespace
+from glider_model.ros import messages
 from glider_model.ros.messages import CLOCK, TOPICS
 from glider_model.ros.tick import MAX_TICKS_AHEAD, take
 from glider_model.settings import ConfigurationError
@@ -232,26 +233,35 @@ class _Brake:
         topic = TOPICS['recorded']
         per_tick = {t.full_name(plan.namespace) for t in TOPICS.values() if t.per_tick}
         self._whole = per_tick <= set(plan.names.values())
-        self._node, self._name = node, topic.full_name(plan.namespace)
+        self._node, self._odom = node, TOPICS['odom'].full_name(plan.namespace)
         self._subscription = node.create_subscription(
-            topic.message_type, self._name, lambda message: None, topic.qos
+            topic.message_type,
+            topic.full_name(plan.namespace),
+            lambda message: None,
+            topic.qos,
         )
         self._recorded_ns: int | None = None
 
     def wait(self, log_ns: int) -> None:
         """Wait until the recorder is not too far behind."""
-        if not self._whole or not self._subscription.get_publisher_count():
-            return
         if self._recorded_ns is None:
             self._recorded_ns = log_ns
-        while log_ns - self._recorded_ns > MAX_TICKS_AHEAD * TICK_NS:
+        while self._whole and log_ns - self._recorded_ns > MAX_TICKS_AHEAD * TICK_NS:
             message = take(self._subscription)
             if message is not None:
                 self._recorded_ns = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
-            elif self._subscription.get_publisher_count():
+            elif self._is_recorded():
                 time.sleep(0.001)
             else:
-                return
+                self._recorded_ns = log_ns
+
+    def _is_recorded(self) -> bool:
+        """Whether a recorder in lockstep listens: it alone says what it has on disk."""
+        return any(
+            info.node_name == messages.RECORDER
+            and info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+            for info in self._node.get_subscriptions_info_by_topic(self._odom)
+        )
 
 
 class Replay:
