@@ -36,7 +36,7 @@ ROSDEP_KEYS = {
 }
 
 #: Modules for which rosdep has no key; pip brings them, from requirements.txt.
-ONLY_PIP = {'mcap', 'plotly', 'rosbags', 'zstandard'}
+ONLY_PIP = {'dask', 'distributed', 'mcap', 'plotly', 'rosbags', 'xarray', 'zstandard'}
 
 #: Packages of ROS 2 Jazzy, of which rosdep takes the name as a key.
 JAZZY = {

@@ -18,6 +18,8 @@ from glider_model.signals import TICK_NS
 
 #: What a score file knows and a bag does not.
 ONLY_IN_THE_FILE = {'engine', 'wall_time_s', 'real_time_factor'}
+#: `./glider score`, and what report, compare and figure begin with.
+USES = (mission.score_again, mission.read_run)
 ATTACHED = ('scenario.yaml', 'vehicle.yaml')
 
 
@@ -120,8 +122,9 @@ def test_score_file_knows_more_than_the_bag(run, tmp_path):
 def test_file_cut_before_its_attachments_tells_what_is_missing(bag_only, keep):
     (file,) = bag_only.glob('*.mcap')
     file.write_bytes(file.read_bytes()[:keep])
-    with pytest.raises(ConfigurationError, match=r'no scenario\.yaml beside'):
-        mission.score_again(bag_only)
+    for use in USES:
+        with pytest.raises(ConfigurationError, match=r'no scenario\.yaml beside'):
+            use(bag_only)
 
 
 def test_file_cut_short_is_scored_as_far_as_it_goes(bag_only):
@@ -134,23 +137,25 @@ def test_file_cut_short_is_scored_as_far_as_it_goes(bag_only):
 
 def test_free_running_recording_is_no_scorecard_of_nothing(tmp_path):
     folder = write_bag(tmp_path / 'flight', said(health.FINISHED, 2 * TICK_NS), but='reference')
-    with pytest.raises(ConfigurationError, match='flight: cannot be scored.*free-running'):
-        mission.score_again(folder)
+    for use in USES:
+        with pytest.raises(ConfigurationError, match='flight: cannot be scored.*free-running'):
+            use(folder)
 
 
 def test_stored_scenario_that_cannot_be_used_is_named(tmp_path):
     (tmp_path / 'scenario.yaml').write_text('profile: {depth_m: 1.0}\n')
     bag = BagWriter(tmp_path / 'flight', 'x', attachments=[tmp_path / 'scenario.yaml'])
     bag.close()
-    with pytest.raises(ConfigurationError, match=r'flight: stored/scenario\.yaml.*depth_m'):
-        mission.score_again(tmp_path / 'flight')
+    for use in USES:
+        with pytest.raises(ConfigurationError, match=r'flight: stored/scenario\.yaml.*depth_m'):
+            use(tmp_path / 'flight')
 
 
 @pytest.mark.parametrize(
     ('name', 'words'), [('nothing', 'no such run folder'), ('', 'not a run folder')]
 )
 def test_what_holds_no_run_is_refused(tmp_path, name, words):
-    for use in (mission.score_again, lambda run: mission.draw(run, tmp_path / 'run.png')):
+    for use in USES:
         with pytest.raises(ConfigurationError, match=words):
             use(tmp_path / name)
     assert list(tmp_path.iterdir()) == []

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import zlib
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -158,6 +159,30 @@ def test_report_from_the_bag_is_that_of_the_flight(flown, tmp_path, call):
     assert code == 0
     assert str(folder / 'report.html') in out.replace('\n', '')
     assert (folder / 'report.html').read_bytes() == first
+
+
+def recorded_only(flown, tmp_path):
+    """What a launch leaves of the same run, and its MCAP file alone."""
+    launched, alone = tmp_path / 'launched', tmp_path / 'alone'
+    shutil.copytree(flown, launched)
+    for name in ('report.html', 'score.json', 'traces.npz'):
+        (launched / name).unlink()
+    alone.mkdir()
+    (file,) = launched.glob('*.mcap')
+    return launched, Path(shutil.copy(file, alone))
+
+
+def test_report_of_a_launched_run_and_of_its_bag_alone(flown, tmp_path, call):
+    """Neither score nor traces were kept: both come from the bag, and are what they were."""
+    (before,) = read_page(flown / 'report.html')[1]['runs']
+    for run in recorded_only(flown, tmp_path):
+        code, _, err = call('report', run)
+        assert code == 0, err
+        text, data = read_page((run if run.is_dir() else run.parent) / 'report.html')
+        (after,) = data['runs']
+        assert after['packed'] == before['packed']
+        assert 'Completed' in text.text
+        assert 'not known' in text.text
 
 
 def test_report_without_a_bag_is_made_of_what_was_kept(tmp_path, call):
@@ -408,6 +433,23 @@ def test_comparison_tells_scores_and_differences(tmp_path, call):
             assert [curve['run'] for curve in panel['curves']] == [0, 1], panel['id']
     lengths = [len(run['arrays']['depth_m']) * run['spacing'] for run in data['runs']]
     assert lengths == pytest.approx([300.0, 200.0])
+
+
+def test_comparison_takes_what_is_only_recorded(flown, tmp_path, call):
+    """One run in three forms has one score, but for what no bag knows."""
+    runs = [flown, *recorded_only(flown, tmp_path)]
+    for options in ((), ('--out', tmp_path / 'all.html')):
+        code, out, err = call('compare', *runs, '--json', *options)
+        assert code == 0, err
+        told = json.loads(out)
+        assert told['differences'] == []
+        first, *others = (run['score'] for run in told['runs'])
+        for score in others:
+            changed = {name for name in first if score[name] != first[name]}
+            assert changed == {'engine', 'wall_time_s', 'real_time_factor'}
+    _, data = read_page(tmp_path / 'all.html')
+    first, *others = (run['packed'] for run in data['runs'])
+    assert others == [first, first]
 
 
 def test_comparison_names_what_only_one_scenario_has(tmp_path, call):
