@@ -36,7 +36,12 @@ ROSDEP_KEYS = {
 }
 
 #: Modules for which rosdep has no key; pip brings them, from requirements.txt.
-ONLY_PIP = {'dask', 'distributed', 'mcap', 'plotly', 'rosbags', 'xarray', 'zstandard'}
+ONLY_PIP = {
+    *('dask', 'distributed', 'foxglove', 'lz4', 'mcap', 'plotly', 'rosbags', 'xarray'),
+    'zstandard',
+}
+#: Names on PyPI that are not those of the modules.
+PYPI_NAMES = {'foxglove': 'foxglove-sdk'}
 
 #: Packages of ROS 2 Jazzy, of which rosdep takes the name as a key.
 JAZZY = {
@@ -205,5 +210,5 @@ def test_what_only_pip_has_is_pinned():
     text = (SOURCES.parent / 'requirements.txt').read_text(encoding='utf-8')
     pinned = set(re.findall(r'^(\w[\w-]*)==', text, re.MULTILINE))
     used = set().union(*(needed(package) for package in MAY_IMPORT))
-    assert used & ONLY_PIP <= pinned
+    assert {PYPI_NAMES.get(module, module) for module in used & ONLY_PIP} <= pinned
     assert 'pydantic' in pinned  # noble has 1.10, this needs 2

@@ -48,7 +48,9 @@ Scheduler = Annotated[
         help='Fly on the Dask cluster with this scheduler, such as tcp://127.0.0.1:8786.',
     ),
 ]
-Run = Annotated[Path, typer.Argument(metavar='RUN', help='Folder of a run, or its .mcap file.')]
+Run = Annotated[
+    Path, typer.Argument(metavar='RUN', help='Folder of a run or a bag, or an .mcap file.')
+]
 Json = Annotated[
     bool, typer.Option('--json', help='Print one JSON object and nothing else on standard output.')
 ]

@@ -4,22 +4,19 @@
 
 import json
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from glider_bringup.console import EXIT_INTERRUPTED, Json, messages, number, output
+from glider_bringup.console import EXIT_INTERRUPTED, Json, Run, messages, number, output
 
 app = typer.Typer()
 
 
 @app.command(epilog='Example: ./glider replay runs/20260101-120000-current_8deg --rate 20')
 def replay(
-    run: Annotated[
-        Path, typer.Argument(metavar='RUN', help='Folder of a run or a bag, or an .mcap file.')
-    ],
+    run: Run,
     rate: Annotated[
         str, typer.Option(metavar='X|max', help='Times the speed of the recording.')
     ] = '1',

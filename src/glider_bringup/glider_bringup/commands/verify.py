@@ -11,7 +11,15 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from glider_bringup.console import EXIT_FAILED, EXIT_INTERRUPTED, Json, messages, output, shares
+from glider_bringup.console import (
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    Json,
+    Run,
+    messages,
+    output,
+    shares,
+)
 
 app = typer.Typer()
 BlockName = Enum('BlockName', {name: name for name in 'plant current guidance control'.split()})
@@ -19,9 +27,7 @@ BlockName = Enum('BlockName', {name: name for name in 'plant current guidance co
 
 @app.command(epilog='Example: ./glider verify runs/20260101-120000-current_8deg')
 def verify(
-    run: Annotated[
-        Path, typer.Argument(metavar='RUN', help='Folder of a run or a bag, or an .mcap file.')
-    ],
+    run: Run,
     settings: Annotated[
         Path | None,
         typer.Option(help="Scenario or parameter file, instead of the recording's own."),
