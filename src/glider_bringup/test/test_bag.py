@@ -274,6 +274,22 @@ def test_rows_end_at_the_first_gap_of_what_is_scored(tmp_path, monkeypatch, bloc
     assert np.flatnonzero(np.isnan(learnt)).tolist() == [20]
 
 
+def test_rows_are_whole_where_a_recorder_from_outside_mixed_up_ticks(tmp_path, monkeypatch):
+    """It takes topic after topic as they come, so that some are ticks behind the others."""
+    monkeypatch.setattr(bag_log, 'BLOCK_TICKS', 20)
+    late = np.random.default_rng(0).uniform(0.0, 5.0, (100, len(SCORED)))
+    order = np.argsort(np.arange(100)[:, np.newaxis] + late, axis=None)
+    bag = BagWriter(tmp_path, 'outside')
+    for tick, topic in zip(*np.unravel_index(order, late.shape), strict=True):
+        codec = TOPICS[SCORED[topic]].codec
+        row = np.full(len(codec.fields), float(tick))
+        bag.write(SCORED[topic], int(tick) * TICK_NS, codec.encode(int(tick) * TICK_NS, row))
+    bag.close()
+    rows = np.concatenate([block.copy() for block in read_blocks(tmp_path)])
+    for name in SCORED:
+        assert rows[:, COLUMNS[name].start].tolist() == list(range(100))
+
+
 @pytest.mark.parametrize('last', [100, BLOCK_TICKS, 5 * BLOCK_TICKS])
 def test_gap_of_any_length_ends_the_rows(tmp_path, last):
     write_with_gaps(tmp_path, [*range(10), last], ())

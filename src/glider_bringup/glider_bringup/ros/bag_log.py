@@ -201,7 +201,8 @@ def read_blocks(run: Path, also: Iterable[str] = ()) -> Iterator[np.ndarray]:
     Yields
     ------
     float64[n, ROW]
-        Rows of consecutive ticks, until the first tick that lacks one of `SCORED`.
+        Rows of consecutive ticks, until the first tick that lacks one of `SCORED`; valid until
+        the next are asked for.
 
     Raises
     ------
@@ -213,36 +214,36 @@ def read_blocks(run: Path, also: Iterable[str] = ()) -> Iterator[np.ndarray]:
         name: (TOPICS[name].codec, COLUMNS[name], name in SCORED) for name in (*SCORED, *also)
     }
     infeasible = _infeasible_changes(file)
-    log = np.full((BLOCK_TICKS, ROW), np.nan)
-    seen = np.zeros(BLOCK_TICKS, dtype=np.int64)
+    log = np.full((2 * BLOCK_TICKS, ROW), np.nan)
+    seen = np.zeros(2 * BLOCK_TICKS, dtype=np.int64)
     start = 0
 
-    def finish() -> np.ndarray:
-        """Rows up to the first tick that lacks something."""
-        missing = np.flatnonzero(seen != len(SCORED))
+    def finish() -> Iterator[np.ndarray]:
+        """The first block up to a tick that lacks something; then the second takes its place."""
+        nonlocal start
+        missing = np.flatnonzero(seen[:BLOCK_TICKS] != len(SCORED))
         rows = int(missing[0]) if len(missing) else BLOCK_TICKS
         log[:rows, COLUMNS['infeasible']] = 0.0
         for tick, flag in infeasible:
             log[max(0, tick - start) : rows, COLUMNS['infeasible']] = flag
-        return log[:rows]
+        yield log[:rows]
+        log[:BLOCK_TICKS], log[BLOCK_TICKS:] = log[BLOCK_TICKS:], np.nan
+        seen[:BLOCK_TICKS], seen[BLOCK_TICKS:] = seen[BLOCK_TICKS:], 0
+        start += BLOCK_TICKS
+        return rows == BLOCK_TICKS
 
     for name, _, payload in _messages(file, wanted):
         codec, columns, is_scored = wanted[name]
         stamp_ns, values = codec.decode(payload)
-        row = stamp_ns // TICK_NS - start
-        if row >= BLOCK_TICKS:
-            block = finish()
-            yield block
-            if len(block) < BLOCK_TICKS:
+        tick = stamp_ns // TICK_NS
+        while tick - start >= 2 * BLOCK_TICKS:  # a recorder from outside keeps no strict order
+            if not (yield from finish()):
                 return
-            start += BLOCK_TICKS
-            row -= BLOCK_TICKS
-            log[:] = np.nan
-            seen[:] = 0
-        if 0 <= row < BLOCK_TICKS:  # else it is late, or ticks are missing before it
-            log[row, columns] = values
-            seen[row] += is_scored
-    yield finish()
+        if tick >= start:
+            log[tick - start, columns] = values
+            seen[tick - start] += is_scored
+    if (yield from finish()):
+        yield from finish()
 
 
 def recorded_and_lost(folder: Path, complete: bool) -> tuple[int, int]:
