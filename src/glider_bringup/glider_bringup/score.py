@@ -92,6 +92,10 @@ class Scorer:
         """Ticks taken in."""
         return sum(block.shape[1] for block in self._blocks)
 
+    def _series(self, column: int) -> np.ndarray:
+        """One series over all blocks, float64[ticks]; not kept, for 30 h of all are 100 MB."""
+        return np.concatenate([np.empty(0), *(block[column] for block in self._blocks)])
+
     def result(self, settle_s: float, target_depth_m: float) -> dict:
         """Scores of everything taken in.
 
@@ -110,20 +114,18 @@ class Scorer:
             ``infeasible``.
             A figure without data is None.
         """
-        series = np.concatenate(self._blocks or [np.empty((_SERIES, 0))], axis=1)
-        ticks = series.shape[1]
-        descending = series[_RATE_REF] > 0.0
-        steady, scored = windows(series[_DEPTH], descending, settle_s, TICK_S)
-        e2 = series[_E2]
-        pitch_error = np.degrees(series[_PITCH] - series[_PITCH_REF])
-        heading = _heading_fluctuation_deg(series[_HEADING])
+        series, ticks = self._series, self.ticks
+        depth, e2 = series(_DEPTH), series(_E2)
+        steady, scored = windows(depth, series(_RATE_REF) > 0.0, settle_s, TICK_S)
+        pitch_error = np.degrees(series(_PITCH) - series(_PITCH_REF))
+        heading = _heading_fluctuation_deg(series(_HEADING))
         whole = steady & _has_whole_mean(ticks)
-        deepest = float(np.max(series[_DEPTH])) if ticks else None
+        deepest = float(np.max(depth)) if ticks else None
         return {
             'ticks': ticks,
             'sim_time_s': _round(ticks * TICK_S),
-            'dives': _count_dives(series[_DEPTH]),
-            'distance_along_path_m': _length(series[_TARGET_N], series[_TARGET_E]),
+            'dives': _count_dives(depth),
+            'distance_along_path_m': _length(series(_TARGET_N), series(_TARGET_E)),
             'cross_track_m': {
                 'rms_steady': _rms(e2[steady]),
                 'max_steady': _largest(e2[steady]),
@@ -142,13 +144,13 @@ class Scorer:
                 'overshoot': None if deepest is None else max(0.0, deepest - target_depth_m),
             },
             'actuator_travel': {
-                'buoyancy_engine_kg': _travel(series[_NET_HEAVINESS]),
-                'pitch_mass_m': _travel(series[_PITCH_MASS]),
-                'roll_mass_deg': math.degrees(_travel(series[_ROLL_MASS])),
+                'buoyancy_engine_kg': _travel(series(_NET_HEAVINESS)),
+                'pitch_mass_m': _travel(series(_PITCH_MASS)),
+                'roll_mass_deg': math.degrees(_travel(series(_ROLL_MASS))),
             },
             'final_state': self._final_state(),
             'infeasible': bool(
-                scored.any() and np.mean(series[_INFEASIBLE, scored]) >= INFEASIBLE_SHARE
+                scored.any() and np.mean(series(_INFEASIBLE)[scored]) >= INFEASIBLE_SHARE
             ),
         }
 
