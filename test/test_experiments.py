@@ -14,7 +14,7 @@ def fly(folder, *options, duration='full'):
     process = subprocess.run(
         [
             *(sys.executable, '-m', 'glider_bringup.cli', 'run', 'current_8deg'),
-            *('--engine', 'direct', '--controller', 'pid', '--duration', duration),
+            *('--engine', 'direct', '--no-report', '--controller', 'pid', '--duration', duration),
             *('--out', str(folder), '--json', *options),
         ],
         capture_output=True,

@@ -389,7 +389,8 @@ def test_figures_are_drawn_of_what_was_flown(tmp_path):
 
     cases = [Case('', 'pid', 'observer', 'current_8deg', SHORT, drawn=True)]
     one = Experiment('profile', 'profile', '', '', '', cases, judge_limits({}, 'pid'))
-    rows, records = fly([one], 1, lambda done: None)
+    with worker_pool(1) as pool:
+        rows, records = fly([one], pool, lambda done: None)
     files = paper_figures.draw([one], rows, records, tmp_path)
     assert [file.name for file in files] == ['figure_05.png', 'figure_06.png', 'figure_07.png']
     for file in files:
