@@ -25,7 +25,7 @@ from rich.table import Table
 from glider_bringup.console import EXIT_FAILED, EXIT_INTERRUPTED, Json, messages, output
 
 #: Modules of this folder, in the order in which they are measured.
-SECTIONS = ('compute', 'memory', 'nodes', 'nodes_memory', 'sweep')
+SECTIONS = ('compute', 'memory', 'nodes', 'nodes_memory', 'sweep', 'storage', 'fleet')
 
 Section = Enum('Section', {name: name for name in SECTIONS})
 

@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Iterable
 from itertools import islice
 
+from distributed import Client, LocalCluster
+
 from glider_bringup.pool import Pool, worker_pool
 from glider_bringup.sweep import Chunk, fly_chunk, make_chunks
 from glider_bringup.sweep_file import load_sweep
@@ -18,9 +20,13 @@ MEANING = {
     'sweep_two_workers_over_one': 'cells in the same time, two workers to one',
     'sweep_worker_peak_rss_mb': 'most resident memory of a worker at the end (MB)',
     'sweep_worker_growth_mb': 'of that, what came after its first chunk (MB)',
+    'sweep_task_ms': 'handing out one chunk: processor time of client and scheduler (ms)',
+    'sweep_task_1000_ms': 'the same with 1000 threads to hand out to (ms)',
 }
 #: Chunks that are timed, and how often: the fastest counts, as others use the machine too.
 CHUNKS, TIMES = 4, 2
+#: Threads of a cluster, and chunks with nothing in them for each of few and of many threads.
+THREADS, EMPTY_CHUNKS = 1000, 500
 
 
 def measure(progress: Callable[[str], None]) -> dict:
@@ -37,6 +43,8 @@ def measure(progress: Callable[[str], None]) -> dict:
             first = _fly(pool, chunks[:1] * 2 * workers)
             seconds[name] = _fastest(lambda pool=pool: _fly(pool, chunks))
             last = _fly(pool, chunks)
+            task_ms = _task_ms(pool)
+    progress(f'{THREADS} threads')
     per_cell = {f'sweep_cell_{name}_s': value / cells for name, value in seconds.items()}
     return {
         **per_cell,
@@ -44,6 +52,8 @@ def measure(progress: Callable[[str], None]) -> dict:
         'sweep_two_workers_over_one': seconds['one_worker'] / seconds['two_workers'],
         'sweep_worker_peak_rss_mb': last,
         'sweep_worker_growth_mb': last - first,
+        'sweep_task_ms': task_ms,
+        'sweep_task_1000_ms': _task_ms_of_many(),
     }
 
 
@@ -60,6 +70,25 @@ def _fastest(work: Callable) -> float:
 def _fly(pool: Pool, chunks: Iterable[Chunk]) -> float:
     """Fly chunks; most resident memory (MB) that a worker has had by then."""
     return max(outcome.result for outcome in pool.outcomes(fly_and_weigh, chunks))
+
+
+def _task_ms(pool: Pool) -> float:
+    """Processor time (ms) of this process, the scheduler's too, for a chunk with nothing in it."""
+    start = time.process_time()
+    for _ in pool.outcomes(fly_chunk, [Chunk(None, [])] * EMPTY_CHUNKS):
+        pass
+    return 1e3 * (time.process_time() - start) / EMPTY_CHUNKS
+
+
+def _task_ms_of_many() -> float:
+    """The same with as many threads as a cluster has, all in one process."""
+    with (
+        LocalCluster(
+            n_workers=1, threads_per_worker=THREADS, dashboard_address=None, memory_limit=0
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        return _task_ms(Pool(client))
 
 
 def fly_and_weigh(chunk: Chunk) -> float:

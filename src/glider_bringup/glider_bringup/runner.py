@@ -82,11 +82,11 @@ def node_commands(
 
 
 def node_environment(domain: int) -> dict[str, str]:
-    """Environment of every node of a run in a ROS domain."""
+    """Environment of every node of a run in a ROS domain, on this machine if nobody says else."""
     return {
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
         **os.environ,
         'ROS_DOMAIN_ID': str(domain),
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
         'RCUTILS_COLORIZED_OUTPUT': '0',
         'PYTHONUNBUFFERED': '1',
     }
