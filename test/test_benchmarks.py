@@ -79,6 +79,20 @@ def test_bench_prints_one_object_of_figures():
     assert figures['mission_30h_peak_rss_mb'] > figures['imported_rss_mb'] > 30.0
 
 
+def test_storage_of_a_sweep_fits_the_memory_that_its_limit_is_for():
+    done = subprocess.run(
+        [sys.executable, FOLDER / 'bench.py', '--only', 'storage', '--json'],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout)
+    assert figures['result_rss_mb'] < figures['result_peak_rss_mb']
+    assert figures['result_largest_peak_rss_mb'] < 600.0
+    assert figures['netcdf_bytes_per_cell'] < figures['journal_bytes_per_cell']
+
+
 def test_bench_of_the_command_line_sends_to_the_script(glider):
     done = glider('bench')
     assert (done.returncode, done.stdout) == (2, '')

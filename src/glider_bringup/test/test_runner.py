@@ -231,6 +231,16 @@ def test_domain_of_the_user_is_kept(monkeypatch):
         assert domain == 42
 
 
+@pytest.mark.parametrize('wanted', [None, 'SUBNET'])
+def test_range_of_the_user_is_kept_and_else_this_machine(monkeypatch, wanted):
+    monkeypatch.delenv('ROS_AUTOMATIC_DISCOVERY_RANGE', raising=False)
+    if wanted:
+        monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', wanted)
+    environment = runner.node_environment(7)
+    assert environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] == (wanted or 'LOCALHOST')
+    assert environment['ROS_DOMAIN_ID'] == '7'
+
+
 def test_every_node_gets_parameters_and_namespace(tmp_path):
     commands = node_commands(tmp_path / 'p.yaml', '/sea')
     assert list(commands) == list(runner.MODULES)
