@@ -86,9 +86,24 @@ class RecorderNode(TickNode):
         self.stopped = True
 
     def unmatched(self) -> list[str]:
-        """What is missing; the path is part of it, so that it is recorded first."""
-        missing = super().unmatched()
+        """What is missing; the path is part of it, so that it is recorded first.
+
+        A replay stands for all nodes.
+        """
+        missing = [] if self.is_replayed() else super().unmatched()
         return missing or ([] if self.has_path else ['guidance_node has not published path'])
+
+    def is_replayed(self) -> bool:
+        """Whether what comes is a recording, published again."""
+        publishers = self.get_publishers_info_by_topic('odom')
+        return any(info.node_name == messages.REPLAY for info in publishers)
+
+    def on_ready(self) -> None:
+        """Forget what came before this run began: it is somebody else's."""
+        if self.ticks.lockstep and not self.is_replayed():
+            for item in self.inputs:
+                while take(item.subscription) is not None:
+                    pass
 
     def on_path(self, raw: bytes) -> None:
         """Keep the path, under the stamp it carries."""
@@ -97,8 +112,10 @@ class RecorderNode(TickNode):
         self.has_path = True
 
     def on_event(self, array) -> None:
-        """Keep what happens to this glider; its end is kept by `on_report`."""
-        if not health.concerns(array, self.get_namespace()) or health.end_of_run(array):
+        """Keep what happens to this glider; the end of a flight is kept by `on_report`."""
+        if not health.concerns(array, self.get_namespace()):
+            return
+        if health.end_of_run(array) and not self.is_replayed():
             return
         for status in array.status:
             for pair in status.values:
@@ -117,8 +134,6 @@ class RecorderNode(TickNode):
 
     def keep(self, item: Input, raw: bytes) -> None:
         """Keep a message until its tick is complete. In lockstep an old one is passed over."""
-        if not self.running:  # it comes from somebody else's run
-            return
         stamp_ns = item.topic.codec.decode_stamp(raw)
         if stamp_ns > item.stamp_ns or not self.ticks.lockstep:
             item.stamp_ns = stamp_ns
@@ -126,7 +141,7 @@ class RecorderNode(TickNode):
 
     def drain(self) -> None:
         """Take and write whatever has come; end when the run is over and all of it is here."""
-        for item in self.inputs:
+        for item in self.inputs if self.running else ():
             while (raw := take(item.subscription)) is not None:
                 self.keep(item, raw)
         while (array := take(self.events)) is not None:

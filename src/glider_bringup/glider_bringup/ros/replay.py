@@ -24,6 +24,8 @@ from glider_model.ros.tick import MAX_TICKS_AHEAD, take
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS
 
+#: Name that rclpy gives to a node of which it knows the endpoints only.
+_NAME_UNKNOWN = '_NODE_NAME_UNKNOWN_'
 #: Sleeps and waits are cut into pieces of this length (s), so that Ctrl-C is heard.
 _PATIENCE_S = 0.1
 #: Depth of a publisher where the recording does not say.
@@ -256,9 +258,12 @@ class _Brake:
                 self._recorded_ns = log_ns
 
     def _is_recorded(self) -> bool:
-        """Whether a recorder in lockstep listens: it alone says what it has on disk."""
+        """Whether a recorder in lockstep listens: it alone says what it has on disk.
+
+        The name of a node can come later than its subscriptions.
+        """
         return any(
-            info.node_name == messages.RECORDER
+            info.node_name in (messages.RECORDER, _NAME_UNKNOWN)
             and info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
             for info in self._node.get_subscriptions_info_by_topic(self._odom)
         )
@@ -278,7 +283,7 @@ class Replay:
         self._plan, self._rate = plan, rate
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         try:
-            self._node = Node('replay_node', enable_rosout=False, start_parameter_services=False)
+            self._node = Node(messages.REPLAY, enable_rosout=False, start_parameter_services=False)
             topics = plan.bag.topics
             self._outputs = {
                 index: _Output(self._node, name, topics[index])

@@ -117,6 +117,8 @@ PLANT, CURRENT, GUIDANCE, CONTROL, RECORDER = (
     'control_node',
     'recorder_node',
 )
+#: Stands for all of them to a recorder.
+REPLAY = 'replay_node'
 
 #: Every topic, per-tick ones first in the order in which a tick is recorded.
 TOPICS = {
