@@ -114,6 +114,8 @@ def test_a_second_glider_in_the_namespace_of_the_first_does_not_disturb_it(tmp_p
             first.terminate()
             out, _ = first.communicate(timeout=DEADLINE_S)
     assert second.returncode == 1
-    assert '/clock is published by /glider/plant_node too' in message
+    # the node that notices first says it, wherever the line is broken
+    assert 'is published by /glider/' in message
+    assert 'a clock of its own' in ' '.join(message.split())
     card = json.loads(out)
     assert (card['reason'], card['messages_lost']) == ('stopped by SIGTERM', 0)

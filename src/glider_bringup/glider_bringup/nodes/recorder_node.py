@@ -59,6 +59,7 @@ class RecorderNode(TickNode):
         self.stage, self.last_odom = '', b''
         self.final_ns: int | None = None
         self.stopped = False
+        self.begun = False
         self.progress_s = 0.0
         for name in PER_TICK:
             self.add_input(name)
@@ -135,6 +136,10 @@ class RecorderNode(TickNode):
     def keep(self, item: Input, raw: bytes) -> None:
         """Keep a message until its tick is complete. In lockstep an old one is passed over."""
         stamp_ns = item.topic.codec.decode_stamp(raw)
+        if self.ticks.lockstep and not self.begun:
+            if stamp_ns > 0 and not self.is_replayed():
+                return  # of a run that is under way: one's own begins with tick 0
+            self.begun = True
         if stamp_ns > item.stamp_ns or not self.ticks.lockstep:
             item.stamp_ns = stamp_ns
             self.order.add(item.topic.name, stamp_ns, raw)

@@ -17,6 +17,7 @@ from glider_model.ros.executor import take
 from glider_model.ros.health import Report
 from glider_model.ros.messages import TOPICS
 from glider_model.ros.tick import (
+    ALONE,
     EXIT_PEER,
     MAX_TICKS_AHEAD,
     Stop,
@@ -28,7 +29,6 @@ from glider_model.signals import TICK_NS, TICK_S
 
 #: Nodes of a run that is just over are out of sight within this time (s).
 _RIVALS_LEAVE_S = 5.0
-_ALONE = 'each glider in a ROS domain needs a namespace and a clock of its own'
 
 
 class ClockSettings(TickSettings):
@@ -122,7 +122,7 @@ class ClockNode(TickNode):
         waited_s = time.monotonic() - self._clock_started_s
         if waited_s > _RIVALS_LEAVE_S and (rivals := self.rivals()):
             # No report: in one namespace it would end the other run too.
-            raise Stop(EXIT_PEER, f'{rivals[0]}; {_ALONE}')
+            raise Stop(EXIT_PEER, f'{rivals[0]}; {ALONE}')
         if waited_s > self.ticks.startup_timeout_s:
             missing = '; '.join(self.unmatched())
             self._fail(f'not ready after {self.ticks.startup_timeout_s:g} s: {missing}')
@@ -178,6 +178,17 @@ class ClockNode(TickNode):
     def _on_pace(self) -> None:
         self._pace_timer.cancel()
         self._release()
+
+    def rivals(self) -> list[str]:
+        """Who else publishes what only this node may publish, in words.
+
+        Who answers a tick that this plant has not published answers another one, which may not
+        have been discovered yet.
+        """
+        answered = any(item.stamp_ns > self.tick * TICK_NS for item in self.inputs)
+        name = self.get_fully_qualified_name()
+        hidden = [f'/clock is published by {name} too'] if answered and self.ticks.lockstep else []
+        return super().rivals() or hidden
 
     def _is_ahead(self) -> bool:
         limit_ns = (self.tick - MAX_TICKS_AHEAD) * TICK_NS

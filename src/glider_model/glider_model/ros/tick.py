@@ -41,6 +41,8 @@ EXIT_CONFIGURATION, EXIT_PEER = 2, 3
 #: Middleware forgets messages of a node that is gone: leave them this time (s) to arrive.
 _LINGER_S = 0.2
 
+#: What to do about a second glider.
+ALONE = 'each glider in a ROS domain needs a namespace and a clock of its own'
 _STARTUP_PERIOD_S = 0.03
 #: Who starts a node by hand is told what it waits for, after this time and then this often (s).
 _PATIENCE_S, _REMIND_S = 10.0, 20.0
@@ -323,6 +325,8 @@ class TickNode(Node):
             item.accept(raw)
         except MessageError as error:
             raise Stop(EXIT_PEER, str(error)) from None
+        if self._due_ns is None and item.stamp_ns > 0:
+            item.stamp_ns = -1  # of a run that is under way: one's own begins with tick 0
 
     def _fire(self) -> None:
         """Act on every tick that is complete, then wait for the input that is missing."""
@@ -350,6 +354,8 @@ class TickNode(Node):
                 return False
             self._accept(item, raw)
         if item.stamp_ns > self._due_ns:
+            if rivals := self.rivals():
+                raise Stop(EXIT_PEER, f'{rivals[0]}; {ALONE}')
             raise Stop(
                 EXIT_PEER,
                 f'{item.topic.publisher} skipped a tick: {item.topic.name} came for '
