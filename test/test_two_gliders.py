@@ -103,7 +103,7 @@ def test_a_bag_has_the_diagnostics_of_its_own_glider_only(together, name):
     assert {full.rpartition('/')[0] for full in said} == {f'/{name}'}
 
 
-def test_a_second_glider_in_the_namespace_of_the_first_does_not_disturb_it(tmp_path):
+def test_a_second_glider_in_the_namespace_of_the_first_is_refused(tmp_path):
     with domain_id() as domain:
         first = start(domain, 'current_8deg', tmp_path / 'first', '--duration', 'full')
         try:
@@ -118,4 +118,5 @@ def test_a_second_glider_in_the_namespace_of_the_first_does_not_disturb_it(tmp_p
     assert 'is published by /glider/' in message
     assert 'a clock of its own' in ' '.join(message.split())
     card = json.loads(out)
-    assert (card['reason'], card['messages_lost']) == ('stopped by SIGTERM', 0)
+    assert card['reason'] == 'stopped by SIGTERM'
+    assert card['messages_recorded'] > 1000
