@@ -182,7 +182,7 @@ class _Process:
 class _Run:
     """The processes of one run, their output, and the order to stop."""
 
-    def __init__(self, commands, environment, on_progress, on_log) -> None:
+    def __init__(self, on_progress, on_log) -> None:
         self._on_progress, self._on_log = on_progress, on_log
         self._selector = selectors.DefaultSelector()
         self._partial: dict[int, bytes] = {}
@@ -191,6 +191,9 @@ class _Run:
         self.first_tick_s: float | None = None
         self.progress: dict[str, Any] = {}
         self.processes: dict[str, _Process] = {}
+
+    def start(self, commands: Mapping[str, Sequence[str]], environment: dict[str, str]) -> None:
+        """Start a process per node."""
         for name, command in commands.items():
             process = _Process(name, command, environment)
             self.processes[name] = process
@@ -343,9 +346,10 @@ def run_nodes(
             log.flush()
             on_log(line)
 
-        run = _Run(commands, node_environment(domain), on_progress, tell)
+        run = _Run(on_progress, tell)
         with _signals(run):
             try:
+                run.start(commands, node_environment(domain))
                 status, culprit = run.watch()
             finally:
                 run.stop()

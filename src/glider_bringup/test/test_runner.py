@@ -180,6 +180,24 @@ def test_signal_aborts_the_run_and_the_recorder_has_the_last_word(fly, number):
     assert signal.getsignal(number) is before
 
 
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_signal_while_the_nodes_are_started_leaves_none(fly, monkeypatch, number):
+    started = []
+
+    class Starting(subprocess.Popen):
+        def __init__(self, *arguments, **options):
+            super().__init__(*arguments, **options)
+            started.append(self)
+            if len(started) == 2:
+                os.kill(os.getpid(), number)
+
+    monkeypatch.setattr(runner.subprocess, 'Popen', Starting)
+    result, _ = fly({'guidance_node': node(), RECORDER: recorder(), PLANT: node()})
+    assert (result.status, result.reason) == ('aborted', f'stopped by {number.name}')
+    assert len(started) == 3
+    assert not [process.pid for process in started if is_alive(process.pid)]
+
+
 @pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGTERM])
 def test_no_node_survives_the_runner(tmp_path, number):
     source = (
