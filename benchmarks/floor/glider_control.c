@@ -123,6 +123,20 @@ static inline SteeringState learn_steering(
     };
 }
 
+static inline double caution(const SteeringState *state)
+{
+    double square = state->b * state->b;
+    return square / (square + max(0.0, state->p[0] - SURE_SHARE * SURE_SHARE * square));
+}
+
+static inline double roll_to_kick(const SteeringState *state, double error)
+{
+    if (state->b * state->k <= 0.0)
+        return 0.0;
+    double small = min(KICK_ERROR, max(-KICK_ERROR, error));
+    return (1.0 - caution(state)) * small * state->k / (state->k * state->k + state->p[7]);
+}
+
 /* Returns the sine of roll; the largest one of use goes to most. */
 static inline double roll_to_turn(
     const SteeringState *state, double turn, double ratio, double limit, double *most)
@@ -130,10 +144,9 @@ static inline double roll_to_turn(
     double b = state->b, c = state->c;
     if (b * c < 0.0)
         limit = min(limit, SHARE_OF_PEAK * sqrt(-b / (3.0 * c)));
-    double doubt = max(0.0, state->p[0] - SURE_SHARE * SURE_SHARE * b * b);
-    double part = turn / ratio * b * b / (b * b + doubt);
     double sine = 0.0;
     if (fabs(b) > SMALLEST_STEERING) {
+        double part = turn / ratio * caution(state);
         for (int i = 0; i < 4; i++) {
             sine += (part - (b + c * sine * sine) * sine) / (b + 3.0 * c * sine * sine);
             sine = min(limit, max(-limit, sine));
@@ -204,19 +217,26 @@ static inline double bank_to_turn(
 {
     double limit = sin(params->roll_limit);
     double ratio = max(speed, LEARN_SPEED) / STEERING_SPEED;
+    double effectiveness = fabs(steering->b) * ratio;
+    bool is_known = steering->p[0] < steering->b * steering->b;
+    double bandwidth = effectiveness * limit / SATURATING_ERROR;
+    if (is_known)
+        bandwidth = KICK_BANDWIDTH * effectiveness / max(fabs(steering->k), SMALLEST_KICK);
+    double share = min(1.0, bandwidth / params->heading_kp);
+    double asked = share * reference->psi_dot;
     double most;
-    double turning
-        = roll_to_turn(steering, reference->psi_dot - steering->d, ratio, limit, &most);
+    double turning = roll_to_turn(steering, asked - steering->d, ratio, limit, &most);
     double roll_left = measured->phi - asin(turning);
     double error = wrap_angle(reference->psi - measured->psi + steering->k * roll_left);
     double psi_dot = measured->psi_dot - steering->k * measured->phi_dot;
-    double share
-        = min(1.0, fabs(steering->b) * ratio * limit / (params->heading_kp * SATURATING_ERROR));
-    double turn = reference->psi_dot + share * params->heading_kp * error
+    double turn = asked + share * params->heading_kp * error
         + share * params->heading_kd * (reference->psi_dot - psi_dot) - *disturbance;
     double sine = roll_to_turn(steering, turn, ratio, limit, &most);
-    if (learning && fabs(sine) < most) {
-        double moved = *disturbance - dt * share * share * params->heading_ki * error;
+    if (learning)
+        sine = min(limit, max(-limit, sine + roll_to_kick(steering, error)));
+    if (learning && is_known && fabs(sine) < most) {
+        double learnt = min(DISTURBANCE_ERROR, max(-DISTURBANCE_ERROR, error));
+        double moved = *disturbance - dt * share * share * params->heading_ki * learnt;
         *disturbance = min(DISTURBANCE_MAX, max(-DISTURBANCE_MAX, moved));
     }
     return asin(sine);

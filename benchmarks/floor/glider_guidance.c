@@ -338,6 +338,19 @@ static void start(
     state->heading_command = psi;
     state->drift = 0.0;
     state->infeasible_ticks = 0;
+    state->lag_dive = 0.0;
+    state->lag_climb = 0.0;
+}
+
+static inline double heading_lag(double lag, double error, double dt)
+{
+    double counted = min(LAG_COUNTED, fabs(error));
+    return lag + dt / LAG_MEMORY_S * (counted * counted - lag);
+}
+
+static inline double lag_stretch(double lag)
+{
+    return 1.0 + min(1.0, max(0.0, (sqrt(lag) - LAG_FROM) / (LAG_TO - LAG_FROM)));
 }
 
 static inline GuidanceOutput guidance_step(
@@ -382,9 +395,18 @@ static inline GuidanceOutput guidance_step(
     /* direction to fly */
     bool surfaced
         = stage == WAITING_ON_SURFACE || stage == SURFACE_PREPARATION || stage == SURFACING;
+    double lag_dive = state->lag_dive, lag_climb = state->lag_climb;
+    if (is_gliding(stage) && profile.ticks * dt > LAG_AFTER_S) {
+        double heading_error = wrap_angle(psi - state->heading.value);
+        if (rate_target > 0.0)
+            lag_dive = heading_lag(lag_dive, heading_error, dt);
+        else
+            lag_climb = heading_lag(lag_climb, heading_error, dt);
+    }
+    double stretch = lag_stretch(rate_target > 0.0 ? lag_dive : lag_climb);
     double lookahead = max(
         params->lookahead,
-        params->lookahead_s * sqrt(ground.x * ground.x + ground.y * ground.y));
+        stretch * params->lookahead_s * sqrt(ground.x * ground.x + ground.y * ground.y));
     double drift_past = state->drift;
     double offset = 0.0;
     if (params->leads) {
@@ -454,7 +476,7 @@ static inline GuidanceOutput guidance_step(
     };
     *state = (GuidanceState){
         state->tick + 1, profile, s, observer, heading, pitch, speed, heading_command,
-        drift_past, infeasible_ticks,
+        drift_past, infeasible_ticks, lag_dive, lag_climb,
     };
     return output;
 }

@@ -26,6 +26,7 @@ from glider_control.steering import (
     SteeringParams,
     SteeringState,
     learn_steering,
+    roll_to_kick,
     roll_to_turn,
 )
 from glider_model.command_filter import Filtered, FilterParams, filter_command
@@ -44,8 +45,14 @@ SCALE_ALPHA, SCALE_V2, SCALE_SIDE, SCALE_ROLL_RATE, SCALE_PITCH_RATE = 0.01, 0.2
 LEARN_SPEED, LEARN_VERTICAL_RATE, LEARN_AFTER_S = 0.15, 0.12, 20.0
 #: d_hat is held within this (rad/s).
 DISTURBANCE_MAX = 0.005
-#: Heading error at which the roll command may reach its limit (rad).
+#: Heading error at which roll may reach its limit (rad), while the sign of b is in doubt.
 SATURATING_ERROR = 0.35
+#: Heading bandwidth over b V / (V_0 |k|), the frequency below which a turn outruns its kick (-).
+KICK_BANDWIDTH = 1.5
+#: Smallest kick that is of importance (-).
+SMALLEST_KICK = 1e-3
+#: d_hat learns from no more than this of a heading error (rad): the rest is yet to be turned.
+DISTURBANCE_ERROR = 0.02
 #: Natural frequency of the filter on the virtual rate command (rad/s), and its rate limit.
 RATE_FILTER = FilterParams(2.0, 10.0)
 
@@ -302,27 +309,40 @@ def learn_phase(state, measured, speed, params, dt):
 def bank_to_turn(steering, disturbance, measured, reference, speed, learning, params, dt):
     """Roll command (rad) that steers to the reference heading, and the new d_hat.
 
-    phi_s = asin sat((psi_s' + k_psi e + k_d (psi_s' - psi') - d_hat) / (b_hat V / V_0)),
-    d_hat' = -k_i e. d_hat waits while the roll command is at its limit.
+    phi_s = asin sat((turn - d_hat) / (b_hat V / V_0)), d_hat' = -w^2 k_i e,
+    turn = w (psi_s' + k_psi e + k_d (psi_s' - psi')).
+
+    The share w keeps the bandwidth below that of the vehicle. To turn, it has to roll, and the
+    kick of the roll goes the wrong way: y'' = U (b phi + k phi') has a zero at z = b / |k|, and a
+    loop faster than about z loses more by the kick than it wins by the turn. d_hat waits while the
+    roll command is at its limit and until the sign of b is known.
     """
     limit = math.sin(params.roll_limit)
     ratio = max(speed, LEARN_SPEED) / STEERING_SPEED
+    effectiveness = abs(steering.b) * ratio
+    is_known = steering.p[0] < steering.b * steering.b
+    bandwidth = effectiveness * limit / SATURATING_ERROR
+    if is_known:
+        bandwidth = KICK_BANDWIDTH * effectiveness / max(abs(steering.k), SMALLEST_KICK)
+    share = min(1.0, bandwidth / params.heading_kp)
+    asked = share * reference.psi_dot
     # the heading that is left when the roll is gone, but for the roll of the turn asked for
-    turning, _ = roll_to_turn(steering, reference.psi_dot - steering.d, ratio, limit)
+    turning, _ = roll_to_turn(steering, asked - steering.d, ratio, limit)
     roll_left = measured.phi - math.asin(turning)
     error = wrap_angle(reference.psi - measured.psi + steering.k * roll_left)
     psi_dot = measured.psi_dot - steering.k * measured.phi_dot
-    # a vehicle that steers weakly is not asked for a bandwidth it does not have
-    share = min(1.0, abs(steering.b) * ratio * limit / (params.heading_kp * SATURATING_ERROR))
     turn = (
-        reference.psi_dot
+        asked
         + share * params.heading_kp * error
         + share * params.heading_kd * (reference.psi_dot - psi_dot)
         - disturbance
     )
     sine, most = roll_to_turn(steering, turn, ratio, limit)
-    if learning and abs(sine) < most:
-        moved = disturbance - dt * share * share * params.heading_ki * error
+    if learning:
+        sine = min(limit, max(-limit, sine + roll_to_kick(steering, error)))
+    if learning and is_known and abs(sine) < most:
+        learnt = min(DISTURBANCE_ERROR, max(-DISTURBANCE_ERROR, error))
+        moved = disturbance - dt * share * share * params.heading_ki * learnt
         disturbance = min(DISTURBANCE_MAX, max(-DISTURBANCE_MAX, moved))
     return math.asin(sine), disturbance
 

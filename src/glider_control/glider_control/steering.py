@@ -30,8 +30,10 @@ STEERING_SPEED = 0.5
 SMALLEST_STEERING = 1e-6
 #: A standard deviation of this share of b is no doubt.
 SURE_SHARE = 0.3
+#: The kick is used for heading errors up to this size (rad).
+KICK_ERROR = 0.09
 #: The vehicle rolls to this share of the roll at which it turns fastest.
-SHARE_OF_PEAK = 0.9
+SHARE_OF_PEAK = 0.7
 
 
 class SteeringLearningSettings(Settings):
@@ -44,7 +46,7 @@ class SteeringLearningSettings(Settings):
         0.02, gt=0.0, le=1.0, description='its standard deviation (rad/s)'
     )
     drift_radps: float = Field(
-        0.002, ge=0.0, le=0.1, description='change of b to be expected in 1000 s (rad/s)'
+        0.0005, ge=0.0, le=0.1, description='change of b to be expected in 1000 s (rad/s)'
     )
     bend_std_radps: float = Field(
         0.01, gt=0.0, le=1.0, description='standard deviation of c before it is known (rad/s)'
@@ -174,13 +176,34 @@ def learn_steering(state, bank, bend, roll_rate, yaw_rate, params, dt):
 
 
 @kernel
+def caution(state):
+    """Share of a turn for which the vehicle is rolled: the less is known of b, the less.
+
+    b^2 / (b^2 + var b) minimises the expected squared error of the turn rate (cautious control:
+    Astrom and Wittenmark, Adaptive Control, 1995, chapter 7). A vehicle whose sign is in doubt is
+    hardly rolled; a deviation that leaves no doubt about it is no reason.
+    """
+    square = state.b * state.b
+    return square / (square + max(0.0, state.p[0] - SURE_SHARE * SURE_SHARE * square))
+
+
+@kernel
+def roll_to_kick(state, error):
+    """Sine of the roll whose kick alone turns the nose by a heading error (rad), if it is of use.
+
+    It is where turn and kick go to the same side: there the heading that is left when the roll is
+    gone comes nearer by itself. Of a kick that is not known well, a share is used, as of b.
+    """
+    if state.b * state.k <= 0.0:
+        return 0.0
+    small = min(KICK_ERROR, max(-KICK_ERROR, error))
+    return (1.0 - caution(state)) * small * state.k / (state.k * state.k + state.p[7])
+
+
+@kernel
 def roll_to_turn(state, turn, ratio, limit):
     """Sine of the roll that turns at ``turn``, and the largest sine that is of use.
 
-    The less is known of b, the more cautiously it is used: the roll is made for the share
-    b^2 / (b^2 + var b) of the turn, which minimises the expected squared error of the turn rate
-    (cautious control: Astrom and Wittenmark, Adaptive Control, 1995, chapter 7). A vehicle whose
-    sign is in doubt is hardly rolled; a deviation that leaves no doubt about it is no reason.
     Where steering fades with roll, b s + c s^3 has a peak; beyond it a vehicle turns the less,
     and at last the other way, the more it rolls.
 
@@ -197,10 +220,9 @@ def roll_to_turn(state, turn, ratio, limit):
     b, c = state.b, state.c
     if b * c < 0.0:
         limit = min(limit, SHARE_OF_PEAK * math.sqrt(-b / (3.0 * c)))
-    doubt = max(0.0, state.p[0] - SURE_SHARE * SURE_SHARE * b * b)
-    part = turn / ratio * b * b / (b * b + doubt)
     sine = 0.0
     if abs(b) > SMALLEST_STEERING:
+        part = turn / ratio * caution(state)
         for _ in range(4):
             sine += (part - (b + c * sine * sine) * sine) / (b + 3.0 * c * sine * sine)
             sine = min(limit, max(-limit, sine))

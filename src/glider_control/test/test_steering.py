@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from glider_control.steering import (
     SteeringLearningSettings,
+    caution,
     learn_steering,
+    roll_to_kick,
     roll_to_turn,
 )
 
@@ -131,11 +133,12 @@ def test_the_roll_turns_as_asked_or_as_much_as_it_can(b, c, turn, ratio):
 
 @given(st.floats(0.001, 0.01), st.floats(0.005, 0.02), st.sampled_from([1.0, -1.0]))
 def test_no_vehicle_is_rolled_past_the_peak_of_its_turn_rate(b, c, side):
-    """Where steering fades with roll, more roll than this turns less."""
+    """Where steering fades with roll, more roll turns less: most of the peak, with less roll."""
     sine, _ = roll_to_turn(known(b, -c), side * 1.0, 1.0, 0.99)
     rolls = np.linspace(0.0, 0.99, 1000)
-    peak = rolls[np.argmax(b * rolls - c * rolls**3)]
-    assert 0.85 * peak <= side * sine <= peak + 1e-3
+    rates = b * rolls - c * rolls**3
+    assert 0.0 < side * sine <= rolls[np.argmax(rates)] + 1e-3
+    assert b * side * sine - c * (side * sine) ** 3 >= 0.85 * np.max(rates)
 
 
 @given(effectiveness, st.floats(0.0, 0.1), st.floats(0.0, 0.1), st.floats(0.0001, 0.05))
@@ -154,3 +157,24 @@ def test_an_estimate_that_passes_zero_does_not_slam_the_roll(b, turn):
     sine, _ = roll_to_turn(known(b, std=1e-3), turn, 1.0, LIMIT)
     assert abs(sine) <= min(LIMIT, abs(turn * b) / 1e-6 + 1e-12)
     assert roll_to_turn(known(0.0, std=0.0), turn, 1.0, LIMIT)[0] == 0.0
+
+
+@given(effectiveness, st.floats(0.0, 0.2))
+def test_caution_is_a_share_and_one_without_doubt(b, std):
+    share = caution(known(b, std=std))
+    assert 0.0 < share <= 1.0
+    if std <= 0.3 * abs(b):
+        assert share == 1.0
+
+
+@given(effectiveness, kicks, st.floats(0.0, 0.1), st.floats(0.01, 0.5), st.floats(-1.0, 1.0))
+def test_the_kick_is_used_where_the_turn_goes_to_its_side(b, k, std, kick_std, error):
+    """Toward the reference, by no more than the whole error, and not against the turn."""
+    state = known(b, std=std)._replace(k=k)
+    state = state._replace(p=(*state.p[:7], kick_std**2, *state.p[8:]))
+    sine = roll_to_kick(state, error)
+    if b * k <= 0.0:
+        assert sine == 0.0
+    else:
+        assert sine * k * error >= 0.0
+        assert abs(sine * k) <= abs(error) * (1.0 + 1e-9)

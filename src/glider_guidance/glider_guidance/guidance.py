@@ -67,6 +67,11 @@ MODEL_VERTICAL_RATE = 0.05
 MODEL_PITCH = math.radians(12.0)
 #: Time constant of the estimated speed through the water (s).
 SPEED_FILTER_S = 30.0
+#: Heading errors are remembered over this time (s), each counted up to this size (rad), from this
+#: time (s) after the beginning of a glide on.
+LAG_MEMORY_S, LAG_COUNTED, LAG_AFTER_S = 3000.0, 0.17, 60.0
+#: Their root mean square (rad) from which on the lookahead grows, and at which it has doubled.
+LAG_FROM, LAG_TO = math.radians(1.0), math.radians(3.4)
 #: The virtual target moves no faster than this (m/s).
 TARGET_SPEED_MAX = 3.0
 
@@ -223,6 +228,8 @@ class GuidanceSettings(GuidanceLawSettings):
             0.0,
             0.0,
             0,
+            0.0,
+            0.0,
         )
 
 
@@ -257,6 +264,8 @@ class GuidanceState(NamedTuple):
     heading_command: float  #: held while the vehicle turns (rad)
     drift: float  #: what the last turn was expected to cost across the path (m)
     infeasible_ticks: int
+    lag_dive: float  #: mean square of the heading error, by phase (rad^2)
+    lag_climb: float
 
 
 class GuidanceOutput(NamedTuple):
@@ -291,6 +300,8 @@ def guidance_abort(state):
         state.heading_command,
         state.drift,
         state.infeasible_ticks,
+        state.lag_dive,
+        state.lag_climb,
     )
 
 
@@ -313,7 +324,27 @@ def _start(state, odometry, psi, theta, params):
         psi,
         0.0,
         0,
+        0.0,
+        0.0,
     )
+
+
+@kernel
+def heading_lag(lag, error, dt):
+    """Mean square (rad^2) of the heading error ``error`` (rad), which forgets."""
+    counted = min(LAG_COUNTED, abs(error))
+    return lag + dt / LAG_MEMORY_S * (counted * counted - lag)
+
+
+@kernel
+def lag_stretch(lag):
+    """Factor on the lookahead, 1 to 2, for a vehicle with the heading lag ``lag`` (rad^2).
+
+    Position is steered by heading. Where heading follows badly, because the vehicle steers weakly
+    and each roll first turns its nose the wrong way, position must be asked for more slowly, or
+    the two loops swing against each other.
+    """
+    return 1.0 + min(1.0, max(0.0, (math.sqrt(lag) - LAG_FROM) / (LAG_TO - LAG_FROM)))
 
 
 @kernel
@@ -389,8 +420,17 @@ def guidance_step(state, odometry, params, dt):
 
     # direction to fly
     surfaced = stage == WAITING_ON_SURFACE or stage == SURFACE_PREPARATION or stage == SURFACING
+    lag_dive, lag_climb = state.lag_dive, state.lag_climb
+    if is_gliding(stage) and profile.ticks * dt > LAG_AFTER_S:
+        heading_error = wrap_angle(psi - state.heading.value)
+        if rate_target > 0.0:
+            lag_dive = heading_lag(lag_dive, heading_error, dt)
+        else:
+            lag_climb = heading_lag(lag_climb, heading_error, dt)
+    stretch = lag_stretch(lag_dive if rate_target > 0.0 else lag_climb)
     lookahead = max(
-        params.lookahead, params.lookahead_s * math.sqrt(ground_n * ground_n + ground_e * ground_e)
+        params.lookahead,
+        stretch * params.lookahead_s * math.sqrt(ground_n * ground_n + ground_e * ground_e),
     )
     drift_past = state.drift
     offset = 0.0
@@ -479,5 +519,7 @@ def guidance_step(state, odometry, params, dt):
         heading_command,
         drift_past,
         infeasible_ticks,
+        lag_dive,
+        lag_climb,
     )
     return new_state, output

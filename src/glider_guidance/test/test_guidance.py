@@ -14,12 +14,15 @@ from hypothesis import strategies as st
 from glider_guidance.current_observer import ObserverState
 from glider_guidance.guidance import (
     INFEASIBLE_S,
+    LAG_AFTER_S,
     GuidanceSettings,
     guidance_abort,
     guidance_step,
+    heading_lag,
+    lag_stretch,
 )
 from glider_guidance.path import HelixPath, StraightPath, WaypointPath
-from glider_guidance.profile import INFLECTING_UP, SURFACING
+from glider_guidance.profile import GLIDING_DOWN, INFLECTING_UP, SURFACING
 from glider_model.frames import quaternion_from_euler, rotate_to_body
 from glider_model.polar import glide_horizontal_speed
 from glider_model.signals import TICK_S, Odometry
@@ -356,3 +359,47 @@ def test_reference_rates_are_the_derivatives_of_the_reference():
     flight = Flight(straight(200.0), (0.0, 50.0, 0.0), (0.1, 0.1), psi=0.3).fly(1000.0)
     assert flight.psi_dot[1:] == pytest.approx(wrapped(np.diff(flight.psi)) / TICK_S, abs=1e-9)
     assert flight.theta_dot[1:] == pytest.approx(np.diff(flight.theta) / TICK_S, abs=1e-9)
+
+
+@given(st.floats(0.0, 10.0), st.floats(0.0, 10.0))
+def test_lookahead_grows_with_the_heading_lag_to_twice_itself(one_deg, other_deg):
+    less, more = (math.radians(angle) ** 2 for angle in sorted((one_deg, other_deg)))
+    assert 1.0 <= lag_stretch(less) <= lag_stretch(more) <= 2.0
+    assert lag_stretch(math.radians(0.9) ** 2) == 1.0
+    assert lag_stretch(math.radians(3.5) ** 2) == 2.0
+
+
+@numba.njit
+def _lags(errors, dt):
+    lag = 0.0
+    for error in errors:
+        lag = heading_lag(lag, error, dt)
+    return lag
+
+
+def test_heading_lag_is_the_mean_square_of_what_is_not_a_turn():
+    """Of a steady oscillation its mean square; of a turn about no more than one of 10 deg."""
+    t = np.arange(0.0, 30000.0, TICK_S)
+    swings = 0.05 * np.sin(t / 7.0)
+    assert _lags(swings, TICK_S) == pytest.approx(0.05**2 / 2.0, rel=0.02)
+    turn = np.where(t < 300.0, 3.0, 0.0)
+    assert _lags(turn[: int(300.0 / TICK_S)], TICK_S) < math.radians(10.0) ** 2 * 0.1
+    assert _lags(turn, TICK_S) < 1e-5
+
+
+def test_vehicle_whose_heading_follows_badly_approaches_by_a_smaller_angle():
+    """30 m beside the path: half the angle at twice the lookahead, in the phase that lags only."""
+    headings = {}
+    for name, lag in (('none', {}), ('dive', {'lag_dive': 0.01}), ('climb', {'lag_climb': 0.01})):
+        guidance = straight(0.0)
+        params = guidance.params()
+        point = Point(100.0, 30.0, 300.0, -0.5, 0.0, 0.25)
+        odometry, _, _ = _odometry(point, (0.0, 0.0), params.polar)
+        state, _ = guidance_step(guidance.initial_state(), odometry, params, TICK_S)
+        state = state._replace(profile=state.profile._replace(stage=GLIDING_DOWN, ticks=0), **lag)
+        for _ in range(int(LAG_AFTER_S / TICK_S) - 10):
+            state, output = guidance_step(state, odometry, params, TICK_S)
+        headings[name] = output.reference.psi
+    assert headings['none'] < -0.2
+    assert math.tan(headings['dive']) == pytest.approx(math.tan(headings['none']) / 2.0, rel=0.05)
+    assert headings['climb'] == headings['none']
