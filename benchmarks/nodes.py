@@ -137,7 +137,7 @@ def _write_messages() -> tuple[float, float, int, float]:
     megabytes = sum(map(len, ticks[0])) * len(ticks) / 1e6
     with TemporaryDirectory() as folder:
         file_s = min(_to_file(ticks, Path(folder)) for _ in range(REPEATS))
-        bag_s = min(_to_bag(ticks, Path(folder)) for _ in range(REPEATS))
+        bag_s = min(_to_bag(ticks, Path(folder) / str(number)) for number in range(REPEATS))
     return file_s, bag_s, messages, megabytes
 
 
