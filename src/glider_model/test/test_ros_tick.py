@@ -7,13 +7,14 @@ import time
 import pytest
 import rclpy
 from rclpy.parameter import Parameter
+from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from glider_model.ros import clock, health
 from glider_model.ros.clock import ClockNode
 from glider_model.ros.executor import make_executor
-from glider_model.ros.messages import CONTROL, CURRENT, GUIDANCE, PLANT, TOPICS
-from glider_model.ros.tick import BlockNode, Stop
+from glider_model.ros.messages import CONTROL, CURRENT, GUIDANCE, PLANT, RECORDER, TOPICS
+from glider_model.ros.tick import MAX_TICKS_AHEAD, BlockNode, Stop
 from glider_model.signals import TICK_NS
 
 TIMEOUT_S = 30.0
@@ -198,6 +199,59 @@ def test_node_that_falls_silent_is_named(make_graph, culprit, topic):
     stop = graph.spin()
     assert stop.code == 3
     assert str(stop).startswith(f'{culprit} did not publish {topic} for t = 2.0 s')
+
+
+@pytest.mark.parametrize('is_rival', [True, False])
+def test_a_plant_of_a_second_glider_does_not_end_the_run(make_graph, context, is_rival):
+    graph = make_graph(last_tick=10**9)
+    assert graph.spin(lambda: graph.plant.tick > 10) is None
+    topic = TOPICS['lockstep']
+    rival = rclpy.create_node('rival', namespace='/glider', context=context)
+    graph.nodes.append(rival)
+    publisher = rival.create_publisher(topic.message_type, topic.name, topic.qos)
+    assert graph.spin(lambda: publisher.get_subscription_count() == len(graph.nodes) - 1) is None
+    process = 'another' if is_rival else graph.plant.process
+    report = health.Report(PLANT, health.FAILED, 'it sank', process=process)
+    publisher.publish(health.report_array(report))
+    until = time.monotonic() + 1.0
+    stop = graph.spin(lambda: time.monotonic() > until)
+    assert (stop is None) == is_rival
+
+
+class Recorder(BlockNode):
+    """Stands in for the recorder: takes nothing, and says what it has on disk when it is told."""
+
+    def __init__(self, **kwargs) -> None:
+        super().__init__(RECORDER, **kwargs)
+        for topic in TOPICS.values():
+            if topic.recorded:
+                self._subscription(topic, lambda raw: None, gated=False)
+        self.recorded = self._publisher(TOPICS['recorded'])
+        self.outputs['recorded'] = (TOPICS['recorded'], self.recorded)
+        self.start_up()
+
+
+def test_only_its_own_recorder_lets_the_plant_go_on(make_graph, context):
+    parameters = {'record': True, 'tick_timeout_s': 30.0}
+    graph = make_graph(last_tick=10**9, **parameters)
+    recorder = Recorder(
+        context=context,
+        namespace='/glider',
+        use_global_arguments=False,
+        parameter_overrides=[Parameter(name, value=value) for name, value in parameters.items()],
+    )
+    graph.nodes.append(recorder)
+    graph.executor.add_node(recorder)
+    assert graph.spin(lambda: graph.plant.tick == MAX_TICKS_AHEAD) is None
+    on_disk = Header(frame_id='another')
+    on_disk.stamp.sec = 10
+    recorder.recorded.publish(on_disk)
+    until = time.monotonic() + 1.0
+    assert graph.spin(lambda: time.monotonic() > until) is None
+    assert graph.plant.tick == MAX_TICKS_AHEAD
+    on_disk.frame_id = recorder.process
+    recorder.recorded.publish(on_disk)
+    assert graph.spin(lambda: graph.plant.tick == MAX_TICKS_AHEAD + 101) is None
 
 
 def test_number_that_is_not_finite_stops_the_run(make_graph):

@@ -107,7 +107,9 @@ class RecorderNode(TickNode):
                     pass
 
     def on_path(self, raw: bytes) -> None:
-        """Keep the path, under the stamp it carries."""
+        """Keep the path, under the stamp it carries; once in step, no other."""
+        if self.begun and not self.is_replayed():
+            return  # of a second glider
         sec, nanosec = struct.unpack_from('<iI', raw, 4)
         self.order.add_event('path', sec * 1_000_000_000 + nanosec, raw)
         self.has_path = True
@@ -129,7 +131,8 @@ class RecorderNode(TickNode):
         if report.node == messages.PLANT and report.phase in (health.FINISHED, health.FAILED):
             self.over_since_s = time.monotonic()
             self.final_ns = report.stamp_ns if report.phase == health.FINISHED else -1
-            named = report._replace(node=f'{self.get_namespace().rstrip("/")}/{report.node}')
+            name = f'{self.get_namespace().rstrip("/")}/{report.node}'
+            named = report._replace(node=name, process='')
             array = to_cdr(health.report_array(named))
             self.order.add_event('/diagnostics', report.stamp_ns, array)
 
@@ -169,7 +172,7 @@ class RecorderNode(TickNode):
 
     def publish_recorded(self) -> None:
         """Let the plant go on."""
-        header = Header()
+        header = Header(frame_id=self.process)
         header.stamp.sec, header.stamp.nanosec = divmod(self.order.written_ns, 1_000_000_000)
         self.recorded.publish(header)
 

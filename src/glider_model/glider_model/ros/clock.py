@@ -197,6 +197,9 @@ class ClockNode(TickNode):
         return self._recorded_ns < limit_ns
 
     def _keep_recorded(self, message: Header) -> None:
+        recorder = self.reports.get(messages.RECORDER)
+        if recorder is None or message.frame_id != recorder.process:
+            return  # of the recorder of a second glider
         self._recorded_ns = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
 
     def _on_recorded(self, message: Header) -> None:

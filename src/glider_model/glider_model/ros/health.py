@@ -31,6 +31,7 @@ class Report(NamedTuple):
     peer: str = ''  #: node it waits for
     topic: str = ''  #: what it waits for
     level: bytes = OK
+    process: str = ''  #: by which a node knows its peers from those of a second glider
 
 
 def status_array(stamp_ns: int, name: str, level: bytes, message: str, values: dict):
@@ -45,7 +46,9 @@ def status_array(stamp_ns: int, name: str, level: bytes, message: str, values: d
 def report_array(report: Report) -> DiagnosticArray:
     """Message that carries ``report``."""
     values = {'phase': report.phase, 'peer': report.peer, 'topic': report.topic}
-    return status_array(report.stamp_ns, report.node, report.level, report.message, values)
+    array = status_array(report.stamp_ns, report.node, report.level, report.message, values)
+    array.status[0].hardware_id = report.process
+    return array
 
 
 def stamp_of(array: DiagnosticArray) -> int:
@@ -62,7 +65,8 @@ def reports_in(array: DiagnosticArray) -> list[Report]:
 def _report(status: DiagnosticStatus, stamp_ns: int) -> Report:
     values = {pair.key: pair.value for pair in status.values}
     phase, peer, topic = (values.get(key, '') for key in ('phase', 'peer', 'topic'))
-    return Report(status.name, phase, status.message, stamp_ns, peer, topic, status.level)
+    said = (status.name, phase, status.message, stamp_ns, peer, topic, status.level)
+    return Report(*said, status.hardware_id)
 
 
 def end_of_run(array: DiagnosticArray) -> Report | None:

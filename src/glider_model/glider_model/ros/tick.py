@@ -8,10 +8,13 @@ same result every time. Free-running nodes act at 10 Hz on the newest inputs and
 """
 
 import gc
+import os
 import signal
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
+from uuid import uuid4
 
 import rclpy
 from pydantic import Field
@@ -38,8 +41,11 @@ FAREWELL_S = 5.0
 #: Exit codes of a node: bad configuration, and a peer that is missing, late or wrong.
 EXIT_CONFIGURATION, EXIT_PEER = 2, 3
 
-#: Middleware forgets messages of a node that is gone: leave them this time (s) to arrive.
-_LINGER_S = 0.2
+#: Middleware forgets messages of a node that is gone: leave them this time (s) to arrive, and to
+#: be sent again if need be.
+_LINGER_S = 0.3
+#: Where Fast DDS looks for its settings, and ours.
+_FASTDDS, _PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE', Path(__file__).with_name('fastdds.xml')
 
 #: What to do about a second glider.
 ALONE = 'each glider in a ROS domain needs a namespace and a clock of its own'
@@ -124,6 +130,7 @@ class TickNode(Node):
         self.gate = Gate()
         self.inputs: list[Input] = []
         self.outputs: dict[str, tuple[Topic, object]] = {}
+        self.process = uuid4().hex
         self.reports: dict[str, Report] = {}
         events, reports = TOPICS['/diagnostics'], TOPICS['lockstep']
         self._events, self._reports = self._publisher(events), self._publisher(reports)
@@ -204,11 +211,14 @@ class TickNode(Node):
         if report.level != health.OK:
             named = report._replace(node=self.get_fully_qualified_name())
             self.publish_event(health.report_array(named))
-        self._reports.publish(to_cdr(health.report_array(report)))
+        self._reports.publish(to_cdr(health.report_array(report._replace(process=self.process))))
 
     def _on_reports(self, array) -> None:
-        """Keep the newest report of every node."""
+        """Keep the newest report of every node; once in step, of those it is in step with."""
         for report in health.reports_in(array):
+            known = self.reports.get(report.node, report)
+            if self.running and self.ticks.lockstep and report.process != known.process:
+                continue
             self.reports[report.node] = report
             self.on_report(report)
 
@@ -505,6 +515,7 @@ def run(node_type: Callable[[], TickNode], args=None) -> int:
         Exit code: 0 at the end of the run and for SIGINT and SIGTERM, 2 for a bad parameter, 3
         for a peer that is missing, late or wrong.
     """
+    os.environ.setdefault(_FASTDDS, str(_PROFILES))
     try:
         rclpy.init(args=args)
     except Exception as error:
@@ -530,8 +541,7 @@ def run(node_type: Callable[[], TickNode], args=None) -> int:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         if node is not None:
             node.close()
-            if rclpy.ok():
-                time.sleep(_LINGER_S)
+            time.sleep(_LINGER_S)
             node.destroy_node()
         rclpy.try_shutdown()
     return _say(stop)
