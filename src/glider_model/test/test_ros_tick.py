@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes in step: order, exactness, readiness, blame, pause, pace, and the free-running mode."""
 
+import os
+import subprocess
+import sys
 import time
 
 import pytest
@@ -252,6 +255,40 @@ def test_only_its_own_recorder_lets_the_plant_go_on(make_graph, context):
     on_disk.frame_id = recorder.process
     recorder.recorded.publish(on_disk)
     assert graph.spin(lambda: graph.plant.tick == MAX_TICKS_AHEAD + 101) is None
+
+
+INTERRUPTED = """
+import os, signal, sys
+from glider_model.ros.tick import TickNode, run
+
+
+class Interrupted(TickNode):
+    def __init__(self):
+        super().__init__('interrupted')
+        self.wall_timer(0.01, self.act)
+
+    def act(self):
+        os.kill(os.getpid(), signal.SIGNAL)
+        sum(range(1_000_000))  # many chances for an exception
+        print('acted to the end', flush=True)
+
+
+sys.exit(run(Interrupted))
+"""
+
+
+@pytest.mark.parametrize('number', ['SIGINT', 'SIGTERM'])
+def test_signal_does_not_break_off_what_a_node_does(number):
+    """Compiled functions do not stand an exception from a signal handler."""
+    done = subprocess.run(
+        [sys.executable, '-c', INTERRUPTED.replace('SIGNAL', number)],
+        env={'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **os.environ},
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT_S,
+    )
+    assert (done.returncode, done.stderr) == (0, '')
+    assert done.stdout.startswith('acted to the end')
 
 
 def test_number_that_is_not_finite_stops_the_run(make_graph):

@@ -516,6 +516,8 @@ def run(node_type: Callable[[], TickNode], args=None) -> int:
         for a peer that is missing, late or wrong.
     """
     os.environ.setdefault(_FASTDDS, str(_PROFILES))
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _leave_to_rclpy)
     try:
         rclpy.init(args=args)
     except Exception as error:
@@ -527,7 +529,7 @@ def run(node_type: Callable[[], TickNode], args=None) -> int:
         with make_executor() as executor:
             executor.add_node(node)
             executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
     except Stop as reason:
         stop = reason
@@ -545,6 +547,14 @@ def run(node_type: Callable[[], TickNode], args=None) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return _say(stop)
+
+
+def _leave_to_rclpy(number, frame) -> None:
+    """Let rclpy, which hears SIGINT too, end the node at its next turn, as it does for SIGTERM.
+
+    A KeyboardInterrupt may come while numba makes the tuples that a step returns, and numba goes
+    on without them: a segmentation fault.
+    """
 
 
 def _say(stop: Stop) -> int:
