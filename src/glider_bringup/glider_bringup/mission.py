@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from glider_bringup.direct import MissionParams, MissionState, fly_blocks
 from glider_bringup.figure import draw_run
+from glider_bringup.interrupts import interrupts_noted
 from glider_bringup.page import FlownRun, write_page
 from glider_bringup.report import report_page
 from glider_bringup.ros.bag import BagWriter
@@ -158,14 +159,15 @@ def fly_direct(
     takers = [taker for taker in (scorer, tracer, bag) if taker is not None]
     status, reason, ticks = 'completed', '', 0
     start = time.perf_counter()
-    try:
+    with interrupts_noted() as interrupts:
         for log in fly_blocks(state, params):
             for taker in takers:
                 taker.add(log)
             ticks += len(log)
             progress(ticks, float(-log[-1, 2]))
-    except KeyboardInterrupt:
-        status, reason = 'aborted', 'stopped by SIGINT'
+            if interrupts:
+                status, reason = 'aborted', 'stopped by SIGINT'
+                break
     wall_time_s = time.perf_counter() - start
     if bag and status == 'completed':
         bag.finish()

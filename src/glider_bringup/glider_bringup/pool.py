@@ -23,6 +23,7 @@ from distributed import Client, Future, LocalCluster, TimeoutError, wait
 from distributed.client import ClosedClientError
 from distributed.scheduler import KilledWorker
 
+from glider_bringup.interrupts import interrupts_noted
 from glider_model.kernel import source_digest
 from glider_model.settings import ConfigurationError
 
@@ -197,14 +198,12 @@ def _interrupts_held_back() -> Iterator[None]:
     inherit that it is blocked; only multiprocessing's tracker would unblock it, when it starts.
     """
     resource_tracker.ensure_running()
-    interrupts = []
-    handler = signal.signal(signal.SIGINT, lambda *_: interrupts.append(True))
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        signal.signal(signal.SIGINT, handler)
+    with interrupts_noted() as interrupts:
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     if interrupts:
         raise KeyboardInterrupt
 

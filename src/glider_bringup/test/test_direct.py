@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Direct engine: the same bits however it is run, and the symmetries of the world."""
 
+import ast
 import json
 import math
 import subprocess
@@ -241,3 +242,31 @@ def test_mission_of_one_dive_ends_by_itself_at_the_surface():
     assert len(log) * TICK_S < 3000.0
     assert np.max(depth) == pytest.approx(60.0, abs=3.0)
     assert np.all(depth[-600:] < 1.5)
+
+
+INTERRUPTED = """
+import signal
+from pathlib import Path
+
+from glider_bringup.mission import fly_direct
+from glider_bringup.scenario import load_scenario
+
+scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 36000.0})
+flown = []
+signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+for shot in range(10):
+    began = []
+    if shot:  # the first one compiles
+        signal.setitimer(signal.ITIMER_REAL, 0.01)
+    flight, _ = fly_direct(scenario, Path(), False, lambda ticks, depth_m: began.append(ticks))
+    flown.append((flight.status, len(began)))
+print(flown)
+"""
+
+
+def test_ctrl_c_within_compiled_code_ends_the_flight_as_aborted():
+    done = subprocess.run(
+        [sys.executable, '-c', INTERRUPTED], capture_output=True, text=True, timeout=300
+    )
+    assert (done.returncode, done.stderr) == (0, '')
+    assert ast.literal_eval(done.stdout) == [('completed', 10), *9 * [('aborted', 1)]]
