@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def interrupts_noted() -> Iterator[list[bool]]:
-    """Ctrl-C is noted in the list that this yields, and not raised.
+    """Ctrl-C is noted in the list that this yields, and not raised; a second one is.
 
     A compiled function does not stand an exception from a signal handler: numba goes on without
     the tuples that it was about to make, and the process ends with a segmentation fault.
@@ -21,7 +21,13 @@ def interrupts_noted() -> Iterator[list[bool]]:
     if not is_main or not callable(handler):  # another thread hears it, or nobody
         yield noted
         return
-    signal.signal(signal.SIGINT, lambda *_: noted.append(True))
+
+    def note(number, frame) -> None:
+        if noted:
+            handler(number, frame)
+        noted.append(True)
+
+    signal.signal(signal.SIGINT, note)
     try:
         yield noted
     finally:
