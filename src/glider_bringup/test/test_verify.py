@@ -5,6 +5,8 @@
 import json
 import shutil
 import struct
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -438,6 +440,39 @@ def test_command_names_a_difference(altered, recorded):
     done = run(altered(messages))
     assert done.exit_code == 1
     assert 'first difference at tick 77 (t = 7.7 s), wrench' in done.stdout
+
+
+INTERRUPTED = """
+import signal, sys
+from glider_bringup.blocks import BLOCKS
+from glider_bringup.cli import app
+
+
+def shoot(compute):
+    def run(*arguments):
+        signal.setitimer(signal.ITIMER_REAL, 1e-4)
+        return compute(*arguments)
+
+    return run
+
+
+for kind in BLOCKS:
+    kind.run = shoot(kind.run)
+signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+app(['verify', *sys.argv[1:]])
+"""
+
+
+@pytest.mark.parametrize('block', ['plant', 'control'])
+def test_ctrl_c_within_compiled_code_is_answered(short_run, block):
+    done = subprocess.run(
+        [sys.executable, '-c', INTERRUPTED, short_run, '--only', block],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert (done.returncode, done.stdout) == (130, '')
+    assert done.stderr.strip().endswith('stopped by SIGINT')
 
 
 @pytest.mark.parametrize(

@@ -44,6 +44,7 @@ def verify(
 
     Exit code 1, and the first tick, topic and field that differ, unless all of them are identical.
     """
+    from glider_bringup.interrupts import interrupts_at
     from glider_bringup.mcap_reader import Bag
     from glider_bringup.ros import verify as work
     from glider_bringup.ros.recording import Recording, read_told
@@ -54,7 +55,8 @@ def verify(
             bag = Bag(run)
             told = read_told(bag, run, settings, Path(scratch))
             recording = Recording(bag, namespace, lambda share: update('reading', share))
-            verdicts = list(work.verify(recording, told, wanted, update))
+            with interrupts_at(update) as update:
+                verdicts = list(work.verify(recording, told, wanted, update))
     except KeyboardInterrupt:
         messages.print('stopped by SIGINT', style='red')
         raise typer.Exit(EXIT_INTERRUPTED) from None
