@@ -121,10 +121,11 @@ def _summary(stream: IO[bytes]) -> Summary | None:
 
 
 def _messages(file: Path, names: Iterable[str]) -> Iterator[tuple[str, int, bytes]]:
-    """Name, log time (ns) and payload of the messages on some topics, in file order.
+    """Name, log time (ns) and payload of the messages on some topics, chunk by chunk.
 
-    A file whose writer was killed has no summary and ends anywhere; it is read up to its last
-    whole chunk.
+    In order of time, or in that of the file if its writer was killed: such a file has no summary
+    and ends anywhere; it is read up to its last whole chunk. With a summary it is the order of
+    time that keeps mcap from reading all chunks before it gives the first message.
     """
     wanted = set(names)
     with file.open('rb') as stream:
@@ -139,7 +140,8 @@ def _messages(file: Path, names: Iterable[str]) -> Iterator[tuple[str, int, byte
                 if _known_name(channel.topic) in wanted
             ]
         try:
-            for _, channel, message in reader.iter_messages(topics, log_time_order=False):
+            in_order = summary is not None
+            for _, channel, message in reader.iter_messages(topics, log_time_order=in_order):
                 name = _known_name(channel.topic)
                 if name in wanted:
                     yield name, message.log_time, message.data
