@@ -3,6 +3,8 @@
 """A bag is scored and drawn without anything that ``./glider run`` adds to it."""
 
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -159,3 +161,30 @@ def test_what_holds_no_run_is_refused(tmp_path, name, words):
         with pytest.raises(ConfigurationError, match=words):
             use(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
+
+
+PEAK = """
+import sys
+from pathlib import Path
+from glider_bringup.ros.bag_log import read_blocks
+
+def peak_mb():
+    lines = Path('/proc/self/status').read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith('VmHWM:')) / 1000.0
+
+blocks, before = read_blocks(Path(sys.argv[1])), peak_mb()
+print(next(blocks).shape[0], peak_mb() - before)
+"""
+
+
+def test_a_long_bag_is_read_piece_by_piece(tmp_path):
+    """The first hour of three takes less memory than all messages do."""
+    scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 10800.0})
+    folder = mission.make_run_folder(scenario, tmp_path / 'run')
+    mission.fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
+    command = [sys.executable, '-c', PEAK, folder]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+    ticks, grown_mb = done.stdout.split()
+    assert int(ticks) == 36000
+    payloads_mb = 3 * 36000 * 2360 / 1e6  # docs/scale.md, t
+    assert float(grown_mb) < 0.5 * payloads_mb
