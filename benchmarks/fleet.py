@@ -19,13 +19,12 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-from glider_bringup.mission import fly_nodes, make_run_folder
-from glider_bringup.scenario import load_scenario
+from nodes import fly_once
+
 from glider_model.signals import TICK_S
 
-SCENARIO, DURATION_S = 'current_8deg', 15.0
+DURATION_S = 15.0
 COUNTS = 5, 10, 20
 #: The flight counts from here on (s); before, things are still said once.
 _SETTLED_S = 5.0
@@ -130,12 +129,7 @@ def wire() -> dict:
     def note(tick: int, depth_m: float) -> None:
         said.append((tick * TICK_S, _sent_bytes()))
 
-    scenario = load_scenario(SCENARIO, {'dives': 0, 'duration_s': DURATION_S})
-    with TemporaryDirectory() as parent:
-        folder = make_run_folder(scenario, Path(parent) / 'run')
-        flight, _ = fly_nodes(scenario, folder, 1.0, note, lambda line: None)
-    if flight.status != 'completed':
-        raise RuntimeError(f'the flight was aborted: {flight.reason}')
+    fly_once(DURATION_S, 1.0, note)
     steady = [one for one in said if _SETTLED_S < one[0] < DURATION_S]
     (first_s, first), (last_s, last) = steady[0], steady[-1]
     return {

@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from glider_bringup.direct import COLUMNS, fly_blocks
-from glider_bringup.mission import Flight, fly_nodes, make_run_folder, mission_of
+from glider_bringup.mission import Flight, Progress, fly_nodes, make_run_folder, mission_of
 from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter
 from glider_bringup.runner import domain_id, node_environment
 from glider_bringup.scenario import load_scenario
@@ -99,6 +99,17 @@ def floor_ticks_per_s() -> float:
     return float(printed)
 
 
+def fly_once(duration_s: float, speed: float, on_progress: Progress) -> Flight:
+    """Fly the scenario over topics, at ``speed`` times real time (0.0: as fast as possible)."""
+    scenario = load_scenario(SCENARIO, {'dives': 0, 'duration_s': duration_s})
+    with TemporaryDirectory() as parent:
+        folder = make_run_folder(scenario, Path(parent) / 'run')
+        flight, _ = fly_nodes(scenario, folder, speed, on_progress, lambda line: None)
+    if flight.status != 'completed':
+        raise RuntimeError(f'the flight over topics was aborted: {flight.reason}')
+    return flight
+
+
 def fly_over_topics(
     duration_s: float, on_tick: Callable[[int], None] = lambda tick: None
 ) -> tuple[float, Flight]:
@@ -113,12 +124,7 @@ def fly_over_topics(
             said.append((tick, time.perf_counter()))
             on_tick(tick)
 
-    scenario = load_scenario(SCENARIO, {'dives': 0, 'duration_s': duration_s})
-    with TemporaryDirectory() as parent:
-        folder = make_run_folder(scenario, Path(parent) / 'run')
-        flight, _ = fly_nodes(scenario, folder, 0.0, note, lambda line: None)
-    if flight.status != 'completed':
-        raise RuntimeError(f'the flight over topics was aborted: {flight.reason}')
+    flight = fly_once(duration_s, 0.0, note)
     (first, start_s), (last, end_s) = said[0], said[-2]
     return (last - first) / (end_s - start_s), flight
 

@@ -67,27 +67,25 @@ def test_a_floor_with_other_arithmetic_is_refused(floor, library, monkeypatch):
         floor.ticks_compared(library, state, params)
 
 
-def test_bench_prints_one_object_of_figures():
+def bench(section: str) -> dict:
+    """Figures of a section, as the command prints them."""
     done = subprocess.run(
-        [sys.executable, FOLDER / 'bench.py', '--only', 'memory', '--json'],
+        [sys.executable, FOLDER / 'bench.py', '--only', section, '--json'],
         capture_output=True,
         text=True,
         timeout=300,
     )
     assert done.returncode == 0, done.stderr
-    figures = json.loads(done.stdout)
+    return json.loads(done.stdout)
+
+
+def test_bench_prints_one_object_of_figures():
+    figures = bench('memory')
     assert figures['mission_30h_peak_rss_mb'] > figures['imported_rss_mb'] > 30.0
 
 
 def test_storage_of_a_sweep_fits_the_memory_that_its_limit_is_for():
-    done = subprocess.run(
-        [sys.executable, FOLDER / 'bench.py', '--only', 'storage', '--json'],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
-    figures = json.loads(done.stdout)
+    figures = bench('storage')
     assert figures['result_rss_mb'] < figures['result_peak_rss_mb']
     assert figures['result_largest_peak_rss_mb'] < 600.0
     assert figures['netcdf_bytes_per_cell'] < figures['journal_bytes_per_cell']

@@ -76,7 +76,11 @@ def number(option: str, text: str, word: str, low: float, high: float) -> float:
 
 @contextmanager
 def progress(scenario: Scenario, ticks: int):
-    """Progress bar with simulated time, real-time factor and depth; yields its update."""
+    """Progress bar of a flight: simulated time, real-time factor and depth.
+
+    Yields what is to be called in flight, with ticks and depth (m), and what while the recording
+    is read back, with ticks.
+    """
     bar = Progress(
         TextColumn('{task.description}'),
         BarColumn(),
@@ -89,7 +93,7 @@ def progress(scenario: Scenario, ticks: int):
     )
     task = bar.add_task('starting', total=ticks, state='')
 
-    def update(flown: int, depth_m: float) -> None:
+    def flying(flown: int, depth_m: float) -> None:
         elapsed = bar.tasks[0].elapsed or 0.0
         factor = flown * TICK_S / elapsed if elapsed > 0.0 else 0.0
         bar.update(
@@ -99,8 +103,12 @@ def progress(scenario: Scenario, ticks: int):
             state=f'{flown * TICK_S:,.0f} s  x{factor:,.0f}  depth {depth_m:6.1f} m',
         )
 
+    def reading(read: int) -> None:
+        state = 'of the recording'
+        bar.update(task, completed=min(read, ticks), description='scoring', state=state)
+
     with bar:
-        yield update
+        yield flying, reading
 
 
 @contextmanager

@@ -189,11 +189,13 @@ def fly_nodes(
     on_log: Callable[[str], None],
     namespace: str | None = None,
     tracer: Tracer | None = None,
+    on_read: Callable[[int], None] = lambda ticks: None,
 ) -> tuple[Flight, dict]:
     """Fly over node processes and topics; the score is read back from the bag.
 
     ``speed`` is in times real time, 0.0 being as fast as possible; ``on_log`` gets each line that
-    a node prints. Nodes in a ``namespace`` of their own have their clock in it.
+    a node prints, ``on_read`` the ticks that have been read back. Nodes in a ``namespace`` of
+    their own have their clock in it.
     """
     attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)
     parameters = node_parameters(scenario, speed=speed, record_to=folder, attachments=attachments)
@@ -211,7 +213,7 @@ def fly_nodes(
     scorer = _scorer(scenario)
     recorded, lost = 0, 0
     if has_bag(folder):  # else it ended before the recorder was up
-        _replay(folder, scorer, tracer)
+        _replay(folder, scorer, tracer, on_read)
         recorded, lost = recorded_and_lost(folder, completed)
     status = 'completed' if completed else 'aborted'
     flight = Flight(status, result.reason, result.flight_s, recorded, lost)

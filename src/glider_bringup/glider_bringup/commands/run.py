@@ -156,15 +156,15 @@ def _fly(
     folder = mission.make_run_folder(scenario, out)
     messages.print(f'{scenario.name}: {scenario.description}')
     tracer = mission.make_tracer(scenario) if report else None
-    with progress(scenario, mission.planned_ticks(scenario)) as update:
+    with progress(scenario, mission.planned_ticks(scenario)) as (flying, reading):
         if engine is Engine.nodes:
             if begin_view:
-                update = _after_first(begin_view, update)
+                flying = _after_first(begin_view, flying)
             flight, scores = mission.fly_nodes(
-                scenario, folder, rate, update, _print_log, namespace, tracer
+                scenario, folder, rate, flying, _print_log, namespace, tracer, reading
             )
         else:
-            flight, scores = mission.fly_direct(scenario, folder, bag, update, tracer)
+            flight, scores = mission.fly_direct(scenario, folder, bag, flying, tracer)
     card = mission.scorecard(scenario, engine.value, flight, scores)
     mission.write_score(folder, card)
     if tracer:
