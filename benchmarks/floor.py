@@ -18,9 +18,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from glider_bringup import direct
-from glider_control import adaptive, allocation, control, steering
+from glider_control import adaptive, allocation, control
+from glider_control import steering as roll
 from glider_guidance import guidance, path, profile
-from glider_model import command_filter, frames, plant, polar, rigid_body, signals
+from glider_model import command_filter, frames, plant, polar, rigid_body, signals, steering
 
 SOURCES = Path(__file__).parent / 'floor'
 #: As fast as IEEE arithmetic in source order allows: no -ffast-math, no fused multiply-add. With
@@ -28,8 +29,8 @@ SOURCES = Path(__file__).parent / 'floor'
 FLAGS = ['-std=c99', '-O3', '-march=native', '-ffp-contract=off']
 
 _MODULES = (
-    *(signals, frames, command_filter, polar, rigid_body, plant),
-    *(path, profile, guidance, steering, allocation, adaptive, control, direct),
+    *(signals, frames, command_filter, polar, rigid_body, plant, steering),
+    *(path, profile, guidance, roll, allocation, adaptive, control, direct),
 )
 #: What the steps hand to each other.
 _SIGNALS = (

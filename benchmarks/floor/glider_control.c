@@ -1,46 +1,9 @@
 /* Copyright 2026 The glider stack authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * glider_control in C99: measurement, allocation, steering, adaptive law, control.
+ * glider_control in C99: allocation, steering, adaptive law, control.
  * Left out: the PID law.
  */
-
-/* ----------------------------------------------------------------------------- measurement */
-
-static inline double follow(double state, double measured, double rate, double share, double dt)
-{
-    double predicted = state + dt * rate;
-    return wrap_angle(predicted + share * wrap_angle(measured - predicted));
-}
-
-static inline Measured measure(
-    Measured state, const Odometry *odometry, bool first, double time_constant, double dt)
-{
-    double q_w = odometry->q_w, q_x = odometry->q_x, q_y = odometry->q_y, q_z = odometry->q_z;
-    Euler attitude = euler_from_quaternion(q_w, q_x, q_y, q_z);
-    double phi = attitude.phi, theta = attitude.theta, psi = attitude.psi;
-    double down
-        = rotate_to_ned(q_w, q_x, q_y, q_z, odometry->u, odometry->v, odometry->w).z;
-    double p = odometry->p, q = odometry->q, r = odometry->r;
-    double s_phi = sin(phi), c_phi = cos(phi);
-    double c_theta = max(0.1, cos(theta));
-    double psi_dot = (s_phi * q + c_phi * r) / c_theta;
-    double theta_dot = c_phi * q - s_phi * r;
-    double phi_dot = p + sin(theta) * psi_dot;
-    if (first)
-        return (Measured){phi, theta, psi, phi_dot, theta_dot, psi_dot, down};
-    double share = dt / (time_constant + dt);
-    double fast = dt / (0.25 * time_constant + dt);
-    return (Measured){
-        follow(state.phi, phi, phi_dot, share, dt),
-        follow(state.theta, theta, theta_dot, share, dt),
-        follow(state.psi, psi, psi_dot, share, dt),
-        state.phi_dot + fast * (phi_dot - state.phi_dot),
-        state.theta_dot + fast * (theta_dot - state.theta_dot),
-        state.psi_dot + fast * (psi_dot - state.psi_dot),
-        state.vertical_rate + fast * (down - state.vertical_rate),
-    };
-}
 
 /* ------------------------------------------------------------------------------ allocation */
 
@@ -84,57 +47,26 @@ static inline Moments moments(
 
 /* -------------------------------------------------------------------------------- steering */
 
-static inline SteeringState learn_steering(
-    const SteeringState *state, double bank, double bend, double roll_rate, double yaw_rate,
-    const SteeringParams *params, double dt)
-{
-    const double *p = state->p;
-    double bb = p[0], bc = p[1], bk = p[2], bd = p[3];
-    double cc = p[4], ck = p[5], cd = p[6], kk = p[7], kd = p[8], dd = p[9];
-    bb += params->drift * dt;
-    cc += params->bend_drift * dt;
-    kk += params->kick_drift * dt;
-    dd += params->disturbance_drift * dt;
-    double g_b = bb * bank + bc * bend + bk * roll_rate + bd;
-    double g_c = bc * bank + cc * bend + ck * roll_rate + cd;
-    double g_k = bk * bank + ck * bend + kk * roll_rate + kd;
-    double g_d = bd * bank + cd * bend + kd * roll_rate + dd;
-    double spread = g_b * bank + g_c * bend + g_k * roll_rate + g_d + params->noise / dt;
-    double gain
-        = (yaw_rate - state->b * bank - state->c * bend - state->k * roll_rate - state->d)
-        / spread;
-    return (SteeringState){
-        state->b + g_b * gain,
-        state->c + g_c * gain,
-        state->k + g_k * gain,
-        state->d + g_d * gain,
-        {
-            bb - g_b * g_b / spread,
-            bc - g_b * g_c / spread,
-            bk - g_b * g_k / spread,
-            bd - g_b * g_d / spread,
-            cc - g_c * g_c / spread,
-            ck - g_c * g_k / spread,
-            cd - g_c * g_d / spread,
-            kk - g_k * g_k / spread,
-            kd - g_k * g_d / spread,
-            dd - g_d * g_d / spread,
-        },
-    };
-}
-
 static inline double caution(const SteeringState *state)
 {
     double square = state->b * state->b;
     return square / (square + max(0.0, state->p[0] - SURE_SHARE * SURE_SHARE * square));
 }
 
+static inline double sure_disturbance(const SteeringState *state)
+{
+    double square = state->d * state->d;
+    return state->d * square / (square + state->p[9]);
+}
+
 static inline double roll_to_kick(const SteeringState *state, double error)
 {
+    double sine = state->k / (state->k * state->k + state->p[7]);
+    if (state->is_kicked)
+        return sine * error;
     if (state->b * state->k <= 0.0)
         return 0.0;
-    double small = min(KICK_ERROR, max(-KICK_ERROR, error));
-    return (1.0 - caution(state)) * small * state->k / (state->k * state->k + state->p[7]);
+    return (1.0 - caution(state)) * sine * min(KICK_ERROR, max(-KICK_ERROR, error));
 }
 
 /* Returns the sine of roll; the largest one of use goes to most. */
@@ -183,32 +115,6 @@ static inline Channel channel_step(
     return (Channel){filtered, xi, zeta, error - xi, k2, k2 - zeta};
 }
 
-/* Changes dive or climb, bank, bend, both rates and steady_s of the state. */
-static inline void learn_phase(
-    AdaptiveState *state, const Measured *measured, double speed, const AdaptiveParams *params,
-    double dt)
-{
-    const SteeringParams *steering = &params->steering;
-    double ratio = max(speed, LEARN_SPEED) / STEERING_SPEED;
-    bool gliding = fabs(measured->vertical_rate) > LEARN_VERTICAL_RATE && speed > LEARN_SPEED;
-    double steady_s = gliding ? state->steady_s + dt : 0.0;
-    double share = steady_s > dt ? dt / (steering->smoothing_s + dt) : 1.0;
-    double sine = sin(measured->phi);
-    double bank = state->bank + share * (sine * ratio - state->bank);
-    double bend = state->bend + share * (sine * sine * sine * ratio - state->bend);
-    double roll_rate = state->roll_rate + share * (measured->phi_dot - state->roll_rate);
-    double yaw_rate = state->yaw_rate + share * (measured->psi_dot - state->yaw_rate);
-    if (steady_s > steering->after_s) {
-        SteeringState *phase = measured->vertical_rate > 0.0 ? &state->dive : &state->climb;
-        *phase = learn_steering(phase, bank, bend, roll_rate, yaw_rate, steering, dt);
-    }
-    state->bank = bank;
-    state->bend = bend;
-    state->roll_rate = roll_rate;
-    state->yaw_rate = yaw_rate;
-    state->steady_s = steady_s;
-}
-
 /* Returns the roll command and changes the disturbance. */
 static inline double bank_to_turn(
     const SteeringState *steering, double *disturbance, const Measured *measured,
@@ -216,25 +122,30 @@ static inline double bank_to_turn(
     double dt)
 {
     double limit = sin(params->roll_limit);
-    double ratio = max(speed, LEARN_SPEED) / STEERING_SPEED;
+    double ratio = speed_ratio(speed);
     double effectiveness = fabs(steering->b) * ratio;
     bool is_known = steering->p[0] < steering->b * steering->b;
     double bandwidth = effectiveness * limit / SATURATING_ERROR;
     if (is_known)
-        bandwidth = KICK_BANDWIDTH * effectiveness / max(fabs(steering->k), SMALLEST_KICK);
+        bandwidth
+            = (steering->b * steering->k < 0.0 ? BANDWIDTH_AGAINST_KICK : BANDWIDTH_WITH_KICK)
+            * effectiveness / max(fabs(steering->k), SMALLEST_KICK);
     double share = min(1.0, bandwidth / params->heading_kp);
     double asked = share * reference->psi_dot;
     double most;
-    double turning = roll_to_turn(steering, asked - steering->d, ratio, limit, &most);
+    double turning
+        = roll_to_turn(steering, asked - sure_disturbance(steering), ratio, limit, &most);
     double roll_left = measured->phi - asin(turning);
     double error = wrap_angle(reference->psi - measured->psi + steering->k * roll_left);
     double psi_dot = measured->psi_dot - steering->k * measured->phi_dot;
     double turn = asked + share * params->heading_kp * error
         + share * params->heading_kd * (reference->psi_dot - psi_dot) - *disturbance;
     double sine = roll_to_turn(steering, turn, ratio, limit, &most);
+    if (steering->is_kicked)
+        sine = 0.0;
     if (learning)
         sine = min(limit, max(-limit, sine + roll_to_kick(steering, error)));
-    if (learning && is_known && fabs(sine) < most) {
+    if (learning && is_known && !steering->is_kicked && fabs(sine) < most) {
         double learnt = min(DISTURBANCE_ERROR, max(-DISTURBANCE_ERROR, error));
         double moved = *disturbance - dt * share * share * params->heading_ki * learnt;
         *disturbance = min(DISTURBANCE_MAX, max(-DISTURBANCE_MAX, moved));
@@ -247,16 +158,17 @@ static inline Moments adaptive_step(
     double alpha, double m_b, Moments applied, bool roll_held, bool pitch_held,
     const AdaptiveParams *params, double dt)
 {
-    learn_phase(state, measured, speed, params, dt);
-    bool learning = state->steady_s > LEARN_AFTER_S;
+    Steering *steering = &state->steering;
+    learn(steering, measured, speed, &params->steering, dt);
+    bool learning = steering->steady_s > LEARN_AFTER_S;
     double roll_command = 0.0;
-    if (state->steady_s > 0.0 && measured->vertical_rate > 0.0)
+    if (steering->steady_s > 0.0 && measured->vertical_rate > 0.0)
         roll_command = bank_to_turn(
-            &state->dive, &state->disturbance_dive, measured, reference, speed, learning,
+            &steering->dive, &state->disturbance_dive, measured, reference, speed, learning,
             params, dt);
-    else if (state->steady_s > 0.0)
+    else if (steering->steady_s > 0.0)
         roll_command = bank_to_turn(
-            &state->climb, &state->disturbance_climb, measured, reference, speed, learning,
+            &steering->climb, &state->disturbance_climb, measured, reference, speed, learning,
             params, dt);
     Filtered roll = filter_command(state->roll, roll_command, params->roll_filter, dt);
 
@@ -322,7 +234,8 @@ static inline Adaptation adaptation(const AdaptiveState *state, const AdaptivePa
     const double *th_p = state->roll_theta, *th_q = state->pitch_theta;
     return (Adaptation){
         th_p[0], th_p[1], th_p[2], th_q[0], th_q[1], th_q[2], th_q[3],
-        state->dive.b, state->disturbance_dive, state->climb.b, state->disturbance_climb,
+        state->steering.dive.b, state->disturbance_dive, state->steering.climb.b,
+        state->disturbance_climb,
         v_1, v_2,
     };
 }
@@ -343,19 +256,23 @@ static inline double hold(double command, double last, double band, double limit
 
 /* Returns the net heaviness and changes the trim. */
 static inline double vertical_rate_law(
-    double *trim, const Measured *measured, const Reference *reference, const Joints *joints,
+    Trim *trim, const Measured *measured, const Reference *reference, const Joints *joints,
     const ControlParams *params, double dt)
 {
-    double forward = glide_net_heaviness(reference->theta, reference->v_d, &params->polar);
+    double sign = reference->v_d > 0.0 ? 1.0 : -1.0;
+    double wanted = glide_net_heaviness(reference->theta, reference->v_d, &params->polar)
+        + sign * trim->drag;
     double error = reference->v_d - measured->vertical_rate;
     double limit = params->allocation.m_b_max;
     bool steady
-        = fabs(error) < VERTICAL_RATE_WINDOW && fabs(joints->m_b - forward - *trim) < 0.05;
+        = fabs(error) < VERTICAL_RATE_WINDOW && fabs(joints->m_b - wanted - trim->ballast) < 0.05;
     if (steady) {
-        *trim += dt * params->buoyancy_ki * error;
-        *trim = min(params->buoyancy_trim_max, max(-params->buoyancy_trim_max, *trim));
+        double most = params->buoyancy_trim_max;
+        trim->ballast
+            = min(most, max(-most, trim->ballast + dt * params->buoyancy_ki * error));
+        trim->drag = min(most, max(-most, trim->drag + dt * params->drag_ki * error * sign));
     }
-    return min(limit, max(-limit, forward + *trim));
+    return min(limit, max(-limit, wanted + trim->ballast));
 }
 
 static inline ControlOutput control_step(
@@ -375,7 +292,7 @@ static inline ControlOutput control_step(
         fabs(last.mu) >= limits->mu_max, fabs(last.x_p) >= limits->x_p_max,
         &params->adaptive, dt);
     double m_b
-        = vertical_rate_law(&state->buoyancy_trim, &measured, reference, joints, params, dt);
+        = vertical_rate_law(&state->trim, &measured, reference, joints, params, dt);
     double mu = allocate_roll(tau.roll, measured.phi, measured.theta, limits);
     double x_p = allocate_pitch(tau.pitch, joints->mu, measured.phi, measured.theta, limits);
 

@@ -232,7 +232,7 @@ static inline double turn_offset(
 {
     double before = smooth((LEAD_FROM_S - to_turn_s) / (LEAD_FROM_S - LEAD_TO_S));
     double after = 1.0 - smooth(since_turn_s / RETURN_S);
-    return 0.5 * (past * after - coming * before);
+    return past * after - coming * before;
 }
 
 /* --------------------------------------------------------------------------- line of sight */
@@ -265,9 +265,10 @@ static inline double target_rate(
     return min(rate_max, max(0.0, (progress + delta * e1) / slope));
 }
 
-/* Progress and whether the course is feasible; guidance does not use the heading. */
-static inline double crab_progress(
-    double course, double speed, double current_n, double current_e, bool *feasible)
+/* Returns the heading; the progress, and whether the course is feasible, go to the pointers. */
+static inline double crab_heading(
+    double course, double speed, double current_n, double current_e, double *progress,
+    bool *feasible)
 {
     double sine = sin(course), cosine = cos(course);
     double across = -sine * current_n + cosine * current_e;
@@ -275,9 +276,9 @@ static inline double crab_progress(
     double ratio = across / max(speed, 1e-3);
     double held = min(1.0, max(-1.0, ratio));
     double crab = asin(held);
-    double progress = speed * cos(crab) + along_course;
-    *feasible = fabs(ratio) <= 1.0 && progress > 0.0;
-    return progress;
+    *progress = speed * cos(crab) + along_course;
+    *feasible = fabs(ratio) <= 1.0 && *progress > 0.0;
+    return wrap_angle(course - crab);
 }
 
 static inline double approach_heading(
@@ -333,24 +334,18 @@ static void start(
     state->profile.lead_down_s = 0.0;
     state->heading = (Filtered){psi, 0.0};
     state->pitch = (Filtered){theta, 0.0};
-    state->speed = glide_horizontal_speed(
-        -params->profile.pitch, params->profile.glide_rate, &params->polar);
+    state->speed = params->profile_speed;
     state->heading_command = psi;
     state->drift = 0.0;
     state->infeasible_ticks = 0;
-    state->lag_dive = 0.0;
-    state->lag_climb = 0.0;
 }
 
-static inline double heading_lag(double lag, double error, double dt)
+static inline double lookahead_stretch(const SteeringState *steering, double lookahead_s)
 {
-    double counted = min(LAG_COUNTED, fabs(error));
-    return lag + dt / LAG_MEMORY_S * (counted * counted - lag);
-}
-
-static inline double lag_stretch(double lag)
-{
-    return 1.0 + min(1.0, max(0.0, (sqrt(lag) - LAG_FROM) / (LAG_TO - LAG_FROM)));
+    if (lookahead_s <= 0.0)
+        return 1.0;
+    double needed_s = LOOKAHEAD_OVER_ZERO / followed_frequency(steering);
+    return min(LOOKAHEAD_STRETCH_MAX, max(1.0, needed_s / lookahead_s));
 }
 
 static inline GuidanceOutput guidance_step(
@@ -380,6 +375,21 @@ static inline GuidanceOutput guidance_step(
     double rate_target;
     double pitch_target = profile_targets(stage, ground.z, &params->profile, &rate_target);
 
+    /* what it can follow */
+    Measured measured = measure(state->measured, odometry, state->tick == 0, ATTITUDE_S, dt);
+    double alpha;
+    double measured_speed
+        = glide_speed(measured.theta, measured.vertical_rate, &params->polar, &alpha);
+    Steering steering = state->steering;
+    learn(&steering, &measured, measured_speed, &params->steering, dt);
+    double stretch = lookahead_stretch(&steering.dive, params->lookahead_s);
+    double next_stretch = lookahead_stretch(&steering.climb, params->lookahead_s);
+    if (rate_target < 0.0) {
+        double other = stretch;
+        stretch = next_stretch;
+        next_stretch = other;
+    }
+
     /* speed through the water and current */
     bool settled = is_gliding(stage) && profile.ticks * dt > SETTLED_S;
     bool valid = settled && fabs(theta) > MODEL_PITCH && fabs(ground.z) > MODEL_VERTICAL_RATE
@@ -392,44 +402,49 @@ static inline GuidanceOutput guidance_step(
     if (valid)
         speed += dt / SPEED_FILTER_S * (model_speed - speed);
 
-    /* direction to fly */
     bool surfaced
         = stage == WAITING_ON_SURFACE || stage == SURFACE_PREPARATION || stage == SURFACING;
-    double lag_dive = state->lag_dive, lag_climb = state->lag_climb;
-    if (is_gliding(stage) && profile.ticks * dt > LAG_AFTER_S) {
-        double heading_error = wrap_angle(psi - state->heading.value);
-        if (rate_target > 0.0)
-            lag_dive = heading_lag(lag_dive, heading_error, dt);
-        else
-            lag_climb = heading_lag(lag_climb, heading_error, dt);
-    }
-    double stretch = lag_stretch(rate_target > 0.0 ? lag_dive : lag_climb);
+    bool turns_over = !is_gliding(stage) && !surfaced;
+    bool begins_to_turn_over = turns_over && is_gliding(state->profile.stage);
+    if (params->compensates && begins_to_turn_over)
+        speed = params->profile_speed;
+
+    /* direction to fly */
+    double lookahead_s = stretch * params->lookahead_s;
     double lookahead = max(
         params->lookahead,
-        stretch * params->lookahead_s * sqrt(ground.x * ground.x + ground.y * ground.y));
+        lookahead_s * sqrt(ground.x * ground.x + ground.y * ground.y));
     double drift_past = state->drift;
     double offset = 0.0;
+    bool is_nearly_over = false;
     if (params->leads) {
         double across = observer.current_e * cos(gamma_d) - observer.current_n * sin(gamma_d);
         double coming = across * turn_lead_s(&profile, &params->profile);
         if (surfaced)
             drift_past = 0.0;
-        else if (is_gliding(state->profile.stage) && !is_gliding(stage))
+        else if (begins_to_turn_over)
             drift_past = across * turn_lead_s(&state->profile, &params->profile);
         if (is_gliding(stage)) {
             double to_turn_s
                 = time_to_turn(&profile, odometry->p_d, ground.z, &params->profile);
             if (state->tick * dt + to_turn_s > params->end_s)
                 to_turn_s = INFINITY;
-            offset = turn_offset(to_turn_s, profile.ticks * dt, coming, drift_past);
+            double part = next_stretch / (stretch + next_stretch);
+            double glided_s = profile.ticks * dt;
+            double next = part * coming, past = part * drift_past;
+            offset = turn_offset(to_turn_s, glided_s, next, past);
+            double moved = turn_offset(to_turn_s - 1.0, glided_s + 1.0, next, past) - offset;
+            offset += OFFSET_AHEAD * lookahead_s * moved;
+            is_nearly_over = to_turn_s < min(READY_S_MAX, READY_S * (next_stretch - 1.0));
         }
     }
     Direction relative = approach_angles(
         error.e2 - offset, error.e3, lookahead, params->vertical_ratio);
     double chi_d = desired_direction(gamma_d, rho_d, relative.azimuth, 0.0).azimuth;
     bool feasible;
-    double progress
-        = crab_progress(gamma_d, speed, observer.current_n, observer.current_e, &feasible);
+    double progress;
+    crab_heading(
+        gamma_d, speed, observer.current_n, observer.current_e, &progress, &feasible);
     double heading_command = chi_d;
     double current_n = 0.0, current_e = 0.0;
     if (params->compensates) {
@@ -439,7 +454,13 @@ static inline GuidanceOutput guidance_step(
             gamma_d, wrap_angle(chi_d - gamma_d), progress, speed, current_n, current_e);
     }
     int64_t infeasible_ticks = feasible ? 0 : state->infeasible_ticks + 1;
-    if (!is_gliding(stage) && !surfaced)
+    if (params->compensates && (is_nearly_over || begins_to_turn_over)) {
+        double made_good;
+        bool is_feasible;
+        heading_command = crab_heading(
+            gamma_d, params->profile_speed, observer.current_n, observer.current_e, &made_good,
+            &is_feasible);
+    } else if (turns_over)
         heading_command = state->heading_command;
 
     /* virtual target */
@@ -476,7 +497,7 @@ static inline GuidanceOutput guidance_step(
     };
     *state = (GuidanceState){
         state->tick + 1, profile, s, observer, heading, pitch, speed, heading_command,
-        drift_past, infeasible_ticks, lag_dive, lag_climb,
+        drift_past, infeasible_ticks, measured, steering,
     };
     return output;
 }

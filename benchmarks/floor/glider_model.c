@@ -1,7 +1,8 @@
 /* Copyright 2026 The glider stack authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * glider_model in C99: frames, polar, command filter, water, rigid body, hydrodynamics, plant.
+ * glider_model in C99: frames, polar, command filter, water, rigid body, hydrodynamics, plant,
+ * measurement, steering.
  * The names and the order of every operation are those of the Python.
  * Left out: sensor noise, and every current but the constant one.
  */
@@ -617,4 +618,153 @@ static inline Odometry plant_odometry(const PlantState *state)
         x.p_n, x.p_e, x.p_d, x.q_w, x.q_x, x.q_y, x.q_z,
         x.u + add.x, x.v + add.y, x.w + add.z, x.p, x.q, x.r,
     };
+}
+
+/* ----------------------------------------------------------------------------- measurement */
+
+static inline double follow(double state, double measured, double rate, double share, double dt)
+{
+    double predicted = state + dt * rate;
+    return wrap_angle(predicted + share * wrap_angle(measured - predicted));
+}
+
+static inline Measured measure(
+    Measured state, const Odometry *odometry, bool first, double time_constant, double dt)
+{
+    double q_w = odometry->q_w, q_x = odometry->q_x, q_y = odometry->q_y, q_z = odometry->q_z;
+    Euler attitude = euler_from_quaternion(q_w, q_x, q_y, q_z);
+    double phi = attitude.phi, theta = attitude.theta, psi = attitude.psi;
+    double down
+        = rotate_to_ned(q_w, q_x, q_y, q_z, odometry->u, odometry->v, odometry->w).z;
+    double p = odometry->p, q = odometry->q, r = odometry->r;
+    double s_phi = sin(phi), c_phi = cos(phi);
+    double c_theta = max(0.1, cos(theta));
+    double psi_dot = (s_phi * q + c_phi * r) / c_theta;
+    double theta_dot = c_phi * q - s_phi * r;
+    double phi_dot = p + sin(theta) * psi_dot;
+    if (first)
+        return (Measured){phi, theta, psi, phi_dot, theta_dot, psi_dot, down};
+    double share = dt / (time_constant + dt);
+    double fast = dt / (0.25 * time_constant + dt);
+    return (Measured){
+        follow(state.phi, phi, phi_dot, share, dt),
+        follow(state.theta, theta, theta_dot, share, dt),
+        follow(state.psi, psi, psi_dot, share, dt),
+        state.phi_dot + fast * (phi_dot - state.phi_dot),
+        state.theta_dot + fast * (theta_dot - state.theta_dot),
+        state.psi_dot + fast * (psi_dot - state.psi_dot),
+        state.vertical_rate + fast * (down - state.vertical_rate),
+    };
+}
+
+/* -------------------------------------------------------------------------------- steering */
+
+static inline double speed_ratio(double speed)
+{
+    return max(speed, LEARN_SPEED) / STEERING_SPEED;
+}
+
+static inline bool is_to_be_kicked(const SteeringState *state, double bank)
+{
+    const double *p = state->p;
+    double square = bank * bank;
+    double against = state->b + square * state->c;
+    double variance = p[0] + 2.0 * square * p[1] + square * square * p[4];
+    if (against * against + variance > STRONG_STEERING * STRONG_STEERING)
+        return false;
+    if (state->k > 0.0)
+        against = -against;
+    if (state->b * state->k > 0.0 && p[0] < state->b * state->b)
+        return false;
+    double std = sqrt(max(0.0, variance));
+    double doubt = std < WELL_KNOWN ? NO_DIFFERENCE * std : std;
+    if (fabs(against) > doubt)
+        return against < 0.0;
+    return state->is_kicked || p[0] > state->b * state->b;
+}
+
+static inline SteeringState learn_steering(
+    const SteeringState *state, double bank, double bend, double roll_rate, double yaw_rate,
+    const SteeringParams *params, double dt)
+{
+    const double *p = state->p;
+    double bb = p[0], bc = p[1], bk = p[2], bd = p[3];
+    double cc = p[4], ck = p[5], cd = p[6], kk = p[7], kd = p[8], dd = p[9];
+    bb += params->drift * dt;
+    cc += params->bend_drift * dt;
+    kk += params->kick_drift * dt;
+    dd += params->disturbance_drift * dt;
+    double g_b = bb * bank + bc * bend + bk * roll_rate + bd;
+    double g_c = bc * bank + cc * bend + ck * roll_rate + cd;
+    double g_k = bk * bank + ck * bend + kk * roll_rate + kd;
+    double g_d = bd * bank + cd * bend + kd * roll_rate + dd;
+    double spread = g_b * bank + g_c * bend + g_k * roll_rate + g_d + params->noise / dt;
+    double gain
+        = (yaw_rate - state->b * bank - state->c * bend - state->k * roll_rate - state->d)
+        / spread;
+    return (SteeringState){
+        state->b + g_b * gain,
+        state->c + g_c * gain,
+        state->k + g_k * gain,
+        state->d + g_d * gain,
+        {
+            bb - g_b * g_b / spread,
+            bc - g_b * g_c / spread,
+            bk - g_b * g_k / spread,
+            bd - g_b * g_d / spread,
+            cc - g_c * g_c / spread,
+            ck - g_c * g_k / spread,
+            cd - g_c * g_d / spread,
+            kk - g_k * g_k / spread,
+            kd - g_k * g_d / spread,
+            dd - g_d * g_d / spread,
+        },
+        state->is_kicked,
+        state->kept_s + dt,
+    };
+}
+
+static inline void choose_steering(SteeringState *state, double sine, double bank)
+{
+    bool is_kicked = is_to_be_kicked(state, bank);
+    bool is_enough = state->is_kicked && fabs(sine) < AT_LIMIT * bank;
+    if (is_kicked == state->is_kicked || is_enough || state->kept_s < KEPT_S)
+        return;
+    state->is_kicked = is_kicked;
+    state->kept_s = 0.0;
+}
+
+static inline double followed_frequency(const SteeringState *state)
+{
+    double frequency
+        = sqrt(state->b * state->b + state->p[0]) / max(fabs(state->k), SMALLEST_KICK);
+    if (state->is_kicked || state->b * state->k > 0.0)
+        return max(KICKED_FREQUENCY, frequency);
+    return frequency;
+}
+
+static inline void learn(
+    Steering *steering, const Measured *measured, double speed, const SteeringParams *params,
+    double dt)
+{
+    double ratio = speed_ratio(speed);
+    bool is_gliding = fabs(measured->vertical_rate) > LEARN_VERTICAL_RATE && speed > LEARN_SPEED;
+    double steady_s = is_gliding ? steering->steady_s + dt : 0.0;
+    double share = steady_s > dt ? dt / (params->smoothing_s + dt) : 1.0;
+    double sine = sin(measured->phi);
+    double bank = steering->bank + share * (sine * ratio - steering->bank);
+    double bend = steering->bend + share * (sine * sine * sine * ratio - steering->bend);
+    double roll_rate = steering->roll_rate + share * (measured->phi_dot - steering->roll_rate);
+    double yaw_rate = steering->yaw_rate + share * (measured->psi_dot - steering->yaw_rate);
+    if (steady_s > params->after_s) {
+        SteeringState *phase
+            = measured->vertical_rate > 0.0 ? &steering->dive : &steering->climb;
+        *phase = learn_steering(phase, bank, bend, roll_rate, yaw_rate, params, dt);
+        choose_steering(phase, bank / ratio, params->bank);
+    }
+    steering->bank = bank;
+    steering->bend = bend;
+    steering->roll_rate = roll_rate;
+    steering->yaw_rate = yaw_rate;
+    steering->steady_s = steady_s;
 }

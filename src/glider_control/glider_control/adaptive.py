@@ -20,37 +20,36 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_control.steering import (
-    STEERING_SPEED,
-    SteeringLearningSettings,
-    SteeringParams,
-    SteeringState,
-    learn_steering,
-    roll_to_kick,
-    roll_to_turn,
-)
+from glider_control.steering import roll_to_kick, roll_to_turn, sure_disturbance
 from glider_model.command_filter import Filtered, FilterParams, filter_command
 from glider_model.frames import wrap_angle
 from glider_model.kernel import kernel
 from glider_model.rigid_body import GRAVITY, rigid_body
 from glider_model.settings import Settings
 from glider_model.signals import Adaptation
+from glider_model.steering import (
+    SMALLEST_KICK,
+    Steering,
+    SteeringLearningSettings,
+    SteeringParams,
+    learn,
+    speed_ratio,
+)
 from glider_model.vehicle import VehicleParams
 
 _TUNABLE = {'tunable': True}
 
 #: Typical size of the regressors: V^2 alpha, V^2 (m^2/s^2), side force (N), rates (rad/s).
 SCALE_ALPHA, SCALE_V2, SCALE_SIDE, SCALE_ROLL_RATE, SCALE_PITCH_RATE = 0.01, 0.25, 2.0, 0.05, 0.03
-#: Adaptation waits below this speed (m/s) and vertical rate (m/s), and this long after a turn (s).
-LEARN_SPEED, LEARN_VERTICAL_RATE, LEARN_AFTER_S = 0.15, 0.12, 20.0
+#: Adaptation waits this long after a turn-over (s).
+LEARN_AFTER_S = 20.0
 #: d_hat is held within this (rad/s).
 DISTURBANCE_MAX = 0.005
 #: Heading error at which roll may reach its limit (rad), while the sign of b is in doubt.
 SATURATING_ERROR = 0.35
-#: Heading bandwidth over b V / (V_0 |k|), the frequency below which a turn outruns its kick (-).
-KICK_BANDWIDTH = 1.5
-#: Smallest kick that is of importance (-).
-SMALLEST_KICK = 1e-3
+#: Heading bandwidth over b V / (V_0 |k|), the frequency up to which a turn outruns its kick (-):
+#: where the kick goes against the turn, and where it goes with it and does the fast part itself.
+BANDWIDTH_AGAINST_KICK, BANDWIDTH_WITH_KICK = 2.0, 1.0
 #: d_hat learns from no more than this of a heading error (rad): the rest is yet to be turned.
 DISTURBANCE_ERROR = 0.02
 #: Natural frequency of the filter on the virtual rate command (rad/s), and its rate limit.
@@ -179,15 +178,9 @@ class AdaptiveState(NamedTuple):
     pitch_channel: ChannelState
     roll_theta: tuple[float, float, float]  #: bias, side force, roll damping (N m)
     pitch_theta: tuple[float, float, float, float]  #: bias, V^2 alpha, V^2, pitch damping (N m)
-    dive: SteeringState
-    climb: SteeringState
+    steering: Steering
     disturbance_dive: float  #: d_hat, turn rate that roll does not explain (rad/s)
     disturbance_climb: float
-    bank: float  #: smoothed regressors of the steering estimator
-    bend: float
-    roll_rate: float  #: smoothed roll rate (rad/s)
-    yaw_rate: float  #: smoothed yaw rate (rad/s)
-    steady_s: float  #: time since the last turn-over (s)
 
 
 def make_adaptive(
@@ -230,13 +223,7 @@ def initial_adaptive(settings: AdaptiveSettings) -> AdaptiveState:
         channel,
         (0.0, 0.0, 0.0),
         (0.0, 0.0, 0.0, 0.0),
-        settings.steering.initial_state(1.0),
-        settings.steering.initial_state(-1.0),
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
+        settings.steering.initial_state(),
         0.0,
         0.0,
     )
@@ -282,52 +269,30 @@ def channel_step(state, error, command, rate, applied, coupling, params, dt):
 
 
 @kernel
-def learn_phase(state, measured, speed, params, dt):
-    """Steering estimates of both phases, what they learn from, time since the last turn-over.
-
-    Only the phase that is flown learns, and only in a glide.
-    """
-    ratio = max(speed, LEARN_SPEED) / STEERING_SPEED
-    gliding = abs(measured.vertical_rate) > LEARN_VERTICAL_RATE and speed > LEARN_SPEED
-    steady_s = state.steady_s + dt if gliding else 0.0
-    share = dt / (params.steering.smoothing_s + dt) if steady_s > dt else 1.0
-    sine = math.sin(measured.phi)
-    bank = state.bank + share * (sine * ratio - state.bank)
-    bend = state.bend + share * (sine * sine * sine * ratio - state.bend)
-    roll_rate = state.roll_rate + share * (measured.phi_dot - state.roll_rate)
-    yaw_rate = state.yaw_rate + share * (measured.psi_dot - state.yaw_rate)
-    dive, climb = state.dive, state.climb
-    if steady_s > params.steering.after_s:
-        if measured.vertical_rate > 0.0:
-            dive = learn_steering(dive, bank, bend, roll_rate, yaw_rate, params.steering, dt)
-        else:
-            climb = learn_steering(climb, bank, bend, roll_rate, yaw_rate, params.steering, dt)
-    return dive, climb, bank, bend, roll_rate, yaw_rate, steady_s
-
-
-@kernel
 def bank_to_turn(steering, disturbance, measured, reference, speed, learning, params, dt):
     """Roll command (rad) that steers to the reference heading, and the new d_hat.
 
     phi_s = asin sat((turn - d_hat) / (b_hat V / V_0)), d_hat' = -w^2 k_i e,
     turn = w (psi_s' + k_psi e + k_d (psi_s' - psi')).
 
-    The share w keeps the bandwidth below that of the vehicle. To turn, it has to roll, and the
-    kick of the roll goes the wrong way: y'' = U (b phi + k phi') has a zero at z = b / |k|, and a
-    loop faster than about z loses more by the kick than it wins by the turn. d_hat waits while the
-    roll command is at its limit and until the sign of b is known.
+    The share w keeps the bandwidth at what the vehicle can follow. To turn, it has to roll, and
+    the kick of the roll goes the wrong way: y'' = U (b phi + k phi') has a zero at z = b / |k|.
+    With a bandwidth of 2 z, and a line of sight that looks 3 / z ahead, the poles lie at 0.8 z and
+    are damped by 0.8. d_hat waits while the roll command is at its limit and until the sign of b is known. A vehicle that
+    hardly turns is steered by its kick alone.
     """
     limit = math.sin(params.roll_limit)
-    ratio = max(speed, LEARN_SPEED) / STEERING_SPEED
+    ratio = speed_ratio(speed)
     effectiveness = abs(steering.b) * ratio
     is_known = steering.p[0] < steering.b * steering.b
     bandwidth = effectiveness * limit / SATURATING_ERROR
     if is_known:
-        bandwidth = KICK_BANDWIDTH * effectiveness / max(abs(steering.k), SMALLEST_KICK)
+        most = BANDWIDTH_AGAINST_KICK if steering.b * steering.k < 0.0 else BANDWIDTH_WITH_KICK
+        bandwidth = most * effectiveness / max(abs(steering.k), SMALLEST_KICK)
     share = min(1.0, bandwidth / params.heading_kp)
     asked = share * reference.psi_dot
     # the heading that is left when the roll is gone, but for the roll of the turn asked for
-    turning, _ = roll_to_turn(steering, asked - steering.d, ratio, limit)
+    turning, _ = roll_to_turn(steering, asked - sure_disturbance(steering), ratio, limit)
     roll_left = measured.phi - math.asin(turning)
     error = wrap_angle(reference.psi - measured.psi + steering.k * roll_left)
     psi_dot = measured.psi_dot - steering.k * measured.phi_dot
@@ -338,9 +303,11 @@ def bank_to_turn(steering, disturbance, measured, reference, speed, learning, pa
         - disturbance
     )
     sine, most = roll_to_turn(steering, turn, ratio, limit)
+    if steering.is_kicked:
+        sine = 0.0
     if learning:
         sine = min(limit, max(-limit, sine + roll_to_kick(steering, error)))
-    if learning and is_known and abs(sine) < most:
+    if learning and is_known and not steering.is_kicked and abs(sine) < most:
         learnt = min(DISTURBANCE_ERROR, max(-DISTURBANCE_ERROR, error))
         moved = disturbance - dt * share * share * params.heading_ki * learnt
         disturbance = min(DISTURBANCE_MAX, max(-DISTURBANCE_MAX, moved))
@@ -371,19 +338,17 @@ def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, 
     -------
     AdaptiveState, tau_p, tau_q
     """
-    dive, climb, bank, bend, roll_rate, yaw_rate, steady_s = learn_phase(
-        state, measured, speed, params, dt
-    )
-    learning = steady_s > LEARN_AFTER_S
+    steering = learn(state.steering, measured, speed, params.steering, dt)
+    learning = steering.steady_s > LEARN_AFTER_S
     d_dive, d_climb = state.disturbance_dive, state.disturbance_climb
     roll_command = 0.0
-    if steady_s > 0.0 and measured.vertical_rate > 0.0:
+    if steering.steady_s > 0.0 and measured.vertical_rate > 0.0:
         roll_command, d_dive = bank_to_turn(
-            dive, d_dive, measured, reference, speed, learning, params, dt
+            steering.dive, d_dive, measured, reference, speed, learning, params, dt
         )
-    elif steady_s > 0.0:
+    elif steering.steady_s > 0.0:
         roll_command, d_climb = bank_to_turn(
-            climb, d_climb, measured, reference, speed, learning, params, dt
+            steering.climb, d_climb, measured, reference, speed, learning, params, dt
         )
     roll = filter_command(state.roll, roll_command, params.roll_filter, dt)
 
@@ -451,15 +416,9 @@ def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, 
         ChannelState(rate_q, xi_q, zeta_q, tau_q, k1_q, k2bar_q),
         th_p,
         th_q,
-        dive,
-        climb,
+        steering,
         d_dive,
         d_climb,
-        bank,
-        bend,
-        roll_rate,
-        yaw_rate,
-        steady_s,
     )
     return new_state, tau_p, tau_q
 
@@ -485,9 +444,9 @@ def adaptation(state, params):
         th_q[1],
         th_q[2],
         th_q[3],
-        state.dive.b,
+        state.steering.dive.b,
         state.disturbance_dive,
-        state.climb.b,
+        state.steering.climb.b,
         state.disturbance_climb,
         v_1,
         v_2,

@@ -27,7 +27,6 @@ from glider_control.allocation import (
     make_allocation,
     moments,
 )
-from glider_control.measurement import Measured, measure
 from glider_control.pid import (
     HeadingSettings,
     PidParams,
@@ -37,6 +36,7 @@ from glider_control.pid import (
 )
 from glider_model.command_filter import Filtered, FilterParams
 from glider_model.kernel import kernel
+from glider_model.measurement import Measured, measure
 from glider_model.polar import Polar, glide_net_heaviness, glide_speed, make_polar
 from glider_model.rigid_body import GRAVITY
 from glider_model.settings import Settings
@@ -61,8 +61,15 @@ class BuoyancySettings(Settings):
         description='integral of the vertical-rate error (kg/m)',
         json_schema_extra=_TUNABLE,
     )
+    drag_ki_kg_per_m: float = Field(
+        0.002,
+        ge=0.0,
+        le=10.0,
+        description='integral that changes sides with dive and climb (kg/m)',
+        json_schema_extra=_TUNABLE,
+    )
     trim_limit_kg: float = Field(
-        0.3, ge=0.0, le=20.0, description='largest correction by the integral (kg)'
+        0.3, ge=0.0, le=20.0, description='largest correction by each integral (kg)'
     )
 
 
@@ -119,6 +126,7 @@ class ControlSettings(ControlLawSettings):
                 roll_filter,
             ),
             self.buoyancy.ki_kg_per_m,
+            self.buoyancy.drag_ki_kg_per_m,
             self.buoyancy.trim_limit_kg,
             filters.attitude_s,
             Joints(
@@ -136,7 +144,7 @@ class ControlSettings(ControlLawSettings):
             Measured(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             initial_adaptive(self.adaptive),
             PidState(0.0, 0.0, 0.0, Filtered(0.0, 0.0)),
-            0.0,
+            Trim(0.0, 0.0),
             Joints(0.0, 0.0, 0.0),
         )
 
@@ -150,10 +158,18 @@ class ControlParams(NamedTuple):
     adaptive: AdaptiveParams
     pid: PidParams
     buoyancy_ki: float  #: (kg/m)
+    drag_ki: float  #: (kg/m)
     buoyancy_trim_max: float  #: (kg)
     attitude_s: float
     dead_band: Joints
     safe_command: Joints  #: as buoyant as possible, mass at neutral, roll level
+
+
+class Trim(NamedTuple):
+    """Integrals of the vertical-rate law."""
+
+    ballast: float  #: the same in dive and climb: ballast, density (kg)
+    drag: float  #: + in a dive, - in a climb (kg)
 
 
 class ControlState(NamedTuple):
@@ -163,7 +179,7 @@ class ControlState(NamedTuple):
     measured: Measured
     adaptive: AdaptiveState
     pid: PidState
-    buoyancy_trim: float  #: integral of the vertical-rate law (kg)
+    trim: Trim
     command: Joints  #: last command
 
 
@@ -186,19 +202,24 @@ def _hold(command, last, band, limit):
 
 @kernel
 def vertical_rate_law(trim, measured, reference, joints, params, dt):
-    """Net heaviness (kg) for the reference's vertical rate, and the new integral.
+    """Net heaviness (kg) for the reference's vertical rate, and the new integrals.
 
-    The glide polar gives the weight of the steady glide; the integral corrects what the vehicle
-    and the water's density differ by. It waits while the vehicle turns over.
+    The glide polar gives the weight of the steady glide. One integral corrects what ballast and
+    density differ by, another, with the sign of the rate, what the drag does: a draggy vehicle
+    has to be heavier in the dive and lighter in the climb, and has to know it as soon as it turns
+    over. Both wait while it does.
     """
-    forward = glide_net_heaviness(reference.theta, reference.v_d, params.polar)
+    sign = 1.0 if reference.v_d > 0.0 else -1.0
+    ballast, drag = trim.ballast, trim.drag
+    wanted = glide_net_heaviness(reference.theta, reference.v_d, params.polar) + sign * drag
     error = reference.v_d - measured.vertical_rate
     limit = params.allocation.m_b_max
-    steady = abs(error) < VERTICAL_RATE_WINDOW and abs(joints.m_b - forward - trim) < 0.05
+    steady = abs(error) < VERTICAL_RATE_WINDOW and abs(joints.m_b - wanted - ballast) < 0.05
     if steady:
-        trim += dt * params.buoyancy_ki * error
-        trim = min(params.buoyancy_trim_max, max(-params.buoyancy_trim_max, trim))
-    return min(limit, max(-limit, forward + trim)), trim
+        most = params.buoyancy_trim_max
+        ballast = min(most, max(-most, ballast + dt * params.buoyancy_ki * error))
+        drag = min(most, max(-most, drag + dt * params.drag_ki * error * sign))
+    return min(limit, max(-limit, wanted + ballast)), Trim(ballast, drag)
 
 
 @kernel
@@ -248,7 +269,7 @@ def control_step(state, odometry, joints, reference, params, dt):
         pid, tau_p, tau_q = pid_step(
             pid, measured, reference, speed, held[1], held[0], params.pid, dt
         )
-    m_b, trim = vertical_rate_law(state.buoyancy_trim, measured, reference, joints, params, dt)
+    m_b, trim = vertical_rate_law(state.trim, measured, reference, joints, params, dt)
     mu = allocate_roll(tau_p, measured.phi, measured.theta, limits)
     x_p = allocate_pitch(tau_q, joints.mu, measured.phi, measured.theta, limits)
 

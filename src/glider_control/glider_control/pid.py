@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_control.steering import STEERING_SPEED
 from glider_model.command_filter import Filtered, FilterParams, filter_command
 from glider_model.frames import wrap_angle
 from glider_model.kernel import kernel
 from glider_model.settings import Settings
+from glider_model.steering import speed_ratio
 
 _TUNABLE = {'tunable': True}
 
@@ -113,7 +113,7 @@ def heading_to_roll(state, measured, reference, speed, params, dt):
     if abs(measured.vertical_rate) < STEERING_VERTICAL_RATE:
         return 0.0, state.heading_integral
     steering = params.steering_dive if measured.vertical_rate > 0.0 else params.steering_climb
-    gain = steering * max(speed, 0.15) / STEERING_SPEED
+    gain = steering * speed_ratio(speed)
     error = wrap_angle(reference.psi - measured.psi)
     turn = (
         reference.psi_dot

@@ -19,8 +19,8 @@ from glider_control.adaptive import (
     initial_adaptive,
     make_adaptive,
 )
-from glider_control.measurement import Measured
 from glider_model.command_filter import FilterParams
+from glider_model.measurement import Measured
 from glider_model.signals import Reference
 from glider_model.vehicle import load_vehicle
 
@@ -143,8 +143,8 @@ def test_nothing_is_learnt_while_the_vehicle_turns_over(change):
     for _ in range(1000):
         state, *_ = step(state, measured(theta=-0.3, phi=0.2, psi_dot=0.01, **change), reference())
     assert state.pitch_theta == (0.0, 0.0, 0.0, 0.0)
-    assert state.dive == initial_adaptive(SETTINGS).dive
-    assert state.climb == initial_adaptive(SETTINGS).climb
+    assert state.steering.dive == initial_adaptive(SETTINGS).steering.dive
+    assert state.steering.climb == initial_adaptive(SETTINGS).steering.climb
 
 
 def test_nose_low_makes_a_nose_up_moment_and_the_other_way_round():
@@ -158,8 +158,8 @@ def test_nose_low_makes_a_nose_up_moment_and_the_other_way_round():
 def test_roll_goes_to_the_side_that_turns_the_right_way(rate, sign):
     """Told that steering is reversed, the law rolls to the other side."""
     state = initial_adaptive(SETTINGS)
-    known = state.dive._replace(b=0.03 * sign)
-    state = state._replace(dive=known, climb=known)
+    known = state.steering.dive._replace(b=0.03 * sign)
+    state = state._replace(steering=state.steering._replace(dive=known, climb=known))
     for _ in range(50):
         now = measured(vertical_rate=rate, theta=-0.5 if rate > 0.0 else 0.5)
         wanted = reference(psi=0.2, v_d=rate, theta=now.theta)
@@ -169,7 +169,8 @@ def test_roll_goes_to_the_side_that_turns_the_right_way(rate, sign):
 
 def test_disturbance_estimate_is_bounded():
     state = initial_adaptive(SETTINGS)
-    state = state._replace(dive=state.dive._replace(b=0.5))
+    steering = state.steering
+    state = state._replace(steering=steering._replace(dive=steering.dive._replace(b=0.5)))
     for _ in range(20000):
         state, *_ = step(state, measured(psi=-0.3), reference())
     assert abs(state.disturbance_dive) == DISTURBANCE_MAX

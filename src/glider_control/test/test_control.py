@@ -66,7 +66,7 @@ def _fly(plant, control, references, noise, ballast, plant_params, params, rows,
 class Flight:
     """A glide from its own trim; ``flight.psi`` and so on are columns of its log, rad."""
 
-    def __init__(self, vehicle='zhang2021', sign=1.0, ballast=0.0, **fields):
+    def __init__(self, vehicle='zhang2021', sign=1.0, ballast=0.0, perturb=None, **fields):
         net, pitch_deg = GLIDES[vehicle]
         model = ControlSettings.model_validate({'vehicle': vehicle, 'law': 'pid', **fields})
         self.params, self.control = model.params(), model.initial_state()
@@ -78,7 +78,9 @@ class Flight:
             'speed_mps': 0.5,
             'net_heaviness_kg': sign * net,
         }
-        plant = PlantSettings(vehicle=vehicle, initial=start, duration_s=1e8)
+        plant = PlantSettings(
+            vehicle=vehicle, initial=start, duration_s=1e8, perturb=perturb or {}
+        )
         self.plant_params, self.plant = plant.params(), plant.initial_state()
         trim = solve_trim(load_vehicle(vehicle).params(), sign * net, math.degrees(self.pitch))
         joints = Joints(sign * net - ballast, trim.pitch_mass_m, 0.0)
@@ -161,20 +163,38 @@ def test_integral_corrects_a_ballast_error_of_50_g(sign, ballast):
     """The vertical rate comes within 2 mm/s; the correction is the ballast within 7 g."""
     flight = Flight('zhang2021', sign, ballast).fly(6000.0)
     assert flight.down[-1] == pytest.approx(flight.rate, abs=0.002)
-    assert flight.control.buoyancy_trim == pytest.approx(ballast, abs=0.007)
+    trim = flight.control.trim
+    assert trim.ballast + sign * trim.drag == pytest.approx(ballast, abs=0.007)
 
 
 def test_without_the_integral_a_ballast_error_stays():
-    flight = Flight(ballast=0.05, buoyancy={'ki_kg_per_m': 0.0}).fly(3000.0)
+    still = {'ki_kg_per_m': 0.0, 'drag_ki_kg_per_m': 0.0}
+    flight = Flight(ballast=0.05, buoyancy=still).fly(3000.0)
     assert flight.rate - flight.down[-1] > 0.01
 
 
 def test_integral_waits_while_the_vehicle_turns_over():
     """From dive to climb the pump needs 200 s: nothing is learned in the first 150 s."""
     flight = Flight().fly(600.0)
-    settled = flight.control.buoyancy_trim
+    settled = flight.control.trim
     flight.fly(150.0, theta=-flight.pitch, rate=-flight.rate)
-    assert flight.control.buoyancy_trim == settled
+    assert flight.control.trim == settled
+
+
+@pytest.mark.parametrize('perturb', [{'K_D0': 1.3}, {'K_D0': 0.75}])
+def test_drag_that_differs_is_known_when_the_vehicle_turns_over(perturb):
+    """The second climb begins at its vertical rate: a third of the error that there is without."""
+    errors = {}
+    for drag_ki in (0.0, 0.002):
+        buoyancy = {'drag_ki_kg_per_m': drag_ki}
+        flight = Flight(perturb=perturb, buoyancy=buoyancy).fly(2500.0)
+        for side in (-1.0, 1.0, -1.0):
+            start = len(flight.down)
+            flight.fly(2500.0, theta=side * flight.pitch, rate=side * flight.rate)
+        glide = slice(start + round(300.0 / TICK_S), start + round(900.0 / TICK_S))
+        errors[drag_ki] = np.mean(np.abs(flight.down[glide] + flight.rate))
+    assert errors[0.0] > 0.01
+    assert errors[0.002] < 0.34 * errors[0.0]
 
 
 def travel(column):

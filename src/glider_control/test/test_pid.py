@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glider_control.control import ControlSettings
-from glider_control.measurement import Measured
 from glider_control.pid import (
     HEADING_INTEGRAL_MAX,
     PITCH_INTEGRAL_MAX,
@@ -20,6 +19,7 @@ from glider_control.pid import (
     pid_step,
 )
 from glider_model.command_filter import Filtered
+from glider_model.measurement import Measured
 from glider_model.signals import TICK_S, Reference
 
 quick = settings(max_examples=60, deadline=None)

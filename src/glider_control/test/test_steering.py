@@ -1,121 +1,29 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The estimator of how a vehicle steers."""
+"""The roll for a turn rate or a heading error."""
 
-import numba
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_control.steering import (
-    SteeringLearningSettings,
-    caution,
-    learn_steering,
-    roll_to_kick,
-    roll_to_turn,
-)
+from glider_control.steering import caution, roll_to_kick, roll_to_turn, sure_disturbance
+from glider_model.steering import SteeringLearningSettings
 
-DT = 0.1
-SETTINGS = SteeringLearningSettings()
-PARAMS = SETTINGS.params()
+PRIOR = SteeringLearningSettings().initial_state().dive
 
 effectiveness = st.floats(0.005, 0.06).flatmap(lambda b: st.sampled_from([b, -b]))
 kicks = st.floats(-0.5, 0.5)
 bends = st.floats(-0.01, 0.01)
-offsets = st.floats(-0.001, 0.001)
-
-
-def turns(seconds: float, seed: int):
-    """Bank (sine of a wandering roll) and roll rate of a vehicle that turns now and then."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(0.0, seconds, DT)
-    roll = sum(
-        rng.uniform(0.02, 0.1) * np.sin(rng.uniform(0.01, 0.1) * t + rng.uniform(0, 6))
-        for _ in range(5)
-    )
-    return np.sin(roll), np.gradient(roll, DT)
-
-
-@numba.njit
-def learn_all(state, bank, roll_rate, yaw_rate, params):
-    for i in range(len(bank)):
-        state = learn_steering(state, bank[i], bank[i] ** 3, roll_rate[i], yaw_rate[i], params, DT)
-    return state
-
-
-def learn(state, bank, roll_rate, yaw_rate):
-    return learn_all(state, bank, roll_rate, yaw_rate, PARAMS)
-
-
-def covariance(state):
-    """Covariance of (b, c, k, d) as a matrix."""
-    matrix = np.zeros((4, 4))
-    matrix[np.triu_indices(4)] = state.p
-    return matrix + np.triu(matrix, 1).T
-
-
-@settings(max_examples=30, deadline=None)
-@given(effectiveness, bends, kicks, offsets, st.integers(0, 1000), st.sampled_from([-1.0, 1.0]))
-def test_estimate_comes_to_the_truth_from_either_sign(b, c, k, d, seed, first_guess):
-    """b within 10 % after 20 min of turning, from any start; c and k within their deviations."""
-    bank, roll_rate = turns(1200.0, seed)
-    yaw_rate = b * bank + c * bank**3 + k * roll_rate + d
-    state = learn(SETTINGS.initial_state(first_guess), bank, roll_rate, yaw_rate)
-    assert state.b == pytest.approx(b, rel=0.1, abs=3e-4)
-    deviation = np.sqrt(np.diag(covariance(state)))
-    assert deviation[2] < 0.5 * SETTINGS.kick_std
-    assert state.c == pytest.approx(c, abs=2.0 * deviation[1])
-    assert state.k == pytest.approx(k, abs=2.0 * deviation[2])
-
-
-def test_rolls_of_several_sizes_tell_the_bend():
-    """From turns at 10, 20 and 30 deg of roll to either side, c is known to better than a half."""
-    sizes = np.sin(np.radians([10.0, -20.0, 30.0, -10.0, 20.0, -30.0]))
-    bank = np.tile(np.repeat(sizes, 3000), 4)
-    state = learn(
-        SETTINGS.initial_state(1.0), bank, np.zeros(len(bank)), 0.003 * bank - 0.006 * bank**3
-    )
-    deviation = np.sqrt(covariance(state)[1, 1])
-    assert deviation < 0.003
-    assert state.b == pytest.approx(0.003, rel=0.1)
-    assert state.c == pytest.approx(-0.006, abs=2.0 * deviation)
-
-
-def test_one_turn_tells_the_sign():
-    """A roll of 20 deg, wrongly expected to turn to starboard, is understood within 40 s."""
-    state = SETTINGS.initial_state(1.0)
-    bank = np.full(400, np.sin(np.radians(20.0)))
-    state = learn(state, bank, np.zeros(400), -0.02 * bank)
-    assert state.b == pytest.approx(-0.02, rel=0.3)
-
-
-def test_straight_flight_teaches_nothing_about_b():
-    """Level and without yaw, b stays and its variance grows only by the expected drift."""
-    before = SETTINGS.initial_state(1.0)
-    still = np.zeros(10000)
-    after = learn(before, still, still, still)
-    assert after.b == before.b
-    assert after.p[0] == pytest.approx(before.p[0] + PARAMS.drift * 1000.0, rel=1e-9)
-
-
-@settings(max_examples=50, deadline=None)
-@given(st.integers(0, 1000), effectiveness)
-def test_covariance_stays_positive_definite(seed, b):
-    bank, roll_rate = turns(300.0, seed)
-    state = learn(SETTINGS.initial_state(1.0), bank, roll_rate, b * bank)
-    assert np.linalg.eigvalsh(covariance(state))[0] > 0.0
-
-
-# ---------------------------------------------------------------------------------- steering
 
 LIMIT = np.sin(np.radians(30.0))
 
 
 def known(b, c=0.0, std=0.0):
     """State of an estimator that is as sure of b as ``std`` says."""
-    state = SETTINGS.initial_state(1.0)
-    return state._replace(b=b, c=c, p=(std * std, *state.p[1:]))
+    return PRIOR._replace(b=b, c=c, p=(std * std, *PRIOR.p[1:]))
 
 
 @settings(max_examples=200, deadline=None)
@@ -178,3 +86,46 @@ def test_the_kick_is_used_where_the_turn_goes_to_its_side(b, k, std, kick_std, e
     else:
         assert sine * k * error >= 0.0
         assert abs(sine * k) <= abs(error) * (1.0 + 1e-9)
+
+
+@given(st.floats(-1e-3, 1e-3), st.floats(1e-6, 1e-3))
+def test_disturbance_in_doubt_counts_for_little(d, std):
+    state = PRIOR._replace(d=d, p=(*PRIOR.p[:9], std * std))
+    sure = sure_disturbance(state)
+    assert 0.0 <= sure * d <= d * d
+    if abs(d) > 10.0 * std:
+        assert sure == pytest.approx(d, rel=0.01)
+    if abs(d) < 0.1 * std:
+        assert abs(sure) <= 0.01 * abs(d)
+
+
+@given(kicks.filter(lambda k: abs(k) > 0.05), st.floats(0.0, 0.5), st.floats(-1.0, 1.0))
+def test_vehicle_that_hardly_turns_is_kicked_for_the_whole_error(k, kick_std, error):
+    """Whichever way it turns; of a kick in doubt a part is used."""
+    state = known(1e-4)._replace(k=k, is_kicked=True)
+    state = state._replace(p=(*state.p[:7], kick_std**2 + 1e-9, *state.p[8:]))
+    sine = roll_to_kick(state, error)
+    assert 0.0 <= sine * k * error <= error * error * (1.0 + 1e-9)
+    if kick_std < 0.01 * abs(k):
+        assert sine * k == pytest.approx(error, rel=1e-3)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.floats(2e-4, 2e-3), st.floats(8.0, 26.0), st.floats(0.2, 0.45), st.floats(-3.0, 3.0))
+def test_kicked_vehicle_holds_its_heading_at_the_bank_at_which_it_does_not_turn(
+    b, null_deg, k, error_deg
+):
+    """Turn and kick go to different sides; the roll grows until the vehicle turns no more.
+
+    psi_left' = b s + c s^3 with b + c s^2 = 0 at the bank ``null_deg``, psi = psi_left - k phi.
+    """
+    c = -b / math.sin(math.radians(null_deg)) ** 2
+    state = known(b, c)._replace(k=-k, is_kicked=True)
+    state = state._replace(p=(*state.p[:7], 1e-9, *state.p[8:]))
+    left, dt = math.radians(error_deg), 4.0
+    for _ in range(20000):
+        sine = min(LIMIT, max(-LIMIT, roll_to_kick(state, -left)))
+        left += dt * (b * sine + c * sine**3)
+        assert abs(left - k * sine) < math.radians(0.2)
+    if abs(error_deg) > 0.1:
+        assert abs(math.degrees(math.asin(sine))) == pytest.approx(null_deg, rel=0.01)

@@ -46,16 +46,25 @@ from glider_guidance.profile import (
 from glider_model.command_filter import Filtered, FilterParams, filter_angle
 from glider_model.frames import euler_from_quaternion, rotate_to_ned, wrap_angle
 from glider_model.kernel import kernel
+from glider_model.measurement import Measured, measure
 from glider_model.polar import (
     Polar,
     glide_alpha,
     glide_horizontal_speed,
+    glide_speed,
     glide_vertical_rate,
     make_polar,
     steepen,
 )
 from glider_model.settings import Settings
 from glider_model.signals import Reference, TrackingError, Water
+from glider_model.steering import (
+    Steering,
+    SteeringLearningSettings,
+    SteeringParams,
+    followed_frequency,
+    learn,
+)
 from glider_model.vehicle import load_vehicle
 
 #: The flight model is believed this long after a glide began (s).
@@ -67,11 +76,17 @@ MODEL_VERTICAL_RATE = 0.05
 MODEL_PITCH = math.radians(12.0)
 #: Time constant of the estimated speed through the water (s).
 SPEED_FILTER_S = 30.0
-#: Heading errors are remembered over this time (s), each counted up to this size (rad), from this
-#: time (s) after the beginning of a glide on.
-LAG_MEMORY_S, LAG_COUNTED, LAG_AFTER_S = 3000.0, 0.17, 60.0
-#: Their root mean square (rad) from which on the lookahead grows, and at which it has doubled.
-LAG_FROM, LAG_TO = math.radians(1.0), math.radians(3.4)
+#: Time constant of the attitude from which steering is learnt (s).
+ATTITUDE_S = 3.0
+#: Lookahead in time, times the frequency up to which the vehicle can be steered, is no less (-).
+LOOKAHEAD_OVER_ZERO = 3.0
+#: It grows to this many times itself.
+LOOKAHEAD_STRETCH_MAX = 10.0
+#: Of the lag behind a desired track that moves aside, this share is made up for beforehand.
+OFFSET_AHEAD = 0.5
+#: A phase that can hardly be steered is entered on its heading: the vehicle turns to it so long
+#: before the turn-over (s) for each time that the lookahead grows by itself, and so long at most.
+READY_S, READY_S_MAX = 60.0, 100.0
 #: The virtual target moves no faster than this (m/s).
 TARGET_SPEED_MAX = 3.0
 
@@ -155,7 +170,7 @@ class CommandFilterSettings(Settings):
     """Command filters of heading and pitch."""
 
     heading_frequency_radps: float = Field(
-        0.15, gt=0.0, le=2.0, description='natural frequency of the heading filter (rad/s)'
+        0.07, gt=0.0, le=2.0, description='natural frequency of the heading filter (rad/s)'
     )
     heading_rate_radps: float = Field(
         0.012, gt=0.0, le=1.0, description='largest rate of the desired heading (rad/s)'
@@ -174,6 +189,9 @@ class GuidanceLawSettings(Settings):
     los: LosSettings = Field(LosSettings(), description='line of sight')
     observer: ObserverSettings = Field(ObserverSettings(), description='current observer')
     filters: CommandFilterSettings = Field(CommandFilterSettings(), description='command filters')
+    steering: SteeringLearningSettings = Field(
+        SteeringLearningSettings(), description='what the vehicle can follow, learnt'
+    )
 
 
 class GuidanceSettings(GuidanceLawSettings):
@@ -199,10 +217,12 @@ class GuidanceSettings(GuidanceLawSettings):
         vehicle = load_vehicle(self.vehicle).params()
         polar = make_polar(vehicle)
         filters = self.filters
+        profile = self.profile.params(self.dives, vehicle.m_b_rate, polar)
         return GuidanceParams(
             self.path.params(),
-            self.profile.params(self.dives, vehicle.m_b_rate, polar),
+            profile,
             polar,
+            glide_horizontal_speed(profile.pitch, profile.glide_rate, polar),
             self.los.method == 'observer',
             self.los.method == 'observer' and self.los.lead_turns,
             self.duration_s if self.duration_s > 0.0 else math.inf,
@@ -213,6 +233,7 @@ class GuidanceSettings(GuidanceLawSettings):
             ObserverParams(self.observer.k3_per_s, self.observer.k4_per_s2),
             FilterParams(filters.heading_frequency_radps, filters.heading_rate_radps),
             FilterParams(filters.pitch_frequency_radps, filters.pitch_rate_radps),
+            self.steering.params(),
         )
 
     def initial_state(self) -> 'GuidanceState':
@@ -228,8 +249,8 @@ class GuidanceSettings(GuidanceLawSettings):
             0.0,
             0.0,
             0,
-            0.0,
-            0.0,
+            Measured(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            self.steering.initial_state(),
         )
 
 
@@ -239,6 +260,7 @@ class GuidanceParams(NamedTuple):
     path: PathParams
     profile: ProfileParams
     polar: Polar
+    profile_speed: float  #: horizontal speed through the water of the steady glide (m/s)
     compensates: bool  #: crab into the estimated current
     leads: bool  #: share the drift of a turn between before and after
     end_s: float  #: when the mission ends (s)
@@ -249,6 +271,7 @@ class GuidanceParams(NamedTuple):
     observer: ObserverParams
     heading_filter: FilterParams
     pitch_filter: FilterParams
+    steering: SteeringParams
 
 
 class GuidanceState(NamedTuple):
@@ -264,8 +287,8 @@ class GuidanceState(NamedTuple):
     heading_command: float  #: held while the vehicle turns (rad)
     drift: float  #: what the last turn was expected to cost across the path (m)
     infeasible_ticks: int
-    lag_dive: float  #: mean square of the heading error, by phase (rad^2)
-    lag_climb: float
+    measured: Measured  #: filtered attitude and rates
+    steering: Steering  #: what the vehicle can follow
 
 
 class GuidanceOutput(NamedTuple):
@@ -300,8 +323,8 @@ def guidance_abort(state):
         state.heading_command,
         state.drift,
         state.infeasible_ticks,
-        state.lag_dive,
-        state.lag_climb,
+        state.measured,
+        state.steering,
     )
 
 
@@ -310,8 +333,6 @@ def _start(state, odometry, psi, theta, params):
     """State at the first tick: closest point of the path, filters at the measured attitude."""
     flat = not params.profile.follows_path
     s = path_closest(odometry.p_n, odometry.p_e, odometry.p_d, flat, params.path)
-    pitch = -params.profile.pitch
-    rate = params.profile.glide_rate
     stage = GLIDING_DOWN if params.profile.follows_path else SURFACE_PREPARATION
     return GuidanceState(
         state.tick,
@@ -320,31 +341,33 @@ def _start(state, odometry, psi, theta, params):
         state.observer,
         Filtered(psi, 0.0),
         Filtered(theta, 0.0),
-        glide_horizontal_speed(pitch, rate, params.polar),
+        params.profile_speed,
         psi,
         0.0,
         0,
-        0.0,
-        0.0,
+        state.measured,
+        state.steering,
     )
 
 
 @kernel
-def heading_lag(lag, error, dt):
-    """Mean square (rad^2) of the heading error ``error`` (rad), which forgets."""
-    counted = min(LAG_COUNTED, abs(error))
-    return lag + dt / LAG_MEMORY_S * (counted * counted - lag)
+def lookahead_stretch(steering, lookahead_s):
+    """Factor on the lookahead, 1 or more, for a vehicle that steers weakly in a phase.
 
+    Position is steered by heading. Where each roll first turns the nose the wrong way, position
+    must be asked for more slowly, or the two loops swing against each other.
 
-@kernel
-def lag_stretch(lag):
-    """Factor on the lookahead, 1 to 2, for a vehicle with the heading lag ``lag`` (rad^2).
-
-    Position is steered by heading. Where heading follows badly, because the vehicle steers weakly
-    and each roll first turns its nose the wrong way, position must be asked for more slowly, or
-    the two loops swing against each other.
+    Parameters
+    ----------
+    steering : SteeringState
+        What is known of the phase.
+    lookahead_s : float
+        Lookahead for a vehicle that steers well (s).
     """
-    return 1.0 + min(1.0, max(0.0, (math.sqrt(lag) - LAG_FROM) / (LAG_TO - LAG_FROM)))
+    if lookahead_s <= 0.0:
+        return 1.0
+    needed_s = LOOKAHEAD_OVER_ZERO / followed_frequency(steering)
+    return min(LOOKAHEAD_STRETCH_MAX, max(1.0, needed_s / lookahead_s))
 
 
 @kernel
@@ -395,6 +418,15 @@ def guidance_step(state, odometry, params, dt):
     if not follows_path:
         e3 = 0.0
 
+    # what it can follow
+    measured = measure(state.measured, odometry, state.tick == 0, ATTITUDE_S, dt)
+    measured_speed, _ = glide_speed(measured.theta, measured.vertical_rate, params.polar)
+    steering = learn(state.steering, measured, measured_speed, params.steering, dt)
+    stretch = lookahead_stretch(steering.dive, params.lookahead_s)
+    next_stretch = lookahead_stretch(steering.climb, params.lookahead_s)
+    if rate_target < 0.0:
+        stretch, next_stretch = next_stretch, stretch
+
     # speed through the water and current
     settled = is_gliding(stage) and profile.ticks * dt > SETTLED_S
     valid = (
@@ -418,34 +450,41 @@ def guidance_step(state, odometry, params, dt):
     if valid:
         speed += dt / SPEED_FILTER_S * (model_speed - speed)
 
-    # direction to fly
     surfaced = stage == WAITING_ON_SURFACE or stage == SURFACE_PREPARATION or stage == SURFACING
-    lag_dive, lag_climb = state.lag_dive, state.lag_climb
-    if is_gliding(stage) and profile.ticks * dt > LAG_AFTER_S:
-        heading_error = wrap_angle(psi - state.heading.value)
-        if rate_target > 0.0:
-            lag_dive = heading_lag(lag_dive, heading_error, dt)
-        else:
-            lag_climb = heading_lag(lag_climb, heading_error, dt)
-    stretch = lag_stretch(lag_dive if rate_target > 0.0 else lag_climb)
+    turns_over = not is_gliding(stage) and not surfaced
+    # a turn-over is flown on the heading of the glide to come, as it should be
+    begins_to_turn_over = turns_over and is_gliding(state.profile.stage)
+    if params.compensates and begins_to_turn_over:
+        speed = params.profile_speed
+
+    # direction to fly
+    lookahead_s = stretch * params.lookahead_s
     lookahead = max(
         params.lookahead,
-        stretch * params.lookahead_s * math.sqrt(ground_n * ground_n + ground_e * ground_e),
+        lookahead_s * math.sqrt(ground_n * ground_n + ground_e * ground_e),
     )
     drift_past = state.drift
     offset = 0.0
+    is_nearly_over = False
     if params.leads and not follows_path:
         across = observer.current_e * math.cos(gamma_d) - observer.current_n * math.sin(gamma_d)
         coming = across * turn_lead_s(profile, params.profile)
         if surfaced:
             drift_past = 0.0
-        elif is_gliding(state.profile.stage) and not is_gliding(stage):
+        elif turns_over and is_gliding(state.profile.stage):
             drift_past = across * turn_lead_s(state.profile, params.profile)
         if is_gliding(stage):
             to_turn_s = time_to_turn(profile, odometry.p_d, ground_d, params.profile)
             if state.tick * dt + to_turn_s > params.end_s:
                 to_turn_s = math.inf
-            offset = turn_offset(to_turn_s, profile.ticks * dt, coming, drift_past)
+            # the phase that steers less well bears the smaller part of the drift
+            part = next_stretch / (stretch + next_stretch)
+            glided_s = profile.ticks * dt
+            coming, past = part * coming, part * drift_past
+            offset = turn_offset(to_turn_s, glided_s, coming, past)
+            moved = turn_offset(to_turn_s - 1.0, glided_s + 1.0, coming, past) - offset
+            offset += OFFSET_AHEAD * lookahead_s * moved
+            is_nearly_over = to_turn_s < min(READY_S_MAX, READY_S * (next_stretch - 1.0))
     gamma_r, rho_r = approach_angles(e2 - offset, e3, lookahead, params.vertical_ratio)
     if not follows_path:
         rho_r = 0.0
@@ -464,8 +503,11 @@ def guidance_step(state, odometry, params, dt):
             observer.current_e,
         )
     infeasible_ticks = 0 if feasible else state.infeasible_ticks + 1
-    surfaced = stage == WAITING_ON_SURFACE or stage == SURFACE_PREPARATION or stage == SURFACING
-    if not is_gliding(stage) and not surfaced:
+    if params.compensates and (is_nearly_over or begins_to_turn_over):
+        heading_command, _, _ = crab_heading(
+            gamma_d, params.profile_speed, observer.current_n, observer.current_e
+        )
+    elif turns_over:
         heading_command = state.heading_command
 
     # pitch and vertical rate
@@ -519,7 +561,7 @@ def guidance_step(state, odometry, params, dt):
         heading_command,
         drift_past,
         infeasible_ticks,
-        lag_dive,
-        lag_climb,
+        measured,
+        steering,
     )
     return new_state, output

@@ -253,9 +253,10 @@ def turn_offset(to_turn_s, since_turn_s, coming, past):
     """Offset (m) of the desired track that shares a turn's drift between before and after.
 
     In a turn the vehicle is slow and the current takes it along by a drift that is known
-    beforehand. The desired track therefore moves up-current by half of the ``coming`` drift before
-    the turn, and from half of the ``past`` drift back to zero after it.
+    beforehand. The desired track therefore moves up-current by the ``coming`` drift (m) before the
+    turn, and from the ``past`` drift back to zero after it: of either, the part that this phase
+    bears.
     """
     before = _smooth((LEAD_FROM_S - to_turn_s) / (LEAD_FROM_S - LEAD_TO_S))
     after = 1.0 - _smooth(since_turn_s / RETURN_S)
-    return 0.5 * (past * after - coming * before)
+    return past * after - coming * before

@@ -14,18 +14,24 @@ from hypothesis import strategies as st
 from glider_guidance.current_observer import ObserverState
 from glider_guidance.guidance import (
     INFEASIBLE_S,
-    LAG_AFTER_S,
+    LOOKAHEAD_STRETCH_MAX,
     GuidanceSettings,
     guidance_abort,
     guidance_step,
-    heading_lag,
-    lag_stretch,
+    lookahead_stretch,
 )
 from glider_guidance.path import HelixPath, StraightPath, WaypointPath
-from glider_guidance.profile import GLIDING_DOWN, INFLECTING_UP, SURFACING
+from glider_guidance.profile import (
+    GLIDING_DOWN,
+    GLIDING_UP,
+    INFLECTING_DOWN,
+    INFLECTING_UP,
+    SURFACING,
+)
 from glider_model.frames import quaternion_from_euler, rotate_to_body
 from glider_model.polar import glide_horizontal_speed
 from glider_model.signals import TICK_S, Odometry
+from glider_model.steering import SteeringLearningSettings
 
 quick = settings(max_examples=25, deadline=None)
 
@@ -222,7 +228,9 @@ def test_estimate_survives_the_turn_at_depth(stall):
 
 
 def test_heading_is_held_while_the_vehicle_turns_over():
-    flight = Flight(straight(profile={'depth_m': 250.0}), current=(0.0, 0.15)).fly(2500.0)
+    filters = {'heading_frequency_radps': 0.2}
+    guidance = straight(profile={'depth_m': 250.0}, filters=filters)
+    flight = Flight(guidance, current=(0.0, 0.15)).fly(2500.0)
     turn = np.flatnonzero(flight.stage == INFLECTING_UP)
     # the filter comes to rest within half a minute
     held = flight.psi[turn[round(30.0 / TICK_S) :]]
@@ -361,43 +369,71 @@ def test_reference_rates_are_the_derivatives_of_the_reference():
     assert flight.theta_dot[1:] == pytest.approx(np.diff(flight.theta) / TICK_S, abs=1e-9)
 
 
-@given(st.floats(0.0, 10.0), st.floats(0.0, 10.0))
-def test_lookahead_grows_with_the_heading_lag_to_twice_itself(one_deg, other_deg):
-    less, more = (math.radians(angle) ** 2 for angle in sorted((one_deg, other_deg)))
-    assert 1.0 <= lag_stretch(less) <= lag_stretch(more) <= 2.0
-    assert lag_stretch(math.radians(0.9) ** 2) == 1.0
-    assert lag_stretch(math.radians(3.5) ** 2) == 2.0
+def weak(b, k=-0.3):
+    """Estimate of a phase, sure of its steering b (rad/s) and kick k."""
+    prior = SteeringLearningSettings().initial_state().dive
+    return prior._replace(b=b, k=k, p=(1e-12, *prior.p[1:]))
 
 
-@numba.njit
-def _lags(errors, dt):
-    lag = 0.0
-    for error in errors:
-        lag = heading_lag(lag, error, dt)
-    return lag
+@given(st.floats(1e-5, 0.1), st.floats(1e-5, 0.1), st.floats(1.0, 1000.0))
+def test_lookahead_grows_as_the_vehicle_steers_less(one, other, lookahead_s):
+    """To three times the time in which a turn outruns its kick; never below what is asked for."""
+    less, more = sorted((one, other))
+    assert lookahead_stretch(weak(less), lookahead_s) >= lookahead_stretch(weak(more), lookahead_s)
+    stretch = lookahead_stretch(weak(less), lookahead_s)
+    assert 1.0 <= stretch <= LOOKAHEAD_STRETCH_MAX
+    if 1.0 < stretch < LOOKAHEAD_STRETCH_MAX:
+        assert stretch * lookahead_s == pytest.approx(3.0 * 0.3 / less, rel=1e-3)
 
 
-def test_heading_lag_is_the_mean_square_of_what_is_not_a_turn():
-    """Of a steady oscillation its mean square; of a turn about no more than one of 10 deg."""
-    t = np.arange(0.0, 30000.0, TICK_S)
-    swings = 0.05 * np.sin(t / 7.0)
-    assert _lags(swings, TICK_S) == pytest.approx(0.05**2 / 2.0, rel=0.02)
-    turn = np.where(t < 300.0, 3.0, 0.0)
-    assert _lags(turn[: int(300.0 / TICK_S)], TICK_S) < math.radians(10.0) ** 2 * 0.1
-    assert _lags(turn, TICK_S) < 1e-5
+def beside(flight, stage, after_s):
+    """Cross-track error (m) when a stage begins for the first time after ``after_s``."""
+    begins = 1 + np.flatnonzero((flight.stage[1:] == stage) & (flight.stage[:-1] != stage))
+    return flight.e2[begins[begins > round(after_s / TICK_S)][0]]
 
 
-def test_vehicle_whose_heading_follows_badly_approaches_by_a_smaller_angle():
-    """30 m beside the path: half the angle at twice the lookahead, in the phase that lags only."""
+@pytest.mark.parametrize(
+    ('phase', 'turn', 'glide'),
+    [('dive', INFLECTING_DOWN, GLIDING_DOWN), ('climb', INFLECTING_UP, GLIDING_UP)],
+)
+def test_phase_that_steers_weakly_is_begun_nearer_to_the_path(phase, turn, glide):
+    """What the current will take the vehicle along by in the turn is led by more beforehand."""
+    before, after = {}, {}
+    for name in ('none', phase):
+        flight = Flight(straight(profile={'depth_m': 500.0}), current=(0.0, 0.1))
+        if name == phase:
+            steering = flight.state.steering._replace(**{phase: weak(0.0015)})
+            flight.state = flight.state._replace(steering=steering)
+        flight.fly(9000.0)
+        before[name], after[name] = beside(flight, turn, 4200.0), beside(flight, glide, 4200.0)
+    assert before[phase] < 1.2 * before['none'] < 0.0
+    assert 0.0 < after[phase] < 0.9 * after['none']
+
+
+def test_turn_over_is_flown_on_the_heading_of_a_steady_glide():
+    """The crab for the speed that pitch and rate ask for, whatever the speed before the turn."""
+    guidance = straight(profile={'depth_m': 250.0})
+    flight = Flight(guidance, current=(0.0, 0.15)).fly(2500.0)
+    turn = np.flatnonzero(flight.stage == INFLECTING_UP)
+    speed = guidance.params().profile_speed
+    assert flight.psi[turn[-1]] == pytest.approx(-math.asin(0.15 / speed), abs=math.radians(0.3))
+
+
+def test_vehicle_that_steers_weakly_approaches_by_a_smaller_angle():
+    """30 m beside the path: half the angle at twice the lookahead, in the weak phase only."""
     headings = {}
-    for name, lag in (('none', {}), ('dive', {'lag_dive': 0.01}), ('climb', {'lag_climb': 0.01})):
+    twice = weak(3.0 * 0.3 / 300.0)
+    for name, phases in (('none', {}), ('dive', {'dive': twice}), ('climb', {'climb': twice})):
         guidance = straight(0.0)
         params = guidance.params()
         point = Point(100.0, 30.0, 300.0, -0.5, 0.0, 0.25)
         odometry, _, _ = _odometry(point, (0.0, 0.0), params.polar)
         state, _ = guidance_step(guidance.initial_state(), odometry, params, TICK_S)
-        state = state._replace(profile=state.profile._replace(stage=GLIDING_DOWN, ticks=0), **lag)
-        for _ in range(int(LAG_AFTER_S / TICK_S) - 10):
+        state = state._replace(
+            profile=state.profile._replace(stage=GLIDING_DOWN, ticks=0),
+            steering=state.steering._replace(**phases),
+        )
+        for _ in range(500):
             state, output = guidance_step(state, odometry, params, TICK_S)
         headings[name] = output.reference.psi
     assert headings['none'] < -0.2

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from glider_control.measurement import Measured, measure
+from glider_model.measurement import Measured, measure
 from glider_model.signals import TICK_S, Odometry
 
 quick = settings(max_examples=60, deadline=None)
