@@ -278,8 +278,8 @@ def bank_to_turn(steering, disturbance, measured, reference, speed, learning, pa
     The share w keeps the bandwidth at what the vehicle can follow. To turn, it has to roll, and
     the kick of the roll goes the wrong way: y'' = U (b phi + k phi') has a zero at z = b / |k|.
     With a bandwidth of 2 z, and a line of sight that looks 3 / z ahead, the poles lie at 0.8 z and
-    are damped by 0.8. d_hat waits while the roll command is at its limit and until the sign of b is known. A vehicle that
-    hardly turns is steered by its kick alone.
+    are damped by 0.8. d_hat waits while the roll command is at its limit and until the sign of b
+    is known. A vehicle that hardly turns is steered by its kick alone.
     """
     limit = math.sin(params.roll_limit)
     ratio = speed_ratio(speed)
