@@ -348,6 +348,11 @@ static inline double lookahead_stretch(const SteeringState *steering, double loo
     return min(LOOKAHEAD_STRETCH_MAX, max(1.0, needed_s / lookahead_s));
 }
 
+static inline double within(double value, double most)
+{
+    return min(most, max(-most, value));
+}
+
 static inline GuidanceOutput guidance_step(
     GuidanceState *state, const Odometry *odometry, const GuidanceParams *params, double dt)
 {
@@ -415,15 +420,20 @@ static inline GuidanceOutput guidance_step(
         params->lookahead,
         lookahead_s * sqrt(ground.x * ground.x + ground.y * ground.y));
     double drift_past = state->drift;
+    double beside = state->beside + dt / BESIDE_S * (error.e2 - state->beside);
+    double more_up_s = state->more_up_s, more_down_s = state->more_down_s;
     double offset = 0.0;
     bool is_nearly_over = false;
     if (params->leads) {
         double across = observer.current_e * cos(gamma_d) - observer.current_n * sin(gamma_d);
-        double coming = across * turn_lead_s(&profile, &params->profile);
+        double more_s = rate_target > 0.0 ? more_up_s : more_down_s;
+        double coming = across * (turn_lead_s(&profile, &params->profile) + more_s);
         if (surfaced)
             drift_past = 0.0;
-        else if (begins_to_turn_over)
-            drift_past = across * turn_lead_s(&state->profile, &params->profile);
+        else if (begins_to_turn_over) {
+            more_s = stage == INFLECTING_UP ? more_up_s : more_down_s;
+            drift_past = across * (turn_lead_s(&state->profile, &params->profile) + more_s);
+        }
         if (is_gliding(stage)) {
             double to_turn_s
                 = time_to_turn(&profile, odometry->p_d, ground.z, &params->profile);
@@ -433,6 +443,14 @@ static inline GuidanceOutput guidance_step(
             double glided_s = profile.ticks * dt;
             double next = part * coming, past = part * drift_past;
             offset = turn_offset(to_turn_s, glided_s, next, past);
+            if (state->profile.ticks * dt < MEASURED_S && MEASURED_S <= glided_s
+                && drift_past != 0.0 && fabs(across) > MEASURED_CURRENT) {
+                more_s = (1.0 - 1.0 / stretch) * (beside - offset) / across;
+                if (rate_target < 0.0)
+                    more_up_s = within(more_up_s + more_s, LEAD_CORRECTION_S);
+                else
+                    more_down_s = within(more_down_s + more_s, LEAD_CORRECTION_S);
+            }
             double moved = turn_offset(to_turn_s - 1.0, glided_s + 1.0, next, past) - offset;
             offset += OFFSET_AHEAD * lookahead_s * moved;
             is_nearly_over = to_turn_s < min(READY_S_MAX, READY_S * (next_stretch - 1.0));
@@ -497,7 +515,7 @@ static inline GuidanceOutput guidance_step(
     };
     *state = (GuidanceState){
         state->tick + 1, profile, s, observer, heading, pitch, speed, heading_command,
-        drift_past, infeasible_ticks, measured, steering,
+        drift_past, infeasible_ticks, beside, more_up_s, more_down_s, measured, steering,
     };
     return output;
 }

@@ -29,6 +29,7 @@ from glider_guidance.path import (
 )
 from glider_guidance.profile import (
     GLIDING_DOWN,
+    INFLECTING_UP,
     INITIAL_PROFILE,
     SURFACE_PREPARATION,
     SURFACING,
@@ -84,6 +85,11 @@ LOOKAHEAD_OVER_ZERO = 3.0
 LOOKAHEAD_STRETCH_MAX = 10.0
 #: Of the lag behind a desired track that moves aside, this share is made up for beforehand.
 OFFSET_AHEAD = 0.5
+#: What a turn really cost across the path is measured so long after it (s), on the cross-track
+#: error smoothed over this time (s), in a cross current of no less than this (m/s).
+MEASURED_S, BESIDE_S, MEASURED_CURRENT = 120.0, 20.0, 0.02
+#: Largest correction of the lead of a turn (s).
+LEAD_CORRECTION_S = 60.0
 #: A phase that can hardly be steered is entered on its heading: the vehicle turns to it so long
 #: before the turn-over (s) for each time that the lookahead grows by itself, and so long at most.
 READY_S, READY_S_MAX = 60.0, 100.0
@@ -249,6 +255,9 @@ class GuidanceSettings(GuidanceLawSettings):
             0.0,
             0.0,
             0,
+            0.0,
+            0.0,
+            0.0,
             Measured(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             self.steering.initial_state(),
         )
@@ -287,6 +296,9 @@ class GuidanceState(NamedTuple):
     heading_command: float  #: held while the vehicle turns (rad)
     drift: float  #: what the last turn was expected to cost across the path (m)
     infeasible_ticks: int
+    beside: float  #: smoothed cross-track error (m)
+    more_up_s: float  #: by how much the turn at depth has to be led more, as learnt (s)
+    more_down_s: float  #: the same for the upper turn
     measured: Measured  #: filtered attitude and rates
     steering: Steering  #: what the vehicle can follow
 
@@ -323,6 +335,9 @@ def guidance_abort(state):
         state.heading_command,
         state.drift,
         state.infeasible_ticks,
+        state.beside,
+        state.more_up_s,
+        state.more_down_s,
         state.measured,
         state.steering,
     )
@@ -345,6 +360,9 @@ def _start(state, odometry, psi, theta, params):
         psi,
         0.0,
         0,
+        0.0,
+        0.0,
+        0.0,
         state.measured,
         state.steering,
     )
@@ -368,6 +386,12 @@ def lookahead_stretch(steering, lookahead_s):
         return 1.0
     needed_s = LOOKAHEAD_OVER_ZERO / followed_frequency(steering)
     return min(LOOKAHEAD_STRETCH_MAX, max(1.0, needed_s / lookahead_s))
+
+
+@kernel
+def within(value, most):
+    """``value``, held within -most and most."""
+    return min(most, max(-most, value))
 
 
 @kernel
@@ -464,15 +488,19 @@ def guidance_step(state, odometry, params, dt):
         lookahead_s * math.sqrt(ground_n * ground_n + ground_e * ground_e),
     )
     drift_past = state.drift
+    beside = state.beside + dt / BESIDE_S * (e2 - state.beside)
+    more_up_s, more_down_s = state.more_up_s, state.more_down_s
     offset = 0.0
     is_nearly_over = False
     if params.leads and not follows_path:
         across = observer.current_e * math.cos(gamma_d) - observer.current_n * math.sin(gamma_d)
-        coming = across * turn_lead_s(profile, params.profile)
+        more_s = more_up_s if rate_target > 0.0 else more_down_s
+        coming = across * (turn_lead_s(profile, params.profile) + more_s)
         if surfaced:
             drift_past = 0.0
         elif turns_over and is_gliding(state.profile.stage):
-            drift_past = across * turn_lead_s(state.profile, params.profile)
+            more_s = more_up_s if stage == INFLECTING_UP else more_down_s
+            drift_past = across * (turn_lead_s(state.profile, params.profile) + more_s)
         if is_gliding(stage):
             to_turn_s = time_to_turn(profile, odometry.p_d, ground_d, params.profile)
             if state.tick * dt + to_turn_s > params.end_s:
@@ -482,6 +510,17 @@ def guidance_step(state, odometry, params, dt):
             glided_s = profile.ticks * dt
             coming, past = part * coming, part * drift_past
             offset = turn_offset(to_turn_s, glided_s, coming, past)
+            if (
+                state.profile.ticks * dt < MEASURED_S <= glided_s
+                and drift_past != 0.0
+                and abs(across) > MEASURED_CURRENT
+            ):
+                # those that steer well make it good by themselves
+                more_s = (1.0 - 1.0 / stretch) * (beside - offset) / across
+                if rate_target < 0.0:
+                    more_up_s = within(more_up_s + more_s, LEAD_CORRECTION_S)
+                else:
+                    more_down_s = within(more_down_s + more_s, LEAD_CORRECTION_S)
             moved = turn_offset(to_turn_s - 1.0, glided_s + 1.0, coming, past) - offset
             offset += OFFSET_AHEAD * lookahead_s * moved
             is_nearly_over = to_turn_s < min(READY_S_MAX, READY_S * (next_stretch - 1.0))
@@ -561,6 +600,9 @@ def guidance_step(state, odometry, params, dt):
         heading_command,
         drift_past,
         infeasible_ticks,
+        beside,
+        more_up_s,
+        more_down_s,
         measured,
         steering,
     )
