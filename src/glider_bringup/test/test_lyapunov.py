@@ -36,7 +36,7 @@ from glider_model.rigid_body import GRAVITY
 from glider_model.signals import TICK_S
 
 #: Dives of 100 m, so that the flight has several inflections.
-FLIGHT = {'dives': 0, 'duration_s': 1600.0, 'profile.depth_m': 100.0}
+FLIGHT = {'dives': 0, 'duration_s': 3200.0, 'profile.depth_m': 100.0}
 UNKNOWN = {
     'trim and roll bias': {'perturb.pitch_trim_m': 0.01, 'perturb.roll_bias_deg': 10.0},
     'damping and moments': {
