@@ -498,7 +498,7 @@ def guidance_step(state, odometry, params, dt):
         coming = across * (turn_lead_s(profile, params.profile) + more_s)
         if surfaced:
             drift_past = 0.0
-        elif turns_over and is_gliding(state.profile.stage):
+        elif begins_to_turn_over:
             more_s = more_up_s if stage == INFLECTING_UP else more_down_s
             drift_past = across * (turn_lead_s(state.profile, params.profile) + more_s)
         if is_gliding(stage):
