@@ -200,6 +200,7 @@ def make_adaptive(
             inertia,
         )
 
+    steering = settings.steering.params()
     _, _, _, i_xx, i_yy, *_ = rigid_body(0.0, 0.0, vehicle)
     return AdaptiveParams(
         channel(settings.roll, i_xx + vehicle.a_44),
@@ -207,7 +208,7 @@ def make_adaptive(
         settings.heading_kp_per_s,
         settings.heading_ki_per_s2,
         settings.heading_kd,
-        settings.steering.params(),
+        steering._replace(bank=min(steering.bank, math.sin(roll_limit))),
         vehicle.m,
         roll_limit,
         roll_filter,
@@ -287,8 +288,8 @@ def bank_to_turn(steering, disturbance, measured, reference, speed, learning, pa
     is_known = steering.p[0] < steering.b * steering.b
     bandwidth = effectiveness * limit / SATURATING_ERROR
     if is_known:
-        most = BANDWIDTH_AGAINST_KICK if steering.b * steering.k < 0.0 else BANDWIDTH_WITH_KICK
-        bandwidth = most * effectiveness / max(abs(steering.k), SMALLEST_KICK)
+        times = BANDWIDTH_AGAINST_KICK if steering.b * steering.k < 0.0 else BANDWIDTH_WITH_KICK
+        bandwidth = times * effectiveness / max(abs(steering.k), SMALLEST_KICK)
     share = min(1.0, bandwidth / params.heading_kp)
     asked = share * reference.psi_dot
     # the heading that is left when the roll is gone, but for the roll of the turn asked for

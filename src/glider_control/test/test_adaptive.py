@@ -167,6 +167,14 @@ def test_roll_goes_to_the_side_that_turns_the_right_way(rate, sign):
     assert np.sign(state.roll.value) == sign
 
 
+def test_vehicle_has_to_turn_at_the_roll_that_it_may_take():
+    """With a smaller limit of roll, the way of steering is decided at that."""
+    vehicle, roll_filter = load_vehicle('zhang2021').params(), FilterParams(0.5, 0.08)
+    for limit_deg, bank_deg in ((20.0, 20.0), (30.0, 30.0), (45.0, 30.0)):
+        params = make_adaptive(SETTINGS, vehicle, math.radians(limit_deg), roll_filter)
+        assert params.steering.bank == pytest.approx(math.sin(math.radians(bank_deg)))
+
+
 def test_disturbance_estimate_is_bounded():
     state = initial_adaptive(SETTINGS)
     steering = state.steering
