@@ -7,6 +7,7 @@ import sys
 import typer
 
 from glider_bringup.commands import (
+    fuzz,
     recorded,
     replay,
     report,
@@ -29,7 +30,7 @@ app = typer.Typer(
     context_settings={'help_option_names': ['-h', '--help']},
 )
 # Commands in the order in which --help lists them.
-for _module in (run, studies, sweeps, recorded, report, replay, verify, vehicles):
+for _module in (run, studies, sweeps, recorded, report, replay, verify, fuzz, vehicles):
     app.add_typer(_module.app)
 
 

@@ -1,0 +1,68 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider fuzz``: hostile use, counted."""
+
+import json
+from enum import Enum
+from importlib import import_module
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from glider_bringup.console import EXIT_FAILED, Json, counter, messages, output
+
+app = typer.Typer()
+#: Doors, each a module of `glider_bringup.fuzzing`, with the cases tried by default.
+COUNTS = {'files': 1000, 'lines': 200, 'messages': 1000, 'bags': 500, 'flights': 500}
+Door = Enum('Door', {door: door for door in COUNTS})
+
+
+@app.command(epilog='Example: ./glider fuzz --only bags --count 100 --seed 7')
+def fuzz(
+    only: Annotated[
+        list[Door] | None, typer.Option(help='Door; can be repeated. Default: all of them.')
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**62, help='Seed of all cases.')] = 0,
+    count: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=1_000_000,
+            help='Cases at each door. Default: '
+            + ', '.join(f'{n} {door}' for door, n in COUNTS.items())
+            + '.',
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Try the doors of the stack with mutated files, command lines, messages, bags and flights.
+
+    Counts tracebacks, hangs (over 10 s) and wrong results given as good ones; exit code 1 if there
+    is any. The same seed tries the same cases.
+    """
+    found = {}
+    for door in dict.fromkeys(one.value for one in only or Door):
+        cases = count or COUNTS[door]
+        with counter(door, cases) as update:
+            work = import_module(f'glider_bringup.fuzzing.{door}')
+            found[door] = work.fuzz(seed, cases, update)
+    if as_json:
+        print(json.dumps({door: one._asdict() for door, one in found.items()}))
+    else:
+        _print(found)
+    if not all(one.clean for one in found.values()):
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _print(found: dict) -> None:
+    """Print the counts, and examples of what went wrong, for a person."""
+    table = Table()
+    for name in ('', 'tried', 'tracebacks', 'hangs', 'wrong'):
+        table.add_column(name, justify='right' if name else 'left')
+    for door, one in found.items():
+        table.add_row(door, *(f'{n:,}' for n in one[:4]))
+    output.print(table)
+    for door, one in found.items():
+        for example in one.examples:
+            messages.print(f'{door}: {example}', soft_wrap=True)
