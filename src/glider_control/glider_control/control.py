@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Control: measurement, attitude law, vertical-rate law and allocation put together.
+"""Control: watch, measurement, attitude law, vertical-rate law and allocation put together.
 
 The channels cannot be swapped: buoyancy sets speed and vertical rate, the mass forward or aft sets
 pitch, the mass turned to a side sets roll and so heading.
@@ -34,7 +34,18 @@ from glider_control.pid import (
     PidState,
     pid_step,
 )
+from glider_control.watch import (
+    INITIAL_WATCH,
+    ORDERED,
+    SURFACES,
+    WatchParams,
+    WatchState,
+    make_watch,
+    take_in,
+    watch,
+)
 from glider_model.command_filter import Filtered, FilterParams
+from glider_model.gate import GateSettings
 from glider_model.kernel import kernel
 from glider_model.measurement import Measured, measure
 from glider_model.polar import Polar, glide_net_heaviness, glide_speed, make_polar
@@ -45,7 +56,7 @@ from glider_model.vehicle import load_vehicle
 
 _TUNABLE = {'tunable': True}
 
-#: Bits of ``ControlOutput.saturation``.
+#: Bits of ``ControlOutput.saturation``; those of `glider_control.watch` come after them.
 SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL = 1, 2, 4
 #: The vertical-rate integrator works within this error of the vertical rate (m/s).
 VERTICAL_RATE_WINDOW = 0.1
@@ -99,12 +110,20 @@ class ControlLawSettings(Settings):
     heading: HeadingSettings = Field(HeadingSettings(), description='bank to turn')
     buoyancy: BuoyancySettings = Field(BuoyancySettings(), description='vertical-rate law')
     filters: FilterSettings = Field(FilterSettings(), description='filters and dead bands')
+    gate: GateSettings = Field(GateSettings(), description='odometry that is refused')
 
 
 class ControlSettings(ControlLawSettings):
     """Everything the control node is told."""
 
     vehicle: str = Field('zhang2021', description='vehicle: masses, ranges, polar, steering')
+    lost_after_s: float = Field(
+        10.0,
+        ge=0.1,
+        le=3600.0,
+        description='free-running: an input that has been stale for so long is lost, and the '
+        'vehicle surfaces for good (s)',
+    )
 
     def params(self) -> 'ControlParams':
         """Kernel parameters."""
@@ -134,7 +153,8 @@ class ControlSettings(ControlLawSettings):
                 filters.pitch_dead_band_m,
                 math.radians(filters.roll_dead_band_deg),
             ),
-            Joints(-kernel_vehicle.m_b_max, 0.0, 0.0),
+            Joints(-kernel_vehicle.m_b_max, -kernel_vehicle.x_p_max, 0.0),
+            make_watch(kernel_vehicle, vehicle.rated_depth_m, self.gate.params()),
         )
 
     def initial_state(self) -> 'ControlState':
@@ -146,6 +166,7 @@ class ControlSettings(ControlLawSettings):
             PidState(0.0, 0.0, 0.0, Filtered(0.0, 0.0)),
             Trim(0.0, 0.0),
             Joints(0.0, 0.0, 0.0),
+            INITIAL_WATCH,
         )
 
 
@@ -162,7 +183,8 @@ class ControlParams(NamedTuple):
     buoyancy_trim_max: float  #: (kg)
     attitude_s: float
     dead_band: Joints
-    safe_command: Joints  #: as buoyant as possible, mass at neutral, roll level
+    safe_command: Joints  #: as buoyant as possible, mass at the climb stop, no roll
+    watch: WatchParams
 
 
 class Trim(NamedTuple):
@@ -181,6 +203,7 @@ class ControlState(NamedTuple):
     pid: PidState
     trim: Trim
     command: Joints  #: last command
+    watch: WatchState
 
 
 class ControlOutput(NamedTuple):
@@ -189,7 +212,7 @@ class ControlOutput(NamedTuple):
     command: Joints
     wrench: Wrench
     adaptation: Adaptation
-    saturation: int  #: sum of SATURATED_* bits
+    saturation: int  #: sum of SATURATED_* bits and of those of `glider_control.watch`
 
 
 @kernel
@@ -207,15 +230,18 @@ def vertical_rate_law(trim, measured, reference, joints, params, dt):
     The glide polar gives the weight of the steady glide. One integral corrects what ballast and
     density differ by, another, with the sign of the rate, what the drag does: a draggy vehicle
     has to be heavier in the dive and lighter in the climb, and has to know it as soon as it turns
-    over. Both wait while it does.
+    over. Both wait while it does; not once the pump is where it was meant to be and the vehicle
+    goes the wrong way all the same.
     """
     sign = 1.0 if reference.v_d > 0.0 else -1.0
     ballast, drag = trim.ballast, trim.drag
     wanted = glide_net_heaviness(reference.theta, reference.v_d, params.polar) + sign * drag
     error = reference.v_d - measured.vertical_rate
     limit = params.allocation.m_b_max
-    steady = abs(error) < VERTICAL_RATE_WINDOW and abs(joints.m_b - wanted - ballast) < 0.05
-    if steady:
+    is_near = abs(error) < VERTICAL_RATE_WINDOW
+    goes_wrong = measured.vertical_rate * sign < 0.0
+    has_arrived = abs(joints.m_b - wanted - ballast) < 0.05
+    if has_arrived and (is_near or goes_wrong):
         most = params.buoyancy_trim_max
         ballast = min(most, max(-most, ballast + dt * params.buoyancy_ki * error))
         drag = min(most, max(-most, drag + dt * params.drag_ki * error * sign))
@@ -223,34 +249,12 @@ def vertical_rate_law(trim, measured, reference, joints, params, dt):
 
 
 @kernel
-def control_step(state, odometry, joints, reference, params, dt):
-    """One tick of control.
-
-    Parameters
-    ----------
-    state : ControlState
-    odometry : Odometry
-        Measured pose and velocity over ground.
-    joints : Joints
-        Where the actuators are.
-    reference : Reference
-    params : ControlParams
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    ControlState, ControlOutput
-    """
-    first = state.tick == 0
-    last = joints if first else state.command
-    limits = params.allocation
-    measured = measure(state.measured, odometry, first, params.attitude_s, dt)
+def attitude_law(state, measured, seen, last, params, dt):
+    """Roll and pitch moment (N m) of the law in use, with its state and what it has learnt."""
+    limits, joints, reference = params.allocation, seen.joints, seen.reference
     speed, alpha = glide_speed(measured.theta, measured.vertical_rate, params.polar)
-
     held = (abs(last.mu) >= limits.mu_max, abs(last.x_p) >= limits.x_p_max)
     adaptive, pid = state.adaptive, state.pid
-    learnt = Adaptation(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if params.adapts:
         adaptive, tau_p, tau_q = adaptive_step(
             adaptive,
@@ -264,21 +268,92 @@ def control_step(state, odometry, joints, reference, params, dt):
             params.adaptive,
             dt,
         )
-        learnt = adaptation(adaptive, params.adaptive)
     else:
         pid, tau_p, tau_q = pid_step(
             pid, measured, reference, speed, held[1], held[0], params.pid, dt
         )
-    m_b, trim = vertical_rate_law(state.trim, measured, reference, joints, params, dt)
-    mu = allocate_roll(tau_p, measured.phi, measured.theta, limits)
-    x_p = allocate_pitch(tau_q, joints.mu, measured.phi, measured.theta, limits)
+    return adaptive, pid, tau_p, tau_q
 
-    command = Joints(
-        _hold(m_b, last.m_b, params.dead_band.m_b, limits.m_b_max),
-        _hold(x_p, last.x_p, params.dead_band.x_p, limits.x_p_max),
-        _hold(mu, last.mu, params.dead_band.mu, limits.mu_max),
+
+@kernel
+def control_surface(state):
+    """Bring the vehicle to the surface, now and for good."""
+    seen = state.watch
+    return ControlState(
+        state.tick,
+        state.measured,
+        state.adaptive,
+        state.pid,
+        state.trim,
+        state.command,
+        WatchState(
+            seen.gate,
+            seen.joints,
+            seen.joints_s,
+            seen.reference,
+            seen.reference_s,
+            seen.lag_m,
+            seen.lag_s,
+            seen.still_s,
+            seen.deep_s,
+            seen.refused_s,
+            seen.buoyancy,
+            seen.pitch,
+            seen.roll,
+            seen.told | ORDERED,
+        ),
     )
-    saturation = 0
+
+
+@kernel
+def control_step(state, odometry, joints, reference, params, dt):
+    """One tick of control.
+
+    Parameters
+    ----------
+    state : ControlState
+    odometry : Odometry
+        Measured pose and velocity over ground; what the gate refuses is not acted on.
+    joints : Joints
+        Where the actuators are.
+    reference : Reference
+    params : ControlParams
+    dt : float
+        Length of the tick (s).
+
+    Returns
+    -------
+    ControlState, ControlOutput
+    """
+    first = state.tick == 0
+    seen = take_in(state.watch, odometry, joints, reference, params.watch, dt)
+    odometry, joints = seen.gate.odometry, seen.joints
+    last = joints if first else state.command
+    limits = params.allocation
+    measured = measure(state.measured, odometry, first, params.attitude_s, dt)
+    before = odometry if first else state.watch.gate.odometry
+    watched = watch(seen, before, measured.vertical_rate, last, params.watch, dt)
+
+    adaptive, pid, trim = state.adaptive, state.pid, state.trim
+    command, tau_p, tau_q = last, 0.0, 0.0
+    m_b = last.m_b
+    if watched.told & SURFACES:
+        command, m_b = params.safe_command, params.safe_command.m_b
+    elif seen.gate.seen:
+        adaptive, pid, tau_p, tau_q = attitude_law(state, measured, seen, last, params, dt)
+        m_b, trim = vertical_rate_law(state.trim, measured, seen.reference, joints, params, dt)
+        mu = allocate_roll(tau_p, measured.phi, measured.theta, limits)
+        x_p = allocate_pitch(tau_q, joints.mu, measured.phi, measured.theta, limits)
+        command = Joints(
+            _hold(m_b, last.m_b, params.dead_band.m_b, limits.m_b_max),
+            _hold(x_p, last.x_p, params.dead_band.x_p, limits.x_p_max),
+            _hold(mu, last.mu, params.dead_band.mu, limits.mu_max),
+        )
+    learnt = Adaptation(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if params.adapts:
+        learnt = adaptation(adaptive, params.adaptive)
+
+    saturation = watched.told
     if abs(command.m_b) >= limits.m_b_max:
         saturation |= SATURATED_BUOYANCY
     if abs(command.x_p) >= limits.x_p_max:
@@ -286,4 +361,5 @@ def control_step(state, odometry, joints, reference, params, dt):
     if abs(command.mu) >= limits.mu_max:
         saturation |= SATURATED_ROLL
     output = ControlOutput(command, Wrench(m_b * GRAVITY, tau_p, tau_q), learnt, saturation)
-    return ControlState(state.tick + 1, measured, adaptive, pid, trim, command), output
+    tick = state.tick + 1 if seen.gate.seen else 0
+    return ControlState(tick, measured, adaptive, pid, trim, command, watched), output

@@ -46,6 +46,7 @@ from glider_guidance.profile import (
 )
 from glider_model.command_filter import Filtered, FilterParams, filter_angle
 from glider_model.frames import euler_from_quaternion, rotate_to_ned, wrap_angle
+from glider_model.gate import INITIAL_GATE, GateParams, GateSettings, GateState, gate_step
 from glider_model.kernel import kernel
 from glider_model.measurement import Measured, measure
 from glider_model.polar import (
@@ -58,7 +59,7 @@ from glider_model.polar import (
     steepen,
 )
 from glider_model.settings import Settings
-from glider_model.signals import Reference, TrackingError, Water
+from glider_model.signals import SURFACE_RATE, Reference, TrackingError, Water
 from glider_model.steering import (
     Steering,
     SteeringLearningSettings,
@@ -198,6 +199,7 @@ class GuidanceLawSettings(Settings):
     steering: SteeringLearningSettings = Field(
         SteeringLearningSettings(), description='what the vehicle can follow, learnt'
     )
+    gate: GateSettings = Field(GateSettings(), description='odometry that is refused')
 
 
 class GuidanceSettings(GuidanceLawSettings):
@@ -240,6 +242,7 @@ class GuidanceSettings(GuidanceLawSettings):
             FilterParams(filters.heading_frequency_radps, filters.heading_rate_radps),
             FilterParams(filters.pitch_frequency_radps, filters.pitch_rate_radps),
             self.steering.params(),
+            self.gate.params(),
         )
 
     def initial_state(self) -> 'GuidanceState':
@@ -260,6 +263,7 @@ class GuidanceSettings(GuidanceLawSettings):
             0.0,
             Measured(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             self.steering.initial_state(),
+            INITIAL_GATE,
         )
 
 
@@ -281,6 +285,7 @@ class GuidanceParams(NamedTuple):
     heading_filter: FilterParams
     pitch_filter: FilterParams
     steering: SteeringParams
+    gate: GateParams
 
 
 class GuidanceState(NamedTuple):
@@ -301,6 +306,7 @@ class GuidanceState(NamedTuple):
     more_down_s: float  #: the same for the upper turn
     measured: Measured  #: filtered attitude and rates
     steering: Steering  #: what the vehicle can follow
+    gate: GateState  #: the odometry that serves
 
 
 class GuidanceOutput(NamedTuple):
@@ -340,6 +346,7 @@ def guidance_abort(state):
         state.more_down_s,
         state.measured,
         state.steering,
+        state.gate,
     )
 
 
@@ -365,6 +372,7 @@ def _start(state, odometry, psi, theta, params):
         0.0,
         state.measured,
         state.steering,
+        state.gate,
     )
 
 
@@ -402,7 +410,7 @@ def guidance_step(state, odometry, params, dt):
     ----------
     state : GuidanceState
     odometry : Odometry
-        Measured pose and velocity over ground.
+        Measured pose and velocity over ground; what the gate refuses is not acted on.
     params : GuidanceParams
     dt : float
         Length of the tick (s).
@@ -411,6 +419,8 @@ def guidance_step(state, odometry, params, dt):
     -------
     GuidanceState, GuidanceOutput
     """
+    gate = gate_step(state.gate, odometry, params.gate, dt)
+    odometry = gate.odometry
     q_w, q_x, q_y, q_z = odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
     _, theta, psi = euler_from_quaternion(q_w, q_x, q_y, q_z)
     ground_n, ground_e, ground_d = rotate_to_ned(
@@ -577,7 +587,7 @@ def guidance_step(state, odometry, params, dt):
         heading.value,
         math.cos(heading_command) * speed + current_n,
         math.sin(heading_command) * speed + current_e,
-        rate_target,
+        SURFACE_RATE if profile.aborted else rate_target,
         0.0,
         pitch.rate,
         heading.rate,
@@ -590,7 +600,7 @@ def guidance_step(state, odometry, params, dt):
         infeasible_ticks * dt > INFEASIBLE_S,
     )
     new_state = GuidanceState(
-        state.tick + 1,
+        state.tick + 1 if gate.seen else 0,
         profile,
         s,
         observer,
@@ -605,5 +615,6 @@ def guidance_step(state, odometry, params, dt):
         more_down_s,
         measured,
         steering,
+        gate,
     )
     return new_state, output

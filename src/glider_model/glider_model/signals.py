@@ -4,6 +4,10 @@
 
 from typing import NamedTuple
 
+#: Vertical rate (m/s, + down) that asks control for the surface with all there is: the whole pump,
+#: the mass at its climb stop, no roll. No glider climbs at it.
+SURFACE_RATE = -10.0
+
 #: Length of one tick (s) and of one tick in the integer nanoseconds of a message stamp.
 TICK_S = 0.1
 TICK_NS = 100_000_000
@@ -52,7 +56,7 @@ class Reference(NamedTuple):
     phi: float  #: desired roll, pitch, heading (rad)
     theta: float
     psi: float
-    v_n: float  #: desired velocity over ground (m/s); v_d is the vertical rate, + down
+    v_n: float  #: desired velocity over ground (m/s); v_d, + down, may be SURFACE_RATE
     v_e: float
     v_d: float
     phi_dot: float  #: desired Euler angle rates (rad/s)

@@ -152,6 +152,8 @@ class Vehicle(Settings):
     moving_mass: MovingMassSettings
     buoyancy_engine: BuoyancyEngineSettings
     hull: HullSettings
+    #: Deepest that the hull is meant to go. Recordings made before there was this field lack it.
+    rated_depth: quantity('m', gt=0.0, le=12000.0) | None = None
     added_mass: AddedMassSettings
     hydrodynamics: HydrodynamicsSettings
     steering: SteeringSettings
@@ -162,6 +164,11 @@ class Vehicle(Settings):
         if fault:
             raise ValueError(f'rigid_body, moving_mass, added_mass: {fault}')
         return self
+
+    @property
+    def rated_depth_m(self) -> float:
+        """Deepest that the hull is meant to go (m); infinite if its file does not say."""
+        return self.rated_depth.value if self.rated_depth else math.inf
 
     def params(self) -> 'VehicleParams':
         """Kernel parameters, SI and radians."""
