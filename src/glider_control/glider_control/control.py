@@ -58,8 +58,8 @@ _TUNABLE = {'tunable': True}
 
 #: Bits of ``ControlOutput.saturation``; those of `glider_control.watch` come after them.
 SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL = 1, 2, 4
-#: The vertical-rate integrator works within this error of the vertical rate (m/s).
-VERTICAL_RATE_WINDOW = 0.1
+#: The integrals of the vertical-rate law wait until the pump is this near to where it goes (kg).
+PUMP_ARRIVED_KG = 0.05
 
 
 class BuoyancySettings(Settings):
@@ -230,18 +230,15 @@ def vertical_rate_law(trim, measured, reference, joints, params, dt):
     The glide polar gives the weight of the steady glide. One integral corrects what ballast and
     density differ by, another, with the sign of the rate, what the drag does: a draggy vehicle
     has to be heavier in the dive and lighter in the climb, and has to know it as soon as it turns
-    over. Both wait while it does; not once the pump is where it was meant to be and the vehicle
-    goes the wrong way all the same.
+    over. Both wait until the pump is where it is meant to be, and no longer: a vehicle that then
+    sinks, or climbs too slowly, needs them most.
     """
     sign = 1.0 if reference.v_d > 0.0 else -1.0
     ballast, drag = trim.ballast, trim.drag
     wanted = glide_net_heaviness(reference.theta, reference.v_d, params.polar) + sign * drag
     error = reference.v_d - measured.vertical_rate
     limit = params.allocation.m_b_max
-    is_near = abs(error) < VERTICAL_RATE_WINDOW
-    goes_wrong = measured.vertical_rate * sign < 0.0
-    has_arrived = abs(joints.m_b - wanted - ballast) < 0.05
-    if has_arrived and (is_near or goes_wrong):
+    if abs(joints.m_b - wanted - ballast) < PUMP_ARRIVED_KG:
         most = params.buoyancy_trim_max
         ballast = min(most, max(-most, ballast + dt * params.buoyancy_ki * error))
         drag = min(most, max(-most, drag + dt * params.drag_ki * error * sign))
