@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_bringup.direct import put
-from glider_control.control import ControlSettings, control_step
+from glider_control.control import ControlSettings, control_step, control_surface
 from glider_guidance.guidance import GuidanceSettings, guidance_abort, guidance_step
 from glider_model.current import CurrentSettings, current_step
 from glider_model.frames import (
@@ -209,7 +209,7 @@ class GuidanceBlock(Block):
     inputs = ('odom',)
     outputs = ('tracking_error', 'current_estimate', 'reference')
 
-    def abort(self) -> None:
+    def surface(self) -> None:
         """Do what the service ``abort`` does."""
         self.state = guidance_abort(self.state)
 
@@ -235,6 +235,10 @@ class ControlBlock(Block):
     name = 'control'
     inputs = ('reference', 'odom', 'joint_states')
     outputs = ('wrench', 'adaptation', 'command')
+
+    def surface(self) -> None:
+        """Do what the node does whose input is lost."""
+        self.state = control_surface(self.state)
 
     def run(self, stamps_ns, inputs):
         """Command, wrench, adaptation and flag of each tick."""

@@ -353,7 +353,7 @@ def _flown(run: Path) -> Iterator[tuple[Scenario, str]]:
     """
     file = run / SCENARIO_FILE
     if file.is_file():
-        yield load_scenario(str(file)), file.read_text(encoding='utf-8')
+        yield load_scenario(str(file), recorded=True), file.read_text(encoding='utf-8')
         return
     stored = attachments(run) if has_bag(run) else {}
     if SCENARIO_FILE not in stored:
@@ -365,7 +365,7 @@ def _flown(run: Path) -> Iterator[tuple[Scenario, str]]:
         for name in {SCENARIO_FILE, VEHICLE_FILE} & set(stored):
             (Path(folder) / name).write_bytes(stored[name])
         try:
-            scenario = load_scenario(str(Path(folder) / SCENARIO_FILE))
+            scenario = load_scenario(str(Path(folder) / SCENARIO_FILE), recorded=True)
         except ConfigurationError as error:
             raise ConfigurationError(str(error).replace(folder, f'{run}: stored')) from None
         yield scenario, stored[SCENARIO_FILE].decode()

@@ -170,7 +170,9 @@ def read_scenario(name: str = DEFAULT_SCENARIO) -> ScenarioSource:
     return ScenarioSource(path, values)
 
 
-def make_scenario(source: ScenarioSource, changes: dict[str, Any] | None = None) -> Scenario:
+def make_scenario(
+    source: ScenarioSource, changes: dict[str, Any] | None = None, recorded: bool = False
+) -> Scenario:
     """Scenario of a file with some of its fields changed.
 
     Parameters
@@ -178,6 +180,8 @@ def make_scenario(source: ScenarioSource, changes: dict[str, Any] | None = None)
     source : ScenarioSource
     changes : dict
         Values by dotted field name, such as ``{'current.speed_kn': 0.5}``.
+    recorded : bool
+        It has been flown: nobody asks any more whether the vehicle is rated for its depth.
 
     Raises
     ------
@@ -191,12 +195,20 @@ def make_scenario(source: ScenarioSource, changes: dict[str, Any] | None = None)
     if changes:
         told += ' with ' + ', '.join(f'{field}={value}' for field, value in changes.items())
     scenario = validate(Scenario, values, told, path.parent)
-    return _find_vehicle(scenario, path.parent, told)
+    scenario = _find_vehicle(scenario, path.parent, told)
+    if not recorded:
+        try:
+            scenario.guidance_settings().check_depth()
+        except ConfigurationError as error:
+            raise ConfigurationError(f'{told}: {error}') from None
+    return scenario
 
 
-def load_scenario(name: str = DEFAULT_SCENARIO, changes: dict[str, Any] | None = None) -> Scenario:
+def load_scenario(
+    name: str = DEFAULT_SCENARIO, changes: dict[str, Any] | None = None, recorded: bool = False
+) -> Scenario:
     """Scenario by name or path, with some of its fields changed; see `make_scenario`."""
-    return make_scenario(read_scenario(name), changes)
+    return make_scenario(read_scenario(name), changes, recorded)
 
 
 def _find_vehicle(scenario: Scenario, folder: Path, source: str) -> Scenario:

@@ -246,7 +246,7 @@ def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[
     _unwrap(odom[:, 5], reference[:, 5], heading_before)
     return {
         'depth_m': odom[:, 2],
-        'depth_ref_m': reference[:, 2],
+        'depth_ref_m': np.maximum(0.0, reference[:, 2]),  # an order to surface points above
         'cross_track_m': error[:, 1],
         'vertical_error_m': error[:, 2],
         'roll_deg': np.degrees(odom[:, 3]),

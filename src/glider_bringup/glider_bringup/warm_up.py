@@ -15,7 +15,7 @@ from glider_bringup.ros.verify import verify
 from glider_bringup.scenario import load_scenario
 from glider_bringup.score import Scorer
 from glider_bringup.traces import halve
-from glider_control.control import control_step
+from glider_control.control import control_step, control_surface
 from glider_guidance.guidance import guidance_abort, guidance_step
 from glider_model.current import current_step
 from glider_model.frames import (
@@ -56,6 +56,7 @@ def main() -> None:
     guidance_abort(guidance)
     reference = reference_from_wire(reference_to_wire(guided.reference))
     _, controlled = control_step(control, odometry, joints, reference, params.control, TICK_S)
+    control_surface(control)
     wrench_to_wire(controlled.wrench)
     plant = plant_step(plant, controlled.command, water, params.plant, TICK_S)
     plant_finished(plant, params.plant)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from glider_model.gate import INITIAL_GATE, GateParams, GateState, gate_step, is_lost
 from glider_model.kernel import kernel
-from glider_model.signals import SURFACE_RATE, Joints, Reference
+from glider_model.signals import SURFACE_TARGET, Joints, Reference
 
 #: Told: an actuator does not follow its command; a measurement was refused.
 STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, REFUSED = 8, 16, 32, 64
@@ -117,7 +117,7 @@ def _is_finite(reference):
     """Whether every number that control uses of a reference is finite."""
     a = reference
     return math.isfinite(
-        a.phi + a.theta + a.psi + a.v_d + a.phi_dot + a.theta_dot + a.psi_dot
+        a.p_d + a.phi + a.theta + a.psi + a.v_d + a.phi_dot + a.theta_dot + a.psi_dot
     )
 
 
@@ -216,9 +216,7 @@ def watch(state, before, vertical_rate, command, params, dt):
     """
     odometry, joints, most = state.gate.odometry, state.joints, params.range
     depth = odometry.p_d
-    lag_m = _depth_lag(
-        state.lag_m, depth, before.p_d, vertical_rate, params.gate.depth_jump, dt
-    )
+    lag_m = _depth_lag(state.lag_m, depth, before.p_d, vertical_rate, params.gate.depth_jump, dt)
     lag_s = state.lag_s + dt if abs(lag_m) > LAG_M else 0.0
     is_still = depth > STILL_BELOW_M and _is_same(odometry, before)
     still_s = state.still_s + dt if is_still else 0.0
@@ -241,7 +239,7 @@ def watch(state, before, vertical_rate, command, params, dt):
         told |= STUCK_ROLL
     if state.refused_s < REFUSAL_TOLD_S:
         told |= REFUSED
-    if state.reference.v_d <= SURFACE_RATE:
+    if state.reference.p_d <= SURFACE_TARGET:
         told |= ORDERED
     if deep_s > TOO_DEEP_S:
         told |= TOO_DEEP

@@ -58,8 +58,8 @@ from glider_model.polar import (
     make_polar,
     steepen,
 )
-from glider_model.settings import Settings
-from glider_model.signals import SURFACE_RATE, Reference, TrackingError, Water
+from glider_model.settings import ConfigurationError, Settings
+from glider_model.signals import SURFACE_TARGET, Reference, TrackingError, Water
 from glider_model.steering import (
     Steering,
     SteeringLearningSettings,
@@ -67,7 +67,7 @@ from glider_model.steering import (
     followed_frequency,
     learn,
 )
-from glider_model.vehicle import load_vehicle
+from glider_model.vehicle import load_vehicle, vehicle_path
 
 #: The flight model is believed this long after a glide began (s).
 SETTLED_S = 120.0
@@ -219,6 +219,29 @@ class GuidanceSettings(GuidanceLawSettings):
         le=1e8,
         description='time at which the mission ends (s), no later turn is led; 0.0: never',
     )
+
+    def check_depth(self) -> None:
+        """Refuse to go deeper than the vehicle is rated for.
+
+        Raises
+        ------
+        ConfigurationError
+            If the lower turn or the path is too deep, or the vehicle's file has no rating.
+        """
+        vehicle = load_vehicle(self.vehicle)
+        if vehicle.rated_depth is None:
+            raise ConfigurationError(
+                f'{vehicle_path(self.vehicle)}: rated_depth: missing (allowed: depth in m that '
+                f'the vehicle is rated for, with unit and source)'
+            )
+        field, deepest = 'profile.depth_m', self.profile.depth_m
+        if self.profile.mode == 'path':
+            field, deepest = 'path', float(self.path.points(500)[:, 2].max())
+        if deepest > vehicle.rated_depth_m:
+            raise ConfigurationError(
+                f'{field}: {deepest:g} m deep, {vehicle.name} is rated for less (allowed: <= '
+                f'{vehicle.rated_depth_m:g} m, rated_depth of the vehicle)'
+            )
 
     def params(self) -> 'GuidanceParams':
         """Kernel parameters."""
@@ -577,6 +600,8 @@ def guidance_step(state, odometry, params, dt):
     t_n, t_e, t_d = path_point(state.s, params.path)
     if not follows_path:
         t_d = params.profile.depth if rate_target > 0.0 else 0.0
+    if profile.aborted:
+        t_d = SURFACE_TARGET
 
     reference = Reference(
         t_n,
@@ -587,7 +612,7 @@ def guidance_step(state, odometry, params, dt):
         heading.value,
         math.cos(heading_command) * speed + current_n,
         math.sin(heading_command) * speed + current_e,
-        SURFACE_RATE if profile.aborted else rate_target,
+        rate_target,
         0.0,
         pitch.rate,
         heading.rate,

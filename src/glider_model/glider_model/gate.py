@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is taken for measured: a wild sample of odometry is refused, the last good one serves.
 
-A sample is refused if a number is not finite, the quaternion is none, a rate or the speed is beyond
-any glider's, or if it lies so far from where the last good one leads that no glider went there.
-After ``hold_s`` of refusals a sample that is good in itself is believed again, for then the world
-has jumped (a fix, a new source); without one the measurement is lost.
+A sample is refused if a number is not finite, the quaternion is none, a rate or the speed is
+beyond any glider's, or if it lies so far from where the last good one leads that no glider went
+there. After ``hold_s`` of refusals a sample that is good in itself is believed again, for then the
+world has jumped (a fix, a new source); without one the measurement is lost.
 """
 
 import math
@@ -46,9 +46,7 @@ class GateSettings(Settings):
         le=1e8,
         description='farthest from where the last sample leads, horizontally (m)',
     )
-    depth_jump_m: float = Field(
-        20.0, gt=0.0, le=1e5, description='the same for the depth (m)'
-    )
+    depth_jump_m: float = Field(20.0, gt=0.0, le=1e5, description='the same for the depth (m)')
     hold_s: float = Field(
         1.0, ge=0.0, le=60.0, description='time for which the last good sample serves (s)'
     )
@@ -180,9 +178,7 @@ def gate_step(state, odometry, params, dt):
     good = is_plausible(odometry, params)
     if good and state.seen and age_s <= params.hold_s:
         last = state.odometry
-        velocity = rotate_to_ned(
-            last.q_w, last.q_x, last.q_y, last.q_z, last.u, last.v, last.w
-        )
+        velocity = rotate_to_ned(last.q_w, last.q_x, last.q_y, last.q_z, last.u, last.v, last.w)
         good = not has_jumped(odometry, last, velocity, age_s, params)
     if good:
         return GateState(_scaled(odometry), True, 0.0, state.refused)

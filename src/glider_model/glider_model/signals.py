@@ -4,9 +4,9 @@
 
 from typing import NamedTuple
 
-#: Vertical rate (m/s, + down) that asks control for the surface with all there is: the whole pump,
-#: the mass at its climb stop, no roll. No glider climbs at it.
-SURFACE_RATE = -10.0
+#: A virtual target as high above the water as this (m, + down) asks control for the surface with
+#: all there is: the whole pump, the mass at its climb stop, no roll. No path leads there.
+SURFACE_TARGET = -1000.0
 
 #: Length of one tick (s) and of one tick in the integer nanoseconds of a message stamp.
 TICK_S = 0.1
@@ -50,13 +50,13 @@ class Water(NamedTuple):
 class Reference(NamedTuple):
     """What guidance asks of control."""
 
-    p_n: float  #: virtual target on the path (m)
+    p_n: float  #: virtual target on the path (m); its depth may be SURFACE_TARGET
     p_e: float
     p_d: float
     phi: float  #: desired roll, pitch, heading (rad)
     theta: float
     psi: float
-    v_n: float  #: desired velocity over ground (m/s); v_d, + down, may be SURFACE_RATE
+    v_n: float  #: desired velocity over ground (m/s); v_d is the vertical rate, + down
     v_e: float
     v_d: float
     phi_dot: float  #: desired Euler angle rates (rad/s)

@@ -364,7 +364,7 @@ def test_free_running_input_keeps_the_newest_and_counts_what_lacks(make_graph, s
     (item,) = graph.blocks[GUIDANCE].inputs
     for stamp_s in stamps:
         raw = item.topic.codec.encode(round(stamp_s * 1e9), 13 * (stamp_s,))
-        item.subscription.callback(raw)
+        item.subscription.callback(raw, {})
     assert item.stamp_ns == round(kept * 1e9)
     assert item.values == 13 * (kept,)
     assert item.lost == lost

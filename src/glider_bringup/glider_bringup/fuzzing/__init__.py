@@ -1,3 +1,3 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Hostile use, seeded and counted: one module for each door, each with ``fuzz(seed, count, tell)``."""
+"""Hostile use, seeded and counted: a module for each door, with ``fuzz(seed, count, tell)``."""

@@ -251,18 +251,20 @@ def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
         values = read_yaml(file)
         if _is_parameters(values):
             return Told(_from_parameters(values, str(file)), str(file), _lockstep(values))
-        return Told(_from_scenario(load_scenario(str(file))), str(file), lockstep)
+        return Told(_from_scenario(load_scenario(str(file), recorded=True)), str(file), lockstep)
     attached = bag.attachments.get(SCENARIO_FILE)
     beside = folder / SCENARIO_FILE
     if beside.is_file():
         differs = attached is not None and attached != beside.read_bytes()
         note = f'{beside} is not the scenario that is attached to the bag' if differs else ''
-        return Told(_from_scenario(load_scenario(str(beside))), str(beside), lockstep, note)
+        return Told(
+            _from_scenario(load_scenario(str(beside), recorded=True)), str(beside), lockstep, note
+        )
     if attached is not None:
         for name in (SCENARIO_FILE, VEHICLE_FILE):
             (scratch / name).write_bytes(bag.attachments.get(name, b''))
         try:
-            blocks = _from_scenario(load_scenario(str(scratch / SCENARIO_FILE)))
+            blocks = _from_scenario(load_scenario(str(scratch / SCENARIO_FILE), recorded=True))
         except ConfigurationError as error:
             text = str(error).replace(f'{scratch}/', f'{bag.files[0]}: attached ')
             raise ConfigurationError(text) from None

@@ -26,7 +26,7 @@ from glider_guidance.profile import STAGE_NAMES, SURFACING
 from glider_model.ros import health, messages
 from glider_model.ros.codec import cdr_places, to_cdr
 from glider_model.ros.messages import TOPICS
-from glider_model.ros.orders import ABORT, PARAMETERS_SET
+from glider_model.ros.orders import ABORT, PARAMETERS_SET, SURFACE
 from glider_model.ros.parameters import with_parameters
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS
@@ -213,8 +213,8 @@ class _Check:
         stamp_ns = self.stamps_ns[step]
         while self._orders and self._orders[0].stamp_ns <= stamp_ns:
             order = self._orders.pop(0)
-            if order.message == ABORT:
-                self.block.abort()
+            if order.message in (ABORT, SURFACE):
+                self.block.surface()
                 continue
             try:
                 self.block.tune(with_parameters(self.block.settings, order.values))
@@ -348,7 +348,7 @@ def _alike(one: bytes, other: bytes) -> bool:
 
 def _orders(events: list[Event], node: str) -> list[Event]:
     """Orders that a node was given in flight, in the order in which it followed them."""
-    asked = [e for e in events if e.node == node and e.message in (ABORT, PARAMETERS_SET)]
+    asked = [e for e in events if e.node == node and e.message in (ABORT, PARAMETERS_SET, SURFACE)]
     return sorted(asked, key=lambda event: event.stamp_ns)
 
 

@@ -6,16 +6,28 @@ import sys
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from glider_control.control import ControlSettings, control_step
+from glider_control import watch
+from glider_control.control import ControlSettings, control_step, control_surface
 from glider_model.frames import odometry_from_wire, reference_from_wire, wrench_to_wire
 from glider_model.ros import health, messages
-from glider_model.ros.orders import PARAMETERS_SET, Orders
+from glider_model.ros.orders import PARAMETERS_SET, SURFACE, Orders
 from glider_model.ros.parameters import changed_parameters, declare_settings
 from glider_model.ros.tick import BlockNode, run
 from glider_model.signals import TICK_S, Joints
 
-#: Bits of the saturation mask, by actuator.
-ACTUATORS = {1: 'buoyancy engine', 2: 'pitch mass', 4: 'roll mass'}
+#: What the bits of the saturation mask stand for: several that say the same of something.
+AT_LIMIT = {1: 'buoyancy engine', 2: 'pitch mass', 4: 'roll mass'}
+STUCK = {
+    watch.STUCK_BUOYANCY: 'buoyancy engine',
+    watch.STUCK_PITCH: 'pitch mass',
+    watch.STUCK_ROLL: 'roll mass',
+}
+SURFACING = {
+    watch.ORDERED: 'ordered',
+    watch.TOO_DEEP: 'deeper than the vehicle is rated for',
+    watch.FROZEN: 'the measured depth, or all that is measured, stands still',
+    watch.LOST: 'nothing usable is measured',
+}
 
 #: A change of saturation is told at most once in this time (ns).
 TELL_EVERY_NS = 1_000_000_000
@@ -32,6 +44,7 @@ class ControlNode(BlockNode):
         self.params = self.settings.params()
         self.state = self.settings.initial_state()
         self.told, self.told_ns = 0, -TELL_EVERY_NS
+        self.stale_ticks = 0
         self.orders = Orders(self)
         self.publish_wrench = self.add_output('wrench')
         self.publish_adaptation = self.add_output('adaptation')
@@ -53,12 +66,14 @@ class ControlNode(BlockNode):
         level = (*(3 * (0.0,)), 1.0, *(9 * (0.0,)))
         odometry, reference = odometry_from_wire(level), reference_from_wire(level)
         joints = Joints(0.0, 0.0, 0.0)
-        _, out = control_step(self.state, odometry, joints, reference, self.params, TICK_S)
+        state, out = control_step(self.state, odometry, joints, reference, self.params, TICK_S)
+        control_surface(state)
         wrench_to_wire(out.wrench)
 
     def step(self, stamp_ns: int, reference, odom, joint_states) -> None:
         """Answer one tick."""
         self.orders.tell(stamp_ns)
+        self.stale_ticks = 0
         self.state, out = control_step(
             self.state,
             odometry_from_wire(odom),
@@ -76,22 +91,43 @@ class ControlNode(BlockNode):
     def tell(self, stamp_ns: int, saturation: int) -> None:
         """Put a change of saturation on /diagnostics."""
         self.told, self.told_ns = saturation, stamp_ns
-        name = self.get_fully_qualified_name()
-        self.publish_event(saturation_event(stamp_ns, saturation, name))
+        event = saturation_event(stamp_ns, saturation, self.get_fully_qualified_name())
+        if event.status[0].level == health.ERROR:
+            self.get_logger().error(event.status[0].message)
+        self.publish_event(event)
 
     def on_stale(self, stamp_ns: int) -> None:
-        """Command maximum buoyancy and level roll."""
+        """Command what surfaces the vehicle, after a while for good."""
+        self.stale_ticks += 1
+        if self.stale_ticks == round(self.settings.lost_after_s / TICK_S):
+            self.state = control_surface(self.state)
+            self.orders.add(SURFACE)
+            said = f'input lost for {self.settings.lost_after_s:g} s: surfacing for good'
+            self.event(stamp_ns, health.ERROR, said)
         self.publish_command(stamp_ns, self.params.safe_command)
 
 
+def _named(saturation: int, names: dict[int, str]) -> str:
+    return ', '.join(name for bit, name in names.items() if saturation & bit)
+
+
 def saturation_event(stamp_ns: int, saturation: int, node: str) -> DiagnosticArray:
-    """Diagnostics that say which actuators are at their limits.
+    """Diagnostics that say which actuators are at their limits, and what control has noticed.
 
     ``node`` is the full name of the node that says it.
     """
-    names = [name for bit, name in ACTUATORS.items() if saturation & bit]
-    level = health.WARN if names else health.OK
-    message = f'at its limit: {", ".join(names)}' if names else 'no actuator at its limit'
+    meanings = {
+        'surfacing for good': SURFACING,
+        'does not follow its command': STUCK,
+        'refused, the last good one serves': {watch.REFUSED: 'a measurement'},
+        'at its limit': AT_LIMIT,
+    }
+    named = {what: _named(saturation, names) for what, names in meanings.items()}
+    said = [f'{what}: {names}' for what, names in named.items() if names]
+    level = health.WARN if said else health.OK
+    if saturation & (watch.SURFACES | sum(STUCK)):
+        level = health.ERROR
+    message = '; '.join(said) or 'no actuator at its limit'
     values = {'saturation': saturation, 't_s': stamp_ns / 1e9}
     return health.status_array(stamp_ns, node, level, message, values)
 

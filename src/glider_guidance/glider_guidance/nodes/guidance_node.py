@@ -32,6 +32,7 @@ class GuidanceNode(BlockNode):
         self.publish_error = self.add_output('tracking_error')
         self.publish_estimate = self.add_output('current_estimate')
         self.settings = declare_settings(self, GuidanceSettings, self.on_settings)
+        self.settings.check_depth()
         self.params = self.settings.params()
         self.state = self.settings.initial_state()
         self.told = None

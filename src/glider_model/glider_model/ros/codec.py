@@ -19,6 +19,8 @@ import numpy as np
 from rclpy.serialization import deserialize_message
 
 _SECOND_NS = 1_000_000_000
+#: Fields that name frames.
+_FRAMES = ('header.frame_id', 'child_frame_id')
 _PRIMITIVES = {
     'boolean': '?',
     'octet': 'c',
@@ -37,7 +39,11 @@ _PRIMITIVES = {
 
 
 class MessageError(ValueError):
-    """A message that cannot be used: a field is missing or is not a finite number."""
+    """A message that cannot be used: it is none, or of another frame, or a field is missing."""
+
+
+class NotFiniteError(MessageError):
+    """A message with a number that is NaN or infinite."""
 
 
 class Place(NamedTuple):
@@ -121,6 +127,8 @@ class Codec:
     def __init__(self, template, fields, stamp: str = 'header.stamp') -> None:
         self.message_type = type(template)
         self.fields = tuple(fields)
+        frames = {path: _value_at(template, path) for path in _FRAMES}
+        self._frames = {path: name for path, name in frames.items() if name}
         self._stamp_path = stamp
         numbers = [1.0e6 + index + 0.123456789 for index in range(len(self.fields))]
         for path, number in zip(self.fields, numbers, strict=True):
@@ -204,19 +212,22 @@ class Codec:
             out[:, at : at + 8 * len(picked)] = block.view(np.uint8).reshape(len(out), -1)
         return out
 
-    def decode(self, raw: bytes) -> tuple[int, tuple[float, ...]]:
+    def decode(self, raw: bytes, check_frames: bool = False) -> tuple[int, tuple[float, ...]]:
         """Stamp (ns) and numbers of a serialized message.
 
         Raises
         ------
         MessageError
-            If a joint is missing, or a number is NaN or infinite.
+            If it is no message of this type, a joint is missing, or, where frames are checked, it
+            names others than the template.
+        NotFiniteError
+            If a number is NaN or infinite.
         """
         if len(raw) != self.size:
-            return self._decode_foreign(raw)
+            return self._decode_foreign(raw, check_frames)
         for start, end, constant in self._constants:
             if raw[start:end] != constant:
-                return self._decode_foreign(raw)
+                return self._decode_foreign(raw, check_frames)
         values: tuple[float, ...] = ()
         for run, at, _ in self._runs:
             values += run.unpack_from(raw, at)
@@ -262,10 +273,27 @@ class Codec:
         if len(raw) == self.size:
             sec, nanosec = self._stamp_format.unpack_from(raw, self._stamp_at)
             return sec * _SECOND_NS + nanosec
-        return self._stamp_of(deserialize_message(raw, self.message_type))
+        return self._stamp_of(self._message(raw))
 
-    def _decode_foreign(self, raw: bytes) -> tuple[int, tuple[float, ...]]:
-        message = deserialize_message(raw, self.message_type)
+    def _message(self, raw: bytes):
+        """The message, whatever its layout."""
+        try:
+            return deserialize_message(raw, self.message_type)
+        except Exception:  # rclpy has no name for its error, and wants no more of it to be known
+            name = self.message_type.__name__
+            raise MessageError(f'{len(raw)} bytes that are no {name}') from None
+
+    def _check_frames(self, message) -> None:
+        """Refuse other frames; a prefix, such as that of a vehicle, is none of our business."""
+        for path, name in self._frames.items():
+            frame = _value_at(message, path)
+            if frame.rpartition('/')[2] != name:
+                raise MessageError(f'{path} is {frame[:80]!r} (allowed: {name!r})')
+
+    def _decode_foreign(self, raw: bytes, check_frames: bool) -> tuple[int, tuple[float, ...]]:
+        message = self._message(raw)
+        if check_frames:
+            self._check_frames(message)
         values = tuple(float(_get(message, path)) for path in self.fields)
         self._refuse_non_finite(values)
         return self._stamp_of(message), values
@@ -279,13 +307,20 @@ class Codec:
             return
         for path, value in zip(self.fields, values, strict=True):
             if not math.isfinite(value):
-                raise MessageError(f'{path} is {value}')
+                raise NotFiniteError(f'{path} is {value}')
 
 
 def _find(raw: bytes, pattern: bytes, path: str) -> int:
     if raw.count(pattern) != 1:
         raise ValueError(f'{path} cannot be located in the serialized message')
     return raw.index(pattern)
+
+
+def _value_at(message, path: str) -> str:
+    """Value at a dotted path; empty where there is none."""
+    for name in path.split('.'):
+        message = getattr(message, name, '')
+    return message
 
 
 def _split(path: str) -> tuple[str, str]:

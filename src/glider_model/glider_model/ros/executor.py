@@ -29,6 +29,7 @@ except ImportError:
 #: in a node.
 _RARE = {'timers': 'timer', 'services': 'service', 'clients': 'client'}
 _GUARDS = ('_guard', '_sigint_gc')
+_MESSAGE_ONLY = Subscription.CallbackType.MessageOnly
 
 
 @cache
@@ -70,12 +71,20 @@ class Gate(CallbackGroup):
         self.awaited.add(new)
 
 
-def take(subscription: Subscription):
-    """Oldest message of a `Gate` subscription that no callback has had, or None."""
+def take_with_info(subscription: Subscription) -> tuple | None:
+    """Oldest message of a `Gate` subscription that no callback has had, and what is known of it.
+
+    That is what a callback with two arguments gets, such as the number that its publisher gave it.
+    """
     if not can_take():
         return None
     with subscription.handle:
-        taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+        return subscription.handle.take_message(subscription.msg_type, subscription.raw)
+
+
+def take(subscription: Subscription):
+    """Oldest message of a `Gate` subscription that no callback has had, or None."""
+    taken = take_with_info(subscription)
     return None if taken is None else taken[0]
 
 
@@ -104,9 +113,10 @@ class TickExecutor(SingleThreadedExecutor):
             self._gather()
         ready, is_other_ready = self._wait(timeout_sec)
         for subscription in ready:
-            message = take(subscription)
-            if message is not None:
-                subscription.callback(message)
+            taken = take_with_info(subscription)
+            if taken is not None:
+                wants_info = subscription._callback_type is not _MESSAGE_ONLY
+                subscription.callback(*(taken if wants_info else taken[:1]))
         if is_other_ready or not ready:
             self._scatter()
             super().spin_once(timeout_sec=0.0)

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from glider_model.ros import health
 
 #: Messages of the events on /diagnostics.
-ABORT, PARAMETERS_SET = 'abort', 'parameters set'
+ABORT, PARAMETERS_SET, SURFACE = 'abort', 'parameters set', 'surface'
 
 
 class Orders:

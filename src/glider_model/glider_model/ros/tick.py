@@ -24,8 +24,8 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
 from glider_model.ros import health, messages, qos
-from glider_model.ros.codec import MessageError, to_cdr
-from glider_model.ros.executor import Gate, make_executor, take
+from glider_model.ros.codec import MessageError, NotFiniteError, to_cdr
+from glider_model.ros.executor import Gate, make_executor, take_with_info
 from glider_model.ros.health import Report
 from glider_model.ros.messages import TOPICS, Topic
 from glider_model.ros.parameters import declare_settings
@@ -34,6 +34,9 @@ from glider_model.signals import TICK_NS, TICK_S
 
 #: The plant is never more than this many ticks ahead of what the recorder has on disk.
 MAX_TICKS_AHEAD = 256
+
+#: Messages that may be lost on their way without their publisher being taken for another.
+MOST_LOST = 50
 
 #: A node waits this long (wall time, s) for the recorder and its peers at the end of a run.
 FAREWELL_S = 5.0
@@ -55,6 +58,8 @@ _PATIENCE_S, _REMIND_S = 10.0, 20.0
 _REPORT_AFTER = 0.4
 _COUNTED = ('lost', 'late')
 _TELL_EVERY_S = 10.0
+#: A topic whose messages are refused is told of at most so often (s of wall time).
+_REFUSED_EVERY_S = 1.0
 _QUIET_PUBLISHER = PublisherEventCallbacks(use_default_callbacks=False)
 _QUIET_SUBSCRIPTION = SubscriptionEventCallbacks(use_default_callbacks=False)
 
@@ -94,6 +99,9 @@ class Input:
         self.stamp_ns = -1
         self.values: tuple[float, ...] = ()
         self.arrived_s = -float('inf')  #: on the clock of the cycles
+        self.number = 0  #: that the publisher gave the last message; 0: none yet
+        self.owner = ''  #: full name of the publisher; '' as long as it is not sure
+        self.refused = 0  #: messages of other publishers, and such as cannot be used
         self.lost = 0  #: messages that lack between those that came
         self.late = 0  #: cycles that had to do with the input of the one before
         self.used_ns = -1
@@ -107,9 +115,30 @@ class Input:
             Naming topic and publisher, if it cannot be used.
         """
         try:
-            self.stamp_ns, self.values = self.topic.codec.decode(raw)
+            self.stamp_ns, self.values = self.topic.codec.decode(raw, check_frames=True)
         except MessageError as error:
-            raise MessageError(f'{self.topic.name} of {self.topic.publisher}: {error}') from None
+            said = f'{self.topic.name} of {self.topic.publisher}: {error}'
+            raise type(error)(said) from None
+
+    def is_from_another(self, info: dict) -> bool:
+        """Whether a message comes from another publisher than those before.
+
+        Publishers number their messages, so that in a line of numbers with two publishers that of
+        the first goes on and that of the second does not. Not every middleware tells the numbers:
+        then nobody is taken for another.
+
+        Parameters
+        ----------
+        info : dict
+            What rclpy tells of the message.
+        """
+        number = info.get('publication_sequence_number') or 0
+        step = number - self.number
+        goes_on = step == 1 or not (number and self.number)
+        if goes_on or self.subscription.get_publisher_count() <= 1 or 1 < step <= MOST_LOST:
+            self.number = number
+            return False
+        return True
 
 
 class TickNode(Node):
@@ -139,6 +168,7 @@ class TickNode(Node):
         self.gate.awaited.add(self._reports_in)
         self._awaited = None
         self._due_ns: int | None = None
+        self._refused_s: dict[str, float] = {}
         self._watched_ns: int | None = None
         self._watched_since_s = 0.0
         self._startup_timer = None
@@ -180,14 +210,14 @@ class TickNode(Node):
         item = Input(TOPICS[name])
         if self.ticks.lockstep:
             item.subscription = self._subscription(
-                item.topic, lambda raw: self._on_message(item, raw)
+                item.topic, lambda raw, info: self._on_message(item, raw, info)
             )
             if not self.inputs:
                 self._await(item)
         else:
             item.subscription = self._subscription(
                 item.topic,
-                lambda raw: self._on_newest(item, raw),
+                lambda raw, info: self._on_newest(item, raw, info),
                 gated=False,
                 profile=qos.NEWEST,
             )
@@ -257,14 +287,18 @@ class TickNode(Node):
         own = self.get_namespace()
         return {info.node_name for info in endpoints if info.node_namespace == own}
 
+    def publisher_names(self, topic: Topic) -> list[str]:
+        """Full names of the nodes that publish a topic, as often as they do."""
+        infos = self.get_publishers_info_by_topic(topic.name)
+        return [f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in infos]
+
     def rivals(self) -> list[str]:
         """Who else publishes what only this node may publish, in words."""
         rivals = []
         for topic, _ in self.outputs.values():
             if topic.publisher != self.get_name():
                 continue
-            infos = self.get_publishers_info_by_topic(topic.name)
-            names = [f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in infos]
+            names = self.publisher_names(topic)
             if self.get_fully_qualified_name() in names:
                 names.remove(self.get_fully_qualified_name())
             rivals += [
@@ -325,18 +359,45 @@ class TickNode(Node):
         """
         raise NotImplementedError
 
-    def _on_message(self, item: Input, raw: bytes) -> None:
+    def _on_message(self, item: Input, raw: bytes, info: dict) -> None:
         if self.running:  # else it comes from somebody else's run
-            self._accept(item, raw)
+            self._accept(item, raw, info)
             self._fire()
 
-    def _accept(self, item: Input, raw: bytes) -> None:
+    def _accept(self, item: Input, raw: bytes, info: dict) -> None:
+        if item.is_from_another(info):
+            self.refuse(item, self._others(item))
+            return
         try:
             item.accept(raw)
-        except MessageError as error:
+        except NotFiniteError as error:
             raise Stop(EXIT_PEER, str(error)) from None
+        except MessageError as error:
+            self.refuse(item, str(error))
+            return
         if self._due_ns is None and item.stamp_ns > 0:
-            item.stamp_ns = -1  # of a run that is under way: one's own begins with tick 0
+            # of a run that is under way: one's own begins with tick 0
+            item.stamp_ns, item.number = -1, 0
+
+    def refuse(self, item: Input, why: str) -> None:
+        """Tell that a message was refused, the first one at once and then now and then."""
+        item.refused += 1
+        now_s = time.monotonic()
+        if now_s - self._refused_s.get(item.topic.name, -float('inf')) < _REFUSED_EVERY_S:
+            return
+        self._refused_s[item.topic.name] = now_s
+        stamp_ns = max(0, self._due_ns if self._due_ns is not None else item.stamp_ns)
+        values = {f'{item.topic.name}_refused': item.refused}
+        self.event(stamp_ns, health.ERROR, f'message refused: {why}', **values)
+
+    def _others(self, item: Input) -> str:
+        """Who else publishes an input, in words."""
+        owner = item.owner
+        if self.ticks.lockstep:
+            owner = f'{self.get_namespace().rstrip("/")}/{item.topic.publisher}'
+        names = set(self.publisher_names(item.topic)) - {owner}
+        others = ' and '.join(sorted(names)) or 'a second publisher'
+        return f'{self.resolve_topic_name(item.topic.name)} is published by {others} too'
 
     def _fire(self) -> None:
         """Act on every tick that is complete, then wait for the input that is missing."""
@@ -359,10 +420,10 @@ class TickNode(Node):
             if self._due_ns is None and item.stamp_ns >= 0:
                 self._due_ns = item.stamp_ns
                 continue
-            raw = take(item.subscription)
-            if raw is None:
+            taken = take_with_info(item.subscription)
+            if taken is None:
                 return False
-            self._accept(item, raw)
+            self._accept(item, *taken)
         if item.stamp_ns > self._due_ns:
             if rivals := self.rivals():
                 raise Stop(EXIT_PEER, f'{rivals[0]}; {ALONE}')
@@ -421,22 +482,28 @@ class TickNode(Node):
         """Time (s) on the clock of the free-running cycles."""
         return self.cycle_clock.now().nanoseconds / 1e9
 
-    def _on_newest(self, item: Input, raw: bytes) -> None:
+    def _on_newest(self, item: Input, raw: bytes, info: dict) -> None:
         """Keep an input in free-running mode.
 
         A stamp that stands still does not refresh it, and a message that was overtaken on its way
         is passed over. One that is older than any input may be means that the clock of the vehicle
         has been set back.
         """
-        before = item.stamp_ns
-        since_ns = item.topic.codec.decode_stamp(raw) - before
-        if before >= 0 and -self.ticks.input_max_age_s * 1e9 <= since_ns < 0:
+        if item.is_from_another(info):
+            self.refuse(item, self._others(item))
             return
+        before = item.stamp_ns
         try:
+            since_ns = item.topic.codec.decode_stamp(raw) - before
+            if before >= 0 and -self.ticks.input_max_age_s * 1e9 <= since_ns < 0:
+                return
             item.accept(raw)
         except MessageError as error:
-            self.get_logger().error(str(error), throttle_duration_sec=1.0)
+            self.refuse(item, str(error))
             return
+        if not item.owner:
+            names = set(self.publisher_names(item.topic))
+            item.owner = names.pop() if len(names) == 1 else ''
         if since_ns:
             item.arrived_s = self.now_s()
         if before >= 0 and since_ns <= self.ticks.input_max_age_s * 1e9:
