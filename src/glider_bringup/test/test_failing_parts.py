@@ -1,0 +1,210 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Missions with measurements and actuators that fail: what shows in the track, what surfaces."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from glider_bringup.direct import COLUMNS, ROW, MissionState, fly
+from glider_bringup.mission import mission_of
+from glider_bringup.scenario import load_scenario
+from glider_control.control import control_step
+from glider_control.watch import (
+    FROZEN,
+    LOST,
+    REFUSED,
+    STUCK_BUOYANCY,
+    STUCK_ROLL,
+    SURFACES,
+    TOO_DEEP,
+)
+from glider_guidance.guidance import guidance_abort, guidance_step
+from glider_guidance.profile import GLIDING_DOWN, GLIDING_UP, INFLECTING_UP
+from glider_model.current import current_step
+from glider_model.frames import (
+    odometry_from_wire,
+    odometry_to_wire,
+    reference_from_wire,
+    reference_to_wire,
+    water_from_wire,
+    water_to_wire,
+)
+from glider_model.plant import plant_joints, plant_measurement, plant_step
+from glider_model.signals import TICK_S
+
+#: One dive to 250 m, with both turns; in a cross current, so that the track has to be held.
+FLIGHT = {'dives': 0, 'duration_s': 3600.0, 'profile.depth_m': 250.0, 'profile.prepare_s': 0.0}
+TICKS = 36000
+E2, COMMAND = COLUMNS['tracking_error'].start + 1, COLUMNS['command']
+
+#: On the wire: position 0:3, quaternion 3:7, velocity 7:10, rates 10:13.
+WILD = {
+    'rates of 10 rad/s': lambda wire: (*wire[:10], 10.0, -10.0, 10.0),
+    'rates of 1e6 rad/s': lambda wire: (*wire[:10], 1e6, 1e6, -1e6),
+    'velocity of 100 m/s': lambda wire: (*wire[:7], 100.0, 0.0, 100.0, *wire[10:]),
+    'quaternion of norm 2': lambda wire: (*wire[:3], *(2.0 * q for q in wire[3:7]), *wire[7:]),
+    'quaternion of norm 0': lambda wire: (*wire[:3], *(4 * (0.0,)), *wire[7:]),
+    'position 10 km off': lambda wire: (wire[0] + 1e4, *wire[1:]),
+    'depth 100 m off': lambda wire: (*wire[:2], wire[2] - 100.0, *wire[3:]),
+    'turned about': lambda wire: (*wire[:3], wire[6], -wire[5], wire[4], -wire[3], *wire[7:]),
+    'not a number': lambda wire: 13 * (float('nan'),),
+}
+PHASES = {'dive': GLIDING_DOWN, 'turn': INFLECTING_UP, 'climb': GLIDING_UP}
+
+
+def tick(state: MissionState, params, corrupt) -> tuple[MissionState, int]:
+    """One tick as in `fly`, with what ``corrupt`` makes of the odometry; the saturation mask."""
+    plant, current, guidance, control = state
+    wire = odometry_to_wire(plant_measurement(plant, params.plant))
+    true = odometry_from_wire(wire)
+    current, water = current_step(current, true[:3], plant.tick * TICK_S, params.current, TICK_S)
+    seen = odometry_from_wire(tuple(corrupt(wire)))
+    guidance, guided = guidance_step(guidance, seen, params.guidance, TICK_S)
+    reference = reference_from_wire(reference_to_wire(guided.reference))
+    control, controlled = control_step(
+        control, seen, plant_joints(plant), reference, params.control, TICK_S
+    )
+    water = water_from_wire(water_to_wire(water))
+    plant = plant_step(plant, controlled.command, water, params.plant, TICK_S)
+    return MissionState(plant, current, guidance, control), controlled.saturation
+
+
+def flown(state: MissionState, params, ticks: int) -> tuple[MissionState, np.ndarray]:
+    log = np.empty((ticks, ROW))
+    state, rows, _ = fly(state, params, log, TICK_S)
+    return state, log[:rows]
+
+
+@cache
+def clean(law: str) -> np.ndarray:
+    """The flight that nothing happens to."""
+    scenario = load_scenario('current_12deg', {**FLIGHT, 'control.law': law})
+    return flown(*mission_of(scenario), TICKS)[1]
+
+
+@pytest.mark.parametrize('law', ['adaptive', 'pid'])
+@pytest.mark.parametrize('phase', PHASES)
+@pytest.mark.parametrize('kind', WILD)
+def test_a_wild_sample_does_not_show_in_the_track(law, phase, kind):
+    """Nowhere is the vehicle more than 1 m from where it would have been, to either side."""
+    expected = clean(law)
+    in_phase = np.flatnonzero(expected[:, COLUMNS['stage']] == PHASES[phase])
+    at = int(in_phase[len(in_phase) // 2])
+    scenario = load_scenario('current_12deg', {**FLIGHT, 'control.law': law})
+    state, params = mission_of(scenario)
+    state, _ = flown(state, params, at)
+    state, mask = tick(state, params, WILD[kind])
+    assert mask & REFUSED
+    state, after = flown(state, params, TICKS - at - 1)
+    apart_m = np.abs(after[:, E2] - expected[at + 1 :, E2])
+    assert np.max(apart_m) < 1.0
+    assert abs(np.max(np.abs(after[:, E2])) - np.max(np.abs(expected[at + 1 :, E2]))) < 1.0
+    assert not np.any(after[:, COLUMNS['saturation']].astype(int) & SURFACES)
+
+
+def flown_with(state: MissionState, params, ticks: int, corrupt) -> tuple[MissionState, list, int]:
+    """Some ticks with corrupted odometry; true depths (m) and the last mask."""
+    depths, mask = [], 0
+    for _ in range(ticks):
+        state, mask = tick(state, params, corrupt)
+        depths.append(state.plant.motion.p_d)
+    return state, depths, mask
+
+
+def in_dive(law: str = 'adaptive', depth_m: float = 120.0, **changes):
+    """A mission on its way down."""
+    scenario = load_scenario('current_12deg', {**FLIGHT, 'control.law': law, **changes})
+    state, params = mission_of(scenario)
+    at = int(np.flatnonzero(-clean(law)[:, 2] > depth_m)[0])
+    return flown(state, params, at)[0], params
+
+
+@pytest.mark.parametrize(
+    ('corrupt', 'reason'),
+    [
+        (lambda wire: (*wire[:2], -120.0, *wire[3:]), FROZEN),
+        (lambda wire, kept=[]: (kept.append(wire) or kept)[0], FROZEN),  # noqa: B006
+        (lambda wire: 13 * (float('nan'),), LOST),
+        (lambda wire: (*wire[:3], *(4 * (0.0,)), *wire[7:]), LOST),
+    ],
+    ids=['depth that stands still', 'all that stands still', 'not a number', 'no attitude'],
+)
+@pytest.mark.parametrize('law', ['adaptive', 'pid'])
+def test_a_measurement_that_fails_brings_the_vehicle_up_for_good(law, corrupt, reason):
+    """At 120 m on its way to 250 m: it turns above 200 m and comes up, whatever is measured."""
+    state, params = in_dive(law)
+    state, depths, mask = flown_with(state, params, 6000, corrupt)
+    assert mask & reason
+    assert max(depths) < 200.0
+    assert depths[-1] < 1.0
+    assert state.control.command == params.control.safe_command
+    _, after = flown(state, params, 3000)  # the measurement is good again, the order stays
+    assert np.all(after[:, COMMAND] == params.control.safe_command)
+
+
+def test_a_second_of_bad_measurements_is_bridged():
+    state, params = in_dive()
+    state, _, mask = flown_with(state, params, 10, lambda wire: 13 * (float('nan'),))
+    assert mask & REFUSED
+    assert not mask & SURFACES
+    _, after = flown(state, params, 1000)
+    assert not np.any(after[50:, COLUMNS['saturation']].astype(int) & (REFUSED | SURFACES))
+
+
+def test_an_abort_uses_the_whole_pump_and_surfaces_with_a_leak():
+    """Aborted at 150 m, with half a kilogram too much, it sank to 964 m and stayed there."""
+    state, params = in_dive(depth_m=150.0)
+    leaky = params.plant.vehicle._replace(ballast=0.5)
+    params = params._replace(plant=params.plant._replace(vehicle=leaky))
+    state = state._replace(guidance=guidance_abort(state.guidance))
+    state, log = flown(state, params, 20000)
+    assert np.all(log[0, COMMAND] == (-1.0, -0.06, 0.0))
+    assert np.all(log[:, COMMAND] == log[0, COMMAND])
+    assert np.max(-log[:, 2]) < 300.0  # 1.4 kg at 4 g/s take six minutes
+    assert -log[-1, 2] < 1.0
+
+
+def test_a_heavy_vehicle_turns_by_itself():
+    """The vertical-rate law waited while the vehicle sank: 1,181 m of 200 m."""
+    changes = {'profile.depth_m': 200.0, 'perturb.net_heaviness_kg': 0.5, 'duration_s': 8000.0}
+    state, params = mission_of(load_scenario('current_8deg', changes))
+    _, log = flown(state, params, 80000)
+    assert np.max(-log[:, 2]) < 320.0
+    assert -log[-1, 2] < 1.0
+
+
+def test_a_vehicle_below_its_rating_surfaces_and_says_so():
+    """0.9 kg too heavy it overshoots 1000 m by more than the margin, and just comes up."""
+    changes = {
+        'perturb.net_heaviness_kg': 0.9,
+        'initial.depth_m': 900.0,
+        'duration_s': 4000.0,
+        'dives': 0,
+    }
+    state, params = mission_of(load_scenario('current_8deg', changes))
+    _, log = flown(state, params, 40000)
+    mask, depth = log[:, COLUMNS['saturation']].astype(int), -log[:, 2]
+    first = int(np.flatnonzero(mask & TOO_DEEP)[0])
+    assert depth[first] == pytest.approx(1020.0, abs=1.0)
+    assert np.all(log[first:, COMMAND] == params.control.safe_command)
+    assert depth[-1] < np.max(depth) - 20.0
+
+
+@pytest.mark.parametrize(
+    ('changes', 'bit'),
+    [
+        ({'perturb.pump_rate': 1e-9}, STUCK_BUOYANCY),
+        ({'perturb.roll_range': 0.0}, STUCK_ROLL),
+    ],
+)
+def test_an_actuator_that_does_not_move_is_told(changes, bit):
+    state, params = mission_of(load_scenario('current_12deg', {**FLIGHT, **changes}))
+    _, log = flown(state, params, 6000)
+    assert log[-1, COLUMNS['saturation']].astype(int) & bit
+
+
+def test_a_clean_flight_says_nothing():
+    for law in ('adaptive', 'pid'):
+        assert not np.any(clean(law)[:, COLUMNS['saturation']].astype(int) & ~7)
