@@ -20,7 +20,8 @@ ORDERED, TOO_DEEP, FROZEN, LOST = 128, 256, 512, 1024
 SURFACES = ORDERED | TOO_DEEP | FROZEN | LOST
 
 #: Below the rated depth a vehicle may be by this share of it, and no less than so much (m): the
-#: lower turn overshoots, with a pump at a third of its rate by 48 m. Longer than this (s) it may not.
+#: lower turn overshoots, with a pump at a third of its rate by 48 m. Longer than this (s) it may
+#: not.
 DEPTH_MARGIN_SHARE, DEPTH_MARGIN_M, TOO_DEEP_S = 0.05, 10.0, 1.0
 #: Way that the vertical rate makes less that of the depth (m), of which the past fades (s): more
 #: than this for so long (s) is a depth that is frozen.

@@ -9,12 +9,15 @@ import time
 
 import pytest
 import rclpy
+from nav_msgs.msg import Odometry
 from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from glider_model.ros import clock, health
 from glider_model.ros.clock import ClockNode
+from glider_model.ros.codec import MessageError, to_cdr
 from glider_model.ros.executor import make_executor
 from glider_model.ros.messages import CONTROL, CURRENT, GUIDANCE, PLANT, RECORDER, TOPICS
 from glider_model.ros.tick import MAX_TICKS_AHEAD, BlockNode, Stop
@@ -302,6 +305,113 @@ def test_number_that_is_not_finite_stops_the_run(make_graph):
     assert stop.code == 3
     assert 'reference of guidance_node' in str(stop)
     assert 'nan' in str(stop)
+
+
+class Intruder:
+    """A node outside of the lockstep that publishes on a topic of the glider, and listens."""
+
+    def __init__(self, graph, context, topic: str) -> None:
+        self.node = rclpy.create_node('intruder', namespace='/other', context=context)
+        graph.nodes.append(self.node)
+        graph.executor.add_node(self.node)
+        self.topic, self.told = TOPICS[topic], []
+        events = TOPICS['/diagnostics']
+        self.node.create_subscription(events.message_type, events.name, self.on_event, events.qos)
+        name = self.topic.full_name('/glider')
+        self.publisher = self.node.create_publisher(self.topic.message_type, name, self.topic.qos)
+
+    def on_event(self, array) -> None:
+        self.told += [status.message for status in array.status]
+
+    def publish(self, raw: bytes) -> None:
+        self.publisher.publish(raw)
+
+    def is_heard(self) -> bool:
+        return self.publisher.get_subscription_count() >= max(1, len(self.topic.readers))
+
+    def was_named(self) -> bool:
+        said = f'/glider/{self.topic.name} is published by /other/intruder too'
+        return any(said in told for told in self.told)
+
+
+@pytest.mark.parametrize(
+    'topic', ['odom', 'joint_states', 'current_velocity', 'reference', 'command']
+)
+def test_second_publisher_in_mid_flight_is_refused_and_named(make_graph, context, topic):
+    """It says what the first one says, with other numbers, for this tick and the ones to come."""
+    graph = make_graph(last_tick=10**9)
+    assert graph.spin(lambda: graph.plant.tick > 10) is None
+    intruder = Intruder(graph, context, topic)
+    assert graph.spin(intruder.is_heard) is None
+    wild = len(intruder.topic.codec.fields) * (12345.0,)
+    for _ in range(10):
+        for ahead in range(5):
+            stamp_ns = (graph.plant.tick + ahead) * TICK_NS
+            intruder.publish(intruder.topic.codec.encode(stamp_ns, wild))
+        until = graph.plant.tick + 5
+        assert graph.spin(lambda: graph.plant.tick > until) is None  # noqa: B023
+    assert graph.spin(intruder.was_named) is None
+    for _, tick, command, current in graph.plant.log:
+        # odom is the tick, joint_states less the tick, and every block sends on the sum
+        assert (command[0], current[0]) == (float(tick), float(tick))
+
+
+def test_publisher_that_takes_the_place_of_one_that_is_gone_is_believed(make_graph):
+    """Free-running, a driver may be started again: its numbers begin at 1."""
+    graph = make_graph(lockstep=False, input_max_age_s=1.0)
+    control = graph.blocks[CONTROL]
+    assert graph.spin(lambda: len(control.steps) > 5) is None
+    guidance = graph.blocks[GUIDANCE]
+    (publisher,) = (p for topic, p in guidance.outputs.values() if topic.name == 'reference')
+    guidance.destroy_publisher(publisher)
+    assert graph.spin(lambda: not control.get_publishers_info_by_topic('reference')) is None
+    guidance.publish['reference'] = guidance.add_output('reference')
+    before = len(control.steps)
+    assert graph.spin(lambda: len(control.steps) > before + 5) is None
+    assert all(item.refused == 0 for item in control.inputs)
+
+
+@pytest.mark.parametrize('lockstep', [True, False])
+@pytest.mark.parametrize(
+    'raw',
+    [b'', b'\0\1\0\0', b'\0\1\0\0' + 40 * b'\xff', bytes(range(256)), 100_000 * b'\xff'],
+    ids=['nothing', 'a header', 'too short', 'noise', 'too long'],
+)
+def test_malformed_message_ends_no_node(make_graph, context, lockstep, raw):
+    graph = make_graph(last_tick=10**9, lockstep=lockstep)
+    control = graph.blocks[CONTROL]
+    assert graph.spin(lambda: len(control.steps) > 3) is None
+    intruder = Intruder(graph, context, 'reference')
+    assert graph.spin(intruder.is_heard) is None
+    (item,) = (item for item in control.inputs if item.topic.name == 'reference')
+
+    def is_refused() -> bool:
+        intruder.publish(raw)  # again: free-running nodes keep the newest message only
+        return item.refused >= 3
+
+    assert graph.spin(is_refused) is None
+    before = len(control.steps)
+    assert graph.spin(lambda: len(control.steps) > before + 3) is None
+
+
+@pytest.mark.parametrize(
+    ('field', 'frame'),
+    [('header.frame_id', 'map_ned'), ('header.frame_id', ''), ('child_frame_id', 'base_link_frd')],
+)
+def test_other_frames_are_refused_and_named(make_graph, context, field, frame):
+    """A driver in NED looks right to everything but the vehicle."""
+    graph = make_graph(lockstep=False, input_max_age_s=1.0, without=())
+    (item,) = graph.blocks[GUIDANCE].inputs
+    message = deserialize_message(item.topic.codec.encode(TICK_NS, 13 * (0.5,)), Odometry)
+    if field == 'child_frame_id':
+        message.child_frame_id = frame
+    else:
+        message.header.frame_id = frame
+    with pytest.raises(MessageError, match=f"{field} is '{frame}'"):
+        item.accept(to_cdr(message))
+    message.header.frame_id, message.child_frame_id = 'map', 'one/base_link'
+    item.accept(to_cdr(message))
+    assert item.values == 13 * (0.5,)
 
 
 def test_speed_is_kept_without_drift(make_graph):
