@@ -43,7 +43,7 @@ SILENT_S, MAX_AGE_S = 3.0, 2.0
 FLIGHT = {'profile.prepare_s': 0.0}
 #: How the stand-in begins.
 GLIDING = {'heading_deg': 30.0, 'pitch_deg': -30.0, 'speed_mps': 0.5, 'net_heaviness_kg': 0.4}
-SAFE = {'buoyancy_engine': -1.0, 'pitch_mass': 0.0, 'roll_mass': 0.0}
+SAFE = {'buoyancy_engine': -1.0, 'pitch_mass': -0.06, 'roll_mass': 0.0}
 DEADLINE_S = 200.0
 
 
