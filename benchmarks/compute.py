@@ -120,8 +120,7 @@ def _mission_s(floor: Floor | None) -> tuple[float, float, float | None]:
 
     whole_s = _cost_s(fly)
     flying_s = whole_s - sum(scoring_s)
-    settle_s, depth_m = scenario.settle_time_s(DURATION_S), scenario.profile.depth_m
-    scoring_s.append(_cost_s(scorer.result, settle_s, depth_m))
+    scoring_s.append(_cost_s(scorer.result, scenario.score_rules(DURATION_S)))
     return flying_s, sum(scoring_s), _cost_s(fly_floor) if floor else None
 
 

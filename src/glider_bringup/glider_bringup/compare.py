@@ -134,12 +134,22 @@ def _headline(runs: list[FlownRun]) -> str:
         for run in runs
         if run.card['cross_track_m']['max_steady'] is not None
     ]
+    whole = [
+        (run.label, run.card['cross_track_m']['max_run'])
+        for run in runs
+        if run.card['cross_track_m'].get('max_run') is not None
+    ]
     if not errors:
         return f'{len(runs)} runs; none has flown long enough for a score in steady glide.'
-    ranked = ', '.join(
-        f'{name} {small(error)}' for name, error in sorted(errors, key=itemgetter(1))
+    return (
+        f'Largest cross-track error in steady glide: {_ranked(errors)}. In the whole run: '
+        f'{_ranked(whole)}.'
     )
-    return f'Largest cross-track error in steady glide: {ranked}.'
+
+
+def _ranked(errors: list[tuple[str, float]]) -> str:
+    """Runs by their errors, the smallest first."""
+    return ', '.join(f'{name} {small(error)}' for name, error in sorted(errors, key=itemgetter(1)))
 
 
 def _panels(runs: list[FlownRun]) -> dict[str, list[Panel]]:

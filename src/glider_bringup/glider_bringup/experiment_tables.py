@@ -78,7 +78,7 @@ def _marked(row: dict | None, rival: dict | None, name: str) -> str:
 
 def _side_by_side(rows: list[dict]) -> Table:
     """One line for each case; in every column adaptive | tuned PID."""
-    figures = dict(list(compared(rows).items())[:4])
+    figures = dict(list(compared(rows).items())[:5])
     table = _table(['adaptive | tuned PID'], list(figures.values()))
     for case in dict.fromkeys(row['case'] for row in rows):
         adaptive, pid = (
@@ -140,6 +140,7 @@ _YAW = _by_flight(
         'heading_fluctuation_deg.rms_steady': 'fluct.\nrms (deg)',
         'cross_track_m.max_steady': 'max\nsteady (m)',
         'cross_track_m.max_all': 'max\nall (m)',
+        'cross_track_m.max_run': 'max\nrun (m)',
     }
 )
 _PROFILE = _by_flight(

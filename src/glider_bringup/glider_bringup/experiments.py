@@ -168,8 +168,8 @@ def _mean(values: np.ndarray) -> float | None:
 
 def _windows(record: Record, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     """Masks of the steady and of all scored samples."""
-    settle_s = scenario.settle_time_s(len(record.time_s) * _SAMPLE_S)
-    return windows(record.depth, record.descending, settle_s, _SAMPLE_S)
+    rules = scenario.score_rules(len(record.time_s) * _SAMPLE_S)
+    return windows(record.depth, record.descending, rules, _SAMPLE_S)
 
 
 def _wrap_deg(angle: np.ndarray) -> np.ndarray:
@@ -252,7 +252,7 @@ def _legs(record: Record) -> Iterator[dict[str, float]]:
 def measure_crab(record: Record, scenario: Scenario) -> dict[str, Any]:
     """Mean distance of the heading from the best crab angle against the current, steady."""
     steady, _ = _windows(record, scenario)
-    speed, north, east = horizontal_speed(scenario), *_current(scenario)
+    speed, north, east = horizontal_speed(scenario), *scenario.constant_current()
     best, _, _ = crab_heading(scenario.path.course_rad(), speed, north, east)
     error = _wrap_deg(record.heading[steady] - math.degrees(best))
     return {'crab_error_deg': _mean(np.abs(error))}
@@ -335,7 +335,7 @@ def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
             yield log
 
     record = Record(blocks())
-    scores = scorer.result(scenario.settle_time_s(scorer.ticks * TICK_S), scenario.profile.depth_m)
+    scores = scorer.result(scenario.score_rules(scorer.ticks * TICK_S))
     for measure in case.measures:
         scores.update(measure(record, scenario))
     return _row(scores), record.thinned(RECORD_POINTS) if case.drawn else None
@@ -406,6 +406,7 @@ COMPARED = {
     'cross_track_m.max_steady': 'max\nsteady (m)',
     'cross_track_m.rms_steady': 'rms\nsteady (m)',
     'cross_track_m.max_all': 'max\nall (m)',
+    'cross_track_m.max_run': 'max\nrun (m)',
     'heading_fluctuation_deg.rms_steady': 'heading\nrms (deg)',
     'pitch_error_deg.rms_steady': 'pitch\nrms (deg)',
 }
@@ -646,16 +647,6 @@ def horizontal_speed(scenario: Scenario) -> float:
     polar = make_polar(load_vehicle(scenario.vehicle).params())
     pitch = -math.radians(scenario.profile.pitch_deg)
     return steady_horizontal_speed(pitch, scenario.profile.net_heaviness_kg, polar)
-
-
-def _current(scenario: Scenario) -> tuple[float, float]:
-    """Constant current of a scenario, north and east (m/s)."""
-    current = scenario.current_settings()
-    direction = math.radians(current.direction_deg)
-    return (
-        current.speed_mps * math.cos(direction),
-        current.speed_mps * math.sin(direction),
-    )
 
 
 def expectation(speed: float, current_mps: float, angle_deg: float) -> dict[str, Any]:

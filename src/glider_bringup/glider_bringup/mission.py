@@ -33,6 +33,7 @@ from glider_bringup.runner import NAMESPACE, node_commands, run_nodes
 from glider_bringup.scenario import Scenario, load_scenario
 from glider_bringup.score import Scorer
 from glider_bringup.traces import TRACED, Tracer, Traces, load_traces
+from glider_guidance.guidance import path_time_s
 from glider_guidance.profile import mission_time_s
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
@@ -69,12 +70,15 @@ class Flight(NamedTuple):
 
 
 def planned_ticks(scenario: Scenario) -> int:
-    """Ticks that a run of the scenario takes; an estimate where dives end it."""
-    duration_s = scenario.duration_s
+    """Ticks that a run of the scenario takes; an estimate where dives or its path end it."""
+    duration_s, plant = scenario.duration_s, scenario.plant_settings()
+    guidance = scenario.guidance_settings().params()
     if scenario.dives:
-        profile = scenario.guidance_settings().params().profile
-        dives_s = mission_time_s(profile, scenario.dives)
-        duration_s = min(duration_s, dives_s + scenario.plant_settings().surface_s)
+        dives_s = mission_time_s(guidance.profile, scenario.dives)
+        duration_s = min(duration_s, dives_s + plant.surface_s)
+    if guidance.ends_with_path:
+        path_s = path_time_s(guidance, *scenario.constant_current())
+        duration_s = min(duration_s, path_s + plant.afloat_s)
     return max(1, round(duration_s / TICK_S))
 
 
@@ -226,8 +230,7 @@ def _scorer(scenario: Scenario) -> Scorer:
 
 
 def _score(scenario: Scenario, scorer: Scorer) -> dict:
-    settle_s = scenario.settle_time_s(scorer.ticks * TICK_S)
-    return scorer.result(settle_s, scenario.profile.depth_m)
+    return scorer.result(scenario.score_rules(scorer.ticks * TICK_S))
 
 
 def scorecard(scenario: Scenario, engine: str | None, flight: Flight, scores: dict) -> dict:

@@ -55,6 +55,7 @@ _GLIDE_KG, _GLIDE_PITCH_DEG, _ROLL_MASS_DEG = 0.4, 30.0, 10.0
 FIGURES = {
     'max_steady_m': ('cross_track_m', 'max_steady'),
     'max_all_m': ('cross_track_m', 'max_all'),
+    'max_run_m': ('cross_track_m', 'max_run'),
     'heading_fluctuation_deg': ('heading_fluctuation_deg', 'rms_steady'),
     'pitch_error_deg': ('pitch_error_deg', 'rms_steady'),
 }

@@ -151,6 +151,10 @@ def verdict(card: dict[str, Any], settle_s: float) -> str:
         text += f' After settling it was at most {small(track["max_all"])} off the path.'
     else:
         text += f' It ended within the settling time of {span(settle_s)}, so errors have no score.'
+    if track.get('max_run') is not None:
+        text += f' In the whole run, settling and turns included: {small(track["max_run"])}.'
+    if card.get('end_of_path_m') is not None:
+        text += f' It came up {small(card["end_of_path_m"])} from the end of the path.'
     return text
 
 
@@ -238,6 +242,11 @@ def _tiles(run: FlownRun) -> str:
             'cross-track, steady',
             number(track['max_steady'], 2, 'm'),
             f'largest; rms {number(track["rms_steady"], 3, "m")}',
+        ),
+        (
+            'cross-track, whole run',
+            number(track.get('max_run'), 2, 'm'),
+            f'largest; {number(track["max_all"], 2, "m")} after settling',
         ),
         (
             'deepest point',
@@ -435,11 +444,11 @@ def report_page(run: FlownRun) -> str:
     ]
     shown = {panel.id for panel in panels if panel.curves or panel.kind != 'time'}
     found = ''.join(f'<li class="{kind}">{escape(text)}</li>' for kind, text in findings(run))
-    settle_s = scenario.settle_time_s(card['sim_time_s'])
+    rules = scenario.score_rules(card['sim_time_s'])
     body = (
         f'<h1><b>{escape(scenario.name)}</b> {escape(scenario.description)}</h1>'
         f'<p class="verdict"><span class="badge {card["status"]}">{_BADGES[card["status"]]}</span>'
-        f'{escape(verdict(card, settle_s))}</p>'
+        f'{escape(verdict(card, rules.settle_s))}</p>'
         f'{_tiles(run)}<ul class="findings">{found}</ul>'
         + (ZOOM_BAR if shown else '')
         + ''.join(
@@ -447,8 +456,9 @@ def report_page(run: FlownRun) -> str:
             for title, group in sections.items()
         )
         + f'<h2>Scorecard</h2>{table(card_rows(card))}'
-        f'<p class="page-note">Steady: after the settling time of {span(settle_s)}, more than '
-        f'10 min from every inflection, deeper than {STEADY_DEPTH_M:.0f} m. Curves show the '
+        f'<p class="page-note">Steady: after the settling time of {span(rules.settle_s)}, more '
+        f'than {span(rules.margin_s)} from every inflection, deeper than '
+        f'{rules.steady_depth_m:.3g} m. Curves show the '
         'smallest and the largest value of every '
         f'{2.0 * run.traces.spacing_s:g} s: no peak is lost.</p>'
         f'<h2>What was flown</h2><pre>{escape(_what_was_set(run))}</pre>'

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenarios: one validated YAML file that says everything about a mission."""
 
+import math
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,13 +11,14 @@ import pydantic
 import yaml
 from pydantic import Field
 
+from glider_bringup.score import Rules
 from glider_control.control import ControlLawSettings, ControlSettings
 from glider_guidance.guidance import GuidanceLawSettings, GuidanceSettings
-from glider_guidance.path import PathSettings, StraightPath
+from glider_guidance.path import PathSettings, StraightPath, path_length, path_point
 from glider_guidance.profile import ProfileSettings
 from glider_model.current import CurrentSettings
 from glider_model.perturb import PerturbSettings, perturbed
-from glider_model.plant import InitialSettings, PlantSettings
+from glider_model.plant import SURFACE_S, InitialSettings, PlantSettings
 from glider_model.sensors import SensorSettings
 from glider_model.settings import (
     ConfigurationError,
@@ -35,6 +37,8 @@ DEFAULT_SCENARIO = 'current_8deg'
 #: A run of this simulated time or more is a long one, with the longer settling time (s).
 LONG_RUN_S = 20000.0
 SETTLE_LONG_S, SETTLE_SHORT_S = 7200.0, 1800.0
+#: Of a short run this share is left out at most.
+SETTLE_SHARE = 0.5
 
 #: Fields of which only one can be given: setting one of them by hand replaces the other.
 _ALTERNATIVES = (
@@ -63,7 +67,8 @@ class Scenario(Settings):
         None,
         ge=0.0,
         le=1e8,
-        description='time left out of the score (s); by default 7200 in long runs, else 1800',
+        description='time left out of the score (s); by default 7200 in long runs, else 1800, a '
+        'dive to depth_m or half of the run, whichever is shortest',
     )
     initial: InitialSettings = Field(
         InitialSettings(depth_m=0.1), description='state at the start'
@@ -96,15 +101,34 @@ class Scenario(Settings):
             initial=self.initial,
             duration_s=self.duration_s,
             dives=self.dives,
+            dive_depth_m=self.profile.depth_m,
+            afloat_s=self._afloat_s(),
             seed=self.seed,
             sensors=self.sensors,
             perturb=self.perturb,
         )
 
+    def _afloat_s(self) -> float:
+        """Time (s) afloat that ends a run: longer than any wait of its mission; 0: never."""
+        if self.path.at_end == 'continue':
+            return 0.0
+        profile = self.profile
+        waits_s = profile.wait_s + profile.prepare_s if profile.surface_every_dives else 0.0
+        return waits_s + SURFACE_S
+
     def current_settings(self) -> CurrentSettings:
         """What the current node is told: directions absolute, the scenario's seed."""
         resolved = self.current.resolved(self.path.course_rad())
         return resolved.model_copy(update={'seed': self.seed})
+
+    def constant_current(self) -> tuple[float, float]:
+        """Constant part of the current, north and east (m/s)."""
+        current = self.current_settings()
+        direction = math.radians(current.direction_deg)
+        return (
+            current.speed_mps * math.cos(direction),
+            current.speed_mps * math.sin(direction),
+        )
 
     def guidance_settings(self) -> GuidanceSettings:
         """What the guidance node is told."""
@@ -125,7 +149,23 @@ class Scenario(Settings):
         """Settling time (s) of a run that lasted ``sim_time_s``."""
         if self.settle_s is not None:
             return self.settle_s
-        return SETTLE_LONG_S if sim_time_s >= LONG_RUN_S else SETTLE_SHORT_S
+        if sim_time_s >= LONG_RUN_S:
+            return SETTLE_LONG_S
+        return min(SETTLE_SHORT_S, self._glide_s(), SETTLE_SHARE * sim_time_s)
+
+    def score_rules(self, sim_time_s: float) -> Rules:
+        """By what a run that lasted ``sim_time_s`` is scored."""
+        end = path_point(path_length(self.path.params()), self.path.params())
+        return Rules(
+            self.settle_time_s(sim_time_s), self.profile.depth_m, self._glide_s(), end[:2]
+        )
+
+    def _glide_s(self) -> float:
+        """Time of a glide to the depth of the lower turn (s); infinite along a path in 3-D."""
+        if self.profile.mode == 'path':
+            return math.inf
+        profile = self.guidance_settings().params().profile
+        return profile.depth / profile.glide_rate
 
     def to_yaml(self) -> str:
         """The scenario as a file that loads to the same scenario."""

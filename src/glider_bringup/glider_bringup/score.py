@@ -2,28 +2,35 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a run achieved: the scorecard, from the numbers on the topics alone.
 
-The same function scores a bag and a direct run. "Steady" counts what is after the settling time,
-more than 600 s away from every inflection on either side, and deeper than 30 m. "All" leaves out
-the settling time only. An inflection is where the desired vertical rate changes its sign.
+The same function scores a bag and a direct run. "Run" counts the whole of it, "all" leaves out the
+settling time, and "steady" counts what is after the settling time, more than 600 s away from every
+inflection on either side, and deeper than 30 m; in dives that are so shallow that this would leave
+nothing, away from inflections by `MARGIN_SHARE` of the time between two of them, and deeper than
+`STEADY_DEPTH_SHARE` of their depth. An inflection is where the desired vertical rate changes its
+sign.
 
 What was measured with noise is scored by the true motion, which the noise's seed gives back.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from glider_bringup.direct import COLUMNS
 from glider_bringup.truth import TrueMotion, wire_of
+from glider_guidance.profile import AT_END_OF_PATH
 from glider_model.frames import euler_from_quaternion, odometry_from_wire, reference_from_wire
 from glider_model.kernel import kernel
-from glider_model.plant import DIVE_ABOVE_M, DIVE_BELOW_M
+from glider_model.plant import dive_depths
 from glider_model.sensors import SensorParams
 from glider_model.signals import TICK_S
 
-#: Around an inflection (s) and shallower than this (m) nothing counts as steady.
+#: Around an inflection (s) and shallower than this (m) nothing counts as steady,
 INFLECTION_MARGIN_S = 600.0
 STEADY_DEPTH_M = 30.0
+#: but of a dive or climb these shares of its time and its depth are left out at most.
+MARGIN_SHARE, STEADY_DEPTH_SHARE = 0.3, 0.25
 #: Heading fluctuation is about the mean over this time (s).
 HEADING_MEAN_S = 300.0
 #: A run is infeasible if the course could not be held for this share of the scored time.
@@ -36,8 +43,28 @@ _TARGET_N, _TARGET_E, _INFEASIBLE, _NET_HEAVINESS, _PITCH_MASS, _ROLL_MASS = ran
 _ODOM, _REFERENCE = COLUMNS['odom'], COLUMNS['reference']
 _E2_COLUMN = COLUMNS['tracking_error'].start + 1
 _INFEASIBLE_COLUMN = COLUMNS['infeasible']
+_STAGE_COLUMN = COLUMNS['stage']
 _ODOM_START, _REFERENCE_START = _ODOM.start, _REFERENCE.start
 _JOINTS_START = COLUMNS['joint_states'].start
+
+
+class Rules(NamedTuple):
+    """By what a run is scored."""
+
+    settle_s: float = 0.0  #: settling time (s)
+    depth_m: float = 1000.0  #: depth of the lower turn (m)
+    glide_s: float = math.inf  #: time of one dive or climb (s)
+    path_end: tuple[float, float] | None = None  #: last point of the path, north and east (m)
+
+    @property
+    def margin_s(self) -> float:
+        """Time around an inflection that is not steady (s)."""
+        return min(INFLECTION_MARGIN_S, MARGIN_SHARE * self.glide_s)
+
+    @property
+    def steady_depth_m(self) -> float:
+        """Depth above which nothing is steady (m)."""
+        return min(STEADY_DEPTH_M, STEADY_DEPTH_SHARE * self.depth_m)
 
 
 @kernel
@@ -76,6 +103,7 @@ class Scorer:
         self._truth = TrueMotion(sensors)
         self._blocks: list[np.ndarray] = []
         self._last: np.ndarray | None = None
+        self._end: np.ndarray | None = None
 
     def add(self, log: np.ndarray) -> None:
         """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
@@ -86,6 +114,9 @@ class Scorer:
         _extract(log, series)
         self._blocks.append(series)
         self._last = log[-1].copy()
+        at_end = np.flatnonzero(log[:, _STAGE_COLUMN] == AT_END_OF_PATH)
+        if self._end is None and len(at_end):
+            self._end = log[at_end[0], _ODOM].copy()
 
     @property
     def ticks(self) -> int:
@@ -96,27 +127,20 @@ class Scorer:
         """One series over all blocks, float64[ticks]; not kept, for 30 h of all are 100 MB."""
         return np.concatenate([np.empty(0), *(block[column] for block in self._blocks)])
 
-    def result(self, settle_s: float, target_depth_m: float) -> dict:
+    def result(self, rules: Rules) -> dict:
         """Scores of everything taken in.
-
-        Parameters
-        ----------
-        settle_s : float
-            Settling time (s).
-        target_depth_m : float
-            Depth of the lower turn, for the overshoot (m).
 
         Returns
         -------
         dict
-            The run's part of ``score.json``: ticks, dives, distance_along_path_m, cross_track_m,
-            pitch_error_deg, heading_fluctuation_deg, depth_m, actuator_travel, final_state, and
-            ``infeasible``.
+            The run's part of ``score.json``: ticks, settle_s, dives, distance_along_path_m,
+            end_of_path_m, cross_track_m, pitch_error_deg, heading_fluctuation_deg, depth_m,
+            actuator_travel, final_state, and ``infeasible``.
             A figure without data is None.
         """
         series, ticks = self._series, self.ticks
         depth, e2 = series(_DEPTH), series(_E2)
-        steady, scored = windows(depth, series(_RATE_REF) > 0.0, settle_s, TICK_S)
+        steady, scored = windows(depth, series(_RATE_REF) > 0.0, rules, TICK_S)
         pitch_error = np.degrees(series(_PITCH) - series(_PITCH_REF))
         heading = _heading_fluctuation_deg(series(_HEADING))
         whole = steady & _has_whole_mean(ticks)
@@ -124,12 +148,15 @@ class Scorer:
         return {
             'ticks': ticks,
             'sim_time_s': _round(ticks * TICK_S),
-            'dives': _count_dives(depth),
+            'settle_s': rules.settle_s,
+            'dives': _count_dives(depth, *dive_depths(rules.depth_m)),
             'distance_along_path_m': _length(series(_TARGET_N), series(_TARGET_E)),
+            'end_of_path_m': self._end_of_path_m(rules.path_end),
             'cross_track_m': {
                 'rms_steady': _rms(e2[steady]),
                 'max_steady': _largest(e2[steady]),
                 'max_all': _largest(e2[scored]),
+                'max_run': _largest(e2),
             },
             'pitch_error_deg': {
                 'rms_steady': _rms(pitch_error[steady]),
@@ -141,7 +168,7 @@ class Scorer:
             },
             'depth_m': {
                 'max': deepest,
-                'overshoot': None if deepest is None else max(0.0, deepest - target_depth_m),
+                'overshoot': None if deepest is None else max(0.0, deepest - rules.depth_m),
             },
             'actuator_travel': {
                 'buoyancy_engine_kg': _travel(series(_NET_HEAVINESS)),
@@ -153,6 +180,13 @@ class Scorer:
                 scored.any() and np.mean(series(_INFEASIBLE)[scored]) >= INFEASIBLE_SHARE
             ),
         }
+
+    def _end_of_path_m(self, path_end: tuple[float, float] | None) -> float | None:
+        """Horizontal distance from the path's end when the mission ended there, at the surface."""
+        if self._end is None or path_end is None:
+            return None
+        odometry = odometry_from_wire(tuple(float(x) for x in self._end))
+        return math.hypot(odometry.p_n - path_end[0], odometry.p_e - path_end[1])
 
     def _final_state(self) -> dict | None:
         """Position, attitude and velocity over ground (body axes FRD) of the last tick."""
@@ -168,7 +202,7 @@ class Scorer:
 
 
 def windows(
-    depth: np.ndarray, descending: np.ndarray, settle_s: float, step_s: float
+    depth: np.ndarray, descending: np.ndarray, rules: Rules, step_s: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Masks of the steady and of all scored samples.
 
@@ -178,14 +212,13 @@ def windows(
         From the start of the run on (m).
     descending : bool[n]
         Whether the desired vertical rate points down.
-    settle_s : float
-        Settling time (s).
+    rules : Rules
     step_s : float
         Time between two samples (s).
     """
-    scored = np.arange(len(depth)) * step_s > settle_s
-    steady = scored & (depth > STEADY_DEPTH_M)
-    margin = round(INFLECTION_MARGIN_S / step_s)
+    scored = np.arange(len(depth)) * step_s > rules.settle_s
+    steady = scored & (depth > rules.steady_depth_m)
+    margin = round(rules.margin_s / step_s)
     for turn in np.flatnonzero(descending[1:] != descending[:-1]) + 1:
         steady[max(0, turn - margin) : turn + margin + 1] = False
     return steady, scored
@@ -212,11 +245,11 @@ def _has_whole_mean(ticks: int) -> np.ndarray:
     return (index >= half) & (index < ticks - half)
 
 
-def _count_dives(depth: np.ndarray) -> int:
+def _count_dives(depth: np.ndarray, below_m: float, above_m: float) -> int:
     """Number of times that the vehicle went deep and came back, as the plant counts them."""
     zone = np.zeros(len(depth), dtype=np.int8)
-    zone[depth > DIVE_BELOW_M] = 1
-    zone[depth < DIVE_ABOVE_M] = -1
+    zone[depth > below_m] = 1
+    zone[depth < above_m] = -1
     zone = zone[zone != 0]
     return int(np.count_nonzero((zone[:-1] == 1) & (zone[1:] == -1)))
 

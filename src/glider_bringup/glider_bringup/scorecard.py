@@ -18,7 +18,9 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
     """Name and text of every line of a scorecard."""
     track, pitch = card['cross_track_m'], card['pitch_error_deg']
     heading, depth = card['heading_fluctuation_deg'], card['depth_m']
-    travel = card['actuator_travel']
+    travel, settle_s = card['actuator_travel'], card.get('settle_s')
+    settling = 'after settling' + ('' if settle_s is None else f', the first {settle_s:,.0f} s')
+    end_m = card.get('end_of_path_m')
     return [
         ('status', card['status'] + (f' ({card["reason"]})' if card['reason'] else '')),
         ('flown', f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}'),
@@ -31,9 +33,12 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
         ),
         ('dives', str(card['dives'])),
         ('along path', _show(card['distance_along_path_m'], 'm', 0)),
+        *([('end of path', f'came up {_show(end_m, "m", 1)} from its last point')]
+          if end_m is not None else []),
         ('cross-track, steady', f'rms {_show(track["rms_steady"], "m", 3)}, max '
          f'{_show(track["max_steady"], "m", 3)}'),
-        ('cross-track, all', f'max {_show(track["max_all"], "m")}'),
+        ('cross-track, all', f'max {_show(track["max_all"], "m")} ({settling})'),
+        ('cross-track, whole run', f'max {_show(track.get("max_run"), "m")}'),
         ('pitch error, steady', f'rms {_show(pitch["rms_steady"], "deg", 3)}, max '
          f'{_show(pitch["max_steady"], "deg", 3)}'),
         ('heading fluctuation', f'rms {_show(heading["rms_steady"], "deg", 3)}, max '

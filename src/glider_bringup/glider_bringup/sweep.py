@@ -18,7 +18,7 @@ from glider_bringup.journal import Journal
 from glider_bringup.mission import Flight, fly_direct, planned_ticks, scorecard
 from glider_bringup.pool import WORKER_DIED, Pool, Progress, WorkError
 from glider_bringup.scenario import Scenario, ScenarioSource, make_scenario
-from glider_bringup.score import Scorer
+from glider_bringup.score import Rules, Scorer
 from glider_bringup.sweep_file import Plan, vehicle_text
 from glider_bringup.sweep_result import NOT_FIGURES, make_dataset, variable_name, write_dataset
 from glider_model.kernel import source_digest
@@ -140,7 +140,7 @@ def _is_finite(figure: Any) -> bool:
 
 def result_names(scenario: Scenario) -> set[str]:
     """Names in a result, apart from its dimensions; a scorecard without a flight has them too."""
-    empty = Scorer().result(0.0, scenario.profile.depth_m)
+    empty = Scorer().result(Rules())
     card = scorecard(scenario, 'direct', Flight('completed', '', 0.0, 0, 0), empty)
     return NOT_FIGURES | {variable_name(figure) for figure, _ in _figures(card)}
 

@@ -13,7 +13,7 @@ from glider_bringup.mission import fly_direct, make_run_folder, make_tracer, mis
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.verify import verify
 from glider_bringup.scenario import load_scenario
-from glider_bringup.score import Scorer
+from glider_bringup.score import Rules, Scorer
 from glider_bringup.traces import halve
 from glider_control.control import control_step, control_surface
 from glider_guidance.guidance import guidance_abort, guidance_step
@@ -41,7 +41,7 @@ def main() -> None:
     fly(state, params, log, TICK_S)
     scorer = Scorer(SensorSettings(position_std_m=1.0).params(0))
     scorer.add(log)
-    scorer.result(0.0, 0.0)
+    scorer.result(Rules())
     tracer = make_tracer(scenario)
     tracer.add(log)
     halve(np.zeros(4, np.float32))

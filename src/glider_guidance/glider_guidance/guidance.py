@@ -9,6 +9,7 @@ import pydantic
 from pydantic import Field
 
 from glider_guidance.current_observer import ObserverParams, ObserverState, observer_step
+from glider_guidance.end_of_path import WayLeft, way_left
 from glider_guidance.los import (
     approach_angles,
     approach_heading,
@@ -23,11 +24,13 @@ from glider_guidance.path import (
     path_angles,
     path_closest,
     path_errors,
+    path_length,
     path_point,
     path_tangent,
     path_turn,
 )
 from glider_guidance.profile import (
+    AT_END_OF_PATH,
     GLIDING_DOWN,
     INFLECTING_UP,
     INITIAL_PROFILE,
@@ -37,7 +40,9 @@ from glider_guidance.profile import (
     ProfileParams,
     ProfileSettings,
     ProfileState,
+    coming_turn,
     is_gliding,
+    look_ahead_s,
     profile_step,
     profile_targets,
     time_to_turn,
@@ -257,6 +262,7 @@ class GuidanceSettings(GuidanceLawSettings):
             self.los.method == 'observer',
             self.los.method == 'observer' and self.los.lead_turns,
             self.duration_s if self.duration_s > 0.0 else math.inf,
+            self.path.at_end == 'stop',
             self.los.lookahead_m if self.los.method == 'observer' else self.los.delta1_m,
             self.los.lookahead_s if self.los.method == 'observer' else 0.0,
             self.los.delta1_per_s,
@@ -300,6 +306,7 @@ class GuidanceParams(NamedTuple):
     compensates: bool  #: crab into the estimated current
     leads: bool  #: share the drift of a turn between before and after
     end_s: float  #: when the mission ends (s)
+    ends_with_path: bool  #: comes up at the end of the path, and stays there
     lookahead: float  #: (m), at least
     lookahead_s: float  #: times the speed over ground, if that is more
     target_gain: float  #: delta1 (1/s)
@@ -355,6 +362,7 @@ def guidance_abort(state):
             True,
             profile.lead_up_s,
             profile.lead_down_s,
+            profile.turn_depth,
         ),
         state.s,
         state.observer,
@@ -381,7 +389,9 @@ def _start(state, odometry, psi, theta, params):
     stage = GLIDING_DOWN if params.profile.follows_path else SURFACE_PREPARATION
     return GuidanceState(
         state.tick,
-        ProfileState(stage, 0, state.profile.dives, state.profile.aborted, 0.0, 0.0),
+        ProfileState(
+            stage, 0, state.profile.dives, state.profile.aborted, 0.0, 0.0, params.profile.depth
+        ),
         s,
         state.observer,
         Filtered(psi, 0.0),
@@ -420,6 +430,38 @@ def lookahead_stretch(steering, lookahead_s):
 
 
 @kernel
+def _way_left(state, e1, params):
+    """What is left of the path; infinite for a mission that does not end with it."""
+    if not params.ends_with_path:
+        return WayLeft(math.inf, 0.0)
+    if state.s >= path_length(params.path):
+        return WayLeft(0.0, 0.0)
+    observer = state.observer
+    return way_left(
+        state.s,
+        e1,
+        params.profile_speed,
+        observer.current_n,
+        observer.current_e,
+        look_ahead_s(params.profile),
+        params.path,
+    )
+
+
+def path_time_s(params: GuidanceParams, current_n: float, current_e: float) -> float:
+    """Estimated time (s) from the start of a path to the surface at its end, in a current (m/s).
+
+    Infinite if the current does not let the vehicle get there.
+    """
+    speed, path = params.profile_speed, params.path
+    left = way_left(0.0, 0.0, speed, current_n, current_e, math.inf, path)
+    climb_s = 0.0
+    if params.profile.follows_path:
+        climb_s = path_point(path_length(path), path)[2] / params.profile.glide_rate
+    return left.glide_s + climb_s
+
+
+@kernel
 def within(value, most):
     """``value``, held within -most and most."""
     return min(most, max(-most, value))
@@ -452,6 +494,8 @@ def guidance_step(state, odometry, params, dt):
     if state.tick == 0:
         state = _start(state, odometry, psi, theta, params)
     follows_path = params.profile.follows_path
+    if params.ends_with_path and state.s >= path_length(params.path):
+        follows_path = False  # it comes up as from a dive
 
     # where the vehicle is relative to the path
     d_n, d_e, d_d = path_tangent(state.s, params.path)
@@ -464,12 +508,14 @@ def guidance_step(state, odometry, params, dt):
     )
 
     # what the vehicle is doing
+    left = _way_left(state, e1, params)
     if follows_path and not state.profile.aborted:
         profile = ProfileState(
-            GLIDING_DOWN, state.profile.ticks + 1, state.profile.dives, False, 0.0, 0.0
+            GLIDING_DOWN, state.profile.ticks + 1, state.profile.dives, False, 0.0, 0.0, 0.0
         )
     else:
-        profile = profile_step(state.profile, odometry.p_d, ground_d, params.profile)
+        profile = profile_step(state.profile, odometry.p_d, ground_d, left, params.profile)
+    turn_depth = coming_turn(profile, odometry.p_d, left, params.profile)
     stage = profile.stage
     pitch_target, rate_target = profile_targets(stage, ground_d, params.profile)
     if not follows_path:
@@ -508,6 +554,7 @@ def guidance_step(state, odometry, params, dt):
         speed += dt / SPEED_FILTER_S * (model_speed - speed)
 
     surfaced = stage == WAITING_ON_SURFACE or stage == SURFACE_PREPARATION or stage == SURFACING
+    surfaced = surfaced or stage == AT_END_OF_PATH
     turns_over = not is_gliding(stage) and not surfaced
     # a turn-over is flown on the heading of the glide to come, as it should be
     begins_to_turn_over = turns_over and is_gliding(state.profile.stage)
@@ -535,7 +582,7 @@ def guidance_step(state, odometry, params, dt):
             more_s = more_up_s if stage == INFLECTING_UP else more_down_s
             drift_past = across * (turn_lead_s(state.profile, params.profile) + more_s)
         if is_gliding(stage):
-            to_turn_s = time_to_turn(profile, odometry.p_d, ground_d, params.profile)
+            to_turn_s = time_to_turn(profile, odometry.p_d, ground_d, turn_depth, params.profile)
             if state.tick * dt + to_turn_s > params.end_s:
                 to_turn_s = math.inf
             # the phase that steers less well bears the smaller part of the drift
@@ -599,7 +646,7 @@ def guidance_step(state, odometry, params, dt):
     pitch = filter_angle(state.pitch, pitch_target, 0.0, params.pitch_filter, dt)
     t_n, t_e, t_d = path_point(state.s, params.path)
     if not follows_path:
-        t_d = params.profile.depth if rate_target > 0.0 else 0.0
+        t_d = turn_depth if rate_target > 0.0 else 0.0
     if profile.aborted:
         t_d = SURFACE_TARGET
 

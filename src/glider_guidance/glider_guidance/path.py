@@ -31,6 +31,8 @@ MAX_DEPTH_M = 12_000.0
 MAX_SLOPE_DEG = 80.0
 #: Waypoints closer together than this coincide (m).
 MIN_LEG_M = 1.0
+#: A path of waypoints that could be degrees is at least so long (m): no glider turns so tightly.
+MIN_WAY_M = 10.0
 #: Least norm(dp_d/ds) of a spline (m/m). Where it vanishes the tangent is undefined.
 MIN_RATE = 0.1
 
@@ -63,6 +65,7 @@ class PathParams(NamedTuple):
     bearing: float  #: from the axis to the start of the helix (rad, clockwise from north)
     turn: float  #: sense of the helix, seen from above: +1 clockwise, -1 counterclockwise
     slope: float  #: descent angle of the helix (rad, + down)
+    ways: np.ndarray  #: float64[n + 1], horizontal way along the path at the knots (m), from 0
 
 
 @kernel
@@ -99,7 +102,7 @@ def _piece(i, s, params):
 
 
 @kernel
-def _locate(s, params):
+def path_piece(s, params):
     """Piece that holds s, and s held to the ends of the path. A knot belongs to what follows."""
     knots = params.knots
     inside = min(max(s, 0.0), knots[-1])
@@ -128,7 +131,7 @@ def path_point(s, params):
     p_n, p_e, p_d : float
         (m, NED)
     """
-    i, inside = _locate(s, params)
+    i, inside = path_piece(s, params)
     n, e, d, dn, de, dd = _piece(i, inside, params)
     beyond = s - inside
     return n + beyond * dn, e + beyond * de, d + beyond * dd
@@ -149,7 +152,7 @@ def path_tangent(s, params):
     dn, de, dd : float
         (m/m, NED)
     """
-    i, inside = _locate(s, params)
+    i, inside = path_piece(s, params)
     _, _, _, dn, de, dd = _piece(i, inside, params)
     return dn, de, dd
 
@@ -278,10 +281,12 @@ def path_closest(p_n, p_e, p_d, horizontal, params):
 
 
 def _cubic_params(knots: np.ndarray, coefficients: np.ndarray) -> PathParams:
+    knots = np.ascontiguousarray(knots, dtype=float)
     return PathParams(
         kind=_CUBIC,
-        knots=np.ascontiguousarray(knots, dtype=float),
+        knots=knots,
         coefficients=np.ascontiguousarray(coefficients, dtype=float),
+        ways=_horizontal_ways(knots, coefficients),
         centre_n=0.0,
         centre_e=0.0,
         start_d=0.0,
@@ -290,6 +295,17 @@ def _cubic_params(knots: np.ndarray, coefficients: np.ndarray) -> PathParams:
         turn=0.0,
         slope=0.0,
     )
+
+
+def _horizontal_ways(knots: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    """Horizontal way (m) from the start of a path of cubics to each knot."""
+    x = np.diff(knots)[:, None] * np.linspace(0.0, 1.0, _SAMPLES_PER_PIECE + 1)
+    c = coefficients[:, :2, :, None]
+    at = c[:, :, 0] + x[:, None] * (
+        c[:, :, 1] + x[:, None] * (c[:, :, 2] + x[:, None] * c[:, :, 3])
+    )
+    steps = np.hypot(*np.moveaxis(np.diff(at, axis=2), 1, 0))
+    return np.concatenate(([0.0], np.cumsum(steps.sum(axis=1))))
 
 
 def _polyline_params(waypoints: np.ndarray) -> PathParams:
@@ -324,6 +340,12 @@ def _point(values: tuple[float, ...], name: str) -> tuple[float, float, float]:
 
 class _PathSettings(Settings):
     """What all paths have in common."""
+
+    at_end: Literal['stop', 'continue'] = Field(
+        'stop',
+        description='at the end of the path: stop, come up there and end the mission, or continue '
+        'along its last course',
+    )
 
     def params(self) -> PathParams:
         """Numbers that the kernels of this module read."""
@@ -541,6 +563,7 @@ class HelixPath(_PathSettings):
             bearing=self.course_rad() - turn * math.pi / 2.0,
             turn=turn,
             slope=slope,
+            ways=knots * math.cos(slope),
         )
 
     def course_rad(self) -> float:
@@ -556,6 +579,7 @@ PathSettings = Annotated[
 def _check_waypoints(waypoints: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     """Refuse waypoints that make no path, and give each one a depth."""
     points = [_point(point, f'waypoint {i}') for i, point in enumerate(waypoints)]
+    _check_metres(points)
     if len({len(point) for point in waypoints}) > 1:
         raise ValueError('all waypoints need a depth, or none (allowed: 2 or 3 numbers in each)')
     for i, (one, after) in enumerate(pairwise(points)):
@@ -590,4 +614,16 @@ def _check_slopes(params: PathParams) -> None:
         raise ValueError(
             f'the spline turns on the spot near waypoint {slowest + round(sample / 64)}: '
             'lead it around in a curve'
+        )
+
+
+def _check_metres(points: list[tuple[float, float, float]]) -> None:
+    """Refuse waypoints that look like degrees of latitude and longitude."""
+    like_degrees = all(abs(point[0]) <= 90.0 and abs(point[1]) <= 180.0 for point in points)
+    legs = [math.dist(one, after) for one, after in pairwise(points)]
+    if like_degrees and (sum(legs) < MIN_WAY_M or max(legs) < MIN_LEG_M):
+        shown = ', '.join(str([point[0], point[1]]) for point in points[:2])
+        raise ValueError(
+            f'{shown}, ... make a path of {sum(legs):.2f} m in all (allowed: >= {MIN_WAY_M} m; '
+            'waypoints are metres north and east of the start, not latitude and longitude)'
         )

@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 
 from pydantic import Field
 
+from glider_guidance.end_of_path import WayLeft, lower_turn, next_dive
 from glider_model.kernel import kernel
 from glider_model.polar import Polar, glide_vertical_rate
 from glider_model.settings import Settings
@@ -19,6 +20,7 @@ GLIDING_UP = 3
 INFLECTING_DOWN = 4
 WAITING_ON_SURFACE = 5
 SURFACING = 6
+AT_END_OF_PATH = 7
 
 STAGE_NAMES = (
     'surface preparation',
@@ -28,6 +30,7 @@ STAGE_NAMES = (
     'inflecting down',
     'waiting on the surface',
     'surfacing on abort',
+    'at the end of the path',
 )
 
 #: Shallower than this the vehicle has reached the surface (m).
@@ -36,6 +39,8 @@ AT_SURFACE_M = 1.0
 PITCH_OVER = 0.5
 #: Largest lead that is believed, in leads by the vehicle's file.
 LEAD_RANGE = 6.0
+#: The path is looked at for so many full dives before its end.
+DIVES_AHEAD = 4.0
 #: The desired track is led between these times before a turn, and comes back in this time (s).
 LEAD_FROM_S, LEAD_TO_S, RETURN_S = 400.0, 150.0, 240.0
 
@@ -113,27 +118,62 @@ class ProfileState(NamedTuple):
     aborted: bool
     lead_up_s: float  #: lead of the turn at depth, as learnt from the last one; 0: none yet (s)
     lead_down_s: float  #: lead of the upper turn
+    turn_depth: float  #: planned lower turn of this dive, or of the next; 0: none is to come (m)
 
 
-INITIAL_PROFILE = ProfileState(SURFACE_PREPARATION, 0, 0, False, 0.0, 0.0)
+INITIAL_PROFILE = ProfileState(SURFACE_PREPARATION, 0, 0, False, 0.0, 0.0, math.inf)
+#: Of a mission that does not end with its path.
+NO_END = WayLeft(math.inf, 0.0)
 
 
 @kernel
-def _next_stage(state, depth, vertical_rate, params):
-    """Stage that follows from where the vehicle is."""
+def _planned_turn(state, depth, left, params):
+    """Lower turn (m) of this dive as it was planned, or of the next as it would be now."""
+    stage = state.stage
+    if stage == GLIDING_UP:
+        return next_dive(
+            left, depth, depth < AT_SURFACE_M, turn_lead_s(state, params), state.dives + 1, params
+        )
+    if stage == SURFACE_PREPARATION or stage == WAITING_ON_SURFACE:
+        return next_dive(left, depth, True, turn_lead_s(state, params), state.dives, params)
+    return state.turn_depth
+
+
+@kernel
+def coming_turn(state, depth, left, params):
+    """Depth of the lower turn to come (m); 0.0 if no dive is to come."""
+    if state.stage == GLIDING_DOWN:
+        return lower_turn(state.turn_depth, left, depth, turn_lead_s(state, params), params)
+    return state.turn_depth
+
+
+@kernel
+def look_ahead_s(params):
+    """Time of straight glide (s) for which the rest of the path is looked at."""
+    return DIVES_AHEAD * 2.0 * (params.depth / params.glide_rate + LEAD_RANGE * params.lead_s)
+
+
+@kernel
+def _next_stage(state, depth, vertical_rate, turn_depth, params):
+    """Stage that follows from where the vehicle is; ``turn_depth`` is that of `coming_turn`."""
     stage = state.stage
     lead = abs(vertical_rate) * turn_lead_s(state, params)
     if state.aborted:
         return WAITING_ON_SURFACE if depth < AT_SURFACE_M else SURFACING
+    is_over = turn_depth <= 0.0
+    if stage == SURFACE_PREPARATION and is_over:
+        return AT_END_OF_PATH
     if stage == SURFACE_PREPARATION and state.ticks >= params.prepare_ticks:
         return GLIDING_DOWN
-    if stage == GLIDING_DOWN and depth + lead >= params.depth:
+    if stage == GLIDING_DOWN and depth + lead >= turn_depth:
         return INFLECTING_UP
     if stage == INFLECTING_UP and vertical_rate < -0.05:
         return GLIDING_UP
     if stage == GLIDING_UP:
         done = state.dives + 1
         last = params.dives > 0 and done >= params.dives
+        if is_over:
+            return AT_END_OF_PATH if depth < AT_SURFACE_M else GLIDING_UP
         if last or (params.surface_every > 0 and done % params.surface_every == 0):
             return WAITING_ON_SURFACE if depth < AT_SURFACE_M else GLIDING_UP
         return INFLECTING_DOWN if depth - lead <= params.top_depth else GLIDING_UP
@@ -147,7 +187,7 @@ def _next_stage(state, depth, vertical_rate, params):
 
 
 @kernel
-def profile_step(state, depth, vertical_rate, params):
+def profile_step(state, depth, vertical_rate, left, params):
     """Advance the stage by one tick.
 
     Parameters
@@ -155,9 +195,13 @@ def profile_step(state, depth, vertical_rate, params):
     state : ProfileState
     depth, vertical_rate : float
         Measured (m, m/s, + down).
+    left : WayLeft
+        What is left of the path; ``NO_END`` if the mission does not end with it.
     params : ProfileParams
     """
-    stage = _next_stage(state, depth, vertical_rate, params)
+    planned = _planned_turn(state, depth, left, params)
+    turn_depth = coming_turn(state, depth, left, params)
+    stage = _next_stage(state, depth, vertical_rate, turn_depth, params)
     up_s, down_s = state.lead_up_s, state.lead_down_s
     if stage == state.stage:
         # the rate falls as the root of the weight: to PITCH_OVER after 1 - PITCH_OVER^2 of the
@@ -168,10 +212,12 @@ def profile_step(state, depth, vertical_rate, params):
             up_s = took_s
         elif stage == INFLECTING_DOWN and vertical_rate < -PITCH_OVER * params.glide_rate:
             down_s = took_s
-        return ProfileState(stage, state.ticks + 1, state.dives, state.aborted, up_s, down_s)
+        return ProfileState(
+            stage, state.ticks + 1, state.dives, state.aborted, up_s, down_s, planned
+        )
     climbed = state.stage == GLIDING_UP and not state.aborted
     dives = state.dives + (1 if climbed else 0)
-    return ProfileState(stage, 0, dives, state.aborted, up_s, down_s)
+    return ProfileState(stage, 0, dives, state.aborted, up_s, down_s, planned)
 
 
 @kernel
@@ -227,16 +273,19 @@ def mission_time_s(params: ProfileParams, dives: int) -> float:
 
 
 @kernel
-def time_to_turn(state, depth, vertical_rate, params):
-    """Time (s) until the pump starts for the next turn; infinite where none is to come."""
+def time_to_turn(state, depth, vertical_rate, turn_depth, params):
+    """Time (s) until the pump starts for the next turn; infinite where none is to come.
+
+    ``turn_depth`` is that of `coming_turn`.
+    """
     rate = max(abs(vertical_rate), 0.01)
     if state.stage == GLIDING_DOWN:
-        return (params.depth - depth) / rate - turn_lead_s(state, params)
+        return (turn_depth - depth) / rate - turn_lead_s(state, params)
     done = state.dives + 1
     surfacing = (params.dives > 0 and done >= params.dives) or (
         params.surface_every > 0 and done % params.surface_every == 0
     )
-    if state.stage == GLIDING_UP and not surfacing:
+    if state.stage == GLIDING_UP and not surfacing and turn_depth > 0.0:
         return (depth - params.top_depth) / rate - turn_lead_s(state, params)
     return math.inf
 

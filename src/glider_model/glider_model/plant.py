@@ -33,10 +33,16 @@ from glider_model.water import WaterParams, WaterSettings, buoyancy_gain, emerge
 
 #: RK4 steps in one tick. One step diverges (roll pole at -37 1/s), four leave 2e-8 m in 600 s.
 SUBSTEPS = 4
-#: A dive counts once the vehicle, having been below the first depth, is above the second (m).
+#: A dive counts once the vehicle, having been below the first depth, is above the second (m)
 DIVE_BELOW_M, DIVE_ABOVE_M = 30.0, 20.0
+#: but in shallow profiles below and above these shares of their depth.
+DIVE_BELOW_SHARE, DIVE_ABOVE_SHARE = 0.7, 0.6
+#: Time at the surface after the last dive (s).
+SURFACE_S = 60.0
 #: Shallower than this the vehicle is at the surface (m).
 SURFACE_M = 1.5
+#: A vehicle that has been below this has dived, not only bobbed (m).
+DIVED_M = 3.0
 #: Damping ratio of heave at the surface, where the hull radiates waves (-).
 SURFACE_DAMPING = 0.2
 
@@ -66,9 +72,10 @@ class PlantState(NamedTuple):
     joints: Joints
     water: Water  #: water velocity during the tick that led here
     tick: int
-    deep: bool  #: has been below DIVE_BELOW_M since it was last above DIVE_ABOVE_M
+    deep: bool  #: has been below where a dive counts since it was last above
     dives: int  #: completed dives
     surface_ticks: int  #: ticks at the surface without a break
+    afloat_ticks: int  #: those in which the pump was not filled; -1: has not dived yet
 
 
 class PlantParams(NamedTuple):
@@ -79,7 +86,18 @@ class PlantParams(NamedTuple):
     max_ticks: int
     stop_after_dives: int  #: 0: only max_ticks ends the run
     stop_surface_ticks: int
+    stop_afloat_ticks: int  #: 0: never
+    dive_below: float  #: a dive counts once the vehicle, having been below this (m)
+    dive_above: float  #: is above this (m)
     sensors: SensorParams
+
+
+def dive_depths(depth_m: float) -> tuple[float, float]:
+    """Depths (m) below and then above which a dive of a profile to ``depth_m`` counts."""
+    return (
+        min(DIVE_BELOW_M, DIVE_BELOW_SHARE * depth_m),
+        min(DIVE_ABOVE_M, DIVE_ABOVE_SHARE * depth_m),
+    )
 
 
 class InitialSettings(Settings):
@@ -109,7 +127,17 @@ class PlantSettings(Settings):
         0, ge=0, le=100000, description='the run ends at the surface after this many; 0: never'
     )
     surface_s: float = Field(
-        60.0, ge=0.0, le=86400.0, description='time at the surface after the last dive (s)'
+        SURFACE_S, ge=0.0, le=86400.0, description='time at the surface after the last dive (s)'
+    )
+    dive_depth_m: float = Field(
+        1000.0, ge=1.0, le=12000.0, description='depth of the dives, by which they are counted (m)'
+    )
+    afloat_s: float = Field(
+        0.0,
+        ge=0.0,
+        le=1e6,
+        description='the run ends once the vehicle, having dived, has been at the surface so long '
+        'without filling its pump (s); 0.0: never',
     )
     seed: int = Field(0, ge=0, le=2**63 - 1, description='seed of the noise')
     sensors: SensorSettings = Field(SensorSettings(), description='noise of the odometry')
@@ -125,6 +153,8 @@ class PlantSettings(Settings):
             max(1, round(self.duration_s / TICK_S)),
             self.dives,
             round(self.surface_s / TICK_S),
+            round(self.afloat_s / TICK_S),
+            *dive_depths(self.dive_depth_m),
             self.sensors.params(self.seed),
         )
 
@@ -139,7 +169,7 @@ class PlantSettings(Settings):
             start.north_m, start.east_m, start.depth_m, *q, start.speed_mps, *(5 * (0.0,))
         )
         m_b = min(limit, max(-limit, start.net_heaviness_kg))
-        return PlantState(motion, Joints(m_b, 0.0, 0.0), Water(0.0, 0.0, 0.0), 0, False, 0, 0)
+        return PlantState(motion, Joints(m_b, 0.0, 0.0), Water(0.0, 0.0, 0.0), 0, False, 0, 0, -1)
 
 
 @kernel
@@ -319,10 +349,21 @@ def plant_step(state, command, water, params, dt):
             (water.v_d - state.water.v_d) / dt,
         )
     motion = integrate(state.motion, state.joints, joints, water, water_rate, params, dt, SUBSTEPS)
-    deep = motion.p_d > DIVE_BELOW_M or (state.deep and motion.p_d >= DIVE_ABOVE_M)
+    deep = motion.p_d > params.dive_below or (state.deep and motion.p_d >= params.dive_above)
     dives = state.dives + 1 if state.deep and not deep else state.dives
     surface_ticks = state.surface_ticks + 1 if motion.p_d < SURFACE_M else 0
-    return PlantState(motion, joints, water, state.tick + 1, deep, dives, surface_ticks)
+    afloat_ticks = _afloat(state.afloat_ticks, motion.p_d, command.m_b > joints.m_b)
+    return PlantState(
+        motion, joints, water, state.tick + 1, deep, dives, surface_ticks, afloat_ticks
+    )
+
+
+@kernel
+def _afloat(ticks, depth, fills):
+    """Ticks afloat after one more; a vehicle that fills its pump is about to dive."""
+    if depth >= SURFACE_M:
+        return 0 if ticks >= 0 or depth > DIVED_M else -1
+    return ticks if ticks < 0 or fills else ticks + 1
 
 
 @kernel
@@ -333,7 +374,8 @@ def plant_finished(state, params):
         and state.dives >= params.stop_after_dives
         and state.surface_ticks >= params.stop_surface_ticks
     )
-    return state.tick + 1 >= params.max_ticks or surfaced
+    afloat = 0 < params.stop_afloat_ticks <= state.afloat_ticks
+    return state.tick + 1 >= params.max_ticks or surfaced or afloat
 
 
 @kernel

@@ -14,7 +14,7 @@ import rclpy
 from rclpy.context import Context
 
 from glider_model.frames import quaternion_from_euler
-from glider_model.plant import Motion, PlantParams, PlantState, plant_step
+from glider_model.plant import Motion, PlantParams, PlantState, dive_depths, plant_step
 from glider_model.sensors import SensorSettings
 from glider_model.signals import TICK_S, Joints, Water
 from glider_model.vehicle import load_vehicle
@@ -79,7 +79,14 @@ class Flight:
 def _plant_params(vehicle='zhang2021', **water):
     params = load_vehicle(vehicle).params() if isinstance(vehicle, str) else vehicle
     return PlantParams(
-        params, WaterSettings(**water).params(), 10**9, 0, 0, SensorSettings().params(0)
+        params,
+        WaterSettings(**water).params(),
+        10**9,
+        0,
+        0,
+        0,
+        *dive_depths(1000.0),
+        SensorSettings().params(0),
     )
 
 
@@ -89,7 +96,7 @@ def _start(position=(0.0, 0.0, 100.0), euler=(0.0, 0.0, 0.0), velocity=(), joint
         *(float(number) for number in position), *quaternion_from_euler(*euler), *velocity
     )
     joints = Joints(*(float(number) for number in joints))
-    return PlantState(motion, joints, Water(0.0, 0.0, 0.0), 0, False, 0, 0)
+    return PlantState(motion, joints, Water(0.0, 0.0, 0.0), 0, False, 0, 0, -1)
 
 
 def _flight(params, state, seconds, commands=None, waters=(0.0, 0.0, 0.0)):

@@ -115,6 +115,7 @@ def _print_study(study: dict) -> None:
         ('diverged', lambda row: str(row['diverged'])),
         ('max steady (m)', lambda row: show(row['max_steady_m'])),
         ('max all (m)', lambda row: show(row['max_all_m'])),
+        ('max whole run (m)', lambda row: show(row['max_run_m'])),
         ('heading rms (deg)', lambda row: show(row['heading_fluctuation_deg'])),
         ('pitch rms (deg)', lambda row: show(row['pitch_error_deg'])),
         ('plants statically unstable', lambda row: str(row['statically_unstable'])),

@@ -20,6 +20,7 @@ from glider_bringup.direct import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.ros.bag import BagWriter
 from glider_control.nodes.control_node import TELL_EVERY_NS, saturation_event
 from glider_guidance.nodes.guidance_node import path_message, stage_event
+from glider_guidance.profile import STAGE_NAMES
 from glider_model.ros import health, messages
 from glider_model.ros.codec import to_cdr
 from glider_model.ros.messages import TOPICS
@@ -156,15 +157,21 @@ def _diagnostics(file: Path) -> Iterator[DiagnosticArray]:
         yield deserialize_message(payload, DiagnosticArray)
 
 
-def _infeasible_changes(file: Path) -> list[tuple[int, bool]]:
-    """Ticks at which the course became infeasible or feasible, from /diagnostics."""
-    changes = []
-    for array in _diagnostics(file):
-        for status in array.status:
-            for pair in status.values:
-                if pair.key == 'infeasible':
-                    changes.append((health.stamp_of(array) // TICK_NS, pair.value == 'true'))
-    return changes
+def _flag_changes(file: Path) -> list[tuple[int, str, float]]:
+    """Tick, column and new value of changes of stage and feasibility, from /diagnostics."""
+    read = {'infeasible': lambda text: text == 'true', 'stage': _stage_number}
+    return [
+        (health.stamp_of(array) // TICK_NS, pair.key, float(read[pair.key](pair.value)))
+        for array in _diagnostics(file)
+        for status in array.status
+        for pair in status.values
+        if pair.key in read
+    ]
+
+
+def _stage_number(name: str) -> float:
+    """Number of a stage; NaN for one that this version does not know."""
+    return STAGE_NAMES.index(name) if name in STAGE_NAMES else np.nan
 
 
 def end_of_run(run: Path) -> tuple[bool, str]:
@@ -198,7 +205,7 @@ def read_blocks(run: Path, also: Iterable[str] = ()) -> Iterator[np.ndarray]:
         Run folder, or its MCAP file.
     also : iterable of str
         Topics to read beside `SCORED`, NaN in ticks that lack them. The columns of all other
-        topics, stage and saturation are NaN.
+        topics and saturation are NaN.
 
     Yields
     ------
@@ -215,7 +222,7 @@ def read_blocks(run: Path, also: Iterable[str] = ()) -> Iterator[np.ndarray]:
     wanted = {
         name: (TOPICS[name].codec, COLUMNS[name], name in SCORED) for name in (*SCORED, *also)
     }
-    infeasible = _infeasible_changes(file)
+    changes = _flag_changes(file)
     log = np.full((2 * BLOCK_TICKS, ROW), np.nan)
     seen = np.zeros(2 * BLOCK_TICKS, dtype=np.int64)
     start = 0
@@ -226,8 +233,8 @@ def read_blocks(run: Path, also: Iterable[str] = ()) -> Iterator[np.ndarray]:
         missing = np.flatnonzero(seen[:BLOCK_TICKS] != len(SCORED))
         rows = int(missing[0]) if len(missing) else BLOCK_TICKS
         log[:rows, COLUMNS['infeasible']] = 0.0
-        for tick, flag in infeasible:
-            log[max(0, tick - start) : rows, COLUMNS['infeasible']] = flag
+        for tick, column, value in changes:
+            log[max(0, tick - start) : rows, COLUMNS[column]] = value
         yield log[:rows]
         log[:BLOCK_TICKS], log[BLOCK_TICKS:] = log[BLOCK_TICKS:], np.nan
         seen[:BLOCK_TICKS], seen[BLOCK_TICKS:] = seen[BLOCK_TICKS:], 0
