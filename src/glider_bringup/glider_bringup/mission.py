@@ -414,7 +414,8 @@ def _flown_run(
 ) -> FlownRun:
     """A run with its name and vehicle."""
     vehicle = load_vehicle(scenario.vehicle)
-    return FlownRun(run.resolve().name, scenario, as_flown, vehicle, card, traces)
+    rules = scenario.score_rules(card['sim_time_s'])
+    return FlownRun(run.resolve().name, scenario, as_flown, vehicle, card, traces, rules)
 
 
 def keep_traces(scenario: Scenario, folder: Path, card: dict, tracer: Tracer) -> FlownRun:

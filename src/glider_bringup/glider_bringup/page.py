@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from glider_bringup.scenario import Scenario
+from glider_bringup.score import Rules
 from glider_bringup.traces import SAMPLES, Traces
 from glider_model.vehicle import Vehicle
 
@@ -85,6 +86,7 @@ class FlownRun(NamedTuple):
     vehicle: Vehicle
     card: dict[str, Any]
     traces: Traces | None  #: None if only the score is wanted
+    rules: Rules  #: by which it is scored
 
     def data(self, names: set[str], own_path: bool) -> dict[str, Any]:
         """What the page's script needs of it: the curves of these names, track and path."""

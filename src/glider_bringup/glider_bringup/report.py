@@ -444,7 +444,7 @@ def report_page(run: FlownRun) -> str:
     ]
     shown = {panel.id for panel in panels if panel.curves or panel.kind != 'time'}
     found = ''.join(f'<li class="{kind}">{escape(text)}</li>' for kind, text in findings(run))
-    rules = scenario.score_rules(card['sim_time_s'])
+    rules = run.rules
     body = (
         f'<h1><b>{escape(scenario.name)}</b> {escape(scenario.description)}</h1>'
         f'<p class="verdict"><span class="badge {card["status"]}">{_BADGES[card["status"]]}</span>'

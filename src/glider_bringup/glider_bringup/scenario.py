@@ -124,6 +124,8 @@ class Scenario(Settings):
     def constant_current(self) -> tuple[float, float]:
         """Constant part of the current, north and east (m/s)."""
         current = self.current_settings()
+        if current.speed_mps is None:
+            return 0.0, 0.0
         direction = math.radians(current.direction_deg)
         return (
             current.speed_mps * math.cos(direction),

@@ -150,7 +150,7 @@ def made_up(controller='adaptive', guidance='observer', case='', **fields):
         'guidance': guidance,
         'status': 'completed',
         'finite': True,
-        'cross_track_m': {'rms_steady': 0.1, 'max_steady': 0.5, 'max_all': 4.0},
+        'cross_track_m': {'rms_steady': 0.1, 'max_steady': 0.5, 'max_all': 4.0, 'max_run': 8.0},
         'pitch_error_deg': {'rms_steady': 0.1, 'max_steady': 0.4},
         'heading_fluctuation_deg': {'rms_steady': 0.1, 'max_steady': 0.4},
         'depth_m': {'max': 1003.0, 'overshoot': 3.0},

@@ -27,7 +27,7 @@ from glider_bringup.montecarlo import (
 )
 from glider_bringup.ros.bag_log import read_blocks
 from glider_bringup.scenario import load_scenario, parse_assignment
-from glider_bringup.score import Scorer
+from glider_bringup.score import Rules, Scorer
 from glider_model.frames import euler_from_quaternion
 from glider_model.perturb import ADDED_MASS, DAMPING, STATIC, VISCOUS, PerturbSettings, perturbed
 from glider_model.ros.messages import TOPICS
@@ -42,7 +42,7 @@ OPTIONS = [f'--set={field}={value}' for field, value in SHORT.items()]
 LAWS = ['adaptive', 'pid']
 #: Topics whose numbers are compared.
 RECORDED = [name for name in COLUMNS if name in TOPICS]
-SPREADS = ('max_steady_m', 'max_all_m', 'heading_fluctuation_deg', 'pitch_error_deg')
+SPREADS = ('max_steady_m', 'max_all_m', 'max_run_m', 'heading_fluctuation_deg', 'pitch_error_deg')
 
 
 def glider(*arguments, timeout=300):
@@ -157,7 +157,7 @@ def test_percentiles_are_figures_that_so_many_plants_do_not_exceed():
 def scores(**changes):
     """Scores of a good run, with other values for some fields."""
     good = {
-        'cross_track_m': {'rms_steady': 0.1, 'max_steady': 0.5, 'max_all': 5.0},
+        'cross_track_m': {'rms_steady': 0.1, 'max_steady': 0.5, 'max_all': 5.0, 'max_run': 9.0},
         'pitch_error_deg': {'rms_steady': 0.1, 'max_steady': 0.2},
         'heading_fluctuation_deg': {'rms_steady': 0.1, 'max_steady': 0.2},
         'final_state': {'position_ned_m': [1.0, 2.0, 3.0], 'attitude_rpy_rad': [0.0, 0.0, 0.0]},
@@ -171,6 +171,7 @@ def test_a_good_run_has_not_diverged():
         'diverged': False,
         'max_steady_m': 0.5,
         'max_all_m': 5.0,
+        'max_run_m': 9.0,
         'heading_fluctuation_deg': 0.1,
         'pitch_error_deg': 0.1,
     }
@@ -180,7 +181,7 @@ def test_a_good_run_has_not_diverged():
     'change',
     [
         {'infeasible': True},
-        {'cross_track_m': {'max_steady': 900.0, 'max_all': 1000.1}},
+        {'cross_track_m': {'max_steady': 900.0, 'max_all': 1000.1, 'max_run': 1000.1}},
         {'pitch_error_deg': {'rms_steady': math.nan}},
         {'final_state': {'position_ned_m': [1.0, math.inf, 3.0]}},
     ],
@@ -198,7 +199,7 @@ def test_result_is_one_json_object_of_the_promised_shape(study):
     assert (result['scenario'], result['plants'], result['seed']) == ('current_8deg', 3, 40)
     assert [row['controller'] for row in result['rows']] == LAWS
     for row in result['rows']:
-        assert list(row)[:6] == ['controller', 'diverged', *SPREADS]
+        assert list(row)[:7] == ['controller', 'diverged', *SPREADS]
         assert row['diverged'] == 0
         for name in SPREADS:
             assert list(row[name]) == ['p50', 'p95', 'worst']
@@ -355,7 +356,7 @@ def test_score_with_noise_is_that_of_the_true_motion(noisy_flight):
     scorer = Scorer(scenario.sensors.params(scenario.seed))
     for block in (log[:7000], log[7000:7001], log[7001:]):
         scorer.add(block)
-    result = scorer.result(60.0, 60.0)
+    result = scorer.result(Rules(60.0, 60.0))
     course = math.radians(30.0)
     across = math.cos(course) * truth[:, 1] - math.sin(course) * truth[:, 0]
     expected = np.max(np.abs(across[601:]))
@@ -373,7 +374,7 @@ def test_what_is_recorded_is_what_was_measured(noisy_flight):
     assert np.std(noise) == pytest.approx(1.0, rel=0.02)
     apparent = Scorer()
     apparent.add(log)
-    assert apparent.result(60.0, 60.0)['depth_m']['max'] > np.max(truth[:, 2]) + 0.5
+    assert apparent.result(Rules(60.0, 60.0))['depth_m']['max'] > np.max(truth[:, 2]) + 0.5
 
 
 def test_without_noise_the_seed_means_nothing_to_the_score(noisy_flight):
@@ -382,7 +383,7 @@ def test_without_noise_the_seed_means_nothing_to_the_score(noisy_flight):
     for sensors in (None, SensorSettings().params(1)):
         scorer = Scorer(sensors)
         scorer.add(log)
-        results.append(scorer.result(60.0, 60.0))
+        results.append(scorer.result(Rules(60.0, 60.0)))
     assert results[0] == results[1]
 
 

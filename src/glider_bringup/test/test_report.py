@@ -22,7 +22,7 @@ from glider_bringup.direct import COLUMNS, fly_blocks
 from glider_bringup.mission import Flight, make_run_folder, read_run, write_report, write_score
 from glider_bringup.report import LOST_M, findings, lost_since_s, span, verdict
 from glider_bringup.scenario import load_scenario
-from glider_bringup.score import Scorer
+from glider_bringup.score import Rules, Scorer
 
 E2 = COLUMNS['tracking_error'].start + 1
 SHORT = {'dives': 0, 'duration_s': 300.0, 'settle_s': 0.0}
@@ -75,8 +75,7 @@ def fly(tmp_path, change=None, stop=False, name='flight', **fields):
         tracer.add(log)
         scorer.add(log)
     flight = Flight('aborted' if stop else 'completed', 'stopped' if stop else '', 1.0, 0, 0)
-    settle_s = scenario.settle_time_s(scorer.ticks * 0.1)
-    scores = scorer.result(settle_s, scenario.profile.depth_m)
+    scores = scorer.result(scenario.score_rules(scorer.ticks * 0.1))
     card = mission.scorecard(scenario, 'direct', flight, scores)
     write_score(folder, card)
     mission.keep_traces(scenario, folder, card, tracer)
@@ -240,7 +239,7 @@ def never_flown(folder):
     scenario = load_scenario('current_8deg')
     folder = make_run_folder(scenario, folder)
     flight = Flight('aborted', 'plant_node was killed by SIGKILL', 0.0, 0, 0)
-    card = mission.scorecard(scenario, 'nodes', flight, Scorer().result(0.0, 1000.0))
+    card = mission.scorecard(scenario, 'nodes', flight, Scorer().result(Rules()))
     write_score(folder, card)
     mission.keep_traces(scenario, folder, card, mission.make_tracer(scenario))
     return folder

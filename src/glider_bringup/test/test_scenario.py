@@ -361,11 +361,63 @@ def test_seed_of_the_scenario_is_that_of_its_current():
 
 @pytest.mark.parametrize(
     ('settle_s', 'time_s', 'expected'),
-    [(None, 10000.0, 1800.0), (None, 108000.0, 7200.0), (300.0, 108000.0, 300.0)],
+    [
+        (None, 10000.0, 1800.0),
+        (None, 3600.0, 1800.0),
+        (None, 2000.0, 1000.0),
+        (None, 108000.0, 7200.0),
+        (300.0, 108000.0, 300.0),
+    ],
 )
 def test_settling_time_is_the_files_or_that_of_the_length_of_the_run(settle_s, time_s, expected):
     scenario = load_scenario('current_8deg', {'settle_s': settle_s})
     assert scenario.settle_time_s(time_s) == expected
+
+
+def test_settling_of_shallow_dives_is_over_after_one_of_them():
+    """200 m at 0.269 m/s."""
+    assert load_scenario('survey').settle_time_s(15000.0) == pytest.approx(743.0, abs=2.0)
+
+
+@pytest.mark.parametrize('name', scenario_names())
+@pytest.mark.parametrize('vehicle', ['zhang2021', 'seawing'])
+def test_windows_of_dives_to_1000_m_are_as_they_always_were(name, vehicle):
+    """What was published of them was scored so."""
+    scenario = load_scenario(name, {'vehicle': vehicle, 'profile.depth_m': 1000.0})
+    rules = scenario.score_rules(10000.0)
+    assert (rules.margin_s, rules.steady_depth_m) == (600.0, 30.0)
+    assert rules.settle_s == (scenario.settle_s or 1800.0)
+    assert scenario.score_rules(20000.0).settle_s == (scenario.settle_s or 7200.0)
+
+
+def test_run_that_stops_with_its_path_is_not_ended_by_a_wait_of_its_mission():
+    """Only by a longer time afloat than any of them; one that continues is not at all."""
+    waits = {'profile.surface_every_dives': 2, 'profile.wait_s': 300.0, 'profile.prepare_s': 40.0}
+    assert load_scenario('survey').plant_settings().afloat_s == 60.0
+    assert load_scenario('survey', waits).plant_settings().afloat_s == 400.0
+    assert load_scenario('survey', {'path.at_end': 'continue'}).plant_settings().afloat_s == 0.0
+
+
+@pytest.mark.parametrize('kind', ['waypoints', 'spline'])
+@pytest.mark.parametrize(
+    'waypoints',
+    [
+        [[36.1, 120.3], [36.2, 120.5]],
+        [[-54.0, -179.9], [-54.5, -178.0], [-53.0, -177.0]],
+        [[10.0, 20.0], [12.0, 20.0], [12.0, 22.0], [10.0, 22.0]],
+    ],
+)
+def test_waypoints_that_look_like_degrees_are_refused_with_a_hint(kind, waypoints):
+    told = r'path\.waypoints = .*\(allowed: >= .* m; metres north and east of the start, not '
+    with pytest.raises(ConfigurationError, match=told + 'latitude and longitude'):
+        load_scenario('survey', {'path.kind': kind, 'path.waypoints': waypoints})
+
+
+@pytest.mark.parametrize(
+    'waypoints', [[[0.0, 0.0], [0.0, 100.0], [90.0, 100.0]], [[1.0, 1.0], [12.0, 1.0]]]
+)
+def test_short_legs_in_metres_are_no_degrees(waypoints):
+    assert load_scenario('survey', {'path.waypoints': waypoints}).path.waypoints[1][0] < 90.0
 
 
 def test_load_does_not_change_a_scenario_loaded_before():

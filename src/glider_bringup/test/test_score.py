@@ -13,7 +13,8 @@ from scipy.ndimage import uniform_filter1d
 from scipy.spatial.transform import Rotation
 
 from glider_bringup.direct import COLUMNS, ROW
-from glider_bringup.score import Scorer
+from glider_bringup.score import Rules, Scorer
+from glider_guidance.profile import AT_END_OF_PATH
 from glider_model.signals import TICK_S
 
 quick = settings(max_examples=20, deadline=None)
@@ -61,10 +62,10 @@ def ticks(seconds):
     return TICK_S * np.arange(round(seconds / TICK_S))
 
 
-def score(log, settle_s=0.0, target_m=TARGET_M):
+def score(log, settle_s=0.0, target_m=TARGET_M, **rules):
     scorer = Scorer()
     scorer.add(log)
-    return scorer.result(settle_s, target_m)
+    return scorer.result(Rules(settle_s, target_m, **rules))
 
 
 def test_sinusoidal_error_has_its_rms_and_its_amplitude():
@@ -99,7 +100,17 @@ def pulse(t, at_s):
     return e2
 
 
-def test_settling_time_is_left_out_of_everything():
+@quick
+@given(st.floats(0.0, 1999.9), st.floats(0.0, 3000.0), st.booleans())
+def test_nothing_is_left_out_of_the_whole_run(at_s, settle_s, is_deep):
+    """Neither settling, nor turns, nor the surface: a single tick of 7 m counts, whenever."""
+    t = ticks(2000.0)
+    rate = np.where(t < 1000.0, 0.25, -0.25)
+    log = make_log(t, e2=-pulse(t, at_s - 0.05), rate_ref=rate, depth=500.0 * is_deep)
+    assert score(log, settle_s=settle_s)['cross_track_m']['max_run'] == 7.0
+
+
+def test_settling_time_is_left_out_of_all_but_the_whole_run():
     """The tick at the settling time itself is left out, the next one counts."""
     t = ticks(2000.0)
     for at_s, counted in ((1000.0, None), (1000.1, 7.0)):
@@ -120,6 +131,26 @@ def test_steady_is_more_than_600_s_from_an_inflection(offset_s, steady):
     assert track['max_all'] == 7.0
 
 
+@pytest.mark.parametrize(
+    ('offset_s', 'steady'), [(-240.1, True), (-239.9, False), (239.9, False), (240.1, True)]
+)
+def test_margin_of_a_shallow_dive_is_a_share_of_its_time(offset_s, steady):
+    """30 % of dives of 800 s, so that 320 s of each are steady."""
+    t = ticks(1600.0)
+    rate = np.where(t < 800.0, 0.25, -0.25)
+    log = make_log(t, e2=pulse(t, 800.0 + offset_s), rate_ref=rate, depth=100.0)
+    track = score(log, target_m=200.0, glide_s=800.0)['cross_track_m']
+    assert track['max_steady'] == (7.0 if steady else 0.0)
+
+
+@pytest.mark.parametrize(('depth_m', 'steady'), [(9.9, 0.0), (10.1, 7.0)])
+def test_steady_in_a_shallow_dive_is_deeper_than_a_quarter_of_it(depth_m, steady):
+    t = ticks(1000.0)
+    depth = np.where(np.abs(t - 500.0) < 50.0, depth_m, 35.0)
+    log = make_log(t, e2=pulse(t, 500.0), depth=depth)
+    assert score(log, target_m=40.0)['cross_track_m']['max_steady'] == steady
+
+
 @pytest.mark.parametrize(('depth_m', 'steady'), [(29.9, 0.0), (30.1, 7.0)])
 def test_steady_is_deeper_than_30_m(depth_m, steady):
     t = ticks(1000.0)
@@ -130,7 +161,7 @@ def test_steady_is_deeper_than_30_m(depth_m, steady):
 
 
 def test_without_a_tick_there_is_no_score():
-    result = Scorer().result(0.0, TARGET_M)
+    result = Scorer().result(Rules())
     assert result['ticks'] == 0
     assert result['final_state'] is None
     assert result['depth_m'] == {'max': None, 'overshoot': None}
@@ -140,14 +171,21 @@ def test_without_a_tick_there_is_no_score():
 
 def test_without_a_steady_tick_only_all_has_a_figure():
     track = score(make_log(ticks(500.0), e2=2.0, depth=10.0))
-    assert track['cross_track_m'] == {'rms_steady': None, 'max_steady': None, 'max_all': 2.0}
+    assert track['cross_track_m'] == {
+        'rms_steady': None,
+        'max_steady': None,
+        'max_all': 2.0,
+        'max_run': 2.0,
+    }
     assert track['pitch_error_deg'] == {'rms_steady': None, 'max_steady': None}
     assert track['heading_fluctuation_deg'] == {'rms_steady': None, 'max_steady': None}
 
 
 def test_run_shorter_than_the_settling_time_has_no_figures():
     result = score(make_log(ticks(500.0), e2=2.0), settle_s=1800.0)
-    assert set(result['cross_track_m'].values()) == {None}
+    track = result['cross_track_m']
+    assert track == {'rms_steady': None, 'max_steady': None, 'max_all': None, 'max_run': 2.0}
+    assert result['settle_s'] == 1800.0
     assert result['infeasible'] is False
 
 
@@ -189,6 +227,25 @@ def test_dives_are_counted_below_30_and_above_20_m():
     """Waves around either depth make no dives of their own; one that is not over counts not."""
     depth = np.array([0, 25, 31, 29, 31, 25, 19, 22, 19, 29, 40, 21, 40, 10, 500.0])
     assert score(make_log(ticks(1.5), depth=depth))['dives'] == 2
+
+
+@pytest.mark.parametrize('target_m', [10.0, 25.0, 40.0, 60.0, 1000.0])
+def test_every_yo_to_the_target_is_a_dive_however_shallow(target_m):
+    """Between the target and the upper turn at 10 m, or half of the target, and up at last."""
+    top_m = min(10.0, 0.5 * target_m)
+    yo = np.concatenate([np.linspace(top_m, target_m, 50), np.linspace(target_m, top_m, 50)])
+    depth = np.concatenate([np.linspace(0.0, top_m, 5), *(4 * [yo]), np.linspace(top_m, 0.0, 5)])
+    log = make_log(TICK_S * np.arange(len(depth)), depth=depth)
+    assert score(log, target_m=target_m)['dives'] == 4
+
+
+def test_end_of_the_path_is_told_from_where_the_vehicle_came_up():
+    """By the first tick of the stage; what it drifts after that does not count."""
+    t = ticks(100.0)
+    log = make_log(t, north=np.where(t < 60.0, 3.0 + 0.0 * t, t), east=4.0, depth=0.5)
+    assert score(log, path_end=(0.0, 0.0))['end_of_path_m'] is None
+    log[t > 50.0, COLUMNS['stage']] = AT_END_OF_PATH
+    assert score(log, path_end=(0.0, 0.0))['end_of_path_m'] == pytest.approx(5.0, abs=1e-9)
 
 
 def test_overshoot_is_what_is_beyond_the_target():
@@ -245,6 +302,7 @@ def reference_score(t, settle_s, depth, e2, theta, theta_ref, psi, rate_ref):
             'rms_steady': rms(e2),
             'max_steady': np.abs(e2[steady]).max(),
             'max_all': np.abs(e2[scored]).max(),
+            'max_run': np.abs(e2).max(),
         },
         'pitch_error_deg': {
             'rms_steady': rms(pitch),
@@ -299,7 +357,7 @@ def test_score_does_not_depend_on_the_blocks(cuts):
     for block in np.split(log, sorted(cuts)):
         scorer.add(block)
     assert scorer.ticks == len(t)
-    assert scorer.result(0.0, TARGET_M) == score(log)
+    assert scorer.result(Rules()) == score(log)
 
 
 def test_scorer_keeps_nothing_of_a_block_by_reference():
@@ -307,6 +365,6 @@ def test_scorer_keeps_nothing_of_a_block_by_reference():
     log = make_log(ticks(800.0), e2=1.0)
     scorer = Scorer()
     scorer.add(log)
-    before = scorer.result(0.0, TARGET_M)
+    before = scorer.result(Rules())
     log[:] = 9.0
-    assert scorer.result(0.0, TARGET_M) == before
+    assert scorer.result(Rules()) == before

@@ -14,7 +14,7 @@ from glider_bringup import traces
 from glider_bringup.direct import COLUMNS, ROW, fly_blocks
 from glider_bringup.mission import make_tracer, mission_of
 from glider_bringup.scenario import load_scenario
-from glider_bringup.score import Scorer
+from glider_bringup.score import Rules, Scorer
 from glider_bringup.traces import CURVES, Tracer, load_traces
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
@@ -195,7 +195,7 @@ def test_noise_is_taken_off_and_what_was_measured_is_kept_beside():
         tracer.add(block)
         scorer.add(block)
     kept = tracer.result()
-    score = scorer.result(0.0, 60.0)
+    score = scorer.result(Rules(depth_m=60.0))
     assert kept.largest('cross_track_m') == pytest.approx(score['cross_track_m']['max_all'])
     assert np.nanmax(kept.curves['depth_m']) == pytest.approx(score['depth_m']['max'])
     noise = kept.curves['measured_depth_m'] - kept.curves['depth_m']

@@ -64,7 +64,7 @@ from glider_model.polar import (
     steepen,
 )
 from glider_model.settings import ConfigurationError, Settings
-from glider_model.signals import SURFACE_TARGET, Reference, TrackingError, Water
+from glider_model.signals import SURFACE_TARGET, TICK_S, Reference, TrackingError, Water
 from glider_model.steering import (
     Steering,
     SteeringLearningSettings,
@@ -453,12 +453,12 @@ def path_time_s(params: GuidanceParams, current_n: float, current_e: float) -> f
 
     Infinite if the current does not let the vehicle get there.
     """
-    speed, path = params.profile_speed, params.path
-    left = way_left(0.0, 0.0, speed, current_n, current_e, math.inf, path)
-    climb_s = 0.0
-    if params.profile.follows_path:
-        climb_s = path_point(path_length(path), path)[2] / params.profile.glide_rate
-    return left.glide_s + climb_s
+    speed, path, profile = params.profile_speed, params.path, params.profile
+    glide_s = way_left(0.0, 0.0, speed, current_n, current_e, math.inf, path).glide_s
+    if profile.follows_path:
+        return glide_s + path_point(path_length(path), path)[2] / profile.glide_rate
+    dives = glide_s / (2.0 * (profile.depth - profile.top_depth) / profile.glide_rate)
+    return profile.prepare_ticks * TICK_S + glide_s + 2.0 * dives * profile.lead_s
 
 
 @kernel

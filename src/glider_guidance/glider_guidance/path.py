@@ -31,7 +31,7 @@ MAX_DEPTH_M = 12_000.0
 MAX_SLOPE_DEG = 80.0
 #: Waypoints closer together than this coincide (m).
 MIN_LEG_M = 1.0
-#: A path of waypoints that could be degrees is at least so long (m): no glider turns so tightly.
+#: A path through waypoints is at least so long (m): it is shorter than any turn of a glider.
 MIN_WAY_M = 10.0
 #: Least norm(dp_d/ds) of a spline (m/m). Where it vanishes the tangent is undefined.
 MIN_RATE = 0.1
@@ -343,8 +343,7 @@ class _PathSettings(Settings):
 
     at_end: Literal['stop', 'continue'] = Field(
         'stop',
-        description='at the end of the path: stop, come up there and end the mission, or continue '
-        'along its last course',
+        description='At the end: stop, come up and end the mission; or continue straight on.',
     )
 
     def params(self) -> PathParams:
@@ -579,7 +578,6 @@ PathSettings = Annotated[
 def _check_waypoints(waypoints: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     """Refuse waypoints that make no path, and give each one a depth."""
     points = [_point(point, f'waypoint {i}') for i, point in enumerate(waypoints)]
-    _check_metres(points)
     if len({len(point) for point in waypoints}) > 1:
         raise ValueError('all waypoints need a depth, or none (allowed: 2 or 3 numbers in each)')
     for i, (one, after) in enumerate(pairwise(points)):
@@ -587,9 +585,21 @@ def _check_waypoints(waypoints: list[tuple[float, ...]]) -> list[tuple[float, ..
         if length < MIN_LEG_M:
             raise ValueError(
                 f'waypoints {i} and {i + 1} coincide: {list(one)!r} and {list(after)!r} are '
-                f'{length:.3f} m apart (allowed: >= {MIN_LEG_M} m)'
+                f'{length:.3f} m apart (allowed: >= {MIN_LEG_M} m{_hint(points)})'
             )
+    length = sum(math.dist(one, after) for one, after in pairwise(points))
+    if length < MIN_WAY_M:
+        raise ValueError(
+            f'the whole path is {length:.3f} m long (allowed: >= {MIN_WAY_M} m{_hint(points)})'
+        )
     return points
+
+
+def _hint(points: list[tuple[float, float, float]]) -> str:
+    """What to say of waypoints so close together that could be degrees."""
+    if any(abs(point[0]) > 90.0 or abs(point[1]) > 180.0 for point in points):
+        return ''
+    return '; metres north and east of the start, not latitude and longitude'
 
 
 def _check_slopes(params: PathParams) -> None:
@@ -614,16 +624,4 @@ def _check_slopes(params: PathParams) -> None:
         raise ValueError(
             f'the spline turns on the spot near waypoint {slowest + round(sample / 64)}: '
             'lead it around in a curve'
-        )
-
-
-def _check_metres(points: list[tuple[float, float, float]]) -> None:
-    """Refuse waypoints that look like degrees of latitude and longitude."""
-    like_degrees = all(abs(point[0]) <= 90.0 and abs(point[1]) <= 180.0 for point in points)
-    legs = [math.dist(one, after) for one, after in pairwise(points)]
-    if like_degrees and (sum(legs) < MIN_WAY_M or max(legs) < MIN_LEG_M):
-        shown = ', '.join(str([point[0], point[1]]) for point in points[:2])
-        raise ValueError(
-            f'{shown}, ... make a path of {sum(legs):.2f} m in all (allowed: >= {MIN_WAY_M} m; '
-            'waypoints are metres north and east of the start, not latitude and longitude)'
         )

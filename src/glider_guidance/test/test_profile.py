@@ -9,12 +9,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from glider_guidance.end_of_path import WayLeft
 from glider_guidance.profile import (
+    AT_END_OF_PATH,
     GLIDING_DOWN,
     GLIDING_UP,
     INFLECTING_DOWN,
     INFLECTING_UP,
     INITIAL_PROFILE,
+    NO_END,
     PITCH_OVER,
     STAGE_NAMES,
     SURFACE_PREPARATION,
@@ -59,7 +62,7 @@ class Point:
         self.stages, self.depths = [self.state.stage], [0.0]
 
     def tick(self):
-        self.state = profile_step(self.state, self.depth, self.rate, self.params)
+        self.state = profile_step(self.state, self.depth, self.rate, self.left(), self.params)
         full = self.settings.net_heaviness_kg
         wanted = math.copysign(full, profile_targets(self.state.stage, self.rate, self.params)[1])
         step = self.pump * TICK_S
@@ -73,6 +76,9 @@ class Point:
         if self.state.stage != self.stages[-1]:
             self.stages.append(self.state.stage)
         self.depths.append(self.depth)
+
+    def left(self):
+        return NO_END
 
     def fly(self, seconds):
         for _ in range(round(seconds / TICK_S)):
@@ -91,6 +97,73 @@ def test_so_many_dives_are_flown_and_counted(dives):
     again = [INFLECTING_DOWN, *ROUND[1:]] * (dives - 1)
     assert point.stages == [*ROUND, *again, WAITING_ON_SURFACE]
     assert point.state.dives == dives
+
+
+class Walker(Point):
+    """A point that goes along a path of ``way_m``, at 0.42 m/s in a glide, and no farther."""
+
+    def __init__(self, way_m, **fields):
+        super().__init__(**fields)
+        self.way_m, self.gone_m = way_m, 0.0
+
+    def left(self):
+        return WayLeft((self.way_m - self.gone_m) / 0.42, 0.0)
+
+    def tick(self):
+        super().tick()
+        self.gone_m += TICK_S * 0.42 * abs(self.rate) / glide_rate(self.params)
+
+
+@pytest.mark.parametrize(
+    ('way_m', 'depth_m'),
+    [
+        (150.0, 100.0),
+        (333.0, 60.0),
+        (500.0, 400.0),
+        (777.0, 90.0),
+        (900.0, 200.0),
+        (1234.0, 150.0),
+    ],
+)
+def test_last_dive_comes_up_at_the_end_of_the_path(way_m, depth_m):
+    """Whatever the way and the depth: the surfacing is within 30 m of it, and stays."""
+    walker = Walker(way_m, dives=0, depth_m=depth_m)
+    while walker.state.stage != AT_END_OF_PATH:
+        walker.tick()
+        assert walker.gone_m < way_m + 100.0
+    assert walker.gone_m == pytest.approx(way_m, abs=30.0)
+    assert max(walker.depths) <= depth_m + 0.2
+    walker.fly(2000.0)
+    assert walker.state.stage == AT_END_OF_PATH
+    assert walker.depth < 1.0
+
+
+def test_only_the_last_two_dives_share_the_way_that_is_left():
+    """1100 m are 3.6 dives to 100 m: two go down all the way, the last two equally deep."""
+    walker = Walker(1100.0, dives=0, depth_m=100.0)
+    while walker.state.stage != AT_END_OF_PATH:
+        walker.tick()
+    depths = np.array(walker.depths)
+    peaks = depths[1:-1][(depths[1:-1] > depths[:-2]) & (depths[1:-1] >= depths[2:])]
+    assert peaks[:-2] == pytest.approx(100.0, abs=0.5)
+    assert len(peaks) == 4
+    assert peaks[-2] == pytest.approx(peaks[-1], abs=10.0)
+    assert 50.0 < peaks[-1] < 95.0
+
+
+def test_so_many_dives_are_not_made_shallower_by_a_long_path():
+    walker = Walker(1e5, dives=2, depth_m=100.0).fly(3000.0)
+    assert walker.state.stage == WAITING_ON_SURFACE
+    assert max(walker.depths) == pytest.approx(100.0, abs=0.5)
+
+
+def test_path_that_is_too_short_for_a_dive_has_one_all_the_same():
+    """The shallowest that has a glide in it."""
+    walker = Walker(1.0, dives=0, depth_m=500.0)
+    while walker.state.stage != AT_END_OF_PATH:
+        walker.tick()
+    assert 20.0 < max(walker.depths) < 40.0
+    assert walker.state.dives == 1
 
 
 def test_without_an_end_the_sawtooth_goes_on():
@@ -143,16 +216,18 @@ def test_preparation_lasts_as_long_as_asked():
 @pytest.mark.parametrize('stage', ALL_STAGES)
 def test_abort_leads_to_surfacing_from_every_stage(stage):
     params = ProfileSettings().params(1, PUMP, POLAR)
-    state = profile_step(ProfileState(stage, 100, 0, True, 0.0, 0.0), 200.0, 0.2, params)
+    state = profile_step(
+        ProfileState(stage, 100, 0, True, 0.0, 0.0, 1000.0), 200.0, 0.2, NO_END, params
+    )
     assert state.stage == SURFACING
 
 
 @pytest.mark.parametrize('stage', ALL_STAGES)
 def test_abort_at_the_surface_stays_there(stage):
     params = ProfileSettings(wait_s=0.0, prepare_s=0.0).params(5, PUMP, POLAR)
-    state = ProfileState(stage, 10**6, 0, True, 0.0, 0.0)
+    state = ProfileState(stage, 10**6, 0, True, 0.0, 0.0, 1000.0)
     for _ in range(100):
-        state = profile_step(state, 0.2, 0.0, params)
+        state = profile_step(state, 0.2, 0.0, NO_END, params)
     assert state.stage == WAITING_ON_SURFACE
 
 

@@ -1,0 +1,147 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Missions that end with their path, and the largest error of every shipped scenario."""
+
+import math
+
+import numpy as np
+import pytest
+from mcap_ros2.reader import read_ros2_messages
+
+from glider_bringup import mission
+from glider_bringup.scenario import load_scenario, scenario_names
+from glider_bringup.scorecard import card_rows
+from glider_model.frames import odometry_from_wire
+from glider_model.sensors import recover
+
+
+def fly(folder, name, with_bag=False, **changes):
+    """Scorecard of a direct run into a folder."""
+    scenario = load_scenario(name, {key.replace('__', '.'): v for key, v in changes.items()})
+    if with_bag:
+        mission.make_run_folder(scenario, folder)
+    flight, scores = mission.fly_direct(scenario, folder, with_bag, lambda ticks, depth_m: None)
+    return mission.scorecard(scenario, 'direct', flight, scores)
+
+
+def recorded(folder, topic):
+    """Messages on a topic of a bag, by the mcap package and the definitions in the file."""
+    (file,) = folder.glob('*.mcap')
+    for message in read_ros2_messages(str(file), topics=[topic]):
+        yield message.ros_msg
+
+
+def true_east(folder, scenario):
+    """Where the vehicle was (m): what it measured less the noise of each tick."""
+    sensors = scenario.sensors.params(scenario.seed)
+    for tick, odom in enumerate(recorded(folder, '/glider/odom')):
+        pose, twist = odom.pose.pose, odom.twist.twist
+        q = pose.orientation
+        wire = (
+            *(pose.position.x, pose.position.y, pose.position.z, q.w, q.x, q.y, q.z),
+            *(twist.linear.x, twist.linear.y, twist.linear.z),
+            *(twist.angular.x, twist.angular.y, twist.angular.z),
+        )
+        yield recover(odometry_from_wire(wire), tick, sensors).p_e
+
+
+@pytest.mark.parametrize('name', scenario_names())
+def test_largest_error_of_the_run_is_the_largest_that_was_recorded(name, tmp_path):
+    """No tick is left out. Behind noise it is the true error: the path is the line of east 0."""
+    folder = tmp_path / 'run'
+    card = fly(folder, name, True, dives=0, duration_s=700.0, settle_s=450.0)
+    found = card['cross_track_m']
+    if name == 'noisy_sensors':
+        errors = np.array(list(true_east(folder, load_scenario(name))))
+        tolerance = 1e-6
+    else:
+        errors = np.array([error.vector.y for error in recorded(folder, '/glider/tracking_error')])
+        tolerance = 0.0
+    assert len(errors) == 7000
+    assert found['max_run'] == pytest.approx(np.abs(errors).max(), abs=tolerance)
+    assert found['max_all'] == pytest.approx(np.abs(errors[4501:]).max(), abs=tolerance)
+    assert mission.score_again(folder)['cross_track_m'] == found
+    rows = dict(card_rows(card))
+    assert rows['cross-track, whole run'] == f'max {found["max_run"]:.2f} m'
+    assert rows['cross-track, all'].endswith('(after settling, the first 450 s)')
+
+
+def test_survey_comes_up_at_its_last_waypoint():
+    """Within 50 m of [1500, -500]; it used to fly on until its time was over, 2 km past it."""
+    card = fly(None, 'survey')
+    north, east, depth = card['final_state']['position_ned_m']
+    assert math.hypot(north - 1500.0, east + 500.0) < 50.0
+    assert depth < 1.0
+    assert card['end_of_path_m'] < 15.0
+    assert card['sim_time_s'] < 20000.0
+    assert card['cross_track_m']['rms_steady'] is not None
+
+
+@pytest.mark.parametrize(
+    'changes',
+    [
+        {'current__speed_kn': 0.0},
+        {'current__speed_kn': 0.6, 'current__direction_deg': 180.0},
+        {'profile__depth_m': 100.0},
+        {'profile__depth_m': 1000.0},
+        {'vehicle': 'seawing'},
+        {'perturb__pump_rate': 0.4},
+        {'profile__surface_every_dives': 3, 'profile__wait_s': 300.0},
+        {'path__waypoints': [[0, 0], [2000, 0], [0, 100]], 'profile__depth_m': 500.0},
+    ],
+    ids=str,
+)
+def test_it_comes_up_there_in_other_water_and_otherwise(changes):
+    """Within 30 m, though no two of them have the same number of dives left."""
+    card = fly(None, 'survey', duration_s=60000.0, **changes)
+    assert card['end_of_path_m'] < 30.0
+    assert card['dives'] > 1
+
+
+@pytest.mark.parametrize('at_end', ['stop', 'continue'])
+def test_a_run_goes_on_past_the_end_of_its_path_only_if_told_to(at_end):
+    fields = {'path__length_m': 400.0, 'profile__depth_m': 100.0, 'path__at_end': at_end}
+    card = fly(None, 'current_8deg', dives=0, duration_s=3000.0, **fields)
+    assert (card['sim_time_s'] < 2000.0) is (at_end == 'stop')
+    assert (card['end_of_path_m'] is None) is (at_end == 'continue')
+
+
+def test_a_path_in_three_dimensions_ends_at_the_surface_too():
+    """The path ends 20 m deep: it comes up from there, along its last course."""
+    path = {'kind': 'waypoints', 'waypoints': [[0, 0, 10], [400, 0, 200], [900, 200, 20]]}
+    card = fly(None, 'spline', duration_s=6000.0, path=path)
+    assert card['sim_time_s'] < 3000.0
+    assert card['end_of_path_m'] < 100.0
+
+
+def test_the_end_of_the_path_is_recorded_and_scored_alike_from_the_bag(tmp_path):
+    folder = tmp_path / 'run'
+    fields = {'path__waypoints': [[0, 0], [300, 0]], 'current__speed_kn': 0.2}
+    card = fly(folder, 'survey', True, **fields)
+    mission.write_score(folder, card)
+    told = [
+        pair.value
+        for array in recorded(folder, '/diagnostics')
+        for status in array.status
+        for pair in status.values
+        if pair.key == 'stage'
+    ]
+    assert told[-1] == 'at the end of the path'
+    assert mission.score_again(folder)['end_of_path_m'] == card['end_of_path_m']
+    text = dict(card_rows(card))['end of path']
+    assert text == f'came up {card["end_of_path_m"]:.1f} m from its last point'
+
+
+@pytest.mark.parametrize(
+    ('name', 'changes'),
+    [
+        ('survey', {}),
+        ('survey', {'current.speed_kn': 0.0}),
+        ('survey', {'profile.depth_m': 800.0}),
+    ],
+)
+def test_estimated_time_knows_the_end_of_the_path(name, changes):
+    """What the progress bar is drawn from, within 10 %."""
+    estimate = mission.planned_ticks(load_scenario(name, changes))
+    card = fly(None, name, **{key.replace('.', '__'): value for key, value in changes.items()})
+    assert estimate == pytest.approx(card['ticks'], rel=0.1)
