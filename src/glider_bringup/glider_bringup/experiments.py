@@ -604,6 +604,7 @@ def _helix(radius: float, direction: str) -> dict[str, Any]:
         'path.radius_m': radius,
         'path.direction': direction,
         'path.turns': round(_HELIX_DEPTH_M / descent, 3),
+        'path.at_end': 'continue',  # scored on a helix until its time is over
         'initial.east_m': -radius if direction == 'cw' else radius,
     }
 
