@@ -2,23 +2,38 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line: ``./glider COMMAND``, or ``glider COMMAND`` in a sourced workspace."""
 
+import errno
+import os
 import sys
 
-import typer
+try:  # imports take a second, in which Ctrl-C may come, and many files
+    import typer
 
-from glider_bringup.commands import (
-    fuzz,
-    recorded,
-    replay,
-    report,
-    run,
-    studies,
-    sweeps,
-    vehicles,
-    verify,
-)
-from glider_bringup.console import EXIT_USAGE, messages
-from glider_model.settings import ConfigurationError
+    from glider_bringup.commands import (
+        fuzz,
+        recorded,
+        replay,
+        report,
+        run,
+        studies,
+        sweeps,
+        vehicles,
+        verify,
+    )
+    from glider_bringup.console import EXIT_FAILED, EXIT_USAGE, messages
+    from glider_model.errors import MAX_LINE, ConfigurationError, shown
+except KeyboardInterrupt:
+    sys.exit(130)
+except (OSError, ImportError) as error:
+    sys.exit(f'glider: cannot be loaded: {error}')
+
+#: Characters of one word of a command line.
+MAX_WORD = 10_000
+#: What the person can mend at once; all other trouble with files is that of the machine.
+_USAGE = {
+    *(errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST),
+    *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP, errno.EINVAL),
+}
 
 app = typer.Typer(
     name='glider',
@@ -34,15 +49,67 @@ for _module in (run, studies, sweeps, recorded, report, replay, verify, fuzz, ve
     app.add_typer(_module.app)
 
 
+def check_words(words: list[str]) -> None:
+    """Refuse words of a command line that could not be shown as they are.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    for number, word in enumerate(words, 1):
+        if len(word) > MAX_WORD:
+            raise ConfigurationError(
+                f'word {number} of the command line: {len(word)} characters '
+                f'(allowed: <= {MAX_WORD}); give a file instead'
+            )
+        if not word.isprintable():
+            raise ConfigurationError(
+                f'word {number} of the command line: {shown(word)} '
+                '(allowed: printable characters, in UTF-8)'
+            )
+
+
 def main() -> int:
-    """Run the command line; mistakes of the user become one message and exit code 2."""
+    """Run the command line; mistakes of the user become one message and exit code 2.
+
+    So does trouble of the machine, such as a full disk, with exit code 1.
+    """
     try:
-        app(prog_name='./glider')
+        code = _run()
+        sys.stdout.flush()
     except ConfigurationError as error:
-        for line in str(error).splitlines():
-            messages.print(line, style='red', soft_wrap=True)
-        return EXIT_USAGE
+        _tell(str(error))
+        code = EXIT_USAGE
+    except OSError as error:
+        _tell(f'{error.filename or "input or output"}: {error.strerror or error}'[:MAX_LINE])
+        code = EXIT_USAGE if error.errno in _USAGE else EXIT_FAILED
+    return code if _flushed() else code or EXIT_FAILED
+
+
+def _run() -> int:
+    """Run the command line; its exit code."""
+    sys.stdout.reconfigure(errors='backslashreplace')
+    try:
+        check_words(sys.argv[1:])
+        app(prog_name='./glider')
+    except SystemExit as end:
+        return end.code
     return 0
+
+
+def _tell(text: str) -> None:
+    for line in text.split('\n'):
+        messages.print(line, style='red', soft_wrap=True)
+
+
+def _flushed() -> bool:
+    """Whether standard output took everything; if not, the interpreter shall not try again."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return False
+    return True
 
 
 if __name__ == '__main__':

@@ -18,18 +18,33 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.text import Text
 
 from glider_bringup.scenario import Scenario
 from glider_control.control import ControlLawSettings
-from glider_model.settings import ConfigurationError
+from glider_model.errors import ConfigurationError, printable
 from glider_model.signals import TICK_S
 
 EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
 
+
+class _PlainConsole(Console):
+    """Names, descriptions and folders come from people.
+
+    Brackets in them are no markup, and what could steer a terminal is shown, not sent.
+    """
+
+    def __init__(self, **kwargs) -> None:
+        super().__init__(highlight=False, markup=False, **kwargs)
+
+    def render_str(self, text: str, **kwargs) -> Text:
+        """Text of a string, wherever in a table or line it stands."""
+        return super().render_str(printable(text, keep='\n\t'), **kwargs)
+
+
 # Standard output carries results only; progress and messages go to standard error.
-# Names, descriptions and folders come from people: brackets in them are no markup.
-output = Console(highlight=False, markup=False)
-messages = Console(stderr=True, highlight=False, markup=False)
+output = _PlainConsole()
+messages = _PlainConsole(stderr=True)
 
 
 def choices(name: str, model, field: str) -> type[Enum]:

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from glider_model.files import parse_json
 from glider_model.settings import ConfigurationError
 
 
@@ -146,6 +147,6 @@ class Journal:
 
 def _is_object(line: bytes) -> bool:
     try:
-        return isinstance(json.loads(line), dict)
-    except ValueError:
+        return isinstance(parse_json(line, 'line'), dict)
+    except ConfigurationError:
         return False

@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 import lz4.frame
 import numpy as np
-import yaml
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -25,6 +24,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema
 
 from glider_bringup.mcap_writer import MAGIC
+from glider_model.files import read_yaml
 from glider_model.kernel import kernel
 from glider_model.settings import ConfigurationError
 
@@ -151,12 +151,12 @@ def _listed_files(metadata: Path) -> list[Path]:
     if not metadata.is_file():
         return []
     try:
-        values = yaml.safe_load(metadata.read_text(encoding='utf-8'))
+        values = read_yaml(metadata)
         information = values['rosbag2_bagfile_information']
         names = [str(name) for name in information['relative_file_paths']]
         storage = information['storage_identifier']
         compression = information.get('compression_format') or ''
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
+    except (KeyError, TypeError) as error:
         raise ConfigurationError(f'{metadata}: not metadata of rosbag2: {error!r}') from None
     if storage != 'mcap' or compression:
         what = f'files compressed with {compression}' if compression else f'storage {storage}'

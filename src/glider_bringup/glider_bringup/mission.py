@@ -35,6 +35,7 @@ from glider_bringup.score import Scorer
 from glider_bringup.traces import TRACED, Tracer, Traces, load_traces
 from glider_guidance.guidance import path_time_s
 from glider_guidance.profile import mission_time_s
+from glider_model.files import is_file, read_json
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
 from glider_model.vehicle import load_vehicle, vehicle_path
@@ -331,18 +332,15 @@ def _replay(
 def _read_score(run: Path) -> dict:
     """Contents of a run's score file; empty if it has none, but a bag."""
     path = run / SCORE_FILE
-    try:
-        card = json.loads(path.read_text(encoding='utf-8'))
-    except (FileNotFoundError, NotADirectoryError):
+    if not is_file(path):
         if not run.exists():
-            raise ConfigurationError(f'{run}: no such run folder or .mcap file') from None
+            raise ConfigurationError(f'{run}: no such run folder or .mcap file')
         if not has_bag(run):
             raise ConfigurationError(
                 f'{run}: not a run folder, it has neither a bag (.mcap) nor a {SCORE_FILE}'
-            ) from None
+            )
         return {}
-    except (OSError, ValueError) as error:
-        raise ConfigurationError(f'{path}: cannot be read: {error}') from None
+    card = read_json(path)
     if not isinstance(card, dict) or not CARD_FIELDS <= set(card):
         raise ConfigurationError(f'{path}: not a scorecard of this program')
     return card

@@ -7,7 +7,6 @@ from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
 
 from glider_bringup.page import (
     ZOOM_BAR,
@@ -22,6 +21,7 @@ from glider_bringup.page import (
 from glider_bringup.score import STEADY_DEPTH_M
 from glider_bringup.scorecard import card_rows
 from glider_bringup.traces import Traces
+from glider_model.files import yaml_text
 from glider_model.signals import TICK_S
 
 #: A track is lost if the vehicle is farther off its path than this until the end (m).
@@ -417,7 +417,7 @@ def _what_was_set(run: FlownRun) -> str:
     told = {'name', 'vehicle', 'description'}
     values = run.scenario.model_dump(mode='json', exclude_defaults=True, exclude=told)
     named = {'name': run.scenario.name, 'vehicle': run.card['vehicle']}
-    return yaml.safe_dump({**named, **values}, sort_keys=False)
+    return yaml_text({**named, **values})
 
 
 def _is_there(curve: Curve, run: FlownRun) -> bool:

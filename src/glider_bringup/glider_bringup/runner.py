@@ -19,6 +19,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+from glider_model.errors import ConfigurationError, shown
+
 PLANT, RECORDER = 'plant_node', 'recorder_node'
 
 #: Module of every node, in the order in which they are started.
@@ -34,10 +36,14 @@ MODULES = {
 NAMESPACE = '/glider'
 #: Remapping that brings the clock into the namespace: docs/adr/0013.
 OWN_CLOCK = ('/clock', 'clock')
-NAMESPACE_ALLOWED = 'names of letters, digits and _, with / between them'
+NAMESPACE_ALLOWED = 'up to 200 characters: names of letters, digits and _, with / between them'
 
-_NAMESPACE = re.compile(r'(/?[A-Za-z_][A-Za-z0-9_]*)*/?')
+_NAMESPACE = re.compile(r'(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?/?')
+#: Characters of a namespace: names of topics in it have at most 248 for ROS.
+_MAX_NAMESPACE = 200
 _DOMAINS = range(1, 102)
+#: Domains that there are ports for.
+_MAX_DOMAIN = 232
 _FATAL = 'fatal: '
 _PR_SET_PDEATHSIG = 1
 _LIBC = ctypes.CDLL(None)
@@ -65,7 +71,8 @@ class RunnerResult(NamedTuple):
 
 def absolute_namespace(text: str) -> str | None:
     """Namespace as ROS writes it, or None if ``text`` is none."""
-    return '/' + text.strip('/') if _NAMESPACE.fullmatch(text) else None
+    usable = len(text) <= _MAX_NAMESPACE and _NAMESPACE.fullmatch(text)
+    return '/' + text.strip('/') if usable else None
 
 
 def node_commands(
@@ -92,17 +99,36 @@ def node_environment(domain: int) -> dict[str, str]:
     }
 
 
+def given_domain() -> int | None:
+    """ROS domain that $ROS_DOMAIN_ID says; None if it says nothing.
+
+    Raises
+    ------
+    ConfigurationError
+        If it is none.
+    """
+    text = os.environ.get('ROS_DOMAIN_ID')
+    if not text:
+        return None
+    if not (text.isascii() and text.isdigit() and len(text) < 9 and int(text) <= _MAX_DOMAIN):
+        raise ConfigurationError(
+            f'ROS_DOMAIN_ID = {shown(text)}: no ROS domain (allowed: 0 to {_MAX_DOMAIN})'
+        )
+    return int(text)
+
+
 @contextmanager
 def domain_id() -> Iterator[int]:
     """ROS domain of a run: $ROS_DOMAIN_ID, or one that no other run on this machine uses.
 
     Raises
     ------
-    RuntimeError
-        If all of them are taken.
+    ConfigurationError
+        If all of them are taken, or $ROS_DOMAIN_ID is none.
     """
-    if os.environ.get('ROS_DOMAIN_ID'):
-        yield int(os.environ['ROS_DOMAIN_ID'])
+    given = given_domain()
+    if given is not None:
+        yield given
         return
     for offset in range(len(_DOMAINS)):
         domain = _DOMAINS[(os.getpid() + offset) % len(_DOMAINS)]
@@ -121,7 +147,7 @@ def domain_id() -> Iterator[int]:
         finally:
             os.close(descriptor)
         return
-    raise RuntimeError('every ROS domain from 1 to 101 is in use by another run')
+    raise ConfigurationError('every ROS domain from 1 to 101 is in use by another run')
 
 
 class _Process:

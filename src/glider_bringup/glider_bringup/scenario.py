@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pydantic
-import yaml
 from pydantic import Field
 
 from glider_bringup.score import Rules
@@ -17,6 +16,8 @@ from glider_guidance.guidance import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.path import PathSettings, StraightPath, path_length, path_point
 from glider_guidance.profile import ProfileSettings
 from glider_model.current import CurrentSettings
+from glider_model.errors import MAX_SHOWN, shown
+from glider_model.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
 from glider_model.perturb import PerturbSettings, perturbed
 from glider_model.plant import SURFACE_S, InitialSettings, PlantSettings
 from glider_model.sensors import SensorSettings
@@ -25,7 +26,6 @@ from glider_model.settings import (
     Settings,
     file_names,
     find_file,
-    read_yaml,
     validate,
 )
 from glider_model.vehicle import load_vehicle, vehicle_names, vehicle_path
@@ -40,6 +40,9 @@ SETTLE_LONG_S, SETTLE_SHORT_S = 7200.0, 1800.0
 #: Of a short run this share is left out at most.
 SETTLE_SHARE = 0.5
 
+#: So many of the fields that were changed are told with what is wrong.
+CHANGES_TOLD = 4
+
 #: Fields of which only one can be given: setting one of them by hand replaces the other.
 _ALTERNATIVES = (
     ('speed_kn', 'speed_mps'),
@@ -51,8 +54,12 @@ _ALTERNATIVES = (
 class Scenario(Settings):
     """A mission: vehicle, water, path, profile, current, guidance, control, and its end."""
 
-    name: str = Field(pattern=r'^[A-Za-z0-9_.-]+$', description='name, used for files')
-    description: str = Field('', description='what the scenario shows')
+    name: str = Field(
+        pattern=r'^[A-Za-z0-9_][A-Za-z0-9_.-]*$',
+        max_length=100,
+        description='name, used for files',
+    )
+    description: str = Field('', max_length=2000, description='what the scenario shows')
     vehicle: str = Field(
         'zhang2021', description='vehicle by name, or path of a file relative to this one'
     )
@@ -172,7 +179,7 @@ class Scenario(Settings):
     def to_yaml(self) -> str:
         """The scenario as a file that loads to the same scenario."""
         values = self.model_dump(mode='json', exclude_none=True, exclude={'current': {'seed'}})
-        return yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+        return yaml_text(values)
 
 
 def scenario_names() -> list[str]:
@@ -233,17 +240,28 @@ def make_scenario(
     path, values = source.path, deepcopy(source.values)
     for field, value in (changes or {}).items():
         _set_field(values, field, value)
-    told = str(path)
-    if changes:
-        told += ' with ' + ', '.join(f'{field}={value}' for field, value in changes.items())
-    scenario = validate(Scenario, values, told, path.parent)
-    scenario = _find_vehicle(scenario, path.parent, told)
+    changed = _told_changes(changes or {})
+
+    def line_of(location: tuple[str, ...]) -> int | None:
+        name = '.'.join(location)
+        here = any(overlap(field, name) for field in changes or {})
+        return None if here else yaml_line(path, location)
+
+    scenario = validate(Scenario, values, str(path), path.parent, line_of, changed)
+    scenario = _find_vehicle(scenario, path.parent, f'{path}{changed}')
     if not recorded:
         try:
             scenario.guidance_settings().check_depth()
         except ConfigurationError as error:
-            raise ConfigurationError(f'{told}: {error}') from None
+            raise ConfigurationError(f'{path}{changed}: {error}') from None
     return scenario
+
+
+def _told_changes(changes: dict[str, Any]) -> str:
+    """The first fields that were changed since a file was read, in words."""
+    told = [f'{field[:MAX_SHOWN]}={shown(value)}' for field, value in changes.items()]
+    more = [f'{len(told) - CHANGES_TOLD} more'] if len(told) > CHANGES_TOLD else []
+    return ' with ' + ', '.join(told[:CHANGES_TOLD] + more) if told else ''
 
 
 def load_scenario(
@@ -257,7 +275,7 @@ def _find_vehicle(scenario: Scenario, folder: Path, source: str) -> Scenario:
     """Scenario whose vehicle is known to be good, wherever nodes are started from."""
     beside = folder / scenario.vehicle
     name = scenario.vehicle
-    if name not in vehicle_names() and beside.suffix and beside.is_file():
+    if name not in vehicle_names() and beside.suffix and is_file(beside):
         name = str(beside.resolve())
     try:
         path = vehicle_path(name)
@@ -306,9 +324,7 @@ def parse_assignment(text: str) -> tuple[str, Any]:
         If the text has not this form.
     """
     field, sign, value = text.partition('=')
-    if not sign or not field.strip():
+    field = field.strip()
+    if not sign or not all(field.split('.')):
         raise ConfigurationError(f'--set {text}: expected path.to.field=value')
-    try:
-        return field.strip(), yaml.safe_load(value)
-    except yaml.YAMLError:
-        raise ConfigurationError(f'--set {text}: the value is not valid YAML') from None
+    return field, parse_yaml(value, f'--set {text}')

@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
-import yaml
 
 from glider_bringup.scenario import Scenario
 from glider_bringup.sweep_result import read_dataset
 from glider_guidance.los import crab_heading
 from glider_model.current import KNOT_MPS
+from glider_model.files import parse_yaml
 from glider_model.polar import make_polar, steady_horizontal_speed
 from glider_model.settings import ConfigurationError, validate
 from glider_model.vehicle import Vehicle
@@ -129,8 +129,12 @@ def _dimensions(file: Path, data: xarray.Dataset) -> tuple[str, str, list[str]]:
 
 def _horizontal_speed(file: Path, data: xarray.Dataset) -> tuple[float, str]:
     """U_h (m/s) that the polar of the vehicle in the file gives, and the vehicle's name."""
-    vehicle = validate(Vehicle, yaml.safe_load(data.attrs['vehicle_yaml']), f'{file}: vehicle')
-    scenario = validate(Scenario, yaml.safe_load(data.attrs['scenario_yaml']), f'{file}: scenario')
+    vehicle, scenario = (
+        validate(
+            model, parse_yaml(data.attrs[f'{what}_yaml'], f'{file}: {what}'), f'{file}: {what}'
+        )
+        for what, model in (('vehicle', Vehicle), ('scenario', Scenario))
+    )
     pitch, heaviness = scenario.profile.pitch_deg, scenario.profile.net_heaviness_kg
     polar = make_polar(vehicle.params())
     return steady_horizontal_speed(-math.radians(pitch), heaviness, polar), vehicle.name

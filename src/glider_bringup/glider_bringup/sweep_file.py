@@ -13,7 +13,7 @@ import math
 import shlex
 from collections.abc import Iterable
 from decimal import Decimal
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -29,13 +29,13 @@ from glider_bringup.scenario import (
     read_scenario,
     scenario_names,
 )
+from glider_model.files import is_file, read_text, read_yaml, yaml_line
 from glider_model.kernel import source_digest
 from glider_model.settings import (
     ConfigurationError,
     Settings,
     file_names,
     find_file,
-    read_yaml,
     validate,
 )
 from glider_model.vehicle import vehicle_path
@@ -198,8 +198,12 @@ Dimension = Annotated[
 class Sweep(Settings):
     """A sweep as its file says it."""
 
-    name: str = Field(pattern=r'^[A-Za-z0-9_.-]+$', description='name, used for files')
-    description: str = Field('', description='what the sweep shows')
+    name: str = Field(
+        pattern=r'^[A-Za-z0-9_][A-Za-z0-9_.-]*$',
+        max_length=100,
+        description='name, used for files',
+    )
+    description: str = Field('', max_length=2000, description='what the sweep shows')
     scenario: str = Field(
         DEFAULT_SCENARIO, description='scenario by name, or path of a file relative to this one'
     )
@@ -244,7 +248,7 @@ class Plan:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.sweep = _validate(path)
-        self.text = path.read_text(encoding='utf-8')
+        self.text = read_text(path)
         self.axes = [_axis(name, one) for name, one in self.sweep.dimensions.items()]
         self.shape = tuple(len(axis.values) for axis in self.axes)
         self.cells = math.prod(self.shape)
@@ -263,7 +267,7 @@ class Plan:
     def _scenario_name(self) -> str:
         name = self.sweep.scenario
         beside = self.path.parent / name
-        return str(beside) if name not in scenario_names() and beside.is_file() else name
+        return str(beside) if name not in scenario_names() and is_file(beside) else name
 
     def _check_overlaps(self) -> None:
         """Each field is set in one place, else one of the places would mean nothing."""
@@ -352,7 +356,7 @@ class Plan:
 
 def vehicle_text(vehicle: str) -> str:
     """Text of the file of a vehicle given by name or path."""
-    return vehicle_path(vehicle).read_text(encoding='utf-8')
+    return read_text(vehicle_path(vehicle))
 
 
 def _axis(name: str, dimension: Dimension) -> Axis:
@@ -371,7 +375,7 @@ def sweep_names() -> list[str]:
 def _validate(path: Path) -> Sweep:
     values = read_yaml(path)
     values.setdefault('name', path.stem)
-    return validate(Sweep, values, str(path))
+    return validate(Sweep, values, str(path), line_of=partial(yaml_line, path))
 
 
 def read_sweep(name: str) -> Sweep:

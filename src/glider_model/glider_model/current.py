@@ -7,6 +7,7 @@ A person writes `CurrentSettings`; `CurrentSettings.params` flattens them into t
 """
 
 import csv
+import io
 import math
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +17,8 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
+from glider_model.errors import ConfigurationError, shown
+from glider_model.files import read_text
 from glider_model.kernel import kernel
 from glider_model.noise import normal_pair, random_stream
 from glider_model.settings import Settings
@@ -25,6 +28,8 @@ from glider_model.signals import Water
 KNOT_MPS = 1852.0 / 3600.0
 #: No component may be faster than this (m/s); the swiftest ocean currents reach about 2.5 m/s.
 MAX_SPEED_MPS = 3.0
+#: Rows of a profile, and components of a current: each is looked at in every tick.
+MAX_ROWS, MAX_COMPONENTS = 10_000, 100
 #: Deepest point of a profile (m).
 MAX_DEPTH_M = 12_000.0
 #: Period of the principal lunar semidiurnal tide M2, 12.4206 h (s).
@@ -352,6 +357,7 @@ class TableCurrent(Settings):
     )
     rows: list[list[float]] | None = Field(
         default=None,
+        max_length=MAX_ROWS,
         description='Rows of [depth (m), north (m/s), east (m/s)] and optionally down (m/s), '
         'by increasing depth.',
     )
@@ -524,7 +530,9 @@ class CurrentSettings(_Flow):
     """
 
     components: list[CurrentComponent] = Field(
-        default=[], description='Further current fields; all of them are added up.'
+        default=[],
+        max_length=MAX_COMPONENTS,
+        description='Further current fields; all of them are added up.',
     )
     seed: int = Field(
         default=0, ge=0, le=2**63 - 1, description='Seed of the random components (1).'
@@ -637,27 +645,28 @@ def _read_profile(path: Path) -> list[list[float]]:
     """
     source = f'file {path}'
     try:
-        with path.open(encoding='utf-8-sig', newline='') as stream:
-            reader = csv.reader(stream, skipinitialspace=True)
-            lines = [(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
-    except OSError as error:
-        raise ValueError(f'{source}: {error.strerror or error}') from None
-    except (UnicodeDecodeError, csv.Error) as error:
+        reader = csv.reader(io.StringIO(read_text(path), newline=''), skipinitialspace=True)
+        lines = [(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
+    except ConfigurationError as error:
+        raise ValueError(f'file {error}') from None
+    except csv.Error as error:
         raise ValueError(f'{source}: not a CSV text file: {error}') from None
     header = [name.strip() for name in lines[0][1]] if lines else []
     missing = [name for name in _COLUMNS[:3] if name not in header]
     if missing:
         raise ValueError(
             f'{source}: row {lines[0][0] if lines else 1}: column {missing[0]} is missing '
-            f'(found: {", ".join(header) or "nothing"})'
+            f'(allowed: {", ".join(_COLUMNS)})'
         )
     for name in header:
         if name not in _COLUMNS or header.count(name) > 1:
             wrong = 'repeated' if name in _COLUMNS else 'unknown'
             raise ValueError(
-                f'{source}: row {lines[0][0]}: column {name!r} is {wrong} '
+                f'{source}: row {lines[0][0]}: column {shown(name)} is {wrong} '
                 f'(allowed: {", ".join(_COLUMNS)})'
             )
+    if len(lines) > MAX_ROWS + 1:
+        raise ValueError(f'{source}: {len(lines) - 1} rows (allowed: <= {MAX_ROWS})')
     rows = []
     for number, cells in lines[1:]:
         if len(cells) != len(header):
@@ -677,5 +686,5 @@ def _number(text: str, where: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise ValueError(f'{where} = {text!r}: not a finite number')
+        raise ValueError(f'{where} = {shown(text)}: not a finite number')
     return value

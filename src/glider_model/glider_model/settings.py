@@ -3,19 +3,15 @@
 """Base of everything a person configures, and how its errors read."""
 
 import re
-from copy import deepcopy
-from functools import lru_cache
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin
 
 import pydantic
-import yaml
+
+from glider_model.errors import MAX_LINES, MAX_SHOWN, ConfigurationError, shown
 
 SettingsT = TypeVar('SettingsT', bound='Settings')
-
-
-class ConfigurationError(ValueError):
-    """A file, field or option that cannot be used. The message is meant for the person."""
 
 
 class Settings(pydantic.BaseModel):
@@ -108,45 +104,81 @@ def unit_of(field: pydantic.fields.FieldInfo) -> str:
     return brackets[1].partition(',')[0] if brackets else ''
 
 
-def error_lines(error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> list[str]:
-    """One line per mistake: field, value, what is wrong, what is allowed."""
-    lines = []
-    for item in error.errors(include_url=False):
-        kind, context, value = item['type'], item.get('ctx') or {}, item['input']
-        path, holders, field = _follow(model, item['loc'])
-        message = item['msg'].removeprefix('Value error, ').replace('Input should', 'should')
-        if kind == 'extra_forbidden':
-            message = 'unknown field'
-        elif kind == 'missing':
-            message = 'missing'
-        elif kind in _NOT_A_MAPPING:
-            message = 'expected a mapping of fields'
-        elif kind in ('union_tag_invalid', 'union_tag_not_found'):
-            path.append(context['discriminator'].strip("'"))
-            value = context.get('tag', value)
-            message = 'unknown' if 'tag' in context else 'missing'
-        shown = '' if isinstance(value, dict) else f' = {value!r}'
-        allowed = _allowed(item, holders, field)
-        where = '.'.join(path) or '(file)'
-        lines.append(f'{where}{shown}: {message}' + (f' ({allowed})' if allowed else ''))
-    return lines
+class Mistake(NamedTuple):
+    """One thing that is wrong with values."""
+
+    location: tuple[str, ...]  #: as the person wrote it
+    text: str  #: field, value, what is wrong, what is allowed
+
+
+def mistakes(error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> list[Mistake]:
+    """Mistakes that an error is about: the first of them, and how many more there are."""
+    found = error.errors(include_url=False)
+    told = [_mistake(item, model) for item in found[:MAX_LINES]]
+    if len(found) > MAX_LINES:
+        told[-1:] = [Mistake((), f'and {len(found) - MAX_LINES + 1} more')]
+    return told
+
+
+def _mistake(item: dict, model: type[pydantic.BaseModel]) -> Mistake:
+    kind, context, value = item['type'], item.get('ctx') or {}, item['input']
+    path, holders, field = _follow(model, item['loc'])
+    message = item['msg'].removeprefix('Value error, ').replace('Input should', 'should')
+    if kind == 'extra_forbidden':
+        message = 'unknown field'
+    elif kind == 'missing':
+        message = 'missing'
+    elif kind in _NOT_A_MAPPING:
+        message = 'expected a mapping of fields'
+    elif kind in ('union_tag_invalid', 'union_tag_not_found'):
+        path.append(context['discriminator'].strip("'"))
+        value = context.get('tag', value)
+        message = 'unknown' if 'tag' in context else 'missing'
+    given = '' if isinstance(value, dict) else f' = {shown(value)}'
+    allowed = _allowed(item, holders, field)
+    where = '.'.join(part[:MAX_SHOWN] for part in path) or '(file)'
+    text = f'{where}{given}: {message}' + (f' ({allowed})' if allowed else '')
+    return Mistake(tuple(path), text)
 
 
 def validate(
-    model: type[SettingsT], values: Any, source: str, folder: Path | None = None
+    model: type[SettingsT],
+    values: Any,
+    source: str,
+    folder: Path | None = None,
+    line_of: Callable[[tuple[str, ...]], int | None] = lambda location: None,
+    changed: str = '',
 ) -> SettingsT:
-    """Validate ``values`` as ``model``; files that it names are looked for in ``folder``.
+    """Validate ``values`` as ``model``.
+
+    Parameters
+    ----------
+    model : type of Settings
+    values
+    source : str
+        File or option that they come from.
+    folder : Path, optional
+        Where files that they name are looked for.
+    line_of : callable, optional
+        Line of the file in which a value stands, by its location; None if it has none.
+    changed : str
+        What was changed since the file was read, in words.
 
     Raises
     ------
     ConfigurationError
-        Naming ``source`` (a file or option), the field, its value and the allowed range.
+        Naming ``source``, the line, the field, its value and the allowed range.
     """
     try:
         return model.model_validate(values, context={'folder': folder} if folder else None)
     except pydantic.ValidationError as error:
-        lines = error_lines(error, model)
-        raise ConfigurationError('\n'.join(f'{source}: {line}' for line in lines)) from None
+        told = []
+        for location, text in mistakes(error, model):
+            line = line_of(location)
+            told.append(
+                f'{source}:{line}{changed}: {text}' if line else f'{source}{changed}: {text}'
+            )
+        raise ConfigurationError('\n'.join(told)) from None
 
 
 def file_names(folder: Path) -> list[str]:
@@ -162,68 +194,18 @@ def find_file(what: str, name: str, folder: Path) -> Path:
     ConfigurationError
         If neither ``folder`` has a file of that name nor there is such a file.
     """
-    known = folder / f'{name}.yaml'
-    if known.is_file():
-        return known
-    path = Path(name)
+    path, names = Path(name), file_names(folder)
+    if name in names:
+        return folder / f'{name}.yaml'
     if path.suffix not in ('.yaml', '.yml'):
         raise ConfigurationError(
-            f'{what} = {name!r}: no such {what} '
-            f'(allowed: {", ".join(file_names(folder))}, or a path to a .yaml file)'
+            f'{what} = {shown(name)}: no such {what} '
+            f'(allowed: {", ".join(names)}, or a path to a .yaml file)'
         )
-    if not path.is_file():
-        raise ConfigurationError(f'{path}: no such {what} file')
-    return path
-
-
-def read_yaml(path: Path) -> dict:
-    """Read a YAML mapping.
-
-    Raises
-    ------
-    ConfigurationError
-        If the file is missing, unreadable, not YAML, or not a mapping.
-    """
     try:
-        values = deepcopy(_parse(path.read_text(encoding='utf-8')))
-    except OSError as error:
-        raise ConfigurationError(f'{path}: {error.strerror or error}') from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f'{path}: not valid YAML: {error}') from None
-    if not isinstance(values, dict):
-        raise ConfigurationError(f'{path}: expected a mapping of fields, found {values!r}')
-    return values
-
-
-@lru_cache(maxsize=16)
-def _parse(text: str) -> Any:
-    """What a YAML text says; the same few files are read for each of many missions."""
-    return yaml.load(text, Loader=_Loader)
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML 1.2 floats (``1e-3`` is a number) and no silently repeated keys."""
-
-
-def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict:
-    seen = set()
-    for key, _ in node.value:
-        if not isinstance(key, yaml.ScalarNode):
-            raise yaml.constructor.ConstructorError(
-                None, None, 'the name of a field must be plain text', key.start_mark
-            )
-        name = loader.construct_object(key)
-        if name in seen:
-            raise yaml.constructor.ConstructorError(
-                None, None, f'field {name!r} is given twice', key.start_mark
-            )
-        seen.add(name)
-    return yaml.SafeLoader.construct_mapping(loader, node, deep=True)
-
-
-_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
-_Loader.add_implicit_resolver(
-    'tag:yaml.org,2002:float',
-    re.compile(r'^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)$'),
-    list('-+0123456789.'),
-)
+        path.stat()
+    except FileNotFoundError:
+        raise ConfigurationError(f'{path}: no such {what} file') from None
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(f'{path}: {getattr(error, "strerror", None) or error}') from None
+    return path

@@ -3,7 +3,7 @@
 """Vehicles: a validated YAML file, every number with unit and source, to kernel parameters."""
 
 import math
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
@@ -11,14 +11,9 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
+from glider_model.files import read_yaml, yaml_line
 from glider_model.rigid_body import mass_matrix
-from glider_model.settings import (
-    Settings,
-    file_names,
-    find_file,
-    read_yaml,
-    validate,
-)
+from glider_model.settings import Settings, file_names, find_file, validate
 
 VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
 
@@ -327,4 +322,4 @@ def load_vehicle(name: str) -> Vehicle:
 @lru_cache(maxsize=16)
 def _read_vehicle(path: Path, mtime_ns: int, size: int) -> Vehicle:
     """Vehicle of a file in this version: every block of a mission asks for it."""
-    return validate(Vehicle, read_yaml(path), str(path))
+    return validate(Vehicle, read_yaml(path), str(path), line_of=partial(yaml_line, path))

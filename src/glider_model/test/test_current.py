@@ -437,7 +437,7 @@ def test_a_wrong_component_says_what_is_allowed(component, message):
     ('text', 'message'),
     [
         (None, 'profile.csv: No such file'),
-        ('', 'profile.csv: row 1: column depth_m is missing .found: nothing'),
+        ('', 'profile.csv: row 1: column depth_m is missing .allowed: depth_m'),
         ('depth_m,north_mps\n0,1\n', 'profile.csv: row 1: column east_mps is missing'),
         ('depth_m,north_mps,east_mps\n', 'profile.csv: no rows'),
         (
@@ -482,7 +482,7 @@ def test_a_wrong_file_is_named_with_column_and_row(tmp_path, text, message):
 def test_a_file_that_is_no_text_is_named(tmp_path):
     path = tmp_path / 'profile.csv'
     path.write_bytes(b'\xff\xfe\x00\x80')
-    with pytest.raises(pydantic.ValidationError, match=r'profile.csv: not a CSV text file'):
+    with pytest.raises(pydantic.ValidationError, match=r'profile.csv:1: not UTF-8 text'):
         field({'kind': 'table', 'file': str(path)})
 
 

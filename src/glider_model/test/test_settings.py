@@ -8,7 +8,9 @@ import pydantic
 import pytest
 from pydantic import Field
 
-from glider_model.settings import ConfigurationError, Settings, read_yaml, validate
+from glider_model.errors import ConfigurationError
+from glider_model.files import read_yaml
+from glider_model.settings import Settings, validate
 
 
 class Cat(Settings):
@@ -157,14 +159,14 @@ def test_numbers_are_numbers(tmp_path, text, number):
 @pytest.mark.parametrize(
     ('text', 'expected'),
     [
-        ('a: 1\na: 2\n', r"a.yaml: not valid YAML: field 'a' is given twice\n.*line 2"),
-        ('b:\n  c: 1\n  c: 1\n', r"field 'c' is given twice\n.*line 3"),
-        ('[a, b]: 1\n', r'a.yaml: not valid YAML: the name of a field must be plain text'),
+        ('a: 1\na: 2\n', r"a.yaml:2: not valid YAML: field 'a' is given twice"),
+        ('b:\n  c: 1\n  c: 1\n', r"a.yaml:3: .*field 'c' is given twice"),
+        ('[a, b]: 1\n', r'a.yaml:1: not valid YAML: the name of a field must be plain text'),
         ('- 1\n- 2\n', r'a.yaml: expected a mapping of fields, found \[1, 2\]'),
         ('', r'a.yaml: expected a mapping of fields, found None'),
-        ('a: [1,\n', r'a.yaml: not valid YAML'),
-        ('a: !!python/object:os.system {}\n', r'a.yaml: not valid YAML'),
-        ('a: 1\n---\nb: 2\n', r'a.yaml: not valid YAML'),
+        ('a: [1,\n', r'a.yaml:2: not valid YAML'),
+        ('a: !!python/object:os.system {}\n', r'a.yaml:1: not valid YAML'),
+        ('a: 1\n---\nb: 2\n', r'a.yaml:3: not valid YAML'),
     ],
 )
 def test_what_is_no_mapping_is_refused(tmp_path, text, expected):
@@ -180,5 +182,5 @@ def test_missing_file_is_named(tmp_path):
 def test_bytes_that_are_no_text_are_refused(tmp_path):
     path = tmp_path / 'a.yaml'
     path.write_bytes(b'\xff\xfe\x00')
-    with pytest.raises(ConfigurationError, match=r'a.yaml: not valid YAML'):
+    with pytest.raises(ConfigurationError, match=r'a.yaml:1: not UTF-8 text, byte 0xff'):
         read_yaml(path)

@@ -21,7 +21,7 @@ from glider_bringup.console import (
     number,
     progress,
 )
-from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace
+from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, parse_assignment
 from glider_bringup.scorecard import print_card
 from glider_guidance.guidance import LosSettings
@@ -113,6 +113,8 @@ def run(
         raise ConfigurationError(f'--namespace {namespace}: not usable (allowed: {allowed})')
     if view and engine is Engine.direct:
         raise ConfigurationError('--view: the direct engine has no topics to show; use nodes')
+    if engine is Engine.nodes:
+        given_domain()
     flown = load_scenario(scenario, fields)
     with _view(view_port, place) if view else nullcontext() as begin_view:
         card, folder = _fly(flown, engine, rate, place, out, bag, report, begin_view)

@@ -22,7 +22,7 @@ from rclpy.qos import DurabilityPolicy
 from glider_bringup.ros.bag import message_definition
 from glider_model.ros import qos
 from glider_model.ros.messages import TOPICS
-from glider_model.ros.parameters import declare_settings
+from glider_model.ros.parameters import declare_settings, refuse_unknown
 from glider_model.ros.tick import EXIT_CONFIGURATION, take
 from glider_model.settings import ConfigurationError, Settings
 
@@ -150,6 +150,7 @@ def main(args=None) -> int:
     rclpy.init(args=args)
     try:
         node = ViewerNode()
+        refuse_unknown(node)
         node.run()
         node.pass_on()
         node.server.stop()

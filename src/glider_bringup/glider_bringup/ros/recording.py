@@ -17,12 +17,13 @@ from glider_bringup.scenario import Scenario, load_scenario
 from glider_control.control import ControlSettings
 from glider_guidance.guidance import GuidanceSettings
 from glider_model.current import CurrentSettings
+from glider_model.files import read_yaml
 from glider_model.plant import PlantSettings
 from glider_model.ros import messages
 from glider_model.ros.codec import Codec
 from glider_model.ros.messages import TOPICS
 from glider_model.ros.parameters import from_parameters
-from glider_model.settings import ConfigurationError, read_yaml
+from glider_model.settings import ConfigurationError
 
 #: Messages of foreign layout whose bytes are kept, for each topic.
 _KEPT = 1000

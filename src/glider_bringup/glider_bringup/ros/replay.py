@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 import rclpy
-import yaml
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -18,6 +17,8 @@ from rclpy.signals import SignalHandlerOptions
 
 from glider_bringup.mcap_reader import Bag, BagTopic
 from glider_bringup.ros.recording import choose_namespace
+from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace, given_domain
+from glider_model.files import parse_yaml
 from glider_model.ros import messages
 from glider_model.ros.messages import CLOCK, TOPICS
 from glider_model.ros.tick import MAX_TICKS_AHEAD, take
@@ -100,7 +101,11 @@ def plan_replay(
         )
     start_ns = bag.start_ns + round(start_s * 1e9)
     end_ns = bag.end_ns if duration_s is None else start_ns + round(duration_s * 1e9)
-    published = recorded if namespace is None else '/' + namespace.strip('/')
+    published = recorded if namespace is None else absolute_namespace(namespace)
+    if published is None:
+        raise ConfigurationError(
+            f'--namespace {namespace}: not usable (allowed: {NAMESPACE_ALLOWED})'
+        )
     renamed = {name: _rename(name, recorded, published) for name in wanted}
     return Plan(
         bag,
@@ -150,9 +155,9 @@ def qos_of(topic: BagTopic) -> QoSProfile:
     Version 9 of rosbag2 writes policies as words, older ones as numbers.
     """
     try:
-        profiles = yaml.safe_load(topic.qos) or [{}]
+        profiles = parse_yaml(topic.qos, topic.name) or [{}]
         found = [_profile(profile) for profile in profiles]
-    except (yaml.YAMLError, TypeError, AttributeError, ValueError, KeyError) as error:
+    except (TypeError, AttributeError, ValueError, KeyError) as error:
         raise ConfigurationError(
             f'{topic.name}: quality of service not readable: {error!r}'
         ) from None
@@ -281,6 +286,7 @@ class Replay:
 
     def __init__(self, plan: Plan, rate: float) -> None:
         self._plan, self._rate = plan, rate
+        given_domain()
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         try:
             self._node = Node(messages.REPLAY, enable_rosout=False, start_parameter_services=False)

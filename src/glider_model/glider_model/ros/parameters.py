@@ -30,7 +30,9 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from glider_model.settings import ConfigurationError, Settings, error_lines, validate
+from glider_model.errors import MAX_SHOWN, shown
+from glider_model.files import parse_json, parse_yaml
+from glider_model.settings import ConfigurationError, Settings, mistakes, validate
 
 SettingsT = TypeVar('SettingsT', bound=Settings)
 
@@ -126,7 +128,7 @@ def _refuse(node: Node, leaf: _Leaf, value, reason: str) -> ConfigurationError:
     limits = _limits(leaf.field, leaf.kind) if leaf.kind else None
     allowed = f' (allowed: {limits[0]} to {limits[1]})' if limits else ''
     return ConfigurationError(
-        f'{node.get_name()}: parameter {leaf.name} = {value!r}: {reason}{allowed}'
+        f'{node.get_name()}: parameter {leaf.name} = {shown(value)}: {reason}{allowed}'
     )
 
 
@@ -156,9 +158,9 @@ def _parse(leaf: _Leaf, value):
     if leaf.kind is not None or not isinstance(value, str):
         return value
     try:
-        return json.loads(value)
-    except json.JSONDecodeError:
-        return yaml.safe_load(value)
+        return parse_json(value, leaf.name)
+    except ConfigurationError:
+        return parse_yaml(value, leaf.name)
 
 
 def _nested(values: dict[str, Any]) -> dict[str, Any]:
@@ -177,15 +179,14 @@ def _validated(node: Node, model: type[SettingsT], leaves, values: dict[str, Any
     for leaf in leaves:
         try:
             tree[leaf.name] = _parse(leaf, values[leaf.name])
-        except yaml.YAMLError:
-            raise _refuse(node, leaf, values[leaf.name], 'not JSON or YAML') from None
+        except ConfigurationError as error:
+            reason = f'not JSON or YAML: {error}'
+            raise _refuse(node, leaf, values[leaf.name], reason) from None
     try:
         return model.model_validate(_nested(tree))
     except pydantic.ValidationError as error:
-        lines = error_lines(error, model)
-        raise ConfigurationError(
-            '\n'.join(f'{node.get_name()}: parameter {line}' for line in lines)
-        ) from None
+        lines = [f'{node.get_name()}: parameter {text}' for _, text in mistakes(error, model)]
+        raise ConfigurationError('\n'.join(lines)) from None
 
 
 def declare_settings(
@@ -237,6 +238,31 @@ def declare_settings(
     return settings
 
 
+def refuse_unknown(node: Node) -> None:
+    """Refuse parameters that a node was given and has not declared; ROS would not say a word.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming them, and those that the node has.
+    """
+    # rclpy has no public name for what the command line and parameter files give to a node
+    given = sorted(node._parameter_overrides)
+    unknown = [
+        name
+        for name in given
+        if not (node.has_parameter(name) or name.startswith('qos_overrides.'))
+    ]
+    if unknown:
+        known = ', '.join(sorted(node.get_parameters_by_prefix('')))
+        raise ConfigurationError(
+            '\n'.join(
+                f'{node.get_name()}: parameter {name[:MAX_SHOWN]}: unknown (allowed: {known})'
+                for name in unknown
+            )
+        )
+
+
 def to_parameters(settings: Settings) -> dict[str, Any]:
     """Nested parameters that `declare_settings` turns back into equal ``settings``."""
     return _nested(
@@ -269,8 +295,8 @@ def with_parameters(settings: SettingsT, values: dict[str, str]) -> SettingsT:
     kept = {leaf.name: leaf.default for leaf in _leaves(type(settings), settings)}
     try:
         given = {name: json.loads(text) for name, text in values.items()}
-    except json.JSONDecodeError:
-        raise ConfigurationError(f'parameters {values}: not JSON') from None
+    except (ValueError, RecursionError):
+        raise ConfigurationError(f'parameters {shown(values)}: not JSON') from None
     return validate(type(settings), _nested({**kept, **given}), 'parameter')
 
 
@@ -290,9 +316,9 @@ def from_parameters(model: type[SettingsT], values: dict[str, Any], source: str)
         if branch is not _MISSING:
             try:
                 tree[leaf.name] = _parse(leaf, branch)
-            except yaml.YAMLError:
+            except ConfigurationError as error:
                 raise ConfigurationError(
-                    f'{source}: {leaf.name} = {branch!r}: not JSON or YAML'
+                    f'{source}: {leaf.name} = {shown(branch)}: not JSON or YAML: {error}'
                 ) from None
     return validate(model, _nested(tree), source)
 

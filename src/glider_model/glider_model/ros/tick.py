@@ -28,7 +28,7 @@ from glider_model.ros.codec import MessageError, NotFiniteError, to_cdr
 from glider_model.ros.executor import Gate, make_executor, take_with_info
 from glider_model.ros.health import Report
 from glider_model.ros.messages import TOPICS, Topic
-from glider_model.ros.parameters import declare_settings
+from glider_model.ros.parameters import declare_settings, refuse_unknown
 from glider_model.settings import ConfigurationError, Settings
 from glider_model.signals import TICK_NS, TICK_S
 
@@ -592,6 +592,7 @@ def run(node_type: Callable[[], TickNode], args=None) -> int:
     node, stop = None, Stop(0)
     try:
         node = node_type()
+        refuse_unknown(node)
         gc.freeze()  # compilers and libraries, which stay: else every full collection visits them
         with make_executor() as executor:
             executor.add_node(node)

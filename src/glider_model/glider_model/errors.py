@@ -1,0 +1,59 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is told to a person: short, printable, whatever a file or an option holds."""
+
+import reprlib
+
+#: Lines that an error has at most, but for one that says how many more there are.
+MAX_LINES = 20
+#: Characters of a line of an error; what is longer loses its middle.
+MAX_LINE = 900
+#: Characters of a value in an error.
+MAX_SHOWN = 80
+
+
+class ConfigurationError(ValueError):
+    """A file, field or option that cannot be used. The message is meant for the person.
+
+    However long or odd what it quotes, it has few lines, each of bounded length and printable.
+    """
+
+    def __init__(self, message: str) -> None:
+        lines = message.split('\n')
+        if len(lines) > MAX_LINES + 1:
+            lines = [*lines[:MAX_LINES], f'and {len(lines) - MAX_LINES} more']
+        super().__init__('\n'.join(printable(_clipped(line)) for line in lines))
+
+
+def _clipped(line: str) -> str:
+    end = MAX_LINE // 3
+    return line if len(line) <= MAX_LINE else f'{line[: MAX_LINE - end - 1]}…{line[-end:]}'
+
+
+def printable(text: str, keep: str = '') -> str:
+    """The same text with what is not printable escaped, but for the characters to ``keep``."""
+    if text.isprintable():
+        return text
+    return ''.join(
+        one if one.isprintable() or one in keep else one.encode('unicode_escape').decode()
+        for one in text
+    )
+
+
+class _Short(reprlib.Repr):
+    """`repr` of a value that takes no longer however large it is."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = MAX_SHOWN
+
+    def repr_int(self, x: int, level: int) -> str:
+        """Digits of a number; only how long it is if nobody would read them."""
+        digits = int(x.bit_length() * 0.30103) + 1
+        return repr(x) if digits < MAX_SHOWN else f'(a number of {digits} digits)'
+
+
+def shown(value) -> str:
+    """`repr` of a value in at most `MAX_SHOWN` characters."""
+    text = _Short().repr(value)
+    return text if len(text) <= MAX_SHOWN else f'{text[: MAX_SHOWN - 1]}…'
