@@ -4,9 +4,12 @@
 
 import errno
 import os
+import signal
 import sys
 
 try:  # imports take a second, in which Ctrl-C may come, and many files
+    # ./glider blocks it until there is someone to take it
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     import typer
 
     from glider_bringup.commands import (
@@ -74,6 +77,9 @@ def main() -> int:
 
     So does trouble of the machine, such as a full disk, with exit code 1.
     """
+    if sys.stdout is None:
+        _tell('standard output is closed')
+        return EXIT_FAILED
     try:
         code = _run()
         sys.stdout.flush()

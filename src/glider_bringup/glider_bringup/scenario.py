@@ -16,7 +16,7 @@ from glider_guidance.guidance import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.path import PathSettings, StraightPath, path_length, path_point
 from glider_guidance.profile import ProfileSettings
 from glider_model.current import CurrentSettings
-from glider_model.errors import MAX_SHOWN, shown
+from glider_model.errors import clipped, shown
 from glider_model.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
 from glider_model.perturb import PerturbSettings, perturbed
 from glider_model.plant import SURFACE_S, InitialSettings, PlantSettings
@@ -259,7 +259,7 @@ def make_scenario(
 
 def _told_changes(changes: dict[str, Any]) -> str:
     """The first fields that were changed since a file was read, in words."""
-    told = [f'{field[:MAX_SHOWN]}={shown(value)}' for field, value in changes.items()]
+    told = [f'{clipped(field)}={shown(value)}' for field, value in changes.items()]
     more = [f'{len(told) - CHANGES_TOLD} more'] if len(told) > CHANGES_TOLD else []
     return ' with ' + ', '.join(told[:CHANGES_TOLD] + more) if told else ''
 
@@ -309,7 +309,9 @@ def _set_field(values: dict, field: str, value) -> None:
     for parent in parents:
         values = values.setdefault(parent, {})
         if not isinstance(values, dict):
-            raise ConfigurationError(f'--set {field}: {parent} is not a group of fields')
+            raise ConfigurationError(
+                f'--set {clipped(field)}: {clipped(parent)} is not a group of fields'
+            )
     for other in _alternatives(last):
         values.pop(other, None)
     values[last] = value
@@ -326,5 +328,5 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     field, sign, value = text.partition('=')
     field = field.strip()
     if not sign or not all(field.split('.')):
-        raise ConfigurationError(f'--set {text}: expected path.to.field=value')
-    return field, parse_yaml(value, f'--set {text}')
+        raise ConfigurationError(f'--set {clipped(text)}: expected path.to.field=value')
+    return field, parse_yaml(value, f'--set {clipped(text)}')

@@ -55,5 +55,9 @@ class _Short(reprlib.Repr):
 
 def shown(value) -> str:
     """`repr` of a value in at most `MAX_SHOWN` characters."""
-    text = _Short().repr(value)
+    return clipped(_Short().repr(value))
+
+
+def clipped(text: str) -> str:
+    """The first `MAX_SHOWN` characters of a text."""
     return text if len(text) <= MAX_SHOWN else f'{text[: MAX_SHOWN - 1]}…'

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar, get_args, get_origin
 
 import pydantic
 
-from glider_model.errors import MAX_LINES, MAX_SHOWN, ConfigurationError, shown
+from glider_model.errors import MAX_LINES, ConfigurationError, clipped, shown
 
 SettingsT = TypeVar('SettingsT', bound='Settings')
 
@@ -136,7 +136,7 @@ def _mistake(item: dict, model: type[pydantic.BaseModel]) -> Mistake:
         message = 'unknown' if 'tag' in context else 'missing'
     given = '' if isinstance(value, dict) else f' = {shown(value)}'
     allowed = _allowed(item, holders, field)
-    where = '.'.join(part[:MAX_SHOWN] for part in path) or '(file)'
+    where = '.'.join(clipped(part) for part in path) or '(file)'
     text = f'{where}{given}: {message}' + (f' ({allowed})' if allowed else '')
     return Mistake(tuple(path), text)
 

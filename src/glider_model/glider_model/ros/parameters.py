@@ -30,7 +30,7 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from glider_model.errors import MAX_SHOWN, shown
+from glider_model.errors import clipped, shown
 from glider_model.files import parse_json, parse_yaml
 from glider_model.settings import ConfigurationError, Settings, mistakes, validate
 
@@ -257,7 +257,7 @@ def refuse_unknown(node: Node) -> None:
         known = ', '.join(sorted(node.get_parameters_by_prefix('')))
         raise ConfigurationError(
             '\n'.join(
-                f'{node.get_name()}: parameter {name[:MAX_SHOWN]}: unknown (allowed: {known})'
+                f'{node.get_name()}: parameter {clipped(name)}: unknown (allowed: {known})'
                 for name in unknown
             )
         )
