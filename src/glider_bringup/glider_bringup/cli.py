@@ -24,6 +24,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
         verify,
     )
     from glider_bringup.console import EXIT_FAILED, EXIT_USAGE, messages
+    from glider_bringup.files import DiskError
     from glider_model.errors import MAX_LINE, ConfigurationError, shown
 except KeyboardInterrupt:
     sys.exit(130)
@@ -85,7 +86,7 @@ def main() -> int:
         sys.stdout.flush()
     except ConfigurationError as error:
         _tell(str(error))
-        code = EXIT_USAGE
+        code = EXIT_FAILED if isinstance(error, DiskError) else EXIT_USAGE
     except OSError as error:
         _tell(f'{error.filename or "input or output"}: {error.strerror or error}'[:MAX_LINE])
         code = EXIT_USAGE if error.errno in _USAGE else EXIT_FAILED

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from glider_bringup.files import save_figure
 from glider_bringup.traces import Traces
 
 #: A picture shows at most this many values of each curve.
@@ -90,8 +91,7 @@ def draw_run(traces: Traces, title: str, file: Path) -> None:
         ),
     )
     figure.suptitle(title)
-    figure.savefig(file, dpi=100)
-    pyplot.close(figure)
+    save_figure(figure, file, dpi=100)
 
 
 def _draw_track(axis, samples: dict[str, np.ndarray]) -> None:

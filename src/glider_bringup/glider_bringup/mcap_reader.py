@@ -3,9 +3,13 @@
 """Bags (rosbag2 folders of MCAP files, or single files), read chunk by chunk at memory speed.
 
 The records are those of the `mcap` package. What its own readers do message by message, a
-compiled scan does for a chunk at once: a flight of 30 h has ten million messages. The summary at
-the end of a file is not relied upon, so that a file whose writer was killed reads as far as it
-goes, and every checksum is tested.
+compiled scan does for a chunk at once: a flight of 30 h has ten million messages.
+
+Two kinds of harm are told apart. A file that was **cut**, as by a writer that was killed, reads as
+far as it goes, and `Bag.cut` says how far. A file that is **damaged** is refused, by an error that
+names the place: every checksum is tested, that of the data section as the file is opened. Where
+there is none (bags of before, and of others) the records are compared with the summary, which has
+a checksum of its own, so that no chunk, topic or attachment is missed in silence.
 """
 
 import struct
@@ -13,7 +17,7 @@ import zlib
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, NamedTuple
 
 import lz4.frame
 import numpy as np
@@ -21,18 +25,23 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Schema
+from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Schema, Statistics
 
 from glider_bringup.mcap_writer import MAGIC
 from glider_model.files import read_yaml
 from glider_model.kernel import kernel
 from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_NS
 
 _HEAD = struct.Struct('<BQ')
+_FOOTER = struct.Struct('<BQQQI')
+_END_SIZE = _FOOTER.size + len(MAGIC)  #: of a file: the footer, and the magic again
+_CHECKED_AT_ONCE = 1 << 20  #: bytes
 _CHUNK_HEAD = struct.Struct('<QQQII')
 _LOG_TIME_AT = 6  # in a message record: channel (2), sequence (4), log time (8), publish time (8)
 _MESSAGE_HEAD = 22
 _UNREADABLE = (McapError, struct.error, UnicodeDecodeError)
+_NOT_TOLD = -1  #: by a zstd frame: the size of its content
 
 
 class BagTopic(NamedTuple):
@@ -65,6 +74,23 @@ class Batch(NamedTuple):
         rows = np.empty((len(chosen), int(self.size[chosen[0]])), np.uint8)
         _gather(self.data, self.start[chosen], rows)
         return rows
+
+
+class _Summary(NamedTuple):
+    """What the end of a file says is in it."""
+
+    schemas: list[Schema]
+    channels: list[Channel]
+    chunks: dict[int, ChunkIndex]  #: by place in the file
+    attachments: set[int]  #: their places
+    statistics: Statistics | None
+
+
+class _Found(NamedTuple):
+    """Places of records in a file."""
+
+    chunks: list[int]
+    attachments: set[int]
 
 
 class _Part(NamedTuple):
@@ -156,7 +182,7 @@ def _listed_files(metadata: Path) -> list[Path]:
         names = [str(name) for name in information['relative_file_paths']]
         storage = information['storage_identifier']
         compression = information.get('compression_format') or ''
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, AttributeError) as error:
         raise ConfigurationError(f'{metadata}: not metadata of rosbag2: {error!r}') from None
     if storage != 'mcap' or compression:
         what = f'files compressed with {compression}' if compression else f'storage {storage}'
@@ -165,6 +191,62 @@ def _listed_files(metadata: Path) -> list[Path]:
             f'ros2 bag convert makes one)'
         )
     return [metadata.parent / name for name in names]
+
+
+def _span(start_ns: int, end_ns: int) -> str:
+    """Times from which to which messages are, in words."""
+    ticks = max(0, end_ns - start_ns) // TICK_NS + 1
+    return f't = {start_ns / 1e9:.1f} s to {end_ns / 1e9:.1f} s, {ticks:,} ticks'
+
+
+def _read_footer(stream: IO[bytes], size: int) -> tuple[int, int, int] | None:
+    """Start of the summary, start of its offsets, and checksum; None if a file does not end so."""
+    if size < _END_SIZE + len(MAGIC):
+        return None
+    stream.seek(size - _END_SIZE)
+    end = stream.read(_END_SIZE)
+    opcode, length, *footer = _FOOTER.unpack_from(end)
+    if (opcode, length) != (Opcode.FOOTER, 20) or not end.endswith(MAGIC):
+        return None
+    return tuple(footer)
+
+
+def _checksum(stream: IO[bytes], end: int) -> int:
+    """CRC of a file up to a place."""
+    stream.seek(0)
+    value = 0
+    while end:
+        data = stream.read(min(end, _CHECKED_AT_ONCE))
+        if not data:
+            break
+        value, end = zlib.crc32(data, value), end - len(data)
+    return value
+
+
+def _parse_summary(data: bytes) -> _Summary:
+    """Records of a summary."""
+    summary, at = _Summary([], [], {}, set(), None), 0
+    while at < len(data):
+        opcode, length = _HEAD.unpack_from(data, at)
+        stream = ReadDataStream(BytesIO(data[at + _HEAD.size : at + _HEAD.size + length]))
+        if opcode == Opcode.SCHEMA:
+            summary.schemas.append(Schema.read(stream))
+        elif opcode == Opcode.CHANNEL:
+            summary.channels.append(Channel.read(stream))
+        elif opcode == Opcode.CHUNK_INDEX:
+            index = ChunkIndex.read(stream)
+            summary.chunks[index.chunk_start_offset] = index
+        elif opcode == Opcode.ATTACHMENT_INDEX:
+            summary.attachments.add(AttachmentIndex.read(stream).offset)
+        elif opcode == Opcode.STATISTICS:
+            summary = summary._replace(statistics=Statistics.read(stream))
+        at += _HEAD.size + length
+    return summary
+
+
+def has_bag(run: Path) -> bool:
+    """Whether a run folder holds a bag, or is one: a single MCAP file."""
+    return run.is_file() or any(run.glob('*.mcap'))
 
 
 class Bag:
@@ -181,7 +263,7 @@ class Bag:
     attachments : dict of bytes
         By name.
     cut : str
-        Empty, or a sentence that says where a file ends early.
+        Empty, or a sentence that says where a file ends early, and how far it goes.
 
     Raises
     ------
@@ -196,18 +278,15 @@ class Bag:
         self.cut = ''
         self._parts: list[_Part] = []
         self._schemas: dict[tuple[int, int], Schema] = {}
+        self._channels: dict[tuple[int, int], Channel] = {}
         self._index: dict[tuple[int, int], int] = {}
         for number, file in enumerate(self.files):
             try:
-                self._open(number, file)
+                with file.open('rb') as stream:
+                    self._open(number, stream)
             except OSError as error:
                 raise ConfigurationError(f'{file}: {error.strerror or error}') from None
-            except _UNREADABLE as error:
-                raise ConfigurationError(f'{file}: damaged: {error!r}') from None
         self._parts.sort(key=lambda part: part.start_ns)
-        if self.cut:  # no summary: topics may be defined in chunks only
-            for part in self._parts:
-                self._read(part)
 
     @property
     def start_ns(self) -> int:
@@ -221,34 +300,144 @@ class Bag:
 
     # ------------------------------------------------------------------ records of a file
 
-    def _open(self, number: int, file: Path) -> None:
-        """Note the chunks of a file, its topics and attachments."""
-        size = file.stat().st_size
-        chunks = 0
+    def _open(self, number: int, stream: IO[bytes]) -> None:
+        """Note the chunks of a file, its topics and attachments, and test its checksums."""
+        file = self.files[number]
+        size = stream.seek(0, 2)
+        footer = _read_footer(stream, size)
+        stream.seek(0)
+        magic = stream.read(len(MAGIC))
+        if not MAGIC.startswith(magic):
+            raise ConfigurationError(f'{file}: not an MCAP file')
+        found, at = _Found([], set()), stream.tell()
+        while True:
+            head = stream.read(_HEAD.size)
+            opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, 0)
+            body = at + _HEAD.size
+            fits = opcode and body + length <= size
+            if not fits or opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                break
+            try:
+                self._take(number, opcode, at, length, stream, found)
+            except _UNREADABLE:
+                raise self._harmed(number, f'the record at byte {at:,} cannot be read') from None
+            at = stream.seek(body + length)
+        ends = fits and opcode == Opcode.DATA_END and length == 4
+        checksum = int.from_bytes(stream.read(4), 'little') if ends else 0
+        if checksum and checksum != _checksum(stream, at):
+            raise self._harmed(number, 'the checksum (CRC) of its data is wrong', footer, found)
+        if footer and not ends:
+            raise self._harmed(number, f'no record begins at byte {at:,}', footer, found)
+        if not checksum and not footer:
+            self._note_cut(number, at, opcode, stream)
+        summary = None if self.cut else self._summary(number, footer, bool(checksum))
+        if summary is None:  # topics may be defined in chunks only
+            for part in [one for one in self._parts if one.file == number]:
+                self._read(part)
+            return
+        if not checksum:
+            self._compare(number, summary, found)
+        for schema in summary.schemas:
+            self._schemas.setdefault((number, schema.id), schema)
+        for channel in summary.channels:
+            self._note_channel(number, channel)
+
+    def _take(
+        self, number: int, opcode: int, at: int, length: int, stream: IO[bytes], found: _Found
+    ) -> None:
+        """Note one record, whose content comes next in the stream."""
+        if opcode == Opcode.CHUNK:
+            found.chunks.append(at)
+            start_ns, end_ns, unpacked = struct.unpack('<QQQ', stream.read(24))
+            if unpacked:
+                order, body = len(found.chunks), at + _HEAD.size
+                self._parts.append(_Part(number, order, body, length, start_ns, end_ns))
+        elif opcode == Opcode.MESSAGE:
+            self._note_loose(number, at, stream.read(_MESSAGE_HEAD), length)
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT):
+            self._note(number, opcode, stream.read(length))
+            if opcode == Opcode.ATTACHMENT:
+                found.attachments.add(at)
+
+    def _note_cut(self, number: int, at: int, opcode: int, stream: IO[bytes]) -> None:
+        """Say where a file ends, and what is the last that is whole."""
+        parts = [part for part in self._parts if part.file == number]
+        end_ns = max((part.end_ns for part in parts), default=None)
+        goes = 'no message is whole' if end_ns is None else f'it goes to t = {end_ns / 1e9:.1f} s'
+        stream.seek(at + _HEAD.size)
+        times = stream.read(16) if opcode == Opcode.CHUNK else b''
+        if len(times) == 16:
+            start_ns, end_ns = struct.unpack('<QQ', times)
+            goes += f', and of the chunk up to t = {end_ns / 1e9:.1f} s only a part is there'
+        self.cut = f'{self.files[number]} ends early, after {at:,} bytes: {goes}'
+
+    def _summary(self, number: int, footer: tuple | None, proven: bool) -> _Summary | None:
+        """Summary of a file; None if it has none.
+
+        One that cannot be read does not matter where the data is ``proven`` to be whole.
+        """
+        if footer is None or not footer[0]:
+            return None
+        start, _, checksum = footer
+        file = self.files[number]
         with file.open('rb') as stream:
-            if stream.read(len(MAGIC)) != MAGIC:
-                raise ConfigurationError(f'{file}: not an MCAP file')
-            while True:
-                at = stream.tell()
-                head = stream.read(_HEAD.size)
-                opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, 0)
-                body = at + _HEAD.size
-                if not opcode or body + length > size:
-                    self.cut = f'{file} ends early, after {at:,} bytes'
-                    return
-                if opcode == Opcode.FOOTER:
-                    return
-                if opcode == Opcode.CHUNK:
-                    chunks += 1
-                    start_ns, end_ns, unpacked = struct.unpack('<QQQ', stream.read(24))
-                    if unpacked:
-                        part = _Part(number, chunks, body, length, start_ns, end_ns)
-                        self._parts.append(part)
-                elif opcode == Opcode.MESSAGE:
-                    self._note_loose(number, at, stream.read(_MESSAGE_HEAD), length)
-                elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT):
-                    self._note(number, opcode, stream.read(length))
-                stream.seek(body + length)
+            stream.seek(start)
+            data = stream.read()[: -_END_SIZE + 25]
+        if checksum and zlib.crc32(data) != checksum:
+            if proven:
+                return None
+            raise self._harmed(number, 'the checksum (CRC) of its summary is wrong')
+        try:
+            return _parse_summary(data[:-25])
+        except _UNREADABLE:
+            raise self._harmed(number, 'its summary cannot be read') from None
+
+    def _compare(self, number: int, summary: _Summary, found: _Found) -> None:
+        """Refuse a file in which a summary and what was found are not the same.
+
+        Raises
+        ------
+        ConfigurationError
+            Naming what lacks.
+        """
+        parts = {part.start - _HEAD.size: part for part in self._parts if part.file == number}
+        places = set(found.chunks)
+        for order, (place, index) in enumerate(sorted(summary.chunks.items()), 1):
+            times = index.message_start_time, index.message_end_time
+            part = parts.get(place)
+            if place not in places or (part and (part.start_ns, part.end_ns) != times):
+                what = f'chunk {order} ({_span(*times)}) is not where it should be'
+                raise self._harmed(number, what)
+        if summary.attachments - found.attachments:
+            raise self._harmed(number, 'an attachment is not where it should be')
+        said = summary.statistics.chunk_count if summary.statistics else len(places)
+        if said != len(places):
+            raise self._harmed(number, f'{len(places)} chunks, {said} by its summary')
+        for mine, theirs in (
+            (self._schemas, summary.schemas),
+            (self._channels, summary.channels),
+        ):
+            for (file, _), one in mine.items():
+                if file == number and theirs and one not in theirs:
+                    raise self._harmed(number, 'a topic or type is not that of its summary')
+
+    def _harmed(
+        self, number: int, what: str, footer: tuple | None = None, found: _Found | None = None
+    ) -> ConfigurationError:
+        """Error about a file; one about a chunk of it, if that can be found."""
+        if found is not None:
+            for part in [one for one in self._parts if one.file == number]:
+                try:
+                    self._read(part)
+                except ConfigurationError as error:
+                    return error
+            try:
+                summary = self._summary(number, footer, True)
+                if summary is not None:
+                    self._compare(number, summary, found)
+            except ConfigurationError as error:
+                return error
+        return ConfigurationError(f'{self.files[number]}: damaged: {what}')
 
     def _note_loose(self, file: int, at: int, head: bytes, length: int) -> None:
         """Note a message that is in no chunk, together with the one before it."""
@@ -272,6 +461,10 @@ class Bag:
             self._schemas[file, schema.id] = schema
         elif opcode == Opcode.ATTACHMENT:
             attachment = Attachment.read(stream)
+            checksum = int.from_bytes(data[-4:], 'little')
+            if checksum and zlib.crc32(memoryview(data)[:-4]) != checksum:
+                what = f'the checksum (CRC) of the attachment {attachment.name!r} is wrong'
+                raise self._harmed(file, what)
             self.attachments.setdefault(attachment.name, attachment.data)
         elif opcode == Opcode.CHANNEL:
             self._note_channel(file, Channel.read(stream))
@@ -279,6 +472,7 @@ class Bag:
     def _note_channel(self, file: int, channel: Channel) -> None:
         if (file, channel.id) in self._index:
             return
+        self._channels[file, channel.id] = channel
         schema = self._schemas.get((file, channel.schema_id))
         topic = BagTopic(
             channel.topic,
@@ -349,6 +543,9 @@ class Bag:
             if (part.file, int(number)) not in self._index:
                 raise self._damaged(part, f'messages of channel {number}, which is not defined')
             topic[channel[:messages] == number] = self._index[part.file, int(number)]
+        times = (int(log_ns[:messages].min()), int(log_ns[:messages].max())) if messages else ()
+        if times and times != (part.start_ns, part.end_ns):
+            raise self._damaged(part, f'its messages are of {_span(*times)}')
         return Batch(data, topic, log_ns[:messages], start[:messages], size[:messages])
 
     def _content(self, part: _Part) -> bytes:
@@ -364,6 +561,9 @@ class Bag:
             compression = data[_CHUNK_HEAD.size : at].decode()
             packed = memoryview(data)[at + 8 :]
             if compression == 'zstd':
+                told = zstandard.frame_content_size(packed)
+                if told not in (size, _NOT_TOLD):
+                    raise self._damaged(part, f'{told:,} bytes in place of {size:,}')
                 content = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
             elif compression == 'lz4':
                 content = lz4.frame.decompress(packed)
@@ -383,5 +583,5 @@ class Bag:
         place = f'bytes {part.start - _HEAD.size:,} to {part.start + part.length:,}'
         return ConfigurationError(
             f'{self.files[part.file]}: chunk {part.number} is damaged: {reason} ({place}, '
-            f't = {part.start_ns / 1e9:.1f} s to {part.end_ns / 1e9:.1f} s)'
+            f'{_span(part.start_ns, part.end_ns)})'
         )

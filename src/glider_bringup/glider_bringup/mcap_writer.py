@@ -5,8 +5,10 @@
 The records are those of the `mcap` package. What its own writer does message by message, a
 `McapWriter` can also do for a block of many ticks at once, which the direct engine needs: a
 mission of 30 h has ten million messages. The bytes depend on what is written and on nothing else.
+Chunks, attachments, the data section and the summary all carry checksums.
 """
 
+import os
 import struct
 import zlib
 from collections.abc import Sequence
@@ -32,6 +34,8 @@ from mcap.records import (
     SummaryOffset,
 )
 
+from glider_bringup.files import not_written
+
 MAGIC = b'\x89MCAP0\r\n'
 _MESSAGE = struct.Struct('<BQHIQQ')
 _INDEX_ENTRY = struct.Struct('<QQ')
@@ -39,11 +43,18 @@ _LIBRARY = 'glider_bringup'
 
 
 class McapWriter:
-    """One MCAP file. Messages are complete on disk after `flush`, the file after `close`."""
+    """One MCAP file.
+
+    After `flush` the operating system has every message: they outlive this process. After `sync`
+    the disk has them: they outlive the machine. The file is complete after `close`. All three
+    raise a `DiskError` if the disk takes no more; what was flushed before can be read.
+    """
 
     def __init__(self, path: Path, profile: str) -> None:
-        self._file = path.open('wb')
-        self._file.write(MAGIC)
+        self._path = path
+        self._file = path.open('wb', buffering=0)
+        self._pending = bytearray(MAGIC)  #: of the file, not yet handed to the operating system
+        self._handed, self._checksum = 0, 0  #: length of what was, and its CRC
         self._compressor = zstandard.ZstdCompressor(level=3)
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
@@ -61,9 +72,24 @@ class McapWriter:
         builder = RecordBuilder()
         record.write(builder)
         data = builder.end()
-        offset = self._file.tell()
-        self._file.write(data)
+        offset = self._tell()
+        self._pending += data
         return offset, len(data)
+
+    def _tell(self) -> int:
+        """Place in the file of what comes next."""
+        return self._handed + len(self._pending)
+
+    def _hand_over(self) -> None:
+        """Write what is pending; what a full disk does not take stays pending."""
+        try:
+            while self._pending:
+                written = self._file.write(self._pending)
+                self._checksum = zlib.crc32(memoryview(self._pending)[:written], self._checksum)
+                self._handed += written
+                del self._pending[:written]
+        except OSError as error:
+            raise not_written(self._path, error) from None
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Define a message type; returns its id."""
@@ -168,7 +194,14 @@ class McapWriter:
         """Finish the chunk at hand and hand it to the operating system."""
         if self._chunk_start_ns is not None:
             self._end_chunk(self._chunk_start_ns)
-        self._file.flush()
+        self._hand_over()
+
+    def sync(self) -> None:
+        """Bring what was flushed to disk, and wait until it is there."""
+        try:
+            os.fdatasync(self._file.fileno())
+        except OSError as error:
+            raise not_written(self._path, error) from None
 
     def _end_chunk(self, start_ns: int) -> None:
         data = self._compressor.compress(self._chunk)
@@ -181,14 +214,14 @@ class McapWriter:
             uncompressed_size=len(self._chunk),
         )
         offset, length = self._put(chunk)
-        index_start = self._file.tell()
+        index_start = self._tell()
         index_offsets = {}
         for channel_id, entries in sorted(self._indexes.items()):
-            index_offsets[channel_id] = self._file.tell()
+            index_offsets[channel_id] = self._tell()
             head = struct.pack(
                 '<BQHI', Opcode.MESSAGE_INDEX, 6 + len(entries), channel_id, len(entries)
             )
-            self._file.write(head + entries)
+            self._pending += head + entries
         self._chunk_indexes.append(
             ChunkIndex(
                 message_start_time=start_ns,
@@ -196,7 +229,7 @@ class McapWriter:
                 chunk_start_offset=offset,
                 chunk_length=length,
                 message_index_offsets=index_offsets,
-                message_index_length=self._file.tell() - index_start,
+                message_index_length=self._tell() - index_start,
                 compression='zstd',
                 compressed_size=len(data),
                 uncompressed_size=len(self._chunk),
@@ -208,11 +241,11 @@ class McapWriter:
 
     # ------------------------------------------------------------------ end
 
-    def close(self) -> None:
-        """Write the summary and close the file."""
+    def close(self, sync: bool = False) -> None:
+        """Write the summary, sync the file if so wanted, and close it."""
         self.flush()
-        self._put(DataEnd(0))
-        summary_start = self._file.tell()
+        self._put(DataEnd(self._checksum))
+        summary_start = self._tell()
         summary = RecordBuilder()
         offsets = []
         for opcode, records in self._summary().items():
@@ -226,9 +259,12 @@ class McapWriter:
             offset.write(summary)
         data = summary.end()
         head = struct.pack('<BQQQ', Opcode.FOOTER, 20, summary_start, offsets_start)
-        self._file.write(data)
+        self._pending += data
         self._put(Footer(summary_start, offsets_start, zlib.crc32(head, zlib.crc32(data))))
-        self._file.write(MAGIC)
+        self._pending += MAGIC
+        self._hand_over()
+        if sync:
+            self.sync()
         self._file.close()
 
     def _summary(self) -> dict[Opcode, list]:

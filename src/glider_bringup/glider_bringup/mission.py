@@ -16,18 +16,13 @@ from typing import NamedTuple
 
 from glider_bringup.direct import MissionParams, MissionState, fly_blocks
 from glider_bringup.figure import draw_run
+from glider_bringup.files import write_whole
 from glider_bringup.interrupts import interrupts_noted
-from glider_bringup.page import FlownRun, write_page
+from glider_bringup.mcap_reader import Bag, has_bag
+from glider_bringup.page import FlownRun
 from glider_bringup.report import report_page
-from glider_bringup.ros.bag import BagWriter
-from glider_bringup.ros.bag_log import (
-    LogWriter,
-    attachments,
-    end_of_run,
-    has_bag,
-    read_blocks,
-    recorded_and_lost,
-)
+from glider_bringup.ros.bag import BagWriter, Sync
+from glider_bringup.ros.bag_log import LogWriter, RecordedLog
 from glider_bringup.ros.node_parameters import node_parameters, write_parameters
 from glider_bringup.runner import NAMESPACE, node_commands, run_nodes
 from glider_bringup.scenario import Scenario, load_scenario
@@ -36,8 +31,9 @@ from glider_bringup.traces import TRACED, Tracer, Traces, load_traces
 from glider_guidance.guidance import path_time_s
 from glider_guidance.profile import mission_time_s
 from glider_model.files import is_file, read_json
+from glider_model.ros.health import FINISHED
 from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_S
+from glider_model.signals import TICK_NS, TICK_S
 from glider_model.vehicle import load_vehicle, vehicle_path
 
 SCENARIO_FILE, VEHICLE_FILE, SCORE_FILE = 'scenario.yaml', 'vehicle.yaml', 'score.json'
@@ -105,9 +101,9 @@ def make_run_folder(scenario: Scenario, out: Path | None) -> Path:
                 f'empty folder)'
             )
         vehicle = vehicle_path(scenario.vehicle)
-        (folder / VEHICLE_FILE).write_bytes(vehicle.read_bytes())
+        write_whole(folder / VEHICLE_FILE, vehicle.read_bytes())
         beside = scenario.model_copy(update={'vehicle': VEHICLE_FILE})
-        (folder / SCENARIO_FILE).write_text(beside.to_yaml(), encoding='utf-8')
+        write_whole(folder / SCENARIO_FILE, beside.to_yaml())
     except OSError as error:
         raise ConfigurationError(f'{folder}: {error.strerror}') from None
     return folder
@@ -156,11 +152,12 @@ def fly_direct(
     with_bag: bool,
     progress: Progress,
     tracer: Tracer | None = None,
+    sync: Sync = 'end',
 ) -> tuple[Flight, dict]:
     """Fly with the direct engine; Ctrl-C ends it as aborted with what was flown."""
     state, params = mission_of(scenario)
     scorer = _scorer(scenario)
-    bag = _open_bag(scenario, folder) if with_bag else None
+    bag = _open_bag(scenario, folder, sync) if with_bag else None
     takers = [taker for taker in (scorer, tracer, bag) if taker is not None]
     status, reason, ticks = 'completed', '', 0
     start = time.perf_counter()
@@ -180,10 +177,11 @@ def fly_direct(
     return Flight(status, reason, wall_time_s, recorded, 0), _score(scenario, scorer)
 
 
-def _open_bag(scenario: Scenario, folder: Path) -> LogWriter:
+def _open_bag(scenario: Scenario, folder: Path, sync: Sync) -> LogWriter:
     attachments = [folder / SCENARIO_FILE, folder / VEHICLE_FILE]
     points = scenario.path.points(500)
-    return LogWriter(BagWriter(folder, scenario.name, attachments=attachments), points)
+    bag = BagWriter(folder, scenario.name, attachments=attachments, sync=sync)
+    return LogWriter(bag, points)
 
 
 def fly_nodes(
@@ -195,6 +193,7 @@ def fly_nodes(
     namespace: str | None = None,
     tracer: Tracer | None = None,
     on_read: Callable[[int], None] = lambda ticks: None,
+    sync: Sync = 'end',
 ) -> tuple[Flight, dict]:
     """Fly over node processes and topics; the score is read back from the bag.
 
@@ -203,7 +202,9 @@ def fly_nodes(
     their own have their clock in it.
     """
     attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)
-    parameters = node_parameters(scenario, speed=speed, record_to=folder, attachments=attachments)
+    parameters = node_parameters(
+        scenario, speed=speed, record_to=folder, attachments=attachments, sync=sync
+    )
     place = namespace or NAMESPACE
     write_parameters(parameters, folder / PARAMETERS_FILE, place)
     result = run_nodes(
@@ -214,14 +215,16 @@ def fly_nodes(
     )
     if result.exit_code == EXIT_CONFIGURATION:
         raise ConfigurationError(result.reason)
-    completed = result.status == 'completed'
+    completed, reason = result.status == 'completed', result.reason
     scorer = _scorer(scenario)
     recorded, lost = 0, 0
     if has_bag(folder):  # else it ended before the recorder was up
-        _replay(folder, scorer, tracer, on_read)
-        recorded, lost = recorded_and_lost(folder, completed)
+        log = _replay(Bag(folder), scorer, tracer, on_read)
+        if completed and (missing := log.missing(None)):
+            completed, reason = False, missing
+        recorded, lost = sum(log.counts.values()), log.lost(completed)
     status = 'completed' if completed else 'aborted'
-    flight = Flight(status, result.reason, result.flight_s, recorded, lost)
+    flight = Flight(status, reason, result.flight_s, recorded, lost)
     return flight, _score(scenario, scorer)
 
 
@@ -263,14 +266,16 @@ def scorecard(scenario: Scenario, engine: str | None, flight: Flight, scores: di
 
 def write_score(folder: Path, card: dict) -> None:
     """Write ``score.json``."""
-    (folder / SCORE_FILE).write_text(json.dumps(card, indent=2) + '\n', encoding='utf-8')
+    write_whole(folder / SCORE_FILE, json.dumps(card, indent=2) + '\n')
 
 
 def score_again(run: Path, progress: Reading = lambda ticks, total: None) -> dict:
     """Scorecard of a run, computed afresh from its bag if it has one.
 
     How the run ended is what its `SCORE_FILE` says, or the bag where there is none: a recording
-    made by the launch file, or the MCAP file alone.
+    made by the launch file, or the MCAP file alone. A run of which ticks are missing in its bag is
+    not completed, whatever is said: its status is ``aborted``, and the reason names what is
+    missing. Reports, figures and comparisons keep to that.
 
     Parameters
     ----------
@@ -281,52 +286,71 @@ def score_again(run: Path, progress: Reading = lambda ticks, total: None) -> dic
     Raises
     ------
     ConfigurationError
-        If it holds no run.
+        If it holds no run, its bag is damaged, or not one tick is in it.
     """
     old = _read_score(run)
     if not has_bag(run):
         return old
-    with _flown(run) as (scenario, _):
-        return _score_bag(run, scenario, old, progress)
+    bag = Bag(run)
+    with _flown(run, bag) as (scenario, _):
+        return _score_bag(run, bag, scenario, old, progress)
 
 
 def _score_bag(
-    run: Path, scenario: Scenario, old: dict, progress: Reading, tracer: Tracer | None = None
+    run: Path,
+    bag: Bag,
+    scenario: Scenario,
+    old: dict,
+    progress: Reading,
+    tracer: Tracer | None = None,
 ) -> dict:
     """Scorecard of a bag, which a tracer may follow; ``old`` is the one the run has, or empty."""
     scorer = _scorer(scenario)
     total = old.get('ticks') or planned_ticks(scenario)
-    _replay(run, scorer, tracer, lambda ticks: progress(ticks, max(ticks, total)))
+    log = _replay(bag, scorer, tracer, lambda ticks: progress(ticks, max(ticks, total)))
+    missing = log.missing(old.get('ticks'))
     if old:
         complete, reason = old['status'] != 'aborted', old['reason']
     else:
-        complete, reason = end_of_run(run)
-    recorded, lost = recorded_and_lost(run, complete)
-    if lost and not scorer.ticks:
-        raise ConfigurationError(
-            f'{run}: cannot be scored: its first tick is not complete, as in a free-running '
-            f'recording (allowed: runs in lockstep, with every message of every tick)'
+        complete, reason = _end_of_run(log)
+    lost = log.lost(complete)
+    if not log.ticks and (lost or missing):
+        why = missing or (
+            'its first tick is not complete, as in a free-running recording (allowed: runs in '
+            'lockstep, with every message of every tick)'
         )
+        raise ConfigurationError(f'{run}: cannot be scored: {why}')
+    if missing and (complete or log.ticks < old.get('ticks', 0)):
+        complete, reason = False, '; '.join(one for one in (reason, missing) if one)
     status = 'completed' if complete else 'aborted'
+    recorded = sum(log.counts.values())
     flight = Flight(status, reason, old.get('wall_time_s'), recorded, lost)
     engine = old.get('engine') or ('nodes' if (run / PARAMETERS_FILE).exists() else None)
     return scorecard(scenario, engine, flight, _score(scenario, scorer))
 
 
+def _end_of_run(log: RecordedLog) -> tuple[bool, str]:
+    """Whether the plant said in a bag that the run is complete; if not, what it said instead."""
+    if log.end is None:
+        return False, 'the recording was stopped before the run was complete'
+    complete = log.end.phase == FINISHED
+    return complete, '' if complete else log.end.message
+
+
 def _replay(
-    run: Path,
-    scorer: Scorer | None,
+    bag: Bag,
+    scorer: Scorer,
     tracer: Tracer | None,
-    progress: Callable[[int], None] = lambda ticks: None,
-) -> None:
+    progress: Callable[[int], None],
+) -> RecordedLog:
     """Give the rows of a bag to those who want them; ``progress`` gets the ticks read."""
     takers = [taker for taker in (scorer, tracer) if taker is not None]
-    ticks = 0
-    for log in read_blocks(run, TRACED if tracer else ()):
+    log = RecordedLog(bag, TRACED if tracer else ())
+    for rows in log.blocks():
         for taker in takers:
-            taker.add(log)
-        ticks += len(log)
-        progress(ticks)
+            taker.add(rows)
+        progress(log.ticks)
+    return log
 
 
 def _read_score(run: Path) -> dict:
@@ -347,7 +371,7 @@ def _read_score(run: Path) -> dict:
 
 
 @contextmanager
-def _flown(run: Path) -> Iterator[tuple[Scenario, str]]:
+def _flown(run: Path, bag: Bag | None) -> Iterator[tuple[Scenario, str]]:
     """Scenario of a run, and the text of its file.
 
     It is the file beside the bag or, if there is none, the one stored in it.
@@ -356,7 +380,7 @@ def _flown(run: Path) -> Iterator[tuple[Scenario, str]]:
     if file.is_file():
         yield load_scenario(str(file), recorded=True), file.read_text(encoding='utf-8')
         return
-    stored = attachments(run) if has_bag(run) else {}
+    stored = bag.attachments if bag else {}
     if SCENARIO_FILE not in stored:
         raise ConfigurationError(
             f'{run}: no {SCENARIO_FILE} beside the bag, and none stored in it: put the one that '
@@ -388,23 +412,29 @@ def read_run(
     Raises
     ------
     ConfigurationError
-        If it holds no run, or nothing that could be drawn.
+        If it holds no run, its bag is damaged, or there is nothing that could be drawn.
     """
     card, kept = _read_score(run), run / TRACES_FILE
-    with _flown(run) as (scenario, as_flown):
-        traces = None
-        if card and traced and kept.is_file():
-            traces = load_traces(kept)
-        elif traced or not card:
-            if not has_bag(run):
-                raise ConfigurationError(
-                    f'{run}: nothing to draw, it has neither {TRACES_FILE} nor a bag (allowed: a '
-                    f'run flown without --no-report, or with a bag)'
-                )
+    bag = Bag(run) if has_bag(run) else None
+    with _flown(run, bag) as (scenario, as_flown):
+        is_kept = card and (not traced or kept.is_file())
+        if is_kept and (bag is None or _covers(bag, card)):
+            traces = load_traces(kept) if traced else None
+        elif bag is None:
+            raise ConfigurationError(
+                f'{run}: nothing to draw, it has neither {TRACES_FILE} nor a bag (allowed: a '
+                f'run flown without --no-report, or with a bag)'
+            )
+        else:
             tracer = make_tracer(scenario) if traced else None
-            afresh = _score_bag(run, scenario, card, progress, tracer)
-            card, traces = card or afresh, tracer.result() if tracer else None
+            card = _score_bag(run, bag, scenario, card, progress, tracer)
+            traces = tracer.result() if tracer else None
         return _flown_run(run, scenario, as_flown, card, traces)
+
+
+def _covers(bag: Bag, card: dict) -> bool:
+    """Whether a bag goes as far as the scorecard of its run."""
+    return not bag.cut and bag.end_ns >= (card['ticks'] - 1) * TICK_NS
 
 
 def _flown_run(
@@ -424,32 +454,21 @@ def keep_traces(scenario: Scenario, folder: Path, card: dict, tracer: Tracer) ->
     ConfigurationError
         If it cannot be written.
     """
-    file, traces = folder / TRACES_FILE, tracer.result()
-    try:
-        traces.save(file)
-    except OSError as error:
-        raise ConfigurationError(f'{file}: cannot be written: {error.strerror}') from None
+    traces = tracer.result()
+    traces.save(folder / TRACES_FILE)
     as_flown = (folder / SCENARIO_FILE).read_text(encoding='utf-8')
     return _flown_run(folder, scenario, as_flown, card, traces)
 
 
 def write_report(run: FlownRun, file: Path) -> None:
-    """Write the report of a run; see `save_page`."""
-    save_page(file, report_page(run))
-
-
-def save_page(file: Path, text: str) -> None:
-    """Write a page.
+    """Write the report of a run.
 
     Raises
     ------
     ConfigurationError
         If the file cannot be written.
     """
-    try:
-        write_page(file, text)
-    except OSError as error:
-        raise ConfigurationError(f'{file}: cannot be written: {error.strerror}') from None
+    write_whole(file, report_page(run))
 
 
 def draw(run: Path, file: Path, progress: Reading = lambda ticks, total: None) -> None:
@@ -462,7 +481,4 @@ def draw(run: Path, file: Path, progress: Reading = lambda ticks, total: None) -
     """
     flown = read_run(run, progress)
     title = f'{flown.scenario.name}: {flown.scenario.description}'
-    try:
-        draw_run(flown.traces, title, file)
-    except (OSError, ValueError) as error:
-        raise ConfigurationError(f'{file}: cannot be written: {error}') from None
+    draw_run(flown.traces, title, file)

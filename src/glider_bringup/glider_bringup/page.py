@@ -4,7 +4,6 @@
 
 import base64
 import json
-import os
 import zlib
 from html import escape
 from pathlib import Path
@@ -147,21 +146,6 @@ def make_page(title: str, body: str, data: dict[str, Any]) -> str:
         library=pack(get_plotlyjs().encode()) if data['panels'] else '',
         script=read('page.js'),
     )
-
-
-def write_page(file: Path, text: str) -> None:
-    """Write a page whole, or not at all.
-
-    Raises
-    ------
-    OSError
-    """
-    draft = file.with_name(f'.{file.name}.part')
-    try:
-        draft.write_text(text, encoding='utf-8')
-        os.replace(draft, file)
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def table(rows, header=()) -> str:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from glider_bringup.experiments import Experiment
+from glider_bringup.files import save_figure
 from glider_bringup.record import Record
 
 #: Flights by experiment, case, controller and guidance.
@@ -73,8 +74,7 @@ def draw(
         figure = pyplot.figure(figsize=(11.0, 8.0), layout='constrained')
         drawing.draw(figure, drawing.experiment, flights, told[drawing.experiment])
         file = folder / f'figure_{drawing.number:02d}.png'
-        figure.savefig(file, dpi=100)
-        pyplot.close(figure)
+        save_figure(figure, file, dpi=100)
         files.append(file)
     return files
 

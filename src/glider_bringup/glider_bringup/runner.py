@@ -15,7 +15,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -365,11 +365,11 @@ def run_nodes(
     RunnerResult
         No process is left when it comes back. SIGINT and SIGTERM to this process abort the run.
     """
-    with domain_id() as domain, log_file.open('w', encoding='utf-8') as log:
+    with domain_id() as domain, log_file.open('wb', buffering=0) as log:
 
         def tell(line: str) -> None:
-            log.write(line + '\n')
-            log.flush()
+            with suppress(OSError):  # of a full disk, which must not end the run before its time
+                log.write(f'{line}\n'.encode())
             on_log(line)
 
         run = _Run(on_progress, tell)

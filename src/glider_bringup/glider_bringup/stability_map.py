@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
+from glider_bringup.files import save_figure
 from glider_bringup.scenario import Scenario
 from glider_bringup.sweep_result import read_dataset
 from glider_guidance.los import crab_heading
@@ -238,12 +239,7 @@ def draw_map(stability: StabilityMap, file: Path) -> None:
         f'Each cell is one flight of {stability.vehicle}, at the tip of the arrow of its current'
     )
     figure.legend(handles=_legend(stability), loc='outside lower center', ncols=2)
-    try:
-        figure.savefig(file, dpi=150)
-    except (OSError, ValueError) as error:
-        raise ConfigurationError(f'{file}: cannot be written: {error}') from None
-    finally:
-        pyplot.close(figure)
+    save_figure(figure, file, dpi=150)
 
 
 def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray) -> None:

@@ -8,12 +8,12 @@ depends on the inputs alone: not on the workers, their order, or interruptions.
 
 import hashlib
 import math
-import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from socket import gethostname
 from typing import Any, NamedTuple
 
+from glider_bringup.files import whole_file
 from glider_bringup.journal import Journal
 from glider_bringup.mission import Flight, fly_direct, planned_ticks, scorecard
 from glider_bringup.pool import WORKER_DIED, Pool, Progress, WorkError
@@ -257,12 +257,8 @@ def write_result(plan: Plan, journal: Journal, file: Path) -> dict[str, Any]:
         If the file cannot be written.
     """
     dataset = make_dataset(plan, journal.records(), STATUSES)
-    part = file.with_suffix('.part')
-    try:
-        write_dataset(dataset, part)
-        os.replace(part, file)
-    except OSError as error:
-        raise ConfigurationError(f'{file}: {error.strerror or error}') from None
+    with whole_file(file) as stream:
+        write_dataset(dataset, Path(stream.name))
     status = dataset['status'].values.ravel()
     return {
         'sweep': plan.sweep.name,

@@ -10,14 +10,13 @@ run does not depend on the blocks in which it came. Buckets begin with two ticks
 """
 
 import math
-import os
-import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from glider_bringup.direct import COLUMNS
+from glider_bringup.files import whole_file
 from glider_bringup.truth import TrueMotion
 from glider_model.current import KNOT_MPS
 from glider_model.frames import poses_from_wire, wrap_angle
@@ -111,24 +110,20 @@ class Traces:
 
         Raises
         ------
-        OSError
+        ConfigurationError
+            If it cannot be written.
         """
-        draft = file.with_name(f'.{file.name}')
-        try:
-            with draft.open('wb') as stream:
-                np.savez_compressed(
-                    stream,
-                    version=VERSION,
-                    ticks=self.ticks,
-                    spacing_s=self.spacing_s,
-                    missing=np.array([self.missing[name] for name in CURVES]),
-                    flagged=np.array([self.flagged[name] for name in _FLAGS]),
-                    **self.curves,
-                    **self.samples,
-                )
-            os.replace(draft, file)
-        finally:
-            draft.unlink(missing_ok=True)
+        with whole_file(file) as stream:
+            np.savez_compressed(
+                stream,
+                version=VERSION,
+                ticks=self.ticks,
+                spacing_s=self.spacing_s,
+                missing=np.array([self.missing[name] for name in CURVES]),
+                flagged=np.array([self.flagged[name] for name in _FLAGS]),
+                **self.curves,
+                **self.samples,
+            )
 
 
 def load_traces(file: Path) -> Traces:
@@ -141,6 +136,8 @@ def load_traces(file: Path) -> Traces:
     """
     try:
         with np.load(file) as archive:
+            if bad := archive.zip.testzip():
+                raise ConfigurationError(f'{file}: damaged: the checksum (CRC) of {bad} is wrong')
             if int(archive['version']) != VERSION:
                 raise ConfigurationError(f'{file}: made by another version of this program')
             return Traces(
@@ -151,11 +148,11 @@ def load_traces(file: Path) -> Traces:
                 dict(zip(CURVES, archive['missing'].tolist(), strict=True)),
                 dict(zip(_FLAGS, archive['flagged'].tolist(), strict=True)),
             )
-    except OSError as error:
-        raise ConfigurationError(f'{file}: {error.strerror or error}') from None
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        if isinstance(error, ConfigurationError):
-            raise
+    except ConfigurationError:
+        raise
+    except FileNotFoundError as error:
+        raise ConfigurationError(f'{file}: {error.strerror}') from None
+    except Exception as error:  # of damaged bytes numpy, zipfile and zlib make all kinds
         raise ConfigurationError(f'{file}: damaged: {error}') from None
 
 

@@ -11,6 +11,7 @@ import typer
 from rich.table import Table
 
 from glider_bringup.console import Json, Run, beside, counter, messages, output
+from glider_bringup.files import write_whole
 from glider_model.settings import ConfigurationError
 
 app = typer.Typer()
@@ -63,7 +64,7 @@ def compare(
     cards, found = [run.card for run in runs], compared.differences(runs)
     if out:
         with messages.status('writing the page'):
-            mission.save_page(out, compared.compare_page(runs))
+            write_whole(out, compared.compare_page(runs))
         messages.print(f'page: {out}', soft_wrap=True)
     if as_json:
         each = zip(names, paths, cards, strict=True)

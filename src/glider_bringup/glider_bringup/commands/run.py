@@ -21,6 +21,7 @@ from glider_bringup.console import (
     number,
     progress,
 )
+from glider_bringup.files import DiskError
 from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, parse_assignment
 from glider_bringup.scorecard import print_card
@@ -30,6 +31,7 @@ from glider_model.signals import TICK_S
 
 app = typer.Typer()
 Engine = Enum('Engine', {text: text for text in get_args(Literal['nodes', 'direct'])})
+When = Enum('When', {text: text for text in ('never', 'end', 'chunk')})
 Guidance = choices('Guidance', LosSettings, 'method')
 
 
@@ -80,6 +82,13 @@ def run(
     bag: Annotated[
         bool, typer.Option('--bag', help='Record a bag in a direct run too; nodes always do.')
     ] = False,
+    sync: Annotated[
+        When,
+        typer.Option(
+            help='When the recording is synced to disk, to outlive a loss of power: never, at its '
+            'end, or with every chunk of 12.8 s, before the flight goes on.'
+        ),
+    ] = When.end,
     report: Annotated[
         bool,
         typer.Option('--report/--no-report', help='Write report.html, and what it is drawn from.'),
@@ -117,7 +126,9 @@ def run(
         given_domain()
     flown = load_scenario(scenario, fields)
     with _view(view_port, place) if view else nullcontext() as begin_view:
-        card, folder = _fly(flown, engine, rate, place, out, bag, report, begin_view)
+        card, folder, has_room = _fly(
+            flown, engine, rate, place, out, bag, sync.value, report, begin_view
+        )
     if as_json:
         print(json.dumps(card))
     else:
@@ -126,6 +137,8 @@ def run(
         raise typer.Exit(
             EXIT_INTERRUPTED if card['reason'].startswith('stopped by') else EXIT_FAILED
         )
+    if not has_room:
+        raise typer.Exit(EXIT_FAILED)
 
 
 @contextmanager
@@ -149,10 +162,14 @@ def _fly(
     namespace: str | None,
     out: Path | None,
     bag: bool,
+    sync: str,
     report: bool,
     begin_view: Callable[[], None] | None,
-) -> tuple[dict, Path]:
-    """Fly and score a scenario with a progress bar; the scorecard and the run folder."""
+) -> tuple[dict, Path, bool]:
+    """Fly and score a scenario with a progress bar.
+
+    Returns the scorecard, the run folder, and whether the disk had room for the report.
+    """
     from glider_bringup import mission
 
     folder = mission.make_run_folder(scenario, out)
@@ -163,21 +180,23 @@ def _fly(
             if begin_view:
                 flying = _after_first(begin_view, flying)
             flight, scores = mission.fly_nodes(
-                scenario, folder, rate, flying, _print_log, namespace, tracer, reading
+                scenario, folder, rate, flying, _print_log, namespace, tracer, reading, sync
             )
         else:
-            flight, scores = mission.fly_direct(scenario, folder, bag, flying, tracer)
+            flight, scores = mission.fly_direct(scenario, folder, bag, flying, tracer, sync)
     card = mission.scorecard(scenario, engine.value, flight, scores)
     mission.write_score(folder, card)
-    if tracer:
-        _write_report(scenario, folder, card, tracer)
+    has_room = _write_report(scenario, folder, card, tracer) if tracer else True
     if flight.reason:
         messages.print(f'{flight.status}: {flight.reason}', style='red')
-    return card, folder
+    return card, folder, has_room
 
 
-def _write_report(scenario: Scenario, folder: Path, card: dict, tracer) -> None:
-    """Write the report of a run that has its score already: whatever happens, that is kept."""
+def _write_report(scenario: Scenario, folder: Path, card: dict, tracer) -> bool:
+    """Write the report of a run that has its score already: whatever happens, that is kept.
+
+    Returns whether the disk had room for it.
+    """
     from glider_bringup import mission
 
     file = folder / mission.REPORT_FILE
@@ -188,8 +207,9 @@ def _write_report(scenario: Scenario, folder: Path, card: dict, tracer) -> None:
     except (Exception, KeyboardInterrupt) as error:
         cause = str(error) or type(error).__name__
         messages.print(f'no report: {cause}', style='red', soft_wrap=True)
-    else:
-        messages.print(f'report: {file}', soft_wrap=True)
+        return not isinstance(error, DiskError)
+    messages.print(f'report: {file}', soft_wrap=True)
+    return True
 
 
 def _after_first(begin: Callable[[], None], update: Callable) -> Callable:

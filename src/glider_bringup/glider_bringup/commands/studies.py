@@ -22,6 +22,7 @@ from glider_bringup.console import (
     output,
     workers_at_work,
 )
+from glider_bringup.files import write_whole
 from glider_bringup.scenario import DEFAULT_SCENARIO, parse_assignment
 from glider_model.signals import TICK_S
 
@@ -90,7 +91,7 @@ def montecarlo(
     whole = study.report(scenario, fields, summary, flights, airframes)
     if out:
         text = json.dumps(whole, indent=2) + '\n'
-        (out / study.RESULT_FILE).write_text(text, encoding='utf-8')
+        write_whole(out / study.RESULT_FILE, text)
     if as_json:
         print(json.dumps(summary))
     else:
@@ -162,7 +163,7 @@ def experiments(
         with messages.status('drawing'):
             drawn = paper_figures.draw(planned, rows, records, out)
         text = json.dumps(result, indent=2) + '\n'
-        (out / study.RESULT_FILE).write_text(text, encoding='utf-8')
+        write_whole(out / study.RESULT_FILE, text)
         for file in drawn:
             messages.print(f'drawn: {file}', soft_wrap=True)
     if as_json:

@@ -12,7 +12,8 @@ from pathlib import Path
 from pydantic import Field
 from std_msgs.msg import Header
 
-from glider_bringup.ros.bag import BagWriter
+from glider_bringup.files import DiskError
+from glider_bringup.ros.bag import BagWriter, Sync
 from glider_bringup.tick_order import TickOrder
 from glider_model.ros import health, messages, qos
 from glider_model.ros.codec import to_cdr
@@ -22,6 +23,9 @@ from glider_model.ros.parameters import declare_settings
 from glider_model.ros.tick import FAREWELL_S, Input, Stop, TickNode, run
 from glider_model.settings import ConfigurationError, Settings
 from glider_model.signals import TICK_NS
+
+#: Exit code where the disk takes no more.
+EXIT_DISK = 1
 
 _DRAIN_S = 0.02
 _PROGRESS_S = 0.25
@@ -36,6 +40,11 @@ class RecorderSettings(Settings):
     folder: str = Field('.', description='folder of the run')
     name: str = Field('run', description='the file is called <name>_0.mcap')
     attachments: list[str] = Field([], description='files to store in the recording')
+    sync: Sync = Field(
+        'end',
+        description='when the recording is synced to disk, to outlive a loss of power: never, at '
+        'its end, or with every chunk too, before its ticks are acknowledged',
+    )
     progress: bool = Field(False, description='print progress as JSON lines on standard output')
 
 
@@ -51,10 +60,12 @@ class RecorderNode(TickNode):
                 self.settings.name,
                 {name: self.resolve_topic_name(name) for name in RECORDED},
                 self.settings.attachments,
+                sync=self.settings.sync,
             )
         except OSError as error:
             raise ConfigurationError(f'{error.filename}: {error.strerror}') from None
         self.order = TickOrder(PER_TICK, TICK_NS, self.write)
+        self.recorded_ns = -TICK_NS  #: newest tick that outlives this process
         self.has_path = False
         self.stage, self.last_odom = '', b''
         self.final_ns: int | None = None
@@ -154,15 +165,29 @@ class RecorderNode(TickNode):
                 self.keep(item, raw)
         while (array := take(self.events)) is not None:
             self.on_event(array)
-        if not self.ticks.lockstep:
-            self.order.write_rest()
-            self.bag.flush()
-        elif self.order.write_complete(self.bag.end_tick):
-            self.publish_recorded()
+        try:
+            self.save()
+        except DiskError as error:
+            raise Stop(EXIT_DISK, str(error)) from None
         if self.last_odom and time.monotonic() - self.progress_s > _PROGRESS_S:
             self.print_progress()
         if self.stopped or (self.final_ns is not None and self.order.written_ns >= self.final_ns):
             raise Stop(0)
+
+    def save(self) -> None:
+        """Write what has come as far as it is complete, and let the plant go on."""
+        if not self.ticks.lockstep:
+            self.order.write_rest()
+            self.bag.flush()
+        elif self.order.write_complete(self.end_tick):
+            self.publish_recorded()
+
+    def end_tick(self, stamp_ns: int) -> bool:
+        """Say that a tick is complete; whether all up to it can be acknowledged."""
+        if not self.bag.end_tick(stamp_ns):
+            return False
+        self.recorded_ns = stamp_ns
+        return True
 
     def write(self, name: str, stamp_ns: int, raw: bytes) -> None:
         """Write one message, in the order that the recording shall have."""
@@ -173,7 +198,7 @@ class RecorderNode(TickNode):
     def publish_recorded(self) -> None:
         """Let the plant go on."""
         header = Header(frame_id=self.process)
-        header.stamp.sec, header.stamp.nanosec = divmod(self.order.written_ns, 1_000_000_000)
+        header.stamp.sec, header.stamp.nanosec = divmod(self.recorded_ns, 1_000_000_000)
         self.recorded.publish(header)
 
     def print_progress(self, **more) -> None:
@@ -199,8 +224,11 @@ class RecorderNode(TickNode):
 
     def close(self) -> None:
         """Write what is left, and complete the folder."""
-        self.order.write_rest()
-        self.bag.close()
+        try:
+            self.order.write_rest()
+            self.bag.close()
+        except DiskError as error:
+            raise Stop(EXIT_DISK, str(error)) from None
         complete = self.final_ns is not None and 0 <= self.final_ns <= self.order.written_ns
         self.print_progress(complete=complete, counts=self.bag.counts)
         if self.context.ok():

@@ -4,21 +4,24 @@
 
 import errno
 import json
-import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from ament_index_python.packages import get_package_share_directory
 from rclpy.qos import QoSProfile
 
+from glider_bringup.files import write_whole
 from glider_bringup.mcap_writer import McapWriter
 from glider_model.ros.messages import TOPICS, Topic
 from glider_model.signals import TICK_NS
 
 #: Ticks per chunk of the file. A chunk is what can be lost when the recorder is killed.
 CHUNK_TICKS = 128
+#: When a recording is synced to disk: never, when it is complete, or with every chunk too.
+Sync = Literal['never', 'end', 'chunk']
 
 _FIELD_TYPE = re.compile(r'(?:^|\n)\s*([a-zA-Z0-9_/]+)(?:\[[^\]]*\])?(?:<=[0-9]+)?\s+')
 _PRIMITIVES = {
@@ -102,11 +105,15 @@ class BagWriter:
         Files stored in the MCAP under their own names.
     topics : iterable of Topic
         In the order in which a tick is written; names given to `write` are theirs.
+    sync : str
+        When the file is synced to disk; what was flushed only is safe from a kill of this process,
+        what was synced from a loss of power as well.
 
     Raises
     ------
     OSError
-        If a recording is there already, or the file cannot be made.
+        If a recording is there already, or the file cannot be made. All methods that write raise
+        a `DiskError` if the disk takes no more.
     """
 
     def __init__(
@@ -116,8 +123,9 @@ class BagWriter:
         names: Mapping[str, str] | None = None,
         attachments: Iterable[Path] = (),
         topics: Iterable[Topic] = tuple(t for t in TOPICS.values() if t.recorded),
+        sync: Sync = 'end',
     ) -> None:
-        self._folder = Path(folder)
+        self._folder, self._sync = Path(folder), sync
         self._folder.mkdir(parents=True, exist_ok=True)
         self._file_name = f'{name}_0.mcap'
         file = self._folder / self._file_name
@@ -145,7 +153,7 @@ class BagWriter:
         for path in attachments:
             path = Path(path)
             self._mcap.add_attachment(path.name, 'application/yaml', path.read_bytes())
-        self._mcap.flush()
+        self.flush()
 
     def write(self, topic: str, stamp_ns: int, payload: bytes) -> None:
         """Add a serialized message."""
@@ -167,22 +175,24 @@ class BagWriter:
         channels = [self._channels[topic] for topic in payloads]
         for start, end in zip(edges[:-1], edges[1:], strict=True):
             if start:
-                self._mcap.flush()
+                self.flush()
             blocks = [payload[start:end] for payload in payloads.values()]
             self._mcap.write_rows(channels, stamps_ns[start:end], blocks)
         if len(stamps_ns):
             self.end_tick(int(stamps_ns[-1]))
 
     def end_tick(self, stamp_ns: int) -> bool:
-        """Say that a tick is complete. True if everything up to it went to disk just now."""
+        """Say that a tick is complete. True if everything up to it was flushed just now."""
         if (stamp_ns // TICK_NS + 1) % CHUNK_TICKS:
             return False
-        self._mcap.flush()
+        self.flush()
         return True
 
     def flush(self) -> None:
-        """Bring everything written so far to disk."""
+        """Write everything so far into the file, and sync it if every chunk is."""
         self._mcap.flush()
+        if self._sync == 'chunk':
+            self._mcap.sync()
 
     @property
     def counts(self) -> dict[str, int]:
@@ -194,11 +204,9 @@ class BagWriter:
         self._mcap.flush()
         text = self._metadata()
         self._mcap.add_metadata('rosbag2', {'serialized_metadata': text})
-        self._mcap.close()
+        self._mcap.close(sync=self._sync != 'never')
         lines = ''.join(f'  {line}\n' for line in text.splitlines())
-        draft = self._folder / '.metadata.yaml'
-        draft.write_text(f'rosbag2_bagfile_information:\n{lines}', encoding='utf-8')
-        os.replace(draft, self._folder / 'metadata.yaml')
+        write_whole(self._folder / 'metadata.yaml', f'rosbag2_bagfile_information:\n{lines}')
 
     def _metadata(self) -> str:
         start_ns = self._mcap.start_ns or 0

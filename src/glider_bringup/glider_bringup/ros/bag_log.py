@@ -2,38 +2,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags to log rows and back: what lets one function score and draw every kind of run."""
 
-import struct
+from collections import Counter
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
-from pathlib import Path
-from typing import IO
+from typing import NamedTuple
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from mcap.exceptions import McapError
-from mcap.reader import McapReader, NonSeekingReader, SeekingReader
-from mcap.summary import Summary
 from rclpy.serialization import deserialize_message
 
 from glider_bringup.blocks import changes_to_tell
 from glider_bringup.direct import BLOCK_TICKS, COLUMNS, ROW
+from glider_bringup.mcap_reader import Bag, Batch
 from glider_bringup.ros.bag import BagWriter
 from glider_control.nodes.control_node import TELL_EVERY_NS, saturation_event
 from glider_guidance.nodes.guidance_node import path_message, stage_event
 from glider_guidance.profile import STAGE_NAMES
 from glider_model.ros import health, messages
-from glider_model.ros.codec import to_cdr
+from glider_model.ros.codec import Codec, to_cdr
 from glider_model.ros.messages import TOPICS
-from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS
 
 _GUIDANCE, _CONTROL, _PLANT = (
     f'/glider/{node}' for node in (messages.GUIDANCE, messages.CONTROL, messages.PLANT)
 )
 _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
-
-#: What readers raise where a file ends too early.
-_CUT = (McapError, struct.error, EOFError)
 
 #: Topics that the score is computed from.
 SCORED = ('odom', 'joint_states', 'reference', 'tracking_error')
@@ -90,191 +82,206 @@ class LogWriter:
         return sum(self._bag.counts.values())
 
 
-def has_bag(run: Path) -> bool:
-    """Whether a run folder holds a bag, or is one: a single MCAP file."""
-    return run.is_file() or any(run.glob('*.mcap'))
-
-
-def _file(run: Path) -> Path:
-    """The one MCAP file of a run folder, or the file that was given in its place."""
-    files = [run] if run.is_file() else sorted(run.glob('*.mcap'))
-    if len(files) != 1:
-        raise ConfigurationError(f'{run}: expected one .mcap file, found {len(files)}')
-    return files[0]
-
-
-def _known_name(topic: str) -> str | None:
-    """Our name of a recorded topic, whatever its namespace."""
+def _known_name(topic: str) -> str:
+    """Our name of a recorded topic, whatever its namespace; its own if it is none of ours."""
     for name in TOPICS:
         if topic == name or topic.endswith('/' + name.lstrip('/')):
             return name
-    return None
-
-
-def _summary(stream: IO[bytes]) -> Summary | None:
-    """Summary at the end of a file, if its writer got so far; the stream is at its start again."""
-    try:
-        return SeekingReader(stream).get_summary()
-    except (*_CUT, OSError):
-        return None
-    finally:
-        stream.seek(0)
-
-
-def _messages(file: Path, names: Iterable[str]) -> Iterator[tuple[str, int, bytes]]:
-    """Name, log time (ns) and payload of the messages on some topics, chunk by chunk.
-
-    In order of time, or in that of the file if its writer was killed: such a file has no summary
-    and ends anywhere; it is read up to its last whole chunk. With a summary it is the order of
-    time that keeps mcap from reading all chunks before it gives the first message.
-    """
-    wanted = set(names)
-    with file.open('rb') as stream:
-        summary = _summary(stream)
-        topics = None
-        reader: McapReader = NonSeekingReader(stream)
-        if summary is not None:
-            reader = SeekingReader(stream)
-            topics = [
-                channel.topic
-                for channel in summary.channels.values()
-                if _known_name(channel.topic) in wanted
-            ]
-        try:
-            in_order = summary is not None
-            for _, channel, message in reader.iter_messages(topics, log_time_order=in_order):
-                name = _known_name(channel.topic)
-                if name in wanted:
-                    yield name, message.log_time, message.data
-        except _CUT as error:
-            if summary is not None:
-                raise ConfigurationError(f'{file}: damaged: {error}') from None
-
-
-def _diagnostics(file: Path) -> Iterator[DiagnosticArray]:
-    """Messages on /diagnostics."""
-    for _, _, payload in _messages(file, ['/diagnostics']):
-        yield deserialize_message(payload, DiagnosticArray)
-
-
-def _flag_changes(file: Path) -> list[tuple[int, str, float]]:
-    """Tick, column and new value of changes of stage and feasibility, from /diagnostics."""
-    read = {'infeasible': lambda text: text == 'true', 'stage': _stage_number}
-    return [
-        (health.stamp_of(array) // TICK_NS, pair.key, float(read[pair.key](pair.value)))
-        for array in _diagnostics(file)
-        for status in array.status
-        for pair in status.values
-        if pair.key in read
-    ]
+    return topic
 
 
 def _stage_number(name: str) -> float:
     """Number of a stage; NaN for one that this version does not know."""
-    return STAGE_NAMES.index(name) if name in STAGE_NAMES else np.nan
+    return float(STAGE_NAMES.index(name)) if name in STAGE_NAMES else np.nan
 
 
-def end_of_run(run: Path) -> tuple[bool, str]:
-    """Whether the plant said in a bag that the run is complete; if not, what it said instead."""
-    for array in _diagnostics(_file(run)):
-        report = health.end_of_run(array)
-        if report:
-            complete = report.phase == health.FINISHED
-            return complete, '' if complete else report.message
-    return False, 'the recording was stopped before the run was complete'
+def _mask(text: str) -> float:
+    """Saturation mask; 0 for what is none."""
+    return float(int(text)) if text.isdecimal() and len(text) < 7 else 0.0
 
 
-def attachments(run: Path) -> dict[str, bytes]:
-    """Files that are stored in a bag, by name."""
-    with _file(run).open('rb') as stream:
-        whole = _summary(stream) is not None
-        reader: McapReader = SeekingReader(stream) if whole else NonSeekingReader(stream)
-        found = {}
-        with suppress(*_CUT):  # of a file that was cut short, whatever comes before its end
-            for attachment in reader.iter_attachments():
-                found[attachment.name] = attachment.data
-    return found
+#: Columns of a row that events on /diagnostics tell, by their keys, and how they are read.
+_FLAGS = {
+    'infeasible': lambda text: float(text == 'true'),
+    'stage': _stage_number,
+    'saturation': _mask,
+}
 
 
-def read_blocks(run: Path, also: Iterable[str] = ()) -> Iterator[np.ndarray]:
-    """Log rows of a bag, as the direct engine would have given them.
+class Decoded(NamedTuple):
+    """Messages of one per-tick topic as numbers."""
+
+    stamps_ns: np.ndarray  #: int64[n], -1 where there is none
+    values: np.ndarray  #: float64[n, m], NaN where there is none
+    own: np.ndarray  #: bool[n]: stamp and numbers are the whole message, byte by byte
+    unusable: dict[int, str]  #: why a node would refuse a message, by row
+
+
+def decode(codec: Codec, batch: Batch, chosen: np.ndarray) -> Decoded:
+    """Messages of a batch, given by their indices, as a node would take them."""
+    count = len(chosen)
+    stamps, own = np.full(count, -1), np.zeros(count, bool)
+    values, unusable = np.full((count, len(codec.fields)), np.nan), {}
+    regular = np.flatnonzero(batch.size[chosen] == codec.size)
+    if len(regular):
+        stamps[regular], values[regular], own[regular] = codec.decode_many(
+            batch.rows(chosen[regular])
+        )
+    for row in np.flatnonzero(~own):
+        try:
+            stamps[row], values[row] = codec.decode(batch.payload(chosen[row]))
+        except Exception as error:  # the middleware has no class for bytes that are no message
+            unusable[int(row)] = str(error).partition('\n')[0]
+    for row in np.flatnonzero(own & ~np.all(np.isfinite(values), axis=1)):
+        field = codec.fields[int(np.flatnonzero(~np.isfinite(values[row]))[0])]
+        unusable[int(row)] = f'{field} is not finite'
+    return Decoded(stamps, values, own, unusable)
+
+
+class RecordedLog:
+    """A bag as the log rows that the direct engine would have given, and what else it tells.
 
     Parameters
     ----------
-    run : Path
-        Run folder, or its MCAP file.
+    bag : Bag
     also : iterable of str
         Topics to read beside `SCORED`, NaN in ticks that lack them. The columns of all other
-        topics and saturation are NaN.
+        topics are NaN.
 
-    Yields
-    ------
-    float64[n, ROW]
-        Rows of consecutive ticks, until the first tick that lacks one of `SCORED`; valid until
-        the next are asked for.
-
-    Raises
-    ------
-    ConfigurationError
-        If there is no bag, or it is damaged.
+    Attributes
+    ----------
+    ticks : int
+        Rows given so far.
+    counts : Counter
+        Messages by topic, known when all `blocks` are taken, as is what follows.
+    end : health.Report or None
+        What the plant said about the end of the run.
     """
-    file = _file(run)
-    wanted = {
-        name: (TOPICS[name].codec, COLUMNS[name], name in SCORED) for name in (*SCORED, *also)
-    }
-    changes = _flag_changes(file)
-    log = np.full((2 * BLOCK_TICKS, ROW), np.nan)
-    seen = np.zeros(2 * BLOCK_TICKS, dtype=np.int64)
-    start = 0
 
-    def finish() -> Iterator[np.ndarray]:
+    def __init__(self, bag: Bag, also: Iterable[str] = ()) -> None:
+        self._bag = bag
+        self.ticks = 0
+        self.counts: Counter[str] = Counter()
+        self.end: health.Report | None = None
+        self._names = (*SCORED, *also)
+        #: Tick, column and new value, in the order in which they were told.
+        self._flags: list[tuple[int, str, float]] = []
+        self._unusable: dict[tuple[str, int], str] = {}
+        self._lacks = ''
+        self._log = np.full((2 * BLOCK_TICKS, ROW), np.nan)
+        #: Which of `SCORED` a tick has, bit by bit.
+        self._has = np.zeros(2 * BLOCK_TICKS, np.int64)
+        self._start, self._over = 0, False
+
+    def blocks(self) -> Iterator[np.ndarray]:
+        """Rows of consecutive ticks, until the first tick that lacks one of `SCORED`.
+
+        Yields
+        ------
+        float64[n, ROW]
+            Valid until the next are asked for.
+
+        Raises
+        ------
+        ConfigurationError
+            If the bag is damaged.
+        """
+        names = {i: _known_name(topic.name) for i, topic in enumerate(self._bag.topics)}
+        for batch in self._bag.batches():
+            found = {}
+            for index in np.unique(batch.topic):
+                name, chosen = names[int(index)], np.flatnonzero(batch.topic == index)
+                self.counts[name] += len(chosen)
+                if name == '/diagnostics':
+                    self._hear(batch, chosen)
+                elif name in self._names and not self._over:
+                    found[name] = decode(TOPICS[name].codec, batch, chosen)
+            yield from self._put(found)
+        while not self._over:
+            yield self._shift()
+
+    def _hear(self, batch: Batch, chosen: np.ndarray) -> None:
+        """Note what events say about the flags of a row, and about the end of the run."""
+        for index in chosen:
+            try:
+                array = deserialize_message(batch.payload(index), DiagnosticArray)
+            except Exception:  # the middleware has no class for bytes that are no message
+                continue
+            self.end = self.end or health.end_of_run(array)
+            self._flags += [
+                (health.stamp_of(array) // TICK_NS, pair.key, _FLAGS[pair.key](pair.value))
+                for status in array.status
+                for pair in status.values
+                if pair.key in _FLAGS
+            ]
+
+    def _put(self, found: dict[str, Decoded]) -> Iterator[np.ndarray]:
+        """Put messages into their rows; gives the rows that are far behind."""
+        while found and not self._over:
+            later = {}
+            for name, (stamps_ns, values, own, unusable) in found.items():
+                ticks = stamps_ns // TICK_NS - self._start
+                usable = ticks >= 0
+                for row, why in unusable.items():
+                    self._unusable.setdefault((name, int(stamps_ns[row]) // TICK_NS), why)
+                    usable[row] = False
+                now = usable & (ticks < len(self._log))
+                self._log[ticks[now], COLUMNS[name]] = values[now]
+                if name in SCORED:
+                    self._has[ticks[now]] |= 1 << SCORED.index(name)
+                if len(rest := np.flatnonzero(usable & ~now)):
+                    later[name] = Decoded(stamps_ns[rest], values[rest], own[rest], {})
+            found = later
+            if found:  # a recorder from outside keeps no strict order
+                yield self._shift()
+
+    def _shift(self) -> np.ndarray:
         """The first block up to a tick that lacks something; then the second takes its place."""
-        nonlocal start
-        missing = np.flatnonzero(seen[:BLOCK_TICKS] != len(SCORED))
+        missing = np.flatnonzero(self._has[:BLOCK_TICKS] != 2 ** len(SCORED) - 1)
         rows = int(missing[0]) if len(missing) else BLOCK_TICKS
-        log[:rows, COLUMNS['infeasible']] = 0.0
-        for tick, column, value in changes:
-            log[max(0, tick - start) : rows, COLUMNS[column]] = value
-        yield log[:rows]
-        log[:BLOCK_TICKS], log[BLOCK_TICKS:] = log[BLOCK_TICKS:], np.nan
-        seen[:BLOCK_TICKS], seen[BLOCK_TICKS:] = seen[BLOCK_TICKS:], 0
-        start += BLOCK_TICKS
-        return rows == BLOCK_TICKS
+        block = self._log[:rows].copy()
+        block[:, [COLUMNS['infeasible'], COLUMNS['saturation']]] = 0.0
+        for tick, column, value in self._flags:
+            block[max(0, tick - self._start) :, COLUMNS[column]] = value
+        if len(missing):
+            self._over, self._lacks = True, self._what_lacks(rows)
+        self._log[:BLOCK_TICKS], self._log[BLOCK_TICKS:] = self._log[BLOCK_TICKS:], np.nan
+        self._has[:BLOCK_TICKS], self._has[BLOCK_TICKS:] = self._has[BLOCK_TICKS:], 0
+        self._start += BLOCK_TICKS
+        self.ticks += rows
+        return block
 
-    for name, _, payload in _messages(file, wanted):
-        codec, columns, is_scored = wanted[name]
-        stamp_ns, values = codec.decode(payload)
-        tick = stamp_ns // TICK_NS
-        while tick - start >= 2 * BLOCK_TICKS:  # a recorder from outside keeps no strict order
-            if not (yield from finish()):
-                return
-        if tick >= start:
-            log[tick - start, columns] = values
-            seen[tick - start] += is_scored
-    if (yield from finish()):
-        yield from finish()
+    def _what_lacks(self, row: int) -> str:
+        """Why a tick is not whole, in words."""
+        tick = self._start + row
+        names = [name for bit, name in enumerate(SCORED) if not self._has[row] >> bit & 1]
+        why = self._unusable.get((names[0], tick), 'not recorded')
+        return f'tick {tick:,} (t = {tick * TICK_NS / 1e9:.1f} s) lacks {names[0]}: {why}'
 
+    def missing(self, ticks: int | None) -> str:
+        """What lacks of a run, in words; empty if nothing does.
 
-def recorded_and_lost(folder: Path, complete: bool) -> tuple[int, int]:
-    """Number of messages in a bag, and of per-tick messages that ought to be but are not.
+        Parameters
+        ----------
+        ticks : int, optional
+            How many were flown, if anybody knows: else what the plant said in the bag counts.
+        """
+        if ticks is None and self.end and self.end.phase == health.FINISHED:
+            ticks = self.end.stamp_ns // TICK_NS + 1
+        told = [self._bag.cut] if self._bag.cut else []
+        if ticks is not None and self.ticks < ticks:
+            told.append(f'{self.ticks:,} of {ticks:,} ticks are there')
+            told += [] if self._bag.cut else [self._lacks]
+        return '; '.join(told)
 
-    A run that was cut short (``complete`` is false) may lack messages of its last two ticks, which
-    is not a loss: a node that ended within a tick may have let the others begin the next one.
-    """
-    file = _file(folder)
-    with file.open('rb') as stream:
-        summary = _summary(stream)
-    counts = dict.fromkeys((topic.name for topic in _PER_TICK), 0)
-    if summary is None:
-        for name, _, _ in _messages(file, TOPICS):
-            counts[name] = counts.get(name, 0) + 1
-    else:
-        recorded = summary.statistics.channel_message_counts
-        for number, channel in summary.channels.items():
-            name = _known_name(channel.topic) or channel.topic
-            counts[name] = recorded.get(number, 0)
-    per_tick = [counts[topic.name] for topic in _PER_TICK]
-    ticks = max(per_tick)
-    expected = ticks if complete else ticks - 2
-    lost = sum(max(0, expected - count) for count in per_tick)
-    return sum(counts.values()), lost
+    def lost(self, complete: bool) -> int:
+        """Number of per-tick messages that ought to be recorded but are not.
+
+        A run that was cut short (``complete`` is false) may lack messages of its last two ticks,
+        which is not a loss: a node that ended within a tick may have let the others begin the
+        next one.
+        """
+        per_tick = [self.counts[topic.name] for topic in _PER_TICK]
+        ticks = max(per_tick)
+        expected = ticks if complete else ticks - 2
+        return sum(max(0, expected - count) for count in per_tick)

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
+from glider_bringup.files import write_whole
 from glider_bringup.scenario import Scenario
 from glider_model.ros import messages
 from glider_model.ros.parameters import parameters_yaml, to_parameters
@@ -18,6 +19,7 @@ def node_parameters(
     lockstep: bool = True,
     record_to: Path | None = None,
     attachments: Iterable[Path] = (),
+    sync: str = 'end',
 ) -> dict[str, dict]:
     """Nested parameters of every node, by node name.
 
@@ -31,6 +33,8 @@ def node_parameters(
         Folder of the recording. Without it there is no recorder.
     attachments : iterable of Path
         Files to store in the recording.
+    sync : str
+        When the recording is synced to disk; see `recorder_node.RecorderSettings`.
     """
     common = {'lockstep': lockstep, 'record': record_to is not None}
     nodes = {
@@ -45,10 +49,11 @@ def node_parameters(
             'name': scenario.name,
             'attachments': json.dumps([str(path.resolve()) for path in attachments]),
             'progress': True,
+            'sync': sync,
         }
     return {name: {**parameters, **common} for name, parameters in nodes.items()}
 
 
 def write_parameters(nodes: dict[str, dict], file: Path, namespace: str = '/glider') -> None:
     """Write the parameter file for ``--params-file``."""
-    file.write_text(parameters_yaml(nodes, namespace), encoding='utf-8')
+    write_whole(file, parameters_yaml(nodes, namespace))

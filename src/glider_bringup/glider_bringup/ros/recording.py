@@ -13,6 +13,7 @@ from rclpy.serialization import deserialize_message
 from glider_bringup.blocks import BlockSettings
 from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE
+from glider_bringup.ros.bag_log import decode
 from glider_bringup.scenario import Scenario, load_scenario
 from glider_control.control import ControlSettings
 from glider_guidance.guidance import GuidanceSettings
@@ -60,31 +61,13 @@ class Series:
 
     def add(self, batch, chosen: np.ndarray) -> None:
         """Take messages of a batch."""
-        count = len(chosen)
-        stamps, own = np.full(count, -1), np.zeros(count, bool)
-        values = np.full((count, len(self.codec.fields)), np.nan)
-        regular = np.flatnonzero(batch.size[chosen] == self.codec.size)
-        if len(regular):
-            stamps[regular], values[regular], own[regular] = self.codec.decode_many(
-                batch.rows(chosen[regular])
-            )
-        for row in np.flatnonzero(~own):
-            self._add_foreign(row, batch.payload(chosen[row]), stamps, values)
-        for row in np.flatnonzero(own & ~np.all(np.isfinite(values), axis=1)):
-            field = self.codec.fields[int(np.flatnonzero(~np.isfinite(values[row]))[0])]
-            self.unusable[self._count + int(row)] = f'{field} is not finite'
-        self._blocks.append((stamps, values, own))
-        self._count += count
-
-    def _add_foreign(self, row: int, raw: bytes, stamps, values) -> None:
-        """Take a message of another layout, as a node does."""
-        index = self._count + int(row)
-        if len(self.raw) < _KEPT:
-            self.raw[index] = raw
-        try:
-            stamps[row], values[row] = self.codec.decode(raw)
-        except Exception as error:  # the middleware has no class for bytes that are no message
-            self.unusable[index] = str(error).splitlines()[0]
+        decoded = decode(self.codec, batch, chosen)
+        for row in np.flatnonzero(~decoded.own)[: max(0, _KEPT - len(self.raw))]:
+            self.raw[self._count + int(row)] = batch.payload(chosen[row])
+        for row, why in decoded.unusable.items():
+            self.unusable[self._count + row] = why
+        self._blocks.append(decoded[:3])
+        self._count += len(chosen)
 
     def close(self) -> None:
         """Make the arrays."""

@@ -263,7 +263,7 @@ class TickNode(Node):
             raise Stop(0)
 
     def close(self) -> None:
-        """Last act before the node is destroyed, whatever ended it."""
+        """Last act before the node is destroyed, whatever ended it; may raise `Stop`."""
 
     def may_leave(self) -> bool:
         """Whether nobody needs this node any more once the run is over."""
@@ -579,8 +579,8 @@ def run(node_type: Callable[[], TickNode], args=None) -> int:
     Returns
     -------
     int
-        Exit code: 0 at the end of the run and for SIGINT and SIGTERM, 2 for a bad parameter, 3
-        for a peer that is missing, late or wrong.
+        Exit code: 0 at the end of the run and for SIGINT and SIGTERM, 1 for a full disk, 2 for a
+        bad parameter, 3 for a peer that is missing, late or wrong.
     """
     os.environ.setdefault(_FASTDDS, str(_PROFILES))
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
@@ -610,7 +610,10 @@ def run(node_type: Callable[[], TickNode], args=None) -> int:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         if node is not None:
-            node.close()
+            try:
+                node.close()
+            except Stop as reason:
+                stop = stop if stop.code else reason
             time.sleep(_LINGER_S)
             node.destroy_node()
         rclpy.try_shutdown()
