@@ -315,7 +315,7 @@ def _score_bag(
         complete, reason = _end_of_run(log)
     lost = log.lost(complete)
     if not log.ticks and (lost or missing):
-        why = missing or (
+        why = bag.cut or (
             'its first tick is not complete, as in a free-running recording (allowed: runs in '
             'lockstep, with every message of every tick)'
         )

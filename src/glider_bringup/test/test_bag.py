@@ -19,9 +19,10 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from glider_bringup.direct import BLOCK_TICKS, COLUMNS
+from glider_bringup.mcap_reader import Bag
 from glider_bringup.ros import bag_log
 from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter, message_definition, type_hash
-from glider_bringup.ros.bag_log import SCORED, read_blocks
+from glider_bringup.ros.bag_log import SCORED, RecordedLog
 from glider_bringup.tick_order import TickOrder
 from glider_bringup.traces import TRACED
 from glider_model.ros.codec import to_cdr
@@ -268,7 +269,7 @@ def test_rows_end_at_the_first_gap_of_what_is_scored(tmp_path, monkeypatch, bloc
     """Ticks after the gap are whole, but not consecutive; what is only drawn may have gaps."""
     monkeypatch.setattr(bag_log, 'BLOCK_TICKS', block_ticks)
     write_with_gaps(tmp_path, range(100), {('odom', 50), ('adaptation', 20)})
-    rows = np.concatenate([block.copy() for block in read_blocks(tmp_path, TRACED)])
+    rows = np.concatenate([block.copy() for block in RecordedLog(Bag(tmp_path), TRACED).blocks()])
     assert rows[:, COLUMNS['odom'].start].tolist() == list(range(50))
     learnt = rows[:, COLUMNS['adaptation'].start]
     assert np.flatnonzero(np.isnan(learnt)).tolist() == [20]
@@ -285,7 +286,7 @@ def test_rows_are_whole_where_a_recorder_from_outside_mixed_up_ticks(tmp_path, m
         row = np.full(len(codec.fields), float(tick))
         bag.write(SCORED[topic], int(tick) * TICK_NS, codec.encode(int(tick) * TICK_NS, row))
     bag.close()
-    rows = np.concatenate([block.copy() for block in read_blocks(tmp_path)])
+    rows = np.concatenate([block.copy() for block in RecordedLog(Bag(tmp_path)).blocks()])
     for name in SCORED:
         assert rows[:, COLUMNS[name].start].tolist() == list(range(100))
 
@@ -293,5 +294,5 @@ def test_rows_are_whole_where_a_recorder_from_outside_mixed_up_ticks(tmp_path, m
 @pytest.mark.parametrize('last', [100, BLOCK_TICKS, 5 * BLOCK_TICKS])
 def test_gap_of_any_length_ends_the_rows(tmp_path, last):
     write_with_gaps(tmp_path, [*range(10), last], ())
-    rows = np.concatenate([block.copy() for block in read_blocks(tmp_path)])
+    rows = np.concatenate([block.copy() for block in RecordedLog(Bag(tmp_path)).blocks()])
     assert rows[:, COLUMNS['odom'].start].tolist() == list(range(10))

@@ -16,6 +16,7 @@ import pytest
 
 from glider_bringup import montecarlo
 from glider_bringup.direct import COLUMNS, ROW, fly
+from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission import make_result_folder, mission_of, score_again
 from glider_bringup.montecarlo import (
     RESULT_FILE,
@@ -25,7 +26,7 @@ from glider_bringup.montecarlo import (
     sample_plant,
     spread,
 )
-from glider_bringup.ros.bag_log import read_blocks
+from glider_bringup.ros.bag_log import RecordedLog
 from glider_bringup.scenario import load_scenario, parse_assignment
 from glider_bringup.score import Rules, Scorer
 from glider_model.frames import euler_from_quaternion
@@ -399,7 +400,9 @@ def test_nodes_and_direct_engine_agree_with_noise_on_a_perturbed_plant(vehicle, 
         )
         assert process.returncode == 0, process.stderr
         cards.append(json.loads(process.stdout))
-        rows = np.concatenate([block.copy() for block in read_blocks(folder, RECORDED)])
+        rows = np.concatenate(
+            [block.copy() for block in RecordedLog(Bag(folder), RECORDED).blocks()]
+        )
         digests.append(rows.tobytes())
     assert digests[0] == digests[1]
     for name in ('ticks', 'cross_track_m', 'depth_m', 'final_state'):

@@ -166,13 +166,14 @@ def test_what_holds_no_run_is_refused(tmp_path, name, words):
 PEAK = """
 import sys
 from pathlib import Path
-from glider_bringup.ros.bag_log import read_blocks
+from glider_bringup.mcap_reader import Bag
+from glider_bringup.ros.bag_log import RecordedLog
 
 def peak_mb():
     lines = Path('/proc/self/status').read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith('VmHWM:')) / 1000.0
 
-blocks, before = read_blocks(Path(sys.argv[1])), peak_mb()
+blocks, before = RecordedLog(Bag(Path(sys.argv[1]))).blocks(), peak_mb()
 print(next(blocks).shape[0], peak_mb() - before)
 """
 

@@ -481,7 +481,6 @@ def test_ctrl_c_within_compiled_code_is_answered(short_run, block):
         ('nothing', None, 'no such run'),
         ('empty', {}, 'no .mcap file'),
         ('text', {'a.mcap': b'not a bag at all'}, 'a.mcap: not an MCAP file'),
-        ('hollow', {'a.mcap': b''}, 'a.mcap: not an MCAP file'),
         (
             'sqlite',
             {
@@ -490,7 +489,8 @@ def test_ctrl_c_within_compiled_code_is_answered(short_run, block):
             },
             'storage sqlite3',
         ),
-        ('garbled', {'metadata.yaml': b'[1, 2'}, 'metadata.yaml: not metadata of rosbag2'),
+        ('garbled', {'metadata.yaml': b'[1, 2'}, 'metadata.yaml: not valid YAML'),
+        ('other', {'metadata.yaml': b'a: 1'}, 'metadata.yaml: not metadata of rosbag2'),
     ],
 )
 def test_what_is_no_bag_is_refused_in_one_message(tmp_path, name, content, words):

@@ -188,8 +188,9 @@ def choose_namespace(bag: Bag, given: str | None) -> str:
         return wanted
     if not found:
         topics = ', '.join(topic.name for topic in bag.topics) or 'none'
+        cut = f'; {bag.cut}' if bag.cut else ''
         raise ConfigurationError(
-            f'{bag.files[0]}: no topic of these nodes is recorded (recorded: {topics})'
+            f'{bag.files[0]}: no topic of these nodes is recorded (recorded: {topics}){cut}'
         )
     if len(found) > 1:
         raise ConfigurationError(

@@ -338,7 +338,8 @@ class Replay:
         self._clock_ns = -TICK_NS
         span_s = (self._plan.end_ns - self._plan.start_ns) / 1e9
         shown_s = 0.0
-        for log_ns, index, raw in self._messages():
+        profiles = {index: output.qos for index, output in self._outputs.items()}
+        for log_ns, index, raw in recorded_messages(self._plan, profiles):
             passed_s = (log_ns - self._plan.start_ns) / 1e9
             if math.isfinite(self._rate):
                 self._sleep_until(began_s + passed_s / self._rate, passed_s, progress)
@@ -366,33 +367,41 @@ class Replay:
             self._clock_ns = log_ns
             self._own_clock.publish(CLOCK.encode(log_ns, ()))
 
-    def _messages(self) -> Iterator[tuple[int, int, bytes]]:
-        """Log time, topic and payload of the messages to publish.
 
-        Those that a latched topic held at the start come first, under the time of the start.
-        """
-        start_ns, end_ns = self._plan.start_ns, self._plan.end_ns
-        chosen = np.array(list(self._outputs))
-        held: dict[int, list[bytes]] = {}
-        latched = [
-            index
-            for index, output in self._outputs.items()
-            if output.qos.durability is DurabilityPolicy.TRANSIENT_LOCAL
-        ]
-        for batch in self._plan.bag.batches():
-            if batch.log_ns[0] > end_ns:
-                break
-            for i in np.flatnonzero((batch.log_ns < start_ns) & np.isin(batch.topic, latched)):
-                index = int(batch.topic[i])
-                kept = held.setdefault(index, [])
-                kept.append(batch.payload(i))
-                del kept[: -self._outputs[index].qos.depth]
-            inside = (batch.log_ns >= start_ns) & (batch.log_ns <= end_ns)
-            for i in np.flatnonzero(inside & np.isin(batch.topic, chosen)):
-                for index, kept in held.items():
-                    yield from ((start_ns, index, raw) for raw in kept)
-                held = {}
-                yield int(batch.log_ns[i]), int(batch.topic[i]), batch.payload(i)
+def recorded_messages(
+    plan: Plan, profiles: dict[int, QoSProfile]
+) -> Iterator[tuple[int, int, bytes]]:
+    """Log time, topic and payload of the messages to publish.
+
+    Those that a latched topic held at the start come first, under the time of the start.
+
+    Parameters
+    ----------
+    plan : Plan
+    profiles : dict of QoSProfile
+        Of every topic that is published, by its index.
+    """
+    chosen = np.array(list(profiles))
+    held: dict[int, list[bytes]] = {}
+    latched = [
+        index
+        for index, profile in profiles.items()
+        if profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    ]
+    for batch in plan.bag.batches():
+        if batch.log_ns[0] > plan.end_ns:
+            break
+        for i in np.flatnonzero((batch.log_ns < plan.start_ns) & np.isin(batch.topic, latched)):
+            index = int(batch.topic[i])
+            kept = held.setdefault(index, [])
+            kept.append(batch.payload(i))
+            del kept[: -profiles[index].depth]
+        inside = (batch.log_ns >= plan.start_ns) & (batch.log_ns <= plan.end_ns)
+        for i in np.flatnonzero(inside & np.isin(batch.topic, chosen)):
+            for index, kept in held.items():
+                yield from ((plan.start_ns, index, raw) for raw in kept)
+            held = {}
+            yield int(batch.log_ns[i]), int(batch.topic[i]), batch.payload(i)
 
 
 def check_not_empty(plan: Plan) -> None:

@@ -1,0 +1,177 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Bags with one flipped bit, or cut, through all that reads bags.
+
+Half of them are as they are written today, half as they were before the data section had a
+checksum; half lie in a run folder, half alone. What a command makes of one counts as wrong if it
+is not what it makes of the unharmed bag, and says neither so nor what is missing.
+"""
+
+import random
+import signal
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from mcap.opcode import Opcode
+
+from glider_bringup import mission
+from glider_bringup.fuzzing.counts import HANG_S, Counter, Counts, Tell
+from glider_bringup.mcap_reader import Bag
+from glider_bringup.report import report_page
+from glider_bringup.ros.recording import Recording, read_told
+from glider_bringup.ros.replay import check_not_empty, plan_replay, qos_of, recorded_messages
+from glider_bringup.ros.verify import report, verify
+from glider_bringup.scenario import load_scenario
+from glider_model.settings import ConfigurationError
+
+#: Two minutes in which everything happens, in ten chunks.
+FLIGHT = {
+    'dives': 0,
+    'duration_s': 120.0,
+    'settle_s': 0.0,
+    'profile.prepare_s': 20.0,
+    'profile.depth_m': 14.0,
+    'profile.top_depth_m': 5.0,
+    'initial.depth_m': 8.0,
+    'sensors.attitude_std_deg': 0.1,
+}
+#: Of so many cases one is cut, the others have a flipped bit.
+CUTS = 5
+#: The end of the data section: opcode, length, and the checksum that there was none of.
+_DATA_END = bytes([Opcode.DATA_END]) + (4).to_bytes(8, 'little')
+
+#: What a command made of a bag, and whether it said that something is missing.
+Answer = tuple[Any, bool]
+
+
+class _Hang(BaseException):
+    """An answer that does not come."""
+
+
+def fuzz(seed: int, count: int, tell: Tell) -> Counts:
+    """Try so many bags; see `glider_bringup.commands.fuzz`."""
+    found, draw = Counter(tell), random.Random(seed)
+    with tempfile.TemporaryDirectory() as scratch, _alarm():
+        folders = _fly(Path(scratch))
+        good = [
+            ({name: read(folder) for name, read in COMMANDS.items()}, _bag_of(folder).read_bytes())
+            for folder in folders
+        ]
+        for case in range(count):
+            which = draw.randrange(len(folders))
+            expected, data = good[which]
+            folder, harmed, how = folders[which], bytearray(data), ''
+            if case % CUTS == CUTS - 1:
+                length = draw.randrange(len(data))
+                del harmed[length:]
+                how = f'cut to {length} bytes'
+            else:
+                bit = draw.randrange(8 * len(data))
+                harmed[bit // 8] ^= 1 << bit % 8
+                how = f'bit {bit % 8} of byte {bit // 8} flipped'
+            _bag_of(folder).write_bytes(harmed)
+            found.add(f'{folder.name}, {how}', *_outcome(folder, expected))
+    return found.result()
+
+
+def _outcome(folder: Path, expected: dict[str, Answer]) -> tuple[str, str]:
+    """The worst that any command did with a bag, and why; empty if all answered well."""
+    for name, read in COMMANDS.items():
+        try:
+            signal.setitimer(signal.ITIMER_REAL, HANG_S)
+            answer, is_told = read(folder)
+        except ConfigurationError:
+            continue
+        except _Hang:
+            return 'hangs', name
+        except Exception as error:
+            return 'tracebacks', f'{name}: {type(error).__name__}: {error}'
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        if answer != expected[name][0] and not is_told:
+            return 'wrong', name
+    return '', ''
+
+
+@contextmanager
+def _alarm() -> Iterator[None]:
+    """Let the alarm clock end what hangs."""
+
+    def ring(number, frame) -> None:
+        raise _Hang
+
+    before = signal.signal(signal.SIGALRM, ring)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGALRM, before)
+
+
+def _fly(scratch: Path) -> list[Path]:
+    """Folders of one flight: bags of today and of before, with all that a run has and alone."""
+    scenario = load_scenario('rough_water', FLIGHT)
+    run = mission.make_run_folder(scenario, scratch / 'run')
+    tracer = mission.make_tracer(scenario)
+    flight, scores = mission.fly_direct(scenario, run, True, lambda *_: None, tracer)
+    card = mission.scorecard(scenario, 'direct', flight, scores)
+    mission.write_score(run, card)
+    mission.keep_traces(scenario, run, card, tracer)
+    folders = [run, *(scratch / name for name in ('alone', 'run_of_before', 'alone_of_before'))]
+    data = _bag_of(run).read_bytes()
+    at = data.rindex(_DATA_END) + len(_DATA_END)
+    before = data[:at] + bytes(4) + data[at + 4 :]
+    for folder, kept in zip(folders[1:], (data, before, before), strict=True):
+        folder.mkdir()
+        others = [] if folder.name.startswith('alone') else run.iterdir()
+        for file in others:
+            (folder / file.name).write_bytes(file.read_bytes())
+        (folder / _bag_of(run).name).write_bytes(kept)
+    return folders
+
+
+def _bag_of(folder: Path) -> Path:
+    (file,) = folder.glob('*.mcap')
+    return file
+
+
+# ---------------------------------------------------------------------- what reads bags
+
+
+def _score(folder: Path) -> Answer:
+    card = mission.score_again(folder)
+    return card, bool(card['reason'])
+
+
+def _report(folder: Path) -> Answer:
+    flown = mission.read_run(folder)
+    return sha256(report_page(flown).encode()).digest(), bool(flown.card['reason'])
+
+
+def _verify(folder: Path) -> Answer:
+    with tempfile.TemporaryDirectory() as scratch:
+        bag = Bag(folder)
+        told = read_told(bag, folder, None, Path(scratch))
+        recording = Recording(bag, None, lambda share: None)
+        verdicts = list(verify(recording, told, [], lambda name, share: None))
+    found = report(bag, recording, told, verdicts)
+    return found, bool(found['notes']) or not found['identical']
+
+
+def _replay(folder: Path) -> Answer:
+    bag = Bag(folder)
+    plan = plan_replay(bag, [], 0.0, None, None)
+    check_not_empty(plan)
+    profiles = {index: qos_of(bag.topics[index]) for index in plan.names}
+    return list(recorded_messages(plan, profiles)), bool(bag.cut)
+
+
+COMMANDS: dict[str, Callable[[Path], Answer]] = {
+    'score': _score,
+    'report': _report,
+    'verify': _verify,
+    'replay': _replay,
+}
