@@ -47,6 +47,16 @@ CARD_FIELDS = {
     *('messages_lost', 'dives', 'distance_along_path_m', 'cross_track_m', 'pitch_error_deg'),
     *('heading_fluctuation_deg', 'depth_m', 'actuator_travel', 'final_state'),
 }
+#: What these fields hold: numbers, lists of numbers, or None where there is no data.
+CARD_GROUPS = {
+    'cross_track_m': {'rms_steady', 'max_steady', 'max_all'},
+    'pitch_error_deg': {'rms_steady', 'max_steady'},
+    'heading_fluctuation_deg': {'rms_steady', 'max_steady'},
+    'depth_m': {'max', 'overshoot'},
+    'actuator_travel': {'buoyancy_engine_kg', 'pitch_mass_m', 'roll_mass_deg'},
+    'final_state': {'position_ned_m', 'attitude_rpy_rad', 'velocity_mps'},
+}
+STATUSES = ('completed', 'infeasible', 'aborted', 'failed')
 #: Exit code of a node that refuses its parameters.
 EXIT_CONFIGURATION = 2
 
@@ -320,7 +330,7 @@ def _score_bag(
             'lockstep, with every message of every tick)'
         )
         raise ConfigurationError(f'{run}: cannot be scored: {why}')
-    if missing and (complete or log.ticks < old.get('ticks', 0)):
+    if missing and (complete or not old or log.ticks < old['ticks']):
         complete, reason = False, '; '.join(one for one in (reason, missing) if one)
     status = 'completed' if complete else 'aborted'
     recorded = sum(log.counts.values())
@@ -365,9 +375,38 @@ def _read_score(run: Path) -> dict:
             )
         return {}
     card = read_json(path)
-    if not isinstance(card, dict) or not CARD_FIELDS <= set(card):
+    if not _is_card(card):
         raise ConfigurationError(f'{path}: not a scorecard of this program')
     return card
+
+
+def _is_card(card) -> bool:
+    """Whether a value, which may be anything, can be taken for a scorecard."""
+    if not isinstance(card, dict) or not CARD_FIELDS <= set(card):
+        return False
+    texts = ('scenario', 'vehicle', 'controller', 'guidance', 'status', 'reason')
+    numbers = ('sim_time_s', 'wall_time_s', 'real_time_factor', 'distance_along_path_m')
+    counts = ('seed', 'ticks', 'messages_recorded', 'messages_lost', 'dives')
+    return (
+        all(isinstance(card[name], str) for name in texts)
+        and card['status'] in STATUSES
+        and isinstance(card['engine'], str | None)
+        and all(isinstance(card[name], int) and card[name] >= 0 for name in counts)
+        and all(_is_figure(card[name]) for name in numbers)
+        and all(
+            isinstance(card[group], dict)
+            and names <= set(card[group])
+            and all(_is_figure(value) for value in card[group].values())
+            for group, names in CARD_GROUPS.items()
+        )
+    )
+
+
+def _is_figure(value) -> bool:
+    """Whether a value is a figure of a scorecard: a number, None, or three numbers."""
+    if isinstance(value, list):
+        return len(value) == 3 and all(isinstance(one, int | float) for one in value)
+    return value is None or isinstance(value, int | float)
 
 
 @contextmanager

@@ -1,0 +1,330 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A bag that was harmed is refused or told, never scored as if it were whole."""
+
+import json
+import math
+import random
+import shutil
+import struct
+import time
+from pathlib import Path
+
+import pytest
+import zstandard
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+
+from glider_bringup import mission
+from glider_bringup.fuzzing import bags
+from glider_bringup.mcap_reader import Bag
+from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter
+from glider_bringup.ros.recording import Recording, read_told
+from glider_bringup.ros.verify import verify
+from glider_bringup.scenario import load_scenario
+from glider_bringup.traces import load_traces
+from glider_model.ros import health
+from glider_model.ros.codec import to_cdr
+from glider_model.ros.messages import PLANT, TOPICS
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_NS, TICK_S
+
+TICKS = 600
+#: The end of a data section, up to its checksum: what 1980cb2 wrote had none.
+DATA_END = struct.pack('<BQ', Opcode.DATA_END, 4)
+
+
+def flip(data: bytes, bit: int) -> bytes:
+    harmed = bytearray(data)
+    harmed[bit // 8] ^= 1 << bit % 8
+    return bytes(harmed)
+
+
+def bag_of(folder: Path) -> Path:
+    (file,) = folder.glob('*.mcap')
+    return file
+
+
+@pytest.fixture(scope='module')
+def flown(tmp_path_factory) -> Path:
+    """Run folder with all that a run has."""
+    changes = {'dives': 0, 'duration_s': TICKS * TICK_S, 'settle_s': 0.0}
+    scenario = load_scenario('current_8deg', changes)
+    folder = mission.make_run_folder(scenario, tmp_path_factory.mktemp('harm') / 'flight')
+    tracer = mission.make_tracer(scenario)
+    flight, scores = mission.fly_direct(scenario, folder, True, lambda *_: None, tracer)
+    card = mission.scorecard(scenario, 'direct', flight, scores)
+    mission.write_score(folder, card)
+    mission.keep_traces(scenario, folder, card, tracer)
+    return folder
+
+
+@pytest.fixture
+def run(flown, tmp_path) -> Path:
+    """A copy of it, to be harmed."""
+    return Path(shutil.copytree(flown, tmp_path / 'flight'))
+
+
+@pytest.fixture
+def run_of_before(run) -> Path:
+    """The same as it was before the data section had a checksum."""
+    data = bag_of(run).read_bytes()
+    at = data.rindex(DATA_END) + len(DATA_END)
+    bag_of(run).write_bytes(data[:at] + bytes(4) + data[at + 4 :])
+    return run
+
+
+def chunk_places(file: Path) -> list[tuple[int, int]]:
+    """Place and length of every chunk, as the mcap package tells."""
+    with file.open('rb') as stream:
+        indexes = make_reader(stream).get_summary().chunk_indexes
+    return sorted((one.chunk_start_offset, one.chunk_length) for one in indexes)
+
+
+# ---------------------------------------------------------------------- the door
+
+
+def test_door_of_bags_is_clean():
+    told = []
+    found = bags.fuzz(5, 25, told.append)
+    assert found == (25, 0, 0, 0, ())
+    assert told == list(range(1, 26))
+
+
+@pytest.mark.parametrize(
+    ('read', 'outcome'),
+    [
+        (lambda folder: ('another', False), 'wrong'),
+        (lambda folder: ('another', True), ''),
+        (lambda folder: ('good', False), ''),
+        (lambda folder: ({}[folder], False), 'tracebacks'),
+        (lambda folder: (time.sleep(5.0), False), 'hangs'),
+        (lambda folder: Bag(folder / 'nowhere'), ''),
+    ],
+)
+def test_door_of_bags_sees_what_goes_wrong(monkeypatch, tmp_path, read, outcome):
+    monkeypatch.setattr(bags, 'HANG_S', 0.05)
+    monkeypatch.setattr(bags, 'COMMANDS', {'it': read})
+    with bags._alarm():
+        assert bags._outcome(tmp_path, {'it': ('good', False)})[0] == outcome
+
+
+# ---------------------------------------------------------------------- flipped bits
+
+
+@pytest.mark.parametrize('share', [0.0, 0.5, 0.99])
+def test_bit_in_a_chunk_is_told_with_time_and_ticks(run, share):
+    file = bag_of(run)
+    place, length = chunk_places(file)[2]
+    file.write_bytes(flip(file.read_bytes(), 8 * (place + 60 + int(share * (length - 62)))))
+    first = 2 * CHUNK_TICKS * TICK_S
+    last = (3 * CHUNK_TICKS - 1) * TICK_S
+    words = rf'chunk 3 is damaged: .*t = {first:.1f} s to {last:.1f} s, {CHUNK_TICKS} ticks'
+    for use in (
+        mission.score_again,
+        mission.read_run,
+        lambda run: mission.draw(run, run / 'x.png'),
+    ):
+        with pytest.raises(ConfigurationError, match=words):
+            use(run)
+
+
+@pytest.mark.parametrize('bit', range(8 * 9))
+def test_head_of_a_chunk_is_checked_in_bags_of_before(run_of_before, bit):
+    """Opcode or length: a chunk that is not seen as one is missed."""
+    file = bag_of(run_of_before)
+    place, _ = chunk_places(file)[2]
+    file.write_bytes(flip(file.read_bytes(), 8 * place + bit))
+    with pytest.raises(ConfigurationError, match='damaged'):
+        Bag(run_of_before)
+
+
+@pytest.mark.parametrize('field', [0, 8])
+def test_times_of_a_chunk_are_checked_in_bags_of_before(run_of_before, field):
+    file = bag_of(run_of_before)
+    place, _ = chunk_places(file)[2]
+    file.write_bytes(flip(file.read_bytes(), 8 * (place + 9 + field) + 30))
+    with pytest.raises(ConfigurationError, match='chunk 3 .*is not where it should be'):
+        Bag(run_of_before)
+
+
+@pytest.mark.parametrize('text', [b'/glider/odom', b'nav_msgs/msg/Odometry', b'transient_local'])
+def test_topics_are_checked_in_bags_of_before(run_of_before, text):
+    file = bag_of(run_of_before)
+    data = file.read_bytes()
+    file.write_bytes(flip(data, 8 * (data.index(text) + 4)))
+    with pytest.raises(ConfigurationError, match='a topic or type is not that of its summary'):
+        Bag(run_of_before)
+
+
+def test_attachment_is_checked(run):
+    file = bag_of(run)
+    data = file.read_bytes()
+    file.write_bytes(flip(data, 8 * data.index(b'vehicle: vehicle.yaml') + 1))
+    with pytest.raises(ConfigurationError, match=r"attachment 'scenario\.yaml' is wrong"):
+        Bag(run)
+
+
+def test_summary_is_not_needed(run):
+    """Nothing depends on it where the data has a checksum; the result is the same."""
+    card = mission.score_again(run)
+    file = bag_of(run)
+    data = file.read_bytes()
+    file.write_bytes(flip(data, 8 * (len(data) - 200)))
+    assert mission.score_again(run) == card
+    file.write_bytes(data[:-200])
+    assert mission.score_again(run) == card
+
+
+# ---------------------------------------------------------------------- cuts, and what is absent
+
+
+@pytest.mark.parametrize('share', [0.6, 0.8])
+def test_cut_run_is_not_completed_wherever_it_is_shown(run, share):
+    file = bag_of(run)
+    file.write_bytes(file.read_bytes()[: int(share * file.stat().st_size)])
+    card = mission.score_again(run)
+    assert 0 < card['ticks'] < TICKS
+    assert card['ticks'] % CHUNK_TICKS == 0
+    assert card['status'] == 'aborted'
+    assert f'{file} ends early, after ' in card['reason']
+    assert f'it goes to t = {(card["ticks"] - 1) * TICK_S:.1f} s' in card['reason']
+    assert f'{card["ticks"]} of {TICKS} ticks are there' in card['reason']
+    for traced in (False, True):
+        assert mission.read_run(run, traced=traced).card == card
+
+
+@pytest.mark.parametrize('size', [0, 1, 100, 6000])
+def test_bag_without_a_whole_tick_is_not_scored(run, size):
+    file = bag_of(run)
+    file.write_bytes(file.read_bytes()[:size])
+    for use in (mission.score_again, mission.read_run):
+        with pytest.raises(ConfigurationError, match='cannot be scored: .* ends early'):
+            use(run)
+
+
+@pytest.mark.parametrize('size', [0, 1, 100])
+def test_bag_without_a_topic_is_not_verified(run, size):
+    file = bag_of(run)
+    file.write_bytes(file.read_bytes()[:size])
+    with pytest.raises(ConfigurationError, match='no topic .* ends early, after'):
+        Recording(Bag(run), None, lambda share: None)
+
+
+def test_score_file_does_not_stand_on_ticks_that_are_absent(run):
+    file = run / 'score.json'
+    card = json.loads(file.read_text())
+    file.write_text(json.dumps({**card, 'ticks': 77000}))
+    for again in (mission.score_again(run), mission.read_run(run).card):
+        assert (again['status'], again['ticks']) == ('aborted', TICKS)
+        assert again['reason'].startswith('600 of 77,000 ticks are there')
+
+
+@pytest.mark.parametrize(('topic', 'why'), [('odom', 'is not finite'), ('wrench', '')])
+def test_number_that_is_none_ends_the_rows_where_it_is_scored(tmp_path, topic, why):
+    """What a node refuses, the reader must not trip over, nor score."""
+    folder = mission.make_run_folder(load_scenario('helix'), tmp_path / 'flight')
+    bag = BagWriter(folder, 'helix')
+    for tick in range(3):
+        for one in TOPICS.values():
+            if one.per_tick:
+                bad = (tick, one.name) == (2, topic)
+                row = [math.nan if bad else 0.0] * len(one.codec.fields)
+                bag.write(one.name, tick * TICK_NS, one.codec.encode(tick * TICK_NS, row))
+    end = health.Report(PLANT, health.FINISHED, '', 2 * TICK_NS)
+    bag.write('/diagnostics', 2 * TICK_NS, to_cdr(health.report_array(end)))
+    bag.close()
+    card = mission.score_again(folder)
+    json.dumps(card, allow_nan=False)
+    if why:
+        assert (card['status'], card['ticks']) == ('aborted', 2)
+        assert '2 of 3 ticks are there; tick 2 (t = 0.2 s) lacks odom: ' in card['reason']
+        assert card['reason'].endswith(why)
+    else:
+        assert (card['status'], card['ticks']) == ('completed', 3)
+
+
+# ---------------------------------------------------------------------- files beside the bag
+
+
+def test_traces_that_are_damaged_are_named(run):
+    file = run / 'traces.npz'
+    data, draw, refused = file.read_bytes(), random.Random(3), 0
+    good = load_traces(file)
+    for _ in range(60):
+        file.write_bytes(flip(data, draw.randrange(8 * len(data))))
+        try:
+            again = load_traces(file)
+        except ConfigurationError as error:
+            assert str(error).startswith(f'{file}: ')
+            refused += 1
+        else:
+            for name, values in good.curves.items():
+                assert again.curves[name].tobytes() == values.tobytes()
+    assert refused > 50
+
+
+def test_score_file_that_is_damaged_is_named_or_can_be_shown(run):
+    file = run / 'score.json'
+    data, draw = file.read_bytes(), random.Random(4)
+    for _ in range(60):
+        file.write_bytes(flip(data, draw.randrange(8 * len(data))))
+        try:
+            mission.write_report(mission.read_run(run), run / 'report.html')
+        except ConfigurationError as error:
+            assert str(error).startswith(str(run))
+
+
+@pytest.mark.parametrize(
+    ('before', 'after'),
+    [
+        (f'"ticks": {TICKS}', '"ticks": "many"'),
+        ('"status": "completed"', '"status": "complete"'),
+        ('"rms_steady"', '"rms_stead"'),
+        ('"reason": ""', '"reason": null'),
+        ('{', '[{'),
+    ],
+)
+def test_score_file_of_another_shape_is_refused(run, before, after):
+    file = run / 'score.json'
+    text = file.read_text()
+    assert before in text
+    file.write_text(text.replace(before, after, 1))
+    for use in (mission.score_again, mission.read_run):
+        with pytest.raises(ConfigurationError, match=r'score\.json: '):
+            use(run)
+
+
+def test_metadata_that_is_damaged_is_named_or_does_not_matter(run):
+    file = run / 'metadata.yaml'
+    data, draw = file.read_bytes(), random.Random(5)
+    topics = Bag(run).topics
+    for _ in range(100):
+        file.write_bytes(flip(data, draw.randrange(8 * len(data))))
+        try:
+            assert Bag(run).topics == topics
+        except ConfigurationError as error:
+            assert str(run) in str(error)
+
+
+# ---------------------------------------------------------------------- bags of before
+
+
+@pytest.mark.parametrize('engine', ['direct', 'nodes'])
+def test_bag_recorded_at_1980cb2_is_scored_shown_verified_and_replayed(tmp_path, engine):
+    """Three seconds of current_8deg; all that is known of them is in the file."""
+    packed = Path(__file__).with_name(f'of_before_{engine}.mcap.zst').read_bytes()
+    file = tmp_path / 'current_8deg_0.mcap'
+    file.write_bytes(zstandard.ZstdDecompressor().decompress(packed))
+    card = mission.score_again(file)
+    assert (card['status'], card['ticks'], card['messages_lost']) == ('completed', 30, 0)
+    assert card['messages_recorded'] == 304
+    mission.write_report(mission.read_run(file), tmp_path / 'report.html')
+    assert (tmp_path / 'report.html').stat().st_size > 100_000
+    bag = Bag(file)
+    told = read_told(bag, file, None, tmp_path)
+    recording = Recording(bag, None, lambda share: None)
+    verdicts = list(verify(recording, told, [], lambda name, share: None))
+    assert [one.ticks for one in verdicts] == [30, 30, 30, 30]
+    messages, _ = bags.COMMANDS['replay'](tmp_path)
+    assert len(messages) == 304

@@ -1,0 +1,152 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A disk that takes no more is named, and what was there before stays."""
+
+import errno
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from glider_bringup import mission
+from glider_bringup.files import DiskError, whole_file, write_whole
+from glider_bringup.mcap_reader import Bag
+from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter
+from glider_bringup.scenario import load_scenario
+from glider_model.ros.messages import TOPICS
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_NS
+
+#: The largest file (B) that a disk which is full allows.
+MOST = 500_000
+
+
+def glider(*arguments) -> subprocess.CompletedProcess:
+    """Run a command on a disk on which no file can grow beyond `MOST`."""
+    return subprocess.run(
+        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env={name: value for name, value in os.environ.items() if name != 'ROS_DOMAIN_ID'},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (MOST, MOST)),
+    )
+
+
+@pytest.mark.parametrize('code', [errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO])
+@pytest.mark.parametrize('there', [False, True])
+def test_file_is_whole_or_as_it_was(tmp_path, monkeypatch, code, there):
+    file = tmp_path / 'score.json'
+    if there:
+        write_whole(file, 'old')
+
+    def fail(number):
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(os, 'fsync', fail)
+    with pytest.raises(DiskError) as error:
+        write_whole(file, 'new')
+    assert str(error.value) == f'{file}: cannot be written: {os.strerror(code)}'
+    assert [one.read_text() for one in tmp_path.iterdir()] == ['old'] * there
+
+
+def test_what_fails_in_between_leaves_nothing(tmp_path):
+    with pytest.raises(KeyError), whole_file(tmp_path / 'x.npz') as stream:
+        stream.write(b'a part')
+        raise KeyError('x')
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_name_that_cannot_be_is_no_matter_of_the_disk(tmp_path):
+    for file in (tmp_path, tmp_path / 'no' / 'x', tmp_path / (300 * 'x')):
+        with pytest.raises(ConfigurationError, match='cannot be written') as error:
+            write_whole(file, 'new')
+        assert not isinstance(error.value, DiskError)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_file_behind_a_link_is_written_and_the_link_stays(tmp_path):
+    file, link = tmp_path / 'file', tmp_path / 'link'
+    file.write_text('old')
+    link.symlink_to(file)
+    write_whole(link, 'new')
+    assert link.is_symlink()
+    assert file.read_text() == 'new'
+
+
+@pytest.mark.parametrize('name', ['report', 'figure'])
+def test_device_that_is_full_is_named_and_stays_a_device(tmp_path, name):
+    scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 10.0})
+    folder = mission.make_run_folder(scenario, tmp_path / 'flight')
+    flight, scores = mission.fly_direct(scenario, folder, True, lambda *_: None)
+    mission.write_score(folder, mission.scorecard(scenario, 'direct', flight, scores))
+    done = glider(name, folder, '--out', '/dev/full')
+    assert (done.returncode, done.stdout) == (1, '')
+    assert done.stderr.split() == '/dev/full: cannot be written: No space left on device'.split()
+    assert Path('/dev/full').is_char_device()
+
+
+def test_bag_is_readable_up_to_where_the_disk_was_full(tmp_path):
+    done = glider(
+        *('run', '--engine', 'direct', '--bag', '--duration', 600),
+        *('--out', tmp_path / 'flight', '--no-report'),
+    )
+    assert done.returncode == 1, done.stderr
+    (file,) = (tmp_path / 'flight').glob('*.mcap')
+    *_, told = done.stderr.strip().splitlines()
+    assert told == f'{file}: cannot be written: File too large'
+    assert 'Traceback' not in done.stderr
+    names = {one.name for one in file.parent.iterdir()}
+    assert names == {file.name, 'scenario.yaml', 'vehicle.yaml'}
+    card = mission.score_again(file.parent)
+    assert card['status'] == 'aborted'
+    assert card['ticks'] >= CHUNK_TICKS
+    assert card['ticks'] % CHUNK_TICKS == 0
+    assert f'{file} ends early' in card['reason']
+
+
+def test_recorder_whose_disk_is_full_ends_the_run_and_is_named(tmp_path):
+    done = glider(
+        *('run', 'rough_water', '--duration', 2000, '--out', tmp_path / 'flight'),
+        *('--no-report', '--json'),
+    )
+    assert done.returncode == 1, done.stderr
+    assert 'Traceback' not in done.stderr
+    (file,) = (tmp_path / 'flight').glob('*.mcap')
+    card = json.loads(done.stdout)
+    assert card['status'] == 'aborted'
+    assert card['reason'] == f'{file}: cannot be written: File too large'
+    assert card['ticks'] >= CHUNK_TICKS
+    assert card == json.loads((file.parent / 'score.json').read_text())
+    assert mission.score_again(file.parent)['ticks'] == card['ticks']
+    assert file.stat().st_size <= MOST
+
+
+def test_bag_goes_on_where_room_was_made(tmp_path):
+    """What the disk did not take is kept, and written with the next chunk."""
+    clock = TOPICS['/clock'].codec
+    bag = BagWriter(tmp_path, 'run')
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def write(tick: int) -> bool:
+        bag.write('/clock', tick * TICK_NS, clock.encode(tick * TICK_NS, ()))
+        return bag.end_tick(tick * TICK_NS)
+
+    for tick in range(CHUNK_TICKS - 1):
+        assert not write(tick)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (bag._mcap._handed + 100, limits[1]))
+    try:
+        with pytest.raises(DiskError):
+            write(CHUNK_TICKS - 1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert 'ends early' in Bag(tmp_path).cut
+    write(CHUNK_TICKS)
+    bag.close()
+    again = Bag(tmp_path)
+    assert not again.cut
+    assert sum(len(batch.topic) for batch in again.batches()) == CHUNK_TICKS + 1
