@@ -13,7 +13,10 @@ from tempfile import TemporaryDirectory
 
 import yaml
 
-from glider_bringup.mission import fly_direct, make_run_folder
+from glider_bringup.direct import fly_blocks
+from glider_bringup.mission import fly_direct, make_run_folder, mission_of
+from glider_bringup.ros.bag import BagWriter, Sync
+from glider_bringup.ros.bag_log import LogWriter
 from glider_bringup.scenario import load_scenario
 from glider_bringup.sweep import JOURNAL_FILE, RESULT_FILE, fly_chunk, make_chunks, open_journal
 from glider_bringup.sweep_file import MAX_CELLS, load_sweep
@@ -31,6 +34,10 @@ MEANING = {
     'cdr_bytes_per_tick': 'messages of a tick, all per-tick topics (B)',
     'bag_bytes_per_h': 'recording of a flight of one hour, compressed (B)',
     'bag_over_cdr': 'ratio of that to its messages',
+    'chunk_flush_ms': 'bringing a chunk of 12.8 s to the operating system, median (ms)',
+    'chunk_sync_ms': 'bringing it to the disk as well, as --sync chunk does, median (ms)',
+    'bag_flushed_real_time_factor': 'recording alone, --sync never: simulated over wall time',
+    'bag_synced_real_time_factor': 'the same with --sync chunk',
     'journal_bytes_per_cell': 'journal of a sweep (B)',
     'journal_append_ms': 'bringing one cell to disk, median (ms)',
     'netcdf_bytes_per_cell': 'result of a sweep (B)',
@@ -66,6 +73,9 @@ def measure(progress: Callable[[str], None]) -> dict:
     progress('one hour with a recording')
     cdr_bytes = sum(topic.codec.size for topic in TOPICS.values() if topic.per_tick)
     bag_bytes = _bag_bytes()
+    progress('an hour recorded, flushed and synced')
+    flush_ms, flushed_s = _record('never')
+    sync_ms, synced_s = _record('chunk')
     progress('one cell of the stability map')
     record = _fly_one_cell()
     with TemporaryDirectory() as parent:
@@ -80,6 +90,10 @@ def measure(progress: Callable[[str], None]) -> dict:
         'cdr_bytes_per_tick': cdr_bytes,
         'bag_bytes_per_h': bag_bytes,
         'bag_over_cdr': bag_bytes / (cdr_bytes * HOUR_S / TICK_S),
+        'chunk_flush_ms': flush_ms,
+        'chunk_sync_ms': sync_ms,
+        'bag_flushed_real_time_factor': HOUR_S / flushed_s,
+        'bag_synced_real_time_factor': HOUR_S / synced_s,
         'journal_bytes_per_cell': journal_bytes / CELLS,
         'journal_append_ms': append_ms,
         'netcdf_bytes_per_cell': result_bytes / CELLS,
@@ -98,6 +112,32 @@ def _bag_bytes() -> int:
         folder = make_run_folder(scenario, Path(parent) / 'run')
         fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
         return sum(file.stat().st_size for file in folder.glob('*.mcap'))
+
+
+def _record(sync: Sync) -> tuple[float, float]:
+    """Time (ms) that a chunk takes to be saved, and wall time (s) of recording an hour.
+
+    On the disk of the folder in which this is started: the one on which runs lie.
+    """
+    scenario = load_scenario(SCENARIO, {'dives': 0, 'duration_s': HOUR_S})
+    times = []
+    with TemporaryDirectory(dir=Path.cwd()) as parent:
+        bag = BagWriter(Path(parent) / 'run', 'run', sync=sync)
+        save = bag.flush
+
+        def timed() -> None:
+            start = time.perf_counter()
+            save()
+            times.append(time.perf_counter() - start)
+
+        bag.flush = timed
+        log, recorded_s = LogWriter(bag, scenario.path.points(2)), 0.0
+        for rows in fly_blocks(*mission_of(scenario)):
+            start = time.perf_counter()
+            log.add(rows)
+            recorded_s += time.perf_counter() - start
+        bag.close()
+    return 1e3 * median(times), recorded_s
 
 
 def _fly_one_cell() -> dict:

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from glider_bringup.files import DiskError
 from glider_model.files import parse_json
 from glider_model.settings import ConfigurationError
 
@@ -124,7 +125,7 @@ class Journal:
 
         Raises
         ------
-        ConfigurationError
+        DiskError
             If they cannot be written, as on a full disk; what was there before is.
         """
         self._write(records)
@@ -139,9 +140,9 @@ class Journal:
             reason = 'not all of it could be written'
         except OSError as error:
             reason = error.strerror
-        raise ConfigurationError(
-            f'{self.path}: {reason}; what was written before is there: make room and go on with '
-            f'--resume'
+        raise DiskError(
+            f'{self.path}: cannot be written: {reason}; what was written before is there: make '
+            f'room and go on with --resume'
         )
 
 
