@@ -7,6 +7,7 @@ import signal
 import struct
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from pydantic import Field
@@ -16,7 +17,7 @@ from glider_bringup.files import DiskError
 from glider_bringup.ros.bag import BagWriter, Sync
 from glider_bringup.tick_order import TickOrder
 from glider_model.ros import health, messages, qos
-from glider_model.ros.codec import to_cdr
+from glider_model.ros.codec import MessageError, to_cdr
 from glider_model.ros.executor import take
 from glider_model.ros.messages import TOPICS
 from glider_model.ros.parameters import declare_settings
@@ -67,7 +68,7 @@ class RecorderNode(TickNode):
         self.order = TickOrder(PER_TICK, TICK_NS, self.write)
         self.recorded_ns = -TICK_NS  #: newest tick that outlives this process
         self.has_path = False
-        self.stage, self.last_odom = '', b''
+        self.stage, self.last_odom, self.depth_m = '', b'', 0.0
         self.final_ns: int | None = None
         self.stopped = False
         self.begun = False
@@ -206,11 +207,13 @@ class RecorderNode(TickNode):
         if not self.settings.progress:
             return
         self.progress_s = time.monotonic()
-        odom = TOPICS['odom'].codec.decode(self.last_odom)[1] if self.last_odom else (0.0,) * 3
+        with suppress(MessageError):  # a number that is none is recorded, but not shown
+            if self.last_odom:
+                self.depth_m = -TOPICS['odom'].codec.decode(self.last_odom)[1][2]
         line = {
             'tick': self.order.written_ns // TICK_NS,
             't_s': self.order.written_ns / 1e9,
-            'depth_m': -odom[2],
+            'depth_m': self.depth_m,
             'stage': self.stage,
             'messages': sum(self.bag.counts.values()),
             'lost': self.order.lost if self.ticks.lockstep else 0,
