@@ -18,7 +18,7 @@ from glider_bringup.ros.bag import BagWriter, Sync
 from glider_bringup.tick_order import TickOrder
 from glider_model.ros import health, messages, qos
 from glider_model.ros.codec import MessageError, to_cdr
-from glider_model.ros.executor import take
+from glider_model.ros.executor import take, take_with_info
 from glider_model.ros.messages import TOPICS
 from glider_model.ros.parameters import declare_settings
 from glider_model.ros.tick import FAREWELL_S, Input, Stop, TickNode, run
@@ -89,7 +89,7 @@ class RecorderNode(TickNode):
         item = Input(TOPICS[name])
         profile = None if self.ticks.lockstep else qos.EVERYTHING
         item.subscription = self._subscription(
-            item.topic, lambda raw: self.keep(item, raw), profile=profile
+            item.topic, lambda raw, info: self.keep(item, raw, info), profile=profile
         )
         self.inputs.append(item)
         return item
@@ -148,11 +148,21 @@ class RecorderNode(TickNode):
             array = to_cdr(health.report_array(named))
             self.order.add_event('/diagnostics', report.stamp_ns, array)
 
-    def keep(self, item: Input, raw: bytes) -> None:
-        """Keep a message until its tick is complete. In lockstep an old one is passed over."""
-        stamp_ns = item.topic.codec.decode_stamp(raw)
+    def keep(self, item: Input, raw: bytes, info: dict) -> None:
+        """Keep a message until its tick is complete.
+
+        Passed over are an old one in lockstep, one of a second publisher, and bytes that are no
+        message: those who need it tell.
+        """
+        try:
+            stamp_ns = item.topic.codec.decode_stamp(raw)
+        except MessageError:
+            return
+        if item.is_from_another(info):
+            return
         if self.ticks.lockstep and not self.begun:
             if stamp_ns > 0 and not self.is_replayed():
+                item.number = 0
                 return  # of a run that is under way: one's own begins with tick 0
             self.begun = True
         if stamp_ns > item.stamp_ns or not self.ticks.lockstep:
@@ -162,8 +172,8 @@ class RecorderNode(TickNode):
     def drain(self) -> None:
         """Take and write whatever has come; end when the run is over and all of it is here."""
         for item in self.inputs if self.running else ():
-            while (raw := take(item.subscription)) is not None:
-                self.keep(item, raw)
+            while (taken := take_with_info(item.subscription)) is not None:
+                self.keep(item, *taken)
         while (array := take(self.events)) is not None:
             self.on_event(array)
         try:
