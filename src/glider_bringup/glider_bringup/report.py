@@ -19,7 +19,7 @@ from glider_bringup.page import (
     table,
 )
 from glider_bringup.score import STEADY_DEPTH_M
-from glider_bringup.scorecard import card_rows
+from glider_bringup.scorecard import card_rows, guard_texts
 from glider_bringup.traces import Traces
 from glider_model.files import yaml_text
 from glider_model.signals import TICK_S
@@ -185,6 +185,7 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
     problems, notes = [], []
     if card['status'] == 'aborted':
         problems.append(f'The run was aborted at {at(card["sim_time_s"])}: {card["reason"]}.')
+    problems += [f'Control noticed {text}.' for text in guard_texts(card)]
     if card['messages_lost']:
         problems.append(f'{card["messages_lost"]:,} messages were lost on the way to the bag.')
     broken = {

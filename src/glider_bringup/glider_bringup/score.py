@@ -17,14 +17,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from glider_bringup.blocks import changes_to_tell
 from glider_bringup.direct import COLUMNS
 from glider_bringup.truth import TrueMotion, wire_of
+from glider_control.watch import ROWS, SURFACES, TELL_EVERY_NS, say
 from glider_guidance.profile import AT_END_OF_PATH
 from glider_model.frames import euler_from_quaternion, odometry_from_wire, reference_from_wire
 from glider_model.kernel import kernel
 from glider_model.plant import dive_depths
 from glider_model.sensors import SensorParams
-from glider_model.signals import TICK_S
+from glider_model.signals import TICK_NS, TICK_S
 
 #: Around an inflection (s) and shallower than this (m) nothing counts as steady,
 INFLECTION_MARGIN_S = 600.0
@@ -36,14 +38,18 @@ HEADING_MEAN_S = 300.0
 #: A run is infeasible if the course could not be held for this share of the scored time.
 INFEASIBLE_SHARE = 0.5
 
-_SERIES = 12
+#: So many events of the watch are kept.
+EVENTS_KEPT = 100
+
+_SERIES = 13
 _DEPTH, _E2, _PITCH, _PITCH_REF, _HEADING, _RATE_REF = range(6)
 _TARGET_N, _TARGET_E, _INFEASIBLE, _NET_HEAVINESS, _PITCH_MASS, _ROLL_MASS = range(6, 12)
+_MASK = 12
 
 _ODOM, _REFERENCE = COLUMNS['odom'], COLUMNS['reference']
 _E2_COLUMN = COLUMNS['tracking_error'].start + 1
 _INFEASIBLE_COLUMN = COLUMNS['infeasible']
-_STAGE_COLUMN = COLUMNS['stage']
+_STAGE_COLUMN, _MASK_COLUMN = COLUMNS['stage'], COLUMNS['saturation']
 _ODOM_START, _REFERENCE_START = _ODOM.start, _REFERENCE.start
 _JOINTS_START = COLUMNS['joint_states'].start
 
@@ -88,6 +94,7 @@ def _extract(log, series):
         series[_NET_HEAVINESS, row] = log[row, _JOINTS_START]
         series[_PITCH_MASS, row] = log[row, _JOINTS_START + 1]
         series[_ROLL_MASS, row] = log[row, _JOINTS_START + 2]
+        series[_MASK, row] = log[row, _MASK_COLUMN]
 
 
 class Scorer:
@@ -135,7 +142,7 @@ class Scorer:
         dict
             The run's part of ``score.json``: ticks, settle_s, dives, distance_along_path_m,
             end_of_path_m, cross_track_m, pitch_error_deg, heading_fluctuation_deg, depth_m,
-            actuator_travel, final_state, and ``infeasible``.
+            actuator_travel, guard, final_state, and ``infeasible``.
             A figure without data is None.
         """
         series, ticks = self._series, self.ticks
@@ -175,6 +182,7 @@ class Scorer:
                 'pitch_mass_m': _travel(series(_PITCH_MASS)),
                 'roll_mass_deg': math.degrees(_travel(series(_ROLL_MASS))),
             },
+            'guard': _guard(series(_MASK)),
             'final_state': self._final_state(),
             'infeasible': bool(
                 scored.any() and np.mean(series(_INFEASIBLE)[scored]) >= INFEASIBLE_SHARE
@@ -199,6 +207,43 @@ class Scorer:
             'attitude_rpy_rad': list(attitude),
             'velocity_mps': [odometry.u, odometry.v, odometry.w],
         }
+
+
+def _guard(mask: np.ndarray) -> dict:
+    """What control noticed in flight, as it told it.
+
+    Parameters
+    ----------
+    mask : float64[ticks]
+        Sum of the bits of `glider_control.watch` and of actuators at their limits.
+
+    Returns
+    -------
+    dict
+        state, reaction, and the first `EVENTS_KEPT` events {t_s, row, reaction, message}.
+    """
+    bits = mask.astype(np.int64) & sum(ROWS)
+    stamps_ns = np.arange(len(bits)) * TICK_NS
+    events, before = [], 0
+    for tick in changes_to_tell(bits, stamps_ns, TELL_EVERY_NS, 0, -TELL_EVERY_NS):
+        new = int(bits[tick]) & ~before
+        before = int(bits[tick])
+        events += [
+            {
+                't_s': _round(tick * TICK_S),
+                'row': row,
+                'reaction': 'surface' if bit & SURFACES else 'none',
+                'message': say(bit),
+            }
+            for bit, (row, _) in ROWS.items()
+            if new & bit
+        ]
+    surfaces = bool(before & SURFACES)
+    return {
+        'state': 'surfacing' if surfaces else 'flying',
+        'reaction': 'surface' if surfaces else 'none',
+        'events': events[:EVENTS_KEPT],
+    }
 
 
 def windows(

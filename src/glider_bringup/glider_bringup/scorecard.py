@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scorecard of a run, as a person reads it."""
 
+from collections import Counter
 from pathlib import Path
 
 from rich.table import Table
@@ -33,6 +34,7 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
         ),
         ('dives', str(card['dives'])),
         ('along path', _show(card['distance_along_path_m'], 'm', 0)),
+        *(('control noticed', text) for text in guard_texts(card)),
         *([('end of path', f'came up {_show(end_m, "m", 1)} from its last point')]
           if end_m is not None else []),
         ('cross-track, steady', f'rms {_show(track["rms_steady"], "m", 3)}, max '
@@ -49,6 +51,18 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
          f'{_show(travel["pitch_mass_m"], "m")}, roll mass '
          f'{_show(travel["roll_mass_deg"], "deg", 0)}'),
     ]  # fmt: skip
+
+
+def guard_texts(card: dict) -> list[str]:
+    """What control noticed, in words: each kind once, with its first time and how often."""
+    first, count = {}, Counter()
+    for event in card.get('guard', {}).get('events', []):
+        first.setdefault(event['message'], event['t_s'])
+        count[event['message']] += 1
+    return [
+        f'at {t_s:,.1f} s: {text}' + (f' ({count[text]} times)' if count[text] > 1 else '')
+        for text, t_s in first.items()
+    ]
 
 
 def print_card(card: dict, folder: Path) -> None:

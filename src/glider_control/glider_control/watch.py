@@ -18,6 +18,20 @@ STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, REFUSED = 8, 16, 32, 64
 #: the depth does not follow the vertical rate, or nothing that is measured moves; no measurement.
 ORDERED, TOO_DEEP, FROZEN, LOST = 128, 256, 512, 1024
 SURFACES = ORDERED | TOO_DEEP | FROZEN | LOST
+STUCK = STUCK_BUOYANCY | STUCK_PITCH | STUCK_ROLL
+#: What the bits are called, and what they say.
+ROWS = {
+    STUCK_BUOYANCY: ('buoyancy_engine_stuck', 'buoyancy engine'),
+    STUCK_PITCH: ('pitch_mass_stuck', 'pitch mass'),
+    STUCK_ROLL: ('roll_mass_stuck', 'roll mass'),
+    REFUSED: ('measurement_refused', 'a measurement'),
+    ORDERED: ('surface_ordered', 'ordered'),
+    TOO_DEEP: ('too_deep', 'deeper than the vehicle is rated for'),
+    FROZEN: ('measurement_frozen', 'the measured depth, or all that is measured, stands still'),
+    LOST: ('measurement_lost', 'nothing usable is measured'),
+}
+#: A change of what is told is told at most once in this time (ns).
+TELL_EVERY_NS = 1_000_000_000
 
 #: Below the rated depth a vehicle may be by this share of it, and no less than so much (m): the
 #: lower turn overshoots, with a pump at a third of its rate by 48 m. Longer than this (s) it may
@@ -101,6 +115,20 @@ def make_watch(vehicle, rated_depth_m: float, gate: GateParams) -> WatchParams:
         for most, rate in zip(ranges, rates, strict=True)
     )
     return WatchParams(gate, rated_depth_m + margin_m, ranges, Joints(*progress))
+
+
+def say(told: int) -> str:
+    """What some of the bits above say, in words; empty if they say nothing."""
+    parts = {
+        'surfacing for good': SURFACES,
+        'does not follow its command': STUCK,
+        'refused, the last good one serves': REFUSED,
+    }
+    named = {
+        what: ', '.join(name for bit, (_, name) in ROWS.items() if told & bits & bit)
+        for what, bits in parts.items()
+    }
+    return '; '.join(f'{what}: {names}' for what, names in named.items() if names)
 
 
 @kernel

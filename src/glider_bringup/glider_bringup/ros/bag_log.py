@@ -14,7 +14,8 @@ from glider_bringup.blocks import changes_to_tell
 from glider_bringup.direct import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.mcap_reader import Bag, Batch
 from glider_bringup.ros.bag import BagWriter
-from glider_control.nodes.control_node import TELL_EVERY_NS, saturation_event
+from glider_control.nodes.control_node import saturation_event
+from glider_control.watch import TELL_EVERY_NS
 from glider_guidance.nodes.guidance_node import path_message, stage_event
 from glider_guidance.profile import STAGE_NAMES
 from glider_model.ros import health, messages

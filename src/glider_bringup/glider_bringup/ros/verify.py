@@ -20,7 +20,8 @@ from rclpy.serialization import deserialize_message
 from glider_bringup.blocks import BLOCKS, Block, BlockSettings, changes_to_tell
 from glider_bringup.mcap_reader import Bag
 from glider_bringup.ros.recording import Event, Recording, Series, Told
-from glider_control.nodes.control_node import TELL_EVERY_NS, saturation_event
+from glider_control.nodes.control_node import saturation_event
+from glider_control.watch import TELL_EVERY_NS
 from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message, stage_event
 from glider_guidance.profile import STAGE_NAMES, SURFACING
 from glider_model.ros import health, messages

@@ -15,22 +15,8 @@ from glider_model.ros.parameters import changed_parameters, declare_settings
 from glider_model.ros.tick import BlockNode, run
 from glider_model.signals import TICK_S, Joints
 
-#: What the bits of the saturation mask stand for: several that say the same of something.
+#: Actuators by the bits of the saturation mask that say that they are at their limits.
 AT_LIMIT = {1: 'buoyancy engine', 2: 'pitch mass', 4: 'roll mass'}
-STUCK = {
-    watch.STUCK_BUOYANCY: 'buoyancy engine',
-    watch.STUCK_PITCH: 'pitch mass',
-    watch.STUCK_ROLL: 'roll mass',
-}
-SURFACING = {
-    watch.ORDERED: 'ordered',
-    watch.TOO_DEEP: 'deeper than the vehicle is rated for',
-    watch.FROZEN: 'the measured depth, or all that is measured, stands still',
-    watch.LOST: 'nothing usable is measured',
-}
-
-#: A change of saturation is told at most once in this time (ns).
-TELL_EVERY_NS = 1_000_000_000
 
 
 class ControlNode(BlockNode):
@@ -43,7 +29,7 @@ class ControlNode(BlockNode):
         self.settings = declare_settings(self, ControlSettings, self.on_settings)
         self.params = self.settings.params()
         self.state = self.settings.initial_state()
-        self.told, self.told_ns = 0, -TELL_EVERY_NS
+        self.told, self.told_ns = 0, -watch.TELL_EVERY_NS
         self.stale_ticks = 0
         self.orders = Orders(self)
         self.publish_wrench = self.add_output('wrench')
@@ -82,7 +68,7 @@ class ControlNode(BlockNode):
             self.params,
             TICK_S,
         )
-        if out.saturation != self.told and stamp_ns - self.told_ns >= TELL_EVERY_NS:
+        if out.saturation != self.told and stamp_ns - self.told_ns >= watch.TELL_EVERY_NS:
             self.tell(stamp_ns, out.saturation)
         self.publish_command(stamp_ns, out.command)
         self.publish_wrench(stamp_ns, wrench_to_wire(out.wrench))
@@ -107,29 +93,20 @@ class ControlNode(BlockNode):
         self.publish_command(stamp_ns, self.params.safe_command)
 
 
-def _named(saturation: int, names: dict[int, str]) -> str:
-    return ', '.join(name for bit, name in names.items() if saturation & bit)
-
-
 def saturation_event(stamp_ns: int, saturation: int, node: str) -> DiagnosticArray:
-    """Diagnostics that say which actuators are at their limits, and what control has noticed.
+    """Diagnostics that say what control has noticed, and which actuators are at their limits.
 
     ``node`` is the full name of the node that says it.
     """
-    meanings = {
-        'surfacing for good': SURFACING,
-        'does not follow its command': STUCK,
-        'refused, the last good one serves': {watch.REFUSED: 'a measurement'},
-        'at its limit': AT_LIMIT,
-    }
-    named = {what: _named(saturation, names) for what, names in meanings.items()}
-    said = [f'{what}: {names}' for what, names in named.items() if names]
-    level = health.WARN if said else health.OK
-    if saturation & (watch.SURFACES | sum(STUCK)):
+    at_limit = ', '.join(name for bit, name in AT_LIMIT.items() if saturation & bit)
+    said = [watch.say(saturation), f'at its limit: {at_limit}' if at_limit else '']
+    message = '; '.join(text for text in said if text)
+    level = health.WARN if message else health.OK
+    if saturation & (watch.SURFACES | watch.STUCK):
         level = health.ERROR
-    message = '; '.join(said) or 'no actuator at its limit'
     values = {'saturation': saturation, 't_s': stamp_ns / 1e9}
-    return health.status_array(stamp_ns, node, level, message, values)
+    text = message or 'no actuator at its limit'
+    return health.status_array(stamp_ns, node, level, text, values)
 
 
 def main(args=None) -> int:
