@@ -36,6 +36,7 @@ from glider_model.signals import TICK_NS
 _HEAD = struct.Struct('<BQ')
 _FOOTER = struct.Struct('<BQQQI')
 _END_SIZE = _FOOTER.size + len(MAGIC)  #: of a file: the footer, and the magic again
+_CHECKED = _FOOTER.size - 4  #: bytes of the footer that the checksum in it is of, too
 _CHECKED_AT_ONCE = 1 << 20  #: bytes
 _CHUNK_HEAD = struct.Struct('<QQQII')
 _LOG_TIME_AT = 6  # in a message record: channel (2), sequence (4), log time (8), publish time (8)
@@ -330,7 +331,7 @@ class Bag:
             raise self._harmed(number, f'no record begins at byte {at:,}', footer, found)
         if not checksum and not footer:
             self._note_cut(number, at, opcode, stream)
-        summary = None if self.cut else self._summary(number, footer, bool(checksum))
+        summary = self._summary(number, footer, bool(checksum))
         if summary is None:  # topics may be defined in chunks only
             for part in [one for one in self._parts if one.file == number]:
                 self._read(part)
@@ -379,16 +380,15 @@ class Bag:
         if footer is None or not footer[0]:
             return None
         start, _, checksum = footer
-        file = self.files[number]
-        with file.open('rb') as stream:
-            stream.seek(start)
-            data = stream.read()[: -_END_SIZE + 25]
+        with self.files[number].open('rb') as stream:
+            stream.seek(min(start, stream.seek(0, 2)))
+            data = stream.read()[: _CHECKED - _END_SIZE]
         if checksum and zlib.crc32(data) != checksum:
             if proven:
                 return None
             raise self._harmed(number, 'the checksum (CRC) of its summary is wrong')
         try:
-            return _parse_summary(data[:-25])
+            return _parse_summary(data[:-_CHECKED])
         except _UNREADABLE:
             raise self._harmed(number, 'its summary cannot be read') from None
 
