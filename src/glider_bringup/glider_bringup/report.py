@@ -242,12 +242,8 @@ def _tiles(run: FlownRun) -> str:
         (
             'cross-track, steady',
             number(track['max_steady'], 2, 'm'),
-            f'largest; rms {number(track["rms_steady"], 3, "m")}',
-        ),
-        (
-            'cross-track, whole run',
-            number(track.get('max_run'), 2, 'm'),
-            f'largest; {number(track["max_all"], 2, "m")} after settling',
+            f'largest; rms {number(track["rms_steady"], 3, "m")}; '
+            f'whole run {number(track.get("max_run"), 2, "m")}',
         ),
         (
             'deepest point',
