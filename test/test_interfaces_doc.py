@@ -16,16 +16,21 @@ import rclpy
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
+from glider_bringup.cli import MAX_WORD
 from glider_bringup.launching import ARGUMENTS
 from glider_bringup.nodes.recorder_node import RecorderNode, RecorderSettings
-from glider_bringup.runner import domain_id
+from glider_bringup.runner import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
+from glider_bringup.scenario import Scenario
+from glider_bringup.sweep_file import MAX_CELLS, MAX_VALUES, Sweep
 from glider_control.control import ControlSettings
 from glider_control.nodes.control_node import ControlNode
 from glider_guidance.guidance import GuidanceSettings
 from glider_guidance.nodes.guidance_node import GuidanceNode
-from glider_guidance.path import PathSettings
+from glider_guidance.path import PathSettings, WaypointPath
 from glider_guidance.profile import STAGE_NAMES
-from glider_model.current import CurrentComponent, CurrentSettings
+from glider_model import files
+from glider_model.current import MAX_ROWS, CurrentComponent, CurrentSettings
+from glider_model.errors import MAX_LINE, MAX_LINES, MAX_SHOWN
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
 from glider_model.nodes.tf_node import TfSettings
@@ -158,6 +163,34 @@ def profile_rows():
         )
 
 
+def limit_rows():
+    """Bounds of what a person writes."""
+    longest = {
+        what: next(item.max_length for item in field.metadata if hasattr(item, 'max_length'))
+        for what, field in (
+            ('name of a scenario or sweep', Scenario.model_fields['name']),
+            ('description', Scenario.model_fields['description']),
+            ('dimensions of a sweep', Sweep.model_fields['dimensions']),
+            ('waypoints of a path', WaypointPath.model_fields['waypoints']),
+            ('components of a current', CurrentSettings.model_fields['components']),
+        )
+    }
+    letters = ' characters: letters, digits, `_`, `.`, `-`'
+    yield 'file', f'regular, in UTF-8, <= {files.MAX_BYTES:,} bytes'
+    yield 'values in a text', f'<= {files.MAX_VALUES:,}, repeated ones counted'
+    yield 'mappings and lists inside each other', f'<= {files.MAX_DEPTH}, also in JSON'
+    yield 'number', f'<= {files.MAX_DIGITS} characters'
+    for what, most in longest.items():
+        what_of = letters if what.startswith('name') else ''
+        yield what, f'<= {most:,}' + (' characters' if what == 'description' else what_of)
+    yield 'cells of a sweep', f'<= {MAX_CELLS:,}, of a dimension {MAX_VALUES:,}'
+    yield 'rows of a table of currents', f'<= {MAX_ROWS:,}'
+    yield '`--namespace`', NAMESPACE_ALLOWED
+    yield '`ROS_DOMAIN_ID`', f'0 to {MAX_DOMAIN}'
+    yield 'word of a command line', f'<= {MAX_WORD:,} characters, printable, in UTF-8'
+    yield 'error', f'<= {MAX_LINES} lines of {MAX_LINE} characters, each value <= {MAX_SHOWN}'
+
+
 def tables() -> dict[str, str]:
     """Every generated table of the document, by the name in its marker."""
     parameters = ('parameter', 'type', 'default', 'allowed', 'at run time', 'meaning')
@@ -173,6 +206,7 @@ def tables() -> dict[str, str]:
         'paths': table(fields, member_rows(PathSettings)),
         'currents': table(fields, member_rows(CurrentComponent)),
         'tf_node': table(parameters, parameter_rows(TfSettings)),
+        'limits': table(('what', 'allowed'), limit_rows()),
         'launch': table(
             ('argument', 'default', 'meaning'),
             (

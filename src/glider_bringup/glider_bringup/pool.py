@@ -30,7 +30,7 @@ from glider_model.settings import ConfigurationError
 #: Tasks that are handed out ahead, for each thread of the workers.
 TASKS_AHEAD = 2
 #: How long a scheduler may take to answer, and how often it is looked at (s).
-CONNECT_S, LOOK_S = 10.0, 2.0
+CONNECT_S, LOOK_S = 5.0, 2.0
 #: Workers of this machine log nothing: what matters is told by the commands. A task whose worker
 #: died is given to one more before it is tried by itself.
 _CONFIG = {

@@ -36,14 +36,16 @@ MODULES = {
 NAMESPACE = '/glider'
 #: Remapping that brings the clock into the namespace: docs/adr/0013.
 OWN_CLOCK = ('/clock', 'clock')
-NAMESPACE_ALLOWED = 'up to 200 characters: names of letters, digits and _, with / between them'
+#: Characters of a namespace: with it, names of topics and services have at most 255.
+MAX_NAMESPACE = 200
+NAMESPACE_ALLOWED = (
+    f'names of letters, digits and _, with / between them, up to {MAX_NAMESPACE} characters'
+)
 
 _NAMESPACE = re.compile(r'(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?/?')
-#: Characters of a namespace: names of topics in it have at most 248 for ROS.
-_MAX_NAMESPACE = 200
 _DOMAINS = range(1, 102)
 #: Domains that there are ports for.
-_MAX_DOMAIN = 232
+MAX_DOMAIN = 232
 _FATAL = 'fatal: '
 _PR_SET_PDEATHSIG = 1
 _LIBC = ctypes.CDLL(None)
@@ -71,7 +73,7 @@ class RunnerResult(NamedTuple):
 
 def absolute_namespace(text: str) -> str | None:
     """Namespace as ROS writes it, or None if ``text`` is none."""
-    usable = len(text) <= _MAX_NAMESPACE and _NAMESPACE.fullmatch(text)
+    usable = len(text) <= MAX_NAMESPACE and _NAMESPACE.fullmatch(text)
     return '/' + text.strip('/') if usable else None
 
 
@@ -110,9 +112,9 @@ def given_domain() -> int | None:
     text = os.environ.get('ROS_DOMAIN_ID')
     if not text:
         return None
-    if not (text.isascii() and text.isdigit() and len(text) < 9 and int(text) <= _MAX_DOMAIN):
+    if not (text.isascii() and text.isdigit() and len(text) < 9 and int(text) <= MAX_DOMAIN):
         raise ConfigurationError(
-            f'ROS_DOMAIN_ID = {shown(text)}: no ROS domain (allowed: 0 to {_MAX_DOMAIN})'
+            f'ROS_DOMAIN_ID = {shown(text)}: no ROS domain (allowed: 0 to {MAX_DOMAIN})'
         )
     return int(text)
 

@@ -22,7 +22,7 @@ class ConfigurationError(ValueError):
         lines = message.split('\n')
         if len(lines) > MAX_LINES + 1:
             lines = [*lines[:MAX_LINES], f'and {len(lines) - MAX_LINES} more']
-        super().__init__('\n'.join(printable(_clipped(line)) for line in lines))
+        super().__init__('\n'.join(_clipped(printable(_clipped(line))) for line in lines))
 
 
 def _clipped(line: str) -> str:
@@ -50,7 +50,7 @@ class _Short(reprlib.Repr):
     def repr_int(self, x: int, level: int) -> str:
         """Digits of a number; only how long it is if nobody would read them."""
         digits = int(x.bit_length() * 0.30103) + 1
-        return repr(x) if digits < MAX_SHOWN else f'(a number of {digits} digits)'
+        return repr(x) if digits < MAX_SHOWN else f'(a number of about {digits} digits)'
 
 
 def shown(value) -> str:

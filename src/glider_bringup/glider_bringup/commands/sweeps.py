@@ -128,8 +128,8 @@ def draw(
     """
     from glider_bringup import stability_map as study
 
-    image = out or file.with_suffix('.png')
     stability = study.load_map(file)
+    image = out or file.with_suffix('.png')
     with messages.status('drawing'):
         study.draw_map(stability, image)
     rows = study.shares(stability)

@@ -18,7 +18,7 @@ class Hang(BaseException):
 
 
 @contextmanager
-def time_limit(seconds: float = HANG_S) -> Iterator[None]:
+def time_limit(seconds: float) -> Iterator[None]:
     """Raise `Hang` in the main thread if what is inside takes longer (s)."""
 
     def stop(number, frame) -> None:
@@ -43,10 +43,10 @@ def outcome_of(case: Callable[[], tuple[str, str]]) -> tuple[str, str]:
     why : str
     """
     try:
-        with time_limit():
+        with time_limit(HANG_S):
             return case()
     except Hang:
-        return 'hangs', f'no answer within {HANG_S:.0f} s'
+        return 'hangs', f'no answer within {HANG_S:g} s'
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         return 'tracebacks', f'{type(error).__name__}: {error} ({place.filename}:{place.lineno})'

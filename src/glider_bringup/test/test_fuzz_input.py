@@ -1,0 +1,79 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider fuzz --only files --only lines``, in little."""
+
+import random
+
+import pytest
+
+from glider_bringup.fuzzing import files, lines, watch
+from glider_bringup.fuzzing.counts import Counts
+from glider_model.errors import ConfigurationError
+
+
+def ignore(tried: int) -> None:
+    """Progress that nobody looks at."""
+
+
+def test_mutated_files_do_no_harm():
+    assert files.fuzz(7, 60, ignore) == Counts(60, 0, 0, 0)
+
+
+def test_hostile_command_lines_do_no_harm():
+    assert lines.fuzz(7, 12, ignore) == Counts(12, 0, 0, 0)
+
+
+def test_shipped_files_are_good():
+    assert all(source.door(file) for source, file in shipped())
+
+
+def shipped():
+    """Every source that is a file, with its file."""
+    for source in files._sources():
+        if source.kind != 'table':
+            finders = {'scenario': files.scenario_path, 'vehicle': files.vehicle_path}
+            find = finders.get(source.kind, lambda name: files.SWEEP_FOLDER / f'{name}.yaml')
+            yield source, find(source.name.removesuffix('.yaml'))
+
+
+def test_the_same_seed_makes_the_same_cases():
+    data = files._sources()[0].data
+    one, again, other = (
+        [files.mutate(data, random.Random(f'{seed} {i}')) for i in range(20)] for seed in (1, 1, 2)
+    )
+    assert one == again
+    assert one != other
+    words = [lines.command_line(random.Random(f'{seed} 3')) for seed in (1, 1, 2)]
+    assert words[0] == words[1] != words[2]
+
+
+@pytest.mark.parametrize(
+    ('answer', 'outcome', 'why'),
+    [
+        (lambda: True, '', ''),
+        (lambda: False, 'wrong', 'not finite'),
+        (lambda: told('x: 1'), '', ''),
+        (lambda: {}['x'], 'tracebacks', 'KeyError'),
+        (lambda: forever(), 'hangs', 'no answer'),
+    ],
+)
+def test_outcomes_are_told_apart(tmp_path, monkeypatch, answer, outcome, why):
+    monkeypatch.setattr(watch, 'HANG_S', 0.2)
+    source = files._Source('vehicle', 'x.yaml', b'', lambda file: answer())
+    found = watch.outcome_of(lambda: files._case(source, b'', tmp_path))
+    assert found[0] == outcome
+    assert why in found[1]
+
+
+def told(text: str) -> bool:
+    raise ConfigurationError(text)
+
+
+def forever() -> bool:
+    while True:
+        pass
+
+
+@pytest.mark.parametrize(('text', 'bad'), [('a\nb', False), ('\x1b', True), ('x' * 20_001, True)])
+def test_error_has_to_be_short_and_printable(text, bad):
+    assert bool(watch.badly_told(text)) is bad
