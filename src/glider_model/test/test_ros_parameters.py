@@ -20,6 +20,7 @@ from glider_model.ros.parameters import (
     declare_settings,
     from_parameters,
     parameters_yaml,
+    refuse_unknown,
     to_parameters,
     with_parameters,
 )
@@ -250,3 +251,43 @@ def test_refused_change_changes_nothing(make_node, name, value):
     assert results[0].reason
     assert seen == []
     assert node.get_parameter('gains.kp').value == before.gains.kp
+
+
+def test_parameters_that_a_node_does_not_have_are_refused_by_name(make_node):
+    node = make_node(gain=1.0, gian=2.0, **{'gains.kd': 3.0})
+    declare_settings(node, Example)
+    with pytest.raises(ConfigurationError) as error:
+        refuse_unknown(node)
+    one, other = str(error.value).split('\n')
+    assert one.startswith(
+        'example_node: parameter gains.kd: unknown (allowed: active, count, gain'
+    )
+    assert other.startswith('example_node: parameter gian: unknown')
+
+
+def test_parameters_of_ros_itself_are_taken(make_node):
+    of_ros = {
+        'use_sim_time': False,
+        'start_type_description_service': True,
+        'qos_overrides./odom.publisher.depth': 3,
+    }
+    node = make_node(gain=1.0, **of_ros)
+    declare_settings(node, Example)
+    assert refuse_unknown(node) is None
+
+
+def test_parameters_that_a_file_has_for_other_nodes_are_none_of_its(make_node, tmp_path):
+    file = tmp_path / 'parameters.yaml'
+    nodes = {'example_node': to_parameters(Example()), 'other_node': {'depth': 1.0}}
+    file.write_text(parameters_yaml(nodes, '/glider'), encoding='utf-8')
+    node = make_node('--params-file', str(file))
+    declare_settings(node, Example)
+    assert refuse_unknown(node) is None
+
+
+@pytest.mark.parametrize('text', ['[' * 100_000, '9' * 5000, '!!timestamp foo', '"\\u0000"'])
+def test_text_that_would_do_harm_is_refused(make_node, text):
+    with pytest.raises(ConfigurationError, match='example_node: parameter legs') as error:
+        declare_settings(make_node(legs=text), Example)
+    assert len(str(error.value)) < 400
+    assert str(error.value).isprintable()
