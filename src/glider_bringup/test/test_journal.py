@@ -59,10 +59,11 @@ def test_tail_of_zeros_as_after_a_power_cut_is_dropped(tmp_path):
         assert path.read_bytes() == whole
 
 
-def test_damage_before_the_last_line_is_refused_and_nothing_is_changed(tmp_path):
+@pytest.mark.parametrize('damage', [b'', b'{"a":' * 100_000 + b'\n', b'9' * 5000 + b'\n'], ids=len)
+def test_damage_before_the_last_line_is_refused_and_nothing_is_changed(tmp_path, damage):
     path = tmp_path / 'journal'
     first, second, *rest = write(path).splitlines(keepends=True)
-    damaged = b''.join([first, second[:10], *rest])
+    damaged = b''.join([first, damage or second[:10], *rest])
     path.write_bytes(damaged)
     with pytest.raises(ConfigurationError, match='line 2 is damaged'):
         read(path)
