@@ -17,6 +17,7 @@ import os
 import platform
 import sys
 from enum import Enum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -40,6 +41,14 @@ def bench(
     only: Annotated[
         list[Section] | None, typer.Option(help='Section; can be repeated. Default: all of them.')
     ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option(
+            file_okay=False,
+            exists=True,
+            help="Another checkout: compute times its plant's tick in the same run.",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Measure how fast this machine flies.
@@ -47,7 +56,7 @@ def bench(
     Every time stands beside its ratio to a floor, which is measured in the same run: what the
     same work costs without this stack. Use an idle machine.
     """
-    figures = machine()
+    figures, options = machine(), {'compute': {'against': against}} if against else {}
     for name in dict.fromkeys(one.value for one in only or Section):
         section = importlib.import_module(name)
         with messages.status(name) as status:
@@ -57,7 +66,7 @@ def bench(
                 if not messages.is_terminal:
                     messages.print(f'{name}: {text}')
 
-            measured = section.measure(progress)
+            measured = section.measure(progress, **options.get(name, {}))
         figures |= measured
         if not as_json:
             output.print(make_table(name, measured, section.MEANING))

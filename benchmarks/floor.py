@@ -1,45 +1,29 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The floor of the compute section: the direct engine's arithmetic in C99, as cc compiles it.
+"""The floor of the compute section: the plant's arithmetic in C99, as cc compiles it.
 
-The C is in ``floor/``. What it shares with the Python is not written twice: structs, constants and
-columns are generated from the Python into ``names.h``, and states and parameters are handed over.
-Built without -ffast-math and without contraction, it computes the same bits.
+The C is in ``floor/``. What it shares with the Python is not written twice: structs and constants
+are generated from the Python into ``names.h``, and states and parameters are handed over. Built
+without -ffast-math and without contraction, it computes the same bits.
 """
 
 import ctypes
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from glider_bringup import direct
-from glider_control import adaptive, allocation, control
-from glider_control import steering as roll
-from glider_guidance import guidance, path, profile
-from glider_model import command_filter, frames, plant, polar, rigid_body, signals, steering
+from glider_model import exponential, hydrodynamics, plant, rigid_body, signals
 
 SOURCES = Path(__file__).parent / 'floor'
 #: As fast as IEEE arithmetic in source order allows: no -ffast-math, no fused multiply-add. With
 #: -fno-math-errno gcc would put another formula in the place of sin(atan(x)).
 FLAGS = ['-std=c99', '-O3', '-march=native', '-ffp-contract=off']
 
-_MODULES = (
-    *(signals, frames, command_filter, polar, rigid_body, plant, steering),
-    *(path, profile, guidance, roll, allocation, adaptive, control, direct),
-)
-#: What the steps hand to each other.
-_SIGNALS = (
-    signals.Odometry(*13 * (0.0,)),
-    signals.Reference(*12 * (0.0,)),
-    signals.TrackingError(*3 * (0.0,)),
-    signals.Wrench(*3 * (0.0,)),
-    signals.Adaptation(*(0.0 for _ in signals.Adaptation._fields)),
-)
+_MODULES = (rigid_body, hydrodynamics, exponential, plant)
 _SCALARS = {
     bool: (ctypes.c_bool, 'bool'),
     int: (ctypes.c_int64, 'int64_t'),
@@ -105,28 +89,15 @@ class Structs:
         return one(value)
 
 
-def _constants(structs: Structs) -> str:
-    """Macros of the constants of the modules, by their names without a leading underscore."""
-    found = {'PI': np.pi}
+def _constants() -> str:
+    """Macros of the constants of the modules."""
+    found = {}
     for module in _MODULES:
         for name, value in vars(module).items():
-            name = name.removeprefix('_')
-            if not re.fullmatch('[A-Z][A-Z0-9_]*', name):
-                continue
-            if isinstance(value, int | float) or hasattr(value, '_fields'):
+            if re.fullmatch('[A-Z][A-Z0-9_]*', name) and isinstance(value, int | float):
                 if found.setdefault(name, value) != value:
                     raise ValueError(f'{name} of {module.__name__} has two values')
-    columns = {
-        f'COLUMN_{name}': getattr(where, 'start', where) for name, where in direct.COLUMNS.items()
-    }
-    text = ''
-    for name, value in {**found, **columns}.items():
-        shown = repr(value)
-        if hasattr(value, '_fields'):
-            structs.declare(value)
-            shown = f'({type(value).__name__}){{{", ".join(map(repr, value))}}}'
-        text += f'#define {name} ({shown})\n'
-    return text
+    return ''.join(f'#define {name} ({value!r})\n' for name, value in found.items())
 
 
 class Floor:
@@ -134,8 +105,8 @@ class Floor:
 
     Parameters
     ----------
-    state, params : MissionState, MissionParams
-        Any mission: what it is made of makes the structs.
+    state, params : PlantState, PlantParams
+        Any plant: what it is made of makes the structs.
 
     Raises
     ------
@@ -145,42 +116,23 @@ class Floor:
 
     def __init__(self, state, params) -> None:
         self._structs = Structs()
-        for value in (state, params, *_SIGNALS):
+        for value in (state, params, plant.Rates(0.0, 0.0, 0.0)):
             self._structs.declare(value)
-        constants = _constants(self._structs)
         with TemporaryDirectory() as folder:
             library = Path(folder) / 'floor.so'
-            (Path(folder) / 'names.h').write_text(constants + '\n' + self._structs.text)
+            (Path(folder) / 'names.h').write_text(_constants() + '\n' + self._structs.text)
             done = subprocess.run(
                 [compiler(), *FLAGS, '-shared', '-fPIC', '-I', folder, '-o', library]
-                + [SOURCES / 'direct.c', '-lm'],
+                + [SOURCES / 'plant.c', '-lm'],
                 capture_output=True,
                 text=True,
             )
             if done.returncode:
                 raise RuntimeError(f'{compiler()} does not compile the floor:\n{done.stderr}')
             self._library = ctypes.CDLL(str(library))
-        # self._library.fly.restype = ctypes.c_int64
 
-    def fly_blocks(self, state, params) -> Iterator[np.ndarray]:
-        """Fly a mission block by block, as `direct.fly_blocks` does."""
-        log = np.empty((direct.BLOCK_TICKS, direct.ROW))
-        c_state, c_params = self._structs.make(state), self._structs.make(params)
-        finished = ctypes.c_bool(False)
-        while not finished:
-            rows = self._library.fly(
-                ctypes.byref(c_state),
-                ctypes.byref(c_params),
-                log.ctypes,
-                ctypes.c_int64(len(log)),
-                ctypes.c_double(signals.TICK_S),
-                ctypes.byref(finished),
-            )
-            yield log[:rows]
-
-    def plant_steps(self, state, params, commands, waters) -> np.ndarray:
-        """Motions of the plant (n, 13) under commands and waters (n, 3)."""
-        motions = np.empty((len(commands), len(state.motion)))
+    def plant_steps(self, state, params, commands, waters, motions) -> None:
+        """Fill ``motions`` (n, 13) as `plant_step.plant_steps` does."""
         c_state, c_params = self._structs.make(state), self._structs.make(params)
         self._library.plant_steps(
             ctypes.byref(c_state),
@@ -191,39 +143,22 @@ class Floor:
             ctypes.c_double(signals.TICK_S),
             motions.ctypes,
         )
-        return motions
 
 
-def ticks_compared(floor: Floor, state, params) -> int:
-    """Ticks of a mission, in all of which every number of engine and floor has the same bits.
-
-    Raises
-    ------
-    RuntimeError
-        If there is a tick in which one has not, naming the first.
-    """
-    engine, in_c = (
-        np.concatenate([block.copy() for block in fly(state, params)])
-        for fly in (direct.fly_blocks, floor.fly_blocks)
-    )
-    compare(engine, in_c, 'log')
-    return len(engine)
-
-
-def compare(engine: np.ndarray, in_c: np.ndarray, what: str) -> None:
-    """Refuse numbers, float64[ticks, columns], that have not the same bits.
+def compare(engine: np.ndarray, in_c: np.ndarray) -> int:
+    """Number of ticks of two motions, float64[ticks, 13], which have the same bits.
 
     Raises
     ------
     RuntimeError
-        Naming the first difference.
+        If they have not, naming the first difference.
     """
-    if engine.shape != in_c.shape:
-        raise RuntimeError(f'{what}: {len(engine)} ticks by the engine, {len(in_c)} in C')
     differs = np.argwhere(engine.view(np.uint64) != in_c.view(np.uint64))
     if len(differs):
         tick, column = differs[0]
         raise RuntimeError(
-            f'{what}: the floor is not the arithmetic of the engine, at tick {tick}, column '
-            f'{column}: {float(engine[tick, column])!r} and {float(in_c[tick, column])!r} in C'
+            f'the floor is not the arithmetic of the plant, at tick {tick}, '
+            f'{plant.Motion._fields[column]}: {float(engine[tick, column])!r} and '
+            f'{float(in_c[tick, column])!r} in C'
         )
+    return len(engine)

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The benchmarks: their floor in C is the engine's arithmetic, and the command prints figures."""
+"""The benchmarks: their floor in C is the plant's arithmetic, and the command prints figures."""
 
 import json
 import subprocess
@@ -10,34 +10,41 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glider_bringup.mission import mission_of
 from glider_bringup.scenario import load_scenario
 
 FOLDER = Path(__file__).resolve().parents[1] / 'benchmarks'
 
 
 @pytest.fixture(scope='module')
-def floor():
-    """Module of the floor."""
+def modules():
+    """Modules of the floor and of the plant's flight."""
     sys.path.insert(0, str(FOLDER))
     try:
         import floor
+        import plant_step
 
         if not floor.compiler():
             pytest.skip('no C compiler')
-        yield floor
+        yield floor, plant_step
     finally:
         sys.path.remove(str(FOLDER))
 
 
-def mission(**changes):
+def motions(modules, way, flight):
+    """Where one of the two plants goes."""
+    rows = np.full((len(flight[2]), 13), np.nan)
+    way(*flight, rows)
+    return rows
+
+
+def flight_of(modules, **changes):
     fields = {field.replace('__', '.'): value for field, value in changes.items()}
-    return mission_of(load_scenario('current_8deg', {'dives': 0, **fields}))
+    return modules[1].flight_of(load_scenario('current_8deg', {'dives': 0, **fields}))
 
 
 @pytest.fixture(scope='module')
-def library(floor):
-    return floor.Floor(*mission())
+def library(modules):
+    return modules[0].Floor(*flight_of(modules, duration_s=0.1)[:2])
 
 
 @pytest.mark.parametrize(
@@ -50,21 +57,27 @@ def library(floor):
         {'duration_s': 3000.0, 'current__angle_deg': -70.0, 'path__course_deg': 130.0},
         {'duration_s': 3000.0, 'initial__north_m': -900.0, 'initial__east_m': 300.0},
         {'duration_s': 3000.0, 'perturb__pump_rate': 0.8, 'water__pycnocline_rise': 0.002},
+        {'duration_s': 3000.0, 'vehicle': 'seawing', 'perturb__K_p': 10.0},
+        # nothing damps the roll: many ticks are several steps
+        {'duration_s': 3000.0, 'profile__depth_m': 60.0, 'perturb__D_p': 0.0},
     ],
 )
-def test_floor_computes_the_bits_of_the_engine(floor, library, changes):
-    state, params = mission(**changes)
-    assert floor.ticks_compared(library, state, params) > 10000
+def test_floor_computes_the_bits_of_the_plant(modules, library, changes):
+    floor, plant_step = modules
+    flight = flight_of(modules, **changes)
+    ways = plant_step.plant_steps, library.plant_steps
+    assert floor.compare(*(motions(modules, way, flight) for way in ways)) > 10000
 
 
-def test_a_floor_with_other_arithmetic_is_refused(floor, library, monkeypatch):
-    state, params = mission(duration_s=300.0)
-    seconds = np.nextafter(params.guidance.lookahead_s, 0.0)
-    other = params._replace(guidance=params.guidance._replace(lookahead_s=seconds))
-    fly = library.fly_blocks
-    monkeypatch.setattr(library, 'fly_blocks', lambda state, _: fly(state, other))
-    with pytest.raises(RuntimeError, match='not the arithmetic of the engine, at tick'):
-        floor.ticks_compared(library, state, params)
+def test_a_floor_with_other_arithmetic_is_refused(modules, library):
+    floor, plant_step = modules
+    state, params, *given = flight_of(modules, duration_s=300.0)
+    vehicle = params.vehicle
+    other = params._replace(vehicle=vehicle._replace(K_D=np.nextafter(vehicle.K_D, 0.0)))
+    engine = motions(modules, plant_step.plant_steps, (state, params, *given))
+    in_c = motions(modules, library.plant_steps, (state, other, *given))
+    with pytest.raises(RuntimeError, match='not the arithmetic of the plant, at tick'):
+        floor.compare(engine, in_c)
 
 
 def bench(section: str) -> dict:

@@ -121,9 +121,10 @@ def caveats(cards: list[dict[str, Any]]) -> list[str]:
             f'The runs last from {span(min(times))} to {span(max(times))}: their scores are of '
             'different times, and each curve ends where its run does.'
         )
-    stopped = sum(card['status'] == 'aborted' for card in cards)
-    if stopped:
-        found.append(f'Aborted before its end: {stopped} of {len(cards)} runs.')
+    for status in ('aborted', 'failed'):
+        stopped = sum(card['status'] == status for card in cards)
+        if stopped:
+            found.append(f'{status.capitalize()} before its end: {stopped} of {len(cards)} runs.')
     return found
 
 

@@ -27,12 +27,14 @@ from glider_model.kernel import kernel
 from glider_model.plant import (
     PlantParams,
     PlantState,
+    not_finite,
     plant_finished,
     plant_joints,
     plant_measurement,
     plant_step,
+    state_fault,
 )
-from glider_model.signals import TICK_S
+from glider_model.signals import TICK_S, Joints
 
 #: Columns of a log row: what the topics of one tick carry, as on the wire, and three flags.
 COLUMNS = {
@@ -50,8 +52,18 @@ COLUMNS = {
     'saturation': 59,
 }
 ROW = 60
+#: Block that a column comes from, where it is not the plant.
+_BLOCKS = {
+    'current_velocity': 'current',
+    **dict.fromkeys(('reference', 'tracking_error', 'current_estimate'), 'guidance'),
+    **dict.fromkeys(('command', 'wrench', 'adaptation'), 'control'),
+}
 #: Ticks that are flown before the log is handed on: one hour.
 BLOCK_TICKS = 36000
+
+
+class NotFiniteError(Exception):
+    """A flight came to numbers that are none. The message says which, and when."""
 
 
 class MissionParams(NamedTuple):
@@ -139,6 +151,22 @@ def fly(state, params, log, dt):
     return MissionState(plant, current, guidance, control), log.shape[0], False
 
 
+def _finite_rows(log: np.ndarray) -> int:
+    """Number of rows before the first one with a number that is not finite."""
+    if np.isfinite(log.sum()):
+        return len(log)
+    wrong = np.flatnonzero(~np.isfinite(log).all(axis=1))
+    return int(wrong[0]) if len(wrong) else len(log)
+
+
+def _fault(row: np.ndarray, tick: int) -> str:
+    """What of a log row is not finite, in words; the first in the order of the blocks."""
+    odometry = odometry_from_wire(tuple(row[COLUMNS['odom']]))
+    fault = state_fault(odometry, Joints(*row[COLUMNS['joint_states']]), tick)
+    wrong = (name for name in _BLOCKS if not np.isfinite(row[COLUMNS[name]]).all())
+    return fault or next(not_finite(f'{_BLOCKS[name]}: {name}', tick) for name in wrong)
+
+
 def fly_blocks(state: MissionState, params: MissionParams) -> Iterator[np.ndarray]:
     """Fly a mission block by block.
 
@@ -146,11 +174,21 @@ def fly_blocks(state: MissionState, params: MissionParams) -> Iterator[np.ndarra
     ------
     float64[n, ROW]
         Log rows, n <= BLOCK_TICKS. The array is used again for the next block.
+
+    Raises
+    ------
+    NotFiniteError
+        After the last tick of which every number is finite.
     """
     log = np.empty((BLOCK_TICKS, ROW))
     current = CurrentState(state.current.tick, state.current.values.copy())
     state = state._replace(current=current)
-    finished = False
+    finished, ticks = False, 0
     while not finished:
         state, rows, finished = fly(state, params, log, TICK_S)
-        yield log[:rows]
+        good = _finite_rows(log[:rows])
+        if good:
+            yield log[:good]
+        if good < rows:
+            raise NotFiniteError(_fault(log[good], ticks + good))
+        ticks += rows

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.direct import fly_blocks
-from glider_bringup.mission import mission_of
+from glider_bringup.direct import NotFiniteError, fly_blocks
+from glider_bringup.mission import finite, mission_of
 from glider_bringup.montecarlo import airframe
 from glider_bringup.pool import Pool, Progress
 from glider_bringup.record import Record
@@ -328,36 +328,30 @@ def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
         )
         params = params._replace(control=params.control._replace(pid=pid))
     scorer = Scorer(scenario.sensors.params(scenario.seed))
+    failed = []
 
     def blocks() -> Iterator[np.ndarray]:
-        for log in fly_blocks(state, params):
-            scorer.add(log)
-            yield log
+        try:
+            for log in fly_blocks(state, params):
+                scorer.add(log)
+                yield log
+        except NotFiniteError as error:
+            failed.append(str(error))
 
     record = Record(blocks())
     scores = scorer.result(scenario.score_rules(scorer.ticks * TICK_S))
     for measure in case.measures:
         scores.update(measure(record, scenario))
-    return _row(scores), record.thinned(RECORD_POINTS) if case.drawn else None
+    return _row(scores, bool(failed)), record.thinned(RECORD_POINTS) if case.drawn else None
 
 
-def _row(scores: dict[str, Any]) -> dict[str, Any]:
+def _row(scores: dict[str, Any], failed: bool = False) -> dict[str, Any]:
     """Scores with status; a number that is not finite becomes None, and is told."""
-    status = 'infeasible' if scores['infeasible'] else 'completed'
-    clean = {name: _clean(value) for name, value in scores.items() if name != 'infeasible'}
-    finite = bool(scores['final_state']) and clean == {
-        name: value for name, value in scores.items() if name != 'infeasible'
-    }
-    return {'status': status, 'finite': finite, **clean}
-
-
-def _clean(value: Any) -> Any:
-    """The same without numbers that JSON does not have."""
-    if isinstance(value, dict):
-        return {name: _clean(inner) for name, inner in value.items()}
-    if isinstance(value, list):
-        return [_clean(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    scores = dict(scores)
+    status = 'infeasible' if scores.pop('infeasible') else 'completed'
+    clean = finite(scores)
+    whole = not failed and bool(scores['final_state']) and clean == scores
+    return {'status': 'failed' if failed else status, 'finite': whole, **clean}
 
 
 def fly(

@@ -6,15 +6,16 @@ A run is a folder: a bag in rosbag2 layout, the scenario and vehicle that made i
 """
 
 import json
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from glider_bringup.direct import MissionParams, MissionState, fly_blocks
+from glider_bringup.direct import MissionParams, MissionState, NotFiniteError, fly_blocks
 from glider_bringup.figure import draw_run
 from glider_bringup.files import write_whole
 from glider_bringup.interrupts import interrupts_noted
@@ -31,6 +32,7 @@ from glider_bringup.traces import TRACED, Tracer, Traces, load_traces
 from glider_guidance.guidance import path_time_s
 from glider_guidance.profile import mission_time_s
 from glider_model.files import is_file, read_json
+from glider_model.plant import NOT_FINITE
 from glider_model.ros.health import FINISHED
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS, TICK_S
@@ -69,8 +71,8 @@ Reading = Callable[[int, int], None]
 class Flight(NamedTuple):
     """How a flight ended, apart from what its topics tell."""
 
-    status: str  #: completed or aborted
-    reason: str  #: why it was aborted
+    status: str  #: completed, aborted, or failed: a number was not finite
+    reason: str  #: why it was aborted, or failed
     wall_time_s: float | None  #: None if nobody measured it
     messages_recorded: int
     messages_lost: int
@@ -164,7 +166,10 @@ def fly_direct(
     tracer: Tracer | None = None,
     sync: Sync = 'end',
 ) -> tuple[Flight, dict]:
-    """Fly with the direct engine; Ctrl-C ends it as aborted with what was flown."""
+    """Fly with the direct engine; Ctrl-C ends it as aborted with what was flown.
+
+    A number that is not finite ends it as failed, with what was flown before.
+    """
     state, params = mission_of(scenario)
     scorer = _scorer(scenario)
     bag = _open_bag(scenario, folder, sync) if with_bag else None
@@ -172,19 +177,29 @@ def fly_direct(
     status, reason, ticks = 'completed', '', 0
     start = time.perf_counter()
     with interrupts_noted() as interrupts:
-        for log in fly_blocks(state, params):
-            for taker in takers:
-                taker.add(log)
-            ticks += len(log)
-            progress(ticks, float(-log[-1, 2]))
-            if interrupts:
-                status, reason = 'aborted', 'stopped by SIGINT'
-                break
+        try:
+            for log in fly_blocks(state, params):
+                for taker in takers:
+                    taker.add(log)
+                ticks += len(log)
+                progress(ticks, float(-log[-1, 2]))
+                if interrupts:
+                    status, reason = 'aborted', 'stopped by SIGINT'
+                    break
+        except NotFiniteError as error:
+            status, reason = 'failed', str(error)
     wall_time_s = time.perf_counter() - start
     if bag and status == 'completed':
         bag.finish()
     recorded = bag.close() if bag else 0
     return Flight(status, reason, wall_time_s, recorded, 0), _score(scenario, scorer)
+
+
+def _ended(complete: bool, reason: str) -> str:
+    """Status of a flight that was complete, or ended early for a reason."""
+    if complete:
+        return 'completed'
+    return 'failed' if NOT_FINITE in reason else 'aborted'
 
 
 def _open_bag(scenario: Scenario, folder: Path, sync: Sync) -> LogWriter:
@@ -233,7 +248,7 @@ def fly_nodes(
         if completed and (missing := log.missing(None)):
             completed, reason = False, missing
         recorded, lost = sum(log.counts.values()), log.lost(completed)
-    status = 'completed' if completed else 'aborted'
+    status = _ended(completed, reason)
     flight = Flight(status, reason, result.flight_s, recorded, lost)
     return flight, _score(scenario, scorer)
 
@@ -248,12 +263,15 @@ def _score(scenario: Scenario, scorer: Scorer) -> dict:
 
 
 def scorecard(scenario: Scenario, engine: str | None, flight: Flight, scores: dict) -> dict:
-    """Contents of ``score.json``."""
-    scores = dict(scores)
+    """Contents of ``score.json``; a figure that is not finite is None there, and a failure."""
+    scores, wrong = dict(scores), list(_not_finite(scores))
     infeasible = scores.pop('infeasible')
     status = flight.status
     if status == 'completed' and infeasible:
         status = 'infeasible'
+    reason = flight.reason
+    if wrong and status != 'failed':
+        status, reason = 'failed', f'the score is not finite: {", ".join(wrong)}'
     sim_time_s = scores['sim_time_s']
     return {
         'scenario': scenario.name,
@@ -263,20 +281,38 @@ def scorecard(scenario: Scenario, engine: str | None, flight: Flight, scores: di
         'engine': engine,
         'seed': scenario.seed,
         'status': status,
-        'reason': flight.reason,
+        'reason': reason,
         'ticks': scores.pop('ticks'),
         'sim_time_s': scores.pop('sim_time_s'),
         'wall_time_s': flight.wall_time_s,
         'real_time_factor': sim_time_s / flight.wall_time_s if flight.wall_time_s else None,
         'messages_recorded': flight.messages_recorded,
         'messages_lost': flight.messages_lost,
-        **scores,
+        **finite(scores),
     }
+
+
+def finite(value: Any) -> Any:
+    """The same without numbers that JSON does not have: they become None."""
+    if isinstance(value, dict):
+        return {name: finite(inner) for name, inner in value.items()}
+    if isinstance(value, list):
+        return [finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _not_finite(scores: dict) -> Iterator[str]:
+    """Dotted names of the figures that are not finite."""
+    for name, value in scores.items():
+        if isinstance(value, dict):
+            yield from (f'{name}.{inner}' for inner in _not_finite(value))
+        elif value != finite(value):
+            yield name
 
 
 def write_score(folder: Path, card: dict) -> None:
     """Write ``score.json``."""
-    write_whole(folder / SCORE_FILE, json.dumps(card, indent=2) + '\n')
+    write_whole(folder / SCORE_FILE, json.dumps(card, indent=2, allow_nan=False) + '\n')
 
 
 def score_again(run: Path, progress: Reading = lambda ticks, total: None) -> dict:
@@ -320,7 +356,7 @@ def _score_bag(
     log = _replay(bag, scorer, tracer, lambda ticks: progress(ticks, max(ticks, total)))
     missing = log.missing(old.get('ticks'))
     if old:
-        complete, reason = old['status'] != 'aborted', old['reason']
+        complete, reason = old['status'] not in ('aborted', 'failed'), old['reason']
     else:
         complete, reason = _end_of_run(log)
     lost = log.lost(complete)
@@ -332,7 +368,7 @@ def _score_bag(
         raise ConfigurationError(f'{run}: cannot be scored: {why}')
     if missing and (complete or not old or log.ticks < old['ticks']):
         complete, reason = False, '; '.join(one for one in (reason, missing) if one)
-    status = 'completed' if complete else 'aborted'
+    status = _ended(complete, reason)
     recorded = sum(log.counts.values())
     flight = Flight(status, reason, old.get('wall_time_s'), recorded, lost)
     engine = old.get('engine') or ('nodes' if (run / PARAMETERS_FILE).exists() else None)

@@ -194,8 +194,11 @@ def make_scenarios(
     return scenarios
 
 
-def judge(scores: dict) -> dict[str, Any]:
-    """Figures of one flight, and whether it diverged; a figure that is not finite is None."""
+def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
+    """Figures of one flight, and whether it diverged; a figure that is not finite is None.
+
+    A flight that failed has diverged, whatever it was like before.
+    """
     figures = {name: scores[group][field] for name, (group, field) in FIGURES.items()}
     numbers = [number for number in figures.values() if number is not None]
     final = scores['final_state'] or {}
@@ -206,13 +209,14 @@ def judge(scores: dict) -> dict[str, Any]:
         name: number if number is not None and math.isfinite(number) else None
         for name, number in figures.items()
     }
-    return {'diverged': not finite or far or scores['infeasible'], **figures}
+    failed = status == 'failed' or not finite
+    return {'diverged': failed or far or scores['infeasible'], **figures}
 
 
 def _fly_plant(scenario: Scenario) -> dict[str, Any]:
     """Fly one scenario in a worker."""
-    _, scores = fly_direct(scenario, Path(), False, lambda ticks, depth_m: None)
-    return judge(scores)
+    flight, scores = fly_direct(scenario, Path(), False, lambda ticks, depth_m: None)
+    return judge(scores, flight.status)
 
 
 def _check_plant(scenario: Scenario) -> dict[str, Any]:

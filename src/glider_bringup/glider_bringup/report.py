@@ -27,7 +27,12 @@ from glider_model.signals import TICK_S
 #: A track is lost if the vehicle is farther off its path than this until the end (m).
 LOST_M = 100.0
 
-_BADGES = {'completed': '✓ Completed', 'infeasible': '! Infeasible', 'aborted': '✕ Aborted'}
+_BADGES = {
+    'completed': '✓ Completed',
+    'infeasible': '! Infeasible',
+    'aborted': '✕ Aborted',
+    'failed': '✕ Failed',
+}
 
 
 class Actuator(NamedTuple):
@@ -136,7 +141,7 @@ def verdict(card: dict[str, Any], settle_s: float) -> str:
     dives = card['dives']
     flown = f'{_count(dives, "dive")} to {depth}' if dives else f'Down to {depth}'
     text = f'{flown}, {along} along the path in {time}.'
-    if card['status'] == 'aborted':
+    if card['status'] in ('aborted', 'failed'):
         text = f'Stopped after {time}: {card["reason"]}. Until then: {flown[0].lower()}{flown[1:]}'
         text += f', {along} along the path.'
     if card['status'] == 'infeasible':
@@ -183,8 +188,9 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
         return f'{span(ticks * TICK_S)} ({100.0 * ticks / traces.ticks:.2g} % of the time)'
 
     problems, notes = [], []
-    if card['status'] == 'aborted':
-        problems.append(f'The run was aborted at {at(card["sim_time_s"])}: {card["reason"]}.')
+    if card['status'] in ('aborted', 'failed'):
+        ended = 'was aborted' if card['status'] == 'aborted' else 'failed'
+        problems.append(f'The run {ended} at {at(card["sim_time_s"])}: {card["reason"]}.')
     problems += [f'Control noticed {text}.' for text in guard_texts(card)]
     if card['messages_lost']:
         problems.append(f'{card["messages_lost"]:,} messages were lost on the way to the bag.')

@@ -17,6 +17,18 @@ import math
 from glider_model.kernel import kernel
 
 
+#: Faster than this no coefficient is known, and the water brakes any hull (m/s, rad/s): a force of
+#: m v per metre per second and a moment of m omega per rad/s beyond it.
+FASTEST_MPS, FASTEST_RADPS = 10.0, 10.0
+
+
+@kernel
+def _body_damping(linear, quadratic, rate, inertia):
+    """Damping moment over its rate (N m s/rad), the brake of a spin included."""
+    damping = max(0.0, linear + quadratic * abs(rate))
+    return damping + inertia * max(0.0, abs(rate) - FASTEST_RADPS)
+
+
 @kernel
 def hydrodynamics(u, v, w, p, q, r, vehicle):
     """Viscous force (N) and moment (N m) for velocity through the water; 6 numbers."""
@@ -49,11 +61,42 @@ def hydrodynamics(u, v, w, p, q, r, vehicle):
         t_x = m_1 * c_a * c_b - m_2 * c_a * s_b - m_3 * s_a + c_d * damp_1 - s_d * damp_3
         t_y = m_1 * s_b + m_2 * c_b + damp_2
         t_z = m_1 * s_a * c_b - m_2 * s_a * s_b + m_3 * c_a + s_d * damp_1 + c_d * damp_3
+    brake = vehicle.m * max(0.0, speed - FASTEST_MPS)
     return (
-        f_x - (vehicle.D_u + vehicle.D_uu * abs(u)) * u,
-        f_y - (vehicle.D_v + vehicle.D_vv * abs(v)) * v,
-        f_z - (vehicle.D_w + vehicle.D_ww * abs(w)) * w,
-        t_x - (vehicle.D_p + vehicle.D_pp * abs(p)) * p,
-        t_y - (vehicle.D_q + vehicle.D_qq * abs(q)) * q,
-        t_z - (vehicle.D_r + vehicle.D_rr * abs(r)) * r,
+        f_x - (max(0.0, vehicle.D_u + vehicle.D_uu * abs(u)) + brake) * u,
+        f_y - (max(0.0, vehicle.D_v + vehicle.D_vv * abs(v)) + brake) * v,
+        f_z - (max(0.0, vehicle.D_w + vehicle.D_ww * abs(w)) + brake) * w,
+        t_x - _body_damping(vehicle.D_p, vehicle.D_pp, p, vehicle.i_xx + vehicle.a_44) * p,
+        t_y - _body_damping(vehicle.D_q, vehicle.D_qq, q, vehicle.i_yy + vehicle.a_55) * q,
+        t_z - _body_damping(vehicle.D_r, vehicle.D_rr, r, vehicle.i_zz + vehicle.a_66) * r,
     )
+
+
+@kernel
+def rate_damping(u, v, w, p, q, r, vehicle):
+    """What the damping moments lose with the rate about their own axis (N m s/rad, 3 numbers).
+
+    - d(moment)/d(rate) of `hydrodynamics`, without what static moments and other rates do.
+    """
+    xz2 = u * u + w * w
+    speed2 = xz2 + v * v
+    s_d2 = 0.0
+    if xz2 > 1e-18:
+        c_a2 = u * u / xz2
+        s_d2 = (1.0 - c_a2) * c_a2 * c_a2 * c_a2 * c_a2
+    d_x = (vehicle.K_p * (1.0 - s_d2) + vehicle.K_r * s_d2) * speed2
+    d_z = (vehicle.K_p * s_d2 + vehicle.K_r * (1.0 - s_d2)) * speed2
+    return (
+        _steepness(vehicle.D_p, vehicle.D_pp, p, vehicle.i_xx + vehicle.a_44) - d_x,
+        _steepness(vehicle.D_q, vehicle.D_qq, q, vehicle.i_yy + vehicle.a_55) - vehicle.K_q * speed2,
+        _steepness(vehicle.D_r, vehicle.D_rr, r, vehicle.i_zz + vehicle.a_66) - d_z,
+    )
+
+
+@kernel
+def _steepness(linear, quadratic, rate, inertia):
+    """Derivative of the damping moment in body axes (N m s/rad)."""
+    steepness = max(0.0, linear + 2.0 * quadratic * abs(rate))
+    if abs(rate) > FASTEST_RADPS:
+        steepness += inertia * (2.0 * abs(rate) - FASTEST_RADPS)
+    return steepness

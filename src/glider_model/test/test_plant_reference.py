@@ -13,13 +13,16 @@ difference to the tick before; the reference lets v_c run evenly from one value 
 dynamics, integrates the path through the water, and adds the held velocities to it.
 """
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from glider_model.plant import Motion, integrate
+from glider_model.exponential import phi_functions
+from glider_model.plant import Motion, derivative, integrate
+from glider_model.rigid_body import make_inertia
 from glider_model.signals import TICK_S, Joints, Water
 from glider_model.vehicle import load_vehicle
 
@@ -216,17 +219,17 @@ def both(request, fly, plant_params, start):
 
 def test_manoeuvre_position_agrees_with_dop853(both):
     plant, reference = both
-    assert np.abs(plant[:, :3] - reference[:, :3]).max() < 1e-6  # m
+    assert np.abs(plant[:, :3] - reference[:, :3]).max() < 1e-3  # m
 
 
 def test_manoeuvre_attitude_agrees_with_dop853(both):
     plant, reference = both
-    assert np.abs(plant[:, 3:7] - reference[:, 3:7]).max() < 1e-6
+    assert np.abs(plant[:, 3:7] - reference[:, 3:7]).max() < 1e-4
 
 
 def test_manoeuvre_velocity_agrees_with_dop853(both):
     plant, reference = both
-    assert np.abs(plant[:, 7:] - reference[:, 7:]).max() < 1e-6  # m/s, rad/s
+    assert np.abs(plant[:, 7:] - reference[:, 7:]).max() < 5e-5  # m/s, rad/s
 
 
 def test_manoeuvre_is_one(both):
@@ -237,32 +240,98 @@ def test_manoeuvre_is_one(both):
     assert np.abs(plant[:, 10:]).max() > 0.01  # rad/s
 
 
-@pytest.mark.parametrize('name', ['zhang2021', 'seawing'])
-def test_rk4_error_has_slope_four(name, plant_params, start):
-    """Halving the step divides the error by 16, with moving actuators and changing water."""
-    state = start(euler=(0.2, -0.4, 1.0), velocity=(0.5, 0.05, -0.03, 0.2, -0.1, 0.05))
+#: A second in which everything moves, far from a glide, and its actuators and water.
+SECOND = {'euler': (0.2, -0.4, 1.0), 'velocity': (0.5, 0.05, -0.03, 0.2, -0.1, 0.05)}
+BEGIN, END = Joints(0.3, 0.01, -0.2), Joints(0.31, 0.013, -0.1)
+WATER, WATER_RATE = np.array([0.2, 0.1, 0.0]), np.array([0.01, -0.02, 0.0])
+
+
+def errors_of_a_second(name, factor, steps, plant_params, start):
+    """Largest error of the motion after `SECOND` against DOP853, for some numbers of steps.
+
+    ``factor`` scales all damping of the rates.
+    """
     params = plant_params(name)
-    begin, end = Joints(0.3, 0.01, -0.2), Joints(0.31, 0.013, -0.1)
+    stiff = {
+        field: factor * getattr(params.vehicle, field)
+        for field in ('D_p', 'D_q', 'D_r', 'K_p', 'K_q', 'K_r')
+    }
+    params = params._replace(vehicle=params.vehicle._replace(**stiff))
+    reference = Reference(name)
+    reference.linear[3:] *= factor
+    for field in ('K_p', 'K_q', 'K_r'):
+        reference.k[field] *= factor
+    state = start(**SECOND)
+    x, before = np.array(state.motion), WATER - WATER_RATE
+    x[7:10] += R_NB(x[3:7]).T @ before
+    begin, end = np.array(BEGIN), np.array(END)
+    x = reference.segment(x, begin, end - begin, before, WATER_RATE, 1.0, 1e-13)
+    x[:3] += WATER
+    x[3:7] /= np.linalg.norm(x[3:7])
+    x[7:10] -= R_NB(x[3:7]).T @ WATER
+    given = state.motion, BEGIN, END, Water(*WATER), Water(*WATER_RATE), params, 1.0
+    return np.array([np.abs(np.array(integrate(*given, n)[0]) - x).max() for n in steps])
 
-    def run(substeps):
-        motion = integrate(
-            state.motion,
-            begin,
-            end,
-            Water(0.2, 0.1, 0.0),
-            Water(0.01, -0.02, 0.0),
-            params,
-            1.0,
-            substeps,
-        )
-        return np.array(motion)
 
-    exact = run(4096)
-    counts = np.array([64, 128, 256])
-    errors = [np.abs(run(count) - exact).max() for count in counts]
-    slope = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
-    assert 3.7 < slope < 4.3
-    assert errors[-1] > 1e-13  # above rounding
+@pytest.mark.parametrize(
+    ('name', 'factor', 'steps', 'low', 'high'),
+    [
+        # not stiff: order 4
+        ('zhang2021', 0.0, [10, 20, 40], 3.8, 4.4),
+        ('seawing', 1.0, [10, 20, 40], 3.8, 4.4),
+        # the pole of roll is 37 1/s: order 4 where the step is short for it, ...
+        ('zhang2021', 1.0, [80, 160, 320], 3.6, 4.4),
+        # ... and where it is long less, as theory has it for stiff parts (Hochbruck and
+        # Ostermann 2005: 2 in the worst case), without ever being unstable
+        ('zhang2021', 10.0, [10, 20, 40], 1.5, 3.0),
+        ('zhang2021', 1000.0, [10, 20, 40], 0.5, 3.0),
+    ],
+)
+def test_error_falls_with_the_order(name, factor, steps, low, high, plant_params, start):
+    errors = errors_of_a_second(name, factor, steps, plant_params, start)
+    slope = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert low < slope < high, errors
+    assert errors[-1] > 1e-12  # above rounding
+
+
+@pytest.mark.parametrize('name', ['zhang2021', 'seawing'])
+def test_without_damping_it_is_the_classical_method(name, plant_params, start):
+    """A Runge-Kutta 4 written down here, on the derivative of the plant."""
+    params = plant_params(name)
+    viscous = dict.fromkeys(('D_p', 'D_q', 'D_r', 'K_p', 'K_q', 'K_r'), 0.0)
+    vehicle = params.vehicle._replace(**viscous)
+    params, x = params._replace(vehicle=vehicle), start(**SECOND).motion
+    still, h = Water(0.0, 0.0, 0.0), TICK_S
+    inertia = make_inertia(BEGIN.x_p, BEGIN.mu, vehicle)
+
+    def f(y):
+        k = derivative(Motion(*y), BEGIN.m_b, inertia, still, still, vehicle, params.water)
+        return np.array(k)
+
+    y = np.array(x)
+    k_1 = f(y)
+    k_2 = f(y + 0.5 * h * k_1)
+    k_3 = f(y + 0.5 * h * k_2)
+    y += h / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + f(y + h * k_3))
+    y[3:7] /= np.linalg.norm(y[3:7])
+    motion, _ = integrate(x, BEGIN, BEGIN, still, still, params, h, 1)
+    np.testing.assert_allclose(np.array(motion), y, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize('z', [0.0, -1e-9, -1e-3, -0.3, -0.5, -0.7, -3.0, -40.0, -2000.0])
+def test_phi_functions(z):
+    """Against their integrals, by Gauss and Legendre."""
+    s, weight = np.polynomial.legendre.leggauss(60)
+    # the integrand is concentrated at the end where the decay is fast
+    edges = 1.0 - np.array([1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0])
+    for k, value in enumerate(phi_functions(z)[1:], 1):
+        parts = [
+            0.5 * (b - a) * weight @ (np.exp((1 - x) * z) * x ** (k - 1) / math.factorial(k - 1))
+            for a, b in itertools.pairwise(edges)
+            for x in [0.5 * (a + b) + 0.5 * (b - a) * s]
+        ]
+        assert value == pytest.approx(sum(parts), rel=1e-13)
+    assert phi_functions(z)[0] == pytest.approx(math.exp(z), rel=1e-14)
 
 
 @pytest.mark.parametrize('name', ['zhang2021', 'seawing'])
@@ -271,7 +340,7 @@ def test_a_single_tick_agrees_with_dop853(name, plant_params, start):
     state = start(euler=(1.0, 0.7, -2.0), velocity=(0.5, 0.2, 0.25, 0.3, -0.2, 0.25))
     begin, end = Joints(-0.3, 0.02, 0.6), Joints(-0.25, 0.03, 0.7)
     water, rate = np.array([0.3, -0.2, 0.0]), np.array([0.1, 0.2, 0.0])
-    motion = integrate(
+    motion, _ = integrate(
         state.motion, begin, end, Water(*water), Water(*rate), plant_params(name), TICK_S, 1024
     )
     reference, x = Reference(name), np.array(state.motion)

@@ -25,7 +25,7 @@ def score(
     with counter('reading the bag', None) as update:
         card = mission.score_again(run, update)
     if as_json:
-        print(json.dumps(card))
+        print(json.dumps(card, allow_nan=False))
     else:
         print_card(card, run)
 

@@ -130,10 +130,10 @@ def run(
             flown, engine, rate, place, out, bag, sync.value, report, begin_view
         )
     if as_json:
-        print(json.dumps(card))
+        print(json.dumps(card, allow_nan=False))
     else:
         print_card(card, folder)
-    if card['status'] == 'aborted':
+    if card['status'] in ('aborted', 'failed'):
         raise typer.Exit(
             EXIT_INTERRUPTED if card['reason'].startswith('stopped by') else EXIT_FAILED
         )
@@ -187,8 +187,8 @@ def _fly(
     card = mission.scorecard(scenario, engine.value, flight, scores)
     mission.write_score(folder, card)
     has_room = _write_report(scenario, folder, card, tracer) if tracer else True
-    if flight.reason:
-        messages.print(f'{flight.status}: {flight.reason}', style='red')
+    if card['reason']:
+        messages.print(f'{card["status"]}: {card["reason"]}', style='red', soft_wrap=True)
     return card, folder, has_room
 
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The vehicle and the water around it, as a node that also makes time."""
 
+import math
 import sys
 
 from glider_model.frames import odometry_to_wire, water_from_wire
@@ -11,6 +12,7 @@ from glider_model.plant import (
     plant_joints,
     plant_measurement,
     plant_step,
+    state_fault,
 )
 from glider_model.ros import messages
 from glider_model.ros.clock import ClockNode
@@ -46,11 +48,14 @@ class PlantNode(ClockNode):
         water_from_wire((0.0, 0.0, 0.0))
 
     def publish_tick(self, stamp_ns: int) -> None:
-        """Publish the state of the vehicle."""
-        self.publish_clock(stamp_ns)
+        """Publish the state of the vehicle, or end the run if there is none any more."""
         measured = plant_measurement(self.state, self.params)
+        joints = plant_joints(self.state)
+        if not math.isfinite(sum(measured) + sum(joints)):
+            self.fail(state_fault(measured, joints, self.state.tick))
+        self.publish_clock(stamp_ns)
         self.publish_odom(stamp_ns, odometry_to_wire(measured))
-        self.publish_joints(stamp_ns, plant_joints(self.state))
+        self.publish_joints(stamp_ns, joints)
 
     def complete_tick(self, command, current_velocity) -> bool:
         """Integrate to the next tick; False at the end of the run."""

@@ -125,7 +125,7 @@ class ClockNode(TickNode):
             raise Stop(EXIT_PEER, f'{rivals[0]}; {ALONE}')
         if waited_s > self.ticks.startup_timeout_s:
             missing = '; '.join(self.unmatched())
-            self._fail(f'not ready after {self.ticks.startup_timeout_s:g} s: {missing}')
+            self.fail(f'not ready after {self.ticks.startup_timeout_s:g} s: {missing}')
 
     def on_ready(self) -> None:
         """Start time."""
@@ -236,7 +236,7 @@ class ClockNode(TickNode):
         if self._paused or waits_for_time:
             self._watched_ns = None
         elif self.stuck_s() > self.ticks.tick_timeout_s:
-            self._fail(self._blame())
+            self.fail(self._blame())
 
     def _blame(self) -> str:
         """Find the node at which the tick hangs, by following who waits for whom."""
@@ -262,6 +262,7 @@ class ClockNode(TickNode):
             f'{self.ticks.tick_timeout_s:g} s'
         )
 
-    def _fail(self, message: str) -> None:
+    def fail(self, message: str) -> None:
+        """End the run, and tell everybody why."""
         self.report(health.FAILED, message, stamp_ns=self._due_ns or 0, level=health.ERROR)
         raise Stop(EXIT_PEER, message)

@@ -1,0 +1,73 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Time of a tick of the plant, under commands and water of a flight of the direct engine.
+
+As a program, with the packages of any checkout on PYTHONPATH, it prints the nanoseconds.
+"""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from glider_bringup.direct import COLUMNS, fly_blocks
+from glider_bringup.mission import mission_of
+from glider_bringup.scenario import Scenario, load_scenario
+from glider_model.frames import water_from_wire
+from glider_model.kernel import kernel
+from glider_model.plant import plant_step
+from glider_model.signals import TICK_S, Joints, Water
+
+#: Dives, turns, the surface: straight path, constant current, no noise.
+SCENARIO = 'current_8deg'
+SHALLOW = {
+    'dives': 0,
+    'duration_s': 6000.0,
+    'profile.depth_m': 150.0,
+    'profile.surface_every_dives': 2,
+}
+REPEATS = 10
+
+
+@kernel
+def _plant_steps(plant, params, commands, waters, dt, motions):
+    for row in range(len(commands)):
+        command = Joints(commands[row, 0], commands[row, 1], commands[row, 2])
+        water = Water(waters[row, 0], waters[row, 1], waters[row, 2])
+        plant = plant_step(plant, command, water, params, dt)
+        for i, value in enumerate(plant.motion):
+            motions[row, i] = value
+
+
+def plant_steps(plant, params, commands, waters, motions) -> None:
+    """Fill ``motions`` (n, 13) with where the plant goes under commands and waters (n, 3)."""
+    _plant_steps(plant, params, commands, waters, TICK_S, motions)
+
+
+def flight_of(scenario: Scenario) -> tuple:
+    """State and parameters of the plant, and the commands and waters (n, 3) of its flight."""
+    state, params = mission_of(scenario)
+    log = np.concatenate([block.copy() for block in fly_blocks(state, params)])
+    commands = np.ascontiguousarray(log[:, COLUMNS['command']])
+    waters = np.array([water_from_wire(row) for row in log[:, COLUMNS['current_velocity']]])
+    return state.plant, params.plant, commands, waters
+
+
+def cost_s(function: Callable, *arguments) -> float:
+    """Processor time (s) of a call."""
+    start = time.thread_time()
+    function(*arguments)
+    return time.thread_time() - start
+
+
+def main() -> None:
+    """Print the least of several times of a tick (ns)."""
+    flight = flight_of(load_scenario(SCENARIO, SHALLOW))
+    motions = np.empty((len(flight[2]), 13))
+    plant_steps(*flight, motions)
+    least_s = min(cost_s(plant_steps, *flight, motions) for _ in range(REPEATS))
+    print(1e9 * least_s / len(motions))
+
+
+if __name__ == '__main__':
+    main()

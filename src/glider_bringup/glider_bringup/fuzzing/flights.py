@@ -1,0 +1,135 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flights of scenarios whose numbers are extreme and allowed: finite, or refused before flight.
+
+A few numeric fields of the scenario at a time are put at their limits or somewhere inside, with
+every vehicle and either attitude law; half of the flights turn over at a shallow depth.
+"""
+
+import math
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import pydantic
+
+from glider_bringup.fuzzing.counts import HANG_S, Counter, Counts, Tell
+from glider_bringup.mission import finite, fly_direct, scorecard
+from glider_bringup.scenario import Scenario, load_scenario
+from glider_model.current import MAX_SPEED_MPS
+from glider_model.settings import ConfigurationError
+from glider_model.vehicle import vehicle_names
+
+#: Sections of a scenario whose numbers are drawn.
+SECTIONS = ('perturb', 'initial', 'water', 'sensors', 'profile', 'guidance', 'control')
+#: What is chosen in every flight, beside a current.
+LAWS, GUIDANCES = ('adaptive', 'pid'), ('observer', 'paper')
+#: Sections that the plant alone is told: half of the flights draw from these only.
+PLANT_SECTIONS = ('perturb', 'initial', 'water')
+#: Most fields changed in one flight.
+FIELDS = 8
+DURATION_S, SHALLOW_M = (100.0, 600.0), (10.0, 60.0)
+#: Share of numbers at a limit; the rest lies between, evenly or by order of magnitude.
+AT_A_LIMIT = 0.6
+
+
+def numeric_fields(model: type[pydantic.BaseModel], before: str) -> Iterator[tuple[str, Any]]:
+    """Dotted names of the numbers in a group of fields, and their fields."""
+    for name, field in model.model_fields.items():
+        kinds = get_args(field.annotation) or (field.annotation,)
+        for kind in kinds:
+            if isinstance(kind, type) and issubclass(kind, pydantic.BaseModel):
+                yield from numeric_fields(kind, f'{before}{name}.')
+        if kinds[0] in (int, float):
+            yield f'{before}{name}', field
+
+
+def limits(field: Any) -> tuple[float, float]:
+    """Lowest and highest number that a field allows."""
+    allowed = {
+        word: getattr(item, word)
+        for item in field.metadata
+        for word in ('ge', 'gt', 'le', 'lt')
+        if getattr(item, word, None) is not None
+    }
+    low, high = allowed.get('ge', allowed.get('gt')), allowed.get('le', allowed.get('lt'))
+    near = 1e-6 * (high - low)
+    return low + near * ('gt' in allowed), high - near * ('lt' in allowed)
+
+
+def _number(draw: np.random.Generator, field: Any) -> float | int:
+    """A number that a field allows, likely one of its limits."""
+    low, high = limits(field)
+    if draw.random() < AT_A_LIMIT:
+        number = (low, high)[draw.integers(2)]
+    elif low > 0.0 and draw.random() < 0.5:
+        number = math.exp(draw.uniform(math.log(low), math.log(high)))
+    else:
+        number = draw.uniform(low, high)
+    return round(number) if int in (field.annotation, *get_args(field.annotation)) else number
+
+
+def draw_changes(seed: int, case: int) -> dict[str, Any]:
+    """Fields of a case, by dotted name."""
+    draw = np.random.Generator(np.random.PCG64([seed, case]))
+    sections = SECTIONS if draw.random() < 0.5 else PLANT_SECTIONS
+    groups = {name: Scenario.model_fields[name].annotation for name in sections}
+    fields = dict(
+        field for name, model in groups.items() for field in numeric_fields(model, f'{name}.')
+    )
+    changes: dict[str, Any] = {
+        'vehicle': str(draw.choice(vehicle_names())),
+        'control.law': str(draw.choice(LAWS)),
+        'guidance.los.method': str(draw.choice(GUIDANCES)),
+        'seed': int(draw.integers(2**31)),
+        'dives': 0,
+        'duration_s': round(draw.uniform(*DURATION_S), 1),
+        'current.speed_mps': draw.uniform(0.0, MAX_SPEED_MPS),
+        'current.angle_deg': draw.uniform(-180.0, 180.0),
+    }
+    if draw.random() < 0.5:
+        changes['profile.depth_m'] = draw.uniform(*SHALLOW_M)
+    for name in draw.choice(sorted(fields), draw.integers(1, FIELDS + 1), replace=False):
+        changes[str(name)] = _number(draw, fields[name])
+    return changes
+
+
+def _fly(changes: dict[str, Any]) -> tuple[str, str]:
+    """Outcome of a flight for `Counter.add`, and why."""
+    numbers = []
+
+    class Taker:
+        def add(self, log: np.ndarray) -> None:
+            numbers.append(bool(np.isfinite(log).all()))
+
+    scenario = load_scenario(changes=changes)
+    flight, scores = fly_direct(scenario, Path(), False, lambda ticks, depth_m: None, Taker())
+    card = scorecard(scenario, 'direct', flight, scores)
+    if card['status'] == 'failed':
+        return 'wrong', card['reason']
+    if not all(numbers) or card != finite(card):
+        return 'wrong', f'not finite, and {card["status"]}'
+    return '', ''
+
+
+def fuzz(seed: int, count: int, tell: Tell) -> Counts:
+    """Fly ``count`` cases; refused before the flight, or finite to its end, is well."""
+    counter = Counter(tell)
+    _fly({'dives': 0, 'duration_s': 1.0})  # loads the kernels, which is no case's fault
+    for case in range(count):
+        changes = draw_changes(seed, case)
+        told = ' '.join(f'--set {name}={value}' for name, value in changes.items())
+        start = time.monotonic()
+        try:
+            outcome, why = _fly(changes)
+        except ConfigurationError:
+            outcome, why = '', ''
+        except Exception as error:
+            outcome, why = 'tracebacks', f'{type(error).__name__}: {error}'
+        seconds = time.monotonic() - start
+        if not outcome and seconds > HANG_S:
+            outcome, why = 'hangs', f'{seconds:.0f} s'
+        counter.add(f'./glider run --engine direct {told}', outcome, why)
+    return counter.result()
