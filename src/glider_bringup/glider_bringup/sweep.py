@@ -116,6 +116,8 @@ def judge(card: dict[str, Any]) -> dict[str, Any]:
     status, reason = card['status'], card['reason']
     if wrong:
         status, reason = FAILED, f'not finite: {", ".join(wrong)}'
+    elif status == FAILED:  # in flight: what it was like before is no figure of this cell
+        return failure(reason)
     elif status not in STATUSES:
         status, reason = FAILED, f'{status}: {reason}'
     return {'status': status, 'reason': reason[:REASON_LENGTH], 'figures': figures}

@@ -16,7 +16,6 @@ import math
 
 from glider_model.kernel import kernel
 
-
 #: Faster than this no coefficient is known, and the water brakes any hull (m/s, rad/s): a force of
 #: m v per metre per second and a moment of m omega per rad/s beyond it.
 FASTEST_MPS, FASTEST_RADPS = 10.0, 10.0
@@ -88,7 +87,8 @@ def rate_damping(u, v, w, p, q, r, vehicle):
     d_z = (vehicle.K_p * s_d2 + vehicle.K_r * (1.0 - s_d2)) * speed2
     return (
         _steepness(vehicle.D_p, vehicle.D_pp, p, vehicle.i_xx + vehicle.a_44) - d_x,
-        _steepness(vehicle.D_q, vehicle.D_qq, q, vehicle.i_yy + vehicle.a_55) - vehicle.K_q * speed2,
+        _steepness(vehicle.D_q, vehicle.D_qq, q, vehicle.i_yy + vehicle.a_55)
+        - vehicle.K_q * speed2,
         _steepness(vehicle.D_r, vehicle.D_rr, r, vehicle.i_zz + vehicle.a_66) - d_z,
     )
 

@@ -1,0 +1,159 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run whose numbers cease to be finite: failed, told by name, exit code 1, valid JSON.
+
+No scenario of a shipped vehicle does so (test_extremes_stay_finite, `./glider fuzz`). A vehicle
+file can: here rolling is driven, not damped, by the flow, so that a roll grows without limit.
+"""
+
+import json
+import math
+
+import pytest
+
+from glider_bringup import experiments, montecarlo, sweep
+from glider_bringup.direct import NotFiniteError, fly_blocks
+from glider_bringup.experiments import Case
+from glider_bringup.fuzzing import flights
+from glider_bringup.mission import fly_direct, mission_of, score_again, scorecard
+from glider_bringup.scenario import load_scenario, read_scenario
+from glider_bringup.sweep import Chunk, Inputs
+from glider_model.vehicle import vehicle_path
+
+DURATION_S = 600.0
+
+
+def strict(text):
+    """JSON as everybody reads it: without NaN and Infinity."""
+
+    def refuse(token):
+        raise AssertionError(f'{token} is no JSON')
+
+    return json.loads(text, parse_constant=refuse)
+
+
+@pytest.fixture(scope='module')
+def driven(tmp_path_factory):
+    """Vehicle file with a roll damping that drives."""
+    text = vehicle_path('zhang2021').read_text()
+    file = tmp_path_factory.mktemp('vehicle') / 'driven.yaml'
+    changed = text.replace('K_p: {value: 0.0', 'K_p: {value: 10000.0')
+    assert changed != text
+    file.write_text(changed)
+    return file
+
+
+@pytest.fixture(scope='module')
+def blown(glider, driven, tmp_path_factory):
+    """The same run by both engines: process and folder."""
+
+    def fly(engine):
+        folder = tmp_path_factory.mktemp('runs') / engine
+        more = ['--set', f'vehicle={driven}', '--duration', DURATION_S, '--out', folder, '--json']
+        return glider('run', 'current_8deg', '--engine', engine, *more), folder
+
+    return {engine: fly(engine) for engine in ('direct', 'nodes')}
+
+
+@pytest.mark.parametrize('engine', ['direct', 'nodes'])
+def test_run_fails_by_name_with_valid_json(blown, engine):
+    process, folder = blown[engine]
+    assert process.returncode == 1
+    assert 'Traceback' not in process.stderr
+    card = strict(process.stdout)
+    assert card == strict((folder / 'score.json').read_text())
+    tick = card['ticks']
+    assert 100 < tick < 10.0 * DURATION_S
+    told = f'plant: the state is not finite at tick {tick} (t = {tick / 10:.1f} s): '
+    assert (card['status'], card['reason'][: len(told)]) == ('failed', told)
+    assert 'p' in card['reason'][len(told) :].split(', ')
+
+
+def test_engines_agree_on_what_was_flown_before(blown):
+    cards = [strict(blown[engine][0].stdout) for engine in ('direct', 'nodes')]
+    for name in ('reason', 'ticks', 'depth_m', 'distance_along_path_m', 'final_state'):
+        assert cards[0][name] == cards[1][name]
+
+
+def test_failed_run_is_reported(glider, blown, tmp_path):
+    _, folder = blown['direct']
+    page = glider('report', folder, '--out', tmp_path / 'report.html')
+    assert page.returncode == 0, page.stderr
+    text = (tmp_path / 'report.html').read_text()
+    assert '✕ Failed' in text
+    assert 'The run failed at ' in text
+
+
+def test_scored_again_it_has_failed_too(blown, tmp_path):
+    process, folder = blown['nodes']
+    assert score_again(folder) == strict(process.stdout)
+    for file in (*folder.glob('*.mcap'), folder / 'scenario.yaml', folder / 'vehicle.yaml'):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    alone, first = score_again(tmp_path), strict(process.stdout)
+    for name in ('status', 'reason', 'ticks', 'final_state'):
+        assert alone[name] == first[name]
+
+
+def test_every_tick_before_is_finite_and_given(driven):
+    changes = {'vehicle': str(driven), 'dives': 0, 'duration_s': DURATION_S}
+    ticks = 0
+    with pytest.raises(NotFiniteError, match='not finite at tick') as error:
+        for log in fly_blocks(*mission_of(load_scenario(changes=changes))):
+            assert math.isfinite(log.sum())
+            ticks += len(log)
+    assert f'at tick {ticks} ' in str(error.value)
+
+
+def test_studies_count_it_as_failed(driven):
+    changes = {'vehicle': str(driven), 'dives': 0, 'duration_s': DURATION_S}
+    scenario = load_scenario(changes=changes)
+    assert montecarlo._fly_plant(scenario)['diverged']
+    row, _ = experiments._fly_case(Case('', 'adaptive', 'observer', 'current_8deg', changes))
+    assert (row['status'], row['finite']) == ('failed', False)
+    vehicles = {sweep.digest(sweep.vehicle_text(scenario.vehicle))}
+    inputs = Inputs(source=read_scenario(), vehicles=vehicles)
+    (record,) = sweep.fly_chunk(Chunk(inputs, [(0, changes)]))
+    assert (record['status'], record['figures']) == ('failed', {})
+    assert 'not finite at tick' in record['reason']
+
+
+def test_score_that_is_not_finite_is_a_failure():
+    """Numbers of flights are bounded, their squares need not be."""
+    scenario = load_scenario(changes={'dives': 0, 'duration_s': 1.0})
+    flight, scores = fly_direct(scenario, None, False, lambda ticks, depth_m: None)
+    scores['cross_track_m']['max_all'] = math.inf
+    scores['final_state']['velocity_mps'][0] = math.nan
+    card = scorecard(scenario, 'direct', flight, scores)
+    assert card['status'] == 'failed'
+    assert card['reason'] == (
+        'the score is not finite: cross_track_m.max_all, final_state.velocity_mps'
+    )
+    assert card['cross_track_m']['max_all'] is card['final_state']['velocity_mps'][0] is None
+    strict(json.dumps(card))
+
+
+def test_extreme_flights_are_finite_or_refused():
+    """A few of `./glider fuzz --only flights`."""
+    counts = flights.fuzz(seed=1, count=30, tell=lambda tried: None)
+    assert counts.clean, counts.examples
+    assert counts.tried == 30
+
+
+def test_fuzz_sees_a_flight_that_fails(driven, monkeypatch):
+    changes = {'vehicle': str(driven), 'dives': 0, 'duration_s': DURATION_S}
+    monkeypatch.setattr(flights, 'draw_changes', lambda seed, case: changes)
+    counts = flights.fuzz(seed=0, count=1, tell=lambda tried: None)
+    assert (counts.wrong, counts.clean) == (1, False)
+    assert 'not finite at tick' in counts.examples[0]
+
+
+@pytest.mark.parametrize('factor', [3.1, 10.0])
+def test_stiff_roll_flies(factor):
+    """Cases of 1980cb2 in which every number was NaN, and the run completed."""
+    changes = {'perturb.D_p': factor, 'dives': 0, 'duration_s': 7000.0}
+    scenario = load_scenario(changes=changes)
+    flight, scores = fly_direct(scenario, None, False, lambda ticks, depth_m: None)
+    card = scorecard(scenario, 'direct', flight, scores)
+    assert (card['status'], card['ticks']) == ('completed', 70000)
+    assert card['depth_m']['max'] > 900.0
+    assert card['cross_track_m']['max_steady'] < 10.0
