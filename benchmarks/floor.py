@@ -19,8 +19,7 @@ import numpy as np
 from glider_model import exponential, hydrodynamics, plant, rigid_body, signals
 
 SOURCES = Path(__file__).parent / 'floor'
-#: As fast as IEEE arithmetic in source order allows: no -ffast-math, no fused multiply-add. With
-#: -fno-math-errno gcc would put another formula in the place of sin(atan(x)).
+#: As fast as IEEE arithmetic in source order allows: no -ffast-math, no fused multiply-add.
 FLAGS = ['-std=c99', '-O3', '-march=native', '-ffp-contract=off']
 
 _MODULES = (rigid_body, hydrodynamics, exponential, plant)
