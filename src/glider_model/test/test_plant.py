@@ -487,12 +487,12 @@ def test_extremes_stay_finite(name, factors, fly, plant_params, start):
         {'D_p': 1e5, 'D_q': 1e5, 'D_r': 1e5, 'D_pp': 1e5, 'D_rr': 1e5},
         {'K_D': 1e5, 'K_L': 1e5},
         {'K_p': -1e5, 'K_q': -1e5, 'K_r': -1e5},
-        {'K_M': -1e5, 'K_MY': 1e5},
+        {'K_M': -1e4, 'K_MY': 1e4, 'K_MR': -1e4},
     ],
     ids=str,
 )
 def test_stiff_vehicles_stay_finite(changes, fly, plant_params, start):
-    """The ends of the ranges of a vehicle file: up from 2 m, through the surface, and down."""
+    """Ends of the ranges of a vehicle file, static moments a hundredfold, through the surface."""
     vehicle = load_vehicle('zhang2021').params()._replace(**changes)
     state = start((0.0, 0.0, 2.0), (0.3, 0.5, 0.0), (0.5, 0.1, -0.1, 0.1, 0.1, 0.1), (-0.5, 0, 0))
     commands = np.repeat([[-0.5, -0.02, 0.5], [0.5, 0.02, -0.5]], 1000, axis=0)
