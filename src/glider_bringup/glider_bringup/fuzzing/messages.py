@@ -1,0 +1,146 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Messages that nobody would send, through the entry of a node and the step behind it.
+
+In the middle of a dive one message is mutated: bits, length, numbers, frames. It is refused by
+name, or the block makes of it, and of the good messages after it, finite numbers and commands
+within the ranges.
+"""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+from rclpy.serialization import deserialize_message
+
+from glider_bringup.direct import COLUMNS, ROW, MissionParams, MissionState, fly
+from glider_bringup.fuzzing.counts import HANG_S, Counter, Counts, Tell
+from glider_bringup.mission import mission_of
+from glider_bringup.scenario import load_scenario
+from glider_control.control import control_step
+from glider_guidance.guidance import guidance_step
+from glider_model.current import current_step
+from glider_model.frames import odometry_from_wire, reference_from_wire
+from glider_model.plant import plant_step
+from glider_model.ros.codec import MessageError, to_cdr
+from glider_model.ros.messages import TOPICS
+from glider_model.ros.tick import Input
+from glider_model.signals import TICK_NS, TICK_S, Joints, Water
+
+#: Topics that a block reads. What the plant makes of a wild current it says itself: it fails.
+READ = ('odom', 'joint_states', 'reference', 'command')
+#: The message comes after this many ticks of a dive.
+TICKS = 3000
+#: Good messages after it.
+AFTER = 10
+_WILD = (np.nan, np.inf, -np.inf, 0.0, 1e308, -1e308, 1e6, -1e6, 5e-324, 10.0, -10.0, 1e4, 2.0)
+
+
+class Scene(NamedTuple):
+    """A mission on its way down, and what the topics carry there."""
+
+    state: MissionState
+    params: MissionParams
+    wires: dict[str, tuple[float, ...]]
+
+
+def make_scene(law: str) -> Scene:
+    """The scene under one of the attitude laws."""
+    scenario = load_scenario('current_12deg', {'dives': 0, 'control.law': law})
+    state, params = mission_of(scenario)
+    log = np.empty((TICKS, ROW))
+    state, _, _ = fly(state, params, log, TICK_S)
+    wires = {name: tuple(float(x) for x in log[-1, COLUMNS[name]]) for name in READ}
+    return Scene(state, params, wires)
+
+
+def _with_wild_numbers(draw: np.random.Generator, codec, values) -> bytes:
+    numbers = list(values)
+    for place in draw.choice(len(numbers), draw.integers(1, len(numbers) + 1), replace=False):
+        numbers[place] = float(draw.choice(_WILD))
+    return codec.encode(TICKS * TICK_NS, numbers)
+
+
+def _flipped(draw: np.random.Generator, codec, values) -> bytes:
+    raw = bytearray(codec.encode(TICKS * TICK_NS, values))
+    for _ in range(draw.integers(1, 9)):
+        raw[draw.integers(len(raw))] ^= 1 << draw.integers(8)
+    return bytes(raw)
+
+
+def _cut_or_longer(draw: np.random.Generator, codec, values) -> bytes:
+    raw = codec.encode(TICKS * TICK_NS, values)
+    length = int(draw.integers(0, 2 * len(raw)))
+    return (raw + draw.bytes(len(raw)))[:length]
+
+
+def _noise(draw: np.random.Generator, codec, values) -> bytes:
+    return draw.bytes(int(draw.integers(0, 2000)))
+
+
+def _of_another_layout(draw: np.random.Generator, codec, values) -> bytes:
+    message = deserialize_message(codec.encode(TICKS * TICK_NS, values), codec.message_type)
+    message.header.frame_id = str(draw.choice(['', 'map_ned', 'map', 'x' * 1000, 'a/map']))
+    if hasattr(message, 'name'):
+        message.name = [str(name) for name in draw.permutation(list(message.name))]
+        message.position = message.position[: draw.integers(len(message.position) + 1)]
+    return to_cdr(message)
+
+
+MUTATIONS = (_with_wild_numbers, _flipped, _cut_or_longer, _noise, _of_another_layout)
+
+
+def _outputs(scene: Scene, name: str, values: tuple[float, ...]) -> list[float]:
+    """Numbers that the readers of a topic make of a message and of good ones after it."""
+    plant, current, guidance, control = scene.state
+    made: list[float] = []
+    limits = scene.params.control.allocation
+    for tick in range(1 + AFTER):
+        wires = {**scene.wires, name: values} if tick == 0 else scene.wires
+        odometry = odometry_from_wire(wires['odom'])
+        reference = reference_from_wire(wires['reference'])
+        guidance, guided = guidance_step(guidance, odometry, scene.params.guidance, TICK_S)
+        joints = Joints(*wires['joint_states'])
+        control, out = control_step(
+            control, odometry, joints, reference, scene.params.control, TICK_S
+        )
+        target = Joints(*wires['command'])
+        plant = plant_step(plant, target, Water(0.0, 0.0, 0.0), scene.params.plant, TICK_S)
+        _, water = current_step(current, odometry[:3], 0.0, scene.params.current, TICK_S)
+        made += [*guided.reference, *guided.error, *out.command, *out.wrench, *plant.motion]
+        made += water if np.all(np.isfinite(odometry[:3])) else ()
+        most = (limits.m_b_max, limits.x_p_max, limits.mu_max)
+        made += [np.nan for x, limit in zip(out.command, most, strict=True) if not abs(x) <= limit]
+    return made
+
+
+def _try(draw: np.random.Generator, scene: Scene, name: str, mutate) -> tuple[str, str]:
+    item = Input(TOPICS[name])
+    try:
+        item.accept(mutate(draw, item.topic.codec, scene.wires[name]))
+    except MessageError:
+        return '', ''
+    if not np.all(np.isfinite(_outputs(scene, name, item.values))):
+        return 'wrong', f'not finite or out of range, after {item.values}'
+    return '', ''
+
+
+def fuzz(seed: int, count: int, tell: Tell) -> Counts:
+    """Send ``count`` messages; refused, or answered within all limits, is well."""
+    counter = Counter(tell)
+    scenes = {law: make_scene(law) for law in ('adaptive', 'pid')}
+    _outputs(scenes['pid'], 'odom', scenes['pid'].wires['odom'])  # loads the kernels
+    for case in range(count):
+        draw = np.random.Generator(np.random.PCG64([seed, case]))
+        law, name = str(draw.choice(list(scenes))), str(draw.choice(READ))
+        mutate = MUTATIONS[draw.integers(len(MUTATIONS))]
+        start = time.monotonic()
+        try:
+            outcome, why = _try(draw, scenes[law], name, mutate)
+        except Exception as error:
+            outcome, why = 'tracebacks', f'{type(error).__name__}: {error}'
+        if not outcome and time.monotonic() - start > HANG_S:
+            outcome, why = 'hangs', f'{time.monotonic() - start:.0f} s'
+        case_text = f'seed {seed}, case {case}: {name}{mutate.__name__.replace("_", " ")}, {law}'
+        counter.add(case_text, outcome, why)
+    return counter.result()
