@@ -24,7 +24,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
         verify,
     )
     from glider_bringup.console import EXIT_FAILED, EXIT_USAGE, messages
-    from glider_bringup.files import DiskError
+    from glider_bringup.disk import DiskError
     from glider_model.errors import MAX_LINE, ConfigurationError, shown
 except KeyboardInterrupt:
     sys.exit(130)

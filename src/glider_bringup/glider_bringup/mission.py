@@ -16,8 +16,8 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 from glider_bringup.direct import MissionParams, MissionState, NotFiniteError, fly_blocks
+from glider_bringup.disk import write_whole
 from glider_bringup.figure import draw_run
-from glider_bringup.files import write_whole
 from glider_bringup.interrupts import interrupts_noted
 from glider_bringup.mcap_reader import Bag, has_bag
 from glider_bringup.page import FlownRun

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from glider_bringup.disk import save_figure
 from glider_bringup.experiments import Experiment
-from glider_bringup.files import save_figure
 from glider_bringup.record import Record
 
 #: Flights by experiment, case, controller and guidance.

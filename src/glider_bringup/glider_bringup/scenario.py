@@ -251,10 +251,21 @@ def make_scenario(
     scenario = _find_vehicle(scenario, path.parent, f'{path}{changed}')
     if not recorded:
         try:
-            scenario.guidance_settings().check_depth()
+            _check_depth(scenario)
         except ConfigurationError as error:
             raise ConfigurationError(f'{path}{changed}: {error}') from None
     return scenario
+
+
+def _check_depth(scenario: Scenario) -> None:
+    """Refuse a mission that begins, or goes, deeper than its vehicle is rated for."""
+    scenario.guidance_settings().check_depth()
+    start_m, rated_m = scenario.initial.depth_m, load_vehicle(scenario.vehicle).rated_depth_m
+    if start_m > rated_m:
+        raise ConfigurationError(
+            f'initial.depth_m = {start_m:g}: deeper than the vehicle is rated for (allowed: <= '
+            f'{rated_m:g} m, its rated_depth)'
+        )
 
 
 def _told_changes(changes: dict[str, Any]) -> str:

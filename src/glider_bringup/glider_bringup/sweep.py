@@ -13,7 +13,7 @@ from pathlib import Path
 from socket import gethostname
 from typing import Any, NamedTuple
 
-from glider_bringup.files import whole_file
+from glider_bringup.disk import whole_file
 from glider_bringup.journal import Journal
 from glider_bringup.mission import Flight, fly_direct, planned_ticks, scorecard
 from glider_bringup.pool import WORKER_DIED, Pool, Progress, WorkError

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from glider_bringup import mission
-from glider_bringup.files import DiskError, whole_file, write_whole
+from glider_bringup.disk import DiskError, whole_file, write_whole
 from glider_bringup.mcap_reader import Bag
 from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter
 from glider_bringup.scenario import load_scenario

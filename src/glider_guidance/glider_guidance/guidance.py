@@ -241,11 +241,11 @@ class GuidanceSettings(GuidanceLawSettings):
             )
         field, deepest = 'profile.depth_m', self.profile.depth_m
         if self.profile.mode == 'path':
-            field, deepest = 'path', float(self.path.points(500)[:, 2].max())
+            field, deepest = 'deepest point of path', float(self.path.points(500)[:, 2].max())
         if deepest > vehicle.rated_depth_m:
             raise ConfigurationError(
-                f'{field}: {deepest:g} m deep, {vehicle.name} is rated for less (allowed: <= '
-                f'{vehicle.rated_depth_m:g} m, rated_depth of the vehicle)'
+                f'{field} = {deepest:g}: deeper than the vehicle is rated for (allowed: <= '
+                f'{vehicle.rated_depth_m:g} m, its rated_depth)'
             )
 
     def params(self) -> 'GuidanceParams':

@@ -21,7 +21,7 @@ from glider_bringup.console import (
     number,
     progress,
 )
-from glider_bringup.files import DiskError
+from glider_bringup.disk import DiskError
 from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, parse_assignment
 from glider_bringup.scorecard import print_card

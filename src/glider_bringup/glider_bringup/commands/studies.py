@@ -22,7 +22,7 @@ from glider_bringup.console import (
     output,
     workers_at_work,
 )
-from glider_bringup.files import write_whole
+from glider_bringup.disk import write_whole
 from glider_bringup.scenario import DEFAULT_SCENARIO, parse_assignment
 from glider_model.signals import TICK_S
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from pydantic import Field
 from std_msgs.msg import Header
 
-from glider_bringup.files import DiskError
+from glider_bringup.disk import DiskError
 from glider_bringup.ros.bag import BagWriter, Sync
 from glider_bringup.tick_order import TickOrder
 from glider_model.ros import health, messages, qos

@@ -13,7 +13,7 @@ import numpy as np
 from ament_index_python.packages import get_package_share_directory
 from rclpy.qos import QoSProfile
 
-from glider_bringup.files import write_whole
+from glider_bringup.disk import write_whole
 from glider_bringup.mcap_writer import McapWriter
 from glider_model.ros.messages import TOPICS, Topic
 from glider_model.signals import TICK_NS

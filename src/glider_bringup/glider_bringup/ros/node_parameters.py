@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from glider_bringup.files import write_whole
+from glider_bringup.disk import write_whole
 from glider_bringup.scenario import Scenario
 from glider_model.ros import messages
 from glider_model.ros.parameters import parameters_yaml, to_parameters
