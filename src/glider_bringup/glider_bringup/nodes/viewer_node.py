@@ -21,9 +21,10 @@ from rclpy.qos import DurabilityPolicy
 
 from glider_bringup.ros.bag import message_definition
 from glider_model.ros import qos
+from glider_model.ros.executor import take
 from glider_model.ros.messages import TOPICS
 from glider_model.ros.parameters import declare_settings, refuse_unknown
-from glider_model.ros.tick import EXIT_CONFIGURATION, take
+from glider_model.ros.tick import EXIT_CONFIGURATION
 from glider_model.settings import ConfigurationError, Settings
 
 NAME = 'viewer_node'

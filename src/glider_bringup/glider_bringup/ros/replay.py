@@ -20,8 +20,9 @@ from glider_bringup.ros.recording import choose_namespace
 from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_model.files import parse_yaml
 from glider_model.ros import messages
+from glider_model.ros.executor import take
 from glider_model.ros.messages import CLOCK, TOPICS
-from glider_model.ros.tick import MAX_TICKS_AHEAD, take
+from glider_model.ros.tick import MAX_TICKS_AHEAD
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS
 
