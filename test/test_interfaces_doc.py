@@ -187,7 +187,10 @@ def limit_rows():
     yield 'rows of a table of currents', f'<= {MAX_ROWS:,}'
     yield '`--namespace`', NAMESPACE_ALLOWED
     yield '`ROS_DOMAIN_ID`', f'0 to {MAX_DOMAIN}'
-    yield 'word of a command line', f'<= {MAX_WORD:,} characters, printable, in UTF-8'
+    yield (
+        'word of a command line',
+        f'<= {MAX_WORD:,} characters without control characters, in UTF-8',
+    )
     yield 'error', f'<= {MAX_LINES} lines of {MAX_LINE} characters, each value <= {MAX_SHOWN}'
 
 

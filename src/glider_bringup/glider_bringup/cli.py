@@ -25,7 +25,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
     )
     from glider_bringup.console import EXIT_FAILED, EXIT_USAGE, messages
     from glider_bringup.disk import DiskError
-    from glider_model.errors import MAX_LINE, ConfigurationError, shown
+    from glider_model.errors import CONTROL, MAX_LINE, ConfigurationError, shown
 except KeyboardInterrupt:
     sys.exit(130)
 except (OSError, ImportError) as error:
@@ -66,10 +66,10 @@ def check_words(words: list[str]) -> None:
                 f'word {number} of the command line: {len(word)} characters '
                 f'(allowed: <= {MAX_WORD}); give a file instead'
             )
-        if not word.isprintable():
+        if CONTROL.search(word):
             raise ConfigurationError(
                 f'word {number} of the command line: {shown(word)} '
-                '(allowed: printable characters, in UTF-8)'
+                '(allowed: text without control characters, in UTF-8)'
             )
 
 
