@@ -32,10 +32,9 @@ from glider_bringup.traces import TRACED, Tracer, Traces, load_traces
 from glider_guidance.guidance import path_time_s
 from glider_guidance.profile import mission_time_s
 from glider_model.files import is_file, read_json
-from glider_model.plant import NOT_FINITE
 from glider_model.ros.health import FINISHED
 from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_NS, TICK_S
+from glider_model.signals import NOT_FINITE, TICK_NS, TICK_S
 from glider_model.vehicle import load_vehicle, vehicle_path
 
 SCENARIO_FILE, VEHICLE_FILE, SCORE_FILE = 'scenario.yaml', 'vehicle.yaml', 'score.json'
@@ -189,8 +188,8 @@ def fly_direct(
         except NotFiniteError as error:
             status, reason = 'failed', str(error)
     wall_time_s = time.perf_counter() - start
-    if bag and status == 'completed':
-        bag.finish()
+    if bag and status != 'aborted':
+        bag.finish(reason)
     recorded = bag.close() if bag else 0
     return Flight(status, reason, wall_time_s, recorded, 0), _score(scenario, scorer)
 
@@ -434,7 +433,20 @@ def _is_card(card) -> bool:
             and names <= set(card[group])
             and all(_is_figure(value) for value in card[group].values())
             for group, names in CARD_GROUPS.items()
+            if card['ticks'] or group != 'final_state'  # a run without a tick has none
         )
+        and _is_guard(card.get('guard', {}))
+    )
+
+
+def _is_guard(guard) -> bool:
+    """Whether a value is what control noticed in a run; runs of before tell nothing of it."""
+    events = guard.get('events', []) if isinstance(guard, dict) else None
+    return isinstance(events, list) and all(
+        isinstance(event, dict)
+        and isinstance(event.get('message'), str)
+        and isinstance(event.get('t_s'), int | float)
+        for event in events
     )
 
 

@@ -42,6 +42,7 @@ NOT_RESULTS = {
     'messages_recorded',
     'messages_lost',
     'seed',
+    'guard',  # what happened, in words
 }
 
 
@@ -126,9 +127,11 @@ def judge(card: dict[str, Any]) -> dict[str, Any]:
 def _figures(card: dict[str, Any], before: str = '') -> Iterator[tuple[str, Any]]:
     """Numbers of a scorecard by dotted name; None where one has no data."""
     for name, value in card.items():
+        if name in NOT_RESULTS:
+            continue
         if isinstance(value, dict):
             yield from _figures(value, f'{before}{name}.')
-        elif not isinstance(value, str) and name not in NOT_RESULTS:
+        elif not isinstance(value, str):
             yield before + name, value
 
 

@@ -28,7 +28,7 @@ from glider_model.perturb import PerturbSettings, perturbed
 from glider_model.rigid_body import GRAVITY, coriolis, make_inertia, solve_mass
 from glider_model.sensors import SensorParams, SensorSettings, measure
 from glider_model.settings import Settings
-from glider_model.signals import TICK_S, Joints, Odometry, Water
+from glider_model.signals import TICK_S, Joints, Odometry, Water, not_finite
 from glider_model.vehicle import VehicleParams, load_vehicle
 from glider_model.water import WaterParams, WaterSettings, buoyancy_gain, emerged_fraction
 
@@ -516,15 +516,6 @@ def plant_measurement(state, params):
 def plant_joints(state):
     """Where the actuators are."""
     return state.joints
-
-
-#: Stands in the reason of every run whose numbers ceased to be finite.
-NOT_FINITE = 'not finite at tick'
-
-
-def not_finite(what: str, tick: int) -> str:
-    """Say that something is not finite at a tick."""
-    return f'{what} is {NOT_FINITE} {tick} (t = {tick * TICK_S:.1f} s)'
 
 
 def state_fault(odometry: Odometry, joints: Joints, tick: int) -> str:

@@ -96,3 +96,12 @@ class Adaptation(NamedTuple):
     disturbance_climb_radps: float
     lyapunov_1: float  #: V1 and V2 without the part of the unknown parameter errors
     lyapunov_2: float
+
+
+#: Stands in the reason of every run whose numbers ceased to be finite.
+NOT_FINITE = 'not finite at tick'
+
+
+def not_finite(what: str, tick: int) -> str:
+    """Say that something is not finite at a tick."""
+    return f'{what} is {NOT_FINITE} {tick} (t = {tick * TICK_S:.1f} s)'

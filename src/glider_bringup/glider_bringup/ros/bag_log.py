@@ -71,10 +71,12 @@ class LogWriter:
             event = saturation_event(self._saturation_ns, self._saturation, _CONTROL)
             self._bag.write('/diagnostics', self._saturation_ns, to_cdr(event))
 
-    def finish(self) -> None:
-        """Write that the run is complete, as the plant says it after the last tick."""
-        stamp_ns = (self._tick - 1) * TICK_NS
+    def finish(self, failure: str = '') -> None:
+        """Write that the run is complete or why it failed, as the plant says it at its end."""
+        stamp_ns = max(0, self._tick - 1) * TICK_NS
         report = health.Report(_PLANT, health.FINISHED, health.COMPLETE, stamp_ns)
+        if failure:
+            report = health.Report(_PLANT, health.FAILED, failure, stamp_ns, level=health.ERROR)
         self._bag.write('/diagnostics', stamp_ns, to_cdr(health.report_array(report)))
 
     def close(self) -> int:

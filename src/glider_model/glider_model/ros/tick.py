@@ -30,7 +30,7 @@ from glider_model.ros.health import Report
 from glider_model.ros.messages import TOPICS, Topic
 from glider_model.ros.parameters import declare_settings, refuse_unknown
 from glider_model.settings import ConfigurationError, Settings
-from glider_model.signals import TICK_NS, TICK_S
+from glider_model.signals import TICK_NS, TICK_S, not_finite
 
 #: The plant is never more than this many ticks ahead of what the recorder has on disk.
 MAX_TICKS_AHEAD = 256
@@ -371,7 +371,8 @@ class TickNode(Node):
         try:
             item.accept(raw)
         except NotFiniteError as error:
-            raise Stop(EXIT_PEER, str(error)) from None
+            tick = max(0, self._due_ns or 0) // TICK_NS
+            raise Stop(EXIT_PEER, not_finite(f'{error}: that', tick)) from None
         except MessageError as error:
             self.refuse(item, str(error))
             return
