@@ -189,7 +189,7 @@ def limit_rows():
     yield '`ROS_DOMAIN_ID`', f'0 to {MAX_DOMAIN}'
     yield (
         'word of a command line',
-        f'<= {MAX_WORD:,} characters without control characters, in UTF-8',
+        f'<= {MAX_WORD:,} characters, printable, in UTF-8',
     )
     yield 'error', f'<= {MAX_LINES} lines of {MAX_LINE} characters, each value <= {MAX_SHOWN}'
 

@@ -8,8 +8,10 @@ import signal
 import sys
 
 try:  # imports take a second, in which Ctrl-C may come, and many files
-    # ./glider blocks it until there is someone to take it
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    # ./glider blocks it until there is someone to take it; workers, which import this too, leave
+    # it to the command
+    if __name__ == '__main__':
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     import typer
 
     from glider_bringup.commands import (
@@ -25,7 +27,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
     )
     from glider_bringup.console import EXIT_FAILED, EXIT_USAGE, messages
     from glider_bringup.disk import DiskError
-    from glider_model.errors import CONTROL, MAX_LINE, ConfigurationError, shown
+    from glider_model.errors import MAX_LINE, ConfigurationError, printable, shown
 except KeyboardInterrupt:
     sys.exit(130)
 except (OSError, ImportError) as error:
@@ -33,6 +35,8 @@ except (OSError, ImportError) as error:
 
 #: Characters of one word of a command line.
 MAX_WORD = 10_000
+#: Spaces that no terminal acts upon, as names of files have them.
+SPACES = '\n\t\u00a0\u2009\u202f\u3000'
 #: What the person can mend at once; all other trouble with files is that of the machine.
 _USAGE = {
     *(errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST),
@@ -66,10 +70,10 @@ def check_words(words: list[str]) -> None:
                 f'word {number} of the command line: {len(word)} characters '
                 f'(allowed: <= {MAX_WORD}); give a file instead'
             )
-        if CONTROL.search(word):
+        if printable(word, keep=SPACES) != word:
             raise ConfigurationError(
                 f'word {number} of the command line: {shown(word)} '
-                '(allowed: text without control characters, in UTF-8)'
+                '(allowed: printable characters, in UTF-8)'
             )
 
 

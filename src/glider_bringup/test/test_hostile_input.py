@@ -121,6 +121,7 @@ def test_content_of_another_file_is_not_shown(refused, tmp_path):
         ('compare', LONG, LONG),
         ('score', 'a\udcff'),
         ('score', '\x1b[31mred'),
+        ('bench', '\u202ered'),
         ('\x1b[31mred',),
         ('run', '--engine', '\x1b[31mred'),
         ('run', 'x' * 20_000),

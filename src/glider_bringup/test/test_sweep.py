@@ -40,6 +40,7 @@ from glider_bringup.sweep_result import make_dataset, write_dataset
 DEADLINE_S = 300.0
 #: What a scorecard has that is not a result of the flight.
 NOT_COMPARED = {'wall_time_s', 'real_time_factor', 'messages_recorded', 'messages_lost', 'seed'}
+NOT_COMPARED |= {'guard'}  # what happened, in words
 #: Variants, a vector field, text in another alphabet, and one cell in which nothing can be flown.
 MINE = {
     'name': 'mine',
@@ -128,9 +129,11 @@ def result(flown):
 def numbers(card, before=''):
     """Numbers of a scorecard by the names that a result gives them."""
     for name, value in card.items():
+        if name in NOT_COMPARED:
+            continue
         if isinstance(value, dict):
             yield from numbers(value, f'{before}{name}_')
-        elif not isinstance(value, str) and name not in NOT_COMPARED:
+        elif not isinstance(value, str):
             yield before + name, value
 
 

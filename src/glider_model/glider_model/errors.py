@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is told to a person: short, printable, whatever a file or an option holds."""
 
-import re
 import reprlib
 
 #: Lines that an error has at most, but for one that says how many more there are.
@@ -11,8 +10,6 @@ MAX_LINES = 20
 MAX_LINE = 900
 #: Characters of a value in an error.
 MAX_SHOWN = 80
-#: Text has line ends and tabs, but no other control characters and no halves of characters.
-CONTROL = re.compile('[\0-\b\v\f\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]')
 
 
 class ConfigurationError(ValueError):

@@ -18,7 +18,7 @@ from typing import Any
 
 import yaml
 
-from glider_model.errors import CONTROL, ConfigurationError, shown
+from glider_model.errors import ConfigurationError, shown
 
 #: Size of a file of text (bytes).
 MAX_BYTES = 1_000_000
@@ -29,6 +29,8 @@ MAX_DEPTH = 40
 #: Characters of a number.
 MAX_DIGITS = 100
 
+# Text has line ends and tabs, but no other control characters and no halves of characters.
+_CONTROL = re.compile('[\0-\b\v\f\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]')
 _TAG_DIRECTIVE = re.compile('^%TAG', re.MULTILINE)
 
 Location = tuple[str, ...]
@@ -119,7 +121,7 @@ _RESOLVER, _CONSTRUCTOR = _Resolver(), yaml.constructor.SafeConstructor()
 def _scalar(event: yaml.ScalarEvent) -> Any:
     """Value of a scalar."""
     text, line = event.value, event.start_mark.line + 1
-    control = CONTROL.search(text)
+    control = _CONTROL.search(text)
     if control:
         raise _RefusedError(line, f'control character {shown(control[0])} in a value')
     tag = _RESOLVER.resolve(yaml.ScalarNode, text, event.implicit)
@@ -149,7 +151,7 @@ class _Open:
         line = event.start_mark.line + 1
         if not isinstance(event, yaml.ScalarEvent) or event.anchor:
             raise _RefusedError(line, 'the name of a field must be plain text')
-        if CONTROL.search(event.value):
+        if _CONTROL.search(event.value):
             raise _RefusedError(line, f'control character in the name {shown(event.value)}')
         if event.value in self.values:
             raise _RefusedError(line, f'field {shown(event.value)} is given twice')
@@ -239,9 +241,9 @@ class _Builder:
 @lru_cache(maxsize=16)
 def _parse(text: str) -> tuple[Any, dict[Location, int]]:
     """What a YAML text says, and the line of each value; files are read for many missions."""
-    odd = CONTROL.search(text) or _TAG_DIRECTIVE.search(text)
+    odd = _CONTROL.search(text) or _TAG_DIRECTIVE.search(text)
     if odd:
-        what = 'control character' if CONTROL.match(odd[0]) else 'directive'
+        what = 'control character' if _CONTROL.match(odd[0]) else 'directive'
         raise _RefusedError(text.count('\n', 0, odd.start()) + 1, f'{what} {shown(odd[0])}')
     builder = _Builder()
     try:
