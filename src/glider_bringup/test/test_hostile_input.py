@@ -15,7 +15,7 @@ DIRECT = ('run', '--engine', 'direct', '--duration', '0.5', '--no-report')
 LONG = 'a' * 300
 BOMB = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
     f'{one}: &{one} [{", ".join([f"*{before}"] * 9)}]\n'
-    for before, one in zip('abcdef', 'bcdefg', strict=True)
+    for before, one in zip('abcdefgh', 'bcdefghi', strict=True)
 )
 
 

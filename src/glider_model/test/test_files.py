@@ -32,10 +32,10 @@ from glider_model.files import (
 )
 from glider_model.vehicle import VEHICLE_FOLDER
 
-#: 414 bytes that stand for 10 million values.
+#: Some 400 bytes that stand for 400 million values.
 BOMB = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
     f'{one}: &{one} [{", ".join([f"*{before}"] * 9)}]\n'
-    for before, one in zip('abcdef', 'bcdefg', strict=True)
+    for before, one in zip('abcdefgh', 'bcdefghi', strict=True)
 )
 
 
