@@ -202,8 +202,9 @@ def test_too_few_files(tmp_path):
 def test_interrupt_while_loading():
     """Ctrl-C that comes as soon as anybody can hear it."""
     program = (
-        'import signal, sys, os; signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}); '
-        'os.kill(os.getpid(), signal.SIGINT); import glider_bringup.cli'
+        'import os, runpy, signal; signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}); '
+        'os.kill(os.getpid(), signal.SIGINT); '
+        'runpy.run_module("glider_bringup.cli", run_name="__main__")'
     )
     found = subprocess.run(
         [sys.executable, '-c', program], capture_output=True, text=True, timeout=60, check=False
