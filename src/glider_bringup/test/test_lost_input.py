@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Control, free-running, whose inputs stop for good: it surfaces, says so, and stays so."""
+"""Control, free-running, whose inputs fail or stop: what it bridges, and what surfaces it."""
 
 import signal
 import time
@@ -8,9 +8,11 @@ import time
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from glider_bringup.runner import domain_id
@@ -18,12 +20,14 @@ from glider_control.control import ControlSettings
 from glider_control.nodes.control_node import ControlNode
 from glider_control.watch import ORDERED
 from glider_model.ros import qos
+from glider_model.ros.codec import to_cdr
 from glider_model.ros.messages import TOPICS
 from glider_model.signals import TICK_NS
 
 LEVEL = (0.0, 0.0, -50.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 INPUTS = {'odom': LEVEL, 'joint_states': (0.4, 0.0, 0.0), 'reference': LEVEL}
 DEADLINE_S = 60.0
+SAFE = tuple(ControlSettings().params().safe_command)
 
 
 @pytest.fixture
@@ -49,7 +53,8 @@ class Vehicle:
             name: self.node.create_publisher(TOPICS[name].message_type, name, TOPICS[name].qos)
             for name in INPUTS
         }
-        self.commands, self.told, self.stamp_ns, self.talks = [], [], 0, True
+        self.commands, self.told, self.stamp_ns = [], [], 0
+        self.says, self.change = INPUTS, lambda name, raw: raw
         self.node.create_subscription(JointState, 'command', self.on_command, 10)
         self.node.create_subscription(
             DiagnosticArray, '/diagnostics', self.on_diagnostics, qos.EVENTS
@@ -64,43 +69,93 @@ class Vehicle:
 
     def publish(self) -> None:
         self.stamp_ns += TICK_NS
-        for name, values in INPUTS.items() if self.talks else ():
-            self.publishers[name].publish(TOPICS[name].codec.encode(self.stamp_ns, values))
+        for name, values in self.says.items():
+            raw = TOPICS[name].codec.encode(self.stamp_ns, values)
+            self.publishers[name].publish(self.change(name, raw))
+
+    def said(self, text: str) -> bool:
+        return any(text in told for told in self.told)
 
 
-def test_lost_input_surfaces_the_vehicle_for_good(context):
-    vehicle = Vehicle(context)
-    parameters = {'lockstep': False, 'input_max_age_s': 0.5, 'lost_after_s': 1.0}
-    overrides = [Parameter(name, value=value) for name, value in parameters.items()]
-    control = ControlNode(context=context, namespace='/glider', parameter_overrides=overrides)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(vehicle.node)
-    executor.add_node(control)
-    safe = tuple(ControlSettings().params().safe_command)
+class Flight:
+    """Control, free-running, and a vehicle that has begun to talk to it."""
 
-    def until(condition) -> None:
+    def __init__(self, context) -> None:
+        parameters = {'lockstep': False, 'input_max_age_s': 0.5, 'lost_after_s': 1.0}
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        self.vehicle = Vehicle(context)
+        self.control = ControlNode(
+            context=context, namespace='/glider', parameter_overrides=overrides
+        )
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(self.vehicle.node)
+        self.executor.add_node(self.control)
+
+    def until(self, condition) -> None:
         end = time.monotonic() + DEADLINE_S
         while not condition():
             assert time.monotonic() < end
-            executor.spin_once(timeout_sec=0.1)
+            self.executor.spin_once(timeout_sec=0.1)
 
-    def said(text: str) -> bool:
-        return any(text in told for told in vehicle.told)
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.control.close()
+        self.control.destroy_node()
+        self.vehicle.node.destroy_node()
 
+
+@pytest.fixture
+def flight(context):
+    flight = Flight(context)
     try:
-        until(lambda: len(vehicle.commands) > 5 and vehicle.commands[-1] != safe)
-        vehicle.talks = False
-        until(lambda: said('input lost for 1 s: surfacing for good'))
-        assert vehicle.commands[-1] == safe
-        vehicle.talks = True
-        until(lambda: said('inputs are fresh again'))
-        before = len(vehicle.commands)
-        until(lambda: len(vehicle.commands) > before + 10)
-        assert set(vehicle.commands[before:]) == {safe}
-        until(lambda: said('surfacing for good: ordered'))
-        assert control.state.watch.told & ORDERED
+        commands = flight.vehicle.commands
+        flight.until(lambda: len(commands) > 5 and commands[-1] != SAFE)
+        yield flight
     finally:
-        executor.shutdown()
-        control.close()
-        control.destroy_node()
-        vehicle.node.destroy_node()
+        flight.close()
+
+
+def test_lost_input_surfaces_the_vehicle_for_good(flight):
+    vehicle = flight.vehicle
+    vehicle.says = {}
+    flight.until(lambda: vehicle.said('input lost for 1 s: surfacing for good'))
+    assert vehicle.commands[-1] == SAFE
+    vehicle.says = INPUTS
+    flight.until(lambda: vehicle.said('inputs are fresh again'))
+    before = len(vehicle.commands)
+    flight.until(lambda: len(vehicle.commands) > before + 10)
+    assert set(vehicle.commands[before:]) == {SAFE}
+    flight.until(lambda: vehicle.said('surfacing for good: ordered'))
+    assert flight.control.state.watch.told & ORDERED
+
+
+@pytest.mark.parametrize('factor', [0.0, 2.0])
+def test_quaternion_that_is_none_is_bridged_counted_and_told(flight, factor):
+    """Driver of a vehicle that has no attitude for some samples; then, for good, none at all."""
+    vehicle = flight.vehicle
+    none = (*LEVEL[:3], *(factor * q for q in LEVEL[3:7]), *LEVEL[7:])
+    vehicle.says = {**INPUTS, 'odom': none}
+    flight.until(lambda: vehicle.said('refused, the last good one serves: a measurement'))
+    vehicle.says = INPUTS
+    flight.until(lambda: vehicle.said('samples refused so far'))
+    assert not vehicle.said('surfacing')
+    assert vehicle.commands[-1] != SAFE
+    vehicle.says = {**INPUTS, 'odom': none}
+    flight.until(lambda: vehicle.said('surfacing for good: nothing usable is measured'))
+    assert vehicle.commands[-1] == SAFE
+
+
+def test_frames_of_ned_are_refused_and_named(flight):
+    vehicle = flight.vehicle
+
+    def in_ned(name: str, raw: bytes) -> bytes:
+        if name != 'odom':
+            return raw
+        message = deserialize_message(raw, Odometry)
+        message.header.frame_id = 'map_ned'
+        return to_cdr(message)
+
+    vehicle.change = in_ned
+    flight.until(lambda: vehicle.said("odom of plant_node: header.frame_id is 'map_ned'"))
+    flight.until(lambda: vehicle.said('missing or stale: odom'))
+    flight.until(lambda: vehicle.commands[-1] == SAFE)

@@ -30,6 +30,7 @@ class ControlNode(BlockNode):
         self.params = self.settings.params()
         self.state = self.settings.initial_state()
         self.told, self.told_ns = 0, -watch.TELL_EVERY_NS
+        self.refused = 0
         self.stale_ticks = 0
         self.orders = Orders(self)
         self.publish_wrench = self.add_output('wrench')
@@ -81,6 +82,11 @@ class ControlNode(BlockNode):
         if event.status[0].level == health.ERROR:
             self.get_logger().error(event.status[0].message)
         self.publish_event(event)
+        refused = self.state.watch.gate.refused
+        if refused != self.refused:
+            self.refused = refused
+            said = f'odometry: {refused} samples refused so far'
+            self.event(stamp_ns, health.WARN, said, odom_refused=refused)
 
     def on_stale(self, stamp_ns: int) -> None:
         """Command what surfaces the vehicle, after a while for good."""
