@@ -11,7 +11,6 @@ import time
 from typing import NamedTuple
 
 import numpy as np
-from rclpy.serialization import deserialize_message
 
 from glider_bringup.direct import COLUMNS, ROW, MissionParams, MissionState, fly
 from glider_bringup.fuzzing.counts import HANG_S, Counter, Counts, Tell
@@ -79,7 +78,7 @@ def _noise(draw: np.random.Generator, codec, values) -> bytes:
 
 
 def _of_another_layout(draw: np.random.Generator, codec, values) -> bytes:
-    message = deserialize_message(codec.encode(TICKS * TICK_NS, values), codec.message_type)
+    message = codec.message(codec.encode(TICKS * TICK_NS, values))
     message.header.frame_id = str(draw.choice(['', 'map_ned', 'map', 'x' * 1000, 'a/map']))
     if hasattr(message, 'name'):
         message.name = [str(name) for name in draw.permutation(list(message.name))]

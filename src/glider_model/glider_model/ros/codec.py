@@ -273,10 +273,16 @@ class Codec:
         if len(raw) == self.size:
             sec, nanosec = self._stamp_format.unpack_from(raw, self._stamp_at)
             return sec * _SECOND_NS + nanosec
-        return self._stamp_of(self._message(raw))
+        return self._stamp_of(self.message(raw))
 
-    def _message(self, raw: bytes):
-        """The message, whatever its layout."""
+    def message(self, raw: bytes):
+        """Message of these bytes, whatever its layout.
+
+        Raises
+        ------
+        MessageError
+            If they are none of this type.
+        """
         try:
             return deserialize_message(raw, self.message_type)
         except Exception:  # rclpy has no name for its error, and wants no more of it to be known
@@ -291,7 +297,7 @@ class Codec:
                 raise MessageError(f'{path} is {frame[:80]!r} (allowed: {name!r})')
 
     def _decode_foreign(self, raw: bytes, check_frames: bool) -> tuple[int, tuple[float, ...]]:
-        message = self._message(raw)
+        message = self.message(raw)
         if check_frames:
             self._check_frames(message)
         values = tuple(float(_get(message, path)) for path in self.fields)
