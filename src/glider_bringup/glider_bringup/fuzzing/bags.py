@@ -8,10 +8,9 @@ is not what it makes of the unharmed bag, and says neither so nor what is missin
 """
 
 import random
-import signal
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,8 @@ from typing import Any
 from mcap.opcode import Opcode
 
 from glider_bringup import mission
-from glider_bringup.fuzzing.counts import HANG_S, Counter, Counts, Tell
+from glider_bringup.fuzzing.counts import Counter, Counts, Tell
+from glider_bringup.fuzzing.watch import outcome_of
 from glider_bringup.mcap_reader import Bag
 from glider_bringup.report import report_page
 from glider_bringup.ros.recording import Recording, read_told
@@ -48,14 +48,10 @@ _DATA_END = bytes([Opcode.DATA_END]) + (4).to_bytes(8, 'little')
 Answer = tuple[Any, bool]
 
 
-class _Hang(BaseException):
-    """An answer that does not come."""
-
-
 def fuzz(seed: int, count: int, tell: Tell) -> Counts:
     """Try so many bags; see `glider_bringup.commands.fuzz`."""
     found, draw = Counter(tell), random.Random(seed)
-    with tempfile.TemporaryDirectory() as scratch, _alarm():
+    with tempfile.TemporaryDirectory() as scratch:
         folders = _fly(Path(scratch))
         good = [
             ({name: read(folder) for name, read in COMMANDS.items()}, _bag_of(folder).read_bytes())
@@ -80,35 +76,22 @@ def fuzz(seed: int, count: int, tell: Tell) -> Counts:
 
 def _outcome(folder: Path, expected: dict[str, Answer]) -> tuple[str, str]:
     """The worst that any command did with a bag, and why; empty if all answered well."""
-    for name, read in COMMANDS.items():
-        try:
-            signal.setitimer(signal.ITIMER_REAL, HANG_S)
-            answer, is_told = read(folder)
-        except ConfigurationError:
-            continue
-        except _Hang:
-            return 'hangs', name
-        except Exception as error:
-            return 'tracebacks', f'{name}: {type(error).__name__}: {error}'
-        finally:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-        if answer != expected[name][0] and not is_told:
-            return 'wrong', name
+    for name in COMMANDS:
+        outcome, why = outcome_of(partial(_compare, name, folder, expected[name]))
+        if outcome:
+            return outcome, f'{name}: {why}'
     return '', ''
 
 
-@contextmanager
-def _alarm() -> Iterator[None]:
-    """Let the alarm clock end what hangs."""
-
-    def ring(number, frame) -> None:
-        raise _Hang
-
-    before = signal.signal(signal.SIGALRM, ring)
+def _compare(name: str, folder: Path, expected: Answer) -> tuple[str, str]:
+    """Whether a command refuses a bag, answers as ever, or says what is missing."""
     try:
-        yield
-    finally:
-        signal.signal(signal.SIGALRM, before)
+        answer, is_told = COMMANDS[name](folder)
+    except ConfigurationError:
+        return '', ''
+    if answer != expected[0] and not is_told:
+        return 'wrong', 'another answer than from the unharmed bag'
+    return '', ''
 
 
 def _fly(scratch: Path) -> list[Path]:

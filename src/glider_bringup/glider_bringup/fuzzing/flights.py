@@ -7,15 +7,16 @@ every vehicle and either attitude law; half of the flights turn over at a shallo
 """
 
 import math
-import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 import pydantic
 
-from glider_bringup.fuzzing.counts import HANG_S, Counter, Counts, Tell
+from glider_bringup.fuzzing.counts import Counter, Counts, Tell
+from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission import finite, fly_direct, scorecard
 from glider_bringup.scenario import Scenario, load_scenario
 from glider_model.current import MAX_SPEED_MPS
@@ -104,7 +105,10 @@ def _fly(changes: dict[str, Any]) -> tuple[str, str]:
         def add(self, log: np.ndarray) -> None:
             numbers.append(bool(np.isfinite(log).all()))
 
-    scenario = load_scenario(changes=changes)
+    try:
+        scenario = load_scenario(changes=changes)
+    except ConfigurationError:
+        return '', ''
     flight, scores = fly_direct(scenario, Path(), False, lambda ticks, depth_m: None, Taker())
     card = scorecard(scenario, 'direct', flight, scores)
     if card['status'] == 'failed':
@@ -121,15 +125,6 @@ def fuzz(seed: int, count: int, tell: Tell) -> Counts:
     for case in range(count):
         changes = draw_changes(seed, case)
         told = ' '.join(f'--set {name}={value}' for name, value in changes.items())
-        start = time.monotonic()
-        try:
-            outcome, why = _fly(changes)
-        except ConfigurationError:
-            outcome, why = '', ''
-        except Exception as error:
-            outcome, why = 'tracebacks', f'{type(error).__name__}: {error}'
-        seconds = time.monotonic() - start
-        if not outcome and seconds > HANG_S:
-            outcome, why = 'hangs', f'{seconds:.0f} s'
+        outcome, why = outcome_of(partial(_fly, changes), time_limit_after)
         counter.add(f'./glider run --engine direct {told}', outcome, why)
     return counter.result()

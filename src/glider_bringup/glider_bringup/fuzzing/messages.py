@@ -7,13 +7,14 @@ name, or the block makes of it, and of the good messages after it, finite number
 within the ranges.
 """
 
-import time
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from glider_bringup.direct import COLUMNS, ROW, MissionParams, MissionState, fly
-from glider_bringup.fuzzing.counts import HANG_S, Counter, Counts, Tell
+from glider_bringup.fuzzing.counts import Counter, Counts, Tell
+from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission import mission_of
 from glider_bringup.scenario import load_scenario
 from glider_control.control import control_step
@@ -133,13 +134,8 @@ def fuzz(seed: int, count: int, tell: Tell) -> Counts:
         draw = np.random.Generator(np.random.PCG64([seed, case]))
         law, name = str(draw.choice(list(scenes))), str(draw.choice(READ))
         mutate = MUTATIONS[draw.integers(len(MUTATIONS))]
-        start = time.monotonic()
-        try:
-            outcome, why = _try(draw, scenes[law], name, mutate)
-        except Exception as error:
-            outcome, why = 'tracebacks', f'{type(error).__name__}: {error}'
-        if not outcome and time.monotonic() - start > HANG_S:
-            outcome, why = 'hangs', f'{time.monotonic() - start:.0f} s'
+        attempt = partial(_try, draw, scenes[law], name, mutate)
+        outcome, why = outcome_of(attempt, time_limit_after)
         case_text = f'seed {seed}, case {case}: {name}{mutate.__name__.replace("_", " ")}, {law}'
         counter.add(case_text, outcome, why)
     return counter.result()

@@ -3,6 +3,7 @@
 """Watches over a case: how long it takes, and what it says."""
 
 import signal
+import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -33,8 +34,25 @@ def time_limit(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def outcome_of(case: Callable[[], tuple[str, str]]) -> tuple[str, str]:
+@contextmanager
+def time_limit_after(seconds: float) -> Iterator[None]:
+    """Raise `Hang` if what is inside took longer (s): compiled code stands no signal handler."""
+    start = time.monotonic()
+    yield
+    if time.monotonic() - start > seconds:
+        raise Hang
+
+
+def outcome_of(
+    case: Callable[[], tuple[str, str]], limit: Callable = time_limit
+) -> tuple[str, str]:
     """What a case came to: its own word, or that it hung or raised.
+
+    Parameters
+    ----------
+    case : callable
+    limit : context manager, optional
+        Raises `Hang`: `time_limit` in the middle, `time_limit_after` of compiled code at its end.
 
     Returns
     -------
@@ -43,7 +61,7 @@ def outcome_of(case: Callable[[], tuple[str, str]]) -> tuple[str, str]:
     why : str
     """
     try:
-        with time_limit(HANG_S):
+        with limit(HANG_S):
             return case()
     except Hang:
         return 'hangs', f'no answer within {HANG_S:g} s'
