@@ -1,0 +1,104 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Nothing has changed in flight since flight_digests.json was made, to the last bit.
+
+    ./glider python test/test_flight_digests.py > test/flight_digests.json     makes it anew
+
+Whoever changes what is flown, and means it, does that and says in CHANGELOG what has changed. A
+digest is that of the numbers of all topics, tick by tick, over ten hours by the direct engine.
+Sine and exponential belong to the C library: on another one the last bits differ, and so does the
+digest of the probe, of what the library makes of some arguments.
+"""
+
+import hashlib
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from glider_bringup.direct import COLUMNS, fly_blocks
+from glider_bringup.mission import mission_of
+from glider_bringup.scenario import load_scenario
+from glider_model.kernel import kernel
+
+DURATION_S = 36000.0
+#: Scenario and changed fields of each mission.
+MISSIONS = {
+    'current_8deg': ('current_8deg', {}),
+    'rough_water': ('rough_water', {}),
+    'noisy_sensors': ('noisy_sensors', {}),
+    'helix': ('helix', {}),
+    'survey': ('survey', {}),
+    'seawing': ('current_8deg', {'vehicle': 'seawing'}),
+}
+#: Fields of the three ways in which each is flown.
+WAYS = {
+    'adaptive': {'control.law': 'adaptive', 'guidance.los.method': 'observer'},
+    'pid': {'control.law': 'pid', 'guidance.los.method': 'observer'},
+    'paper': {'control.law': 'adaptive', 'guidance.los.method': 'paper'},
+}
+
+
+@kernel
+def _functions(x):
+    return (
+        math.sin(x),
+        math.cos(x),
+        math.tan(x),
+        math.asin(math.sin(x)),
+        math.atan2(x, 3.0),
+        math.exp(-x * x),
+        math.log(1.0 + x * x),
+        math.sqrt(x * x + 0.1),
+    )
+
+
+def probe() -> str:
+    """Digest of what the mathematical library makes of some arguments."""
+    numbers = [_functions(0.001 * i - 2.0) for i in range(4000)]
+    return hashlib.sha256(np.array(numbers).tobytes()).hexdigest()[:16]
+
+
+def digest(mission: str, way: str) -> str:
+    """Digest of one flight: sha256 of its ticks, topic by topic in the order of their names."""
+    name, changes = MISSIONS[mission]
+    ends = {'dives': 0, 'duration_s': DURATION_S}
+    scenario = load_scenario(name, {**changes, **WAYS[way], **ends})
+    seen = hashlib.sha256()
+    for log in fly_blocks(*mission_of(scenario)):
+        for topic in sorted(COLUMNS):
+            seen.update(np.ascontiguousarray(log[:, COLUMNS[topic]]).tobytes())
+    return seen.hexdigest()[:32]
+
+
+def table() -> dict:
+    """Digests of all flights, and of the library they were made with."""
+    flights = {f'{mission} {way}': digest(mission, way) for mission in MISSIONS for way in WAYS}
+    return {'probe': probe(), 'duration_s': DURATION_S, 'flights': flights}
+
+
+@pytest.fixture(scope='module')
+def made():
+    """Table that the flights are compared with."""
+    text = Path(__file__).with_name('flight_digests.json').read_text(encoding='utf-8')
+    return json.loads(text)
+
+
+def test_the_table_holds_every_flight(made):
+    assert set(made['flights']) == {f'{mission} {way}' for mission in MISSIONS for way in WAYS}
+    assert len(set(made['flights'].values())) == len(made['flights'])
+    assert made['duration_s'] == DURATION_S
+
+
+@pytest.mark.parametrize('mission', MISSIONS)
+@pytest.mark.parametrize('way', WAYS)
+def test_ten_hours_have_the_bits_that_they_had(made, mission, way):
+    if probe() != made['probe']:
+        pytest.skip('another mathematical library than the table was made with')
+    assert digest(mission, way) == made['flights'][f'{mission} {way}']
+
+
+if __name__ == '__main__':
+    print(json.dumps(table(), indent=2))
