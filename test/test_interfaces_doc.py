@@ -22,12 +22,12 @@ from glider_bringup.nodes.recorder_node import RecorderNode, RecorderSettings
 from glider_bringup.runner import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
 from glider_bringup.scenario import Scenario
 from glider_bringup.sweep_file import MAX_CELLS, MAX_VALUES, Sweep
-from glider_control.control import ControlSettings
 from glider_control.nodes.control_node import ControlNode
-from glider_guidance.guidance import GuidanceSettings
+from glider_control.settings import ControlSettings
 from glider_guidance.nodes.guidance_node import GuidanceNode
 from glider_guidance.path import PathSettings, WaypointPath
 from glider_guidance.profile import STAGE_NAMES
+from glider_guidance.settings import GuidanceSettings
 from glider_model import files
 from glider_model.current import MAX_ROWS, CurrentComponent, CurrentSettings
 from glider_model.errors import MAX_LINE, MAX_LINES, MAX_SHOWN

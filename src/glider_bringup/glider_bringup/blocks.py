@@ -11,8 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_bringup.direct import put
-from glider_control.control import ControlSettings, control_step, control_surface
-from glider_guidance.guidance import GuidanceSettings, guidance_abort, guidance_step
+from glider_control.control import control_step, control_surface
+from glider_control.settings import ControlSettings
+from glider_guidance.guidance import guidance_abort, guidance_step
+from glider_guidance.settings import GuidanceSettings
 from glider_model.current import CurrentSettings, current_step
 from glider_model.frames import (
     odometry_from_wire,

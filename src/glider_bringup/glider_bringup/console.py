@@ -21,7 +21,7 @@ from rich.progress import (
 from rich.text import Text
 
 from glider_bringup.scenario import Scenario
-from glider_control.control import ControlLawSettings
+from glider_control.settings import ControlLawSettings
 from glider_model.errors import ConfigurationError, printable
 from glider_model.signals import TICK_S
 

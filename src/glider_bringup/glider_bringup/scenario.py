@@ -11,10 +11,10 @@ import pydantic
 from pydantic import Field
 
 from glider_bringup.score import Rules
-from glider_control.control import ControlLawSettings, ControlSettings
-from glider_guidance.guidance import GuidanceLawSettings, GuidanceSettings
+from glider_control.settings import ControlLawSettings, ControlSettings
 from glider_guidance.path import PathSettings, StraightPath, path_length, path_point
 from glider_guidance.profile import ProfileSettings
+from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_model.current import CurrentSettings
 from glider_model.errors import clipped, shown
 from glider_model.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text

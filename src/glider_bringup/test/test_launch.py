@@ -13,8 +13,8 @@ from glider_bringup import launching
 from glider_bringup.launching import ARGUMENTS, TF, LaunchedNode, check_names, plan_launch
 from glider_bringup.runner import MODULES, PLANT, RECORDER
 from glider_bringup.scenario import scenario_names
-from glider_control.control import ControlLawSettings
-from glider_guidance.guidance import LosSettings
+from glider_control.settings import ControlLawSettings
+from glider_guidance.settings import LosSettings
 from glider_model.settings import ConfigurationError
 
 LAUNCH_FILE = Path(__file__).parents[1] / 'launch' / 'glider.launch.py'

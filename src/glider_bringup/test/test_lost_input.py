@@ -16,8 +16,8 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from glider_bringup.runner import domain_id
-from glider_control.control import ControlSettings
 from glider_control.nodes.control_node import ControlNode
+from glider_control.settings import ControlSettings
 from glider_control.watch import ORDERED
 from glider_model.ros import qos
 from glider_model.ros.codec import to_cdr

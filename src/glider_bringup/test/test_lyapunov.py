@@ -22,14 +22,14 @@ import pytest
 from glider_bringup.direct import ROW, fly
 from glider_bringup.mission import mission_of
 from glider_bringup.scenario import load_scenario
-from glider_control.adaptive import (
+from glider_control.allocation import moments
+from glider_control.laws.adaptive import (
     SCALE_ALPHA,
     SCALE_PITCH_RATE,
     SCALE_ROLL_RATE,
     SCALE_SIDE,
     SCALE_V2,
 )
-from glider_control.allocation import moments
 from glider_model.plant import plant_joints
 from glider_model.polar import glide_speed
 from glider_model.rigid_body import GRAVITY

@@ -10,7 +10,7 @@ import pytest
 from glider_bringup.direct import ROW, fly
 from glider_bringup.mission import fly_direct, mission_of
 from glider_bringup.montecarlo import airframe, judge, make_scenarios, sample_plant
-from glider_guidance.guidance import lookahead_stretch
+from glider_guidance.methods.observer import lookahead_stretch
 from glider_model.perturb import PerturbSettings, perturbed
 from glider_model.signals import TICK_S
 from glider_model.vehicle import load_vehicle

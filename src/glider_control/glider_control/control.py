@@ -6,168 +6,32 @@ The channels cannot be swapped: buoyancy sets speed and vertical rate, the mass 
 pitch, the mass turned to a side sets roll and so heading.
 """
 
-import math
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
-from pydantic import Field
-
-from glider_control.adaptive import (
-    AdaptiveParams,
-    AdaptiveSettings,
-    AdaptiveState,
-    adaptation,
-    adaptive_step,
-    initial_adaptive,
-    make_adaptive,
-)
 from glider_control.allocation import (
     AllocationParams,
     allocate_pitch,
     allocate_roll,
-    make_allocation,
     moments,
 )
-from glider_control.pid import (
-    HeadingSettings,
-    PidParams,
-    PidSettings,
-    PidState,
-    pid_step,
-)
+from glider_control.law import Seen, law_learnt, law_step
+from glider_control.vertical_rate import Trim, vertical_rate_law
 from glider_control.watch import (
-    INITIAL_WATCH,
     ORDERED,
     SURFACES,
     WatchParams,
     WatchState,
-    make_watch,
     take_in,
     watch,
 )
-from glider_model.command_filter import Filtered, FilterParams
-from glider_model.gate import GateSettings
 from glider_model.kernel import kernel
 from glider_model.measurement import Measured, measure
-from glider_model.polar import Polar, glide_net_heaviness, glide_speed, make_polar
+from glider_model.polar import Polar, glide_speed
 from glider_model.rigid_body import GRAVITY
-from glider_model.settings import Settings
 from glider_model.signals import Adaptation, Joints, Wrench
-from glider_model.vehicle import load_vehicle
-
-_TUNABLE = {'tunable': True}
 
 #: Bits of ``ControlOutput.saturation``; those of `glider_control.watch` come after them.
 SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL = 1, 2, 4
-#: The integrals of the vertical-rate law wait until the pump is this near to where it goes (kg).
-PUMP_ARRIVED_KG = 0.05
-
-
-class BuoyancySettings(Settings):
-    """Vertical rate on the buoyancy engine."""
-
-    ki_kg_per_m: float = Field(
-        0.004,
-        ge=0.0,
-        le=10.0,
-        description='integral of the vertical-rate error (kg/m)',
-        json_schema_extra=_TUNABLE,
-    )
-    drag_ki_kg_per_m: float = Field(
-        0.002,
-        ge=0.0,
-        le=10.0,
-        description='integral that changes sides with dive and climb (kg/m)',
-        json_schema_extra=_TUNABLE,
-    )
-    trim_limit_kg: float = Field(
-        0.3, ge=0.0, le=20.0, description='largest correction by each integral (kg)'
-    )
-
-
-class FilterSettings(Settings):
-    """What keeps noise from moving the motors."""
-
-    attitude_s: float = Field(
-        3.0, gt=0.0, le=60.0, description='time constant of the attitude filter (s)'
-    )
-    buoyancy_dead_band_kg: float = Field(
-        0.005, ge=0.0, le=1.0, description='change of command that the pump ignores (kg)'
-    )
-    pitch_dead_band_m: float = Field(
-        1e-4, ge=0.0, le=0.1, description='change of command that the pitch mass ignores (m)'
-    )
-    roll_dead_band_deg: float = Field(
-        0.2, ge=0.0, le=10.0, description='change of command that the roll mass ignores (deg)'
-    )
-
-
-class ControlLawSettings(Settings):
-    """How to control, whatever the vehicle: the control section of a scenario."""
-
-    law: Literal['adaptive', 'pid'] = Field('adaptive', description='attitude law')
-    adaptive: AdaptiveSettings = Field(AdaptiveSettings(), description='gains of the adaptive law')
-    pid: PidSettings = Field(PidSettings(), description='gains of the PID law')
-    heading: HeadingSettings = Field(HeadingSettings(), description='bank to turn')
-    buoyancy: BuoyancySettings = Field(BuoyancySettings(), description='vertical-rate law')
-    filters: FilterSettings = Field(FilterSettings(), description='filters and dead bands')
-    gate: GateSettings = Field(GateSettings(), description='odometry that is refused')
-
-
-class ControlSettings(ControlLawSettings):
-    """Everything the control node is told."""
-
-    vehicle: str = Field('zhang2021', description='vehicle: masses, ranges, polar, steering')
-    lost_after_s: float = Field(
-        10.0,
-        ge=0.1,
-        le=3600.0,
-        description='free-running: an input that has been stale for so long is lost, and the '
-        'vehicle surfaces for good (s)',
-    )
-
-    def params(self) -> 'ControlParams':
-        """Kernel parameters."""
-        vehicle = load_vehicle(self.vehicle)
-        kernel_vehicle = vehicle.params()
-        heading, filters = self.heading, self.filters
-        roll_limit = math.radians(heading.roll_limit_deg)
-        roll_filter = FilterParams(heading.roll_frequency_radps, heading.roll_rate_radps)
-        return ControlParams(
-            make_allocation(kernel_vehicle),
-            make_polar(kernel_vehicle),
-            self.law == 'adaptive',
-            make_adaptive(self.adaptive, kernel_vehicle, roll_limit, roll_filter),
-            PidParams(
-                *(getattr(self.pid, name) for name in PidSettings.model_fields),
-                vehicle.steering.dive.value,
-                vehicle.steering.climb.value,
-                roll_limit,
-                roll_filter,
-            ),
-            self.buoyancy.ki_kg_per_m,
-            self.buoyancy.drag_ki_kg_per_m,
-            self.buoyancy.trim_limit_kg,
-            filters.attitude_s,
-            Joints(
-                filters.buoyancy_dead_band_kg,
-                filters.pitch_dead_band_m,
-                math.radians(filters.roll_dead_band_deg),
-            ),
-            Joints(-kernel_vehicle.m_b_max, -kernel_vehicle.x_p_max, 0.0),
-            make_watch(kernel_vehicle, vehicle.rated_depth_m, self.gate.params()),
-        )
-
-    def initial_state(self) -> 'ControlState':
-        """State before the first tick."""
-        return ControlState(
-            0,
-            Measured(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-            initial_adaptive(self.adaptive),
-            PidState(0.0, 0.0, 0.0, Filtered(0.0, 0.0)),
-            Trim(0.0, 0.0),
-            Joints(0.0, 0.0, 0.0),
-            INITIAL_WATCH,
-        )
 
 
 class ControlParams(NamedTuple):
@@ -175,9 +39,7 @@ class ControlParams(NamedTuple):
 
     allocation: AllocationParams
     polar: Polar
-    adapts: bool  #: adaptive law, else PID
-    adaptive: AdaptiveParams
-    pid: PidParams
+    law: NamedTuple  #: of the law that was chosen
     buoyancy_ki: float  #: (kg/m)
     drag_ki: float  #: (kg/m)
     buoyancy_trim_max: float  #: (kg)
@@ -187,20 +49,12 @@ class ControlParams(NamedTuple):
     watch: WatchParams
 
 
-class Trim(NamedTuple):
-    """Integrals of the vertical-rate law."""
-
-    ballast: float  #: the same in dive and climb: ballast, density (kg)
-    drag: float  #: + in a dive, - in a climb (kg)
-
-
 class ControlState(NamedTuple):
     """Control between two ticks."""
 
     tick: int
     measured: Measured
-    adaptive: AdaptiveState
-    pid: PidState
+    law: NamedTuple  #: of the law that was chosen
     trim: Trim
     command: Joints  #: last command
     watch: WatchState
@@ -224,52 +78,22 @@ def _hold(command, last, band, limit):
 
 
 @kernel
-def vertical_rate_law(trim, measured, reference, joints, params, dt):
-    """Net heaviness (kg) for the reference's vertical rate, and the new integrals.
-
-    The glide polar gives the weight of the steady glide. One integral corrects what ballast and
-    density differ by, another, with the sign of the rate, what the drag does: a draggy vehicle
-    has to be heavier in the dive and lighter in the climb, and has to know it as soon as it turns
-    over. Both wait until the pump is where it is meant to be, and no longer: a vehicle that then
-    sinks, or climbs too slowly, needs them most.
-    """
-    sign = 1.0 if reference.v_d > 0.0 else -1.0
-    ballast, drag = trim.ballast, trim.drag
-    wanted = glide_net_heaviness(reference.theta, reference.v_d, params.polar) + sign * drag
-    error = reference.v_d - measured.vertical_rate
-    limit = params.allocation.m_b_max
-    if abs(joints.m_b - wanted - ballast) < PUMP_ARRIVED_KG:
-        most = params.buoyancy_trim_max
-        ballast = min(most, max(-most, ballast + dt * params.buoyancy_ki * error))
-        drag = min(most, max(-most, drag + dt * params.drag_ki * error * sign))
-    return min(limit, max(-limit, wanted + ballast)), Trim(ballast, drag)
-
-
-@kernel
-def attitude_law(state, measured, seen, last, params, dt):
-    """Roll and pitch moment (N m) of the law in use, with its state and what it has learnt."""
-    limits, joints, reference = params.allocation, seen.joints, seen.reference
+def see(measured, taken, last, params):
+    """What a law sees of what was taken in, the `WatchState` of this tick."""
+    limits, joints = params.allocation, taken.joints
     speed, alpha = glide_speed(measured.theta, measured.vertical_rate, params.polar)
-    held = (abs(last.mu) >= limits.mu_max, abs(last.x_p) >= limits.x_p_max)
-    adaptive, pid = state.adaptive, state.pid
-    if params.adapts:
-        adaptive, tau_p, tau_q = adaptive_step(
-            adaptive,
-            measured,
-            reference,
-            speed,
-            alpha,
-            joints.m_b,
-            moments(joints.x_p, joints.mu, measured.phi, measured.theta, limits),
-            held,
-            params.adaptive,
-            dt,
-        )
-    else:
-        pid, tau_p, tau_q = pid_step(
-            pid, measured, reference, speed, held[1], held[0], params.pid, dt
-        )
-    return adaptive, pid, tau_p, tau_q
+    tau_p, tau_q = moments(joints.x_p, joints.mu, measured.phi, measured.theta, limits)
+    return Seen(
+        measured,
+        taken.reference,
+        speed,
+        alpha,
+        joints.m_b,
+        tau_p,
+        tau_q,
+        abs(last.mu) >= limits.mu_max,
+        abs(last.x_p) >= limits.x_p_max,
+    )
 
 
 @kernel
@@ -279,8 +103,7 @@ def control_surface(state):
     return ControlState(
         state.tick,
         state.measured,
-        state.adaptive,
-        state.pid,
+        state.law,
         state.trim,
         state.command,
         WatchState(
@@ -323,22 +146,22 @@ def control_step(state, odometry, joints, reference, params, dt):
     ControlState, ControlOutput
     """
     first = state.tick == 0
-    seen = take_in(state.watch, odometry, joints, reference, params.watch, dt)
-    odometry, joints = seen.gate.odometry, seen.joints
+    taken = take_in(state.watch, odometry, joints, reference, params.watch, dt)
+    odometry, joints = taken.gate.odometry, taken.joints
     last = joints if first else state.command
     limits = params.allocation
     measured = measure(state.measured, odometry, first, params.attitude_s, dt)
     before = odometry if first else state.watch.gate.odometry
-    watched = watch(seen, before, measured.vertical_rate, last, params.watch, dt)
+    watched = watch(taken, before, measured.vertical_rate, last, params.watch, dt)
 
-    adaptive, pid, trim = state.adaptive, state.pid, state.trim
+    law, trim = state.law, state.trim
     command, tau_p, tau_q = last, 0.0, 0.0
     m_b = last.m_b
     if watched.told & SURFACES:
         command, m_b = params.safe_command, params.safe_command.m_b
-    elif seen.gate.seen:
-        adaptive, pid, tau_p, tau_q = attitude_law(state, measured, seen, last, params, dt)
-        m_b, trim = vertical_rate_law(state.trim, measured, seen.reference, joints, params, dt)
+    elif taken.gate.seen:
+        law, tau_p, tau_q = law_step(law, see(measured, taken, last, params), params.law, dt)
+        m_b, trim = vertical_rate_law(state.trim, measured, taken.reference, joints, params, dt)
         mu = allocate_roll(tau_p, measured.phi, measured.theta, limits)
         x_p = allocate_pitch(tau_q, joints.mu, measured.phi, measured.theta, limits)
         command = Joints(
@@ -346,10 +169,6 @@ def control_step(state, odometry, joints, reference, params, dt):
             _hold(x_p, last.x_p, params.dead_band.x_p, limits.x_p_max),
             _hold(mu, last.mu, params.dead_band.mu, limits.mu_max),
         )
-    learnt = Adaptation(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    if params.adapts:
-        learnt = adaptation(adaptive, params.adaptive)
-
     saturation = watched.told
     if abs(command.m_b) >= limits.m_b_max:
         saturation |= SATURATED_BUOYANCY
@@ -357,6 +176,7 @@ def control_step(state, odometry, joints, reference, params, dt):
         saturation |= SATURATED_PITCH
     if abs(command.mu) >= limits.mu_max:
         saturation |= SATURATED_ROLL
+    learnt = law_learnt(law, params.law)
     output = ControlOutput(command, Wrench(m_b * GRAVITY, tau_p, tau_q), learnt, saturation)
-    tick = state.tick + 1 if seen.gate.seen else 0
-    return ControlState(tick, measured, adaptive, pid, trim, command, watched), output
+    tick = state.tick + 1 if taken.gate.seen else 0
+    return ControlState(tick, measured, law, trim, command, watched), output

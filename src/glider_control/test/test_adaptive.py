@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_control.adaptive import (
+from glider_control.laws.adaptive import (
     DISTURBANCE_MAX,
     SCALE_ALPHA,
     SCALE_PITCH_RATE,

@@ -14,9 +14,9 @@ from glider_control.control import (
     SATURATED_BUOYANCY,
     SATURATED_PITCH,
     SATURATED_ROLL,
-    ControlSettings,
     control_step,
 )
+from glider_control.settings import ControlSettings
 from glider_model.frames import euler_from_quaternion, quaternion_from_euler, rotate_to_ned
 from glider_model.plant import PlantSettings, plant_odometry, plant_step
 from glider_model.polar import glide_vertical_rate

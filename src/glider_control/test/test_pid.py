@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_control.control import ControlSettings
-from glider_control.pid import (
+from glider_control.laws.pid import (
     HEADING_INTEGRAL_MAX,
     PITCH_INTEGRAL_MAX,
     ROLL_INTEGRAL_MAX,
@@ -18,6 +17,7 @@ from glider_control.pid import (
     heading_to_roll,
     pid_step,
 )
+from glider_control.settings import ControlSettings
 from glider_model.command_filter import Filtered
 from glider_model.measurement import Measured
 from glider_model.signals import TICK_S, Reference

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_control.steering import caution, roll_to_kick, roll_to_turn, sure_disturbance
+from glider_control.turning import caution, roll_to_kick, roll_to_turn, sure_disturbance
 from glider_model.steering import SteeringLearningSettings
 
 PRIOR = SteeringLearningSettings().initial_state().dive

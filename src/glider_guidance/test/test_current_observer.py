@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm, solve_continuous_lyapunov
 
 from glider_guidance.current_observer import ObserverParams, ObserverState, observer_step
-from glider_guidance.guidance import ObserverSettings
+from glider_guidance.settings import ObserverSettings
 
 quick = settings(max_examples=50, deadline=None)
 

@@ -12,14 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glider_guidance.current_observer import ObserverState
-from glider_guidance.guidance import (
-    INFEASIBLE_S,
-    LOOKAHEAD_STRETCH_MAX,
-    GuidanceSettings,
-    guidance_abort,
-    guidance_step,
-    lookahead_stretch,
-)
+from glider_guidance.guidance import INFEASIBLE_S, guidance_abort, guidance_step
+from glider_guidance.methods.observer import LOOKAHEAD_STRETCH_MAX, lookahead_stretch
 from glider_guidance.path import HelixPath, StraightPath, WaypointPath
 from glider_guidance.profile import (
     GLIDING_DOWN,
@@ -28,6 +22,7 @@ from glider_guidance.profile import (
     INFLECTING_UP,
     SURFACING,
 )
+from glider_guidance.settings import GuidanceSettings
 from glider_model.frames import quaternion_from_euler, rotate_to_body
 from glider_model.polar import glide_horizontal_speed
 from glider_model.signals import TICK_S, Odometry

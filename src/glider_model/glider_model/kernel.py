@@ -5,7 +5,8 @@
 numba decides whether a cached function is stale by looking at the file that defines it, not at the
 files of the functions it calls. A change in ``hydrodynamics.py`` would go unnoticed in a cached
 ``plant_step``. The cache folder is therefore named by a digest over the sources of all packages
-whose kernels call each other: change any of them and everything is compiled afresh.
+whose kernels call each other, those of other distributions that fill a slot among them: change any
+of them and everything is compiled afresh.
 """
 
 import hashlib
@@ -16,12 +17,14 @@ from pathlib import Path
 
 import numba
 
+from glider_model.plugins import registered, sources
+
 _PACKAGES = ('glider_model', 'glider_guidance', 'glider_control', 'glider_bringup')
 
 
 @cache
 def source_digest() -> str:
-    """Digest of every Python source of the packages that are importable here."""
+    """Digest of the sources of our packages, and of those that registered something."""
     digest = hashlib.sha256(numba.__version__.encode())
     for name in _PACKAGES:
         spec = importlib.util.find_spec(name)
@@ -31,6 +34,11 @@ def source_digest() -> str:
         for path in sorted(folder.rglob('*.py')):
             digest.update(str(path.relative_to(folder)).encode())
             digest.update(path.read_bytes())
+    for point in registered():
+        digest.update(f'{point.group} {point.name} {point.value}'.encode())
+    for path in sources():
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 

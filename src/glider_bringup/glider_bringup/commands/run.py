@@ -25,7 +25,7 @@ from glider_bringup.disk import DiskError
 from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, parse_assignment
 from glider_bringup.scorecard import print_card
-from glider_guidance.guidance import LosSettings
+from glider_guidance.settings import LosSettings
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
 

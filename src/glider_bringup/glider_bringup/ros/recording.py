@@ -15,8 +15,8 @@ from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE
 from glider_bringup.ros.bag_log import decode
 from glider_bringup.scenario import Scenario, load_scenario
-from glider_control.control import ControlSettings
-from glider_guidance.guidance import GuidanceSettings
+from glider_control.settings import ControlSettings
+from glider_guidance.settings import GuidanceSettings
 from glider_model.current import CurrentSettings
 from glider_model.files import read_yaml
 from glider_model.plant import PlantSettings

@@ -7,7 +7,8 @@ import sys
 from diagnostic_msgs.msg import DiagnosticArray
 
 from glider_control import watch
-from glider_control.control import ControlSettings, control_step, control_surface
+from glider_control.control import control_step, control_surface
+from glider_control.settings import ControlSettings
 from glider_model.frames import odometry_from_wire, reference_from_wire, wrench_to_wire
 from glider_model.ros import health, messages
 from glider_model.ros.orders import PARAMETERS_SET, SURFACE, Orders

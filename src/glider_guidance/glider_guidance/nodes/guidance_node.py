@@ -9,8 +9,9 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 from std_srvs.srv import Trigger
 
-from glider_guidance.guidance import GuidanceSettings, guidance_abort, guidance_step
+from glider_guidance.guidance import guidance_abort, guidance_step
 from glider_guidance.profile import STAGE_NAMES
+from glider_guidance.settings import GuidanceSettings
 from glider_model.frames import odometry_from_wire, reference_to_wire, water_to_wire
 from glider_model.ros import health, messages
 from glider_model.ros.orders import ABORT, PARAMETERS_SET, Orders

@@ -20,7 +20,8 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_control.steering import roll_to_kick, roll_to_turn, sure_disturbance
+from glider_control.law import Bank, LawSettings, law_learnt, law_step
+from glider_control.turning import roll_to_kick, roll_to_turn, sure_disturbance
 from glider_model.command_filter import Filtered, FilterParams, filter_command
 from glider_model.frames import wrap_angle
 from glider_model.kernel import kernel
@@ -35,7 +36,7 @@ from glider_model.steering import (
     learn,
     speed_ratio,
 )
-from glider_model.vehicle import VehicleParams
+from glider_model.vehicle import Vehicle
 
 _TUNABLE = {'tunable': True}
 
@@ -87,6 +88,19 @@ class ChannelSettings(Settings):
     )
     bound: float = Field(3.0, gt=0.0, le=100.0, description='projection: largest parameter (N m)')
 
+    def params(self, inertia: float) -> 'ChannelParams':
+        """Kernel parameters of a channel that turns an inertia (kg m^2)."""
+        return ChannelParams(
+            self.l1_per_s,
+            self.b1,
+            self.b2,
+            self.gamma,
+            self.sigma_per_s,
+            self.dead_zone_radps,
+            self.bound,
+            inertia,
+        )
+
 
 class RollChannelSettings(ChannelSettings):
     """Gains of the roll channel."""
@@ -109,7 +123,7 @@ class RollChannelSettings(ChannelSettings):
     )
 
 
-class AdaptiveSettings(Settings):
+class AdaptiveSettings(LawSettings):
     """Gains of the adaptive law."""
 
     pitch: ChannelSettings = Field(ChannelSettings(), description='pitch channel')
@@ -130,6 +144,36 @@ class AdaptiveSettings(Settings):
     steering: SteeringLearningSettings = Field(
         SteeringLearningSettings(), description='estimator of the steering effectiveness'
     )
+
+    def params(self, vehicle: Vehicle, bank: Bank) -> 'AdaptiveParams':
+        """Kernel parameters for a vehicle whose masses, but nothing else, are known."""
+        kernel_vehicle, steering = vehicle.params(), self.steering.params()
+        _, _, _, i_xx, i_yy, *_ = rigid_body(0.0, 0.0, kernel_vehicle)
+        return AdaptiveParams(
+            self.roll.params(i_xx + kernel_vehicle.a_44),
+            self.pitch.params(i_yy + kernel_vehicle.a_55),
+            self.heading_kp_per_s,
+            self.heading_ki_per_s2,
+            self.heading_kd,
+            steering._replace(bank=min(steering.bank, math.sin(bank.limit))),
+            kernel_vehicle.m,
+            bank.limit,
+            bank.filter,
+        )
+
+    def initial_state(self) -> 'AdaptiveState':
+        """State of a law that knows nothing yet."""
+        channel = ChannelState(Filtered(0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
+        return AdaptiveState(
+            Filtered(0.0, 0.0),
+            channel,
+            channel,
+            (0.0, 0.0, 0.0),
+            (0.0, 0.0, 0.0, 0.0),
+            self.steering.initial_state(),
+            0.0,
+            0.0,
+        )
 
 
 class ChannelParams(NamedTuple):
@@ -181,53 +225,6 @@ class AdaptiveState(NamedTuple):
     steering: Steering
     disturbance_dive: float  #: d_hat, turn rate that roll does not explain (rad/s)
     disturbance_climb: float
-
-
-def make_adaptive(
-    settings: AdaptiveSettings, vehicle: VehicleParams, roll_limit: float, roll_filter
-) -> AdaptiveParams:
-    """Kernel parameters for a vehicle whose masses, but nothing else, are known."""
-
-    def channel(gains: ChannelSettings, inertia: float) -> ChannelParams:
-        return ChannelParams(
-            gains.l1_per_s,
-            gains.b1,
-            gains.b2,
-            gains.gamma,
-            gains.sigma_per_s,
-            gains.dead_zone_radps,
-            gains.bound,
-            inertia,
-        )
-
-    steering = settings.steering.params()
-    _, _, _, i_xx, i_yy, *_ = rigid_body(0.0, 0.0, vehicle)
-    return AdaptiveParams(
-        channel(settings.roll, i_xx + vehicle.a_44),
-        channel(settings.pitch, i_yy + vehicle.a_55),
-        settings.heading_kp_per_s,
-        settings.heading_ki_per_s2,
-        settings.heading_kd,
-        steering._replace(bank=min(steering.bank, math.sin(roll_limit))),
-        vehicle.m,
-        roll_limit,
-        roll_filter,
-    )
-
-
-def initial_adaptive(settings: AdaptiveSettings) -> AdaptiveState:
-    """State of a law that knows nothing yet."""
-    channel = ChannelState(Filtered(0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
-    return AdaptiveState(
-        Filtered(0.0, 0.0),
-        channel,
-        channel,
-        (0.0, 0.0, 0.0),
-        (0.0, 0.0, 0.0, 0.0),
-        settings.steering.initial_state(),
-        0.0,
-        0.0,
-    )
 
 
 @kernel
@@ -315,30 +312,11 @@ def bank_to_turn(steering, disturbance, measured, reference, speed, learning, pa
     return math.asin(sine), disturbance
 
 
+@law_step.body(AdaptiveParams)
 @kernel
-def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, params, dt):
-    """Roll and pitch moment (N m) of the adaptive law.
-
-    Parameters
-    ----------
-    state : AdaptiveState
-    measured : Measured
-    reference : Reference
-    speed, alpha : float
-        Speed through the water (m/s) and angle of attack (rad), by the flight model.
-    m_b : float
-        Net heaviness (kg).
-    applied : tuple of float
-        Roll and pitch moment that the moving mass makes now (N m).
-    held : tuple of bool
-        Whether roll and pitch mass are at their limits: their parameters wait.
-    params : AdaptiveParams
-    dt : float
-
-    Returns
-    -------
-    AdaptiveState, tau_p, tau_q
-    """
+def adaptive_step(state, seen, params, dt):
+    """Roll and pitch moment (N m) of the adaptive law: see `law_step`."""
+    measured, reference, speed = seen.measured, seen.reference, seen.speed
     steering = learn(state.steering, measured, speed, params.steering, dt)
     learning = steering.steady_s > LEARN_AFTER_S
     d_dive, d_climb = state.disturbance_dive, state.disturbance_climb
@@ -369,17 +347,17 @@ def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, 
     a_p = a_phi - c_phi * t_theta * r - s_phi * t_theta * a_q
 
     rate_p, xi_p, zeta_p, k1_p, k2_p, k2bar_p = channel_step(
-        state.roll_channel, e_phi, a_p, p, applied[0], 1.0, params.roll, dt
+        state.roll_channel, e_phi, a_p, p, seen.tau_p, 1.0, params.roll, dt
     )
     rate_q, xi_q, zeta_q, k1_q, k2_q, k2bar_q = channel_step(
-        state.pitch_channel, e_theta, a_q, q, applied[1], c_phi, params.pitch, dt
+        state.pitch_channel, e_theta, a_q, q, seen.tau_q, c_phi, params.pitch, dt
     )
 
     # regressors; the side force that sideslip makes, from the lateral balance of a turn
     v2 = speed * speed
-    side = params.mass * speed * r - m_b * GRAVITY * c_theta * s_phi
+    side = params.mass * speed * r - seen.m_b * GRAVITY * c_theta * s_phi
     phi_p = (1.0, side / SCALE_SIDE, rate_p.value / SCALE_ROLL_RATE)
-    phi_q = (1.0, v2 * alpha / SCALE_ALPHA, v2 / SCALE_V2, rate_q.value / SCALE_PITCH_RATE)
+    phi_q = (1.0, v2 * seen.alpha / SCALE_ALPHA, v2 / SCALE_V2, rate_q.value / SCALE_PITCH_RATE)
 
     th_p, th_q = state.roll_theta, state.pitch_theta
     tau_p = (
@@ -396,14 +374,14 @@ def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, 
         - (phi_q[0] * th_q[0] + phi_q[1] * th_q[1] + phi_q[2] * th_q[2] + phi_q[3] * th_q[3])
     )
 
-    if learning and not held[0] and abs(k2bar_p) > params.roll.dead_zone:
+    if learning and not seen.roll_held and abs(k2bar_p) > params.roll.dead_zone:
         s = params.roll.sigma
         th_p = (
             _project(th_p[0], phi_p[0] * k2bar_p, s, params.roll, dt),
             _project(th_p[1], phi_p[1] * k2bar_p, s, params.roll, dt),
             _project(th_p[2], phi_p[2] * k2bar_p, s, params.roll, dt),
         )
-    if learning and not held[1] and abs(k2bar_q) > params.pitch.dead_zone:
+    if learning and not seen.pitch_held and abs(k2bar_q) > params.pitch.dead_zone:
         s = params.pitch.sigma
         th_q = (
             _project(th_q[0], phi_q[0] * k2bar_q, s, params.pitch, dt),
@@ -424,6 +402,7 @@ def adaptive_step(state, measured, reference, speed, alpha, m_b, applied, held, 
     return new_state, tau_p, tau_q
 
 
+@law_learnt.body(AdaptiveParams)
 @kernel
 def adaptation(state, params):
     """What the law has learnt, with the Lyapunov functions of its errors.

@@ -11,17 +11,21 @@ from typing import NamedTuple
 
 from pydantic import Field
 
+from glider_control.law import Bank, LawSettings, law_step
 from glider_model.command_filter import Filtered, FilterParams, filter_command
 from glider_model.frames import wrap_angle
 from glider_model.kernel import kernel
-from glider_model.settings import Settings
 from glider_model.steering import speed_ratio
+from glider_model.vehicle import Vehicle
 
 _TUNABLE = {'tunable': True}
 
 
-class PidSettings(Settings):
-    """Gains of the PID law. Moments in N m, angles in rad."""
+class PidSettings(LawSettings):
+    """Gains of the PID law.
+
+    Moments in N m, angles in rad.
+    """
 
     pitch_kp: float = Field(
         8.0, ge=0.0, le=1000.0, description='pitch (N m/rad)', json_schema_extra=_TUNABLE
@@ -51,19 +55,19 @@ class PidSettings(Settings):
         0.3, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=_TUNABLE
     )
 
+    def params(self, vehicle: Vehicle, bank: Bank) -> 'PidParams':
+        """Kernel parameters for a vehicle whose steering is known."""
+        return PidParams(
+            *(getattr(self, name) for name in PidSettings.model_fields),
+            vehicle.steering.dive.value,
+            vehicle.steering.climb.value,
+            bank.limit,
+            bank.filter,
+        )
 
-class HeadingSettings(Settings):
-    """Bank to turn."""
-
-    roll_limit_deg: float = Field(
-        30.0, ge=1.0, le=60.0, description='largest commanded roll (deg)'
-    )
-    roll_frequency_radps: float = Field(
-        0.5, gt=0.0, le=5.0, description='natural frequency of the roll filter (rad/s)'
-    )
-    roll_rate_radps: float = Field(
-        0.08, gt=0.0, le=1.0, description='largest rate of the desired roll (rad/s)'
-    )
+    def initial_state(self) -> 'PidState':
+        """Integrators at zero."""
+        return PidState(0.0, 0.0, 0.0, Filtered(0.0, 0.0))
 
 
 class PidParams(NamedTuple):
@@ -129,32 +133,19 @@ def heading_to_roll(state, measured, reference, speed, params, dt):
     return math.asin(_clip(demand, limit)), integral
 
 
+@law_step.body(PidParams)
 @kernel
-def pid_step(state, measured, reference, speed, pitch_held, roll_held, params, dt):
-    """Roll and pitch moment (N m) of the PID law.
-
-    Parameters
-    ----------
-    state : PidState
-    measured : Measured
-    reference : Reference
-    speed : float
-        Speed through the water (m/s).
-    pitch_held, roll_held : bool
-        The actuator was at its limit: its integrator waits.
-    params : PidParams
-    dt : float
-
-    Returns
-    -------
-    PidState, tau_p, tau_q
-    """
-    roll_command, heading_integral = heading_to_roll(state, measured, reference, speed, params, dt)
+def pid_step(state, seen, params, dt):
+    """Roll and pitch moment (N m) of the PID law: see `law_step`."""
+    measured, reference = seen.measured, seen.reference
+    roll_command, heading_integral = heading_to_roll(
+        state, measured, reference, seen.speed, params, dt
+    )
     roll = filter_command(state.roll, roll_command, params.roll_filter, dt)
 
     e_phi = wrap_angle(roll.value - measured.phi)
     roll_integral = state.roll_integral
-    if not roll_held:
+    if not seen.roll_held:
         roll_integral = _clip(roll_integral + dt * params.roll_ki * e_phi, ROLL_INTEGRAL_MAX)
     tau_p = (
         params.roll_kp * e_phi + params.roll_kd * (roll.rate - measured.phi_dot) + roll_integral
@@ -162,7 +153,7 @@ def pid_step(state, measured, reference, speed, pitch_held, roll_held, params, d
 
     e_theta = reference.theta - measured.theta
     pitch_integral = state.pitch_integral
-    if not pitch_held:
+    if not seen.pitch_held:
         pitch_integral = _clip(pitch_integral + dt * params.pitch_ki * e_theta, PITCH_INTEGRAL_MAX)
     tau_q = (
         params.pitch_kp * e_theta

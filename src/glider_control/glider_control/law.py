@@ -1,0 +1,112 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a control law is: settings, params, state, and a kernel that fills the slot `law_step`.
+
+A law turns what control sees into a roll and a pitch moment. All else, from the odometry that is
+refused to the allocation of moments to masses, is the same for every law. docs/your_law.md builds
+one from nothing.
+"""
+
+import math
+from typing import NamedTuple
+
+from pydantic import Field
+
+from glider_model.command_filter import FilterParams
+from glider_model.measurement import Measured
+from glider_model.settings import Settings
+from glider_model.signals import Adaptation, Reference
+from glider_model.slot import default, slot
+from glider_model.vehicle import Vehicle
+
+
+class HeadingSettings(Settings):
+    """Bank to turn."""
+
+    roll_limit_deg: float = Field(
+        30.0, ge=1.0, le=60.0, description='largest commanded roll (deg)'
+    )
+    roll_frequency_radps: float = Field(
+        0.5, gt=0.0, le=5.0, description='natural frequency of the roll filter (rad/s)'
+    )
+    roll_rate_radps: float = Field(
+        0.08, gt=0.0, le=1.0, description='largest rate of the desired roll (rad/s)'
+    )
+
+    def params(self) -> 'Bank':
+        """Kernel parameters."""
+        return Bank(
+            math.radians(self.roll_limit_deg),
+            FilterParams(self.roll_frequency_radps, self.roll_rate_radps),
+        )
+
+
+class Bank(NamedTuple):
+    """How a vehicle may be rolled to turn it."""
+
+    limit: float  #: largest commanded roll (rad)
+    filter: FilterParams  #: command filter of the roll
+
+
+class Seen(NamedTuple):
+    """What a law sees at a tick. Angles in NED / FRD."""
+
+    measured: Measured  #: attitude, Euler rates and vertical rate, filtered
+    reference: Reference  #: what guidance asks for
+    speed: float  #: through the water, by the flight model (m/s)
+    alpha: float  #: angle of attack, by the flight model (rad)
+    m_b: float  #: net heaviness by the buoyancy engine (kg, + sinks)
+    tau_p: float  #: roll moment that the moving mass makes now (N m)
+    tau_q: float  #: pitch moment that it makes now (N m)
+    roll_held: bool  #: the roll mass was sent to its limit: integrators wait
+    pitch_held: bool  #: the pitch mass was
+
+
+class LawSettings(Settings):
+    """Gains of a control law; every field has a default.
+
+    A subclass is called by the name of its file in `glider_control.laws`, or by that of its entry
+    point in the group ``glider.control_laws``. Its fields are those of ``control.NAME``.
+    """
+
+    def params(self, vehicle: Vehicle, bank: Bank) -> NamedTuple:
+        """Kernel parameters, of a type of the law's own, for a vehicle as its file says."""
+        raise NotImplementedError
+
+    def initial_state(self) -> NamedTuple:
+        """State before the first tick, of the type that `law_step` returns."""
+        raise NotImplementedError
+
+
+@slot
+def law_step(state, seen, params, dt):
+    """One tick of a control law, by the type of its params.
+
+    Parameters
+    ----------
+    state : NamedTuple
+        Of the law; the surface and a refused odometry leave it as it is.
+    seen : Seen
+    params : NamedTuple
+        Those of `LawSettings.params`.
+    dt : float
+        Length of the tick (s).
+
+    Returns
+    -------
+    state : NamedTuple
+    tau_p, tau_q : float
+        Roll and pitch moment wanted of the moving mass (N m).
+    """
+
+
+@slot
+@default
+def law_learnt(state, params):
+    """What a law has learnt, for the topic ``adaptation``: nothing, if it does not say.
+
+    Returns
+    -------
+    Adaptation
+    """
+    return Adaptation(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

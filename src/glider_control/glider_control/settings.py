@@ -1,0 +1,141 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of control, and what the kernels are told by them."""
+
+import math
+from typing import Literal
+
+import pydantic
+from pydantic import Field
+
+from glider_control import laws
+from glider_control.allocation import make_allocation
+from glider_control.control import ControlParams, ControlState
+from glider_control.law import HeadingSettings, LawSettings
+from glider_control.vertical_rate import Trim
+from glider_control.watch import INITIAL_WATCH, make_watch
+from glider_model import plugins
+from glider_model.gate import GateSettings
+from glider_model.measurement import Measured
+from glider_model.polar import make_polar
+from glider_model.settings import Settings
+from glider_model.signals import Joints
+from glider_model.vehicle import load_vehicle
+
+_TUNABLE = {'tunable': True}
+
+
+class BuoyancySettings(Settings):
+    """Vertical rate on the buoyancy engine."""
+
+    ki_kg_per_m: float = Field(
+        0.004,
+        ge=0.0,
+        le=10.0,
+        description='integral of the vertical-rate error (kg/m)',
+        json_schema_extra=_TUNABLE,
+    )
+    drag_ki_kg_per_m: float = Field(
+        0.002,
+        ge=0.0,
+        le=10.0,
+        description='integral that changes sides with dive and climb (kg/m)',
+        json_schema_extra=_TUNABLE,
+    )
+    trim_limit_kg: float = Field(
+        0.3, ge=0.0, le=20.0, description='largest correction by each integral (kg)'
+    )
+
+
+class FilterSettings(Settings):
+    """What keeps noise from moving the motors."""
+
+    attitude_s: float = Field(
+        3.0, gt=0.0, le=60.0, description='time constant of the attitude filter (s)'
+    )
+    buoyancy_dead_band_kg: float = Field(
+        0.005, ge=0.0, le=1.0, description='change of command that the pump ignores (kg)'
+    )
+    pitch_dead_band_m: float = Field(
+        1e-4, ge=0.0, le=0.1, description='change of command that the pitch mass ignores (m)'
+    )
+    roll_dead_band_deg: float = Field(
+        0.2, ge=0.0, le=10.0, description='change of command that the roll mass ignores (deg)'
+    )
+
+
+#: Other parameters of control: no law can have such a name.
+TAKEN = {'law', 'heading', 'buoyancy', 'filters', 'gate', 'vehicle', 'lost_after_s'}
+#: Settings of every control law by its name.
+LAWS = plugins.classes(plugins.CONTROL_LAWS, LawSettings, laws, TAKEN)
+
+#: The choice of a law, and the gains of each, so that another one is chosen by one word.
+_LawChoice = pydantic.create_model(
+    '_LawChoice',
+    __base__=Settings,
+    law=(Literal[tuple(LAWS)], Field('adaptive', description='attitude law')),
+    **{
+        name: (settings, Field(settings(), description=plugins.summary(settings)))
+        for name, settings in LAWS.items()
+    },
+)
+
+
+class ControlLawSettings(_LawChoice):
+    """How to control, whatever the vehicle: the control section of a scenario."""
+
+    heading: HeadingSettings = Field(HeadingSettings(), description='bank to turn')
+    buoyancy: BuoyancySettings = Field(BuoyancySettings(), description='vertical-rate law')
+    filters: FilterSettings = Field(FilterSettings(), description='filters and dead bands')
+    gate: GateSettings = Field(GateSettings(), description='odometry that is refused')
+
+    @property
+    def chosen(self) -> LawSettings:
+        """Gains of the law that was chosen."""
+        return getattr(self, self.law)
+
+
+class ControlSettings(ControlLawSettings):
+    """Everything the control node is told."""
+
+    vehicle: str = Field('zhang2021', description='vehicle: masses, ranges, polar, steering')
+    lost_after_s: float = Field(
+        10.0,
+        ge=0.1,
+        le=3600.0,
+        description='free-running: an input that has been stale for so long is lost, and the '
+        'vehicle surfaces for good (s)',
+    )
+
+    def params(self) -> 'ControlParams':
+        """Kernel parameters."""
+        vehicle = load_vehicle(self.vehicle)
+        kernel_vehicle = vehicle.params()
+        filters = self.filters
+        return ControlParams(
+            make_allocation(kernel_vehicle),
+            make_polar(kernel_vehicle),
+            self.chosen.params(vehicle, self.heading.params()),
+            self.buoyancy.ki_kg_per_m,
+            self.buoyancy.drag_ki_kg_per_m,
+            self.buoyancy.trim_limit_kg,
+            filters.attitude_s,
+            Joints(
+                filters.buoyancy_dead_band_kg,
+                filters.pitch_dead_band_m,
+                math.radians(filters.roll_dead_band_deg),
+            ),
+            Joints(-kernel_vehicle.m_b_max, -kernel_vehicle.x_p_max, 0.0),
+            make_watch(kernel_vehicle, vehicle.rated_depth_m, self.gate.params()),
+        )
+
+    def initial_state(self) -> 'ControlState':
+        """State before the first tick."""
+        return ControlState(
+            0,
+            Measured(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            self.chosen.initial_state(),
+            Trim(0.0, 0.0),
+            Joints(0.0, 0.0, 0.0),
+            INITIAL_WATCH,
+        )

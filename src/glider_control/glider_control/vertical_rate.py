@@ -1,0 +1,40 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The vertical-rate law: from the rate that is asked for to the buoyancy engine."""
+
+from typing import NamedTuple
+
+from glider_model.kernel import kernel
+from glider_model.polar import glide_net_heaviness
+
+#: The integrals of the vertical-rate law wait until the pump is this near to where it goes (kg).
+PUMP_ARRIVED_KG = 0.05
+
+
+class Trim(NamedTuple):
+    """Integrals of the vertical-rate law."""
+
+    ballast: float  #: the same in dive and climb: ballast, density (kg)
+    drag: float  #: + in a dive, - in a climb (kg)
+
+
+@kernel
+def vertical_rate_law(trim, measured, reference, joints, params, dt):
+    """Net heaviness (kg) for the reference's vertical rate, and the new integrals.
+
+    The glide polar gives the weight of the steady glide. One integral corrects what ballast and
+    density differ by, another, with the sign of the rate, what the drag does: a draggy vehicle
+    has to be heavier in the dive and lighter in the climb, and has to know it as soon as it turns
+    over. Both wait until the pump is where it is meant to be, and no longer: a vehicle that then
+    sinks, or climbs too slowly, needs them most.
+    """
+    sign = 1.0 if reference.v_d > 0.0 else -1.0
+    ballast, drag = trim.ballast, trim.drag
+    wanted = glide_net_heaviness(reference.theta, reference.v_d, params.polar) + sign * drag
+    error = reference.v_d - measured.vertical_rate
+    limit = params.allocation.m_b_max
+    if abs(joints.m_b - wanted - ballast) < PUMP_ARRIVED_KG:
+        most = params.buoyancy_trim_max
+        ballast = min(most, max(-most, ballast + dt * params.buoyancy_ki * error))
+        drag = min(most, max(-most, drag + dt * params.drag_ki * error * sign))
+    return min(limit, max(-limit, wanted + ballast)), Trim(ballast, drag)

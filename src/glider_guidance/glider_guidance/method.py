@@ -1,0 +1,145 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a guidance method is: settings, params, state, and a kernel that fills `method_step`.
+
+A method says in which direction to fly, of all that guidance knows. The stages of the yo, pitch,
+vertical rate and the virtual target are the same for every method. docs/your_law.md builds one
+from nothing.
+"""
+
+from typing import NamedTuple
+
+from pydantic import Field
+
+from glider_model.settings import Settings
+from glider_model.signals import TrackingError, Water
+from glider_model.slot import slot
+from glider_model.steering import Steering
+from glider_model.vehicle import Vehicle
+
+_TUNABLE = {'tunable': True}
+
+
+class LosGains(Settings):
+    """Line of sight, as far as methods share it."""
+
+    lookahead_m: float = Field(
+        40.0,
+        ge=1.0,
+        le=10000.0,
+        description='least lookahead of the observer method (m)',
+        json_schema_extra=_TUNABLE,
+    )
+    lookahead_s: float = Field(
+        150.0,
+        ge=0.0,
+        le=3600.0,
+        description='lookahead of the observer method in time at the speed over ground (s)',
+        json_schema_extra=_TUNABLE,
+    )
+    lead_turns: bool = Field(
+        True, description='share the drift of a turn between before and after (observer method)'
+    )
+    delta1_m: float = Field(
+        3.2,
+        ge=0.1,
+        le=10000.0,
+        description="Delta1, lookahead of the paper's method (m)",
+        json_schema_extra=_TUNABLE,
+    )
+    delta1_per_s: float = Field(
+        0.1,
+        gt=0.0,
+        le=5.0,
+        description='delta1, pull of the virtual target toward the vehicle (1/s)',
+        json_schema_extra=_TUNABLE,
+    )
+    delta2: float = Field(
+        1.0,
+        ge=0.05,
+        le=20.0,
+        description='delta2, ratio of the vertical lookahead to the distance (-)',
+        json_schema_extra=_TUNABLE,
+    )
+
+
+class MethodSettings(Settings):
+    """Gains of a guidance method; every field has a default.
+
+    A subclass is called by the name of its file in `glider_guidance.methods`, or by that of its
+    entry point in the group ``glider.guidance_methods``. Its fields are those of
+    ``guidance.NAME``; the first line of its docstring says what it does.
+    """
+
+    def params(self, los: LosGains, vehicle: Vehicle) -> NamedTuple:
+        """Kernel parameters, of a type of the method's own."""
+        raise NotImplementedError
+
+    def initial_state(self) -> NamedTuple:
+        """State before the first tick, of the type that `method_step` returns."""
+        raise NotImplementedError
+
+
+class Leg(NamedTuple):
+    """What the vehicle is doing: the stage of the yo."""
+
+    stage: int  #: one of `glider_guidance.profile`
+    descends: bool  #: it is to go down, or to turn down
+    is_gliding: bool  #: a steady glide
+    is_surfaced: bool  #: at the surface, or on the way there for good
+    turns_over: bool  #: between two glides
+    begins_to_turn_over: bool  #: since this tick
+    glided_s: float  #: time in this stage (s)
+    glided_before_s: float  #: that of the tick before (s)
+    lead_s: float  #: time by which the coming turn is led (s)
+    lead_before_s: float  #: that of the tick before (s)
+    to_turn_s: float  #: time until the pump starts for the next turn; infinite: none (s)
+
+
+class Situation(NamedTuple):
+    """What a method sees at a tick. NED, angles in rad."""
+
+    course: float  #: gamma_d of the path at the virtual target
+    elevation: float  #: rho_d of the path there, + up; 0 in a sawtooth
+    error: TrackingError  #: position in the path frame; e3 = 0 in a sawtooth
+    follows_path: bool  #: in three dimensions; else depth is that of a sawtooth
+    ground_n: float  #: velocity over ground (m/s)
+    ground_e: float
+    speed: float  #: horizontal speed through the water, estimated (m/s)
+    glide_speed: float  #: that of the steady glide to come, by the flight model (m/s)
+    current: Water  #: estimated (m/s)
+    steering: Steering  #: what is known of how the vehicle turns
+    leg: Leg
+    heading: float  #: that was asked for last
+
+
+class Asked(NamedTuple):
+    """What a method asks for."""
+
+    heading: float  #: through the water (rad)
+    elevation: float  #: over ground, + up (rad); of no account in a sawtooth
+    speed: float  #: horizontal, through the water, as it is reckoned with from now on (m/s)
+    current_n: float  #: current that is reckoned with (m/s)
+    current_e: float
+    feasible: bool  #: the path can be held in this current
+
+
+@slot
+def method_step(state, seen, params, dt):
+    """One tick of a guidance method, by the type of its params.
+
+    Parameters
+    ----------
+    state : NamedTuple
+        Of the method.
+    seen : Situation
+    params : NamedTuple
+        Those of `MethodSettings.params`.
+    dt : float
+        Length of the tick (s).
+
+    Returns
+    -------
+    NamedTuple, Asked
+        Its state after the tick, and what it asks for.
+    """

@@ -1,0 +1,52 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's method: line of sight as printed, equations (8) to (10), with no estimate."""
+
+from typing import NamedTuple
+
+from glider_guidance.los import approach_angles, crab_heading, desired_direction
+from glider_guidance.method import Asked, LosGains, MethodSettings, method_step
+from glider_model.kernel import kernel
+from glider_model.vehicle import Vehicle
+
+
+class PaperSettings(MethodSettings):
+    """As printed, no estimate."""
+
+    def params(self, los: LosGains, vehicle: Vehicle) -> 'PaperParams':
+        """Kernel parameters."""
+        return PaperParams(los.delta1_m, los.delta2)
+
+    def initial_state(self) -> 'PaperState':
+        """There is nothing that it keeps."""
+        return PaperState(0)
+
+
+class PaperParams(NamedTuple):
+    """Gains of the method."""
+
+    lookahead: float  #: Delta1 (m)
+    vertical_ratio: float  #: delta2 (-)
+
+
+class PaperState(NamedTuple):
+    """Nothing; a tuple of numbers cannot be empty."""
+
+    nothing: int
+
+
+@method_step.body(PaperParams)
+@kernel
+def paper_step(state, seen, params, dt):
+    """Direction to fly: see `method_step`."""
+    gamma_r, rho_r = approach_angles(
+        seen.error.e2, seen.error.e3, params.lookahead, params.vertical_ratio
+    )
+    if not seen.follows_path:
+        rho_r = 0.0
+    heading, elevation = desired_direction(seen.course, seen.elevation, gamma_r, rho_r)
+    current = seen.current
+    _, _, feasible = crab_heading(seen.course, seen.speed, current.v_n, current.v_e)
+    if seen.leg.turns_over:
+        heading = seen.heading
+    return state, Asked(heading, elevation, seen.speed, 0.0, 0.0, feasible)

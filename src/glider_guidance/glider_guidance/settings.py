@@ -1,0 +1,202 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of guidance, and what the kernels are told by them."""
+
+import math
+from typing import Literal
+
+import pydantic
+from pydantic import Field
+
+from glider_guidance import methods
+from glider_guidance.current_observer import ObserverParams, ObserverState
+from glider_guidance.guidance import Commanded, Followed, GuidanceParams, GuidanceState, WaterState
+from glider_guidance.method import LosGains, MethodSettings
+from glider_guidance.path import PathSettings, StraightPath
+from glider_guidance.profile import INITIAL_PROFILE, ProfileSettings
+from glider_model import plugins
+from glider_model.command_filter import Filtered, FilterParams
+from glider_model.gate import INITIAL_GATE, GateSettings
+from glider_model.measurement import Measured
+from glider_model.polar import glide_horizontal_speed, make_polar
+from glider_model.settings import ConfigurationError, Settings
+from glider_model.steering import SteeringLearningSettings
+from glider_model.vehicle import load_vehicle, vehicle_path
+
+#: Other parameters of guidance: no method can have such a name.
+TAKEN = {'los', 'observer', 'filters', 'steering', 'gate', 'vehicle', 'path', 'profile'}
+TAKEN |= {'dives', 'duration_s'}
+#: Settings of every guidance method by its name.
+METHODS = plugins.classes(plugins.GUIDANCE_METHODS, MethodSettings, methods, TAKEN)
+
+_MethodChoice = pydantic.create_model(
+    '_MethodChoice',
+    __base__=Settings,
+    method=(
+        Literal[tuple(METHODS)],
+        Field(
+            'observer',
+            description='; '.join(
+                f'{name}: {plugins.summary(settings)}' for name, settings in METHODS.items()
+            ),
+        ),
+    ),
+)
+
+#: Gains of the methods that have some of their own, by the names of the methods.
+_MethodGains = pydantic.create_model(
+    '_MethodGains',
+    __base__=Settings,
+    **{
+        name: (settings, Field(settings(), description=plugins.summary(settings)))
+        for name, settings in METHODS.items()
+        if settings.model_fields
+    },
+)
+
+
+class LosSettings(LosGains, _MethodChoice):
+    """Line of sight."""
+
+
+class ObserverSettings(Settings):
+    """Current observer."""
+
+    k3_per_s: float = Field(
+        0.02,
+        gt=0.0,
+        le=1.0,
+        description='K3, gain on position (1/s)',
+        json_schema_extra={'tunable': True},
+    )
+    k4_per_s2: float = Field(
+        1e-4,
+        gt=0.0,
+        le=0.1,
+        description='K4, gain on the current (1/s^2)',
+        json_schema_extra={'tunable': True},
+    )
+
+    @pydantic.model_validator(mode='after')
+    def _is_stable(self):
+        if self.k4_per_s2 > 5.0 * self.k3_per_s:
+            raise ValueError(
+                f'k4_per_s2 = {self.k4_per_s2} is unstable in steps of 0.1 s (allowed: at most '
+                f'5 k3_per_s = {5.0 * self.k3_per_s:g})'
+            )
+        return self
+
+
+class CommandFilterSettings(Settings):
+    """Command filters of heading and pitch."""
+
+    heading_frequency_radps: float = Field(
+        0.07, gt=0.0, le=2.0, description='natural frequency of the heading filter (rad/s)'
+    )
+    heading_rate_radps: float = Field(
+        0.012, gt=0.0, le=1.0, description='largest rate of the desired heading (rad/s)'
+    )
+    pitch_frequency_radps: float = Field(
+        0.12, gt=0.0, le=2.0, description='natural frequency of the pitch filter (rad/s)'
+    )
+    pitch_rate_radps: float = Field(
+        0.03, gt=0.0, le=1.0, description='largest rate of the desired pitch (rad/s)'
+    )
+
+
+class GuidanceLawSettings(_MethodGains):
+    """How to guide, whatever the vehicle and the path: the guidance section of a scenario."""
+
+    los: LosSettings = Field(LosSettings(), description='line of sight')
+    observer: ObserverSettings = Field(ObserverSettings(), description='current observer')
+    filters: CommandFilterSettings = Field(CommandFilterSettings(), description='command filters')
+    steering: SteeringLearningSettings = Field(
+        SteeringLearningSettings(), description='what the vehicle can follow, learnt'
+    )
+    gate: GateSettings = Field(GateSettings(), description='odometry that is refused')
+
+    @property
+    def chosen(self) -> MethodSettings:
+        """Gains of the method that was chosen."""
+        method = METHODS[self.los.method]
+        return getattr(self, self.los.method) if method.model_fields else method()
+
+
+class GuidanceSettings(GuidanceLawSettings):
+    """Everything the guidance node is told."""
+
+    vehicle: str = Field('zhang2021', description='vehicle whose glide polar and pump are used')
+    path: PathSettings = Field(
+        StraightPath(kind='straight', length_m=25000.0), description='path to follow'
+    )
+    profile: ProfileSettings = Field(ProfileSettings(), description='sawtooth')
+    dives: int = Field(
+        0, ge=0, le=100000, description='dives before waiting on the surface; 0: no end'
+    )
+    duration_s: float = Field(
+        0.0,
+        ge=0.0,
+        le=1e8,
+        description='time at which the mission ends (s), no later turn is led; 0.0: never',
+    )
+
+    def check_depth(self) -> None:
+        """Refuse to go deeper than the vehicle is rated for.
+
+        Raises
+        ------
+        ConfigurationError
+            If the lower turn or the path is too deep, or the vehicle's file has no rating.
+        """
+        vehicle = load_vehicle(self.vehicle)
+        if vehicle.rated_depth is None:
+            raise ConfigurationError(
+                f'{vehicle_path(self.vehicle)}: rated_depth: missing (allowed: depth in m that '
+                f'the vehicle is rated for, with unit and source)'
+            )
+        field, deepest = 'profile.depth_m', self.profile.depth_m
+        if self.profile.mode == 'path':
+            field, deepest = 'deepest point of path', float(self.path.points(500)[:, 2].max())
+        if deepest > vehicle.rated_depth_m:
+            raise ConfigurationError(
+                f'{field} = {deepest:g}: deeper than the vehicle is rated for (allowed: <= '
+                f'{vehicle.rated_depth_m:g} m, its rated_depth)'
+            )
+
+    def params(self) -> GuidanceParams:
+        """Kernel parameters."""
+        vehicle = load_vehicle(self.vehicle)
+        kernel_vehicle = vehicle.params()
+        polar = make_polar(kernel_vehicle)
+        filters = self.filters
+        profile = self.profile.params(self.dives, kernel_vehicle.m_b_rate, polar)
+        return GuidanceParams(
+            self.path.params(),
+            profile,
+            polar,
+            glide_horizontal_speed(profile.pitch, profile.glide_rate, polar),
+            self.chosen.params(self.los, vehicle),
+            self.duration_s if self.duration_s > 0.0 else math.inf,
+            self.path.at_end == 'stop',
+            self.los.delta1_per_s,
+            ObserverParams(self.observer.k3_per_s, self.observer.k4_per_s2),
+            FilterParams(filters.heading_frequency_radps, filters.heading_rate_radps),
+            FilterParams(filters.pitch_frequency_radps, filters.pitch_rate_radps),
+            self.steering.params(),
+            self.gate.params(),
+        )
+
+    def initial_state(self) -> GuidanceState:
+        """State before the first tick."""
+        level = Filtered(0.0, 0.0)
+        return GuidanceState(
+            0,
+            INITIAL_GATE,
+            INITIAL_PROFILE,
+            0.0,
+            Followed(Measured(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), self.steering.initial_state()),
+            WaterState(ObserverState(0.0, 0.0, 0.0, 0.0), 0.0),
+            self.chosen.initial_state(),
+            Commanded(level, level, 0.0),
+            0,
+        )
