@@ -56,9 +56,9 @@ def record(state, params, out):
     log = np.empty((1, ROW))
     for tick in range(len(out)):
         joints = plant_joints(state.plant)
-        th_p, th_q = state.control.adaptive.roll_theta, state.control.adaptive.pitch_theta
+        th_p, th_q = state.control.law.roll_theta, state.control.law.pitch_theta
         state, _, finished = fly(state, params, log, TICK_S)
-        measured, adaptive = state.control.measured, state.control.adaptive
+        measured, adaptive = state.control.measured, state.control.law
         roll, pitch, polar = adaptive.roll_channel, adaptive.pitch_channel, params.control.polar
         phi, theta = measured.phi, measured.theta
         s_phi, c_phi, c_theta = math.sin(phi), math.cos(phi), math.cos(theta)
@@ -67,7 +67,7 @@ def record(state, params, out):
         r = c_phi * c_theta * measured.psi_dot - s_phi * measured.theta_dot
         speed, alpha = glide_speed(theta, measured.vertical_rate, polar)
         v2 = speed * speed
-        mass = params.control.adaptive.mass
+        mass = params.control.law.mass
         side = mass * speed * r - joints.m_b * GRAVITY * c_theta * s_phi
         model_p = (
             th_p[0] + th_p[1] * side / SCALE_SIDE + th_p[2] * roll.rate.value / SCALE_ROLL_RATE
@@ -93,7 +93,7 @@ def fly_unknown(changes):
     scenario = load_scenario('current_8deg', {**FLIGHT, **changes})
     state, params = mission_of(scenario)
     out = np.empty((round(scenario.duration_s / TICK_S), CROSS + 1))
-    return params.control.adaptive, out[: record(state, params, out)]
+    return params.control.law, out[: record(state, params, out)]
 
 
 def gains(law):

@@ -62,7 +62,7 @@ def test_guidance_looks_further_ahead_for_the_weak_only(seed, is_weak):
     log, is_over = np.empty((50000, ROW)), False
     while not is_over:
         state, _, is_over = fly(state, params, log, TICK_S)
-    guidance = state.guidance
-    assert lookahead_stretch(guidance.steering.climb, 150.0) == 1.0
-    dive = lookahead_stretch(guidance.steering.dive, 150.0)
+    steering = state.guidance.followed.steering
+    assert lookahead_stretch(steering.climb, 150.0) == 1.0
+    dive = lookahead_stretch(steering.dive, 150.0)
     assert (1.2 < dive < 4.0) if is_weak else dive == 1.0

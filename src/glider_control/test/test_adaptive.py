@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_control.law import Bank, Seen
 from glider_control.laws.adaptive import (
     DISTURBANCE_MAX,
     SCALE_ALPHA,
@@ -16,8 +17,6 @@ from glider_control.laws.adaptive import (
     SCALE_V2,
     AdaptiveSettings,
     adaptive_step,
-    initial_adaptive,
-    make_adaptive,
 )
 from glider_model.command_filter import FilterParams
 from glider_model.measurement import Measured
@@ -27,8 +26,8 @@ from glider_model.vehicle import load_vehicle
 DT = 0.1
 SPEED, ALPHA = 0.5, 0.028
 SETTINGS = AdaptiveSettings()
-PARAMS = make_adaptive(
-    SETTINGS, load_vehicle('zhang2021').params(), math.radians(30.0), FilterParams(0.5, 0.08)
+PARAMS = SETTINGS.params(
+    load_vehicle('zhang2021'), Bank(math.radians(30.0), FilterParams(0.5, 0.08))
 )
 
 
@@ -42,7 +41,8 @@ def reference(**changes) -> Reference:
 
 
 def step(state, now, wanted, applied=(0.0, 0.0), held=(False, False)):
-    return adaptive_step(state, now, wanted, SPEED, ALPHA, 0.4, applied, held, PARAMS, DT)
+    seen = Seen(now, wanted, SPEED, ALPHA, 0.4, *applied, *held)
+    return adaptive_step(state, seen, PARAMS, DT)
 
 
 class PitchPlant:
@@ -52,7 +52,7 @@ class PitchPlant:
         self.theta_star = np.array(theta_star)
         self.theta, self.q = -0.5 + error, 0.0
         self.tau = 0.0
-        self.state = initial_adaptive(SETTINGS)
+        self.state = SETTINGS.initial_state()
 
     def fly(self, seconds, wanted=None):
         """Lyapunov function V2, parameters and pitch errors of every tick."""
@@ -130,7 +130,7 @@ def test_parameters_stay_within_the_projection():
 
 @pytest.mark.parametrize('held', [(True, False), (False, True)])
 def test_held_actuator_teaches_nothing(held):
-    state = initial_adaptive(SETTINGS)
+    state = SETTINGS.initial_state()
     for _ in range(1000):
         state, *_ = step(state, measured(phi=0.1, theta=-0.4), reference(), held=held)
     assert (state.roll_theta == (0.0, 0.0, 0.0)) == held[0]
@@ -139,17 +139,17 @@ def test_held_actuator_teaches_nothing(held):
 
 @pytest.mark.parametrize('change', [{'vertical_rate': 0.05}, {'vertical_rate': -0.05}])
 def test_nothing_is_learnt_while_the_vehicle_turns_over(change):
-    state = initial_adaptive(SETTINGS)
+    state = SETTINGS.initial_state()
     for _ in range(1000):
         state, *_ = step(state, measured(theta=-0.3, phi=0.2, psi_dot=0.01, **change), reference())
     assert state.pitch_theta == (0.0, 0.0, 0.0, 0.0)
-    assert state.steering.dive == initial_adaptive(SETTINGS).steering.dive
-    assert state.steering.climb == initial_adaptive(SETTINGS).steering.climb
+    assert state.steering.dive == SETTINGS.initial_state().steering.dive
+    assert state.steering.climb == SETTINGS.initial_state().steering.climb
 
 
 def test_nose_low_makes_a_nose_up_moment_and_the_other_way_round():
     for theta, sign in ((-0.6, 1.0), (-0.4, -1.0)):
-        _, _, tau_q = step(initial_adaptive(SETTINGS), measured(theta=theta), reference())
+        _, _, tau_q = step(SETTINGS.initial_state(), measured(theta=theta), reference())
         assert np.sign(tau_q) == sign
 
 
@@ -157,7 +157,7 @@ def test_nose_low_makes_a_nose_up_moment_and_the_other_way_round():
 @pytest.mark.parametrize('sign', [1.0, -1.0])
 def test_roll_goes_to_the_side_that_turns_the_right_way(rate, sign):
     """Told that steering is reversed, the law rolls to the other side."""
-    state = initial_adaptive(SETTINGS)
+    state = SETTINGS.initial_state()
     known = state.steering.dive._replace(b=0.03 * sign)
     state = state._replace(steering=state.steering._replace(dive=known, climb=known))
     for _ in range(50):
@@ -169,14 +169,14 @@ def test_roll_goes_to_the_side_that_turns_the_right_way(rate, sign):
 
 def test_vehicle_has_to_turn_at_the_roll_that_it_may_take():
     """With a smaller limit of roll, the way of steering is decided at that."""
-    vehicle, roll_filter = load_vehicle('zhang2021').params(), FilterParams(0.5, 0.08)
+    vehicle, roll_filter = load_vehicle('zhang2021'), FilterParams(0.5, 0.08)
     for limit_deg, bank_deg in ((20.0, 20.0), (30.0, 30.0), (45.0, 30.0)):
-        params = make_adaptive(SETTINGS, vehicle, math.radians(limit_deg), roll_filter)
+        params = SETTINGS.params(vehicle, Bank(math.radians(limit_deg), roll_filter))
         assert params.steering.bank == pytest.approx(math.sin(math.radians(bank_deg)))
 
 
 def test_disturbance_estimate_is_bounded():
-    state = initial_adaptive(SETTINGS)
+    state = SETTINGS.initial_state()
     steering = state.steering
     state = state._replace(steering=steering._replace(dive=steering.dive._replace(b=0.5)))
     for _ in range(20000):
@@ -186,7 +186,7 @@ def test_disturbance_estimate_is_bounded():
 
 def test_mirror_image_gives_mirror_image():
     """Port and starboard exchanged: roll moment, roll and disturbance change their sign only."""
-    port, starboard = initial_adaptive(SETTINGS), initial_adaptive(SETTINGS)
+    port, starboard = SETTINGS.initial_state(), SETTINGS.initial_state()
     for tick in range(600):
         swing = 0.1 * math.sin(0.05 * tick)
         for side in (1.0, -1.0):

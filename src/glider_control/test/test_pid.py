@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_control.law import Seen
 from glider_control.laws.pid import (
     HEADING_INTEGRAL_MAX,
     PITCH_INTEGRAL_MAX,
@@ -39,7 +40,11 @@ vertical_rates = st.sampled_from([-0.3, -0.2, 0.2, 0.3])
 
 
 def params_of(vehicle='zhang2021', **gains):
-    return ControlSettings.model_validate({'vehicle': vehicle, 'pid': gains}).params().pid
+    return (
+        ControlSettings.model_validate({'vehicle': vehicle, 'law': 'pid', 'pid': gains})
+        .params()
+        .law
+    )
 
 
 PARAMS = {name: params_of(name) for name in ('zhang2021', 'seawing')}
@@ -61,16 +66,8 @@ def steer(seen, reference, vehicle='zhang2021', state=AT_REST, speed=0.5):
 
 def control(seen, reference, state=AT_REST, pitch_held=False, roll_held=False, params=None):
     """State, roll moment and pitch moment (N m) after one tick."""
-    return pid_step(
-        state,
-        seen,
-        reference,
-        0.5,
-        pitch_held,
-        roll_held,
-        params or PARAMS['zhang2021'],
-        TICK_S,
-    )
+    sight = Seen(seen, reference, 0.5, 0.03, 0.4, 0.0, 0.0, roll_held, pitch_held)
+    return pid_step(state, sight, params or PARAMS['zhang2021'], TICK_S)
 
 
 @quick

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glider_guidance.current_observer import ObserverState
-from glider_guidance.guidance import INFEASIBLE_S, guidance_abort, guidance_step
+from glider_guidance.guidance import INFEASIBLE_S, WaterState, guidance_abort, guidance_step
 from glider_guidance.methods.observer import LOOKAHEAD_STRETCH_MAX, lookahead_stretch
 from glider_guidance.path import HelixPath, StraightPath, WaypointPath
 from glider_guidance.profile import (
@@ -133,7 +133,7 @@ def wrapped(angle):
 def step(guidance, point, current=(0.0, 0.0), observer=(0.0, 0.0, 0.0, 0.0)):
     """Output of one tick at a point, with a given estimate."""
     params = guidance.params()
-    state = guidance.initial_state()._replace(observer=ObserverState(*observer))
+    state = guidance.initial_state()._replace(water=WaterState(ObserverState(*observer), 0.0))
     odometry, _, _ = _odometry(Point(*(float(x) for x in point)), current, params.polar)
     return guidance_step(state, odometry, params, TICK_S)
 
@@ -259,7 +259,9 @@ def test_cross_track_error_is_positive_to_starboard():
 def test_cross_current_faster_than_the_vehicle_is_infeasible_after_a_while():
     guidance = straight()
     params = guidance.params()
-    state = guidance.initial_state()._replace(observer=ObserverState(0.0, 0.0, 0.0, 0.6))
+    state = guidance.initial_state()._replace(
+        water=WaterState(ObserverState(0.0, 0.0, 0.0, 0.6), 0.0)
+    )
     odometry, _, _ = _odometry(Point(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0), params.polar)
     flags = []
     for _ in range(round(INFEASIBLE_S / TICK_S) + 5):
@@ -296,7 +298,7 @@ def test_paper_method_drifts_off_the_path_where_the_other_does_not():
     fields = {'profile': {'depth_m': 5000.0}}
     paper = {'los': {'method': 'paper', 'delta1_m': 60.0}}
     flight = Flight(straight(**fields, **paper), current=(0.0, 0.2)).fly(3500.0)
-    speed = flight.state.speed
+    speed = flight.state.water.speed
     expected = 60.0 * 0.2 / math.sqrt(speed**2 - 0.2**2)
     assert flight.e2[-1] == pytest.approx(expected, rel=0.02)
     assert abs(Flight(straight(**fields), current=(0.0, 0.2)).fly(3500.0).e2[-1]) < 0.1
@@ -352,7 +354,7 @@ def test_abort_turns_the_vehicle_up(mode):
 
 def test_desired_velocity_is_along_the_course_at_the_speed_through_the_water():
     flight = Flight(straight(60.0, profile={'depth_m': 5000.0})).fly(3000.0)
-    speed = flight.state.speed
+    speed = flight.state.water.speed
     assert (flight.v_n[-1], flight.v_e[-1]) == pytest.approx(
         turned((speed, 0.0), math.radians(60.0)), abs=1e-6
     )
@@ -368,6 +370,12 @@ def weak(b, k=-0.3):
     """Estimate of a phase, sure of its steering b (rad/s) and kick k."""
     prior = SteeringLearningSettings().initial_state().dive
     return prior._replace(b=b, k=k, p=(1e-12, *prior.p[1:]))
+
+
+def steered(state, **phases):
+    """State of guidance that knows its vehicle to steer so."""
+    steering = state.followed.steering._replace(**phases)
+    return state._replace(followed=state.followed._replace(steering=steering))
 
 
 @given(st.floats(1e-5, 0.1), st.floats(1e-5, 0.1), st.floats(1.0, 1000.0))
@@ -397,8 +405,7 @@ def test_phase_that_steers_weakly_is_begun_nearer_to_the_path(phase, turn, glide
     for name in ('none', phase):
         flight = Flight(straight(profile={'depth_m': 500.0}), current=(0.0, 0.1))
         if name == phase:
-            steering = flight.state.steering._replace(**{phase: weak(0.0015)})
-            flight.state = flight.state._replace(steering=steering)
+            flight.state = steered(flight.state, **{phase: weak(0.0015)})
         flight.fly(4800.0)
         before[name], after[name] = beside(flight, turn), beside(flight, glide)
     assert before[phase] < 1.2 * before['none'] < 0.0
@@ -412,11 +419,10 @@ def test_lead_of_a_turn_is_corrected_where_a_weak_phase_follows():
         for stall in (0.0, 3.0):
             guidance = straight(profile={'depth_m': 500.0})
             flight = Flight(guidance, current=(0.0, 0.1), stall=stall)
-            steering = flight.state.steering._replace(**phases)
-            flight.state = flight.state._replace(steering=steering)
+            flight.state = steered(flight.state, **phases)
             state = flight.fly(12000.0).state
-            learnt[name, stall] = state.more_down_s
-            assert state.more_up_s == 0.0
+            learnt[name, stall] = state.method.more_down_s
+            assert state.method.more_up_s == 0.0
     assert learnt['weak', 0.0] > 5.0 + learnt['weak', 3.0]
     assert learnt['strong', 0.0] == learnt['strong', 3.0] == 0.0
 
@@ -440,9 +446,8 @@ def test_vehicle_that_steers_weakly_approaches_by_a_smaller_angle():
         point = Point(100.0, 30.0, 300.0, -0.5, 0.0, 0.25)
         odometry, _, _ = _odometry(point, (0.0, 0.0), params.polar)
         state, _ = guidance_step(guidance.initial_state(), odometry, params, TICK_S)
-        state = state._replace(
+        state = steered(state, **phases)._replace(
             profile=state.profile._replace(stage=GLIDING_DOWN, ticks=0),
-            steering=state.steering._replace(**phases),
         )
         for _ in range(500):
             state, output = guidance_step(state, odometry, params, TICK_S)

@@ -73,7 +73,10 @@ def classes(group: str, base: ClassT, package: ModuleType, taken: set[str]) -> d
             found[point.name] = _load(point, base, taken | set(found))
         except Exception as error:  # it is not our code
             told = f'{type(error).__name__}: {error}'.partition('\n')[0]
-            print(ConfigurationError(f'glider: {_origin(point)}: not usable: {told}'), file=sys.stderr)
+            print(
+                ConfigurationError(f'glider: {_origin(point)}: not usable: {told}'),
+                file=sys.stderr,
+            )
     return found
 
 
