@@ -316,7 +316,7 @@ def test_in_path_mode_the_pitch_follows_the_error_below_the_path():
     for offset in (-10.0, 0.0, 10.0):
         state, output = step(slope_guidance(), (100.0, 0.0, 157.735 + offset, -0.5, 0.0, 0.25))
         assert math.copysign(1.0, output.error.e3) == math.copysign(1.0, offset) or offset == 0.0
-        pitches[offset] = state.pitch.value
+        pitches[offset] = state.commanded.pitch.value
     assert pitches[-10.0] < pitches[0.0] < pitches[10.0]
 
 
