@@ -11,53 +11,35 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_control.control import ControlParams, ControlState, control_step
-from glider_guidance.guidance import GuidanceParams, GuidanceState, guidance_step
+from glider_bringup.blocks import BLOCKS
+from glider_control.block import control_tick
+from glider_control.control import ControlParams, ControlState
+from glider_guidance.block import guidance_tick
+from glider_guidance.guidance import GuidanceParams, GuidanceState
+from glider_model.block import put
 from glider_model.current import CurrentParams, CurrentState, current_step_in_place
-from glider_model.frames import (
-    odometry_from_wire,
-    odometry_to_wire,
-    reference_from_wire,
-    reference_to_wire,
-    water_from_wire,
-    water_to_wire,
-    wrench_to_wire,
-)
+from glider_model.frames import odometry_from_wire, water_to_wire
 from glider_model.kernel import kernel
-from glider_model.plant import (
-    PlantParams,
-    PlantState,
-    not_finite,
-    plant_finished,
-    plant_joints,
-    plant_measurement,
-    plant_step,
-    state_fault,
-)
+from glider_model.plant import PlantParams, PlantState, not_finite, state_fault
+from glider_model.plant_block import plant_move, plant_outputs
 from glider_model.signals import TICK_S, Joints
+from glider_model.wiring import FIELDS, WIRING, publisher
 
-#: Columns of a log row: what the topics of one tick carry, as on the wire, and three flags.
-COLUMNS = {
-    'odom': slice(0, 13),
-    'joint_states': slice(13, 16),
-    'current_velocity': slice(16, 19),
-    'reference': slice(19, 32),
-    'tracking_error': slice(32, 35),
-    'current_estimate': slice(35, 38),
-    'command': slice(38, 41),
-    'wrench': slice(41, 44),
-    'adaptation': slice(44, 57),
-    'stage': 57,
-    'infeasible': 58,
-    'saturation': 59,
-}
-ROW = 60
-#: Block that a column comes from, where it is not the plant.
-_BLOCKS = {
-    'current_velocity': 'current',
-    **dict.fromkeys(('reference', 'tracking_error', 'current_estimate'), 'guidance'),
-    **dict.fromkeys(('command', 'wrench', 'adaptation'), 'control'),
-}
+
+def _columns() -> dict[str, slice | int]:
+    """Columns of a log row: what the topics of one tick carry, as on the wire, then the flags."""
+    columns, start = {}, 0
+    for topic in (topic for wired in WIRING for topic in wired.outputs if FIELDS[topic]):
+        columns[topic] = slice(start, start + len(FIELDS[topic]))
+        start = columns[topic].stop
+    for flag in (flag for block in BLOCKS if block.say for flag in block.flags):
+        columns[flag] = start
+        start += 1
+    return columns
+
+
+COLUMNS = _columns()
+ROW = max(COLUMNS.values(), key=lambda place: place if isinstance(place, int) else 0) + 1
 #: Ticks that are flown before the log is handed on: one hour.
 BLOCK_TICKS = 36000
 
@@ -85,13 +67,6 @@ class MissionState(NamedTuple):
 
 
 @kernel
-def put(log, row, start, values):
-    """Write numbers into a row, from a column on."""
-    for i, value in enumerate(values):
-        log[row, start + i] = value
-
-
-@kernel
 def fly(state, params, log, dt):
     """Fly until the log is full or the mission ends.
 
@@ -116,36 +91,17 @@ def fly(state, params, log, dt):
     """
     plant, current, guidance, control = state
     for row in range(log.shape[0]):
-        odometry_wire = odometry_to_wire(plant_measurement(plant, params.plant))
-        odometry = odometry_from_wire(odometry_wire)
-        joints = plant_joints(plant)
-        position = (odometry.p_n, odometry.p_e, odometry.p_d)
-        current, water = current_step_in_place(
-            current, position, plant.tick * dt, params.current, dt
-        )
-        water_wire = water_to_wire(water)
-        guidance, guided = guidance_step(guidance, odometry, params.guidance, dt)
-        reference_wire = reference_to_wire(guided.reference)
-        reference = reference_from_wire(reference_wire)
-        control, controlled = control_step(
-            control, odometry, joints, reference, params.control, dt
-        )
-        put(log, row, 0, odometry_wire)
-        put(log, row, 13, joints)
-        put(log, row, 16, water_wire)
-        put(log, row, 19, reference_wire)
-        put(log, row, 32, guided.error)
-        put(log, row, 35, water_to_wire(guided.current))
-        put(log, row, 38, controlled.command)
-        put(log, row, 41, wrench_to_wire(controlled.wrench))
-        put(log, row, 44, controlled.adaptation)
-        log[row, 57] = guided.stage
-        log[row, 58] = guided.infeasible
-        log[row, 59] = controlled.saturation
-        finished = plant_finished(plant, params.plant)
-        plant = plant_step(
-            plant, controlled.command, water_from_wire(water_wire), params.plant, dt
-        )
+        t_s = plant.tick * dt
+        (odom, joints), finished = plant_outputs(plant, params.plant)
+        place = odometry_from_wire(odom)
+        position = (place.p_n, place.p_e, place.p_d)
+        current, velocity = current_step_in_place(current, position, t_s, params.current, dt)
+        water = water_to_wire(velocity)
+        guidance, guided, stage = guidance_tick(guidance, t_s, (odom,), params.guidance, dt)
+        seen = (guided[0], odom, joints)
+        control, controlled, told = control_tick(control, t_s, seen, params.control, dt)
+        plant = plant_move(plant, (controlled[0], water), params.plant, dt)
+        put(log, row, 0, (odom, joints, water, *guided, *controlled, stage, told))
         if finished:
             return MissionState(plant, current, guidance, control), row + 1, True
     return MissionState(plant, current, guidance, control), log.shape[0], False
@@ -163,8 +119,9 @@ def _fault(row: np.ndarray, tick: int) -> str:
     """What of a log row is not finite, in words; the first in the order of the blocks."""
     odometry = odometry_from_wire(tuple(row[COLUMNS['odom']]))
     fault = state_fault(odometry, Joints(*row[COLUMNS['joint_states']]), tick)
-    wrong = (name for name in _BLOCKS if not np.isfinite(row[COLUMNS[name]]).all())
-    return fault or next(not_finite(f'{_BLOCKS[name]}: {name}', tick) for name in wrong)
+    topics = (name for name in COLUMNS if name in FIELDS)
+    wrong = (name for name in topics if not np.isfinite(row[COLUMNS[name]]).all())
+    return fault or next(not_finite(f'{publisher(name).name}: {name}', tick) for name in wrong)
 
 
 def fly_blocks(state: MissionState, params: MissionParams) -> Iterator[np.ndarray]:

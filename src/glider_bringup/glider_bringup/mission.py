@@ -141,12 +141,7 @@ def make_result_folder(folder: Path, result: str) -> None:
 
 def mission_of(scenario: Scenario) -> tuple[MissionState, MissionParams]:
     """State at tick 0 and parameters of the four blocks."""
-    blocks = (
-        scenario.plant_settings(),
-        scenario.current_settings(),
-        scenario.guidance_settings(),
-        scenario.control_settings(),
-    )
+    blocks = scenario.block_settings()
     state = MissionState(*(block.initial_state() for block in blocks))
     return state, MissionParams(*(block.params() for block in blocks))
 

@@ -19,18 +19,16 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+from glider_model import wiring
 from glider_model.errors import ConfigurationError, shown
+from glider_model.wiring import WIRING
 
-PLANT, RECORDER = 'plant_node', 'recorder_node'
+PLANT, RECORDER = wiring.PLANT.node, 'recorder_node'
 
-#: Module of every node, in the order in which they are started.
-MODULES = {
-    'guidance_node': 'glider_guidance.nodes.guidance_node',
-    'control_node': 'glider_control.nodes.control_node',
-    'current_node': 'glider_model.nodes.current_node',
-    RECORDER: 'glider_bringup.nodes.recorder_node',
-    PLANT: 'glider_model.nodes.plant_node',
-}
+#: Module of every node, in the order in which they are started: the plant, which makes time, is
+#: the last.
+MODULES = {wired.node: wired.module for wired in WIRING if wired != wiring.PLANT}
+MODULES |= {RECORDER: 'glider_bringup.nodes.recorder_node', PLANT: wiring.PLANT.module}
 
 #: Where the nodes of a glider live, if nobody says otherwise.
 NAMESPACE = '/glider'

@@ -154,6 +154,15 @@ class Scenario(Settings):
         """What the control node is told."""
         return ControlSettings(vehicle=self.vehicle, **dict(self.control))
 
+    def block_settings(self) -> tuple[Settings, ...]:
+        """What the node of each block is told, in the order of `glider_bringup.blocks`."""
+        return (
+            self.plant_settings(),
+            self.current_settings(),
+            self.guidance_settings(),
+            self.control_settings(),
+        )
+
     def settle_time_s(self, sim_time_s: float) -> float:
         """Settling time (s) of a run that lasted ``sim_time_s``."""
         if self.settle_s is not None:

@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_bringup.blocks import changes_to_tell
 from glider_bringup.direct import COLUMNS
 from glider_bringup.truth import TrueMotion, wire_of
 from glider_control.watch import ROWS, SURFACES, TELL_EVERY_NS, say
 from glider_guidance.profile import AT_END_OF_PATH
+from glider_model.block import changes_to_tell
 from glider_model.frames import euler_from_quaternion, odometry_from_wire, reference_from_wire
 from glider_model.kernel import kernel
 from glider_model.plant import dive_depths
@@ -225,7 +225,8 @@ def _guard(mask: np.ndarray) -> dict:
     bits = mask.astype(np.int64) & sum(ROWS)
     stamps_ns = np.arange(len(bits)) * TICK_NS
     events, before = [], 0
-    for tick in changes_to_tell(bits, stamps_ns, TELL_EVERY_NS, 0, -TELL_EVERY_NS):
+    told = np.zeros(1, np.int64)
+    for tick in changes_to_tell(bits[:, None], stamps_ns, TELL_EVERY_NS, told, -TELL_EVERY_NS):
         new = int(bits[tick]) & ~before
         before = int(bits[tick])
         events += [

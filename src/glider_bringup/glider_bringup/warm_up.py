@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from glider_bringup.blocks import BLOCKS
 from glider_bringup.direct import ROW, fly
 from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission import fly_direct, make_run_folder, make_tracer, mission_of
@@ -15,26 +16,15 @@ from glider_bringup.ros.verify import verify
 from glider_bringup.scenario import load_scenario
 from glider_bringup.score import Rules, Scorer
 from glider_bringup.traces import halve
-from glider_control.control import control_step, control_surface
-from glider_guidance.guidance import guidance_abort, guidance_step
-from glider_model.current import current_step
-from glider_model.frames import (
-    odometry_from_wire,
-    odometry_to_wire,
-    reference_from_wire,
-    reference_to_wire,
-    water_from_wire,
-    water_to_wire,
-    wrench_to_wire,
-)
-from glider_model.plant import plant_finished, plant_joints, plant_measurement, plant_step
+from glider_model.plant_block import PLANT, plant_move, plant_outputs
 from glider_model.sensors import SensorSettings
 from glider_model.signals import TICK_S
 from glider_model.trim import solve_trim
+from glider_model.wiring import at_rest
 
 
 def main() -> None:
-    """One tick by the direct engine, one by the steps as the nodes call them, and a trim."""
+    """One tick by the direct engine, one by each block as its node calls it, and a trim."""
     scenario = load_scenario()
     state, params = mission_of(scenario)
     log = np.zeros((1, ROW))
@@ -46,20 +36,13 @@ def main() -> None:
     tracer.add(log)
     halve(np.zeros(4, np.float32))
 
-    plant, current, guidance, control = state
-    odometry = odometry_from_wire(odometry_to_wire(plant_measurement(plant, params.plant)))
-    joints = plant_joints(plant)
-    position = (odometry.p_n, odometry.p_e, odometry.p_d)
-    _, water = current_step(current, position, 0.0, params.current, TICK_S)
-    water = water_from_wire(water_to_wire(water))
-    guidance, guided = guidance_step(guidance, odometry, params.guidance, TICK_S)
-    guidance_abort(guidance)
-    reference = reference_from_wire(reference_to_wire(guided.reference))
-    _, controlled = control_step(control, odometry, joints, reference, params.control, TICK_S)
-    control_surface(control)
-    wrench_to_wire(controlled.wrench)
-    plant = plant_step(plant, controlled.command, water, params.plant, TICK_S)
-    plant_finished(plant, params.plant)
+    for block, told, own in zip(BLOCKS[1:], params[1:], state[1:], strict=True):
+        inputs = tuple(at_rest(topic) for topic in block.wired.inputs)
+        moved, _, _ = block.tick(own, 0.0, inputs, told, TICK_S)
+        if block.surface:
+            block.surface(moved)
+    at_sea = tuple(at_rest(topic) for topic in PLANT.wired.inputs)
+    plant_outputs(plant_move(state.plant, at_sea, params.plant, TICK_S), params.plant)
     verify_one_tick()
     solve_trim(params.plant.vehicle, 0.4, pitch_deg=-30.0)
 

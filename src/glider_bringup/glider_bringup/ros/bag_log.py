@@ -10,22 +10,19 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
-from glider_bringup.blocks import changes_to_tell
+from glider_bringup.blocks import BLOCKS
 from glider_bringup.direct import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.mcap_reader import Bag, Batch
 from glider_bringup.ros.bag import BagWriter
-from glider_control.nodes.control_node import saturation_event
-from glider_control.watch import TELL_EVERY_NS
-from glider_guidance.nodes.guidance_node import path_message, stage_event
+from glider_guidance.nodes.guidance_node import path_message
 from glider_guidance.profile import STAGE_NAMES
+from glider_model.block import Telling
 from glider_model.ros import health, messages
 from glider_model.ros.codec import Codec, to_cdr
 from glider_model.ros.messages import TOPICS
 from glider_model.signals import TICK_NS
 
-_GUIDANCE, _CONTROL, _PLANT = (
-    f'/glider/{node}' for node in (messages.GUIDANCE, messages.CONTROL, messages.PLANT)
-)
+_PLANT = f'/glider/{messages.PLANT}'
 _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 
 #: Topics that the score is computed from.
@@ -38,8 +35,7 @@ class LogWriter:
     def __init__(self, bag: BagWriter, path_points: np.ndarray) -> None:
         self._bag = bag
         self._tick = 0
-        self._told: tuple[int, bool] | None = None
-        self._saturation, self._saturation_ns = 0, -TELL_EVERY_NS
+        self._tellings = [Telling(block) for block in BLOCKS if block.say]
         bag.write('path', 0, to_cdr(path_message(path_points)))
 
     def add(self, log: np.ndarray) -> None:
@@ -54,22 +50,15 @@ class LogWriter:
         self._tick += len(log)
 
     def _tell(self, stamps: np.ndarray, log: np.ndarray) -> None:
-        """Write the diagnostics of each change of stage, feasibility or saturation."""
-        flags = log[:, [COLUMNS['stage'], COLUMNS['infeasible']]]
-        changed = np.flatnonzero(np.any(flags[1:] != flags[:-1], axis=1)) + 1
-        for row in (0, *changed):
-            now = (int(flags[row, 0]), bool(flags[row, 1]))
-            if now != self._told:
-                self._told = now
-                stamp = int(stamps[row])
-                self._bag.write('/diagnostics', stamp, to_cdr(stage_event(stamp, *now, _GUIDANCE)))
-        saturation = log[:, COLUMNS['saturation']].astype(np.int64)
-        for row in changes_to_tell(
-            saturation, stamps, TELL_EVERY_NS, self._saturation, self._saturation_ns
-        ):
-            self._saturation, self._saturation_ns = int(saturation[row]), int(stamps[row])
-            event = saturation_event(self._saturation_ns, self._saturation, _CONTROL)
-            self._bag.write('/diagnostics', self._saturation_ns, to_cdr(event))
+        """Write the events of each block."""
+        for telling in self._tellings:
+            block = telling.block
+            flags = log[:, [COLUMNS[flag] for flag in block.flags]].astype(np.int64)
+            node = f'/glider/{block.wired.node}'
+            for row in telling.among(flags, stamps):
+                stamp_ns = int(stamps[row])
+                event = health.said_array(stamp_ns, node, block.say(*flags[row].tolist()))
+                self._bag.write('/diagnostics', stamp_ns, to_cdr(event))
 
     def finish(self, failure: str = '') -> None:
         """Write that the run is complete or why it failed, as the plant says it at its end."""

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
+from glider_bringup.blocks import BLOCKS
 from glider_bringup.disk import write_whole
 from glider_bringup.scenario import Scenario
 from glider_model.ros import messages
@@ -38,11 +39,10 @@ def node_parameters(
     """
     common = {'lockstep': lockstep, 'record': record_to is not None}
     nodes = {
-        messages.PLANT: {**to_parameters(scenario.plant_settings()), 'speed': speed},
-        messages.CURRENT: to_parameters(scenario.current_settings()),
-        messages.GUIDANCE: to_parameters(scenario.guidance_settings()),
-        messages.CONTROL: to_parameters(scenario.control_settings()),
+        block.wired.node: to_parameters(settings)
+        for block, settings in zip(BLOCKS, scenario.block_settings(), strict=True)
     }
+    nodes[messages.PLANT]['speed'] = speed
     if record_to is not None:
         nodes[messages.RECORDER] = {
             'folder': str(record_to.resolve()),

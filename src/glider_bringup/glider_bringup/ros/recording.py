@@ -4,37 +4,25 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
-from glider_bringup.blocks import BlockSettings
+from glider_bringup.blocks import BLOCKS
 from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE
 from glider_bringup.ros.bag_log import decode
 from glider_bringup.scenario import Scenario, load_scenario
-from glider_control.settings import ControlSettings
-from glider_guidance.settings import GuidanceSettings
-from glider_model.current import CurrentSettings
 from glider_model.files import read_yaml
-from glider_model.plant import PlantSettings
-from glider_model.ros import messages
 from glider_model.ros.codec import Codec
 from glider_model.ros.messages import TOPICS
 from glider_model.ros.parameters import from_parameters
-from glider_model.settings import ConfigurationError
+from glider_model.settings import ConfigurationError, Settings
 
 #: Messages of foreign layout whose bytes are kept, for each topic.
 _KEPT = 1000
-
-_SETTINGS = {
-    messages.PLANT: PlantSettings,
-    messages.CURRENT: CurrentSettings,
-    messages.GUIDANCE: GuidanceSettings,
-    messages.CONTROL: ControlSettings,
-}
 
 
 class Series:
@@ -205,7 +193,7 @@ def choose_namespace(bag: Bag, given: str | None) -> str:
 class Told(NamedTuple):
     """What the nodes of a recorded run were told."""
 
-    blocks: BlockSettings
+    blocks: dict[str, Settings | None]  #: by name of the block; None: it is not known
     source: str  #: where it stands
     lockstep: bool | None  #: None: it does not say
     note: str = ''
@@ -263,13 +251,9 @@ def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
     )
 
 
-def _from_scenario(scenario: Scenario) -> BlockSettings:
-    return BlockSettings(
-        scenario.plant_settings(),
-        scenario.current_settings(),
-        scenario.guidance_settings(),
-        scenario.control_settings(),
-    )
+def _from_scenario(scenario: Scenario) -> dict[str, Settings | None]:
+    settings = zip(BLOCKS, scenario.block_settings(), strict=True)
+    return {block.wired.name: one for block, one in settings}
 
 
 def _sections(values: dict) -> dict[str, dict]:
@@ -292,11 +276,13 @@ def _lockstep(values: dict) -> bool | None:
     return all(said) if said else None
 
 
-def _from_parameters(values: dict, source: str) -> BlockSettings:
+def _from_parameters(values: dict, source: str) -> dict[str, Settings | None]:
     sections = _sections(values)
-    found: list[Any] = []
-    for node, model in _SETTINGS.items():
+    found: dict[str, Settings | None] = {}
+    for block in BLOCKS:
+        node = block.wired.node
         given = {**sections.get('**', {}), **sections.get(node, {})}
         told = node in sections or '**' in sections
-        found.append(from_parameters(model, given, f'{source}: {node}') if told else None)
-    return BlockSettings(*found)
+        settings = from_parameters(block.settings, given, f'{source}: {node}') if told else None
+        found[block.wired.name] = settings
+    return found

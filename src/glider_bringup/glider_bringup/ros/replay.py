@@ -21,7 +21,7 @@ from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace, given_d
 from glider_model.files import parse_yaml
 from glider_model.ros import messages
 from glider_model.ros.executor import take
-from glider_model.ros.messages import CLOCK, TOPICS
+from glider_model.ros.messages import TOPICS
 from glider_model.ros.tick import MAX_TICKS_AHEAD
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS
@@ -366,7 +366,7 @@ class Replay:
         """Publish /clock by the log times of a recording that has none."""
         if self._own_clock is not None and log_ns - self._clock_ns >= TICK_NS:
             self._clock_ns = log_ns
-            self._own_clock.publish(CLOCK.encode(log_ns, ()))
+            self._own_clock.publish(TOPICS['/clock'].codec.encode(log_ns, ()))
 
 
 def recorded_messages(

@@ -17,20 +17,23 @@ from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Path
 from rclpy.serialization import deserialize_message
 
-from glider_bringup.blocks import BLOCKS, Block, BlockSettings, changes_to_tell
+from glider_bringup.blocks import BLOCKS
 from glider_bringup.mcap_reader import Bag
+from glider_bringup.recorded_inputs import RecordedBlock
 from glider_bringup.ros.recording import Event, Recording, Series, Told
-from glider_control.nodes.control_node import saturation_event
-from glider_control.watch import TELL_EVERY_NS
-from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message, stage_event
+from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
 from glider_guidance.profile import STAGE_NAMES, SURFACING
-from glider_model.ros import health, messages
+from glider_model import wiring
+from glider_model.block import Telling
+from glider_model.plant_block import PLANT
+from glider_model.ros import health
 from glider_model.ros.codec import cdr_places, to_cdr
 from glider_model.ros.messages import TOPICS
 from glider_model.ros.orders import ABORT, PARAMETERS_SET, SURFACE
 from glider_model.ros.parameters import with_parameters
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS
+from glider_model.wiring import WIRING, Wired
 
 IDENTICAL, DIFFERENT, SKIPPED = 'identical', 'different', 'skipped'
 
@@ -43,8 +46,6 @@ _BYTES_ALIKE = 16
 #: Free-running: an input goes on by one message from step to step, or by one of these.
 _ADVANCES = (1, 0, 2, 3, 4, 5, 6, 7, 8)
 
-_NODES = {'plant': messages.PLANT, 'current': messages.CURRENT}
-_NODES |= {'guidance': messages.GUIDANCE, 'control': messages.CONTROL}
 _NOT_RECORDED, _WHOLE = 'not recorded', '(message)'
 
 
@@ -187,15 +188,15 @@ def _by_tick(series: Series, ticks: int) -> tuple[_Track, list[int]]:
 class _Check:
     """One block at work, and what has been found so far."""
 
-    def __init__(self, block: Block, recording: Recording, stamps_ns: np.ndarray) -> None:
+    def __init__(self, block: RecordedBlock, recording: Recording, stamps_ns: np.ndarray) -> None:
         self.block, self.recording, self.stamps_ns = block, recording, stamps_ns
         self.found: list[Difference] = []
         self.compared: Counter[str] = Counter()
         self.differing: Counter[str] = Counter()
         self.notes: list[str] = []
-        self.flags = np.zeros((len(stamps_ns), 2), np.int64)
+        self.flags = np.zeros((len(stamps_ns), len(block.block.flags)), np.int64)
         self.ticks = 0
-        self._orders = _orders(recording.events, recording.node(_NODES[block.name]))
+        self._orders = _orders(recording.events, recording.node(block.block.wired.node))
 
     def add(self, difference: Difference) -> None:
         """Keep a difference."""
@@ -226,9 +227,7 @@ class _Check:
         """Outputs of the steps from start to end; rows are the messages of the inputs."""
         series = self.recording.series
         inputs = {name: series[name].values[index] for name, index in rows.items()}
-        computed = self.block.run(self.stamps_ns[start:end], inputs)
-        if 'flags' in computed:
-            self.flags[start:end] = computed.pop('flags')
+        computed, self.flags[start:end] = self.block.run(self.stamps_ns[start:end], inputs)
         self.ticks = end
         return computed
 
@@ -324,7 +323,7 @@ class _Check:
         self.differing = Counter({name: n for name, n in self.differing.items() if n})
         first = min(self.found, key=lambda one: one.stamp_ns, default=None)
         return Verdict(
-            self.block.name,
+            self.block.block.wired.name,
             DIFFERENT if first else IDENTICAL,
             '',
             self.ticks,
@@ -356,21 +355,17 @@ def _orders(events: list[Event], node: str) -> list[Event]:
 def _finish_events(check: _Check) -> None:
     """Compare what the block tells on /diagnostics, and the path."""
     stamps_ns, flags = check.stamps_ns[: check.ticks], check.flags[: check.ticks]
-    node = check.recording.node(_NODES[check.block.name])
-    if check.block.name == 'guidance':
+    block = check.block.block
+    node = check.recording.node(block.wired.node)
+    if block.wired == wiring.GUIDANCE:
         check.compare_path()
-        changed = np.flatnonzero(np.any(flags[1:] != flags[:-1], axis=1)) + 1
-        told = [0, *changed] if len(flags) else []
+    if block.say:
+        told = Telling(block, int(stamps_ns[0])).among(flags, stamps_ns)
         arrays = [
-            stage_event(int(stamps_ns[i]), flags[i, 0], bool(flags[i, 1]), node) for i in told
+            health.said_array(int(stamps_ns[i]), node, block.say(*flags[i].tolist())) for i in told
         ]
-        check.compare_events(arrays, lambda e: e.node == node and 'stage' in e.values)
-    elif check.block.name == 'control':
-        long_ago_ns = stamps_ns[0] - TELL_EVERY_NS
-        told = changes_to_tell(flags[:, 0].copy(), stamps_ns, TELL_EVERY_NS, 0, long_ago_ns)
-        arrays = [saturation_event(int(stamps_ns[i]), int(flags[i, 0]), node) for i in told]
-        check.compare_events(arrays, lambda e: e.node == node and 'saturation' in e.values)
-    elif check.block.name == 'plant':
+        check.compare_events(arrays, lambda e: e.node == node and block.flags[0] in e.values)
+    elif block is PLANT:
         ends = [int(stamp_ns) for stamp_ns in stamps_ns[flags[:, 0] > 0]]
         arrays = [
             health.report_array(health.Report(node, health.FINISHED, health.COMPLETE, stamp_ns))
@@ -382,29 +377,29 @@ def _finish_events(check: _Check) -> None:
 # ---------------------------------------------------------------------- lockstep
 
 
-def _in_lockstep(block: Block, recording: Recording, progress) -> Verdict:
+def _in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict:
     """Compare a block tick by tick."""
-    series = recording.series
+    series, wired = recording.series, block.block.wired
     most = max(len(one) for one in series.values())
     ticks = 1 + max(
         int(placed[placed < 2 * most + 1000].max(initial=0))
         for placed in (place_ticks(one.stamps_ns) for one in series.values())
     )
-    inputs = {name: _by_tick(series[name], ticks)[0] for name in block.inputs}
+    inputs = {name: _by_tick(series[name], ticks)[0] for name in wired.inputs}
     late = [name for name, track in inputs.items() if track.index[0] < 0]
     if late:
         first_ns = int(series[late[0]].stamps_ns[0])
         return skipped(
-            block.name,
+            wired.name,
             f'its state is not known: {late[0]} is recorded from {_time(first_ns)} on, not from '
             f'the first tick',
         )
     check = _Check(block, recording, np.arange(ticks, dtype=np.int64) * TICK_NS)
     count = min(track.gap for track in inputs.values())
-    if block.name == 'plant':  # publishes a tick before it needs the inputs of that tick
+    if block.block is PLANT:  # publishes a tick before it needs the inputs of that tick
         count = min(count + 1, ticks)
     outputs = {}
-    for name in block.outputs:
+    for name in wired.outputs:
         if name not in series:
             check.notes.append(f'{name} is not recorded')
             continue
@@ -424,7 +419,7 @@ def _in_lockstep(block: Block, recording: Recording, progress) -> Verdict:
     for name, track in inputs.items():
         if track.gap < max(track.end, ticks - _TICKS_OF_THE_END):
             reason = track.series.unusable.get(int(track.index[track.gap]), _NOT_RECORDED)
-            wanted = f'an input of {block.name}, which cannot be computed any further'
+            wanted = f'an input of {wired.name}, which cannot be computed any further'
             check.add(Difference(int(check.stamps_ns[track.gap]), name, _WHOLE, wanted, reason))
     behind = ticks - check.ticks
     if behind and not check.found:
@@ -450,24 +445,27 @@ def _by_stamp(series: Series, stamps_ns: np.ndarray) -> tuple[_Track, list[int]]
     return _Track(series, index), [*left, *range(j, len(series))]
 
 
-def _free_running(block: Block, recording: Recording, progress) -> Verdict:
+def _free_running(block: RecordedBlock, recording: Recording, progress) -> Verdict:
     """Compare a block step by step, each with the inputs that it must have had.
 
     A step carries the newest stamp among its inputs. That names the input of guidance. Of those of
     control it names one; the others may be a message older, which is found out by trying.
     """
-    series = {n: one for n, one in recording.series.items() if n in block.inputs + block.outputs}
-    marker = next((name for name in block.outputs if name in series), None)
+    wired = block.block.wired
+    ours = wired.inputs + wired.outputs
+    series = {name: one for name, one in recording.series.items() if name in ours}
+    # what is published first is published while an input is stale, too
+    marker = next((name for name in reversed(wired.outputs) if name in series), None)
     if marker is None:
-        return skipped(block.name, f'none of {", ".join(block.outputs)} is recorded')
+        return skipped(wired.name, f'none of {", ".join(wired.outputs)} is recorded')
     stamps_ns = series[marker].stamps_ns
-    if block.name == 'control':
+    if wired == wiring.CONTROL:
         safe = np.array(block.params.safe_command)
         if marker == 'command':
             stamps_ns = stamps_ns[~np.all(series[marker].values == safe, axis=1)]
     check = _Check(block, recording, stamps_ns)
     outputs = {}
-    for name in block.outputs:
+    for name in wired.outputs:
         if name not in series:
             check.notes.append(f'{name} is not recorded')
             continue
@@ -478,7 +476,7 @@ def _free_running(block: Block, recording: Recording, progress) -> Verdict:
                 stamp_ns = int(series[name].stamps_ns[i])
                 check.add(Difference(stamp_ns, name, _WHOLE, text, 'not computed'))
     start, cuts = 0, check.cuts(len(stamps_ns))
-    first = {name: _newest(series[name], stamps_ns[0]) for name in block.inputs}
+    first = {name: _newest(series[name], stamps_ns[0]) for name in wired.inputs}
     options = _options({name: [n, n - 1, n - 2, n - 3] for name, n in first.items()})
     while start < len(stamps_ns):
         check.follow_orders(start)
@@ -587,15 +585,15 @@ def skipped(block: str, reason: str) -> Verdict:
     return Verdict(block, SKIPPED, reason, 0, {}, {}, None, [])
 
 
-def _reason_to_skip(kind: type[Block], settings, recording: Recording, lockstep: bool) -> str:
+def _reason_to_skip(wired: Wired, settings, recording: Recording, lockstep: bool) -> str:
     if settings is None:
         return 'the settings say nothing about it'
-    missing = [name for name in kind.inputs if name not in recording.series]
+    missing = [name for name in wired.inputs if name not in recording.series]
     if missing:
         return f'its input {" and ".join(missing)} is not recorded'
-    if not any(name in recording.series for name in kind.outputs):
-        return f'none of {", ".join(kind.outputs)} is recorded'
-    if not lockstep and kind.name in ('plant', 'current'):
+    if not any(name in recording.series for name in wired.outputs):
+        return f'none of {", ".join(wired.outputs)} is recorded'
+    if not lockstep and wired in (wiring.PLANT, wiring.CURRENT):
         return 'free-running: which inputs it had at a tick is not on record'
     return ''
 
@@ -624,17 +622,18 @@ def verify(
         For each block, in the order in which they act in a tick.
     """
     lockstep = keeps_step(recording) if told.lockstep is None else told.lockstep
-    settings: BlockSettings = told.blocks
-    for kind in BLOCKS:
-        if only and kind.name not in only:
+    for block in BLOCKS:
+        name = block.wired.name
+        if only and name not in only:
             continue
-        own = getattr(settings, kind.name)
-        reason = _reason_to_skip(kind, own, recording, lockstep)
+        settings = told.blocks[name]
+        reason = _reason_to_skip(block.wired, settings, recording, lockstep)
         if reason:
-            yield skipped(kind.name, reason)
+            yield skipped(name, reason)
             continue
         work = _in_lockstep if lockstep else _free_running
-        yield work(kind(own), recording, lambda share, name=kind.name: progress(name, share))
+        recorded = RecordedBlock(block, settings)
+        yield work(recorded, recording, lambda share, name=name: progress(name, share))
 
 
 def report(bag: Bag, recording: Recording, told: Told, verdicts: list[Verdict]) -> dict:
@@ -677,15 +676,15 @@ def _block_report(one: Verdict, verdicts: list[Verdict], recording: Recording) -
 def _hints(one: Verdict, verdicts: list[Verdict], recording: Recording) -> list[str]:
     """What else may have led to the first difference of a block."""
     hints = []
-    (kind,) = [block for block in BLOCKS if block.name == one.block]
+    (wired,) = [wired for wired in WIRING if wired.name == one.block]
     for other in verdicts:
         source = other.first
-        if source and source.topic in kind.inputs and source.stamp_ns <= one.first.stamp_ns:
+        if source and source.topic in wired.inputs and source.stamp_ns <= one.first.stamp_ns:
             hints.append(
                 f'its input {source.topic} differs at {_time(source.stamp_ns)} from what '
                 f'{other.block} computes: if the recording is damaged there, this is why'
             )
-    told = [event for event in recording.events if event.node == recording.node(_NODES[one.block])]
+    told = [event for event in recording.events if event.node == recording.node(wired.node)]
     aborted = any(event.values.get('stage') == STAGE_NAMES[SURFACING] for event in told)
     if aborted and not any(event.message == ABORT for event in told):
         hints.append('an abort is not on record: older versions did not record the call itself')

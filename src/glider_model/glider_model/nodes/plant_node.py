@@ -5,67 +5,49 @@
 import math
 import sys
 
-from glider_model.frames import odometry_to_wire, water_from_wire
-from glider_model.plant import (
-    PlantSettings,
-    plant_finished,
-    plant_joints,
-    plant_measurement,
-    plant_step,
-    state_fault,
-)
-from glider_model.ros import messages
+from glider_model.frames import odometry_from_wire
+from glider_model.plant import state_fault
+from glider_model.plant_block import PLANT, plant_move, plant_outputs
 from glider_model.ros.clock import ClockNode
 from glider_model.ros.parameters import declare_settings
 from glider_model.ros.tick import run
-from glider_model.signals import TICK_S, Joints, Water
+from glider_model.signals import TICK_S, Joints
+from glider_model.wiring import at_rest
 
 
 class PlantNode(ClockNode):
     """Publishes /clock, odom and joint_states; obeys command in current_velocity."""
 
     def __init__(self, **kwargs) -> None:
-        super().__init__(messages.PLANT, **kwargs)
-        settings = declare_settings(self, PlantSettings)
+        super().__init__(PLANT.wired.node, **kwargs)
+        settings = declare_settings(self, PLANT.settings)
         self.params = settings.params()
         self.state = settings.initial_state()
-        self.command = plant_joints(self.state)
-        self.water = Water(0.0, 0.0, 0.0)
-        self.publish_clock = self.add_output('/clock')
-        self.publish_odom = self.add_output('odom')
-        self.publish_joints = self.add_output('joint_states')
-        self.add_input('command')
-        self.add_input('current_velocity')
-        self.compile_kernels()
+        #: newest command and water velocity; none moves the actuators before the first command
+        self.newest = [tuple(self.state.joints), at_rest('current_velocity')]
+        self.publish_clock, *self.publishers = map(self.add_output, PLANT.wired.outputs)
+        for topic in PLANT.wired.inputs:
+            self.add_input(topic)
+        plant_outputs(plant_move(self.state, tuple(self.newest), self.params, TICK_S), self.params)
         self.start_up()
-
-    def compile_kernels(self) -> None:
-        """Call every kernel once, so that no tick waits for the compiler."""
-        state = plant_step(self.state, self.command, self.water, self.params, TICK_S)
-        plant_finished(state, self.params)
-        odometry_to_wire(plant_measurement(state, self.params))
-        plant_joints(state)
-        water_from_wire((0.0, 0.0, 0.0))
 
     def publish_tick(self, stamp_ns: int) -> None:
         """Publish the state of the vehicle, or end the run if there is none any more."""
-        measured = plant_measurement(self.state, self.params)
-        joints = plant_joints(self.state)
-        if not math.isfinite(sum(measured) + sum(joints)):
-            self.fail(state_fault(measured, joints, self.state.tick))
+        outputs, _ = plant_outputs(self.state, self.params)
+        if not math.isfinite(sum(map(sum, outputs))):
+            odom, joints = outputs
+            self.fail(state_fault(odometry_from_wire(odom), Joints(*joints), self.state.tick))
         self.publish_clock(stamp_ns)
-        self.publish_odom(stamp_ns, odometry_to_wire(measured))
-        self.publish_joints(stamp_ns, joints)
+        for publish, values in zip(self.publishers, outputs, strict=True):
+            publish(stamp_ns, values)
 
-    def complete_tick(self, command, current_velocity) -> bool:
+    def complete_tick(self, *inputs: tuple[float, ...]) -> bool:
         """Integrate to the next tick; False at the end of the run."""
-        if plant_finished(self.state, self.params):
+        _, finished = plant_outputs(self.state, self.params)
+        if finished:
             return False
-        if command:
-            self.command = Joints(*command)
-        if current_velocity:
-            self.water = water_from_wire(current_velocity)
-        self.state = plant_step(self.state, self.command, self.water, self.params, TICK_S)
+        self.newest = [new or old for new, old in zip(inputs, self.newest, strict=True)]
+        self.state = plant_move(self.state, tuple(self.newest), self.params, TICK_S)
         return True
 
 

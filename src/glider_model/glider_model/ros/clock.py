@@ -26,6 +26,7 @@ from glider_model.ros.tick import (
     seconds,
 )
 from glider_model.signals import TICK_NS, TICK_S
+from glider_model.wiring import WIRING
 
 #: Nodes of a run that is just over are out of sight within this time (s).
 _RIVALS_LEAVE_S = 5.0
@@ -102,7 +103,7 @@ class ClockNode(TickNode):
             self.wall_timer(0.25, self._on_startup_watch)
 
     def _peers(self) -> list[str]:
-        peers = [messages.CURRENT, messages.GUIDANCE, messages.CONTROL]
+        peers = [wired.node for wired in WIRING if wired.node != self.get_name()]
         return [*peers, messages.RECORDER] if self.ticks.record else peers
 
     def unmatched(self) -> list[str]:

@@ -11,9 +11,12 @@ from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from glider_model.block import Said
 from glider_model.ros.messages import PLANT
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+_LEVELS = {'ok': OK, 'warn': WARN, 'error': ERROR}
 
 STARTING, READY, WAITING, FINISHED, FAILED = 'starting', 'ready', 'waiting', 'finished', 'failed'
 
@@ -41,6 +44,12 @@ def status_array(stamp_ns: int, name: str, level: bytes, message: str, values: d
     pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
     array.status = [DiagnosticStatus(level=level, name=name, message=message, values=pairs)]
     return array
+
+
+def said_array(stamp_ns: int, node: str, said: Said) -> DiagnosticArray:
+    """Event of a block at a tick; ``node`` is the full name of the node that tells it."""
+    values = {**said.values, 't_s': stamp_ns / 1e9}
+    return status_array(stamp_ns, node, _LEVELS[said.level], said.message, values)
 
 
 def report_array(report: Report) -> DiagnosticArray:

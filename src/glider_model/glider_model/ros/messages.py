@@ -16,23 +16,14 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
+from glider_model import wiring
 from glider_model.ros import qos
 from glider_model.ros.codec import Codec
 from glider_model.signals import Adaptation
+from glider_model.wiring import FIELDS, JOINTS, WIRING
 
 #: Frame names: the world (ENU), the body (FLU), the path frame of the tracking error.
 MAP, BASE_LINK, PATH_FRAME = 'map', 'base_link', 'path'
-
-#: Joint names of joint_states and command, in the order of `glider_model.signals.Joints`.
-JOINTS = ('buoyancy_engine', 'pitch_mass', 'roll_mass')
-
-_XYZ = ('x', 'y', 'z')
-_POSE_AND_TWIST = (
-    *(f'pose.pose.position.{axis}' for axis in _XYZ),
-    *(f'pose.pose.orientation.{axis}' for axis in ('w', *_XYZ)),
-    *(f'twist.twist.linear.{axis}' for axis in _XYZ),
-    *(f'twist.twist.angular.{axis}' for axis in _XYZ),
-)
 
 
 def _stamped(message, frame: str):
@@ -40,36 +31,33 @@ def _stamped(message, frame: str):
     return message
 
 
-def _odometry(child_frame: str) -> Codec:
-    template = _stamped(Odometry(child_frame_id=child_frame), MAP)
-    return Codec(template, _POSE_AND_TWIST)
+def _odometry(child_frame: str):
+    return _stamped(Odometry(child_frame_id=child_frame), MAP)
 
 
-def _named(names: tuple[str, ...]) -> Codec:
-    template = JointState(name=list(names), position=[0.0] * len(names))
-    return Codec(template, [f'position[{name}]' for name in names])
+def _named(names: tuple[str, ...]) -> JointState:
+    """Numbers with names and a stamp, which every plotting tool shows by name."""
+    return JointState(name=list(names), position=[0.0] * len(names))
 
 
-def _velocity() -> Codec:
-    return Codec(_stamped(TwistStamped(), MAP), [f'twist.linear.{axis}' for axis in _XYZ])
-
-
-CLOCK = Codec(Clock(), (), stamp='clock')
-ODOM = _odometry(BASE_LINK)
-JOINT_STATES = _named(JOINTS)
-CURRENT_VELOCITY = _velocity()
-#: Its twist is expressed in `map`: desired velocity over ground and Euler angle rates.
-REFERENCE = _odometry(MAP)
-TRACKING_ERROR = Codec(_stamped(Vector3Stamped(), PATH_FRAME), [f'vector.{axis}' for axis in _XYZ])
-CURRENT_ESTIMATE = _velocity()
-COMMAND = _named(JOINTS)
-WRENCH = Codec(
-    _stamped(WrenchStamped(), BASE_LINK), ('wrench.force.z', 'wrench.torque.x', 'wrench.torque.y')
-)
-
-
-#: Numbers with names and a stamp: a JointState, which every plotting tool shows by name.
-ADAPTATION = _named(Adaptation._fields)
+#: Per-tick messages as they are before numbers and stamps are put in. The twist of the reference
+#: is expressed in `map`: desired velocity over ground and Euler angle rates.
+_TEMPLATES = {
+    '/clock': Clock(),
+    'odom': _odometry(BASE_LINK),
+    'joint_states': _named(JOINTS),
+    'current_velocity': _stamped(TwistStamped(), MAP),
+    'reference': _odometry(MAP),
+    'tracking_error': _stamped(Vector3Stamped(), PATH_FRAME),
+    'current_estimate': _stamped(TwistStamped(), MAP),
+    'command': _named(JOINTS),
+    'wrench': _stamped(WrenchStamped(), BASE_LINK),
+    'adaptation': _named(Adaptation._fields),
+}
+_CODECS = {
+    name: Codec(template, FIELDS[name], stamp='clock' if name == '/clock' else 'header.stamp')
+    for name, template in _TEMPLATES.items()
+}
 
 
 class Topic(NamedTuple):
@@ -106,17 +94,14 @@ class Topic(NamedTuple):
         return f'/{namespace.strip("/")}/{self.name}'.replace('//', '/')
 
 
-def _per_tick(name: str, codec: Codec, publisher: str, *readers: str) -> Topic:
-    return Topic(name, codec.message_type, publisher, readers, codec)
+def _per_tick(name: str) -> Topic:
+    codec, needed_by = _CODECS[name], (wired.node for wired in wiring.readers(name))
+    return Topic(name, codec.message_type, wiring.publisher(name).node, tuple(needed_by), codec)
 
 
-PLANT, CURRENT, GUIDANCE, CONTROL, RECORDER = (
-    'plant_node',
-    'current_node',
-    'guidance_node',
-    'control_node',
-    'recorder_node',
-)
+#: Names of the nodes.
+PLANT, CURRENT, GUIDANCE, CONTROL = (wired.node for wired in WIRING)
+RECORDER = 'recorder_node'
 #: Stands for all of them to a recorder.
 REPLAY = 'replay_node'
 
@@ -124,16 +109,7 @@ REPLAY = 'replay_node'
 TOPICS = {
     topic.name: topic
     for topic in (
-        _per_tick('/clock', CLOCK, PLANT),
-        _per_tick('odom', ODOM, PLANT, CURRENT, GUIDANCE, CONTROL),
-        _per_tick('joint_states', JOINT_STATES, PLANT, CONTROL),
-        _per_tick('current_velocity', CURRENT_VELOCITY, CURRENT, PLANT),
-        _per_tick('reference', REFERENCE, GUIDANCE, CONTROL),
-        _per_tick('tracking_error', TRACKING_ERROR, GUIDANCE),
-        _per_tick('current_estimate', CURRENT_ESTIMATE, GUIDANCE),
-        _per_tick('command', COMMAND, CONTROL, PLANT),
-        _per_tick('wrench', WRENCH, CONTROL),
-        _per_tick('adaptation', ADAPTATION, CONTROL),
+        *(_per_tick(name) for wired in WIRING for name in wired.outputs),
         Topic('path', Path, GUIDANCE, qos=qos.LATCHED),
         Topic('/diagnostics', DiagnosticArray, 'all', qos=qos.EVENTS),
         Topic('lockstep', DiagnosticArray, 'all', qos=qos.EVENTS, recorded=False),

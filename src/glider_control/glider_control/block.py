@@ -1,0 +1,55 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Control as a block."""
+
+from glider_control import watch
+from glider_control.control import ControlParams, control_step, control_surface
+from glider_control.settings import ControlSettings
+from glider_model.block import Block, Said, block_tick
+from glider_model.frames import odometry_from_wire, reference_from_wire, wrench_to_wire
+from glider_model.kernel import kernel
+from glider_model.signals import Joints
+from glider_model.wiring import CONTROL as WIRED
+
+#: Actuators by the bits of the saturation mask that say that they are at their limits.
+AT_LIMIT = {1: 'buoyancy engine', 2: 'pitch mass', 4: 'roll mass'}
+
+
+@block_tick.body(ControlParams)
+@kernel
+def control_tick(state, t_s, inputs, params, dt):
+    """One tick: reference, odom, joint_states in; command, wrench, adaptation out."""
+    reference, odom, joints = inputs
+    state, out = control_step(
+        state,
+        odometry_from_wire(odom),
+        Joints(joints[0], joints[1], joints[2]),
+        reference_from_wire(reference),
+        params,
+        dt,
+    )
+    command = (out.command.m_b, out.command.x_p, out.command.mu)
+    return state, (command, wrench_to_wire(out.wrench), out.adaptation), (out.saturation,)
+
+
+def say(saturation: int) -> Said:
+    """What control has noticed, and which actuators are at their limits."""
+    at_limit = ', '.join(name for bit, name in AT_LIMIT.items() if saturation & bit)
+    said = [watch.say(saturation), f'at its limit: {at_limit}' if at_limit else '']
+    message = '; '.join(text for text in said if text)
+    level = 'warn' if message else 'ok'
+    if saturation & (watch.SURFACES | watch.STUCK):
+        level = 'error'
+    return Said(level, message or 'no actuator at its limit', {'saturation': saturation})
+
+
+CONTROL = Block(
+    WIRED,
+    ControlSettings,
+    control_tick,
+    flags=('saturation',),
+    quiet=(0,),
+    every_ns=watch.TELL_EVERY_NS,
+    say=say,
+    surface=control_surface,
+)

@@ -1,0 +1,42 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Guidance as a block."""
+
+from glider_guidance.guidance import GuidanceParams, guidance_abort, guidance_step
+from glider_guidance.profile import STAGE_NAMES
+from glider_guidance.settings import GuidanceSettings
+from glider_model.block import Block, Said, block_tick
+from glider_model.frames import odometry_from_wire, reference_to_wire, water_to_wire
+from glider_model.kernel import kernel
+from glider_model.wiring import GUIDANCE as WIRED
+
+
+@block_tick.body(GuidanceParams)
+@kernel
+def guidance_tick(state, t_s, inputs, params, dt):
+    """One tick: odom in; reference, tracking_error, current_estimate out; see `block_tick`."""
+    state, out = guidance_step(state, odometry_from_wire(inputs[0]), params, dt)
+    error = (out.error.e1, out.error.e2, out.error.e3)
+    outputs = (reference_to_wire(out.reference), error, water_to_wire(out.current))
+    return state, outputs, (out.stage, int(out.infeasible))
+
+
+def say(stage: int, infeasible: int) -> Said:
+    """Which stage began, or whether the course can be held."""
+    name = STAGE_NAMES[stage]
+    values = {'stage': name, 'infeasible': str(bool(infeasible)).lower()}
+    if infeasible:
+        message = f'{name}; the course cannot be held against this current'
+        return Said('warn', message, values)
+    return Said('ok', name, values)
+
+
+GUIDANCE = Block(
+    WIRED,
+    GuidanceSettings,
+    guidance_tick,
+    flags=('stage', 'infeasible'),
+    quiet=(-1, -1),
+    say=say,
+    surface=guidance_abort,
+)
