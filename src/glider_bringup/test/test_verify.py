@@ -444,8 +444,8 @@ def test_command_names_a_difference(altered, recorded):
 
 INTERRUPTED = """
 import signal, sys
-from glider_bringup.blocks import BLOCKS
 from glider_bringup.cli import app
+from glider_bringup.recorded_inputs import RecordedBlock
 
 
 def shoot(compute):
@@ -456,8 +456,7 @@ def shoot(compute):
     return run
 
 
-for kind in BLOCKS:
-    kind.run = shoot(kind.run)
+RecordedBlock.run = shoot(RecordedBlock.run)
 signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
 app(['verify', *sys.argv[1:]])
 """

@@ -43,7 +43,7 @@ class ControlNode(BlockNode):
             self.surface(SURFACE)
             said = f'input lost for {self.settings.lost_after_s:g} s: surfacing for good'
             self.event(stamp_ns, health.ERROR, said)
-        publish_command = self.publishers[0]
+        publish_command = self.senders[0]
         publish_command(stamp_ns, self.params.safe_command)
 
 

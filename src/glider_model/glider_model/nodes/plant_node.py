@@ -25,7 +25,7 @@ class PlantNode(ClockNode):
         self.state = settings.initial_state()
         #: newest command and water velocity; none moves the actuators before the first command
         self.newest = [tuple(self.state.joints), at_rest('current_velocity')]
-        self.publish_clock, *self.publishers = map(self.add_output, PLANT.wired.outputs)
+        self.publish_clock, *self.senders = map(self.add_output, PLANT.wired.outputs)
         for topic in PLANT.wired.inputs:
             self.add_input(topic)
         plant_outputs(plant_move(self.state, tuple(self.newest), self.params, TICK_S), self.params)
@@ -38,7 +38,7 @@ class PlantNode(ClockNode):
             odom, joints = outputs
             self.fail(state_fault(odometry_from_wire(odom), Joints(*joints), self.state.tick))
         self.publish_clock(stamp_ns)
-        for publish, values in zip(self.publishers, outputs, strict=True):
+        for publish, values in zip(self.senders, outputs, strict=True):
             publish(stamp_ns, values)
 
     def complete_tick(self, *inputs: tuple[float, ...]) -> bool:

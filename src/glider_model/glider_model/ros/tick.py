@@ -526,7 +526,7 @@ class BlockNode(TickNode):
     def __init__(self, block: Block, **kwargs) -> None:
         super().__init__(block.wired.node, **kwargs)
         self.block = block
-        self.publishers = [self.add_output(topic) for topic in block.wired.outputs]
+        self.senders = [self.add_output(topic) for topic in block.wired.outputs]
         self.settings = declare_settings(self, block.settings, self.on_settings)
         self.params = self.settings.params()
         self.state = self.settings.initial_state()
@@ -564,7 +564,7 @@ class BlockNode(TickNode):
         self.state, outputs, flags = self.block.tick(self.state, t_s, inputs, self.params, TICK_S)
         if self.block.say and self.telling.is_due(flags, stamp_ns):
             self.tell(stamp_ns, flags)
-        for publish, values in zip(self.publishers, outputs, strict=True):
+        for publish, values in zip(self.senders, outputs, strict=True):
             publish(stamp_ns, values)
 
     def tell(self, stamp_ns: int, flags: tuple[int, ...]) -> None:
