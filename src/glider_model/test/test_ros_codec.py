@@ -16,7 +16,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
 from glider_model.ros.codec import MessageError, cdr_places, to_cdr
-from glider_model.ros.messages import COMMAND, JOINTS, ODOM, TOPICS
+from glider_model.ros.messages import JOINTS, TOPICS
+
+ODOM, COMMAND = TOPICS['odom'].codec, TOPICS['command'].codec
 
 PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 STAMPS = st.integers(0, (2**31 - 1) * 10**9)

@@ -6,12 +6,13 @@ import sys
 
 from glider_control.block import CONTROL
 from glider_model.ros import health
+from glider_model.ros.block_node import DeclaredNode
 from glider_model.ros.orders import SURFACE
-from glider_model.ros.tick import BlockNode, run
+from glider_model.ros.tick import run
 from glider_model.signals import TICK_S
 
 
-class ControlNode(BlockNode):
+class ControlNode(DeclaredNode):
     """How to get there. Free-running, it surfaces the vehicle when an input is stale."""
 
     when_stale = 'commanding the safe state until then'

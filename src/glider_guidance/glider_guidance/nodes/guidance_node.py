@@ -11,15 +11,16 @@ from std_srvs.srv import Trigger
 from glider_guidance.block import GUIDANCE
 from glider_model.frames import water_to_wire
 from glider_model.ros import messages
+from glider_model.ros.block_node import DeclaredNode
 from glider_model.ros.orders import ABORT
-from glider_model.ros.tick import BlockNode, run
+from glider_model.ros.tick import run
 from glider_model.signals import Water
 
 #: Number of points of the published path.
 PATH_POINTS = 500
 
 
-class GuidanceNode(BlockNode):
+class GuidanceNode(DeclaredNode):
     """Where to go. The service abort brings the vehicle to the surface for good."""
 
     def __init__(self, **kwargs) -> None:

@@ -5,10 +5,11 @@
 import sys
 
 from glider_model.current_block import CURRENT
-from glider_model.ros.tick import BlockNode, run
+from glider_model.ros.block_node import DeclaredNode
+from glider_model.ros.tick import run
 
 
-class CurrentNode(BlockNode):
+class CurrentNode(DeclaredNode):
     """odom in, current_velocity out."""
 
     def __init__(self, **kwargs) -> None:
