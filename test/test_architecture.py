@@ -24,6 +24,7 @@ MAY_IMPORT = {
 #: ros/rosdistro, where it names an Ubuntu package for noble.
 ROSDEP_KEYS = {
     'hypothesis': 'python3-hypothesis',
+    'jinja2': 'python3-jinja2',
     'matplotlib': 'python3-matplotlib',
     'numba': 'python3-numba',
     'numpy': 'python3-numpy',

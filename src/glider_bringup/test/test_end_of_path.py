@@ -10,7 +10,7 @@ from mcap_ros2.reader import read_ros2_messages
 
 from glider_bringup import mission
 from glider_bringup.scenario import load_scenario, scenario_names
-from glider_bringup.scorecard import card_rows
+from glider_bringup.showing.scorecard import card_rows
 from glider_model.frames import odometry_from_wire
 from glider_model.sensors import recover
 

@@ -385,7 +385,7 @@ def test_result_for_a_person_fits_a_narrow_terminal(paths, capsys):
 
 def test_figures_are_drawn_of_what_was_flown(tmp_path):
     """Only those whose flights there are."""
-    from glider_bringup import paper_figures
+    from glider_bringup.showing import paper_figures
 
     cases = [Case('', 'pid', 'observer', 'current_8deg', SHORT, drawn=True)]
     one = Experiment('profile', 'profile', '', '', '', cases, judge_limits({}, 'pid'))

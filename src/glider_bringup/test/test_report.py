@@ -20,9 +20,10 @@ import pytest
 from glider_bringup import cli, mission
 from glider_bringup.direct import COLUMNS, fly_blocks
 from glider_bringup.mission import Flight, make_run_folder, read_run, write_report, write_score
-from glider_bringup.report import LOST_M, findings, lost_since_s, span, verdict
 from glider_bringup.scenario import load_scenario
 from glider_bringup.score import Rules, Scorer
+from glider_bringup.showing.findings import LOST_M, findings, lost_since_s, verdict
+from glider_bringup.showing.words import span
 
 E2 = COLUMNS['tracking_error'].start + 1
 SHORT = {'dives': 0, 'duration_s': 300.0, 'settle_s': 0.0}

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from glider_bringup.console import Json, Run, beside, counter, output
-from glider_bringup.scorecard import print_card
+from glider_bringup.showing.scorecard import print_card
 
 app = typer.Typer()
 

@@ -51,8 +51,8 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Compare runs: scores side by side, and what their scenarios differ in."""
-    from glider_bringup import compare as compared
     from glider_bringup import mission
+    from glider_bringup.showing import compare as compared
 
     if len(paths) < 2:
         raise ConfigurationError(f'{paths[0]}: one run only (allowed: two or more)')
@@ -71,13 +71,26 @@ def compare(
         scores = [{'run': name, 'folder': str(one), 'score': card} for name, one, card in each]
         print(json.dumps({'runs': scores, 'differences': found}))
         return
-    _print_rows('', names, compared.score_rows(cards))
+    _print_rows('', names, _marked(compared.score_rows(cards)))
+    output.print(compared.HOW_TO_READ.format(mark='*'), soft_wrap=True)
     for text in compared.caveats(cards):
         output.print(text, soft_wrap=True)
+    if compared.are_equal(cards):
+        output.print(compared.EQUAL)
     if found:
         _print_rows('what the scenarios differ in', names, compared.difference_rows(found))
     else:
         output.print('scenarios and vehicles are the same')
+
+
+def _marked(rows: list) -> list[list[str]]:
+    """Lines of scores as text: value, difference from the first run, mark of the better one."""
+
+    def text(cell) -> str:
+        change = f' ({cell.change})' if cell.change else ''
+        return f'{cell.text}{change}{" *" if cell.better else ""}'
+
+    return [[name, *map(text, cells)] for name, cells in rows]
 
 
 def _print_rows(title: str, names: list[str], rows: list[list[str]]) -> None:

@@ -24,7 +24,7 @@ from glider_bringup.console import (
 from glider_bringup.disk import DiskError
 from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, parse_assignment
-from glider_bringup.scorecard import print_card
+from glider_bringup.showing.scorecard import print_card, print_places
 from glider_guidance.settings import LosSettings
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
@@ -102,6 +102,8 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Fly a scenario; record it, write its report and print the scorecard."""
+    from glider_bringup import mission
+
     fields = dict(parse_assignment(text) for text in changes or [])
     if controller:
         fields['control.law'] = controller.value
@@ -129,10 +131,12 @@ def run(
         card, folder, has_room = _fly(
             flown, engine, rate, place, out, bag, sync.value, report, begin_view
         )
+    page = folder / mission.REPORT_FILE
     if as_json:
         print(json.dumps(card, allow_nan=False))
+        print_places(messages, folder, page)
     else:
-        print_card(card, folder)
+        print_card(card, folder, page)
     if card['status'] in ('aborted', 'failed'):
         raise typer.Exit(
             EXIT_INTERRUPTED if card['reason'].startswith('stopped by') else EXIT_FAILED
@@ -208,7 +212,6 @@ def _write_report(scenario: Scenario, folder: Path, card: dict, tracer) -> bool:
         cause = str(error) or type(error).__name__
         messages.print(f'no report: {cause}', style='red', soft_wrap=True)
         return not isinstance(error, DiskError)
-    messages.print(f'report: {file}', soft_wrap=True)
     return True
 
 

@@ -148,8 +148,9 @@ def experiments(
     By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
     engine: 135 flights, most of them of 30 hours.
     """
-    from glider_bringup import experiment_tables, mission, paper_figures
+    from glider_bringup import experiment_tables, mission
     from glider_bringup import experiments as study
+    from glider_bringup.showing import paper_figures
 
     planned = study.make_experiments([one.value for one in only or Group])
     flights = study.count_flights(planned)

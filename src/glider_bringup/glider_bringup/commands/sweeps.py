@@ -126,7 +126,7 @@ def draw(
     FILE is the result of ./glider sweep over current.speed_kn, current.angle_deg and at most one
     more dimension, such as stability_map.
     """
-    from glider_bringup import stability_map as study
+    from glider_bringup.showing import stability_map as study
 
     stability = study.load_map(file)
     image = out or file.with_suffix('.png')

@@ -21,11 +21,11 @@ from glider_bringup import mission
 from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import outcome_of
 from glider_bringup.mcap_reader import Bag
-from glider_bringup.report import report_page
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.replay import check_not_empty, plan_replay, qos_of, recorded_messages
 from glider_bringup.ros.verify import report, verify
 from glider_bringup.scenario import load_scenario
+from glider_bringup.showing.report import report_page
 from glider_model.settings import ConfigurationError
 
 #: Two minutes in which everything happens, in ten chunks.

@@ -5,12 +5,13 @@
 from collections import Counter
 from pathlib import Path
 
+from rich.console import Console
 from rich.table import Table
 
 from glider_bringup.console import output
 
 
-def _show(value: float | None, unit: str, digits: int = 2) -> str:
+def show(value: float | None, unit: str, digits: int = 2) -> str:
     """Number with its unit; a dash if there is none."""
     return '-' if value is None else f'{value:,.{digits}f} {unit}'.rstrip()
 
@@ -26,30 +27,30 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
         ('status', card['status'] + (f' ({card["reason"]})' if card['reason'] else '')),
         ('flown', f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}'),
         ('engine', f'{card["engine"] or "not known"}, seed {card["seed"]}'),
-        ('simulated time', _show(card['sim_time_s'], 's', 1)),
-        ('real-time factor', _show(card['real_time_factor'], '', 0)),
+        ('simulated time', show(card['sim_time_s'], 's', 1)),
+        ('real-time factor', show(card['real_time_factor'], '', 0)),
         (
             'messages',
             f'{card["messages_recorded"]:,} recorded, {card["messages_lost"]} lost',
         ),
         ('dives', str(card['dives'])),
-        ('along path', _show(card['distance_along_path_m'], 'm', 0)),
+        ('along path', show(card['distance_along_path_m'], 'm', 0)),
         *(('control noticed', text) for text in guard_texts(card)),
-        *([('end of path', f'came up {_show(end_m, "m", 1)} from its last point')]
+        *([('end of path', f'came up {show(end_m, "m", 1)} from its last point')]
           if end_m is not None else []),
-        ('cross-track, steady', f'rms {_show(track["rms_steady"], "m", 3)}, max '
-         f'{_show(track["max_steady"], "m", 3)}'),
-        ('cross-track, all', f'max {_show(track["max_all"], "m")} ({settling})'),
-        ('cross-track, whole run', f'max {_show(track.get("max_run"), "m")}'),
-        ('pitch error, steady', f'rms {_show(pitch["rms_steady"], "deg", 3)}, max '
-         f'{_show(pitch["max_steady"], "deg", 3)}'),
-        ('heading fluctuation', f'rms {_show(heading["rms_steady"], "deg", 3)}, max '
-         f'{_show(heading["max_steady"], "deg", 3)}'),
-        ('depth', f'max {_show(depth["max"], "m", 1)}, overshoot '
-         f'{_show(depth["overshoot"], "m", 1)}'),
-        ('actuator travel', f'pump {_show(travel["buoyancy_engine_kg"], "kg", 1)}, pitch mass '
-         f'{_show(travel["pitch_mass_m"], "m")}, roll mass '
-         f'{_show(travel["roll_mass_deg"], "deg", 0)}'),
+        ('cross-track, steady', f'rms {show(track["rms_steady"], "m", 3)}, max '
+         f'{show(track["max_steady"], "m", 3)}'),
+        ('cross-track, all', f'max {show(track["max_all"], "m")} ({settling})'),
+        ('cross-track, whole run', f'max {show(track.get("max_run"), "m")}'),
+        ('pitch error, steady', f'rms {show(pitch["rms_steady"], "deg", 3)}, max '
+         f'{show(pitch["max_steady"], "deg", 3)}'),
+        ('heading fluctuation', f'rms {show(heading["rms_steady"], "deg", 3)}, max '
+         f'{show(heading["max_steady"], "deg", 3)}'),
+        ('depth', f'max {show(depth["max"], "m", 1)}, overshoot '
+         f'{show(depth["overshoot"], "m", 1)}'),
+        ('actuator travel', f'pump {show(travel["buoyancy_engine_kg"], "kg", 1)}, pitch mass '
+         f'{show(travel["pitch_mass_m"], "m")}, roll mass '
+         f'{show(travel["roll_mass_deg"], "deg", 0)}'),
     ]  # fmt: skip
 
 
@@ -65,10 +66,17 @@ def guard_texts(card: dict) -> list[str]:
     ]
 
 
-def print_card(card: dict, folder: Path) -> None:
-    """Print the scorecard for a person."""
+def print_card(card: dict, folder: Path, report: Path | None = None) -> None:
+    """Print the scorecard for a person, and where the run and its report are."""
     table = Table(title=card['scenario'], show_header=False, title_justify='left')
     for name, text in card_rows(card):
         table.add_row(name, text)
     output.print(table)
-    output.print(f'run folder: {folder}', soft_wrap=True)
+    print_places(output, folder, report)
+
+
+def print_places(console: Console, folder: Path, report: Path | None) -> None:
+    """Print where a run is, and its report if it has one."""
+    console.print(f'run folder: {folder}', soft_wrap=True)
+    if report and report.is_file():
+        console.print(f'report: {report}', soft_wrap=True)

@@ -3,12 +3,10 @@
 """Web pages that are one file and need no network: plotly.js, curves and text in one."""
 
 import base64
-import json
 import zlib
-from html import escape
+from functools import cache
 from pathlib import Path
-from string import Template
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +15,11 @@ from glider_bringup.score import Rules
 from glider_bringup.traces import SAMPLES, Traces
 from glider_model.vehicle import Vehicle
 
-_FOLDER = Path(__file__).parent / 'page'
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+#: Templates, style and scripts of the pages.
+_WEB = Path(__file__).parent / 'web'
 #: Compression: 1 is fast, and close to what more would give.
 _LEVEL = 1
 #: A path is drawn with so many points.
@@ -51,14 +53,10 @@ class Panel(NamedTuple):
     inverted: bool = False
     log: bool = False
 
-    def html(self) -> str:
-        """Place of the panel in the page."""
-        size = 'low' if self.id.startswith('learnt') else 'map' if self.kind != 'time' else ''
-        return (
-            f'<figure class="panel {size}"><h3>{escape(self.title)}</h3>'
-            f'<figcaption>{escape(self.caption)}</figcaption>'
-            f'<div class="plot" id="{self.id}"></div></figure>'
-        )
+    @property
+    def shape(self) -> str:
+        """How the style calls its shape: low, map, or none."""
+        return 'low' if self.id.startswith('learnt') else 'map' if self.kind != 'time' else ''
 
 
 def pack(data: bytes) -> str:
@@ -130,50 +128,36 @@ def page_data(runs: list[FlownRun], panels: list[Panel]) -> dict[str, Any]:
     }
 
 
-def make_page(title: str, body: str, data: dict[str, Any]) -> str:
-    """Whole text of a page; ``body`` is HTML, ``title`` is not."""
+@cache
+def _templates() -> 'Environment':
+    """Templates of the pages: what is put in is text, and an unknown name an error."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    found = Environment(
+        loader=FileSystemLoader(_WEB),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    found.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
+    found.globals['source'] = lambda name: (_WEB / name).read_text(encoding='utf-8')
+    return found
+
+
+def make_page(template: str, data: dict[str, Any], **content) -> str:
+    """Whole text of a page.
+
+    Parameters
+    ----------
+    template : str
+        File in ``web``.
+    data : dict
+        From `page_data`.
+    **content
+        What the template names.
+    """
     from plotly.offline import get_plotlyjs
 
-    def read(name: str) -> str:
-        return (_FOLDER / name).read_text(encoding='utf-8')
-
-    text = json.dumps(data, allow_nan=False, separators=(',', ':'))
-    return Template(read('page.html')).substitute(
-        title=escape(title),
-        style=read('page.css'),
-        body=body,
-        data=text.replace('<', '\\u003c'),
-        library=pack(get_plotlyjs().encode()) if data['panels'] else '',
-        script=read('page.js'),
-    )
-
-
-def table(rows, header=()) -> str:
-    """HTML table whose first column names what the others hold."""
-    head = ''.join(f'<th scope="col">{cell}</th>' for cell in header)
-    lines = ''.join(
-        f'<tr><th scope="row">{escape(first)}</th>'
-        + ''.join(f'<td>{escape(cell)}</td>' for cell in others)
-        + '</tr>'
-        for first, *others in rows
-    )
-    head = f'<thead><tr>{head}</tr></thead>' if head else ''
-    return f'<div class="table"><table>{head}<tbody>{lines}</tbody></table></div>'
-
-
-ZOOM_BAR = (
-    '<div class="bar">Shown: <output id="shown"></output>'
-    '<button id="whole" disabled>whole run</button>'
-    '<span>Drag across a time panel to zoom into all of them; double-click to go back.</span>'
-    '</div>'
-)
-
-
-def section(title: str, panels: list[Panel]) -> str:
-    """Panels under a heading; maps stand side by side."""
-    if not panels:
-        return ''
-    html = ''.join(panel.html() for panel in panels)
-    is_map = all(panel.kind != 'time' for panel in panels)
-    html = f'<div class="maps">{html}</div>' if is_map else html
-    return f'<h2>{escape(title)}</h2>{html}'
+    library = pack(get_plotlyjs().encode()) if data['panels'] else ''
+    return _templates().get_template(template).render(data=data, library=library, **content)

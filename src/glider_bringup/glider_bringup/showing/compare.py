@@ -1,0 +1,329 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Runs side by side: their scores, what their scenarios differ in, and one page over the other."""
+
+from collections.abc import Iterator
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from glider_bringup.showing.panels import ACTUATORS
+from glider_bringup.showing.scorecard import guard_texts, show
+from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page, page_data
+from glider_bringup.showing.words import small, span
+from glider_model.settings import ConfigurationError
+
+#: Curves that are laid over each other: panel, title, caption, axis, curve.
+_OVERLAID = (
+    ('depth', 'Depth', 'How deep each was.', 'depth (m)', 'depth_m'),
+    (
+        'cross_track',
+        'Cross-track error',
+        'Distance from its own path, + to starboard of it.',
+        'off the path (m)',
+        'cross_track_m',
+    ),
+    ('pitch', 'Pitch', 'Nose up is positive.', 'pitch (deg)', 'pitch_deg'),
+    ('heading', 'Heading', 'Clockwise from north.', 'heading (deg)', 'heading_deg'),
+    ('roll', 'Roll', 'Starboard side down is positive.', 'roll (deg)', 'roll_deg'),
+    *(
+        (
+            one.joint,
+            one.title,
+            f'{one.caption}.',
+            f'{one.title.lower()} ({one.unit})',
+            one.position,
+        )
+        for one in ACTUATORS
+    ),
+)
+#: Colours before they come again, then dashed.
+_COLOURS = 8
+
+
+def labels(folders: list[Path]) -> list[str]:
+    """Short names of runs: those of their folders, or the whole paths if two have one name.
+
+    Raises
+    ------
+    ConfigurationError
+        If a run is given twice.
+    """
+    whole = [folder.resolve() for folder in folders]
+    for i, folder in enumerate(whole):
+        if folder in whole[:i]:
+            raise ConfigurationError(f'{folders[i]}: given twice (allowed: different runs)')
+    names = [folder.name for folder in whole]
+    return names if len(set(names)) == len(names) else [str(folder) for folder in folders]
+
+
+def _fields(values: Any, name: str = '') -> Iterator[tuple[str, Any]]:
+    """Every number and word in nested values, with its dotted name."""
+    if isinstance(values, dict):
+        for key, inner in values.items():
+            yield from _fields(inner, f'{name}.{key}' if name else key)
+    else:
+        yield name, values
+
+
+def differences(runs: list[FlownRun]) -> list[dict[str, Any]]:
+    """Fields in which the scenarios of runs, or their vehicles, are not all the same.
+
+    Returns
+    -------
+    list of dict
+        ``field``, its dotted name, and ``values``, one of each run; None where there is no
+        such field.
+    """
+    flat = []
+    for run in runs:
+        values = run.scenario.model_dump(mode='json', exclude={'vehicle', 'description'})
+        vehicle = run.vehicle.model_dump(mode='json', exclude={'description'})
+        flat.append(dict(_fields({**values, 'vehicle': vehicle})))
+    names = dict.fromkeys(name for fields in flat for name in fields)
+    return [
+        {'field': name, 'values': [fields.get(name) for fields in flat]}
+        for name in names
+        if any(fields.get(name) != flat[0].get(name) for fields in flat)
+    ]
+
+
+def difference_rows(found: list[dict[str, Any]]) -> list[list[str]]:
+    """Lines of differences: field, then the text of each value."""
+    return [
+        [one['field'], *(_said(one['field'], value) for value in one['values'])] for one in found
+    ]
+
+
+def _said(field: str, value: Any) -> str:
+    """Value of a field; a long time also as a person says it."""
+    if value is None:
+        return '-'
+    is_long = field.endswith('_s') and isinstance(value, int | float) and value >= 120.0
+    return f'{value} ({span(value)})' if is_long else str(value)
+
+
+# ---------------------------------------------------------------------------------- scores
+
+
+class Figure(NamedTuple):
+    """A figure of a scorecard that is compared."""
+
+    name: str
+    keys: tuple[str, ...]  #: where it is in the card
+    unit: str  #: s: said as a time
+    digits: int
+    less_is_better: bool = False  #: else neither more nor less is
+
+
+class Cell(NamedTuple):
+    """What a comparison shows of one run in one line."""
+
+    text: str
+    change: str = ''  #: from the first run; empty where there is nothing to subtract
+    better: bool = False
+
+
+_TRACK, _PITCH, _HEADING = 'cross_track_m', 'pitch_error_deg', 'heading_fluctuation_deg'
+FIGURES = (
+    Figure('simulated time', ('sim_time_s',), 's', 1),
+    Figure('real-time factor', ('real_time_factor',), '', 0),
+    Figure('messages recorded', ('messages_recorded',), '', 0),
+    Figure('messages lost', ('messages_lost',), '', 0, True),
+    Figure('dives', ('dives',), '', 0),
+    Figure('along path', ('distance_along_path_m',), 'm', 0),
+    Figure('came up from the end of path', ('end_of_path_m',), 'm', 1, True),
+    Figure('cross-track, steady, rms', (_TRACK, 'rms_steady'), 'm', 3, True),
+    Figure('cross-track, steady, max', (_TRACK, 'max_steady'), 'm', 3, True),
+    Figure('cross-track, after settling, max', (_TRACK, 'max_all'), 'm', 2, True),
+    Figure('cross-track, whole run, max', (_TRACK, 'max_run'), 'm', 2, True),
+    Figure('pitch error, steady, rms', (_PITCH, 'rms_steady'), 'deg', 3, True),
+    Figure('pitch error, steady, max', (_PITCH, 'max_steady'), 'deg', 3, True),
+    Figure('heading fluctuation, rms', (_HEADING, 'rms_steady'), 'deg', 3, True),
+    Figure('heading fluctuation, max', (_HEADING, 'max_steady'), 'deg', 3, True),
+    Figure('depth, max', ('depth_m', 'max'), 'm', 1),
+    Figure('depth, overshoot', ('depth_m', 'overshoot'), 'm', 1, True),
+    Figure('pump travel', ('actuator_travel', 'buoyancy_engine_kg'), 'kg', 1, True),
+    Figure('pitch mass travel', ('actuator_travel', 'pitch_mass_m'), 'm', 2, True),
+    Figure('roll mass travel', ('actuator_travel', 'roll_mass_deg'), 'deg', 0, True),
+)
+#: What a scorecard says of how a run was computed and recorded, not of the flight.
+_NOT_FLOWN = (
+    *('engine', 'wall_time_s', 'real_time_factor'),
+    *('messages_recorded', 'messages_lost'),
+)
+#: Runs are judged against each other if none lasts longer than another by more than this share.
+ALIKE = 0.1
+HOW_TO_READ = (
+    'In brackets: the difference from the first run. {mark} marks the better value; nothing is '
+    'marked where neither is better, in a run that was stopped, and where one run lasts more than '
+    'a tenth longer than another.'
+)
+
+
+def _value(card: dict[str, Any], figure: Figure) -> float | None:
+    """A figure of a card, rounded as it is shown; cards of before lack some."""
+    value: Any = card
+    for key in figure.keys:
+        value = value.get(key) if isinstance(value, dict) else None
+    return None if value is None else round(value, figure.digits)
+
+
+def _change(figure: Figure, value: float | None, first: float | None) -> str:
+    """How a value differs from that of the first run."""
+    if value is None or first is None:
+        return ''
+    difference = round(value - first, figure.digits)
+    if not difference:
+        return '='
+    if figure.unit == 's':
+        return f'{"+" if difference > 0.0 else "-"}{span(abs(difference))}'
+    return f'{difference:+,.{figure.digits}f}'
+
+
+def _best(figure: Figure, cards: list[dict[str, Any]]) -> float | None:
+    """The better value of a figure, or None if none is better or they cannot be judged."""
+    judged = [card for card in cards if not _was_stopped(card)]
+    values = {_value(card, figure) for card in judged} - {None}
+    if not figure.less_is_better or len(values) < 2:
+        return None
+    times = [card['sim_time_s'] for card in judged]
+    return min(values) if max(times) <= (1.0 + ALIKE) * min(times) else None
+
+
+def _was_stopped(card: dict[str, Any]) -> bool:
+    return card['status'] in ('aborted', 'failed')
+
+
+def _cells(figure: Figure, cards: list[dict[str, Any]]) -> list[Cell]:
+    """One figure of all runs."""
+    best, first = _best(figure, cards), _value(cards[0], figure)
+    cells = []
+    for i, card in enumerate(cards):
+        value = _value(card, figure)
+        is_time = figure.unit == 's' and value is not None
+        text = span(value) if is_time else show(value, figure.unit, figure.digits)
+        better = best is not None and value == best and not _was_stopped(card)
+        cells.append(Cell(text, _change(figure, value, first) if i else '', better))
+    return cells
+
+
+def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
+    """Lines of scorecards side by side: name, then a cell of each run."""
+
+    def told(name: str, say) -> tuple[str, list[Cell]]:
+        return name, [Cell(say(card)) for card in cards]
+
+    rows = [
+        told('status', lambda card: ': '.join(filter(None, (card['status'], card['reason'])))),
+        told(
+            'flown',
+            lambda card: f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}',
+        ),
+        told('engine', lambda card: f'{card["engine"] or "not known"}, seed {card["seed"]}'),
+    ]
+    if any(guard_texts(card) for card in cards):
+        rows.append(
+            told('control noticed', lambda card: '; '.join(guard_texts(card)) or 'nothing')
+        )
+    return rows + [
+        (figure.name, _cells(figure, cards))
+        for figure in FIGURES
+        if any(_value(card, figure) is not None for card in cards)
+    ]
+
+
+def are_equal(cards: list[dict[str, Any]]) -> bool:
+    """Whether runs were flown alike: one scorecard, to the last digit."""
+    flown = [
+        {name: value for name, value in card.items() if name not in _NOT_FLOWN} for card in cards
+    ]
+    return all(one == flown[0] for one in flown)
+
+
+EQUAL = 'The runs are equal: their scores are the same to the last digit.'
+
+
+def caveats(cards: list[dict[str, Any]]) -> list[str]:
+    """What to mind when these scores are compared."""
+    found = []
+    times = [card['sim_time_s'] for card in cards]
+    if max(times) != min(times):
+        found.append(
+            f'The runs last from {span(min(times))} to {span(max(times))}: their scores are of '
+            'different times, and each curve ends where its run does.'
+        )
+    for status in ('aborted', 'failed'):
+        stopped = sum(card['status'] == status for card in cards)
+        if stopped:
+            found.append(f'{status.capitalize()} before its end: {stopped} of {len(cards)} runs.')
+    return found
+
+
+def _headline(runs: list[FlownRun]) -> str:
+    """How far off the path each was, in a sentence."""
+    if are_equal([run.card for run in runs]):
+        return EQUAL
+    errors = [
+        (run.label, run.card['cross_track_m']['max_steady'])
+        for run in runs
+        if run.card['cross_track_m']['max_steady'] is not None
+    ]
+    whole = [
+        (run.label, run.card['cross_track_m']['max_run'])
+        for run in runs
+        if run.card['cross_track_m'].get('max_run') is not None
+    ]
+    if not errors:
+        return f'{len(runs)} runs; none has flown long enough for a score in steady glide.'
+    return (
+        f'Largest cross-track error in steady glide: {_ranked(errors)}. In the whole run: '
+        f'{_ranked(whole)}.'
+    )
+
+
+def _ranked(errors: list[tuple[str, float]]) -> str:
+    """Runs by their errors, the smallest first."""
+    return ', '.join(f'{name} {small(error)}' for name, error in sorted(errors, key=itemgetter(1)))
+
+
+def _panels(runs: list[FlownRun]) -> dict[str, list[Panel]]:
+    """Panels by heading."""
+    flown = [(i, run) for i, run in enumerate(runs) if run.traces.ticks]
+
+    def overlaid(panel: str, title: str, caption: str, axis: str, name: str) -> Panel:
+        curves = tuple(
+            Curve(name, run.label, f'run{i % _COLOURS}', dashed=i >= _COLOURS, run=i)
+            for i, run in flown
+            if run.traces.has(name)
+        )
+        return Panel(panel, title, caption, axis, curves, inverted=name == 'depth_m')
+
+    if not flown:
+        return {}
+    return {
+        'Where they went': [
+            Panel('track', 'Tracks', 'From above, to scale.', kind='track'),
+            Panel(
+                'space', 'In three dimensions', 'Drag to turn. Depth is stretched.', kind='space'
+            ),
+        ],
+        'How they flew': [overlaid(*row) for row in _OVERLAID],
+    }
+
+
+def compare_page(runs: list[FlownRun]) -> str:
+    """Text of the page that lays runs over each other."""
+    sections, cards = _panels(runs), [run.card for run in runs]
+    return make_page(
+        'compare.html',
+        page_data(runs, [panel for group in sections.values() for panel in group]),
+        title=f'{len(runs)} runs compared',
+        headline=_headline(runs),
+        keys=[(run.label, i % _COLOURS, i >= _COLOURS) for i, run in enumerate(runs)],
+        scores=score_rows(cards),
+        how_to_read=HOW_TO_READ.format(mark='✓'),
+        notes=caveats(cards),
+        differences=difference_rows(differences(runs)),
+        sections=sections,
+    )

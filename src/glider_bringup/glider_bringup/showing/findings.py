@@ -1,0 +1,112 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What happened in a run, in words: the verdict, and what went wrong."""
+
+from typing import Any
+
+import numpy as np
+
+from glider_bringup.score import STEADY_DEPTH_M
+from glider_bringup.showing.panels import ACTUATORS, limits_of
+from glider_bringup.showing.scorecard import guard_texts
+from glider_bringup.showing.web_page import FlownRun
+from glider_bringup.showing.words import count, small, span, way
+from glider_bringup.traces import Traces
+from glider_model.signals import TICK_S
+
+#: A track is lost if the vehicle is farther off its path than this until the end (m).
+LOST_M = 100.0
+
+
+def verdict(card: dict[str, Any], settle_s: float) -> str:
+    """What happened, in a sentence or two."""
+    if not card['ticks']:
+        return f'It ended before the first tick: {card["reason"] or "no reason is known"}.'
+    time, along = span(card['sim_time_s']), way(card['distance_along_path_m'])
+    depth = f'{card["depth_m"]["max"]:,.0f} m'
+    dives = card['dives']
+    flown = f'{count(dives, "dive")} to {depth}' if dives else f'Down to {depth}'
+    text = f'{flown}, {along} along the path in {time}.'
+    if card['status'] in ('aborted', 'failed'):
+        text = f'Stopped after {time}: {card["reason"]}. Until then: {flown[0].lower()}{flown[1:]}'
+        text += f', {along} along the path.'
+    if card['status'] == 'infeasible':
+        text += ' The current was too strong to hold the course for half of the time or more.'
+    track = card['cross_track_m']
+    if track['max_steady'] is not None:
+        text += (
+            f' In steady glide it stayed within {small(track["max_steady"])} of the path '
+            f'(rms {small(track["rms_steady"])}).'
+        )
+    elif track['max_all'] is not None:
+        text += f' After settling it was at most {small(track["max_all"])} off the path.'
+    else:
+        text += f' It ended within the settling time of {span(settle_s)}, so errors have no score.'
+    if track.get('max_run') is not None:
+        text += f' In the whole run, settling and turns included: {small(track["max_run"])}.'
+    if card.get('end_of_path_m') is not None:
+        text += f' It came up {small(card["end_of_path_m"])} from the end of the path.'
+    return text
+
+
+def lost_since_s(traces: Traces) -> float | None:
+    """Since when the vehicle was off its path by more than `LOST_M` till the end (s), or None.
+
+    Near the surface, where a vehicle drifts with the current, does not count.
+    """
+    curves = traces.curves
+    with np.errstate(invalid='ignore'):
+        deep = np.flatnonzero(curves['depth_m'] > STEADY_DEPTH_M)
+        off = np.fmax(np.abs(curves['cross_track_m']), np.abs(curves['vertical_error_m']))[deep]
+        near = np.flatnonzero(off <= LOST_M)
+    first = near[-1] + 1 if len(near) else 0
+    return float(deep[first]) * traces.spacing_s if first < len(deep) else None
+
+
+def findings(run: FlownRun) -> list[tuple[str, str]]:
+    """What went wrong, and what is worth a look: kind (problem, note, fine) and sentence."""
+    card, traces = run.card, run.traces
+
+    def at(time_s: float | None) -> str:
+        return span(time_s) if time_s else 'the start'
+
+    def share(ticks: int) -> str:
+        return f'{span(ticks * TICK_S)} ({100.0 * ticks / traces.ticks:.2g} % of the time)'
+
+    problems, notes = [], []
+    if card['status'] in ('aborted', 'failed'):
+        ended = 'was aborted' if card['status'] == 'aborted' else 'failed'
+        problems.append(f'The run {ended} at {at(card["sim_time_s"])}: {card["reason"]}.')
+    problems += [f'Control noticed {text}.' for text in guard_texts(card)]
+    if card['messages_lost']:
+        problems.append(f'{card["messages_lost"]:,} messages were lost on the way to the bag.')
+    broken = {
+        name: count
+        for name, count in traces.missing.items()
+        if count and not name.startswith('measured_')
+    }
+    if broken:
+        counts = ', '.join(f'{name} ({count:,})' for name, count in broken.items())
+        problems.append(f'Ticks without a finite value, out of {traces.ticks:,}: {counts}.')
+    since_s = lost_since_s(traces)
+    if since_s is not None:
+        problems.append(
+            f'Track lost: more than {LOST_M:.0f} m off the path from {at(since_s)} to the end.'
+        )
+    ticks = traces.flagged['infeasible']
+    if ticks:
+        text = f'The course could not be held against the estimated current for {share(ticks)}, '
+        text += f'first at {at(traces.first_s("infeasible"))}.'
+        (problems if card['status'] == 'infeasible' else notes).append(text)
+    for actuator, limit in zip(ACTUATORS, limits_of(run), strict=True):
+        ticks = traces.flagged[actuator.flag]
+        if ticks:
+            notes.append(
+                f'{actuator.title} commanded to its limit of {limit:g} {actuator.unit} for '
+                f'{share(ticks)}, first at {at(traces.first_s(actuator.flag))}.'
+            )
+    if not problems:
+        messages = ', and no message was lost' if card['messages_recorded'] else ''
+        fine = f'Nothing went wrong: the run is complete, the course could be held{messages}.'
+        return [('fine', fine), *(('note', text) for text in notes)]
+    return [*(('problem', text) for text in problems), *(('note', text) for text in notes)]

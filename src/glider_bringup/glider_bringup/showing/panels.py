@@ -1,0 +1,249 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The panels of a report: which curves of a run are drawn together, and what is said of them."""
+
+import math
+from typing import NamedTuple
+
+from glider_bringup.showing.web_page import Curve, FlownRun, Panel
+
+
+class Actuator(NamedTuple):
+    """How pages show an actuator."""
+
+    joint: str
+    unit: str
+    title: str
+    caption: str
+
+    @property
+    def position(self) -> str:
+        """Name of the curve of where it is."""
+        return f'{self.joint}_{self.unit}'
+
+    @property
+    def command(self) -> str:
+        """Name of the curve of where it shall go."""
+        return f'{self.joint}_ref_{self.unit}'
+
+    @property
+    def flag(self) -> str:
+        """Name of the curve that says when it is commanded to its limit."""
+        return f'{self.joint}_at_limit'
+
+
+ACTUATORS = (
+    Actuator('buoyancy_engine', 'kg', 'Buoyancy engine', 'Net heaviness, + sinks'),
+    Actuator('pitch_mass', 'mm', 'Pitch mass', 'Position from neutral, + forward: nose down'),
+    Actuator('roll_mass', 'deg', 'Roll mass', 'Rotation, + to starboard; 0 hangs straight down'),
+)
+#: Groups of what the adaptive law has learnt: panel, title, caption, axis, curves.
+_LEARNT = (
+    (
+        'learnt_pitch',
+        'Pitch moment',
+        'Parameters of the pitch moment that the file of the vehicle does not have.',
+        'N m',
+        ('pitch_bias_nm', 'pitch_alpha_nm', 'pitch_speed_nm', 'pitch_damping_nm'),
+    ),
+    (
+        'learnt_roll',
+        'Roll moment',
+        'Parameters of the roll moment that the file of the vehicle does not have.',
+        'N m',
+        ('roll_bias_nm', 'roll_side_force_nm', 'roll_damping_nm'),
+    ),
+    (
+        'learnt_steering',
+        'Steering',
+        'Turn rate over sine of roll at 0.5 m/s, + to starboard: it differs in dive and climb.',
+        'rad/s',
+        ('steering_dive_radps', 'steering_climb_radps'),
+    ),
+    (
+        'learnt_disturbance',
+        'Turn-rate disturbance',
+        'Turn rate that is there without roll.',
+        'rad/s',
+        ('disturbance_dive_radps', 'disturbance_climb_radps'),
+    ),
+    (
+        'learnt_lyapunov',
+        'Lyapunov functions',
+        'V1 of the angles, V2 of angles and rates, without the part of the unknown parameter '
+        'errors. They fall where errors die out, and jump where a turn begins.',
+        'V1, V2 (-)',
+        ('lyapunov_1', 'lyapunov_2'),
+    ),
+)
+_ROLES = ('measured', 'reference', 'third', 'fourth')
+
+
+def limits_of(run: FlownRun) -> tuple[float, float, float]:
+    """Limits of the actuators, in the units of `ACTUATORS`."""
+    vehicle = run.vehicle.params()
+    return vehicle.m_b_max, 1e3 * vehicle.x_p_max, math.degrees(vehicle.mu_max)
+
+
+def _maps() -> list[Panel]:
+    """Plan view and three-dimensional view."""
+    return [
+        Panel(
+            'track',
+            'Track',
+            'From above, to scale. Arrows: where the current flows to. What is zoomed into below '
+            'is drawn bold.',
+            kind='track',
+        ),
+        Panel(
+            'space',
+            'In three dimensions',
+            'Drag to turn. Depth is stretched.',
+            kind='space',
+        ),
+    ]
+
+
+def _flight_panels(run: FlownRun) -> list[Panel]:
+    """How it flew: depth, errors, attitude."""
+    traces = run.traces
+    noisy = traces.has('measured_depth_m')
+
+    def curves(name: str, *others: Curve) -> tuple[Curve, ...]:
+        label = 'true' if noisy else 'flown'
+        measured = (Curve(f'measured_{name}', 'measured, with noise', 'faint'),) if noisy else ()
+        return (*measured, Curve(name, label, 'measured'), *others)
+
+    follows_path = run.scenario.profile.mode == 'path'
+    target = 'virtual target' if follows_path else 'turn flown to'
+    below = Curve('vertical_error_m', 'normal to the path, + below it', 'third')
+    lost = Curve('cross_track_m', 'course cannot be held', 'alert', flag='infeasible')
+    return [
+        Panel(
+            'depth',
+            'Depth',
+            'How deep it was, and the depth it was flying to.',
+            'depth (m)',
+            curves('depth_m', Curve('depth_ref_m', target, 'reference', dashed=True)),
+            inverted=True,
+        ),
+        Panel(
+            'cross_track',
+            'Cross-track error',
+            'Distance from the path, + to starboard of it. A vehicle can hardly steer while it '
+            'turns over between dive and climb: at the inflections.',
+            'off the path (m)',
+            curves('cross_track_m', *((below,) if follows_path else ()), lost),
+            inflections=0,
+        ),
+        Panel(
+            'pitch',
+            'Pitch',
+            'Nose up is positive: a dive has about minus, a climb plus the glide pitch.',
+            'pitch (deg)',
+            curves('pitch_deg', Curve('pitch_ref_deg', 'desired', 'reference', dashed=True)),
+        ),
+        Panel(
+            'heading',
+            'Heading',
+            'Clockwise from north, counted on through 180 deg. It differs from the course of the '
+            'path by the crab angle against the current.',
+            'heading (deg)',
+            curves('heading_deg', Curve('heading_ref_deg', 'desired', 'reference', dashed=True)),
+        ),
+        Panel(
+            'roll',
+            'Roll',
+            'Starboard side down is positive. Control banks to turn; the roll it asks for is its '
+            'own, so there is no reference.',
+            'roll (deg)',
+            curves('roll_deg'),
+        ),
+    ]
+
+
+def _actuator_panels(run: FlownRun) -> list[Panel]:
+    """What the actuators did."""
+    panels = []
+    for one, limit in zip(ACTUATORS, limits_of(run), strict=True):
+        used = run.traces.largest(one.position) / limit
+        panels.append(
+            Panel(
+                one.joint,
+                one.title,
+                f'{one.caption}. Its limits of ±{limit:g} {one.unit} are drawn where it comes '
+                f'near them; the largest use of its range was {100.0 * used:.0f} %.',
+                f'{one.title.lower()} ({one.unit})',
+                (
+                    Curve(one.position, 'position', 'measured'),
+                    Curve(one.command, 'commanded', 'reference', dashed=True),
+                    Curve(one.command, 'at its limit', 'alert', flag=one.flag),
+                ),
+                limits=(-limit, limit),
+            )
+        )
+    return panels
+
+
+def _current_panels(run: FlownRun) -> list[Panel]:
+    """The current, and what guidance believed it to be."""
+    return [
+        Panel(
+            f'current_{axis}',
+            f'Current, {axis}',
+            f'Velocity of the water to the {axis}, and what guidance estimates from its drift.',
+            'current (kn)',
+            (
+                Curve(f'current_{axis}_kn', 'true', 'measured'),
+                Curve(f'estimate_{axis}_kn', 'estimated', 'reference', dashed=True),
+            ),
+        )
+        for axis in ('north', 'east')
+    ]
+
+
+def _learnt_panels(run: FlownRun) -> list[Panel]:
+    """What the adaptive law has learnt; nothing of what stayed zero."""
+    panels = []
+    for panel, title, caption, axis, names in _LEARNT:
+        names = [name for name in names if run.traces.largest(name) > 0.0]
+        curves = tuple(
+            Curve(name, _label(name), role) for name, role in zip(names, _ROLES, strict=False)
+        )
+        if curves:
+            log = panel == 'learnt_lyapunov'
+            panels.append(Panel(panel, title, caption, axis, curves, log=log))
+    return panels
+
+
+def _label(name: str) -> str:
+    """Name of something learnt, without its unit."""
+    for unit in ('_nm', '_radps'):
+        name = name.removesuffix(unit)
+    return name.replace('_', ' ')
+
+
+def _is_there(curve: Curve, run: FlownRun) -> bool:
+    """Whether there is anything to draw of a curve."""
+    return run.traces.has(curve.name) and not (curve.flag and not run.traces.flagged[curve.flag])
+
+
+def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
+    """Panels of a report by heading; without those, and their curves, that have no data."""
+    if not run.traces.ticks:
+        return {}
+    groups = {
+        'Where it went': _maps(),
+        'How it flew': _flight_panels(run),
+        'What the actuators did': _actuator_panels(run),
+        'The current': _current_panels(run),
+        'What control learnt': _learnt_panels(run),
+    }
+    found = {}
+    for heading, panels in groups.items():
+        drawn = (
+            panel._replace(curves=tuple(curve for curve in panel.curves if _is_there(curve, run)))
+            for panel in panels
+        )
+        found[heading] = [panel for panel in drawn if panel.curves or panel.kind != 'time']
+    return {heading: panels for heading, panels in found.items() if panels}

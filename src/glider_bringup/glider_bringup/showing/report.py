@@ -1,0 +1,88 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a run: one web page that says what happened, to someone who was not there."""
+
+from glider_bringup.showing.findings import findings, verdict
+from glider_bringup.showing.panels import report_panels
+from glider_bringup.showing.scorecard import card_rows
+from glider_bringup.showing.web_page import FlownRun, make_page, page_data
+from glider_bringup.showing.words import count, span, way
+from glider_model.files import yaml_text
+
+_BADGES = {
+    'completed': '✓ Completed',
+    'infeasible': '! Infeasible',
+    'aborted': '✕ Aborted',
+    'failed': '✕ Failed',
+}
+
+
+def _number(value: float | None, digits: int, unit: str) -> str:
+    """Number and unit that stay on one line."""
+    return '-' if value is None else f'{value:,.{digits}f}\N{NO-BREAK SPACE}{unit}'
+
+
+def _tiles(run: FlownRun) -> list[tuple[str, str, str]]:
+    """The figures that a person asks for first: name, value, and more about it."""
+    card, depth_m = run.card, run.scenario.profile.depth_m
+    track, pitch = card['cross_track_m'], card['pitch_error_deg']
+    heading, depth = card['heading_fluctuation_deg'], card['depth_m']
+    beyond = f'{_number(depth["overshoot"], 1, "m")} beyond {_number(depth_m, 0, "m")}'
+    return [
+        ('simulated time', span(card['sim_time_s']), f'{card["ticks"]:,} ticks of 0.1 s'),
+        ('along the path', way(card['distance_along_path_m']), count(card['dives'], 'dive')),
+        (
+            'cross-track, steady',
+            _number(track['max_steady'], 2, 'm'),
+            f'largest; rms {_number(track["rms_steady"], 3, "m")}; '
+            f'whole run {_number(track.get("max_run"), 2, "m")}',
+        ),
+        (
+            'deepest point',
+            _number(depth['max'], 1, 'm'),
+            beyond if run.scenario.profile.mode == 'profile' else '',
+        ),
+        (
+            'pitch error, steady',
+            _number(pitch['rms_steady'], 2, 'deg'),
+            f'rms; largest {_number(pitch["max_steady"], 2, "deg")}',
+        ),
+        (
+            'heading, steady',
+            _number(heading['rms_steady'], 3, 'deg'),
+            f'fluctuation, rms; largest {_number(heading["max_steady"], 3, "deg")}',
+        ),
+    ]
+
+
+def _what_was_set(run: FlownRun) -> str:
+    """Fields of the scenario that are not as they would be by default, as YAML."""
+    told = {'name', 'vehicle', 'description'}
+    values = run.scenario.model_dump(mode='json', exclude_defaults=True, exclude=told)
+    named = {'name': run.scenario.name, 'vehicle': run.card['vehicle']}
+    return yaml_text({**named, **values})
+
+
+def report_page(run: FlownRun) -> str:
+    """Text of the report of a run."""
+    card, rules = run.card, run.rules
+    sections = report_panels(run)
+    return make_page(
+        'report.html',
+        page_data([run], [panel for group in sections.values() for panel in group]),
+        title=f'{run.scenario.name}: {card["status"]}',
+        scenario=run.scenario,
+        status=card['status'],
+        badge=_BADGES[card['status']],
+        verdict=verdict(card, rules.settle_s),
+        tiles=_tiles(run),
+        findings=findings(run),
+        sections=sections,
+        card=card_rows(card),
+        settle=span(rules.settle_s),
+        margin=span(rules.margin_s),
+        steady_depth_m=f'{rules.steady_depth_m:.3g}',
+        bucket_s=f'{2.0 * run.traces.spacing_s:g}',
+        was_set=_what_was_set(run),
+        as_flown=run.as_flown,
+    )

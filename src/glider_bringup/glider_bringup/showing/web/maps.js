@@ -1,0 +1,139 @@
+// Where it went: from above, in three dimensions, or from the side.
+
+/** Zoomed-in part of a track, as indices of its samples. */
+function visible(run, from, to) {
+  const last = run.arrays.track_north_m.length - 1;
+  const begin = Math.max(0, Math.min(last, Math.floor(from / run.spacing / 2)));
+  return [begin, Math.max(begin, Math.min(last, Math.ceil(to / run.spacing / 2)))];
+}
+
+const spread = ([low, high], span) => [(low + high - span) / 2, (low + high + span) / 2];
+
+/** What both maps show: scale, unit, and the extent of what was flown. */
+function mapFrame() {
+  const east = extent(page.runs.map((run) => run.arrays.track_east_m));
+  const north = extent(page.runs.map((run) => run.arrays.track_north_m));
+  const depth = extent(page.runs.map((run) => run.arrays.track_depth_m));
+  const span = Math.max(east[1] - east[0], north[1] - north[0], 20);
+  const [scale, unit] = span > 2000 ? [1e-3, 'km'] : [1, 'm'];
+  return { east, north, depth, span, scale, unit };
+}
+
+function pathTrace(run, scale, more) {
+  return {
+    x: run.path.map((p) => p[1] * scale), y: run.path.map((p) => p[0] * scale), mode: 'lines',
+    line: { color: values(page.runs.length > 1 ? '--limit' : '--reference'), width: 2, dash: 'dash' },
+    name: 'desired path', ...more,
+  };
+}
+
+/** Arrows along a track, with the direction and the speed of the water. */
+function currentTrace(run, frame) {
+  const { track_east_m: e, track_north_m: n, water_east_kn: we, water_north_kn: wn } = run.arrays;
+  const fastest = we.reduce((most, v, i) => Math.max(most, Math.hypot(v, wn[i]) || 0), 0);
+  const x = [];
+  const y = [];
+  const size = [];
+  const length = (0.09 * frame.span) / fastest;
+  for (let k = 0; k < 12 && fastest > 0; k += 1) {
+    const i = Math.round((k * (e.length - 1)) / 11);
+    x.push(e[i] * frame.scale, (e[i] + we[i] * length) * frame.scale, null);
+    y.push(n[i] * frame.scale, (n[i] + wn[i] * length) * frame.scale, null);
+    size.push(0, 9, 0);
+  }
+  return {
+    x, y, mode: 'lines+markers', name: `current, up to ${fastest.toFixed(2)} kn`, hoverinfo: 'skip',
+    line: { color: values('--third'), width: 1.6 },
+    marker: { symbol: 'arrow', angleref: 'previous', size, opacity: 1, color: values('--third') },
+  };
+}
+
+const trackColour = (i) => values(page.runs.length > 1 ? `--run${i % 8}` : '--measured');
+const trackName = (run) => (page.runs.length > 1 ? run.label : 'track');
+const isZoomed = (from, to) => from > 0 || to < page.duration;
+
+function drawTrack(panel, element, from, to) {
+  const frame = mapFrame();
+  const traces = [];
+  page.runs.forEach((run, i) => {
+    if (run.own_path) {
+      traces.push(pathTrace(run, frame.scale, { showlegend: i === 0, hoverinfo: 'skip' }));
+    }
+  });
+  if (page.runs.length === 1) traces.push(currentTrace(page.runs[0], frame));
+  page.runs.forEach((run, i) => {
+    const { track_east_m: e, track_north_m: n } = run.arrays;
+    traces.push({
+      x: pick(e, 4000, frame.scale), y: pick(n, 4000, frame.scale), mode: 'lines', name: trackName(run),
+      line: { color: trackColour(i), width: lineWidth(i) + 0.4 },
+      hovertemplate: `east %{x:.3~f} ${frame.unit}, north %{y:.3~f} ${frame.unit}`,
+    });
+    const [begin, end] = visible(run, from, to);
+    traces.push({
+      x: isZoomed(from, to) ? pick(e, 2000, frame.scale, begin, end) : [],
+      y: isZoomed(from, to) ? pick(n, 2000, frame.scale, begin, end) : [],
+      mode: 'lines', name: 'zoomed in', hoverinfo: 'skip', showlegend: i === 0 && isZoomed(from, to),
+      line: { color: trackColour(i), width: 7 }, opacity: 0.5,
+    });
+    traces.push({
+      x: pick(e.slice(0, 1), 1, frame.scale), y: pick(n.slice(0, 1), 1, frame.scale),
+      mode: 'markers', name: 'start', showlegend: i === 0, hoverinfo: 'name',
+      marker: { color: trackColour(i), size: 10, line: { color: values('--card'), width: 2 } },
+    });
+  });
+  const padded = 1.2 * frame.span * frame.scale;
+  const centre = ([low, high]) => [low * frame.scale, high * frame.scale];
+  return Plotly.react(element, traces, {
+    ...look(),
+    margin: { l: 60, r: 10, t: 46, b: 40 },
+    showlegend: true,
+    legend: { orientation: 'h', x: 0, y: 1.01, yanchor: 'bottom' },
+    hovermode: 'closest',
+    dragmode: 'pan',
+    xaxis: axis(`east (${frame.unit})`, {
+      range: spread(centre(frame.east), padded), nticks: 6, scaleanchor: 'y', constrain: 'range',
+    }),
+    yaxis: axis(`north (${frame.unit})`, { range: spread(centre(frame.north), padded), nticks: 8 }),
+  }, { responsive: true, displayModeBar: false, scrollZoom: false });
+}
+
+function drawSpace(panel, element) {
+  const frame = mapFrame();
+  const traces = [];
+  const clip = (p) => p[1] >= frame.east[0] - frame.span && p[1] <= frame.east[1] + frame.span
+    && p[0] >= frame.north[0] - 0.05 * frame.span && p[0] <= frame.north[1] + 0.05 * frame.span;
+  page.runs.forEach((run, i) => {
+    const { track_east_m: e, track_north_m: n, track_depth_m: d } = run.arrays;
+    const path = run.path.filter(clip);
+    traces.push({
+      ...pathTrace({ path }, frame.scale), type: 'scatter3d', z: path.map((p) => p[2]),
+      hoverinfo: 'skip', showlegend: i === 0, visible: run.own_path,
+    });
+    traces.push({
+      type: 'scatter3d', mode: 'lines', name: trackName(run), line: { color: trackColour(i), width: 4 },
+      x: pick(e, 2500, frame.scale), y: pick(n, 2500, frame.scale), z: pick(d, 2500, 1),
+      hovertemplate: `east %{x:.3~f}, north %{y:.3~f} ${frame.unit}, depth %{z:.1f} m`,
+    });
+  });
+  // the scales of east and north are one; a thin map is widened, depth is stretched
+  const width = Math.max(frame.east[1] - frame.east[0], 0.45 * frame.span) * 1.05;
+  const height = Math.max(frame.north[1] - frame.north[0], 0.45 * frame.span) * 1.05;
+  const side = 1.25 / Math.max(width, height);
+  const km = ([low, high], span) => spread([low * frame.scale, high * frame.scale], span * frame.scale);
+  const far = element.clientWidth < 480 ? 1.5 : 1.15;
+  const paint = { backgroundcolor: values('--card'), showbackground: false };
+  return Plotly.react(element, traces, {
+    ...look(),
+    margin: { l: 0, r: 0, t: 0, b: 0 },
+    showlegend: true,
+    legend: { orientation: 'h', x: 0, y: 1, yanchor: 'top' },
+    scene: {
+      aspectmode: 'manual',
+      aspectratio: { x: width * side, y: height * side, z: 0.75 },
+      camera: { eye: { x: 1.5 * far, y: -1.35 * far, z: 0.8 * far }, center: { x: 0, y: 0, z: -0.1 } },
+      xaxis: axis(`east (${frame.unit})`, { ...paint, range: km(frame.east, width), nticks: 5 }),
+      yaxis: axis(`north (${frame.unit})`, { ...paint, range: km(frame.north, height), nticks: 5 }),
+      zaxis: axis('depth (m)', { ...paint, range: [Math.max(frame.depth[1], 10) * 1.02, 0], nticks: 5 }),
+    },
+  }, { responsive: true, displayModeBar: false });
+}

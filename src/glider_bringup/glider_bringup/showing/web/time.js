@@ -1,0 +1,84 @@
+// How panels look, and curves over time.
+
+const values = (tag) => getComputedStyle(document.documentElement).getPropertyValue(tag).trim();
+
+function look() {
+  const ink = values('--ink');
+  return {
+    paper_bgcolor: 'rgba(0,0,0,0)',
+    plot_bgcolor: 'rgba(0,0,0,0)',
+    font: { family: getComputedStyle(document.body).fontFamily, size: 13, color: ink },
+    hoverlabel: { bgcolor: values('--card'), bordercolor: values('--line'), font: { color: ink } },
+    legend: { orientation: 'h', x: 1, xanchor: 'right', y: 1.02, yanchor: 'bottom' },
+  };
+}
+
+const axis = (title, more) => ({
+  title: { text: title, standoff: 6, font: { size: 12 } },
+  exponentformat: 'power',
+  gridcolor: values('--grid'),
+  linecolor: values('--line'),
+  zerolinecolor: values('--line'),
+  automargin: true,
+  ...more,
+});
+
+function curveData(panel, curve, from, to, width) {
+  return thin(page.runs[curve.run], curve.name, curve.flag, from, to, width);
+}
+
+/** Dotted vertical lines at the inflections, over the whole height. */
+function inflectionTrace(run) {
+  const x = [];
+  const y = [];
+  for (const time of run.inflections) {
+    x.push(time / page.unit.seconds, time / page.unit.seconds, null);
+    y.push(0, 1, null);
+  }
+  return {
+    x, y, yaxis: 'y2', mode: 'lines', name: 'inflection', hoverinfo: 'skip',
+    line: { color: values('--limit'), width: 1, dash: 'dot' },
+  };
+}
+
+/** Of runs that lie over each other, the first is broadest, so that all can be seen. */
+const lineWidth = (run) => (page.runs.length > 1 ? Math.max(1.4, 3.2 - 0.9 * run) : 1.6);
+
+function drawTime(panel, element, from, to) {
+  const traces = panel.curves.map((curve) => ({
+    ...curveData(panel, curve, from, to, element.clientWidth),
+    mode: 'lines',
+    name: curve.label,
+    connectgaps: false,
+    hoverinfo: curve.flag ? 'skip' : 'all',
+    line: {
+      color: values(`--${curve.role}`),
+      width: curve.flag ? 6 : lineWidth(curve.run),
+      dash: curve.dashed ? 'dash' : 'solid',
+    },
+    opacity: curve.flag ? 0.75 : 1,
+  }));
+  const reach = extent(traces.map((trace) => trace.y.map(Math.abs)))[1];
+  const limits = panel.limits.filter((value) => reach > 0.5 * Math.abs(value)).map((value) => ({
+    type: 'line', xref: 'paper', x0: 0, x1: 1, y0: value, y1: value, layer: 'below',
+    line: { color: values('--limit'), width: 1.5, dash: 'longdash' },
+  }));
+  if (panel.inflections >= 0) traces.push(inflectionTrace(page.runs[panel.inflections]));
+  return Plotly.react(element, traces, {
+    ...look(),
+    margin: { l: 64, r: 14, t: 24, b: 38 },
+    showlegend: true,
+    hovermode: 'x unified',
+    dragmode: 'zoom',
+    shapes: limits,
+    xaxis: axis(`time (${page.unit.name})`, {
+      range: [from / page.unit.seconds, to / page.unit.seconds], hoverformat: '.4~f',
+    }),
+    yaxis: axis(panel.axis, {
+      fixedrange: true, automargin: false, nticks: 6, type: panel.log ? 'log' : 'linear',
+      autorange: panel.inverted ? 'reversed' : true,
+      ...(panel.log ? { dtick: 3 } : {}),
+    }),
+    yaxis2: { overlaying: 'y', range: [0, 1], visible: false, fixedrange: true },
+  }, { responsive: true, displayModeBar: false });
+}
