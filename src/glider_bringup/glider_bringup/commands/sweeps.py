@@ -127,11 +127,12 @@ def draw(
     more dimension, such as stability_map.
     """
     from glider_bringup.showing import stability_map as study
+    from glider_bringup.showing.map_figure import draw_map
 
     stability = study.load_map(file)
     image = out or file.with_suffix('.png')
     with messages.status('drawing'):
-        study.draw_map(stability, image)
+        draw_map(stability, image)
     rows = study.shares(stability)
     if as_json:
         print(
@@ -144,7 +145,13 @@ def draw(
     for heading in ('share of the cells', *(row['panel'] or 'flights' for row in rows)):
         table.add_column(heading)
     for name in [name for name in rows[0] if name != 'panel']:
-        shown = (f'{row[name]:.1%}' if name != 'cells' else str(row[name]) for row in rows)
-        table.add_row(name.replace('_', ' '), *shown)
+        table.add_row(name.replace('_', ' '), *(_share(name, row[name]) for row in rows))
     output.print(table)
     output.print(f'drawn: {image}', soft_wrap=True)
+
+
+def _share(name: str, value: float | None) -> str:
+    """Text of a row of shares: a share, a number of cells, or a dash where there is none."""
+    if value is None:
+        return '-'
+    return str(value) if name == 'cells' else f'{value:.1%}'

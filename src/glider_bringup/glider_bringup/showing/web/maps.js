@@ -84,7 +84,7 @@ function drawTrack(panel, element, from, to) {
   const padded = 1.2 * frame.span * frame.scale;
   const centre = ([low, high]) => [low * frame.scale, high * frame.scale];
   return Plotly.react(element, traces, {
-    ...look(),
+    ...look(element),
     margin: { l: 60, r: 10, t: 46, b: 40 },
     showlegend: true,
     legend: { orientation: 'h', x: 0, y: 1.01, yanchor: 'bottom' },
@@ -94,10 +94,14 @@ function drawTrack(panel, element, from, to) {
       range: spread(centre(frame.east), padded), nticks: 6, scaleanchor: 'y', constrain: 'range',
     }),
     yaxis: axis(`north (${frame.unit})`, { range: spread(centre(frame.north), padded), nticks: 8 }),
-  }, { responsive: true, displayModeBar: false, scrollZoom: false });
+  }, { displayModeBar: false, scrollZoom: false });
 }
 
-function drawSpace(panel, element) {
+/** How far away the eye starts: everything with its labels is in view. */
+const farOf = (element) => (isNarrow(element) ? 1.5 : 1.15);
+
+/** Traces and layout of the view in three dimensions, turned as the element has it. */
+function spaceFigure(panel, element) {
   const frame = mapFrame();
   const traces = [];
   const clip = (p) => p[1] >= frame.east[0] - frame.span && p[1] <= frame.east[1] + frame.span
@@ -120,20 +124,78 @@ function drawSpace(panel, element) {
   const height = Math.max(frame.north[1] - frame.north[0], 0.45 * frame.span) * 1.05;
   const side = 1.25 / Math.max(width, height);
   const km = ([low, high], span) => spread([low * frame.scale, high * frame.scale], span * frame.scale);
-  const far = element.clientWidth < 480 ? 1.5 : 1.15;
+  const far = farOf(element);
   const paint = { backgroundcolor: values('--card'), showbackground: false };
-  return Plotly.react(element, traces, {
-    ...look(),
+  const camera = element.layout?.scene.camera || {
+    eye: { x: 1.5 * far, y: -1.35 * far, z: 0.8 * far }, center: { x: 0, y: 0, z: -0.1 },
+  };
+  const layout = {
+    ...look(element),
     margin: { l: 0, r: 0, t: 0, b: 0 },
     showlegend: true,
     legend: { orientation: 'h', x: 0, y: 1, yanchor: 'top' },
     scene: {
       aspectmode: 'manual',
       aspectratio: { x: width * side, y: height * side, z: 0.75 },
-      camera: { eye: { x: 1.5 * far, y: -1.35 * far, z: 0.8 * far }, center: { x: 0, y: 0, z: -0.1 } },
+      camera,
       xaxis: axis(`east (${frame.unit})`, { ...paint, range: km(frame.east, width), nticks: 5 }),
       yaxis: axis(`north (${frame.unit})`, { ...paint, range: km(frame.north, height), nticks: 5 }),
       zaxis: axis('depth (m)', { ...paint, range: [Math.max(frame.depth[1], 10) * 1.02, 0], nticks: 5 }),
     },
-  }, { responsive: true, displayModeBar: false });
+  };
+  return { data: traces, layout };
+}
+
+function drawSpace(panel, element) {
+  const { data, layout } = spaceFigure(panel, element);
+  return Plotly.react(element, data, layout, { displayModeBar: false });
+}
+
+// ------------------------------------------------------------------------------- from the side
+
+/** Whether the browser can draw in three dimensions; plotly asks for the same. */
+function hasWebgl() {
+  const context = document.createElement('canvas').getContext('webgl');
+  if (context) context.getExtension('WEBGL_lose_context')?.loseContext();
+  return Boolean(context);
+}
+
+/** Make a view in three dimensions one from the side. */
+function seenFromTheSide(panel) {
+  if (panel.kind !== 'space') return;
+  panel.kind = 'side';
+  const figure = document.getElementById(panel.id).parentElement;
+  figure.querySelector('h3').textContent = 'From the side';
+  figure.querySelector('figcaption').textContent = 'Depth over the distance flown; depth is '
+    + 'stretched. This browser has no WebGL for the view in three dimensions.';
+}
+
+/** Horizontal distance flown until each sample (m). */
+function distances(run) {
+  const { track_east_m: e, track_north_m: n } = run.arrays;
+  const flown = new Float64Array(e.length);
+  for (let i = 1; i < e.length; i += 1) {
+    flown[i] = flown[i - 1] + (Math.hypot(e[i] - e[i - 1], n[i] - n[i - 1]) || 0);
+  }
+  return flown;
+}
+
+function drawSide(panel, element) {
+  const flown = page.runs.map(distances);
+  const [scale, unit] = extent(flown)[1] > 2000 ? [1e-3, 'km'] : [1, 'm'];
+  const traces = page.runs.map((run, i) => ({
+    x: pick(flown[i], 4000, scale), y: pick(run.arrays.track_depth_m, 4000, 1),
+    mode: 'lines', name: trackName(run), line: { color: trackColour(i), width: lineWidth(i) + 0.4 },
+    hovertemplate: `%{x:.3~f} ${unit}, depth %{y:.1f} m`,
+  }));
+  return Plotly.react(element, traces, {
+    ...look(element),
+    margin: { l: 60, r: 10, t: 46, b: 40 },
+    showlegend: true,
+    legend: { orientation: 'h', x: 0, y: 1.01, yanchor: 'bottom' },
+    hovermode: 'closest',
+    dragmode: false,
+    xaxis: axis(`distance flown (${unit})`, { fixedrange: true, nticks: 6 }),
+    yaxis: axis('depth (m)', { fixedrange: true, nticks: 8, autorange: 'reversed' }),
+  }, { displayModeBar: false });
 }

@@ -1,35 +1,51 @@
-// Draws the panels, zooms into all of them, and puts them on paper.
+// Draws the panels, zooms into all of them, fits them to their places, and puts them on paper.
 
-const DRAW = { time: drawTime, track: drawTrack, space: drawSpace };
+const DRAW = { time: drawTime, track: drawTrack, space: drawSpace, side: drawSide };
+const root = document.documentElement;
+/** How far away the eye is on paper, where a view is half a page wide; see farOf. */
+const FAR_ON_PAPER = 1.65;
+/** What is shown (s); how wide each panel was drawn; count of the calls to show. */
+let shown = [0, page.duration];
+const widths = new Map();
 let turn = 0;
+
+const place = (panel) => document.getElementById(panel.id);
 
 /** Number without useless digits, with its unit of time. */
 const clock = (seconds) => `${Number((seconds / page.unit.seconds).toFixed(4))} ${page.unit.name}`;
 
 function tell(from, to) {
-  const zoomed = isZoomed(from, to);
   document.getElementById('shown').textContent = `${clock(from)} to ${clock(to)}`;
-  document.getElementById('whole').disabled = !zoomed;
+  document.getElementById('whole').disabled = !isZoomed(from, to);
 }
 
-/** Show a span of time in every panel, those in view first; a newer call ends an older one. */
+function draw(panel) {
+  widths.set(panel.id, place(panel).clientWidth);
+  return DRAW[panel.kind](panel, place(panel), ...shown);
+}
+
+/**
+ * Show a span of time in every panel, those in view at once; a newer call ends an older one.
+ * The view in three dimensions shows the whole run; it is drawn again only with everything.
+ */
 async function show(from, to, everything = false) {
   turn += 1;
   const mine = turn;
-  document.documentElement.dataset.state = 'busy';
+  shown = [from, to];
+  root.dataset.state = 'busy';
   tell(from, to);
   const inView = (panel) => {
-    const box = document.getElementById(panel.id).getBoundingClientRect();
+    const box = place(panel).getBoundingClientRect();
     return box.bottom > 0 && box.top < window.innerHeight;
   };
-  const order = [...page.panels].sort((a, b) => inView(b) - inView(a));
-  for (const panel of order) {
-    if (panel.kind === 'space' && !everything) continue;
-    await new Promise((resolve) => { setTimeout(resolve); });
+  const panels = page.panels.filter(({ kind }) => everything || !['space', 'side'].includes(kind));
+  const near = new Set(panels.filter(inView));
+  for (const panel of [...near, ...panels.filter((one) => !near.has(one))]) {
+    if (!near.has(panel)) await new Promise((resolve) => { setTimeout(resolve); });
     if (mine !== turn) return;
-    await DRAW[panel.kind](panel, document.getElementById(panel.id), from, to);
+    await draw(panel);
   }
-  document.documentElement.dataset.state = 'ready';
+  if (mine === turn) root.dataset.state = 'ready';
 }
 
 function onZoom(event) {
@@ -42,22 +58,89 @@ function onZoom(event) {
   if (to > from) show(from, to);
 }
 
+// ------------------------------------------------------------------------------- sizes, paper
+
+/** Draw again what has become wider or narrower. */
+function onResize() {
+  const changed = page.panels.some((panel) => place(panel).clientWidth !== widths.get(panel.id));
+  if (changed && !root.classList.contains('paper')) show(...shown, true);
+}
+
+/**
+ * Take a picture of a view in three dimensions, as it is turned now, in the colours of paper:
+ * browsers print what WebGL has drawn as a blank, and a picture takes too long once they print.
+ */
+async function takePicture(panel) {
+  const figure = place(panel).parentElement;
+  const isPaper = root.classList.contains('paper');
+  const farther = FAR_ON_PAPER / farOf(place(panel));
+  const isPictured = figure.classList.contains('pictured');
+  figure.classList.remove('pictured');
+  root.classList.add('paper');
+  const { data, layout } = spaceFigure(panel, place(panel));
+  root.classList.toggle('paper', isPaper);
+  figure.classList.toggle('pictured', isPictured);
+  const { eye, ...camera } = layout.scene.camera;
+  layout.scene.camera = {
+    ...camera, eye: { x: farther * eye.x, y: farther * eye.y, z: farther * eye.z },
+  };
+  const image = new Image();
+  image.alt = panel.title;
+  const { width, height } = layout;
+  image.src = await Plotly.toImage({ data, layout }, { format: 'png', width, height, scale: 3 });
+  await image.decode();
+  figure.querySelector('img')?.remove();
+  figure.append(image);
+  figure.classList.add('pictured');
+}
+
+/** Draw for a page of paper: its width, dark on white. It has to be done when this returns. */
+function beforePrint() {
+  turn += 1;
+  root.classList.add('paper');
+  for (const panel of page.panels) {
+    if (!place(panel).closest('.pictured')) draw(panel);
+  }
+}
+
+function afterPrint() {
+  root.classList.remove('paper');
+  show(...shown, true);
+}
+
+// ------------------------------------------------------------------------------- start
+
+function listen() {
+  const whole = () => { show(0, page.duration); return false; };
+  for (const panel of page.panels) {
+    if (panel.kind === 'time') {
+      place(panel).on('plotly_relayout', onZoom);
+      place(panel).on('plotly_doubleclick', whole);
+    }
+    if (panel.kind === 'space') place(panel).on('plotly_relayout', () => takePicture(panel));
+  }
+  document.getElementById('whole').addEventListener('click', whole);
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+    show(...shown, true);
+  });
+  const observer = new ResizeObserver(onResize);
+  for (const panel of page.panels) observer.observe(place(panel));
+  window.addEventListener('beforeprint', beforePrint);
+  window.addEventListener('afterprint', afterPrint);
+}
+
 async function main() {
   const script = document.createElement('script');
   script.textContent = new TextDecoder().decode(
     await unpack(document.getElementById('library').textContent));
   document.head.append(script);
   for (const run of page.runs) run.arrays = await unpackArrays(run.packed);
+  if (!hasWebgl()) page.panels.forEach(seenFromTheSide);
   await show(0, page.duration, true);
-  for (const panel of page.panels.filter((one) => one.kind === 'time')) {
-    const element = document.getElementById(panel.id);
-    element.on('plotly_relayout', onZoom);
-    element.on('plotly_doubleclick', () => { show(0, page.duration); return false; });
-  }
-  document.getElementById('whole').addEventListener('click', () => show(0, page.duration));
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
-    show(0, page.duration, true);
-  });
+  root.dataset.state = 'busy';
+  listen();
+  for (const panel of page.panels.filter(({ kind }) => kind === 'space')) await takePicture(panel);
+  root.dataset.state = 'ready';
 }
 
 if (page.panels.length) {
@@ -68,5 +151,5 @@ if (page.panels.length) {
     main();
   }
 } else {
-  document.documentElement.dataset.state = 'ready';
+  root.dataset.state = 'ready';
 }

@@ -2,12 +2,18 @@
 
 const values = (tag) => getComputedStyle(document.documentElement).getPropertyValue(tag).trim();
 
-function look() {
+const isNarrow = (element) => element.clientWidth < 480;
+
+/** Colours, fonts and size that panels have in common; the size is that of their place. */
+function look(element) {
   const ink = values('--ink');
+  const size = isNarrow(element) ? 11 : 13;
   return {
+    width: element.clientWidth,
+    height: element.clientHeight,
     paper_bgcolor: 'rgba(0,0,0,0)',
     plot_bgcolor: 'rgba(0,0,0,0)',
-    font: { family: getComputedStyle(document.body).fontFamily, size: 13, color: ink },
+    font: { family: getComputedStyle(document.body).fontFamily, size, color: ink },
     hoverlabel: { bgcolor: values('--card'), bordercolor: values('--line'), font: { color: ink } },
     legend: { orientation: 'h', x: 1, xanchor: 'right', y: 1.02, yanchor: 'bottom' },
   };
@@ -15,7 +21,7 @@ function look() {
 
 const axis = (title, more) => ({
   title: { text: title, standoff: 6, font: { size: 12 } },
-  exponentformat: 'power',
+  exponentformat: 'e',
   gridcolor: values('--grid'),
   linecolor: values('--line'),
   zerolinecolor: values('--line'),
@@ -65,8 +71,8 @@ function drawTime(panel, element, from, to) {
   }));
   if (panel.inflections >= 0) traces.push(inflectionTrace(page.runs[panel.inflections]));
   return Plotly.react(element, traces, {
-    ...look(),
-    margin: { l: 64, r: 14, t: 24, b: 38 },
+    ...look(element),
+    margin: { l: isNarrow(element) ? 64 : 76, r: 14, t: 24, b: 38 },
     showlegend: true,
     hovermode: 'x unified',
     dragmode: 'zoom',
@@ -77,8 +83,8 @@ function drawTime(panel, element, from, to) {
     yaxis: axis(panel.axis, {
       fixedrange: true, automargin: false, nticks: 6, type: panel.log ? 'log' : 'linear',
       autorange: panel.inverted ? 'reversed' : true,
-      ...(panel.log ? { dtick: 3 } : {}),
+      ...(panel.log ? { dtick: 3, exponentformat: 'power' } : {}),
     }),
     yaxis2: { overlaying: 'y', range: [0, 1], visible: false, fixedrange: true },
-  }, { responsive: true, displayModeBar: false });
+  }, { displayModeBar: false });
 }
