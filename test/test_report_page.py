@@ -36,7 +36,7 @@ DRAWN = """() => page.panels.map(({ id, kind }) => {
   const box = element.querySelector('.main-svg, canvas').getBoundingClientRect();
   const layout = element._fullLayout;
   return {
-    id, kind, width: box.width, height: box.height,
+    id, kind, width: box.width, height: box.height, place: element.clientWidth,
     ranges: kind === 'time' ? layout.xaxis.range : null,
     lines: element.querySelectorAll('.scatterlayer path.js-line').length,
     canvas: element.querySelectorAll('canvas').length,
@@ -44,6 +44,59 @@ DRAWN = """() => page.panels.map(({ id, kind }) => {
       name: trace.name, x: Array.from(trace.x), y: Array.from(trace.y), z: trace.z || null,
     })),
   };
+})"""
+
+
+#: Whether every chart is as wide as its place.
+FILLED = """() => page.panels.every(({ id }) => {
+  const element = document.getElementById(id);
+  const box = element.querySelector('.main-svg').getBoundingClientRect();
+  return Math.abs(box.width - element.clientWidth) < 1;
+})"""
+#: Width of A4, and of the margin on either side (px of CSS).
+A4_PX, MARGIN_PX = 210.0 / 25.4 * 96.0, 12.0 / 25.4 * 96.0
+#: Note what is about to be printed, after the page itself has made ready for it.
+NOTE_WHAT_IS_PRINTED = """() => window.addEventListener('beforeprint', () => {
+  const figures = [...document.querySelectorAll('figure')];
+  const boxes = figures.map((figure) => figure.getBoundingClientRect());
+  const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom
+    && b.top < a.bottom;
+  const space = document.getElementById('space').parentElement;
+  const image = space.querySelector('img');
+  const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight);
+  const context = canvas.getContext('2d');
+  context.drawImage(image, 0, 0);
+  const pixels = context.getImageData(0, 0, canvas.width, canvas.height).data;
+  let coloured = 0;
+  for (let i = 0; i < pixels.length; i += 4) {
+    const [red, green, blue, opaque] = pixels.slice(i, i + 4);
+    const grey = Math.max(red, green, blue) - Math.min(red, green, blue) < 60;
+    if (opaque > 200 && !grey) coloured += 1;
+  }
+  window.printed = {
+    panels: page.panels.map(({ id, kind }) => {
+      const element = document.getElementById(id);
+      const drawn = kind === 'space' ? image : element.querySelector('.main-svg');
+      return {
+        id, width: drawn.getBoundingClientRect().width,
+        place: kind === 'space' ? drawn.clientWidth : element.clientWidth,
+        ink: kind === 'space' ? '#000000' : element._fullLayout.font.color,
+      };
+    }),
+    overlaps: figures.flatMap((_, i) => figures.slice(i + 1).map((_, j) => [i, i + 1 + j]))
+      .filter(([i, j]) => meet(boxes[i], boxes[j])),
+    picture: {
+      coloured,
+      shown: [...space.querySelectorAll('img, .plot')].filter((one) => one.clientHeight)
+        .map((one) => one.tagName),
+    },
+  };
+})"""
+
+#: Where pages of paper may end, for what a selector names.
+STYLES = """(names) => [...document.querySelectorAll(names)].map((one) => {
+  const { breakAfter, breakInside } = getComputedStyle(one);
+  return [breakAfter, breakInside];
 })"""
 
 
@@ -62,11 +115,16 @@ def open_page(browser, file, **options):
     said, asked = [], []
     page.on('console', lambda message: said.append(message.text) if _is_bad(message) else None)
     page.on('pageerror', lambda error: said.append(str(error)))
-    page.on('request', lambda request: asked.append(request.url))
+    page.on('request', lambda request: asked.append(request.url) if _leaves(request) else None)
     page.set_default_timeout(DEADLINE_MS)
     page.goto(file.as_uri())
     page.wait_for_function(IS_READY)
     return page, said, asked
+
+
+def _leaves(request):
+    """Tell whether a request asks for something outside of the page's own memory."""
+    return not request.url.startswith('blob:')
 
 
 def _is_bad(message):
@@ -77,9 +135,14 @@ def _is_bad(message):
 # ---------------------------------------------------------------------------------- fixtures
 
 
+def browser_executable():
+    """Path of Chromium, or None."""
+    return next(filter(None, map(shutil.which, BROWSERS)), None)
+
+
 @pytest.fixture(scope='module')
 def browser():
-    executable = next(filter(None, map(shutil.which, BROWSERS)), None)
+    executable = browser_executable()
     if executable is None:
         missing = 'no Chromium here; on Debian or Ubuntu: apt-get install chromium'
         if os.environ.get('CI') == 'true':
@@ -122,6 +185,7 @@ def check_drawn(panels):
             track = panel['traces'][-1]
             assert min(map(len, map(finite, (track['x'], track['y'], track['z'])))) > 1
             continue
+        assert panel['width'] == pytest.approx(panel['place'], abs=1.0), 'it fills its place'
         drawn = [trace for trace in panel['traces'] if len(finite(trace['y'])) > 1]
         assert drawn, panel['id']
         assert panel['lines'] >= len(drawn) - (panel['kind'] == 'track'), panel['id']
@@ -238,12 +302,89 @@ def test_report_of_a_run_over_nodes_in_a_narrow_dark_window(browser, over_nodes)
         viewport={'width': 390, 'height': 844},
         color_scheme='dark',
     )
-    check_drawn(page.evaluate(DRAWN))
+    panels = page.evaluate(DRAWN)
+    check_drawn(panels)
+    assert min(panel['place'] for panel in panels) > 340
     assert page.evaluate('document.documentElement.scrollWidth') == 390, 'nothing sticks out'
     ink = page.evaluate("document.getElementById('depth')._fullLayout.font.color")
     assert int(ink[1:3], 16) > 0xC0, 'light ink on a dark page'
     assert (said, len(asked)) == ([], 1)
     page.close()
+
+
+def test_charts_follow_the_window(browser, default_run):
+    """Made narrow while zoomed in: each chart is as wide as its place, and the zoom stays."""
+    page, said, _ = open_page(browser, default_run / 'report.html')
+    drag(page, 'cross_track', 0.4, 0.5)
+    page.wait_for_function("document.getElementById('whole').disabled === false")
+    page.wait_for_function(IS_READY)
+    before = {panel['id']: panel for panel in page.evaluate(DRAWN)}
+    page.set_viewport_size({'width': 390, 'height': 844})
+    page.wait_for_function(FILLED)
+    page.wait_for_function(IS_READY)
+    after = page.evaluate(DRAWN)
+    check_drawn(after)
+    for panel in after:
+        assert panel['ranges'] == before[panel['id']]['ranges']
+        assert panel['place'] < before[panel['id']]['place']
+    assert said == []
+    page.close()
+
+
+def test_report_on_paper(browser, default_run, tmp_path):
+    """From a wide dark window onto A4: as wide as the page, dark ink, the 3-D view a picture."""
+    page, said, asked = open_page(browser, default_run / 'report.html', color_scheme='dark')
+    before = page.evaluate(DRAWN)
+    page.evaluate(NOTE_WHAT_IS_PRINTED)
+    paper = page.pdf(path=tmp_path / 'report.pdf', prefer_css_page_size=True)
+    printed = page.evaluate('window.printed')
+    assert len(printed['panels']) == len(before)
+    for panel in printed['panels']:
+        assert panel['width'] == pytest.approx(panel['place'], abs=1.0), panel['id']
+        assert panel['place'] <= A4_PX - 2 * MARGIN_PX
+        assert int(panel['ink'][1:3], 16) < 0x40, 'dark ink'
+    assert printed['overlaps'] == []
+    assert printed['picture']['shown'] == ['IMG']
+    assert printed['picture']['coloured'] > 1000, 'the track is in it'
+    sizes = re.findall(rb'/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]', paper)
+    assert 4 < len(sizes) < 12
+    assert {(round(float(x)), round(float(y))) for x, y in sizes} == {(595, 842)}
+    assert paper.count(b'/Subtype /Image') > 0
+    page.wait_for_function(IS_READY)
+    assert page.evaluate(DRAWN) == before, 'the screen is as it was'
+
+    page.emulate_media(media='print')
+    headings = page.evaluate(STYLES, 'h2, .panel h3')
+    assert len(headings) > 20
+    assert {after for after, _ in headings} == {'avoid'}, 'no page ends below a heading'
+    assert {inside for _, inside in page.evaluate(STYLES, '.panel, .tile, tr')} == {'avoid'}
+    assert (said, len(asked)) == ([], 1)
+    page.close()
+
+
+def test_report_without_webgl(browser, default_run):
+    """A side view in place of the one in three dimensions, and no word of plotly's about it."""
+    options = ['--no-sandbox', '--disable-gpu', '--disable-3d-apis']
+    with browser.browser_type.launch(
+        executable_path=browser_executable(), args=options
+    ) as without:
+        page, said, asked = open_page(without, default_run / 'report.html')
+        panels = page.evaluate(DRAWN)
+        check_drawn(panels)
+        (side,) = (panel for panel in panels if panel['id'] == 'space')
+        assert side['kind'] == 'side'
+        (track,) = side['traces']
+        card = json.loads((default_run / 'score.json').read_text())
+        assert max(track['y']) == pytest.approx(card['depth_m']['max'], abs=0.1)
+        assert max(track['x']) == pytest.approx(card['distance_along_path_m'] / 1e3, rel=0.01)
+        figure = page.locator('figure', has=page.locator('#space'))
+        assert 'From the side' in figure.inner_text()
+        page.locator('#space').click()
+        assert len(page.context.pages) == 1, 'no other page opens'
+        text = page.evaluate('document.body.outerHTML.replaceAll(/<script[^]*?<.script>/g, "")')
+        assert 'webgl.org' not in text
+        assert page.locator('a').count() == 0
+        assert (said, len(asked)) == ([], 1)
 
 
 def test_report_of_an_aborted_run(browser, start_glider, tmp_path):
@@ -306,8 +447,7 @@ def write_picture():
         run = Path(folder) / 'run'
         command = [sys.executable, '-m', 'glider_bringup.cli', 'run', '--engine', 'direct']
         subprocess.run([*command, '--out', run], check=True)
-        executable = next(filter(None, map(shutil.which, BROWSERS)))
-        with browser_at(executable) as browser:
+        with browser_at(browser_executable()) as browser:
             page, _, _ = open_page(
                 browser, run / 'report.html', viewport={'width': 1180, 'height': 1900}
             )

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glider_bringup import cli, mission
+from glider_bringup import cli, console, mission
 from glider_bringup.direct import COLUMNS, fly_blocks
 from glider_bringup.mission import Flight, make_run_folder, read_run, write_report, write_score
 from glider_bringup.scenario import load_scenario
@@ -216,6 +216,17 @@ def test_run_without_report_leaves_none_and_says_what_is_missing(tmp_path, call)
     assert (code, out) == (2, '')
     for word in ('flight', 'traces.npz', 'bag', '--no-report'):
         assert word in err
+
+
+def test_run_folder_and_report_are_told_together(tmp_path, call):
+    for name, options in (('plain', ()), ('json', ('--json',)), ('none', ('--no-report',))):
+        folder = tmp_path / name
+        flight = ('--engine', 'direct', '--duration', 5, '--out', folder)
+        code, out, err = call('run', *flight, *options)
+        assert code == 0
+        told = [f'run folder: {folder}', f'report: {folder / "report.html"}']
+        lines = (err if name == 'json' else out).splitlines()
+        assert lines[-2 if name != 'none' else -1 :] == told[: 2 if name != 'none' else 1]
 
 
 def test_script_in_a_description_is_only_text(tmp_path):
@@ -476,6 +487,87 @@ def test_comparison_for_a_person_lists_each_run(tmp_path, call):
     assert code == 0
     for word in ('one', 'two', 'completed', 'aborted', 'cross-track', 'the same'):
         assert word in out
+
+
+def altered(folder, name, **figures):
+    """Copy of a run beside it, with other figures in its score."""
+    other = folder.parent / name
+    shutil.copytree(folder, other)
+    card = json.loads((other / 'score.json').read_text())
+    for key, value in figures.items():
+        group, _, figure = key.partition('__')
+        if figure:
+            card[group][figure] = value
+        else:
+            card[group] = value
+    (other / 'score.json').write_text(json.dumps(card))
+    return other
+
+
+def compared(call, *folders):
+    """Cells of each line of a comparison for a person."""
+    code, out, err = call('compare', *folders)
+    assert code == 0, err
+    lines = [line.split('│') for line in out.splitlines() if line.startswith('│')]
+    return {name.strip(): [cell.strip() for cell in cells] for _, name, *cells, _ in lines}, out
+
+
+@pytest.fixture
+def wide(monkeypatch):
+    """Terminal on which no line of a comparison is broken."""
+    monkeypatch.setattr(console.output, 'width', 300)
+
+
+def test_comparison_shows_differences_and_marks_the_better(tmp_path, call, wide):
+    figures = {'cross_track_m__max_all': 4.0, 'depth_m__max': 40.0, 'dives': 2}
+    one = altered(fly(tmp_path), 'one', sim_time_s=7721.0, **figures)
+    two = altered(one, 'two', sim_time_s=7901.5, cross_track_m__max_all=3.5, depth_m__max=41.0)
+    stopped = altered(one, 'stopped', status='aborted', cross_track_m__max_all=0.5)
+    rows, _ = compared(call, one, two, stopped)
+    assert rows['simulated time'] == ['2 h 9 min', '2 h 12 min (+3 min)', '2 h 9 min (=)']
+    assert rows['cross-track, after settling, max'] == [
+        *('4.00 m', '3.50 m (-0.50) *', '0.50 m (-3.50)'),  # no merit of a run that was stopped
+    ]
+    assert rows['depth, max'] == ['40.0 m', '41.0 m (+1.0)', '40.0 m (=)']  # neither is better
+    assert rows['dives'] == ['2', '2 (=)', '2 (=)']
+    page = tmp_path / 'page.html'
+    assert call('compare', one, two, '--out', page)[0] == 0
+    text = ' '.join(read_page(page)[0].text.split())
+    assert 'after settling, max 4.00 m 3.50 m (-0.50) ✓' in text
+
+
+def test_comparison_of_a_long_and_a_short_run_marks_nothing(tmp_path, call, wide):
+    one = altered(fly(tmp_path), 'one', sim_time_s=1000.0, cross_track_m__max_all=4.0)
+    two = altered(one, 'two', sim_time_s=1101.0, cross_track_m__max_all=3.0)
+    rows, _ = compared(call, one, two)
+    assert rows['cross-track, after settling, max'] == ['4.00 m', '3.00 m (-1.00)']
+
+
+def test_comparison_of_equal_runs_says_so(tmp_path, call, wide):
+    one = fly(tmp_path, name='one')
+    again = altered(one, 'again', wall_time_s=9.0, engine='nodes')
+    rows, out = compared(call, one, again)
+    assert 'The runs are equal' in out
+    assert rows['cross-track, whole run, max'][1].endswith('(=)')
+    assert not any(cell.endswith('*') for cells in rows.values() for cell in cells)
+    page = tmp_path / 'page.html'
+    assert call('compare', one, again, '--out', page)[0] == 0
+    assert 'The runs are equal' in read_page(page)[0].text
+    _, out = compared(call, one, altered(one, 'other', cross_track_m__max_run=0.123))
+    assert 'The runs are equal' not in out
+
+
+def test_comparison_keeps_its_lines_where_one_run_has_more_to_tell(tmp_path, call, wide):
+    """What control noticed in one of them shifts nothing."""
+    one = fly(tmp_path, name='one')
+    event = {'t_s': 12.0, 'row': 'x', 'reaction': 'none', 'message': 'something odd'}
+    guard = {'state': 'flying', 'reaction': 'none', 'events': [event]}
+    two = altered(one, 'two', guard=guard, end_of_path_m=7.25)
+    for runs, order in (((one, two), 1), ((two, one), -1)):
+        rows, _ = compared(call, *runs)
+        assert rows['control noticed'][::order] == ['nothing', 'at 12.0 s: something odd']
+        assert rows['came up from the end of path'][::order][0] == '-'
+        assert rows['depth, max'][1] == f'{rows["depth, max"][0]} (=)'
 
 
 def test_comparison_with_a_run_that_never_flew(tmp_path, call):

@@ -128,6 +128,87 @@ def test_sweep_without_a_third_dimension_is_one_panel(tmp_path):
     assert stability.panels == ['']
 
 
+def edges(values, alone):
+    """Bounds of cells: half way to the neighbours, and as far on the outer side."""
+    if len(values) == 1:
+        return np.array([values[0] - alone, values[0] + alone])
+    steps = np.diff(values) / 2.0
+    return np.array([values[0] - steps[0], *(values[:-1] + steps), values[-1] + steps[-1]])
+
+
+def areas(speeds, angles):
+    """Areas of lost, critical and stable cells: sectors of rings."""
+    rings = np.diff(np.maximum(edges(speeds, 0.1), 0.0) ** 2)
+    bounds = edges(angles, 5.0)
+    if len(angles) > 1 and min(angles) >= 0.0 and max(angles) <= 180.0:
+        bounds = np.clip(bounds, 0.0, 180.0)
+    wedges = np.diff(bounds)
+    lost = wedges[0] if len(angles) > 1 else 0.0
+    critical = (wedges.sum() - lost) * (rings[0] if len(speeds) > 1 else 0.0)
+    parts = np.array([lost * rings.sum(), critical, 0.0])
+    parts[2] = wedges.sum() * rings.sum() - parts.sum()
+    return parts / (wedges.sum() * rings.sum())
+
+
+def over(speeds, angles):
+    """Dimensions of speeds within angles."""
+    fields = (('angle', 'current.angle_deg', angles), ('speed', 'current.speed_kn', speeds))
+    return {
+        name: {'kind': 'values', 'field': field, 'values': [float(one) for one in values]}
+        for name, field, values in fields
+    }
+
+
+@pytest.mark.parametrize(
+    ('speeds', 'angles', 'circle'),
+    [
+        ([0.5, 1.0], [0.0, 30.0, 60.0], '0.5 kn'),  # the sweep called small
+        ([0.2, 0.4, 0.6, 0.8], [45.0], '0.2 kn'),
+        ([0.25, 0.5, 0.75, 1.0], [20.0, 25.0, 30.0, 35.0, 40.0], '0.5 kn'),
+        ([1.0], [0.0, 45.0, 90.0, 135.0, 180.0], '1 kn'),
+        ([0.1, 0.2, 0.5, 1.4], [-70.0, -60.0, -20.0, 0.0, 5.0, 90.0], '0.5 kn'),
+        ([0.5, 1.0, 1.5], list(range(0, 360, 30)), '1 kn'),
+    ],
+)
+def test_nothing_of_a_map_is_cut_off(tmp_path, monkeypatch, speeds, angles, circle):
+    """Lost the first angle, critical the lowest speed of the others: so much of each is seen."""
+    errors = [
+        60.0 if not j and len(angles) > 1 else 20.0 if not i and len(speeds) > 1 else 1.0
+        for j in range(len(angles))
+        for i in range(len(speeds))
+    ]
+    file = write(tmp_path, errors, dimensions=over(speeds, angles))
+    for image in ('map.png', 'map.svg'):
+        out = str(tmp_path / image)
+        monkeypatch.setattr(sys, 'argv', ['glider', 'map', str(file), '--out', out])
+        assert cli.main() == 0
+    pixels = (255.0 * matplotlib.image.imread(tmp_path / 'map.png')[..., :3]).round().astype(int)
+    seen = np.array(
+        [
+            np.count_nonzero((pixels == list(bytes.fromhex(colour))).all(axis=-1))
+            for colour in ('d55e00', 'f0e442', '56b4e9')
+        ]
+    )
+    assert seen.sum() > 0.02 * pixels.shape[0] * pixels.shape[1]
+    assert seen / seen.sum() == pytest.approx(areas(speeds, angles), abs=0.04)
+    drawing = (tmp_path / 'map.svg').read_text()
+    assert f'<!--  {circle} -->' in drawing
+    held = shares(load_map(file))[0]['stable_of_feasible']
+    assert f'<!-- {held:.0%} of the feasible -->' in drawing
+
+
+def test_map_of_currents_that_nobody_can_hold(tmp_path, monkeypatch, capsys):
+    file = write(tmp_path, [None], dimensions=over([1.5, 1.6], [80.0, 90.0]))
+    arguments = ['glider', 'map', str(file), '--out', str(tmp_path / 'map.svg')]
+    monkeypatch.setattr(sys, 'argv', [*arguments, '--json'])
+    assert cli.main() == 0
+    (panel,) = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)['panels']
+    assert (panel['feasible'], panel['stable_of_feasible']) == (0.0, None)
+    monkeypatch.setattr(sys, 'argv', arguments)
+    assert cli.main() == 0
+    assert 'no cell is feasible' in (tmp_path / 'map.svg').read_text()
+
+
 def test_file_that_is_no_map_is_refused(tmp_path, monkeypatch, capsys):
     def told(*arguments):
         return refused(arguments, monkeypatch, capsys)
@@ -149,8 +230,6 @@ def test_file_that_is_no_map_is_refused(tmp_path, monkeypatch, capsys):
     assert 'at most one more' in told(write(tmp_path, [1.0], dimensions=more))
     less = {'speed': DIMENSIONS['speed'], 'depth': depth}
     assert 'current.angle_deg' in told(write(tmp_path, [1.0], dimensions=less))
-    single = {**DIMENSIONS, 'angle': {**DIMENSIONS['angle'], 'values': [0.0]}}
-    assert 'one value only' in told(write(tmp_path, [1.0], dimensions=single))
 
 
 def test_sweep_that_failed_everywhere_has_no_map(tmp_path, monkeypatch, capsys):
