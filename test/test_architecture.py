@@ -120,6 +120,13 @@ def test_every_package_is_checked():
     assert {path.parent.name for path in SOURCES.glob('*/package.xml')} == set(MAY_IMPORT)
 
 
+@pytest.mark.parametrize('package', MAY_IMPORT)
+def test_every_folder_with_modules_is_installed(package):
+    """Setuptools finds folders by their __init__.py; without, only a symlinked build has them."""
+    folders = {path.parent for path in (SOURCES / package / package).rglob('*.py')}
+    assert [path for path in folders if not (path / '__init__.py').is_file()] == []
+
+
 def test_imports_follow_the_architecture():
     found = violations(SOURCES)
     assert not found, '\n' + '\n'.join(found)
