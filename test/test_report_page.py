@@ -335,6 +335,11 @@ def test_report_on_paper(browser, default_run, tmp_path):
     """From a wide dark window onto A4: as wide as the page, dark ink, the 3-D view a picture."""
     page, said, asked = open_page(browser, default_run / 'report.html', color_scheme='dark')
     before = page.evaluate(DRAWN)
+    straight = page.locator('figure img').get_attribute('src')
+    page.evaluate("Plotly.relayout('space', { 'scene.camera.eye': { x: -1, y: 2, z: 1 } })")
+    page.wait_for_function(
+        "(src) => document.querySelector('figure img').src !== src", arg=straight
+    )
     page.evaluate(NOTE_WHAT_IS_PRINTED)
     paper = page.pdf(path=tmp_path / 'report.pdf', prefer_css_page_size=True)
     printed = page.evaluate('window.printed')

@@ -4,10 +4,12 @@ const DRAW = { time: drawTime, track: drawTrack, space: drawSpace, side: drawSid
 const root = document.documentElement;
 /** How far away the eye is on paper, where a view is half a page wide; see farOf. */
 const FAR_ON_PAPER = 1.65;
-/** What is shown (s); how wide each panel was drawn; count of the calls to show. */
+/** What is shown (s), and how wide each panel was drawn (px). */
 let shown = [0, page.duration];
 const widths = new Map();
+/** Count of the calls to show; timer of the next picture. */
 let turn = 0;
+let waiting;
 
 const place = (panel) => document.getElementById(panel.id);
 
@@ -94,6 +96,12 @@ async function takePicture(panel) {
   figure.classList.add('pictured');
 }
 
+/** Take it when the view has come to rest: a wheel turns it in many steps. */
+function takePictureSoon(panel) {
+  clearTimeout(waiting);
+  waiting = setTimeout(() => takePicture(panel), 400);
+}
+
 /** Draw for a page of paper: its width, dark on white. It has to be done when this returns. */
 function beforePrint() {
   turn += 1;
@@ -117,7 +125,7 @@ function listen() {
       place(panel).on('plotly_relayout', onZoom);
       place(panel).on('plotly_doubleclick', whole);
     }
-    if (panel.kind === 'space') place(panel).on('plotly_relayout', () => takePicture(panel));
+    if (panel.kind === 'space') place(panel).on('plotly_relayout', () => takePictureSoon(panel));
   }
   document.getElementById('whole').addEventListener('click', whole);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
@@ -139,7 +147,8 @@ async function main() {
   await show(0, page.duration, true);
   root.dataset.state = 'busy';
   listen();
-  for (const panel of page.panels.filter(({ kind }) => kind === 'space')) await takePicture(panel);
+  // should a picture fail, the view itself is printed
+  await Promise.allSettled(page.panels.filter(({ kind }) => kind === 'space').map(takePicture));
   root.dataset.state = 'ready';
 }
 
