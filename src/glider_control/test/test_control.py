@@ -10,7 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_control.control import SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL, control_step
+from glider_control.control import (
+    SATURATED_BUOYANCY,
+    SATURATED_PITCH,
+    SATURATED_ROLL,
+    control_step,
+)
 from glider_control.settings import ControlSettings
 from glider_model.frames import euler_from_quaternion, quaternion_from_euler, rotate_to_ned
 from glider_model.plant import PlantSettings, plant_odometry, plant_step
