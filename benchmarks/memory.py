@@ -16,8 +16,8 @@ _IMPORT = 'from glider_bringup import mission\n'
 _FLY = """
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from glider_bringup import mission
-from glider_bringup.scenario import load_scenario
+from glider_bringup import missions
+from glider_bringup.mission.scenario import load_scenario
 
 scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 108000.0})
 with TemporaryDirectory() as folder:

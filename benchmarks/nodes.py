@@ -17,11 +17,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from glider_bringup.direct import COLUMNS, fly_blocks
-from glider_bringup.mission import Flight, Progress, fly_nodes, make_run_folder, mission_of
+from glider_bringup.engines.direct import COLUMNS, fly_blocks
+from glider_bringup.engines.processes import domain_id, node_environment
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.missions import Flight, Progress, fly_nodes, make_run_folder, mission_of
 from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter
-from glider_bringup.runner import domain_id, node_environment
-from glider_bringup.scenario import load_scenario
 from glider_bringup.tick_order import TickOrder
 from glider_model.ros.messages import TOPICS
 from glider_model.signals import TICK_NS

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from nodes import fly_over_topics
 
-from glider_bringup.runner import MODULES
+from glider_bringup.engines.processes import MODULES
 from glider_model.signals import TICK_S
 
 HOURS, MISSION_HOURS = 1.0, 30.0

@@ -13,11 +13,11 @@ from tempfile import TemporaryDirectory
 
 import yaml
 
-from glider_bringup.direct import fly_blocks
-from glider_bringup.mission import fly_direct, make_run_folder, mission_of
+from glider_bringup.engines.direct import fly_blocks
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.missions import fly_direct, make_run_folder, mission_of
 from glider_bringup.ros.bag import BagWriter, Sync
 from glider_bringup.ros.bag_log import LogWriter
-from glider_bringup.scenario import load_scenario
 from glider_bringup.sweep import JOURNAL_FILE, RESULT_FILE, fly_chunk, make_chunks, open_journal
 from glider_bringup.sweep_file import MAX_CELLS, load_sweep
 from glider_model.ros.messages import TOPICS

@@ -12,7 +12,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from glider_bringup.scenario import load_scenario
+from glider_bringup.mission.scenario import load_scenario
 from glider_model.ros.messages import BASE_LINK, JOINTS, MAP, TOPICS
 from glider_model.signals import TICK_NS
 

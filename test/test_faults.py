@@ -18,8 +18,8 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 
-from glider_bringup.runner import MODULES, PLANT
-from glider_bringup.scenario import SCENARIO_FOLDER
+from glider_bringup.engines.processes import MODULES, PLANT
+from glider_bringup.mission.scenario import SCENARIO_FOLDER
 from glider_model.ros.messages import TOPICS
 from glider_model.signals import TICK_NS
 from glider_model.vehicle import vehicle_path

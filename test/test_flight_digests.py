@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glider_bringup.direct import COLUMNS, fly_blocks
-from glider_bringup.mission import mission_of
-from glider_bringup.scenario import load_scenario
+from glider_bringup.engines.direct import COLUMNS, fly_blocks
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.missions import mission_of
 from glider_model.kernel import kernel
 
 DURATION_S = 36000.0

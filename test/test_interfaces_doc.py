@@ -17,10 +17,10 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from glider_bringup.cli import MAX_WORD
-from glider_bringup.launching import ARGUMENTS
+from glider_bringup.engines.launch_plan import ARGUMENTS
+from glider_bringup.engines.processes import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
+from glider_bringup.mission.scenario import Scenario
 from glider_bringup.nodes.recorder_node import RecorderNode, RecorderSettings
-from glider_bringup.runner import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
-from glider_bringup.scenario import Scenario
 from glider_bringup.sweep_file import MAX_CELLS, MAX_VALUES, Sweep
 from glider_control.nodes.control_node import ControlNode
 from glider_control.settings import ControlSettings

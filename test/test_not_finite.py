@@ -12,11 +12,11 @@ import math
 import pytest
 
 from glider_bringup import experiments, montecarlo, sweep
-from glider_bringup.direct import NotFiniteError, fly_blocks
+from glider_bringup.engines.direct import NotFiniteError, fly_blocks
 from glider_bringup.experiments import Case
 from glider_bringup.fuzzing import flights
-from glider_bringup.mission import fly_direct, mission_of, score_again, scorecard
-from glider_bringup.scenario import load_scenario, read_scenario
+from glider_bringup.mission.scenario import load_scenario, read_scenario
+from glider_bringup.missions import fly_direct, mission_of, score_again, scorecard
 from glider_bringup.sweep import Chunk, Inputs
 from glider_model.vehicle import vehicle_path
 

@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 
-from glider_bringup.runner import domain_id, node_environment
+from glider_bringup.engines.processes import domain_id, node_environment
 from glider_model.ros.messages import TOPICS
 
 GLIDER = [sys.executable, '-m', 'glider_bringup.cli']

@@ -19,10 +19,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
-from glider_bringup.mission import mission_of
+from glider_bringup.engines.processes import NAMESPACE, domain_id
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.missions import mission_of
 from glider_bringup.ros.bag import BagWriter
-from glider_bringup.runner import NAMESPACE, domain_id
-from glider_bringup.scenario import load_scenario
 from glider_control.control import control_step
 from glider_control.nodes.control_node import saturation_event
 from glider_guidance.guidance import guidance_abort, guidance_step

@@ -20,7 +20,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from glider_bringup.scenario import Scenario
+from glider_bringup.mission.scenario import Scenario
 from glider_control.settings import ControlLawSettings
 from glider_model.errors import ConfigurationError, printable
 from glider_model.signals import TICK_S

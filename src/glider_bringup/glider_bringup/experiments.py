@@ -15,13 +15,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.direct import NotFiniteError, fly_blocks
-from glider_bringup.mission import finite, mission_of
+from glider_bringup.engines.direct import NotFiniteError, fly_blocks
+from glider_bringup.mission.scenario import Scenario, load_scenario
+from glider_bringup.missions import finite, mission_of
 from glider_bringup.montecarlo import airframe
 from glider_bringup.pool import Pool, Progress
-from glider_bringup.record import Record
-from glider_bringup.scenario import Scenario, load_scenario
-from glider_bringup.score import Scorer, windows
+from glider_bringup.scoring.one_hertz import Record
+from glider_bringup.scoring.score import Scorer, windows
 from glider_guidance.los import crab_heading
 from glider_model.current import KNOT_MPS
 from glider_model.perturb import perturbed

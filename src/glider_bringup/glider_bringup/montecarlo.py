@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from glider_bringup.mission import fly_direct
+from glider_bringup.mission.scenario import Scenario, load_scenario
+from glider_bringup.missions import fly_direct
 from glider_bringup.pool import Pool, Progress
-from glider_bringup.scenario import Scenario, load_scenario
 from glider_model.perturb import (
     ADDED_MASS,
     DAMPING,

@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 from glider_bringup.disk import whole_file
 from glider_bringup.journal import Journal
-from glider_bringup.mission import Flight, fly_direct, planned_ticks, scorecard
+from glider_bringup.mission.scenario import Scenario, ScenarioSource, make_scenario
+from glider_bringup.missions import Flight, fly_direct, planned_ticks, scorecard
 from glider_bringup.pool import WORKER_DIED, Pool, Progress, WorkError
-from glider_bringup.scenario import Scenario, ScenarioSource, make_scenario
-from glider_bringup.score import Rules, Scorer
+from glider_bringup.scoring.score import Rules, Scorer
 from glider_bringup.sweep_file import Plan, vehicle_text
 from glider_bringup.sweep_result import NOT_FIGURES, make_dataset, variable_name, write_dataset
 from glider_model.kernel import source_digest

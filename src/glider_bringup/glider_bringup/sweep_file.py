@@ -21,7 +21,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_bringup.scenario import (
+from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
     make_scenario,

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from glider_bringup.scenario import Scenario
+from glider_bringup.mission.scenario import Scenario
 from glider_bringup.sweep_file import Axis, Plan
 from glider_model.kernel import source_digest
 from glider_model.settings import find_field, unit_of

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from glider_bringup.blocks import BLOCKS
-from glider_bringup.direct import ROW, fly
+from glider_bringup.engines.direct import ROW, fly
 from glider_bringup.mcap_reader import Bag
-from glider_bringup.mission import fly_direct, make_run_folder, make_tracer, mission_of
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.missions import fly_direct, make_run_folder, make_tracer, mission_of
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.verify import verify
-from glider_bringup.scenario import load_scenario
-from glider_bringup.score import Rules, Scorer
-from glider_bringup.traces import halve
+from glider_bringup.scoring.score import Rules, Scorer
+from glider_bringup.scoring.traces import halve
 from glider_model.plant_block import PLANT, plant_move, plant_outputs
 from glider_model.sensors import SensorSettings
 from glider_model.signals import TICK_S

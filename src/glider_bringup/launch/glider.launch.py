@@ -14,7 +14,7 @@ from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from glider_bringup.launching import (
+from glider_bringup.engines.launch_plan import (
     ARGUMENTS,
     TF,
     LaunchedNode,
@@ -22,7 +22,7 @@ from glider_bringup.launching import (
     check_names,
     plan_launch,
 )
-from glider_bringup.runner import PLANT
+from glider_bringup.engines.processes import PLANT
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -9,8 +9,8 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from glider_bringup.mission import fly_direct, make_run_folder
-from glider_bringup.scenario import load_scenario
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.missions import fly_direct, make_run_folder
 
 
 class Recorded(NamedTuple):

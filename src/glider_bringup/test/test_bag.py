@@ -18,13 +18,13 @@ from nav_msgs.msg import Path as PathMessage
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from glider_bringup.direct import BLOCK_TICKS, COLUMNS
+from glider_bringup.engines.direct import BLOCK_TICKS, COLUMNS
 from glider_bringup.mcap_reader import Bag
 from glider_bringup.ros import bag_log
 from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter, message_definition, type_hash
 from glider_bringup.ros.bag_log import SCORED, RecordedLog
+from glider_bringup.scoring.traces import TRACED
 from glider_bringup.tick_order import TickOrder
-from glider_bringup.traces import TRACED
 from glider_model.ros.codec import to_cdr
 from glider_model.ros.messages import TOPICS
 from glider_model.signals import TICK_NS

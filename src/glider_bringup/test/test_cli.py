@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from glider_bringup import cli
-from glider_bringup.scenario import scenario_names
+from glider_bringup.mission.scenario import scenario_names
 from glider_bringup.sweep_file import sweep_names
 from glider_model.vehicle import vehicle_names, vehicle_path
 

@@ -11,7 +11,7 @@ import sys
 import numpy as np
 import pytest
 
-from glider_bringup.direct import (
+from glider_bringup.engines.direct import (
     BLOCK_TICKS,
     COLUMNS,
     ROW,
@@ -20,7 +20,7 @@ from glider_bringup.direct import (
     fly,
     fly_blocks,
 )
-from glider_bringup.scenario import load_scenario
+from glider_bringup.mission.scenario import load_scenario
 from glider_model.signals import TICK_S
 
 #: A dive of 60 m and back within half an hour, so that a flight has everything in it.
@@ -100,9 +100,9 @@ def test_flight_leaves_its_initial_state_as_it_was(rough):
 #: Flies missions one after another and prints a digest of each one's log.
 BATCH = """
 import hashlib, json, sys
-from glider_bringup.direct import fly_blocks
-from glider_bringup.mission import mission_of
-from glider_bringup.scenario import load_scenario
+from glider_bringup.engines.direct import fly_blocks
+from glider_bringup.missions import mission_of
+from glider_bringup.mission.scenario import load_scenario
 digests = {}
 for name in sys.argv[2:]:
     log = hashlib.sha256()
@@ -248,8 +248,8 @@ INTERRUPTED = """
 import signal
 from pathlib import Path
 
-from glider_bringup.mission import fly_direct
-from glider_bringup.scenario import load_scenario
+from glider_bringup.missions import fly_direct
+from glider_bringup.mission.scenario import load_scenario
 
 scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 36000.0})
 flown = []

@@ -36,10 +36,10 @@ from glider_bringup.experiments import (
     report,
     steering_share,
 )
-from glider_bringup.mission import make_result_folder
+from glider_bringup.mission.scenario import load_scenario, parse_assignment
+from glider_bringup.missions import make_result_folder
 from glider_bringup.pool import worker_pool
-from glider_bringup.record import Record
-from glider_bringup.scenario import load_scenario, parse_assignment
+from glider_bringup.scoring.one_hertz import Record
 from glider_model.settings import ConfigurationError
 from glider_model.trim import solve_trim
 from glider_model.vehicle import load_vehicle

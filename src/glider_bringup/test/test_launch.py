@@ -9,10 +9,16 @@ from pathlib import Path
 import pytest
 import yaml
 
-from glider_bringup import launching
-from glider_bringup.launching import ARGUMENTS, TF, LaunchedNode, check_names, plan_launch
-from glider_bringup.runner import MODULES, PLANT, RECORDER
-from glider_bringup.scenario import scenario_names
+from glider_bringup.engines import launch_plan
+from glider_bringup.engines.launch_plan import (
+    ARGUMENTS,
+    TF,
+    LaunchedNode,
+    check_names,
+    plan_launch,
+)
+from glider_bringup.engines.processes import MODULES, PLANT, RECORDER
+from glider_bringup.mission.scenario import scenario_names
 from glider_control.settings import ControlLawSettings
 from glider_guidance.settings import LosSettings
 from glider_model.settings import ConfigurationError
@@ -30,7 +36,7 @@ def parameters(plan) -> dict[str, dict]:
 def tf2(monkeypatch):
     """tf2_msgs is not there, wherever this runs; tests say where it is."""
     there = []
-    monkeypatch.setattr(launching, 'find_spec', lambda name: there or None)
+    monkeypatch.setattr(launch_plan, 'find_spec', lambda name: there or None)
     return there
 
 

@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import pytest
 from rosbags.highlevel import AnyReader
 
-from glider_bringup import mission
-from glider_bringup.scenario import load_scenario
+from glider_bringup import missions
+from glider_bringup.mission.scenario import load_scenario
 from glider_model.frames import (
     euler_from_quaternion,
     odometry_to_wire,
@@ -54,8 +54,8 @@ def last(tmp_path_factory) -> dict:
     """Last message of every topic of a bag, read by a library that is not ours."""
     folder = tmp_path_factory.mktemp('run') / 'flight'
     scenario = load_scenario('survey', {'dives': 0, 'duration_s': 30.0})
-    mission.make_run_folder(scenario, folder)
-    mission.fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
+    missions.make_run_folder(scenario, folder)
+    missions.fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
     found = {}
     with AnyReader([folder]) as reader:
         for connection, _, raw in reader.messages():

@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from glider_bringup.runner import domain_id
+from glider_bringup.engines.processes import domain_id
 from glider_control.nodes.control_node import ControlNode
 from glider_control.settings import ControlSettings
 from glider_control.watch import ORDERED

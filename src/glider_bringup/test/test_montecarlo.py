@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 from glider_bringup import montecarlo
-from glider_bringup.direct import COLUMNS, ROW, fly
+from glider_bringup.engines.direct import COLUMNS, ROW, fly
 from glider_bringup.mcap_reader import Bag
-from glider_bringup.mission import make_result_folder, mission_of, score_again
+from glider_bringup.mission.scenario import load_scenario, parse_assignment
+from glider_bringup.missions import make_result_folder, mission_of, score_again
 from glider_bringup.montecarlo import (
     RESULT_FILE,
     airframe,
@@ -27,8 +28,7 @@ from glider_bringup.montecarlo import (
     spread,
 )
 from glider_bringup.ros.bag_log import RecordedLog
-from glider_bringup.scenario import load_scenario, parse_assignment
-from glider_bringup.score import Rules, Scorer
+from glider_bringup.scoring.score import Rules, Scorer
 from glider_model.frames import euler_from_quaternion
 from glider_model.perturb import ADDED_MASS, DAMPING, STATIC, VISCOUS, PerturbSettings, perturbed
 from glider_model.ros.messages import TOPICS

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from glider_bringup import mission
+from glider_bringup import missions
+from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.ros.bag import BagWriter
-from glider_bringup.scenario import load_scenario
 from glider_model.ros import health
 from glider_model.ros.codec import to_cdr
 from glider_model.ros.messages import PLANT, TOPICS
@@ -21,7 +21,7 @@ from glider_model.signals import TICK_NS
 #: What a score file knows and a bag does not.
 ONLY_IN_THE_FILE = {'engine', 'wall_time_s', 'real_time_factor'}
 #: `./glider score`, and what report, compare and figure begin with.
-USES = (mission.score_again, mission.read_run)
+USES = (missions.score_again, missions.read_run)
 ATTACHED = ('scenario.yaml', 'vehicle.yaml')
 
 
@@ -29,9 +29,9 @@ ATTACHED = ('scenario.yaml', 'vehicle.yaml')
 def run(tmp_path_factory) -> Path:
     """Run folder with bag and score file."""
     scenario = load_scenario('noisy_sensors', {'dives': 0, 'duration_s': 300.0, 'settle_s': 0.0})
-    folder = mission.make_run_folder(scenario, tmp_path_factory.mktemp('run') / 'flight')
-    flight, scores = mission.fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
-    mission.write_score(folder, mission.scorecard(scenario, 'direct', flight, scores))
+    folder = missions.make_run_folder(scenario, tmp_path_factory.mktemp('run') / 'flight')
+    flight, scores = missions.fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
+    missions.write_score(folder, missions.scorecard(scenario, 'direct', flight, scores))
     return folder
 
 
@@ -52,7 +52,7 @@ def said(phase: str, stamp_ns: int, message: str = '') -> bytes:
 def write_bag(folder: Path, *reports: bytes, but: str = '') -> Path:
     """Run folder, as a launch makes it, with three ticks in its bag, ``but`` in the last only."""
     scenario = load_scenario('helix')
-    mission.make_run_folder(scenario, folder)
+    missions.make_run_folder(scenario, folder)
     bag = BagWriter(folder, 'helix', attachments=[folder / name for name in ATTACHED])
     for tick in range(3):
         for topic in TOPICS.values():
@@ -66,11 +66,11 @@ def write_bag(folder: Path, *reports: bytes, but: str = '') -> Path:
 
 
 def test_scored_from_the_bag_as_it_was_in_flight(run, bag_only):
-    card = mission.score_again(run)
+    card = missions.score_again(run)
     assert (card['status'], card['engine']) == ('completed', 'direct')
     (file,) = bag_only.glob('*.mcap')
     for source in (bag_only, file):
-        again = mission.score_again(source)
+        again = missions.score_again(source)
         assert again.keys() == card.keys()
         assert {name for name in card if again[name] != card[name]} == ONLY_IN_THE_FILE
         assert [again[name] for name in sorted(ONLY_IN_THE_FILE)] == [None, None, None]
@@ -81,12 +81,12 @@ def test_launched_run_has_parameters_and_no_score_file(run, tmp_path):
     shutil.copytree(run, folder)
     (folder / 'score.json').unlink()
     (folder / 'parameters.yaml').touch()
-    again = mission.score_again(folder)
+    again = missions.score_again(folder)
     assert (again['engine'], again['status'], again['reason']) == ('nodes', 'completed', '')
 
 
 def test_drawn_from_the_bag_alone(bag_only):
-    mission.draw(bag_only, bag_only / 'run.png')
+    missions.draw(bag_only, bag_only / 'run.png')
     assert (bag_only / 'run.png').read_bytes().startswith(b'\x89PNG')
 
 
@@ -99,7 +99,7 @@ def test_drawn_from_the_bag_alone(bag_only):
     ],
 )
 def test_status_is_what_the_plant_said_last(tmp_path, reports, status, words):
-    card = mission.score_again(write_bag(tmp_path / 'flight', *reports))
+    card = missions.score_again(write_bag(tmp_path / 'flight', *reports))
     assert card['status'] == status
     assert words in card['reason']
     assert bool(card['reason']) is bool(words)
@@ -116,7 +116,7 @@ def test_score_file_knows_more_than_the_bag(run, tmp_path):
             '"reason": ""', '"reason": "stopped by SIGINT"'
         )
     )
-    card = mission.score_again(folder)
+    card = missions.score_again(folder)
     assert (card['status'], card['reason']) == ('aborted', 'stopped by SIGINT')
 
 
@@ -132,7 +132,7 @@ def test_file_cut_before_its_attachments_tells_what_is_missing(bag_only, keep):
 def test_file_cut_short_is_scored_as_far_as_it_goes(bag_only):
     (file,) = bag_only.glob('*.mcap')
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
-    card = mission.score_again(bag_only)
+    card = missions.score_again(bag_only)
     assert card['status'] == 'aborted'
     assert 500 < card['ticks'] < 2500
 
@@ -181,8 +181,8 @@ print(next(blocks).shape[0], peak_mb() - before)
 def test_a_long_bag_is_read_piece_by_piece(tmp_path):
     """The first hour of three takes less memory than all messages do."""
     scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 10800.0})
-    folder = mission.make_run_folder(scenario, tmp_path / 'run')
-    mission.fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
+    folder = missions.make_run_folder(scenario, tmp_path / 'run')
+    missions.fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
     command = [sys.executable, '-c', PEAK, folder]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
     ticks, grown_mb = done.stdout.split()

@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glider_bringup import cli, console, mission
-from glider_bringup.direct import COLUMNS, fly_blocks
-from glider_bringup.mission import Flight, make_run_folder, read_run, write_report, write_score
-from glider_bringup.scenario import load_scenario
-from glider_bringup.score import Rules, Scorer
+from glider_bringup import cli, console, missions
+from glider_bringup.engines.direct import COLUMNS, fly_blocks
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.missions import Flight, make_run_folder, read_run, write_report, write_score
+from glider_bringup.scoring.score import Rules, Scorer
 from glider_bringup.showing.findings import LOST_M, findings, lost_since_s, verdict
 from glider_bringup.showing.words import span
 
@@ -70,16 +70,16 @@ def fly(tmp_path, change=None, stop=False, name='flight', **fields):
     """Fly in this process; ``change`` alters each block of the log, ``stop`` is a Ctrl-C."""
     scenario = load_scenario('current_8deg', {**SHORT, **fields})
     folder = make_run_folder(scenario, tmp_path / name)
-    tracer, scorer = mission.make_tracer(scenario), Scorer()
-    for log in fly_blocks(*mission.mission_of(scenario)):
+    tracer, scorer = missions.make_tracer(scenario), Scorer()
+    for log in fly_blocks(*missions.mission_of(scenario)):
         log = log if change is None else change(log.copy())
         tracer.add(log)
         scorer.add(log)
     flight = Flight('aborted' if stop else 'completed', 'stopped' if stop else '', 1.0, 0, 0)
     scores = scorer.result(scenario.score_rules(scorer.ticks * 0.1))
-    card = mission.scorecard(scenario, 'direct', flight, scores)
+    card = missions.scorecard(scenario, 'direct', flight, scores)
     write_score(folder, card)
-    mission.keep_traces(scenario, folder, card, tracer)
+    missions.keep_traces(scenario, folder, card, tracer)
     return folder
 
 
@@ -251,9 +251,9 @@ def never_flown(folder):
     scenario = load_scenario('current_8deg')
     folder = make_run_folder(scenario, folder)
     flight = Flight('aborted', 'plant_node was killed by SIGKILL', 0.0, 0, 0)
-    card = mission.scorecard(scenario, 'nodes', flight, Scorer().result(Rules()))
+    card = missions.scorecard(scenario, 'nodes', flight, Scorer().result(Rules()))
     write_score(folder, card)
-    mission.keep_traces(scenario, folder, card, mission.make_tracer(scenario))
+    missions.keep_traces(scenario, folder, card, missions.make_tracer(scenario))
     return folder
 
 

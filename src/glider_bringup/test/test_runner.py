@@ -12,8 +12,8 @@ import time
 
 import pytest
 
-from glider_bringup import runner
-from glider_bringup.runner import PLANT, RECORDER, domain_id, node_commands, run_nodes
+from glider_bringup.engines import processes
+from glider_bringup.engines.processes import PLANT, RECORDER, domain_id, node_commands, run_nodes
 
 #: A node that says it is there, and then waits for a signal.
 WAIT = """
@@ -191,7 +191,7 @@ def test_signal_while_the_nodes_are_started_leaves_none(fly, monkeypatch, number
             if len(started) == 2:
                 os.kill(os.getpid(), number)
 
-    monkeypatch.setattr(runner.subprocess, 'Popen', Starting)
+    monkeypatch.setattr(processes.subprocess, 'Popen', Starting)
     result, _ = fly({'guidance_node': node(), RECORDER: recorder(), PLANT: node()})
     assert (result.status, result.reason) == ('aborted', f'stopped by {number.name}')
     assert len(started) == 3
@@ -202,7 +202,7 @@ def test_signal_while_the_nodes_are_started_leaves_none(fly, monkeypatch, number
 def test_no_node_survives_the_runner(tmp_path, number):
     source = (
         'import sys; from pathlib import Path\n'
-        'from glider_bringup.runner import run_nodes\n'
+        'from glider_bringup.engines.processes import run_nodes\n'
         f'run_nodes({dict(guidance_node=node(DEAF), recorder_node=recorder(), plant_node=node())},'
         f' Path({str(tmp_path / "log.txt")!r}))\n'
     )
@@ -254,16 +254,16 @@ def test_range_of_the_user_is_kept_and_else_this_machine(monkeypatch, wanted):
     monkeypatch.delenv('ROS_AUTOMATIC_DISCOVERY_RANGE', raising=False)
     if wanted:
         monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', wanted)
-    environment = runner.node_environment(7)
+    environment = processes.node_environment(7)
     assert environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] == (wanted or 'LOCALHOST')
     assert environment['ROS_DOMAIN_ID'] == '7'
 
 
 def test_every_node_gets_parameters_and_namespace(tmp_path):
     commands = node_commands(tmp_path / 'p.yaml', '/sea')
-    assert list(commands) == list(runner.MODULES)
+    assert list(commands) == list(processes.MODULES)
     for name, command in commands.items():
-        assert command[:3] == [sys.executable, '-m', runner.MODULES[name]]
+        assert command[:3] == [sys.executable, '-m', processes.MODULES[name]]
         assert str(tmp_path / 'p.yaml') in command
         assert '__ns:=/sea' in command
     assert json.dumps(commands)

@@ -9,7 +9,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_bringup.scenario import (
+from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
     load_scenario,

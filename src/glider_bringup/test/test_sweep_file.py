@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glider_bringup import cli
-from glider_bringup.scenario import Scenario, load_scenario, overlap
+from glider_bringup.mission.scenario import Scenario, load_scenario, overlap
 from glider_bringup.sweep_file import (
     GridDimension,
     LogUniformDimension,

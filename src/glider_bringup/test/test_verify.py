@@ -20,10 +20,10 @@ from typer.testing import CliRunner
 
 from glider_bringup.cli import app
 from glider_bringup.mcap_reader import Bag
-from glider_bringup.mission import fly_direct, make_run_folder
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.missions import fly_direct, make_run_folder
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.verify import IDENTICAL, place_ticks, report, verify
-from glider_bringup.scenario import load_scenario
 from glider_model.ros.messages import TOPICS
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glider_bringup.direct import ROW, fly
-from glider_bringup.mission import fly_direct, mission_of
+from glider_bringup.engines.direct import ROW, fly
+from glider_bringup.missions import fly_direct, mission_of
 from glider_bringup.montecarlo import airframe, judge, make_scenarios, sample_plant
 from glider_guidance.methods.observer import lookahead_stretch
 from glider_model.perturb import PerturbSettings, perturbed

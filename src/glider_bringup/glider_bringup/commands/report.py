@@ -26,13 +26,13 @@ def report(
     ] = None,
 ) -> None:
     """Write the report of a run again: one HTML file that needs no network."""
-    from glider_bringup import mission
+    from glider_bringup import missions
 
-    file = out or beside(run, mission.REPORT_FILE)
+    file = out or beside(run, missions.REPORT_FILE)
     with counter('reading the bag', None) as update:
-        flown = mission.read_run(run, update)
+        flown = missions.read_run(run, update)
     with messages.status('writing the report'):
-        mission.write_report(flown, file)
+        missions.write_report(flown, file)
     output.print(f'report: {file}', soft_wrap=True)
     if show and not webbrowser.open(file.resolve().as_uri()):
         messages.print(f'no browser found; open {file} in one', style='red', soft_wrap=True)
@@ -51,7 +51,7 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Compare runs: scores side by side, and what their scenarios differ in."""
-    from glider_bringup import mission
+    from glider_bringup import missions
     from glider_bringup.showing import compare as compared
 
     if len(paths) < 2:
@@ -59,7 +59,7 @@ def compare(
     names, runs = compared.labels(paths), []
     for path, name in zip(paths, names, strict=True):
         with counter(f'reading {name}', None) as update:
-            flown = mission.read_run(path, update, traced=out is not None)
+            flown = missions.read_run(path, update, traced=out is not None)
         runs.append(flown._replace(label=name))
     cards, found = [run.card for run in runs], compared.differences(runs)
     if out:

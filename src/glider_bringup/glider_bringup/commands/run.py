@@ -22,8 +22,13 @@ from glider_bringup.console import (
     progress,
 )
 from glider_bringup.disk import DiskError
-from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace, given_domain
-from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, parse_assignment
+from glider_bringup.engines.processes import NAMESPACE_ALLOWED, absolute_namespace, given_domain
+from glider_bringup.mission.scenario import (
+    DEFAULT_SCENARIO,
+    Scenario,
+    load_scenario,
+    parse_assignment,
+)
 from glider_bringup.showing.scorecard import print_card, print_places
 from glider_guidance.settings import LosSettings
 from glider_model.settings import ConfigurationError
@@ -102,7 +107,7 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Fly a scenario; record it, write its report and print the scorecard."""
-    from glider_bringup import mission
+    from glider_bringup import missions
 
     fields = dict(parse_assignment(text) for text in changes or [])
     if controller:
@@ -131,7 +136,7 @@ def run(
         card, folder, has_room = _fly(
             flown, engine, rate, place, out, bag, sync.value, report, begin_view
         )
-    page = folder / mission.REPORT_FILE
+    page = folder / missions.REPORT_FILE
     if as_json:
         print(json.dumps(card, allow_nan=False))
         print_places(messages, folder, page)
@@ -148,7 +153,7 @@ def run(
 @contextmanager
 def _view(port: int, namespace: str | None):
     """Live view, and the word how to open it; yields what lets it begin."""
-    from glider_bringup.viewing import live_view
+    from glider_bringup.engines.live_view import live_view
 
     with live_view(port, namespace) as (address, begin):
         messages.print(
@@ -174,22 +179,22 @@ def _fly(
 
     Returns the scorecard, the run folder, and whether the disk had room for the report.
     """
-    from glider_bringup import mission
+    from glider_bringup import missions
 
-    folder = mission.make_run_folder(scenario, out)
+    folder = missions.make_run_folder(scenario, out)
     messages.print(f'{scenario.name}: {scenario.description}')
-    tracer = mission.make_tracer(scenario) if report else None
-    with progress(scenario, mission.planned_ticks(scenario)) as (flying, reading):
+    tracer = missions.make_tracer(scenario) if report else None
+    with progress(scenario, missions.planned_ticks(scenario)) as (flying, reading):
         if engine is Engine.nodes:
             if begin_view:
                 flying = _after_first(begin_view, flying)
-            flight, scores = mission.fly_nodes(
+            flight, scores = missions.fly_nodes(
                 scenario, folder, rate, flying, _print_log, namespace, tracer, reading, sync
             )
         else:
-            flight, scores = mission.fly_direct(scenario, folder, bag, flying, tracer, sync)
-    card = mission.scorecard(scenario, engine.value, flight, scores)
-    mission.write_score(folder, card)
+            flight, scores = missions.fly_direct(scenario, folder, bag, flying, tracer, sync)
+    card = missions.scorecard(scenario, engine.value, flight, scores)
+    missions.write_score(folder, card)
     has_room = _write_report(scenario, folder, card, tracer) if tracer else True
     if card['reason']:
         messages.print(f'{card["status"]}: {card["reason"]}', style='red', soft_wrap=True)
@@ -201,13 +206,13 @@ def _write_report(scenario: Scenario, folder: Path, card: dict, tracer) -> bool:
 
     Returns whether the disk had room for it.
     """
-    from glider_bringup import mission
+    from glider_bringup import missions
 
-    file = folder / mission.REPORT_FILE
+    file = folder / missions.REPORT_FILE
     try:
         with messages.status('writing the report'):
-            run = mission.keep_traces(scenario, folder, card, tracer)
-            mission.write_report(run, file)
+            run = missions.keep_traces(scenario, folder, card, tracer)
+            missions.write_report(run, file)
     except (Exception, KeyboardInterrupt) as error:
         cause = str(error) or type(error).__name__
         messages.print(f'no report: {cause}', style='red', soft_wrap=True)

@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from glider_bringup.console import EXIT_FAILED, Json, messages, output
-from glider_bringup.scenario import load_scenario, scenario_names
+from glider_bringup.mission.scenario import load_scenario, scenario_names
 from glider_bringup.sweep_file import read_sweep, sweep_names
 from glider_model.settings import ConfigurationError
 from glider_model.trim import Trim, solve_trim

@@ -17,14 +17,14 @@ from typing import Any
 
 from mcap.opcode import Opcode
 
-from glider_bringup import mission
+from glider_bringup import missions
 from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import outcome_of
 from glider_bringup.mcap_reader import Bag
+from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.replay import check_not_empty, plan_replay, qos_of, recorded_messages
 from glider_bringup.ros.verify import report, verify
-from glider_bringup.scenario import load_scenario
 from glider_bringup.showing.report import report_page
 from glider_model.settings import ConfigurationError
 
@@ -97,12 +97,12 @@ def _compare(name: str, folder: Path, expected: Answer) -> tuple[str, str]:
 def _fly(scratch: Path) -> list[Path]:
     """Folders of one flight: bags of today and of before, with all that a run has and alone."""
     scenario = load_scenario('rough_water', FLIGHT)
-    run = mission.make_run_folder(scenario, scratch / 'run')
-    tracer = mission.make_tracer(scenario)
-    flight, scores = mission.fly_direct(scenario, run, True, lambda *_: None, tracer)
-    card = mission.scorecard(scenario, 'direct', flight, scores)
-    mission.write_score(run, card)
-    mission.keep_traces(scenario, run, card, tracer)
+    run = missions.make_run_folder(scenario, scratch / 'run')
+    tracer = missions.make_tracer(scenario)
+    flight, scores = missions.fly_direct(scenario, run, True, lambda *_: None, tracer)
+    card = missions.scorecard(scenario, 'direct', flight, scores)
+    missions.write_score(run, card)
+    missions.keep_traces(scenario, run, card, tracer)
     folders = [run, *(scratch / name for name in ('alone', 'run_of_before', 'alone_of_before'))]
     data = _bag_of(run).read_bytes()
     at = data.rindex(_DATA_END) + len(_DATA_END)
@@ -125,12 +125,12 @@ def _bag_of(folder: Path) -> Path:
 
 
 def _score(folder: Path) -> Answer:
-    card = mission.score_again(folder)
+    card = missions.score_again(folder)
     return card, bool(card['reason'])
 
 
 def _report(folder: Path) -> Answer:
-    flown = mission.read_run(folder)
+    flown = missions.read_run(folder)
     return sha256(report_page(flown).encode()).digest(), bool(flown.card['reason'])
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import badly_told, outcome_of
-from glider_bringup.scenario import load_scenario, scenario_names, scenario_path
+from glider_bringup.mission.scenario import load_scenario, scenario_names, scenario_path
 from glider_bringup.sweep_file import SWEEP_FOLDER, load_sweep, sweep_names
 from glider_model.errors import ConfigurationError
 from glider_model.vehicle import load_vehicle, vehicle_names, vehicle_path

@@ -17,8 +17,8 @@ import pydantic
 
 from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
-from glider_bringup.mission import finite, fly_direct, scorecard
-from glider_bringup.scenario import Scenario, load_scenario
+from glider_bringup.mission.scenario import Scenario, load_scenario
+from glider_bringup.missions import finite, fly_direct, scorecard
 from glider_model.current import MAX_SPEED_MPS
 from glider_model.settings import ConfigurationError
 from glider_model.vehicle import vehicle_names

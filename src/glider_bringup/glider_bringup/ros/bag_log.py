@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
 from glider_bringup.blocks import BLOCKS
-from glider_bringup.direct import BLOCK_TICKS, COLUMNS, ROW
+from glider_bringup.engines.direct import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.mcap_reader import Bag, Batch
 from glider_bringup.ros.bag import BagWriter
 from glider_guidance.nodes.guidance_node import path_message

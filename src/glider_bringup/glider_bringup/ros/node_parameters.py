@@ -8,7 +8,7 @@ from pathlib import Path
 
 from glider_bringup.blocks import BLOCKS
 from glider_bringup.disk import write_whole
-from glider_bringup.scenario import Scenario
+from glider_bringup.mission.scenario import Scenario
 from glider_model.ros import messages
 from glider_model.ros.parameters import parameters_yaml, to_parameters
 

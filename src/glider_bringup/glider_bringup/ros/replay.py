@@ -15,9 +15,9 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
+from glider_bringup.engines.processes import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_bringup.mcap_reader import Bag, BagTopic
 from glider_bringup.ros.recording import choose_namespace
-from glider_bringup.runner import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_model.files import parse_yaml
 from glider_model.ros import messages
 from glider_model.ros.executor import take

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from glider_bringup.score import STEADY_DEPTH_M
+from glider_bringup.scoring.score import STEADY_DEPTH_M
+from glider_bringup.scoring.traces import Traces
 from glider_bringup.showing.panels import ACTUATORS, limits_of
 from glider_bringup.showing.scorecard import guard_texts
 from glider_bringup.showing.web_page import FlownRun
 from glider_bringup.showing.words import count, small, span, way
-from glider_bringup.traces import Traces
 from glider_model.signals import TICK_S
 
 #: A track is lost if the vehicle is farther off its path than this until the end (m).

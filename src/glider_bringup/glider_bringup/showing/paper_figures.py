@@ -15,7 +15,7 @@ import numpy as np
 
 from glider_bringup.disk import save_figure
 from glider_bringup.experiments import Experiment
-from glider_bringup.record import Record
+from glider_bringup.scoring.one_hertz import Record
 
 #: Flights by experiment, case, controller and guidance.
 Flights = dict[tuple[str, str, str, str], Record]

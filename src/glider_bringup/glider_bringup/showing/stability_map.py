@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
-from glider_bringup.scenario import Scenario
+from glider_bringup.mission.scenario import Scenario
 from glider_bringup.sweep_result import read_dataset
 from glider_guidance.los import crab_heading
 from glider_model.current import KNOT_MPS

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.scenario import Scenario
-from glider_bringup.score import Rules
-from glider_bringup.traces import SAMPLES, Traces
+from glider_bringup.mission.scenario import Scenario
+from glider_bringup.scoring.score import Rules
+from glider_bringup.scoring.traces import SAMPLES, Traces
 from glider_model.vehicle import Vehicle
 
 if TYPE_CHECKING:

@@ -11,9 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from glider_bringup.mission import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE, make_run_folder
-from glider_bringup.ros.node_parameters import node_parameters, write_parameters
-from glider_bringup.runner import (
+from glider_bringup.engines.processes import (
     MODULES,
     NAMESPACE_ALLOWED,
     OWN_CLOCK,
@@ -21,7 +19,14 @@ from glider_bringup.runner import (
     RECORDER,
     absolute_namespace,
 )
-from glider_bringup.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, scenario_names
+from glider_bringup.mission.scenario import (
+    DEFAULT_SCENARIO,
+    Scenario,
+    load_scenario,
+    scenario_names,
+)
+from glider_bringup.missions import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE, make_run_folder
+from glider_bringup.ros.node_parameters import node_parameters, write_parameters
 from glider_model.ros.messages import CURRENT
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S

@@ -15,20 +15,20 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-from glider_bringup.direct import MissionParams, MissionState, NotFiniteError, fly_blocks
 from glider_bringup.disk import write_whole
+from glider_bringup.engines.direct import MissionParams, MissionState, NotFiniteError, fly_blocks
+from glider_bringup.engines.processes import NAMESPACE, node_commands, run_nodes
 from glider_bringup.interrupts import interrupts_noted
 from glider_bringup.mcap_reader import Bag, has_bag
+from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.ros.bag import BagWriter, Sync
 from glider_bringup.ros.bag_log import LogWriter, RecordedLog
 from glider_bringup.ros.node_parameters import node_parameters, write_parameters
-from glider_bringup.runner import NAMESPACE, node_commands, run_nodes
-from glider_bringup.scenario import Scenario, load_scenario
-from glider_bringup.score import Scorer
+from glider_bringup.scoring.score import Scorer
+from glider_bringup.scoring.traces import TRACED, Tracer, Traces, load_traces
 from glider_bringup.showing.figure import draw_run
 from glider_bringup.showing.report import report_page
 from glider_bringup.showing.web_page import FlownRun
-from glider_bringup.traces import TRACED, Tracer, Traces, load_traces
 from glider_guidance.guidance import path_time_s
 from glider_guidance.profile import mission_time_s
 from glider_model.files import is_file, read_json

@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from glider_bringup.direct import COLUMNS
+from glider_bringup.engines.direct import COLUMNS
 from glider_model.frames import odometry_from_wire, odometry_to_wire
 from glider_model.kernel import kernel
 from glider_model.sensors import SensorParams, is_noisy, recover

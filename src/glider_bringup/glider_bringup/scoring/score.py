@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_bringup.direct import COLUMNS
-from glider_bringup.truth import TrueMotion, wire_of
+from glider_bringup.engines.direct import COLUMNS
+from glider_bringup.scoring.true_motion import TrueMotion, wire_of
 from glider_control.watch import ROWS, SURFACES, TELL_EVERY_NS, say
 from glider_guidance.profile import AT_END_OF_PATH
 from glider_model.block import changes_to_tell

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from glider_bringup.runner import NAMESPACE, OWN_CLOCK, domain_id
+from glider_bringup.engines.processes import NAMESPACE, OWN_CLOCK, domain_id
 from glider_model.settings import ConfigurationError
 
 #: The view has this long (s) to leave.

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.direct import COLUMNS
 from glider_bringup.disk import whole_file
-from glider_bringup.truth import TrueMotion
+from glider_bringup.engines.direct import COLUMNS
+from glider_bringup.scoring.true_motion import TrueMotion
 from glider_model.current import KNOT_MPS
 from glider_model.frames import poses_from_wire, wrap_angle
 from glider_model.kernel import kernel

@@ -7,7 +7,7 @@ from copy import copy
 
 import numpy as np
 
-from glider_bringup.direct import COLUMNS, ROW
+from glider_bringup.engines.direct import COLUMNS, ROW
 from glider_model.frames import poses_from_wire
 from glider_model.signals import TICK_S
 
