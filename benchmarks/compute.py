@@ -19,8 +19,8 @@ from floor import Floor, compare, compiler, compiler_version
 from plant_step import SCENARIO, SHALLOW, cost_s, flight_of, plant_steps
 
 from glider_bringup.engines.direct import fly_blocks
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_bringup.missions import mission_of
 from glider_bringup.scoring.score import Scorer
 
 #: The mission: straight path, constant current, no noise.

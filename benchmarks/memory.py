@@ -12,16 +12,12 @@ MEANING = {
     'mission_30h_rss_over_imported': 'ratio of the two',
 }
 
-_IMPORT = 'from glider_bringup import mission\n'
+_IMPORT = 'from glider_bringup.scoring.card import fly_scored\n'
 _FLY = """
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from glider_bringup import missions
 from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.scoring.card import fly_scored
 
-scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 108000.0})
-with TemporaryDirectory() as folder:
-    mission.fly_direct(scenario, Path(folder), False, lambda ticks, depth_m: None)
+fly_scored(load_scenario('current_8deg', {'dives': 0, 'duration_s': 108000.0}))
 """
 #: VmHWM, and not ru_maxrss: a child starts with the largest that its parent ever was.
 _PEAK = """

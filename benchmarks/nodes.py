@@ -18,9 +18,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from glider_bringup.engines.direct import COLUMNS, fly_blocks
+from glider_bringup.engines.flight import Flight, Progress, mission_of
 from glider_bringup.engines.processes import domain_id, node_environment
+from glider_bringup.engines.recorded import fly_nodes
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import Flight, Progress, fly_nodes, make_run_folder, mission_of
 from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter
 from glider_bringup.tick_order import TickOrder
 from glider_model.ros.messages import TOPICS
@@ -104,7 +106,7 @@ def fly_once(duration_s: float, speed: float, on_progress: Progress) -> Flight:
     scenario = load_scenario(SCENARIO, {'dives': 0, 'duration_s': duration_s})
     with TemporaryDirectory() as parent:
         folder = make_run_folder(scenario, Path(parent) / 'run')
-        flight, _ = fly_nodes(scenario, folder, speed, on_progress, lambda line: None)
+        flight = fly_nodes(scenario, folder, progress=on_progress, speed=speed)
     if flight.status != 'completed':
         raise RuntimeError(f'the flight over topics was aborted: {flight.reason}')
     return flight

@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 from glider_bringup.engines.direct import COLUMNS, fly_blocks
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_bringup.missions import mission_of
 from glider_model.frames import water_from_wire
 from glider_model.kernel import kernel
 from glider_model.plant import plant_step

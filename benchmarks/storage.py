@@ -14,11 +14,19 @@ from tempfile import TemporaryDirectory
 import yaml
 
 from glider_bringup.engines.direct import fly_blocks
+from glider_bringup.engines.flight import mission_of
+from glider_bringup.engines.recorded import fly_recorded
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import fly_direct, make_run_folder, mission_of
 from glider_bringup.ros.bag import BagWriter, Sync
 from glider_bringup.ros.bag_log import LogWriter
-from glider_bringup.sweep import JOURNAL_FILE, RESULT_FILE, fly_chunk, make_chunks, open_journal
+from glider_bringup.studies.sweep import (
+    JOURNAL_FILE,
+    RESULT_FILE,
+    fly_chunk,
+    make_chunks,
+    open_journal,
+)
 from glider_bringup.sweep_file import MAX_CELLS, load_sweep
 from glider_model.ros.messages import TOPICS
 from glider_model.signals import TICK_S
@@ -51,7 +59,7 @@ MEANING = {
 _WRITE = """
 import json, sys, time
 from pathlib import Path
-from glider_bringup.sweep import RESULT_FILE, open_journal, write_result
+from glider_bringup.studies.sweep import RESULT_FILE, open_journal, write_result
 from glider_bringup.sweep_file import load_sweep
 
 def memory_mb(name):
@@ -110,7 +118,7 @@ def _bag_bytes() -> int:
     scenario = load_scenario(SCENARIO, {'dives': 0, 'duration_s': HOUR_S})
     with TemporaryDirectory() as parent:
         folder = make_run_folder(scenario, Path(parent) / 'run')
-        fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
+        fly_recorded(scenario, folder)
         return sum(file.stat().st_size for file in folder.glob('*.mcap'))
 
 

@@ -9,7 +9,7 @@ from itertools import islice
 from distributed import Client, LocalCluster
 
 from glider_bringup.pool import Pool, worker_pool
-from glider_bringup.sweep import Chunk, fly_chunk, make_chunks
+from glider_bringup.studies.sweep import Chunk, fly_chunk, make_chunks
 from glider_bringup.sweep_file import load_sweep
 
 MEANING = {

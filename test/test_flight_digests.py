@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 
 from glider_bringup.engines.direct import COLUMNS, fly_blocks
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import mission_of
 from glider_model.kernel import kernel
 
 DURATION_S = 36000.0

@@ -12,7 +12,7 @@ import yaml
 from mcap.reader import make_reader
 
 from glider_bringup.engines.processes import MODULES, node_commands, run_nodes
-from glider_bringup.missions import PARAMETERS_FILE
+from glider_bringup.mission.run_folder import PARAMETERS_FILE
 from glider_model.ros.messages import TOPICS
 from glider_model.signals import TICK_S
 

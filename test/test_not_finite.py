@@ -11,13 +11,16 @@ import math
 
 import pytest
 
-from glider_bringup import experiments, montecarlo, sweep
+from glider_bringup import experiments, montecarlo
 from glider_bringup.engines.direct import NotFiniteError, fly_blocks
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.experiments import Case
 from glider_bringup.fuzzing import flights
 from glider_bringup.mission.scenario import load_scenario, read_scenario
-from glider_bringup.missions import fly_direct, mission_of, score_again, scorecard
-from glider_bringup.sweep import Chunk, Inputs
+from glider_bringup.scoring.again import score_again
+from glider_bringup.scoring.card import fly_scored, scorecard
+from glider_bringup.studies import sweep
+from glider_bringup.studies.sweep import Chunk, Inputs
 from glider_model.vehicle import vehicle_path
 
 DURATION_S = 600.0
@@ -120,7 +123,7 @@ def test_studies_count_it_as_failed(driven):
 def test_score_that_is_not_finite_is_a_failure():
     """Numbers of flights are bounded, their squares need not be."""
     scenario = load_scenario(changes={'dives': 0, 'duration_s': 1.0})
-    flight, scores = fly_direct(scenario, None, False, lambda ticks, depth_m: None)
+    flight, scores = fly_scored(scenario)
     scores['cross_track_m']['max_all'] = math.inf
     scores['final_state']['velocity_mps'][0] = math.nan
     card = scorecard(scenario, 'direct', flight, scores)
@@ -152,7 +155,7 @@ def test_stiff_roll_flies(factor):
     """Cases of 1980cb2 in which every number was NaN, and the run completed."""
     changes = {'perturb.D_p': factor, 'dives': 0, 'duration_s': 7000.0}
     scenario = load_scenario(changes=changes)
-    flight, scores = fly_direct(scenario, None, False, lambda ticks, depth_m: None)
+    flight, scores = fly_scored(scenario)
     card = scorecard(scenario, 'direct', flight, scores)
     assert (card['status'], card['ticks']) == ('completed', 70000)
     assert card['depth_m']['max'] > 900.0

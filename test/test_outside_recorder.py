@@ -14,11 +14,12 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import SetBool
 
-from glider_bringup import missions
 from glider_bringup.engines.processes import PLANT, RECORDER, domain_id, node_commands
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.ros.bag import message_definition
 from glider_bringup.ros.node_parameters import node_parameters, write_parameters
+from glider_bringup.scoring.again import score_again
 from glider_model.ros.messages import TOPICS
 
 TICKS = 400
@@ -76,7 +77,7 @@ class OutsideRecorder:
 def fly(tmp_path, monkeypatch):
     """Start nodes of a run, by name; all of them are gone at the end."""
     scenario = load_scenario('survey', {'dives': 0, 'duration_s': TICKS / 10, 'settle_s': 0.0})
-    folder = missions.make_run_folder(scenario, tmp_path / 'flight')
+    folder = make_run_folder(scenario, tmp_path / 'flight')
     write_parameters(node_parameters(scenario), tmp_path / 'parameters.yaml')
     commands = node_commands(tmp_path / 'parameters.yaml')
     processes = []
@@ -120,7 +121,7 @@ def test_paused_at_its_start_a_run_is_recorded_whole_and_scored(fly):
     recorder.wait_for(is_whole, processes, 'not every message of every tick')
     recorder.wait_for(lambda: processes[0].poll() == 0, processes, 'the plant does not end')
     recorder.write(folder / 'outside.mcap')
-    card = missions.score_again(folder)
+    card = score_again(folder)
     assert (card['status'], card['ticks'], card['messages_lost']) == ('completed', TICKS, 0)
     assert card['sim_time_s'] == pytest.approx(TICKS / 10)
     recorder.node.destroy_node()

@@ -19,14 +19,15 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.processes import NAMESPACE, domain_id
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import mission_of
 from glider_bringup.ros.bag import BagWriter
+from glider_control import block as control
 from glider_control.control import control_step
-from glider_control.nodes.control_node import saturation_event
+from glider_guidance import block as guidance
 from glider_guidance.guidance import guidance_abort, guidance_step
-from glider_guidance.nodes.guidance_node import path_message, stage_event
+from glider_guidance.nodes.guidance_node import path_message
 from glider_model.frames import (
     odometry_from_wire,
     odometry_to_wire,
@@ -194,7 +195,11 @@ class Vehicle:
             self.told = (out.stage, out.infeasible)
             self.put(
                 '/diagnostics',
-                to_cdr(stage_event(stamp_ns, *self.told, f'{NAMESPACE}/guidance_node')),
+                to_cdr(
+                    health.said_array(
+                        stamp_ns, f'{NAMESPACE}/guidance_node', guidance.say(*self.told)
+                    )
+                ),
             )
         self.reference = (stamp_ns, reference_to_wire(out.reference))
         self.publish('reference', *self.reference)
@@ -223,7 +228,11 @@ class Vehicle:
             self.saturation = (out.saturation, stamp_ns)
             self.put(
                 '/diagnostics',
-                to_cdr(saturation_event(stamp_ns, out.saturation, f'{NAMESPACE}/control_node')),
+                to_cdr(
+                    health.said_array(
+                        stamp_ns, f'{NAMESPACE}/control_node', control.say(out.saturation)
+                    )
+                ),
             )
         self.publish('command', stamp_ns, out.command)
         self.command = out.command

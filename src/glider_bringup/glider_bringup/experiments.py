@@ -15,18 +15,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.engines.direct import NotFiniteError, fly_blocks
+from glider_bringup.engines.flight import fly as fly_mission
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_bringup.missions import finite, mission_of
 from glider_bringup.montecarlo import airframe
 from glider_bringup.pool import Pool, Progress
-from glider_bringup.scoring.one_hertz import Record
-from glider_bringup.scoring.score import Scorer, windows
+from glider_bringup.scoring.card import finite
+from glider_bringup.scoring.one_hertz import Record, Recorder
+from glider_bringup.scoring.score import make_scorer, scores_of, windows
 from glider_guidance.los import crab_heading
 from glider_model.current import KNOT_MPS
 from glider_model.perturb import perturbed
 from glider_model.polar import make_polar, steady_horizontal_speed
-from glider_model.signals import TICK_S
 from glider_model.vehicle import load_vehicle
 
 RESULT_FILE = 'experiments.json'
@@ -327,22 +327,13 @@ def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
             steering_dive=steering.dive.value, steering_climb=steering.climb.value
         )
         params = params._replace(control=params.control._replace(pid=pid))
-    scorer = Scorer(scenario.sensors.params(scenario.seed))
-    failed = []
-
-    def blocks() -> Iterator[np.ndarray]:
-        try:
-            for log in fly_blocks(state, params):
-                scorer.add(log)
-                yield log
-        except NotFiniteError as error:
-            failed.append(str(error))
-
-    record = Record(blocks())
-    scores = scorer.result(scenario.score_rules(scorer.ticks * TICK_S))
+    scorer, recorder = make_scorer(scenario), Recorder()
+    flight = fly_mission(scenario, [scorer, recorder], mission=(state, params))
+    record, scores = recorder.result(), scores_of(scenario, scorer)
     for measure in case.measures:
         scores.update(measure(record, scenario))
-    return _row(scores, bool(failed)), record.thinned(RECORD_POINTS) if case.drawn else None
+    row = _row(scores, flight.status == 'failed')
+    return row, record.thinned(RECORD_POINTS) if case.drawn else None
 
 
 def _row(scores: dict[str, Any], failed: bool = False) -> dict[str, Any]:

@@ -10,14 +10,13 @@ number of plants and of worker processes.
 import json
 import math
 import shlex
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_bringup.missions import fly_direct
 from glider_bringup.pool import Pool, Progress
+from glider_bringup.scoring.card import fly_scored
 from glider_model.perturb import (
     ADDED_MASS,
     DAMPING,
@@ -215,7 +214,7 @@ def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
 
 def _fly_plant(scenario: Scenario) -> dict[str, Any]:
     """Fly one scenario in a worker."""
-    flight, scores = fly_direct(scenario, Path(), False, lambda ticks, depth_m: None)
+    flight, scores = fly_scored(scenario)
     return judge(scores, flight.status)
 
 

@@ -82,7 +82,7 @@ def make_dataset(
     ----------
     plan : Plan
     records : iterable of dict
-        What `glider_bringup.sweep.fly_chunk` says of every cell, in any order.
+        What `glider_bringup.studies.sweep.fly_chunk` says of every cell, in any order.
     statuses : tuple of str
         Names of the values of the variable ``status``.
     """

@@ -9,13 +9,16 @@ import numpy as np
 
 from glider_bringup.blocks import BLOCKS
 from glider_bringup.engines.direct import ROW, fly
+from glider_bringup.engines.flight import mission_of
+from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mcap_reader import Bag
+from glider_bringup.mission.rules import Rules
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import fly_direct, make_run_folder, make_tracer, mission_of
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.verify import verify
-from glider_bringup.scoring.score import Rules, Scorer
-from glider_bringup.scoring.traces import halve
+from glider_bringup.scoring.score import Scorer
+from glider_bringup.scoring.traces import halve, make_tracer
 from glider_model.plant_block import PLANT, plant_move, plant_outputs
 from glider_model.sensors import SensorSettings
 from glider_model.signals import TICK_S
@@ -52,7 +55,7 @@ def verify_one_tick() -> None:
     scenario = load_scenario(changes={'dives': 0, 'duration_s': TICK_S})
     with tempfile.TemporaryDirectory() as scratch:
         folder = make_run_folder(scenario, Path(scratch) / 'run')
-        fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
+        fly_recorded(scenario, folder)
         bag = Bag(folder)
         told = read_told(bag, folder, None, Path(scratch))
         recording = Recording(bag, None, lambda share: None)

@@ -9,8 +9,9 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+from glider_bringup.engines.recorded import fly_recorded
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import fly_direct, make_run_folder
 
 
 class Recorded(NamedTuple):
@@ -88,5 +89,5 @@ def short_run(tmp_path_factory) -> Path:
     }
     scenario = load_scenario('rough_water', changes)
     folder = make_run_folder(scenario, tmp_path_factory.mktemp('short') / 'run')
-    fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
+    fly_recorded(scenario, folder)
     return folder

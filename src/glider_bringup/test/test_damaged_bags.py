@@ -15,14 +15,19 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 
-from glider_bringup import missions
+from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.fuzzing import bags, watch
 from glider_bringup.mcap_reader import Bag
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.verify import verify
-from glider_bringup.scoring.traces import load_traces
+from glider_bringup.scoring.again import score_again
+from glider_bringup.scoring.card import scorecard, write_score
+from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.traces import load_traces, make_tracer
+from glider_bringup.showing.flown_run import draw, keep_traces, read_run, write_report
 from glider_model.ros import health
 from glider_model.ros.codec import to_cdr
 from glider_model.ros.messages import PLANT, TOPICS
@@ -50,12 +55,13 @@ def flown(tmp_path_factory) -> Path:
     """Run folder with all that a run has."""
     changes = {'dives': 0, 'duration_s': TICKS * TICK_S, 'settle_s': 0.0}
     scenario = load_scenario('current_8deg', changes)
-    folder = missions.make_run_folder(scenario, tmp_path_factory.mktemp('harm') / 'flight')
-    tracer = missions.make_tracer(scenario)
-    flight, scores = missions.fly_direct(scenario, folder, True, lambda *_: None, tracer)
-    card = missions.scorecard(scenario, 'direct', flight, scores)
-    missions.write_score(folder, card)
-    missions.keep_traces(scenario, folder, card, tracer)
+    folder = make_run_folder(scenario, tmp_path_factory.mktemp('harm') / 'flight')
+    tracer = make_tracer(scenario)
+    scorer = make_scorer(scenario)
+    flight = fly_recorded(scenario, folder, [scorer, tracer])
+    card = scorecard(scenario, 'direct', flight, scores_of(scenario, scorer))
+    write_score(folder, card)
+    keep_traces(scenario, folder, card, tracer)
     return folder
 
 
@@ -120,9 +126,9 @@ def test_bit_in_a_chunk_is_told_with_time_and_ticks(run, share):
     last = (3 * CHUNK_TICKS - 1) * TICK_S
     words = rf'chunk 3 is damaged: .*t = {first:.1f} s to {last:.1f} s, {CHUNK_TICKS} ticks'
     for use in (
-        missions.score_again,
-        missions.read_run,
-        lambda run: missions.draw(run, run / 'x.png'),
+        score_again,
+        read_run,
+        lambda run: draw(run, run / 'x.png'),
     ):
         with pytest.raises(ConfigurationError, match=words):
             use(run)
@@ -166,13 +172,13 @@ def test_attachment_is_checked(run):
 
 def test_summary_is_not_needed(run):
     """Nothing depends on it where the data has a checksum; the result is the same."""
-    card = missions.score_again(run)
+    card = score_again(run)
     file = bag_of(run)
     data = file.read_bytes()
     file.write_bytes(flip(data, 8 * (len(data) - 200)))
-    assert missions.score_again(run) == card
+    assert score_again(run) == card
     file.write_bytes(data[:-200])
-    assert missions.score_again(run) == card
+    assert score_again(run) == card
 
 
 # ---------------------------------------------------------------------- cuts, and what is absent
@@ -182,7 +188,7 @@ def test_summary_is_not_needed(run):
 def test_cut_run_is_not_completed_wherever_it_is_shown(run, share):
     file = bag_of(run)
     file.write_bytes(file.read_bytes()[: int(share * file.stat().st_size)])
-    card = missions.score_again(run)
+    card = score_again(run)
     assert 0 < card['ticks'] < TICKS
     assert card['ticks'] % CHUNK_TICKS == 0
     assert card['status'] == 'aborted'
@@ -190,14 +196,14 @@ def test_cut_run_is_not_completed_wherever_it_is_shown(run, share):
     assert f'it goes to t = {(card["ticks"] - 1) * TICK_S:.1f} s' in card['reason']
     assert f'{card["ticks"]} of {TICKS} ticks are there' in card['reason']
     for traced in (False, True):
-        assert missions.read_run(run, traced=traced).card == card
+        assert read_run(run, traced=traced).card == card
 
 
 @pytest.mark.parametrize('size', [0, 1, 100, 6000])
 def test_bag_without_a_whole_tick_is_not_scored(run, size):
     file = bag_of(run)
     file.write_bytes(file.read_bytes()[:size])
-    for use in (missions.score_again, missions.read_run):
+    for use in (score_again, read_run):
         with pytest.raises(ConfigurationError, match='cannot be scored: .* ends early'):
             use(run)
 
@@ -214,7 +220,7 @@ def test_score_file_does_not_stand_on_ticks_that_are_absent(run):
     file = run / 'score.json'
     card = json.loads(file.read_text())
     file.write_text(json.dumps({**card, 'ticks': 77000}))
-    for again in (missions.score_again(run), missions.read_run(run).card):
+    for again in (score_again(run), read_run(run).card):
         assert (again['status'], again['ticks']) == ('aborted', TICKS)
         assert again['reason'].startswith('600 of 77,000 ticks are there')
 
@@ -222,7 +228,7 @@ def test_score_file_does_not_stand_on_ticks_that_are_absent(run):
 @pytest.mark.parametrize(('topic', 'why'), [('odom', 'is not finite'), ('wrench', '')])
 def test_number_that_is_none_ends_the_rows_where_it_is_scored(tmp_path, topic, why):
     """What a node refuses, the reader must not trip over, nor score."""
-    folder = missions.make_run_folder(load_scenario('helix'), tmp_path / 'flight')
+    folder = make_run_folder(load_scenario('helix'), tmp_path / 'flight')
     bag = BagWriter(folder, 'helix')
     for tick in range(3):
         for one in TOPICS.values():
@@ -233,7 +239,7 @@ def test_number_that_is_none_ends_the_rows_where_it_is_scored(tmp_path, topic, w
     end = health.Report(PLANT, health.FINISHED, '', 2 * TICK_NS)
     bag.write('/diagnostics', 2 * TICK_NS, to_cdr(health.report_array(end)))
     bag.close()
-    card = missions.score_again(folder)
+    card = score_again(folder)
     json.dumps(card, allow_nan=False)
     if why:
         assert (card['status'], card['ticks']) == ('aborted', 2)
@@ -269,7 +275,7 @@ def test_score_file_that_is_damaged_is_named_or_can_be_shown(run):
     for _ in range(60):
         file.write_bytes(flip(data, draw.randrange(8 * len(data))))
         try:
-            missions.write_report(missions.read_run(run), run / 'report.html')
+            write_report(read_run(run), run / 'report.html')
         except ConfigurationError as error:
             assert str(error).startswith(str(run))
 
@@ -289,7 +295,7 @@ def test_score_file_of_another_shape_is_refused(run, before, after):
     text = file.read_text()
     assert before in text
     file.write_text(text.replace(before, after, 1))
-    for use in (missions.score_again, missions.read_run):
+    for use in (score_again, read_run):
         with pytest.raises(ConfigurationError, match=r'score\.json: '):
             use(run)
 
@@ -315,10 +321,10 @@ def test_bag_recorded_at_1980cb2_is_scored_shown_verified_and_replayed(tmp_path,
     packed = Path(__file__).with_name(f'of_before_{engine}.mcap.zst').read_bytes()
     file = tmp_path / 'current_8deg_0.mcap'
     file.write_bytes(zstandard.ZstdDecompressor().decompress(packed))
-    card = missions.score_again(file)
+    card = score_again(file)
     assert (card['status'], card['ticks'], card['messages_lost']) == ('completed', 30, 0)
     assert card['messages_recorded'] == 304
-    missions.write_report(missions.read_run(file), tmp_path / 'report.html')
+    write_report(read_run(file), tmp_path / 'report.html')
     assert (tmp_path / 'report.html').stat().st_size > 100_000
     bag = Bag(file)
     told = read_told(bag, file, None, tmp_path)

@@ -101,7 +101,7 @@ def test_flight_leaves_its_initial_state_as_it_was(rough):
 BATCH = """
 import hashlib, json, sys
 from glider_bringup.engines.direct import fly_blocks
-from glider_bringup.missions import mission_of
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
 digests = {}
 for name in sys.argv[2:]:
@@ -246,9 +246,8 @@ def test_mission_of_one_dive_ends_by_itself_at_the_surface():
 
 INTERRUPTED = """
 import signal
-from pathlib import Path
 
-from glider_bringup.missions import fly_direct
+from glider_bringup.engines.flight import fly
 from glider_bringup.mission.scenario import load_scenario
 
 scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 36000.0})
@@ -258,7 +257,7 @@ for shot in range(10):
     began = []
     if shot:  # the first one compiles
         signal.setitimer(signal.ITIMER_REAL, 0.01)
-    flight, _ = fly_direct(scenario, Path(), False, lambda ticks, depth_m: began.append(ticks))
+    flight = fly(scenario, progress=lambda ticks, depth_m: began.append(ticks))
     flown.append((flight.status, len(began)))
 print(flown)
 """

@@ -8,8 +8,14 @@ import numpy as np
 import pytest
 from mcap_ros2.reader import read_ros2_messages
 
-from glider_bringup import missions
+from glider_bringup.engines.flight import fly as fly_flight
+from glider_bringup.engines.recorded import fly_recorded
+from glider_bringup.mission.planned import planned_ticks
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario, scenario_names
+from glider_bringup.scoring.again import score_again
+from glider_bringup.scoring.card import scorecard, write_score
+from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.showing.scorecard import card_rows
 from glider_model.frames import odometry_from_wire
 from glider_model.sensors import recover
@@ -18,10 +24,13 @@ from glider_model.sensors import recover
 def fly(folder, name, with_bag=False, **changes):
     """Scorecard of a direct run into a folder."""
     scenario = load_scenario(name, {key.replace('__', '.'): v for key, v in changes.items()})
+    scorer = make_scorer(scenario)
     if with_bag:
-        missions.make_run_folder(scenario, folder)
-    flight, scores = missions.fly_direct(scenario, folder, with_bag, lambda ticks, depth_m: None)
-    return missions.scorecard(scenario, 'direct', flight, scores)
+        make_run_folder(scenario, folder)
+        flight = fly_recorded(scenario, folder, [scorer])
+    else:
+        flight = fly_flight(scenario, [scorer])
+    return scorecard(scenario, 'direct', flight, scores_of(scenario, scorer))
 
 
 def recorded(folder, topic):
@@ -60,7 +69,7 @@ def test_largest_error_of_the_run_is_the_largest_that_was_recorded(name, tmp_pat
     assert len(errors) == 7000
     assert found['max_run'] == pytest.approx(np.abs(errors).max(), abs=tolerance)
     assert found['max_all'] == pytest.approx(np.abs(errors[4501:]).max(), abs=tolerance)
-    assert missions.score_again(folder)['cross_track_m'] == found
+    assert score_again(folder)['cross_track_m'] == found
     rows = dict(card_rows(card))
     assert rows['cross-track, whole run'] == f'max {found["max_run"]:.2f} m'
     assert rows['cross-track, all'].endswith('(after settling, the first 450 s)')
@@ -118,7 +127,7 @@ def test_the_end_of_the_path_is_recorded_and_scored_alike_from_the_bag(tmp_path)
     folder = tmp_path / 'run'
     fields = {'path__waypoints': [[0, 0], [300, 0]], 'current__speed_kn': 0.2}
     card = fly(folder, 'survey', True, **fields)
-    missions.write_score(folder, card)
+    write_score(folder, card)
     told = [
         pair.value
         for array in recorded(folder, '/diagnostics')
@@ -127,7 +136,7 @@ def test_the_end_of_the_path_is_recorded_and_scored_alike_from_the_bag(tmp_path)
         if pair.key == 'stage'
     ]
     assert told[-1] == 'at the end of the path'
-    assert missions.score_again(folder)['end_of_path_m'] == card['end_of_path_m']
+    assert score_again(folder)['end_of_path_m'] == card['end_of_path_m']
     text = dict(card_rows(card))['end of path']
     assert text == f'came up {card["end_of_path_m"]:.1f} m from its last point'
 
@@ -142,6 +151,6 @@ def test_the_end_of_the_path_is_recorded_and_scored_alike_from_the_bag(tmp_path)
 )
 def test_estimated_time_knows_the_end_of_the_path(name, changes):
     """What the progress bar is drawn from, within 10 %."""
-    estimate = missions.planned_ticks(load_scenario(name, changes))
+    estimate = planned_ticks(load_scenario(name, changes))
     card = fly(None, name, **{key.replace('.', '__'): value for key, value in changes.items()})
     assert estimate == pytest.approx(card['ticks'], rel=0.1)

@@ -36,10 +36,10 @@ from glider_bringup.experiments import (
     report,
     steering_share,
 )
+from glider_bringup.mission.run_folder import make_result_folder
 from glider_bringup.mission.scenario import load_scenario, parse_assignment
-from glider_bringup.missions import make_result_folder
 from glider_bringup.pool import worker_pool
-from glider_bringup.scoring.one_hertz import Record
+from glider_bringup.scoring.one_hertz import Recorder
 from glider_model.settings import ConfigurationError
 from glider_model.trim import solve_trim
 from glider_model.vehicle import load_vehicle
@@ -288,7 +288,7 @@ def test_numbers_that_json_does_not_have_are_told_as_none():
 
 def survey_record(heading):
     """Target along three legs, north, west and south, 2000 s each; heading as given (deg)."""
-    record = copy.copy(Record([]))
+    record = copy.copy(Recorder().result())
     time_s = np.arange(6000.0)
     course = np.radians(np.repeat([0.0, -90.0, -180.0], 2000))
     record.time_s = time_s

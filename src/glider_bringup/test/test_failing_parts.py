@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from glider_bringup.engines.direct import COLUMNS, ROW, MissionState, fly
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import mission_of
 from glider_control.control import control_step
 from glider_control.watch import (
     FROZEN,

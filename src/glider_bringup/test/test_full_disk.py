@@ -12,11 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from glider_bringup import missions
 from glider_bringup.disk import DiskError, whole_file, write_whole
+from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mcap_reader import Bag
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter
+from glider_bringup.scoring.again import score_again
+from glider_bringup.scoring.card import scorecard, write_score
+from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_model.ros.messages import TOPICS
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_NS
@@ -81,9 +85,10 @@ def test_file_behind_a_link_is_written_and_the_link_stays(tmp_path):
 @pytest.mark.parametrize('name', ['report', 'figure'])
 def test_device_that_is_full_is_named_and_stays_a_device(tmp_path, name):
     scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 10.0})
-    folder = missions.make_run_folder(scenario, tmp_path / 'flight')
-    flight, scores = missions.fly_direct(scenario, folder, True, lambda *_: None)
-    missions.write_score(folder, missions.scorecard(scenario, 'direct', flight, scores))
+    folder = make_run_folder(scenario, tmp_path / 'flight')
+    scorer = make_scorer(scenario)
+    flight = fly_recorded(scenario, folder, [scorer])
+    write_score(folder, scorecard(scenario, 'direct', flight, scores_of(scenario, scorer)))
     done = glider(name, folder, '--out', '/dev/full')
     assert (done.returncode, done.stdout) == (1, '')
     assert done.stderr.split() == '/dev/full: cannot be written: No space left on device'.split()
@@ -102,7 +107,7 @@ def test_bag_is_readable_up_to_where_the_disk_was_full(tmp_path):
     assert 'Traceback' not in done.stderr
     names = {one.name for one in file.parent.iterdir()}
     assert names == {file.name, 'scenario.yaml', 'vehicle.yaml'}
-    card = missions.score_again(file.parent)
+    card = score_again(file.parent)
     assert card['status'] == 'aborted'
     assert card['ticks'] >= CHUNK_TICKS
     assert card['ticks'] % CHUNK_TICKS == 0
@@ -122,7 +127,7 @@ def test_recorder_whose_disk_is_full_ends_the_run_and_is_named(tmp_path):
     assert card['reason'] == f'{file}: cannot be written: File too large'
     assert card['ticks'] >= CHUNK_TICKS
     assert card == json.loads((file.parent / 'score.json').read_text())
-    assert missions.score_again(file.parent)['ticks'] == card['ticks']
+    assert score_again(file.parent)['ticks'] == card['ticks']
     assert file.stat().st_size <= MOST
 
 

@@ -12,7 +12,8 @@ from types import SimpleNamespace
 import pytest
 from rosbags.highlevel import AnyReader
 
-from glider_bringup import missions
+from glider_bringup.engines.recorded import fly_recorded
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_model.frames import (
     euler_from_quaternion,
@@ -54,8 +55,8 @@ def last(tmp_path_factory) -> dict:
     """Last message of every topic of a bag, read by a library that is not ours."""
     folder = tmp_path_factory.mktemp('run') / 'flight'
     scenario = load_scenario('survey', {'dives': 0, 'duration_s': 30.0})
-    missions.make_run_folder(scenario, folder)
-    missions.fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
+    make_run_folder(scenario, folder)
+    fly_recorded(scenario, folder)
     found = {}
     with AnyReader([folder]) as reader:
         for connection, _, raw in reader.messages():

@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 
 from glider_bringup.engines.direct import ROW, fly
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import mission_of
 from glider_control.allocation import moments
 from glider_control.laws.adaptive import (
     SCALE_ALPHA,

@@ -16,9 +16,11 @@ import pytest
 
 from glider_bringup import montecarlo
 from glider_bringup.engines.direct import COLUMNS, ROW, fly
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.mcap_reader import Bag
+from glider_bringup.mission.rules import Rules
+from glider_bringup.mission.run_folder import make_result_folder
 from glider_bringup.mission.scenario import load_scenario, parse_assignment
-from glider_bringup.missions import make_result_folder, mission_of, score_again
 from glider_bringup.montecarlo import (
     RESULT_FILE,
     airframe,
@@ -28,7 +30,8 @@ from glider_bringup.montecarlo import (
     spread,
 )
 from glider_bringup.ros.bag_log import RecordedLog
-from glider_bringup.scoring.score import Rules, Scorer
+from glider_bringup.scoring.again import score_again
+from glider_bringup.scoring.score import Scorer
 from glider_model.frames import euler_from_quaternion
 from glider_model.perturb import ADDED_MASS, DAMPING, STATIC, VISCOUS, PerturbSettings, perturbed
 from glider_model.ros.messages import TOPICS

@@ -9,9 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from glider_bringup import missions
+from glider_bringup.engines.recorded import fly_recorded
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.ros.bag import BagWriter
+from glider_bringup.scoring.again import score_again
+from glider_bringup.scoring.card import scorecard, write_score
+from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.showing.flown_run import draw, read_run
 from glider_model.ros import health
 from glider_model.ros.codec import to_cdr
 from glider_model.ros.messages import PLANT, TOPICS
@@ -21,7 +26,7 @@ from glider_model.signals import TICK_NS
 #: What a score file knows and a bag does not.
 ONLY_IN_THE_FILE = {'engine', 'wall_time_s', 'real_time_factor'}
 #: `./glider score`, and what report, compare and figure begin with.
-USES = (missions.score_again, missions.read_run)
+USES = (score_again, read_run)
 ATTACHED = ('scenario.yaml', 'vehicle.yaml')
 
 
@@ -29,9 +34,10 @@ ATTACHED = ('scenario.yaml', 'vehicle.yaml')
 def run(tmp_path_factory) -> Path:
     """Run folder with bag and score file."""
     scenario = load_scenario('noisy_sensors', {'dives': 0, 'duration_s': 300.0, 'settle_s': 0.0})
-    folder = missions.make_run_folder(scenario, tmp_path_factory.mktemp('run') / 'flight')
-    flight, scores = missions.fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
-    missions.write_score(folder, missions.scorecard(scenario, 'direct', flight, scores))
+    folder = make_run_folder(scenario, tmp_path_factory.mktemp('run') / 'flight')
+    scorer = make_scorer(scenario)
+    flight = fly_recorded(scenario, folder, [scorer])
+    write_score(folder, scorecard(scenario, 'direct', flight, scores_of(scenario, scorer)))
     return folder
 
 
@@ -52,7 +58,7 @@ def said(phase: str, stamp_ns: int, message: str = '') -> bytes:
 def write_bag(folder: Path, *reports: bytes, but: str = '') -> Path:
     """Run folder, as a launch makes it, with three ticks in its bag, ``but`` in the last only."""
     scenario = load_scenario('helix')
-    missions.make_run_folder(scenario, folder)
+    make_run_folder(scenario, folder)
     bag = BagWriter(folder, 'helix', attachments=[folder / name for name in ATTACHED])
     for tick in range(3):
         for topic in TOPICS.values():
@@ -66,11 +72,11 @@ def write_bag(folder: Path, *reports: bytes, but: str = '') -> Path:
 
 
 def test_scored_from_the_bag_as_it_was_in_flight(run, bag_only):
-    card = missions.score_again(run)
+    card = score_again(run)
     assert (card['status'], card['engine']) == ('completed', 'direct')
     (file,) = bag_only.glob('*.mcap')
     for source in (bag_only, file):
-        again = missions.score_again(source)
+        again = score_again(source)
         assert again.keys() == card.keys()
         assert {name for name in card if again[name] != card[name]} == ONLY_IN_THE_FILE
         assert [again[name] for name in sorted(ONLY_IN_THE_FILE)] == [None, None, None]
@@ -81,12 +87,12 @@ def test_launched_run_has_parameters_and_no_score_file(run, tmp_path):
     shutil.copytree(run, folder)
     (folder / 'score.json').unlink()
     (folder / 'parameters.yaml').touch()
-    again = missions.score_again(folder)
+    again = score_again(folder)
     assert (again['engine'], again['status'], again['reason']) == ('nodes', 'completed', '')
 
 
 def test_drawn_from_the_bag_alone(bag_only):
-    missions.draw(bag_only, bag_only / 'run.png')
+    draw(bag_only, bag_only / 'run.png')
     assert (bag_only / 'run.png').read_bytes().startswith(b'\x89PNG')
 
 
@@ -99,7 +105,7 @@ def test_drawn_from_the_bag_alone(bag_only):
     ],
 )
 def test_status_is_what_the_plant_said_last(tmp_path, reports, status, words):
-    card = missions.score_again(write_bag(tmp_path / 'flight', *reports))
+    card = score_again(write_bag(tmp_path / 'flight', *reports))
     assert card['status'] == status
     assert words in card['reason']
     assert bool(card['reason']) is bool(words)
@@ -116,7 +122,7 @@ def test_score_file_knows_more_than_the_bag(run, tmp_path):
             '"reason": ""', '"reason": "stopped by SIGINT"'
         )
     )
-    card = missions.score_again(folder)
+    card = score_again(folder)
     assert (card['status'], card['reason']) == ('aborted', 'stopped by SIGINT')
 
 
@@ -132,7 +138,7 @@ def test_file_cut_before_its_attachments_tells_what_is_missing(bag_only, keep):
 def test_file_cut_short_is_scored_as_far_as_it_goes(bag_only):
     (file,) = bag_only.glob('*.mcap')
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
-    card = missions.score_again(bag_only)
+    card = score_again(bag_only)
     assert card['status'] == 'aborted'
     assert 500 < card['ticks'] < 2500
 
@@ -181,8 +187,8 @@ print(next(blocks).shape[0], peak_mb() - before)
 def test_a_long_bag_is_read_piece_by_piece(tmp_path):
     """The first hour of three takes less memory than all messages do."""
     scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 10800.0})
-    folder = missions.make_run_folder(scenario, tmp_path / 'run')
-    missions.fly_direct(scenario, folder, True, lambda ticks, depth_m: None)
+    folder = make_run_folder(scenario, tmp_path / 'run')
+    fly_recorded(scenario, folder)
     command = [sys.executable, '-c', PEAK, folder]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
     ticks, grown_mb = done.stdout.split()

@@ -17,12 +17,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glider_bringup import cli, console, missions
+from glider_bringup import cli, console
 from glider_bringup.engines.direct import COLUMNS, fly_blocks
+from glider_bringup.engines.flight import Flight, mission_of
+from glider_bringup.mission.rules import Rules
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import Flight, make_run_folder, read_run, write_report, write_score
-from glider_bringup.scoring.score import Rules, Scorer
+from glider_bringup.scoring.card import scorecard, write_score
+from glider_bringup.scoring.score import Scorer
+from glider_bringup.scoring.traces import make_tracer
 from glider_bringup.showing.findings import LOST_M, findings, lost_since_s, verdict
+from glider_bringup.showing.flown_run import keep_traces, read_run, write_report
 from glider_bringup.showing.words import span
 
 E2 = COLUMNS['tracking_error'].start + 1
@@ -70,16 +75,16 @@ def fly(tmp_path, change=None, stop=False, name='flight', **fields):
     """Fly in this process; ``change`` alters each block of the log, ``stop`` is a Ctrl-C."""
     scenario = load_scenario('current_8deg', {**SHORT, **fields})
     folder = make_run_folder(scenario, tmp_path / name)
-    tracer, scorer = missions.make_tracer(scenario), Scorer()
-    for log in fly_blocks(*missions.mission_of(scenario)):
+    tracer, scorer = make_tracer(scenario), Scorer()
+    for log in fly_blocks(*mission_of(scenario)):
         log = log if change is None else change(log.copy())
         tracer.add(log)
         scorer.add(log)
     flight = Flight('aborted' if stop else 'completed', 'stopped' if stop else '', 1.0, 0, 0)
     scores = scorer.result(scenario.score_rules(scorer.ticks * 0.1))
-    card = missions.scorecard(scenario, 'direct', flight, scores)
+    card = scorecard(scenario, 'direct', flight, scores)
     write_score(folder, card)
-    missions.keep_traces(scenario, folder, card, tracer)
+    keep_traces(scenario, folder, card, tracer)
     return folder
 
 
@@ -251,9 +256,9 @@ def never_flown(folder):
     scenario = load_scenario('current_8deg')
     folder = make_run_folder(scenario, folder)
     flight = Flight('aborted', 'plant_node was killed by SIGKILL', 0.0, 0, 0)
-    card = missions.scorecard(scenario, 'nodes', flight, Scorer().result(Rules()))
+    card = scorecard(scenario, 'nodes', flight, Scorer().result(Rules()))
     write_score(folder, card)
-    missions.keep_traces(scenario, folder, card, missions.make_tracer(scenario))
+    keep_traces(scenario, folder, card, make_tracer(scenario))
     return folder
 
 

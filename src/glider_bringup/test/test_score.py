@@ -13,7 +13,8 @@ from scipy.ndimage import uniform_filter1d
 from scipy.spatial.transform import Rotation
 
 from glider_bringup.engines.direct import COLUMNS, ROW
-from glider_bringup.scoring.score import Rules, Scorer
+from glider_bringup.mission.rules import Rules
+from glider_bringup.scoring.score import Scorer
 from glider_guidance.profile import AT_END_OF_PATH
 from glider_model.signals import TICK_S
 

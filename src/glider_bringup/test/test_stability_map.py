@@ -14,7 +14,7 @@ import yaml
 
 from glider_bringup import cli
 from glider_bringup.showing.stability_map import CLASSES, CRITICAL_M, STABLE_M, load_map, shares
-from glider_bringup.sweep import STATUSES, failure
+from glider_bringup.studies.sweep import STATUSES, failure
 from glider_bringup.sweep_file import load_sweep
 from glider_bringup.sweep_result import make_dataset, read_dataset, write_dataset
 

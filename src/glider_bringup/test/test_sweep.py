@@ -23,7 +23,7 @@ from scipy.io import netcdf_file
 from glider_bringup import cli, pool, sweep_file
 from glider_bringup.journal import Journal
 from glider_bringup.pool import WorkError, worker_pool
-from glider_bringup.sweep import (
+from glider_bringup.studies.sweep import (
     JOURNAL_FILE,
     RESULT_FILE,
     STATUSES,

@@ -11,11 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glider_bringup.engines.direct import COLUMNS, ROW, fly_blocks
+from glider_bringup.engines.flight import mission_of
+from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import make_tracer, mission_of
 from glider_bringup.scoring import traces
-from glider_bringup.scoring.score import Rules, Scorer
-from glider_bringup.scoring.traces import CURVES, Tracer, load_traces
+from glider_bringup.scoring.score import Scorer
+from glider_bringup.scoring.traces import CURVES, Tracer, load_traces, make_tracer
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
 from glider_model.vehicle import load_vehicle

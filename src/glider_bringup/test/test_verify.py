@@ -19,9 +19,10 @@ from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
 from glider_bringup.cli import app
+from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mcap_reader import Bag
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import fly_direct, make_run_folder
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.verify import IDENTICAL, place_ticks, report, verify
 from glider_model.ros.messages import TOPICS
@@ -298,7 +299,7 @@ def test_change_is_found_where_the_run_itself_would_have_changed(
     block, fields = CHANGES[change]
     told = load_scenario(str(short_run / 'scenario.yaml'), fields)
     flown = make_run_folder(told, tmp_path / 'flown')
-    fly_direct(told, flown, True, lambda ticks, depth_m: None)
+    fly_recorded(told, flown)
     (one,), (other,) = short_run.glob('*.mcap'), flown.glob('*.mcap')
     outputs = [name for name in PER_TICK if BLOCK_OF[name] == block]
     pairs = [

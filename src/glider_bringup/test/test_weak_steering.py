@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Vehicles that turn a tenth of what their file says, nothing, or back, hold their track."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from glider_bringup.engines.direct import ROW, fly
-from glider_bringup.missions import fly_direct, mission_of
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.montecarlo import airframe, judge, make_scenarios, sample_plant
+from glider_bringup.scoring.card import fly_scored
 from glider_guidance.methods.observer import lookahead_stretch
 from glider_model.perturb import PerturbSettings, perturbed
 from glider_model.signals import TICK_S
@@ -33,7 +32,7 @@ def flight(request):
     scenario = make_scenarios('current_12deg', fields, ['adaptive'], 1, request.param)[
         0, 'adaptive'
     ]
-    _, scores = fly_direct(scenario, Path(), False, lambda *flown: None)
+    _, scores = fly_scored(scenario)
     return request.param, judge(scores)
 
 

@@ -20,10 +20,10 @@ def score(
     as_json: Json = False,
 ) -> None:
     """Score a run again, from its bag; a run without a bag shows the score it was given."""
-    from glider_bringup import missions
+    from glider_bringup.scoring.again import score_again
 
     with counter('reading the bag', None) as update:
-        card = missions.score_again(run, update)
+        card = score_again(run, update)
     if as_json:
         print(json.dumps(card, allow_nan=False))
     else:
@@ -39,9 +39,9 @@ def figure(
     ] = None,
 ) -> None:
     """Draw a run: track, depth, errors, attitude, current and actuators."""
-    from glider_bringup import missions
+    from glider_bringup.showing.flown_run import draw
 
     file = out or beside(run, 'run.png')
     with counter('reading the bag', None) as update:
-        missions.draw(run, file, update)
+        draw(run, file, update)
     output.print(f'drawn: {file}', soft_wrap=True)

@@ -26,13 +26,14 @@ def report(
     ] = None,
 ) -> None:
     """Write the report of a run again: one HTML file that needs no network."""
-    from glider_bringup import missions
+    from glider_bringup.mission.run_folder import REPORT_FILE
+    from glider_bringup.showing.flown_run import read_run, write_report
 
-    file = out or beside(run, missions.REPORT_FILE)
+    file = out or beside(run, REPORT_FILE)
     with counter('reading the bag', None) as update:
-        flown = missions.read_run(run, update)
+        flown = read_run(run, update)
     with messages.status('writing the report'):
-        missions.write_report(flown, file)
+        write_report(flown, file)
     output.print(f'report: {file}', soft_wrap=True)
     if show and not webbrowser.open(file.resolve().as_uri()):
         messages.print(f'no browser found; open {file} in one', style='red', soft_wrap=True)
@@ -51,15 +52,15 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Compare runs: scores side by side, and what their scenarios differ in."""
-    from glider_bringup import missions
     from glider_bringup.showing import compare as compared
+    from glider_bringup.showing.flown_run import read_run
 
     if len(paths) < 2:
         raise ConfigurationError(f'{paths[0]}: one run only (allowed: two or more)')
     names, runs = compared.labels(paths), []
     for path, name in zip(paths, names, strict=True):
         with counter(f'reading {name}', None) as update:
-            flown = missions.read_run(path, update, traced=out is not None)
+            flown = read_run(path, update, traced=out is not None)
         runs.append(flown._replace(label=name))
     cards, found = [run.card for run in runs], compared.differences(runs)
     if out:

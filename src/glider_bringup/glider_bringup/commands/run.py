@@ -107,7 +107,7 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Fly a scenario; record it, write its report and print the scorecard."""
-    from glider_bringup import missions
+    from glider_bringup.mission.run_folder import REPORT_FILE
 
     fields = dict(parse_assignment(text) for text in changes or [])
     if controller:
@@ -136,7 +136,7 @@ def run(
         card, folder, has_room = _fly(
             flown, engine, rate, place, out, bag, sync.value, report, begin_view
         )
-    page = folder / missions.REPORT_FILE
+    page = folder / REPORT_FILE
     if as_json:
         print(json.dumps(card, allow_nan=False))
         print_places(messages, folder, page)
@@ -179,22 +179,41 @@ def _fly(
 
     Returns the scorecard, the run folder, and whether the disk had room for the report.
     """
-    from glider_bringup import missions
+    from glider_bringup.engines.flight import fly
+    from glider_bringup.mission.planned import planned_ticks
+    from glider_bringup.mission.run_folder import make_run_folder
+    from glider_bringup.scoring.card import scorecard, write_score
+    from glider_bringup.scoring.score import make_scorer, scores_of
+    from glider_bringup.scoring.traces import make_tracer
 
-    folder = missions.make_run_folder(scenario, out)
+    if bag or engine is Engine.nodes:  # else nothing of ROS is needed
+        from glider_bringup.engines.recorded import fly_nodes, fly_recorded
+
+    folder = make_run_folder(scenario, out)
     messages.print(f'{scenario.name}: {scenario.description}')
-    tracer = missions.make_tracer(scenario) if report else None
-    with progress(scenario, missions.planned_ticks(scenario)) as (flying, reading):
+    scorer, tracer = make_scorer(scenario), make_tracer(scenario) if report else None
+    takers = [scorer, tracer] if tracer else [scorer]
+    with progress(scenario, planned_ticks(scenario)) as (flying, reading):
         if engine is Engine.nodes:
             if begin_view:
                 flying = _after_first(begin_view, flying)
-            flight, scores = missions.fly_nodes(
-                scenario, folder, rate, flying, _print_log, namespace, tracer, reading, sync
+            flight = fly_nodes(
+                scenario,
+                folder,
+                takers,
+                flying,
+                speed=rate,
+                namespace=namespace,
+                on_log=_print_log,
+                on_read=reading,
+                sync=sync,
             )
+        elif bag:
+            flight = fly_recorded(scenario, folder, takers, flying, sync)
         else:
-            flight, scores = missions.fly_direct(scenario, folder, bag, flying, tracer, sync)
-    card = missions.scorecard(scenario, engine.value, flight, scores)
-    missions.write_score(folder, card)
+            flight = fly(scenario, takers, flying)
+    card = scorecard(scenario, engine.value, flight, scores_of(scenario, scorer))
+    write_score(folder, card)
     has_room = _write_report(scenario, folder, card, tracer) if tracer else True
     if card['reason']:
         messages.print(f'{card["status"]}: {card["reason"]}', style='red', soft_wrap=True)
@@ -206,13 +225,14 @@ def _write_report(scenario: Scenario, folder: Path, card: dict, tracer) -> bool:
 
     Returns whether the disk had room for it.
     """
-    from glider_bringup import missions
+    from glider_bringup.mission.run_folder import REPORT_FILE
+    from glider_bringup.showing.flown_run import keep_traces, write_report
 
-    file = folder / missions.REPORT_FILE
+    file = folder / REPORT_FILE
     try:
         with messages.status('writing the report'):
-            run = missions.keep_traces(scenario, folder, card, tracer)
-            missions.write_report(run, file)
+            run = keep_traces(scenario, folder, card, tracer)
+            write_report(run, file)
     except (Exception, KeyboardInterrupt) as error:
         cause = str(error) or type(error).__name__
         messages.print(f'no report: {cause}', style='red', soft_wrap=True)

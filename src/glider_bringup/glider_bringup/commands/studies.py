@@ -73,8 +73,8 @@ def montecarlo(
     Each hydrodynamic coefficient differs by up to 30 %, added mass by 15 %, trim by 10 mm, roll at
     rest by 10 deg, ballast by 50 g; water is stratified. Control knows the file only.
     """
-    from glider_bringup import missions
     from glider_bringup import montecarlo as study
+    from glider_bringup.mission.run_folder import make_result_folder
 
     fields = dict(parse_assignment(text) for text in changes or [])
     if duration != 'full':
@@ -82,7 +82,7 @@ def montecarlo(
     laws = list(dict.fromkeys(one.value for one in controller or Controller))
     scenarios = study.make_scenarios(scenario, fields, laws, plants, seed)
     if out:
-        missions.make_result_folder(out, study.RESULT_FILE)
+        make_result_folder(out, study.RESULT_FILE)
     messages.print(f'{scenario}: {plants} plants, each by {" and by ".join(laws)}')
     with workers_at_work(workers, scheduler) as pool, counter('flying', len(scenarios)) as update:
         flights, airframes = study.fly_plants(scenarios, pool, update)
@@ -148,14 +148,15 @@ def experiments(
     By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
     engine: 135 flights, most of them of 30 hours.
     """
-    from glider_bringup import experiment_tables, missions
+    from glider_bringup import experiment_tables
     from glider_bringup import experiments as study
+    from glider_bringup.mission.run_folder import make_result_folder
     from glider_bringup.showing import paper_figures
 
     planned = study.make_experiments([one.value for one in only or Group])
     flights = study.count_flights(planned)
     if out:
-        missions.make_result_folder(out, study.RESULT_FILE)
+        make_result_folder(out, study.RESULT_FILE)
     messages.print(f'{len(planned)} experiments, {flights} flights')
     with workers_at_work(workers, scheduler) as pool, counter('flying', flights) as update:
         rows, records = study.fly(planned, pool, update)

@@ -51,7 +51,7 @@ def sweep(
     Each cell has the numbers that ./glider run gives for it. The file is the same to the last byte
     whatever the number of workers and of interruptions. Exit code 1 if a cell failed.
     """
-    from glider_bringup import sweep as study
+    from glider_bringup.studies import sweep as study
     from glider_bringup.sweep_file import load_sweep
 
     with messages.status('checking every value of the sweep'):
@@ -84,7 +84,7 @@ def sweep(
 
 def _fly(plan, journal, known, workers, scheduler, again: str) -> None:
     """Fly what is missing, with a progress bar; say how to go on if something ends it early."""
-    from glider_bringup import sweep as study
+    from glider_bringup.studies import sweep as study
 
     def advice() -> str:
         flown = sum(study.flown_cells(plan, journal))

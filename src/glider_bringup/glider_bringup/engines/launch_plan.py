@@ -19,13 +19,18 @@ from glider_bringup.engines.processes import (
     RECORDER,
     absolute_namespace,
 )
+from glider_bringup.mission.run_folder import (
+    PARAMETERS_FILE,
+    SCENARIO_FILE,
+    VEHICLE_FILE,
+    make_run_folder,
+)
 from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
     load_scenario,
     scenario_names,
 )
-from glider_bringup.missions import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE, make_run_folder
 from glider_bringup.ros.node_parameters import node_parameters, write_parameters
 from glider_model.ros.messages import CURRENT
 from glider_model.settings import ConfigurationError

@@ -17,14 +17,20 @@ from typing import Any
 
 from mcap.opcode import Opcode
 
-from glider_bringup import missions
+from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import outcome_of
 from glider_bringup.mcap_reader import Bag
+from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.replay import check_not_empty, plan_replay, qos_of, recorded_messages
 from glider_bringup.ros.verify import report, verify
+from glider_bringup.scoring.again import score_again
+from glider_bringup.scoring.card import scorecard, write_score
+from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.traces import make_tracer
+from glider_bringup.showing.flown_run import keep_traces, read_run
 from glider_bringup.showing.report import report_page
 from glider_model.settings import ConfigurationError
 
@@ -97,12 +103,13 @@ def _compare(name: str, folder: Path, expected: Answer) -> tuple[str, str]:
 def _fly(scratch: Path) -> list[Path]:
     """Folders of one flight: bags of today and of before, with all that a run has and alone."""
     scenario = load_scenario('rough_water', FLIGHT)
-    run = missions.make_run_folder(scenario, scratch / 'run')
-    tracer = missions.make_tracer(scenario)
-    flight, scores = missions.fly_direct(scenario, run, True, lambda *_: None, tracer)
-    card = missions.scorecard(scenario, 'direct', flight, scores)
-    missions.write_score(run, card)
-    missions.keep_traces(scenario, run, card, tracer)
+    run = make_run_folder(scenario, scratch / 'run')
+    tracer = make_tracer(scenario)
+    scorer = make_scorer(scenario)
+    flight = fly_recorded(scenario, run, [scorer, tracer])
+    card = scorecard(scenario, 'direct', flight, scores_of(scenario, scorer))
+    write_score(run, card)
+    keep_traces(scenario, run, card, tracer)
     folders = [run, *(scratch / name for name in ('alone', 'run_of_before', 'alone_of_before'))]
     data = _bag_of(run).read_bytes()
     at = data.rindex(_DATA_END) + len(_DATA_END)
@@ -125,12 +132,12 @@ def _bag_of(folder: Path) -> Path:
 
 
 def _score(folder: Path) -> Answer:
-    card = missions.score_again(folder)
+    card = score_again(folder)
     return card, bool(card['reason'])
 
 
 def _report(folder: Path) -> Answer:
-    flown = missions.read_run(folder)
+    flown = read_run(folder)
     return sha256(report_page(flown).encode()).digest(), bool(flown.card['reason'])
 
 

@@ -9,7 +9,6 @@ every vehicle and either attitude law; half of the flights turn over at a shallo
 import math
 from collections.abc import Iterator
 from functools import partial
-from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -18,7 +17,7 @@ import pydantic
 from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_bringup.missions import finite, fly_direct, scorecard
+from glider_bringup.scoring.card import finite, fly_scored, scorecard
 from glider_model.current import MAX_SPEED_MPS
 from glider_model.settings import ConfigurationError
 from glider_model.vehicle import vehicle_names
@@ -109,7 +108,7 @@ def _fly(changes: dict[str, Any]) -> tuple[str, str]:
         scenario = load_scenario(changes=changes)
     except ConfigurationError:
         return '', ''
-    flight, scores = fly_direct(scenario, Path(), False, lambda ticks, depth_m: None, Taker())
+    flight, scores = fly_scored(scenario, [Taker()])
     card = scorecard(scenario, 'direct', flight, scores)
     if card['status'] == 'failed':
         return 'wrong', card['reason']

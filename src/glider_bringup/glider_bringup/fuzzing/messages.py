@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_bringup.engines.direct import COLUMNS, ROW, MissionParams, MissionState, fly
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.missions import mission_of
 from glider_control.control import control_step
 from glider_guidance.guidance import guidance_step
 from glider_model.current import current_step

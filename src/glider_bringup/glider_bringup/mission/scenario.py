@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import pydantic
 from pydantic import Field
 
-from glider_bringup.scoring.score import Rules
+from glider_bringup.mission.rules import Rules
 from glider_control.settings import ControlLawSettings, ControlSettings
 from glider_guidance.path import PathSettings, StraightPath, path_length, path_point
 from glider_guidance.profile import ProfileSettings

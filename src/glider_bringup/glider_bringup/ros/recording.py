@@ -12,8 +12,8 @@ from rclpy.serialization import deserialize_message
 
 from glider_bringup.blocks import BLOCKS
 from glider_bringup.mcap_reader import Bag
+from glider_bringup.mission.run_folder import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_bringup.missions import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE
 from glider_bringup.ros.bag_log import decode
 from glider_model.files import read_yaml
 from glider_model.ros.codec import Codec

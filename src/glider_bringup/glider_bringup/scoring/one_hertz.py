@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A log thinned to one row a second: what experiments measure and the paper's figures show."""
 
-from collections.abc import Iterable
 from copy import copy
 
 import numpy as np
@@ -11,18 +10,38 @@ from glider_bringup.engines.direct import COLUMNS, ROW
 from glider_model.frames import poses_from_wire
 from glider_model.signals import TICK_S
 
+#: Of so many ticks one is kept.
+_EVERY = round(1.0 / TICK_S)
+
+
+class Recorder:
+    """Takes log blocks as they come and keeps one row a second of them."""
+
+    def __init__(self) -> None:
+        self._rows: list[np.ndarray] = []
+        self._ticks = 0
+
+    def add(self, log: np.ndarray) -> None:
+        """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
+        self._rows.append(log[-self._ticks % _EVERY :: _EVERY].copy())
+        self._ticks += len(log)
+
+    def result(self) -> 'Record':
+        """What was kept of everything taken in so far."""
+        return Record(np.concatenate([np.empty((0, ROW)), *self._rows]))
+
 
 class Record:
-    """A log thinned to one row a second. Angles in deg, NED; attributes are arrays over time."""
+    """A log thinned to one row a second. Angles in deg, NED; attributes are arrays over time.
 
-    def __init__(self, blocks: Iterable[np.ndarray]) -> None:
-        rows, first = round(1.0 / TICK_S), 0
-        thinned = []
-        for block in blocks:
-            thinned.append(block[(-first) % rows :: rows].copy())
-            first += len(block)
-        log = np.concatenate(thinned) if thinned else np.empty((0, ROW))
-        self.time_s = np.arange(len(log)) * rows * TICK_S
+    Parameters
+    ----------
+    log : float64[n, ROW]
+        One row a second.
+    """
+
+    def __init__(self, log: np.ndarray) -> None:
+        self.time_s = np.arange(len(log)) * _EVERY * TICK_S
         odom = poses_from_wire(log[:, COLUMNS['odom']])
         reference = poses_from_wire(log[:, COLUMNS['reference']])
         self.north, self.east, self.depth = odom[:, 0], odom[:, 1], odom[:, 2]

@@ -13,11 +13,12 @@ What was measured with noise is scored by the true motion, which the noise's see
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from glider_bringup.engines.direct import COLUMNS
+from glider_bringup.mission.rules import Rules
+from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import TrueMotion, wire_of
 from glider_control.watch import ROWS, SURFACES, TELL_EVERY_NS, say
 from glider_guidance.profile import AT_END_OF_PATH
@@ -28,11 +29,6 @@ from glider_model.plant import dive_depths
 from glider_model.sensors import SensorParams
 from glider_model.signals import TICK_NS, TICK_S
 
-#: Around an inflection (s) and shallower than this (m) nothing counts as steady,
-INFLECTION_MARGIN_S = 600.0
-STEADY_DEPTH_M = 30.0
-#: but of a dive or climb these shares of its time and its depth are left out at most.
-MARGIN_SHARE, STEADY_DEPTH_SHARE = 0.3, 0.25
 #: Heading fluctuation is about the mean over this time (s).
 HEADING_MEAN_S = 300.0
 #: A run is infeasible if the course could not be held for this share of the scored time.
@@ -52,25 +48,6 @@ _INFEASIBLE_COLUMN = COLUMNS['infeasible']
 _STAGE_COLUMN, _MASK_COLUMN = COLUMNS['stage'], COLUMNS['saturation']
 _ODOM_START, _REFERENCE_START = _ODOM.start, _REFERENCE.start
 _JOINTS_START = COLUMNS['joint_states'].start
-
-
-class Rules(NamedTuple):
-    """By what a run is scored."""
-
-    settle_s: float = 0.0  #: settling time (s)
-    depth_m: float = 1000.0  #: depth of the lower turn (m)
-    glide_s: float = math.inf  #: time of one dive or climb (s)
-    path_end: tuple[float, float] | None = None  #: last point of the path, north and east (m)
-
-    @property
-    def margin_s(self) -> float:
-        """Time around an inflection that is not steady (s)."""
-        return min(INFLECTION_MARGIN_S, MARGIN_SHARE * self.glide_s)
-
-    @property
-    def steady_depth_m(self) -> float:
-        """Depth above which nothing is steady (m)."""
-        return min(STEADY_DEPTH_M, STEADY_DEPTH_SHARE * self.depth_m)
 
 
 @kernel
@@ -105,6 +82,8 @@ class Scorer:
     sensors : SensorParams, optional
         Noise of the odometry; without it the odometry is taken for the truth.
     """
+
+    topics = ()  # it needs none beside those that are always read
 
     def __init__(self, sensors: SensorParams | None = None) -> None:
         self._truth = TrueMotion(sensors)
@@ -207,6 +186,16 @@ class Scorer:
             'attitude_rpy_rad': list(attitude),
             'velocity_mps': [odometry.u, odometry.v, odometry.w],
         }
+
+
+def make_scorer(scenario: Scenario) -> Scorer:
+    """Scorer of a run of a scenario."""
+    return Scorer(scenario.sensors.params(scenario.seed))
+
+
+def scores_of(scenario: Scenario, scorer: Scorer) -> dict:
+    """Scores of what a scorer has taken in, by the rules of its scenario."""
+    return scorer.result(scenario.score_rules(scorer.ticks * TICK_S))
 
 
 def _guard(mask: np.ndarray) -> dict:

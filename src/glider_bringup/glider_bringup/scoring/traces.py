@@ -17,6 +17,7 @@ import numpy as np
 
 from glider_bringup.disk import whole_file
 from glider_bringup.engines.direct import COLUMNS
+from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import TrueMotion
 from glider_model.current import KNOT_MPS
 from glider_model.frames import poses_from_wire, wrap_angle
@@ -24,7 +25,7 @@ from glider_model.kernel import kernel
 from glider_model.sensors import SensorParams
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S, Adaptation
-from glider_model.vehicle import VehicleParams
+from glider_model.vehicle import VehicleParams, load_vehicle
 
 #: Most buckets that are kept of a run.
 BUCKETS = 2**15
@@ -167,6 +168,8 @@ class Tracer:
         Noise of the odometry; what was measured is then kept beside the truth.
     """
 
+    topics = TRACED
+
     def __init__(self, vehicle: VehicleParams, sensors: SensorParams | None = None) -> None:
         self._limits = np.array([vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max])
         self._truth = TrueMotion(sensors)
@@ -225,6 +228,12 @@ class Tracer:
             halve(points)
         self._samples[: BUCKETS // 2] = self._samples[::2]
         self._size *= 2
+
+
+def make_tracer(scenario: Scenario) -> Tracer:
+    """Tracer of a run of a scenario."""
+    vehicle = load_vehicle(scenario.vehicle).params()
+    return Tracer(vehicle, scenario.sensors.params(scenario.seed))
 
 
 def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[str, np.ndarray]:

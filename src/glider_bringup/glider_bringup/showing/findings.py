@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from glider_bringup.scoring.score import STEADY_DEPTH_M
+from glider_bringup.mission.rules import STEADY_DEPTH_M
 from glider_bringup.scoring.traces import Traces
 from glider_bringup.showing.panels import ACTUATORS, limits_of
 from glider_bringup.showing.scorecard import guard_texts

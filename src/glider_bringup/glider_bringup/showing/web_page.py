@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
-from glider_bringup.scoring.score import Rules
 from glider_bringup.scoring.traces import SAMPLES, Traces
 from glider_model.vehicle import Vehicle
 

@@ -14,11 +14,14 @@ from socket import gethostname
 from typing import Any, NamedTuple
 
 from glider_bringup.disk import whole_file
+from glider_bringup.engines.flight import Flight
 from glider_bringup.journal import Journal
+from glider_bringup.mission.planned import planned_ticks
+from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario, ScenarioSource, make_scenario
-from glider_bringup.missions import Flight, fly_direct, planned_ticks, scorecard
 from glider_bringup.pool import WORKER_DIED, Pool, Progress, WorkError
-from glider_bringup.scoring.score import Rules, Scorer
+from glider_bringup.scoring.card import fly_scored, scorecard
+from glider_bringup.scoring.score import Scorer
 from glider_bringup.sweep_file import Plan, vehicle_text
 from glider_bringup.sweep_result import NOT_FIGURES, make_dataset, variable_name, write_dataset
 from glider_model.kernel import source_digest
@@ -88,7 +91,7 @@ def _fly_cell(inputs: Inputs, changes: dict[str, Any]) -> dict[str, Any]:
         scenario = make_scenario(inputs.source, changes)
         if digest(vehicle_text(scenario.vehicle)) not in inputs.vehicles:
             raise WorkError(f'{gethostname()} has another file of {scenario.vehicle}')
-        flight, scores = fly_direct(scenario, Path(), False, lambda ticks, depth_m: None)
+        flight, scores = fly_scored(scenario)
         card = scorecard(scenario, 'direct', flight, scores)
     except WorkError:
         raise

@@ -1,0 +1,104 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flights that leave a bag in their run folder: by the direct engine, or over nodes."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from glider_bringup.engines.flight import Flight, Progress, Taker, fly
+from glider_bringup.engines.processes import NAMESPACE, node_commands, run_nodes
+from glider_bringup.mcap_reader import Bag, has_bag
+from glider_bringup.mission.run_folder import (
+    LOG_FILE,
+    PARAMETERS_FILE,
+    SCENARIO_FILE,
+    VEHICLE_FILE,
+)
+from glider_bringup.mission.scenario import Scenario
+from glider_bringup.ros.bag import BagWriter, Sync
+from glider_bringup.ros.bag_log import LogWriter
+from glider_bringup.ros.node_parameters import node_parameters, write_parameters
+from glider_bringup.ros.read_back import Reader, ended, read_back
+from glider_model.settings import ConfigurationError
+
+#: Exit code of a node that refuses its parameters.
+EXIT_CONFIGURATION = 2
+
+
+def fly_recorded(
+    scenario: Scenario,
+    folder: Path,
+    takers: Iterable[Taker] = (),
+    progress: Progress | None = None,
+    sync: Sync = 'end',
+) -> Flight:
+    """Fly with the direct engine, as `fly` does, and write the bag of the run."""
+    attachments = [folder / SCENARIO_FILE, folder / VEHICLE_FILE]
+    points = scenario.path.points(500)
+    writer = BagWriter(folder, scenario.name, attachments=attachments, sync=sync)
+    bag = LogWriter(writer, points)
+    flight = fly(scenario, [*takers, bag], progress)
+    if flight.status != 'aborted':
+        bag.finish(flight.reason)
+    return flight._replace(messages_recorded=bag.close())
+
+
+def fly_nodes(
+    scenario: Scenario,
+    folder: Path,
+    takers: Iterable[Reader] = (),
+    progress: Progress | None = None,
+    *,
+    speed: float = 0.0,
+    namespace: str | None = None,
+    on_log: Callable[[str], None] = lambda line: None,
+    on_read: Callable[[int], None] = lambda ticks: None,
+    sync: Sync = 'end',
+) -> Flight:
+    """Fly over node processes and topics; what takers are given is read back from the bag.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    folder : Path
+        Run folder.
+    takers : iterable of Reader
+    progress : callable, optional
+    speed : float
+        In times real time; 0.0 is as fast as possible.
+    namespace : str, optional
+        Nodes in a namespace of their own have their clock in it.
+    on_log : callable
+        Gets each line that a node prints.
+    on_read : callable
+        Gets the ticks that have been read back.
+    sync : str
+        When the bag is synced to disk.
+    """
+    attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)
+    parameters = node_parameters(
+        scenario, speed=speed, record_to=folder, attachments=attachments, sync=sync
+    )
+    place = namespace or NAMESPACE
+    write_parameters(parameters, folder / PARAMETERS_FILE, place)
+
+    def tell(said: dict) -> None:
+        if progress:
+            progress(said['tick'], said['depth_m'])
+
+    result = run_nodes(
+        node_commands(folder / PARAMETERS_FILE, place, own_clock=namespace is not None),
+        folder / LOG_FILE,
+        on_progress=tell,
+        on_log=on_log,
+    )
+    if result.exit_code == EXIT_CONFIGURATION:
+        raise ConfigurationError(result.reason)
+    completed, reason = result.status == 'completed', result.reason
+    recorded, lost = 0, 0
+    if has_bag(folder):  # else it ended before the recorder was up
+        log = read_back(Bag(folder), takers, on_read)
+        if completed and (missing := log.missing(None)):
+            completed, reason = False, missing
+        recorded, lost = sum(log.counts.values()), log.lost(completed)
+    return Flight(ended(completed, reason), reason, result.flight_s, recorded, lost)

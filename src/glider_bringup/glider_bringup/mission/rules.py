@@ -1,0 +1,31 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""By what a run is scored."""
+
+import math
+from typing import NamedTuple
+
+#: Around an inflection (s) and shallower than this (m) nothing counts as steady,
+INFLECTION_MARGIN_S = 600.0
+STEADY_DEPTH_M = 30.0
+#: but of a dive or climb these shares of its time and its depth are left out at most.
+MARGIN_SHARE, STEADY_DEPTH_SHARE = 0.3, 0.25
+
+
+class Rules(NamedTuple):
+    """By what a run is scored."""
+
+    settle_s: float = 0.0  #: settling time (s)
+    depth_m: float = 1000.0  #: depth of the lower turn (m)
+    glide_s: float = math.inf  #: time of one dive or climb (s)
+    path_end: tuple[float, float] | None = None  #: last point of the path, north and east (m)
+
+    @property
+    def margin_s(self) -> float:
+        """Time around an inflection that is not steady (s)."""
+        return min(INFLECTION_MARGIN_S, MARGIN_SHARE * self.glide_s)
+
+    @property
+    def steady_depth_m(self) -> float:
+        """Depth above which nothing is steady (m)."""
+        return min(STEADY_DEPTH_M, STEADY_DEPTH_SHARE * self.depth_m)

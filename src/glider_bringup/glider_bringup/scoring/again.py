@@ -1,0 +1,89 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Scoring a run again, from its bag."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from glider_bringup.engines.flight import Flight
+from glider_bringup.mcap_reader import Bag, has_bag
+from glider_bringup.mission.planned import planned_ticks
+from glider_bringup.mission.run_folder import PARAMETERS_FILE, scenario_of
+from glider_bringup.mission.scenario import Scenario
+from glider_bringup.ros.bag_log import RecordedLog
+from glider_bringup.ros.read_back import Reader, ended, read_back
+from glider_bringup.scoring.card import read_score, scorecard
+from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_model.ros.health import FINISHED
+from glider_model.settings import ConfigurationError
+
+#: Gets the ticks read from a bag, and about how many there are.
+Reading = Callable[[int, int], None]
+
+
+def score_again(run: Path, progress: Reading = lambda ticks, total: None) -> dict:
+    """Scorecard of a run, computed afresh from its bag if it has one.
+
+    How the run ended is what its `SCORE_FILE` says, or the bag where there is none: a recording
+    made by the launch file, or the MCAP file alone. A run of which ticks are missing in its bag is
+    not completed, whatever is said: its status is ``aborted``, and the reason names what is
+    missing. Reports, figures and comparisons keep to that.
+
+    Parameters
+    ----------
+    run : Path
+        Run folder, or its MCAP file.
+    progress : callable, optional
+
+    Raises
+    ------
+    ConfigurationError
+        If it holds no run, its bag is damaged, or not one tick is in it.
+    """
+    old = read_score(run)
+    if not has_bag(run):
+        return old
+    bag = Bag(run)
+    with scenario_of(run, bag.attachments) as (scenario, _):
+        return score_bag(run, bag, scenario, old, progress)
+
+
+def score_bag(
+    run: Path,
+    bag: Bag,
+    scenario: Scenario,
+    old: dict,
+    progress: Reading,
+    takers: Iterable[Reader] = (),
+) -> dict:
+    """Scorecard of a bag, whose rows takers are given too; ``old`` is the one it has, or empty."""
+    scorer = make_scorer(scenario)
+    total = old.get('ticks') or planned_ticks(scenario)
+    log = read_back(bag, [scorer, *takers], lambda ticks: progress(ticks, max(ticks, total)))
+    missing = log.missing(old.get('ticks'))
+    if old:
+        complete, reason = old['status'] not in ('aborted', 'failed'), old['reason']
+    else:
+        complete, reason = _end_of_run(log)
+    lost = log.lost(complete)
+    if not log.ticks and (lost or missing):
+        why = bag.cut or (
+            'its first tick is not complete, as in a free-running recording (allowed: runs in '
+            'lockstep, with every message of every tick)'
+        )
+        raise ConfigurationError(f'{run}: cannot be scored: {why}')
+    if missing and (complete or not old or log.ticks < old['ticks']):
+        complete, reason = False, '; '.join(one for one in (reason, missing) if one)
+    status = ended(complete, reason)
+    recorded = sum(log.counts.values())
+    flight = Flight(status, reason, old.get('wall_time_s'), recorded, lost)
+    engine = old.get('engine') or ('nodes' if (run / PARAMETERS_FILE).exists() else None)
+    return scorecard(scenario, engine, flight, scores_of(scenario, scorer))
+
+
+def _end_of_run(log: RecordedLog) -> tuple[bool, str]:
+    """Whether the plant said in a bag that the run is complete; if not, what it said instead."""
+    if log.end is None:
+        return False, 'the recording was stopped before the run was complete'
+    complete = log.end.phase == FINISHED
+    return complete, '' if complete else log.end.message

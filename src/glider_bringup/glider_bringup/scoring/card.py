@@ -1,0 +1,158 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The scorecard as data, which is ``score.json``: made, written, read and checked."""
+
+import json
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from glider_bringup.disk import write_whole
+from glider_bringup.engines.flight import Flight, Progress, Taker, fly
+from glider_bringup.mcap_reader import has_bag
+from glider_bringup.mission.run_folder import SCORE_FILE
+from glider_bringup.mission.scenario import Scenario
+from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_model.files import is_file, read_json
+from glider_model.settings import ConfigurationError
+from glider_model.vehicle import load_vehicle
+
+#: Fields without which a score file is not a scorecard.
+CARD_FIELDS = {
+    *('scenario', 'vehicle', 'controller', 'guidance', 'engine', 'seed', 'status', 'reason'),
+    *('ticks', 'sim_time_s', 'wall_time_s', 'real_time_factor', 'messages_recorded'),
+    *('messages_lost', 'dives', 'distance_along_path_m', 'cross_track_m', 'pitch_error_deg'),
+    *('heading_fluctuation_deg', 'depth_m', 'actuator_travel', 'final_state'),
+}
+#: What these fields hold: numbers, lists of numbers, or None where there is no data.
+CARD_GROUPS = {
+    'cross_track_m': {'rms_steady', 'max_steady', 'max_all'},
+    'pitch_error_deg': {'rms_steady', 'max_steady'},
+    'heading_fluctuation_deg': {'rms_steady', 'max_steady'},
+    'depth_m': {'max', 'overshoot'},
+    'actuator_travel': {'buoyancy_engine_kg', 'pitch_mass_m', 'roll_mass_deg'},
+    'final_state': {'position_ned_m', 'attitude_rpy_rad', 'velocity_mps'},
+}
+STATUSES = ('completed', 'infeasible', 'aborted', 'failed')
+
+
+def fly_scored(
+    scenario: Scenario, takers: Iterable[Taker] = (), progress: Progress | None = None
+) -> tuple[Flight, dict]:
+    """Fly with the direct engine, as `fly` does, and give the scores too."""
+    scorer = make_scorer(scenario)
+    flight = fly(scenario, [scorer, *takers], progress)
+    return flight, scores_of(scenario, scorer)
+
+
+def scorecard(scenario: Scenario, engine: str | None, flight: Flight, scores: dict) -> dict:
+    """Contents of ``score.json``; a figure that is not finite is None there, and a failure."""
+    scores, wrong = dict(scores), list(_not_finite(scores))
+    infeasible = scores.pop('infeasible')
+    status = flight.status
+    if status == 'completed' and infeasible:
+        status = 'infeasible'
+    reason = flight.reason
+    if wrong and status != 'failed':
+        status, reason = 'failed', f'the score is not finite: {", ".join(wrong)}'
+    sim_time_s = scores['sim_time_s']
+    return {
+        'scenario': scenario.name,
+        'vehicle': load_vehicle(scenario.vehicle).name,
+        'controller': scenario.control.law,
+        'guidance': scenario.guidance.los.method,
+        'engine': engine,
+        'seed': scenario.seed,
+        'status': status,
+        'reason': reason,
+        'ticks': scores.pop('ticks'),
+        'sim_time_s': scores.pop('sim_time_s'),
+        'wall_time_s': flight.wall_time_s,
+        'real_time_factor': sim_time_s / flight.wall_time_s if flight.wall_time_s else None,
+        'messages_recorded': flight.messages_recorded,
+        'messages_lost': flight.messages_lost,
+        **finite(scores),
+    }
+
+
+def finite(value: Any) -> Any:
+    """The same without numbers that JSON does not have: they become None."""
+    if isinstance(value, dict):
+        return {name: finite(inner) for name, inner in value.items()}
+    if isinstance(value, list):
+        return [finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _not_finite(scores: dict) -> Iterator[str]:
+    """Dotted names of the figures that are not finite."""
+    for name, value in scores.items():
+        if isinstance(value, dict):
+            yield from (f'{name}.{inner}' for inner in _not_finite(value))
+        elif value != finite(value):
+            yield name
+
+
+def write_score(folder: Path, card: dict) -> None:
+    """Write ``score.json``."""
+    write_whole(folder / SCORE_FILE, json.dumps(card, indent=2, allow_nan=False) + '\n')
+
+
+def read_score(run: Path) -> dict:
+    """Contents of a run's score file; empty if it has none, but a bag."""
+    path = run / SCORE_FILE
+    if not is_file(path):
+        if not run.exists():
+            raise ConfigurationError(f'{run}: no such run folder or .mcap file')
+        if not has_bag(run):
+            raise ConfigurationError(
+                f'{run}: not a run folder, it has neither a bag (.mcap) nor a {SCORE_FILE}'
+            )
+        return {}
+    card = read_json(path)
+    if not _is_card(card):
+        raise ConfigurationError(f'{path}: not a scorecard of this program')
+    return card
+
+
+def _is_card(card) -> bool:
+    """Whether a value, which may be anything, can be taken for a scorecard."""
+    if not isinstance(card, dict) or not CARD_FIELDS <= set(card):
+        return False
+    texts = ('scenario', 'vehicle', 'controller', 'guidance', 'status', 'reason')
+    numbers = ('sim_time_s', 'wall_time_s', 'real_time_factor', 'distance_along_path_m')
+    counts = ('seed', 'ticks', 'messages_recorded', 'messages_lost', 'dives')
+    return (
+        all(isinstance(card[name], str) for name in texts)
+        and card['status'] in STATUSES
+        and isinstance(card['engine'], str | None)
+        and all(isinstance(card[name], int) and card[name] >= 0 for name in counts)
+        and all(_is_figure(card[name]) for name in numbers)
+        and all(
+            isinstance(card[group], dict)
+            and names <= set(card[group])
+            and all(_is_figure(value) for value in card[group].values())
+            for group, names in CARD_GROUPS.items()
+            if card['ticks'] or group != 'final_state'  # a run without a tick has none
+        )
+        and _is_guard(card.get('guard', {}))
+    )
+
+
+def _is_guard(guard) -> bool:
+    """Whether a value is what control noticed in a run; runs of before tell nothing of it."""
+    events = guard.get('events', []) if isinstance(guard, dict) else None
+    return isinstance(events, list) and all(
+        isinstance(event, dict)
+        and isinstance(event.get('message'), str)
+        and isinstance(event.get('t_s'), int | float)
+        for event in events
+    )
+
+
+def _is_figure(value) -> bool:
+    """Whether a value is a figure of a scorecard: a number, None, or three numbers."""
+    if isinstance(value, list):
+        return len(value) == 3 and all(isinstance(one, int | float) for one in value)
+    return value is None or isinstance(value, int | float)

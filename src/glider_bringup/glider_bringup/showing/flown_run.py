@@ -1,0 +1,107 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run as pages and figures show it: read from where it was kept, or from its bag."""
+
+from pathlib import Path
+
+from glider_bringup.disk import write_whole
+from glider_bringup.mcap_reader import Bag, has_bag
+from glider_bringup.mission.run_folder import SCENARIO_FILE, TRACES_FILE, scenario_of
+from glider_bringup.mission.scenario import Scenario
+from glider_bringup.scoring.again import Reading, score_bag
+from glider_bringup.scoring.card import read_score
+from glider_bringup.scoring.traces import Tracer, Traces, load_traces, make_tracer
+from glider_bringup.showing.figure import draw_run
+from glider_bringup.showing.report import report_page
+from glider_bringup.showing.web_page import FlownRun
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_NS
+from glider_model.vehicle import load_vehicle
+
+
+def read_run(
+    run: Path, progress: Reading = lambda ticks, total: None, traced: bool = True
+) -> FlownRun:
+    """A run as pages and figures show it: as it was kept when it was flown, else from its bag.
+
+    Parameters
+    ----------
+    run : Path
+        Run folder, or its MCAP file.
+    progress : callable, optional
+    traced : bool
+        Whether its traces are wanted; if not, and it has a scorecard, its bag is not read.
+
+    Raises
+    ------
+    ConfigurationError
+        If it holds no run, its bag is damaged, or there is nothing that could be drawn.
+    """
+    card, kept = read_score(run), run / TRACES_FILE
+    bag = Bag(run) if has_bag(run) else None
+    with scenario_of(run, bag.attachments if bag else {}) as (scenario, as_flown):
+        is_kept = card and (not traced or kept.is_file())
+        if is_kept and (bag is None or _covers(bag, card)):
+            traces = load_traces(kept) if traced else None
+        elif bag is None:
+            raise ConfigurationError(
+                f'{run}: nothing to draw, it has neither {TRACES_FILE} nor a bag (allowed: a '
+                f'run flown without --no-report, or with a bag)'
+            )
+        else:
+            tracer = make_tracer(scenario) if traced else None
+            card = score_bag(run, bag, scenario, card, progress, [tracer] if tracer else [])
+            traces = tracer.result() if tracer else None
+        return flown_run(run, scenario, as_flown, card, traces)
+
+
+def _covers(bag: Bag, card: dict) -> bool:
+    """Whether a bag goes as far as the scorecard of its run."""
+    return not bag.cut and bag.end_ns >= (card['ticks'] - 1) * TICK_NS
+
+
+def flown_run(
+    run: Path, scenario: Scenario, as_flown: str, card: dict, traces: Traces | None
+) -> FlownRun:
+    """A run with its name and vehicle."""
+    vehicle = load_vehicle(scenario.vehicle)
+    rules = scenario.score_rules(card['sim_time_s'])
+    return FlownRun(run.resolve().name, scenario, as_flown, vehicle, card, traces, rules)
+
+
+def keep_traces(scenario: Scenario, folder: Path, card: dict, tracer: Tracer) -> FlownRun:
+    """Keep what was traced of a flight in its run folder.
+
+    Raises
+    ------
+    ConfigurationError
+        If it cannot be written.
+    """
+    traces = tracer.result()
+    traces.save(folder / TRACES_FILE)
+    as_flown = (folder / SCENARIO_FILE).read_text(encoding='utf-8')
+    return flown_run(folder, scenario, as_flown, card, traces)
+
+
+def write_report(run: FlownRun, file: Path) -> None:
+    """Write the report of a run.
+
+    Raises
+    ------
+    ConfigurationError
+        If the file cannot be written.
+    """
+    write_whole(file, report_page(run))
+
+
+def draw(run: Path, file: Path, progress: Reading = lambda ticks, total: None) -> None:
+    """Draw a run into an image file.
+
+    Raises
+    ------
+    ConfigurationError
+        If it holds no run, or the image cannot be written.
+    """
+    flown = read_run(run, progress)
+    title = f'{flown.scenario.name}: {flown.scenario.description}'
+    draw_run(flown.traces, title, file)
