@@ -1,3 +1,37 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Flying it: scenarios, engines, recorder, scores and the command line."""
+"""Flying it: scenarios, engines, recorder, scores and the command line.
+
+What ``__all__`` names is for programs of your own; docs/python.md shows it. It is loaded when it
+is first asked for, so that ``import glider_bringup as glider`` takes no time.
+"""
+
+from importlib import import_module
+from typing import Any
+
+#: Public names: the module of each, and its name there.
+_PUBLIC = {
+    'ConfigurationError': ('glider_model.settings', 'ConfigurationError'),
+    'Run': ('glider_bringup.door.run', 'Run'),
+    'Scenario': ('glider_bringup.mission.scenario', 'Scenario'),
+    'fly': ('glider_bringup.door.run', 'fly'),
+    'load_scenario': ('glider_bringup.mission.scenario', 'load_scenario'),
+    'open_run': ('glider_bringup.door.run', 'open_run'),
+    'scenarios': ('glider_bringup.door.studies', 'scenarios'),
+    'sweep': ('glider_bringup.door.studies', 'sweep'),
+    'trim': ('glider_bringup.door.studies', 'trim'),
+    'vehicles': ('glider_bringup.door.studies', 'vehicles'),
+}
+__all__ = list(_PUBLIC)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PUBLIC:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    module, public = _PUBLIC[name]
+    found = globals()[name] = getattr(import_module(module), public)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

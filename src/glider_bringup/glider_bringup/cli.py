@@ -15,6 +15,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
     import typer
 
     from glider_bringup.commands import (
+        export,
         fuzz,
         recorded,
         replay,
@@ -53,7 +54,7 @@ app = typer.Typer(
     context_settings={'help_option_names': ['-h', '--help']},
 )
 # Commands in the order in which --help lists them.
-for _module in (run, studies, sweeps, recorded, report, replay, verify, fuzz, vehicles):
+for _module in (run, studies, sweeps, recorded, report, export, replay, verify, fuzz, vehicles):
     app.add_typer(_module.app)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+import glider_bringup
 from glider_bringup.blocks import BLOCKS
 from glider_bringup.engines.direct import ROW, fly
 from glider_bringup.engines.flight import mission_of
@@ -47,6 +48,7 @@ def main() -> None:
     at_sea = tuple(at_rest(topic) for topic in PLANT.wired.inputs)
     plant_outputs(plant_move(state.plant, at_sea, params.plant, TICK_S), params.plant)
     verify_one_tick()
+    glider_bringup.fly(duration=TICK_S).to_xarray()
     solve_trim(params.plant.vehicle, 0.4, pitch_deg=-30.0)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import contextmanager, nullcontext
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated
 
 import typer
 
@@ -23,6 +23,7 @@ from glider_bringup.console import (
 )
 from glider_bringup.disk import DiskError
 from glider_bringup.engines.processes import NAMESPACE_ALLOWED, absolute_namespace, given_domain
+from glider_bringup.mission.choices import ENGINES, chosen_fields
 from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
@@ -35,7 +36,7 @@ from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
 
 app = typer.Typer()
-Engine = Enum('Engine', {text: text for text in get_args(Literal['nodes', 'direct'])})
+Engine = Enum('Engine', {text: text for text in ENGINES})
 When = Enum('When', {text: text for text in ('never', 'end', 'chunk')})
 Guidance = choices('Guidance', LosSettings, 'method')
 
@@ -109,17 +110,15 @@ def run(
     """Fly a scenario; record it, write its report and print the scorecard."""
     from glider_bringup.mission.run_folder import REPORT_FILE
 
-    fields = dict(parse_assignment(text) for text in changes or [])
-    if controller:
-        fields['control.law'] = controller.value
-    if guidance:
-        fields['guidance.los.method'] = guidance.value
-    if seed is not None:
-        fields['seed'] = seed
-    if duration is not None:
-        fields['dives'] = 0
-        if duration != 'full':
-            fields['duration_s'] = number('--duration', duration, 'full', TICK_S, 1e8)
+    if duration not in (None, 'full'):
+        duration = number('--duration', duration, 'full', TICK_S, 1e8)
+    fields = chosen_fields(
+        dict(parse_assignment(text) for text in changes or []),
+        controller and controller.value,
+        guidance and guidance.value,
+        seed,
+        duration,
+    )
     rate = 0.0 if speed == 'max' else number('--speed', speed, 'max', 0.01, 1e6)
     if rate and engine is Engine.direct:
         raise ConfigurationError('--speed: the direct engine knows only max')

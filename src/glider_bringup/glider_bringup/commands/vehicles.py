@@ -84,6 +84,18 @@ def test() -> None:
     raise ConfigurationError('test: run it through the ./glider script of the workspace')
 
 
+@app.command(epilog='Example: ./glider python my_study.py')
+def python() -> None:
+    """Run Python with the stack in it: a program, -m MODULE, or an interpreter."""
+    raise ConfigurationError('python: run it through the ./glider script of the workspace')
+
+
+@app.command(epilog='Example: ./glider jupyter lab examples/first_flight.ipynb')
+def jupyter() -> None:
+    """Run Jupyter with the stack in it, once it is installed there."""
+    raise ConfigurationError('jupyter: run it through the ./glider script of the workspace')
+
+
 @app.command(epilog='Example: ./glider bench --only compute --json')
 def bench() -> None:
     """Measure how fast this machine flies, as ratios to floors measured in the same run."""

@@ -1,0 +1,74 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run's dataset as a file of another world: NetCDF, CSV, MATLAB."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import xarray
+from scipy.io import savemat
+
+from glider_bringup.disk import whole_file
+from glider_bringup.sweep_result import write_dataset
+
+#: Rows of a CSV file that are written at once: an hour.
+_ROWS = 36_000
+#: How the files end.
+SUFFIXES = {'netcdf': '.nc', 'csv': '.csv', 'mat': '.mat'}
+
+#: Called with the rows that are written.
+Progress = Callable[[int], None]
+
+
+def write_netcdf(dataset: xarray.Dataset, file: Path, progress: Progress) -> None:
+    """Write NetCDF 3 with 64-bit offsets: units, long names and frames are attributes."""
+    with whole_file(file) as stream:
+        write_dataset(dataset, Path(stream.name))
+    progress(dataset.sizes['time'])
+
+
+def write_csv(dataset: xarray.Dataset, file: Path, progress: Progress) -> None:
+    """Write one row a tick under a line of ``name [unit]``; numbers read back to the same bits."""
+    variables = {'time': dataset['time'], **dataset.data_vars}
+    header = [f'{name} [{variable.attrs["units"]}]' for name, variable in variables.items()]
+    rows = dataset.sizes['time']
+    with whole_file(file) as stream:
+        stream.write((','.join(header) + '\n').encode())
+        for start in range(0, rows, _ROWS):
+            part = dataset.isel(time=slice(start, start + _ROWS)).to_dataframe()
+            stream.write(part.to_csv(header=False, na_rep='nan').encode())
+            progress(min(rows, start + _ROWS))
+
+
+def write_mat(dataset: xarray.Dataset, file: Path, progress: Progress) -> None:
+    """Write a MAT-file of version 5 with the structs data, units, long_names, flags and about.
+
+    The fields of the first three are called alike; ``flags`` says what the numbers of a state or
+    mask mean, ``about`` what was flown.
+    """
+    variables = {'time': dataset['time'], **dataset.data_vars}
+    content = {
+        'data': {name: variable.values for name, variable in variables.items()},
+        'units': {name: variable.attrs['units'] for name, variable in variables.items()},
+        'long_names': {name: variable.attrs['long_name'] for name, variable in variables.items()},
+        'flags': {
+            name: {
+                key.removeprefix('flag_'): value
+                for key, value in variable.attrs.items()
+                if key.startswith('flag_')
+            }
+            for name, variable in variables.items()
+            if 'flag_meanings' in variable.attrs
+        },
+        'about': dict(dataset.attrs),
+    }
+    with whole_file(file) as stream:
+        savemat(stream, content, long_field_names=True, oned_as='column')
+    progress(dataset.sizes['time'])
+
+
+WRITERS: dict[str, Callable[[xarray.Dataset, Path, Progress], None]] = {
+    'netcdf': write_netcdf,
+    'csv': write_csv,
+    'mat': write_mat,
+}

@@ -1,0 +1,292 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flights from Python, and runs that were flown."""
+
+import weakref
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from glider_bringup.engines.direct import COLUMNS, ROW
+from glider_bringup.engines.flight import Flight
+from glider_bringup.engines.flight import fly as fly_direct
+from glider_bringup.engines.processes import given_domain
+from glider_bringup.mcap_reader import Bag, has_bag
+from glider_bringup.mission.choices import ENGINES, chosen_fields
+from glider_bringup.mission.planned import planned_ticks
+from glider_bringup.mission.run_folder import (
+    REPORT_FILE,
+    TRACES_FILE,
+    make_run_folder,
+    scenario_of,
+)
+from glider_bringup.mission.scenario import (
+    DEFAULT_SCENARIO,
+    Scenario,
+    ScenarioSource,
+    load_scenario,
+    make_scenario,
+)
+from glider_bringup.scoring.card import scorecard, write_score
+from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.traces import make_tracer
+from glider_model.files import parse_yaml
+from glider_model.settings import ConfigurationError
+from glider_model.signals import TICK_S
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class Rows:
+    """Takes log blocks as they come and keeps them all: 17 MB for each simulated hour."""
+
+    topics = tuple(name for name, columns in COLUMNS.items() if isinstance(columns, slice))
+
+    def __init__(self) -> None:
+        self._blocks: list[np.ndarray] = []
+
+    def add(self, log: np.ndarray) -> None:
+        """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
+        self._blocks.append(log.copy())
+
+    def result(self) -> np.ndarray:
+        """Everything taken in so far, float64[ticks, ROW]."""
+        if len(self._blocks) != 1:
+            self._blocks = [np.concatenate([np.empty((0, ROW)), *self._blocks])]
+        return self._blocks[0]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that was flown, by `fly` or long ago.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        What was flown.
+    score : dict
+        The scorecard, as in ``score.json``.
+    folder : Path or None
+        Its run folder or MCAP file; None if it lives in memory alone.
+    """
+
+    scenario: Scenario
+    score: dict[str, Any]
+    folder: Path | None
+    _rows: Callable[[], np.ndarray] = field(repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        card = self.score
+        return (
+            f'Run({card["scenario"]}, {card["controller"]}, {card["status"]}, '
+            f'{card["sim_time_s"]:,.1f} s, folder={self.folder and str(self.folder)!r})'
+        )
+
+    def to_xarray(self) -> 'xarray.Dataset':
+        """Every number of every topic, tick by tick.
+
+        Returns
+        -------
+        xarray.Dataset
+            One-dimensional variables over ``time`` (s), uniform in steps of 0.1 s. Names are those
+            of the topics with that of the quantity, such as ``odom_depth``. World NED, body FRD,
+            SI and radians, whatever the topics carry; units, meaning and frame are in ``attrs``.
+
+        Raises
+        ------
+        ConfigurationError
+            If the run has no bag, or it is damaged.
+        """
+        from glider_bringup.door.dataset import make_dataset
+
+        return make_dataset(self._rows(), self.scenario, self.score)
+
+    def report(self, path: str | Path | None = None) -> Path:
+        """Write the report: one HTML file that needs no network.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            By default ``report.html`` in the run folder, or in the current one if there is none.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ConfigurationError
+            If it cannot be written, or there is nothing that could be drawn.
+        """
+        from glider_bringup.showing.flown_run import flown_run, read_run, write_report
+
+        folder = self.folder if self.folder and self.folder.is_dir() else None
+        file = Path(path) if path is not None else (folder or Path()) / REPORT_FILE
+        if self.folder:
+            flown = read_run(self.folder)
+        else:
+            tracer = make_tracer(self.scenario)
+            tracer.add(self._rows())
+            text = self.scenario.to_yaml()
+            name = Path(self.scenario.name)
+            flown = flown_run(name, self.scenario, text, self.score, tracer.result())
+        write_report(flown, file)
+        return file
+
+
+def _scenario(scenario: str | Path | Scenario, fields: dict[str, Any]) -> Scenario:
+    """The scenario with some fields changed; one that was made already is validated again."""
+    if not isinstance(scenario, Scenario):
+        return load_scenario(str(scenario), fields)
+    if not fields:
+        return scenario
+    values = parse_yaml(scenario.to_yaml(), scenario.name)
+    return make_scenario(ScenarioSource(Path(scenario.name), values), fields)
+
+
+def fly(
+    scenario: str | Path | Scenario = DEFAULT_SCENARIO,
+    set: Mapping[str, Any] | None = None,
+    *,
+    controller: str | None = None,
+    guidance: str | None = None,
+    seed: int | None = None,
+    duration: float | str | None = None,
+    engine: str = 'direct',
+    out: str | Path | None = None,
+    bag: bool = False,
+    progress: bool = False,
+) -> Run:
+    """Fly a scenario, as ``./glider run`` does.
+
+    Ctrl-C ends a flight, whose status is then ``aborted``; what was flown is kept.
+
+    Parameters
+    ----------
+    scenario : str, Path or Scenario
+        By name, by path of its YAML file, or as it was loaded.
+    set : mapping, optional
+        Scenario fields to change, by dotted name, such as ``{'current.speed_kn': 0.8}``.
+    controller, guidance, seed : optional
+        Attitude law, line of sight and seed instead of those of the scenario.
+    duration : float or 'full', optional
+        Simulated time (s), or that of the whole scenario. By default its dives.
+    engine : str
+        ``'direct'``, one compiled loop, or ``'nodes'``, ROS 2 processes. Same results.
+    out : str or Path, optional
+        Run folder: scenario, vehicle, score, and what its report is drawn from. Without one
+        nothing is written.
+    bag : bool
+        Whether the direct engine records a bag into the run folder; nodes always do.
+    progress : bool
+        Whether a bar is shown on standard error.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming field, value and allowed range.
+    """
+    from glider_bringup.console import number
+    from glider_bringup.console import progress as bar
+
+    if duration not in (None, 'full'):
+        duration = number('--duration', str(duration), 'full', TICK_S, 1e8)
+    if engine not in ENGINES:
+        raise ConfigurationError(f'--engine {engine}: unknown (allowed: {", ".join(ENGINES)})')
+    if bag and out is None:
+        raise ConfigurationError('--bag: a bag needs a run folder (allowed: with --out)')
+    if engine == 'nodes':
+        given_domain()
+    flown = _scenario(scenario, chosen_fields(set or {}, controller, guidance, seed, duration))
+    scorer, rows = make_scorer(flown), Rows()
+    tracer = make_tracer(flown) if out is not None else None
+    takers = [scorer, rows, *([tracer] if tracer else [])]
+    with (
+        _run_folder(flown, out, engine) as folder,
+        bar(flown, planned_ticks(flown)) if progress else nullcontext((None, None)) as shown,
+    ):
+        flight = _fly(flown, takers, engine, folder, bag, *shown)
+        card = scorecard(flown, engine, flight, scores_of(flown, scorer))
+        if tracer:
+            write_score(folder, card)
+            tracer.result().save(folder / TRACES_FILE)
+    return Run(flown, card, None if out is None else folder, rows.result)
+
+
+@contextmanager
+def _run_folder(scenario: Scenario, out: str | Path | None, engine: str) -> Iterator[Path | None]:
+    """Folder of a run: a new one, one that nodes need for as long as they fly, or none."""
+    if out is not None:
+        yield make_run_folder(scenario, Path(out))
+    elif engine == 'nodes':
+        with TemporaryDirectory() as scratch:
+            yield make_run_folder(scenario, Path(scratch) / 'run')
+    else:
+        yield None
+
+
+def _fly(
+    scenario: Scenario,
+    takers: list,
+    engine: str,
+    folder: Path | None,
+    bag: bool,
+    flying: Callable[[int, float], None] | None,
+    reading: Callable[[int], None] | None,
+) -> Flight:
+    """Fly with the engine of this name, into the folder if there is a bag."""
+    if engine == 'direct' and not bag:
+        return fly_direct(scenario, takers, flying)
+    from glider_bringup.engines.recorded import fly_nodes, fly_recorded
+
+    if engine == 'direct':
+        return fly_recorded(scenario, folder, takers, flying)
+    return fly_nodes(scenario, folder, takers, flying, on_read=reading or (lambda ticks: None))
+
+
+def open_run(path: str | Path) -> Run:
+    """A run that was flown before.
+
+    Parameters
+    ----------
+    path : str or Path
+        Run folder, or an MCAP file.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no run, or its bag is damaged.
+    """
+    from glider_bringup.showing.flown_run import read_run
+
+    path = Path(path)
+    card = read_run(path, traced=False).card
+    with ExitStack() as stack:
+        attachments = Bag(path).attachments if has_bag(path) else {}
+        scenario, _ = stack.enter_context(scenario_of(path, attachments))
+        run = Run(scenario, card, path, partial(_rows_of, path))
+        # what an MCAP file brings is there as long as the run is
+        weakref.finalize(run, stack.pop_all().close)
+    return run
+
+
+def _rows_of(path: Path) -> np.ndarray:
+    """Rows of the bag of a run, float64[ticks, ROW]."""
+    if not has_bag(path):
+        raise ConfigurationError(
+            f'{path}: what was flown is not in it, it has no bag (allowed: a run over nodes, or a '
+            f'direct one with --bag)'
+        )
+    from glider_bringup.ros.read_back import read_back
+
+    rows = Rows()
+    read_back(Bag(path), [rows])
+    return rows.result()

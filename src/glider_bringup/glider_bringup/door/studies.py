@@ -1,0 +1,119 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Sweeps, trims and lists from Python."""
+
+from contextlib import nullcontext
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from glider_bringup.mission.scenario import load_scenario, scenario_names
+from glider_model.trim import Trim, solve_trim
+from glider_model.vehicle import load_vehicle, vehicle_names
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def scenarios() -> dict[str, str]:
+    """Names of the scenarios that come with the stack, and what each shows."""
+    return {name: load_scenario(name).description for name in scenario_names()}
+
+
+def vehicles() -> dict[str, str]:
+    """Names of the vehicles that come with the stack, and what each is."""
+    return {name: load_vehicle(name).description for name in vehicle_names()}
+
+
+def trim(
+    vehicle: str | Path,
+    net_heaviness_kg: float,
+    *,
+    pitch_deg: float | None = None,
+    pitch_mass_m: float | None = None,
+    roll_mass_deg: float = 0.0,
+) -> Trim:
+    """Steady glide or spiral of a vehicle, as ``./glider trim`` solves it.
+
+    Parameters
+    ----------
+    vehicle : str or Path
+        By name, or path of its YAML file.
+    net_heaviness_kg : float
+        Positive sinks (kg).
+    pitch_deg, pitch_mass_m : float, optional
+        One of them: pitch (deg, nose up), or the pitch mass from its neutral position (m).
+    roll_mass_deg : float
+        Roll mass, positive to starboard (deg).
+
+    Returns
+    -------
+    Trim
+        Its field ``converged`` is False if there is no steady state.
+
+    Raises
+    ------
+    ConfigurationError
+        If both or neither of pitch and pitch mass are given, or an actuator does not go there.
+    """
+    params = load_vehicle(str(vehicle)).params()
+    return solve_trim(params, net_heaviness_kg, pitch_deg, pitch_mass_m, roll_mass_deg)
+
+
+def sweep(
+    name: str | Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    out: str | Path | None = None,
+    resume: bool = False,
+    progress: bool = False,
+) -> 'xarray.Dataset':
+    """Fly every combination of the values in a sweep file, as ``./glider sweep`` does.
+
+    Workers are processes that begin by importing your program: what is not to run in them too
+    stands under ``if __name__ == '__main__':``.
+
+    Parameters
+    ----------
+    name : str or Path
+        Sweep by name, or path of its YAML file.
+    workers : int, optional
+        Processes; by default one per processor.
+    scheduler : str, optional
+        Address of the scheduler of a Dask cluster, instead.
+    out : str or Path, optional
+        Folder of journal and result. Without one nothing is kept.
+    resume : bool
+        Go on where an interrupted sweep in this folder has stopped.
+    progress : bool
+        Whether a bar is shown on standard error.
+
+    Returns
+    -------
+    xarray.Dataset
+        Every figure of the scorecard over the dimensions of the sweep. ``status`` says how each
+        flight ended, ``reason`` why one failed.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming file, field, value and allowed range.
+    """
+    from glider_bringup.console import counter
+    from glider_bringup.pool import worker_pool
+    from glider_bringup.studies import sweep as study
+    from glider_bringup.sweep_file import load_sweep
+    from glider_bringup.sweep_result import read_dataset
+
+    plan = load_sweep(str(name))
+    bar = counter('flying', plan.cells) if progress else nullcontext(lambda done: None)
+    with nullcontext(out) if out is not None else TemporaryDirectory() as place:
+        folder = Path(place)
+        with study.open_journal(plan, folder, resume) as journal:
+            known = study.flown_cells(plan, journal)
+            if not all(known):
+                with worker_pool(workers, scheduler) as pool, bar as update:
+                    study.fly_sweep(plan, journal, known, pool, update, lambda: None)
+            study.write_result(plan, journal, folder / study.RESULT_FILE)
+        return read_dataset(folder / study.RESULT_FILE)

@@ -1,0 +1,40 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a person chooses for a flight beside its scenario, as fields of the scenario."""
+
+from typing import Any, Literal
+
+#: The engines: node processes over topics, or one compiled loop. Same results.
+ENGINES = ('nodes', 'direct')
+
+
+def chosen_fields(
+    changes: dict[str, Any],
+    controller: str | None = None,
+    guidance: str | None = None,
+    seed: int | None = None,
+    duration: float | Literal['full'] | None = None,
+) -> dict[str, Any]:
+    """Values by dotted name, for `load_scenario`.
+
+    Parameters
+    ----------
+    changes : dict
+        Values by dotted name.
+    controller, guidance, seed : optional
+        Instead of those of the scenario.
+    duration : float or 'full', optional
+        Simulated time (s), or that of the whole scenario; by default its dives.
+    """
+    fields = dict(changes)
+    if controller is not None:
+        fields['control.law'] = controller
+    if guidance is not None:
+        fields['guidance.los.method'] = guidance
+    if seed is not None:
+        fields['seed'] = seed
+    if duration is not None:
+        fields['dives'] = 0
+        if duration != 'full':
+            fields['duration_s'] = duration
+    return fields
