@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
+from glider_bringup.blocks import changes_to_tell
 from glider_bringup.engines.direct import COLUMNS
+from glider_bringup.mission.run_folder import VEHICLE_FILE
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import wire_of
 from glider_control.control import SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL
-from glider_control.watch import ROWS
+from glider_control.watch import ROWS, TELL_EVERY_NS
 from glider_guidance.profile import STAGE_NAMES
 from glider_model.frames import (
     euler_from_quaternion,
@@ -27,6 +29,7 @@ from glider_model.frames import (
 )
 from glider_model.kernel import kernel, source_digest
 from glider_model.signals import TICK_NS, Adaptation
+from glider_model.vehicle import vehicle_path
 
 NED, FRD, PATH = 'NED', 'FRD', 'path'
 _AXES = ('north', 'east', 'down')
@@ -65,7 +68,7 @@ class _Variable(NamedTuple):
 
 
 def _position(topic: str, what: str) -> list[_Variable]:
-    texts = ('north of the start of the map', 'east of it', 'depth, positive down')
+    texts = ('north', 'east', 'depth, positive down')
     names = ('north', 'east', 'depth')
     return [
         _Variable(topic, name, 'm', f'{what}, {text}', NED)
@@ -175,6 +178,15 @@ def _numbers(log: np.ndarray) -> dict[str, tuple]:
     }
 
 
+def _as_told(saturation: np.ndarray) -> np.ndarray:
+    """Saturation masks, int16[n], as a bag has them: a change is told at most once a second."""
+    stamps_ns = np.arange(len(saturation)) * TICK_NS
+    told = changes_to_tell(saturation, stamps_ns, TELL_EVERY_NS, 0, -TELL_EVERY_NS)
+    values = np.append(0, saturation[told])
+    lengths = np.diff(np.concatenate(([0], told, [len(saturation)])))
+    return np.repeat(values, lengths).astype(np.int16)
+
+
 def _flags(log: np.ndarray) -> dict[str, tuple]:
     """Variables that are states or bits, with what they mean by the conventions of CF."""
     stage = np.nan_to_num(log[:, COLUMNS['stage']], nan=_UNKNOWN_STAGE).astype(np.int8)
@@ -205,10 +217,10 @@ def _flags(log: np.ndarray) -> dict[str, tuple]:
         ),
         'saturation': (
             'time',
-            log[:, COLUMNS['saturation']].astype(np.int16),
+            _as_told(log[:, COLUMNS['saturation']].astype(np.int64)),
             {
                 **told,
-                'long_name': 'what control notices, bit by bit',
+                'long_name': 'what control notices, bit by bit, told once a second at most',
                 'flag_masks': np.array(list(bits), dtype=np.int16),
                 'flag_meanings': ' '.join(bits.values()),
             },
@@ -233,6 +245,7 @@ def make_dataset(log: np.ndarray, scenario: Scenario, score: dict[str, Any]) -> 
         One-dimensional variables over ``time`` (s), each with ``units``, ``long_name``, ``topic``
         and, if it has one, ``frame``.
     """
+    beside = scenario.model_copy(update={'vehicle': VEHICLE_FILE})  # as in a run folder
     time_s = np.arange(len(log)) * TICK_NS / 1e9
     about = ('scenario', 'vehicle', 'controller', 'guidance', 'seed', 'status')
     return xarray.Dataset(
@@ -247,7 +260,8 @@ def make_dataset(log: np.ndarray, scenario: Scenario, score: dict[str, Any]) -> 
             'frames': 'world NED, body FRD, SI and radians; path: along, to starboard, below',
             **{name: score[name] for name in about},
             'score_json': json.dumps(score),
-            'scenario_yaml': scenario.to_yaml(),
+            'scenario_yaml': beside.to_yaml(),
+            'vehicle_yaml': vehicle_path(scenario.vehicle).read_text(encoding='utf-8'),
             'code_digest': source_digest(),
         },
     )

@@ -1,0 +1,386 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flights and runs from Python, and the files that other programs read."""
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from mcap_ros2.reader import read_ros2_messages
+from scipy.io import loadmat
+from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
+
+import glider_bringup as glider
+from glider_bringup.cli import app
+from glider_model.settings import ConfigurationError
+
+#: Half of what is named north, east and down in the world of topics: x east, y north, z up.
+ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+FLU = np.diag([1.0, -1.0, -1.0])
+
+
+@pytest.fixture(scope='module')
+def flown(tmp_path_factory) -> glider.Run:
+    """Four minutes in rough water, down and up again, with noise, a bag and a run folder."""
+    changes = {
+        'profile.prepare_s': 20.0,
+        'profile.depth_m': 14.0,
+        'profile.top_depth_m': 5.0,
+        'sensors.attitude_std_deg': 0.1,
+    }
+    out = tmp_path_factory.mktemp('door') / 'run'
+    return glider.fly('rough_water', changes, seed=3, duration=240.0, out=out, bag=True)
+
+
+@pytest.fixture(scope='module')
+def data(flown) -> xarray.Dataset:
+    return flown.to_xarray()
+
+
+@pytest.fixture(scope='module')
+def messages(flown) -> dict[str, list]:
+    """Every message of the bag, decoded by another library with the definitions in the file."""
+    (file,) = flown.folder.glob('*.mcap')
+    found = {}
+    for message in read_ros2_messages(str(file)):
+        name = message.channel.topic.removeprefix('/glider/')
+        found.setdefault(name, []).append(message.ros_msg)
+    return found
+
+
+def columns(data: xarray.Dataset, topic: str, *names: str) -> np.ndarray:
+    return np.stack([data[f'{topic}_{name}'].values for name in names], axis=1)
+
+
+def xyz(vectors) -> np.ndarray:
+    return np.array([(v.x, v.y, v.z) for v in vectors])
+
+
+# ---------------------------------------------------------------------- the package
+
+
+def run_python(program: str, *options: str) -> str:
+    done = subprocess.run(
+        [sys.executable, *options, '-c', program], capture_output=True, text=True, timeout=300
+    )
+    assert (done.returncode, done.stderr) == (0, '')
+    return done.stdout
+
+
+def test_import_of_the_package_loads_nothing():
+    program = 'import sys, glider_bringup; print({"numba", "numpy", "rclpy"} & {*sys.modules})'
+    assert run_python(program) == 'set()\n'
+
+
+def test_every_public_name_is_there_and_documented():
+    for name in glider.__all__:
+        assert getattr(glider, name).__doc__.strip()
+    assert dir(glider) == sorted(glider.__all__)
+    with pytest.raises(AttributeError, match='no attribute'):
+        glider.swim  # noqa: B018
+
+
+def test_a_flight_and_its_dataset_need_no_ros():
+    program = (
+        'import sys, glider_bringup as glider\n'
+        'print(len(glider.fly(duration=1.0).to_xarray().time), "rclpy" in sys.modules)'
+    )
+    assert run_python(program) == '10 False\n'
+
+
+#: Flies what every kind of study gives its workers, and says what they have loaded. The command
+#: line is imported because a worker begins by importing the program that started it.
+STUDIES = """
+import sys
+
+import glider_bringup.cli
+from glider_bringup.experiments import Case, _fly_case
+from glider_bringup.montecarlo import _fly_plant, make_scenarios
+from glider_bringup.pool import worker_pool
+from glider_bringup.studies.sweep import fly_chunk, make_chunks
+from glider_bringup.sweep_file import load_sweep
+
+
+def fly(study):
+    function, task = study
+    status = function(task)
+    return 'glider_bringup' in sys.modules, 'rclpy' in sys.modules, status is not None
+
+
+if __name__ == '__main__':
+    plan = load_sweep('small')
+    known = bytearray(plan.cells - 1) + b'\\0'
+    known[:-1] = b'\\1' * (plan.cells - 1)
+    (scenario,) = make_scenarios('current_8deg', {'duration_s': 1.0}, ['pid'], 1, 0).values()
+    case = Case('one', 'pid', 'observer', 'current_8deg', {'duration_s': 1.0})
+    studies = {
+        'montecarlo': (_fly_plant, scenario),
+        'sweep': (fly_chunk, next(make_chunks(plan, known, 1))),
+        'experiments': (_fly_case, case),
+    }
+    with worker_pool(1) as pool:
+        print(pool.results(fly, studies, lambda done: None))
+"""
+
+
+def test_a_study_worker_loads_no_ros(tmp_path):
+    program = tmp_path / 'studies.py'
+    program.write_text(STUDIES)
+    done = subprocess.run(
+        [sys.executable, program], capture_output=True, text=True, timeout=300, cwd=tmp_path
+    )
+    assert done.stderr == ''
+    seen = (True, False, True)
+    assert done.stdout.strip() == str(dict.fromkeys(('montecarlo', 'sweep', 'experiments'), seen))
+
+
+# ---------------------------------------------------------------------- numbers
+
+
+def test_time_is_uniform_and_every_variable_says_what_it_is(data):
+    assert np.array_equal(data.time, np.arange(2400) / 10)
+    assert data.time.attrs['units'] == 's'
+    for variable in data.data_vars.values():
+        assert variable.dims == ('time',)
+        assert {'units', 'long_name', 'topic'} <= set(variable.attrs)
+    frames = {variable.attrs.get('frame') for variable in data.data_vars.values()}
+    assert frames == {'NED', 'FRD', 'path', None}
+
+
+def test_odometry_is_that_of_the_messages_in_ned_and_frd(data, messages):
+    pose = [message.pose.pose for message in messages['odom']]
+    twist = [message.twist.twist for message in messages['odom']]
+    north_east_depth = xyz(one.position for one in pose) @ ENU.T
+    assert np.array_equal(columns(data, 'odom', 'north', 'east', 'depth'), north_east_depth)
+    velocity = xyz(one.linear for one in twist) @ FLU
+    assert np.array_equal(columns(data, 'odom', 'u', 'v', 'w'), velocity)
+    rates = xyz(one.angular for one in twist) @ FLU
+    assert np.array_equal(columns(data, 'odom', 'p', 'q', 'r'), rates)
+    imaginary = xyz(one.orientation for one in pose)
+    wire = Rotation.from_quat(
+        [(*v, one.orientation.w) for one, v in zip(pose, imaginary, strict=True)]
+    ).as_matrix()
+    expected = ENU @ wire @ FLU
+    euler = columns(data, 'odom', 'roll', 'pitch', 'heading')
+    turned = Rotation.from_euler('ZYX', euler[:, ::-1]).as_matrix()
+    assert np.abs(turned - expected).max() < 1e-12
+    quaternion = columns(data, 'odom', 'q_x', 'q_y', 'q_z', 'q_w')
+    assert np.abs(Rotation.from_quat(quaternion).as_matrix() - expected).max() < 1e-12
+
+
+def test_joints_water_and_control_are_those_of_the_messages(data, messages):
+    joints = ('buoyancy_engine', 'pitch_mass', 'roll_mass')
+    for topic in ('joint_states', 'command'):
+        positions = [message.position for message in messages[topic]]
+        assert list(messages[topic][0].name) == list(joints)
+        assert np.array_equal(columns(data, topic, *joints), positions)
+    for topic in ('current_velocity', 'current_estimate'):
+        velocity = xyz(message.twist.linear for message in messages[topic]) @ ENU.T
+        assert np.array_equal(columns(data, topic, 'north', 'east', 'down'), velocity)
+    error = xyz(message.vector for message in messages['tracking_error'])
+    names = ('along', 'across', 'below')
+    assert np.array_equal(columns(data, 'tracking_error', *names), error)
+    wrench = [message.wrench for message in messages['wrench']]
+    demanded = [(-one.force.z, one.torque.x, -one.torque.y) for one in wrench]
+    names = ('heave_force', 'roll_moment', 'pitch_moment')
+    assert np.array_equal(columns(data, 'wrench', *names), demanded)
+    learnt = np.array([message.position for message in messages['adaptation']])
+    names = [name for name in data.data_vars if name.startswith('adaptation_')]
+    assert [
+        f'adaptation_{name}'.startswith(own)
+        for name, own in zip(messages['adaptation'][0].name, names, strict=True)
+    ] == 13 * [True]
+    assert np.array_equal(np.stack([data[name] for name in names], axis=1), learnt)
+
+
+def test_reference_is_that_of_the_messages(data, messages):
+    pose = [message.pose.pose for message in messages['reference']]
+    twist = [message.twist.twist for message in messages['reference']]
+    position = xyz(one.position for one in pose) @ ENU.T
+    assert np.array_equal(columns(data, 'reference', 'north', 'east', 'depth'), position)
+    velocity = xyz(one.linear for one in twist) @ ENU.T
+    names = [f'velocity_{axis}' for axis in ('north', 'east', 'down')]
+    assert np.array_equal(columns(data, 'reference', *names), velocity)
+    rates = xyz(one.angular for one in twist) @ FLU
+    names = [f'{angle}_rate' for angle in ('roll', 'pitch', 'heading')]
+    assert np.array_equal(columns(data, 'reference', *names), rates)
+    assert data.reference_pitch.min() < -0.3 < 0.3 < data.reference_pitch.max()
+
+
+def test_flags_mean_what_they_say(data):
+    meanings = data.stage.attrs['flag_meanings'].split()
+    named = dict(zip(data.stage.attrs['flag_values'].tolist(), meanings, strict=True))
+    stages = [named[value] for value in np.unique(data.stage)]
+    assert stages[:2] == ['surface_preparation', 'gliding_down']
+    diving = data.stage == 1
+    assert float(data.odom_pitch.where(diving).mean()) < -0.2
+    masks = data.saturation.attrs['flag_masks']
+    assert len(masks) == len(data.saturation.attrs['flag_meanings'].split())
+    assert np.all(data.saturation.values & ~np.bitwise_or.reduce(masks) == 0)
+    assert np.any(data.saturation.values & masks[0])
+
+
+# ---------------------------------------------------------------------- runs
+
+
+def test_run_folder_bag_and_memory_give_the_same(flown, data, tmp_path):
+    (file,) = flown.folder.glob('*.mcap')
+    alone = tmp_path / 'alone.mcap'
+    alone.write_bytes(file.read_bytes())
+    for path in (flown.folder, alone):
+        again = glider.open_run(path)
+        xarray.testing.assert_equal(again.to_xarray(), data)
+    assert glider.open_run(flown.folder).score == flown.score
+    assert json.loads((flown.folder / 'score.json').read_text()) == flown.score
+    once_more = glider.fly(again.scenario, duration=240.0)
+    xarray.testing.assert_equal(once_more.to_xarray(), data)
+
+
+def test_run_over_nodes_gives_the_same_and_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    over_nodes = glider.fly('survey', duration=3.0, engine='nodes')
+    directly = glider.fly('survey', duration=3.0)
+    assert over_nodes.score['engine'] == 'nodes'
+    assert over_nodes.folder is directly.folder is None
+    xarray.testing.assert_equal(over_nodes.to_xarray(), directly.to_xarray())
+    assert not list(tmp_path.iterdir())
+
+
+def test_fly_gives_what_the_command_line_gives(flown, tmp_path):
+    options = [
+        *('run', flown.folder / 'scenario.yaml', '--engine', 'direct', '--json', '--no-report'),
+        *('--duration', '240', '--out', tmp_path / 'run'),
+    ]
+    done = CliRunner().invoke(app, list(map(str, options)))
+    card = json.loads(done.stdout)
+    measured = {'wall_time_s', 'real_time_factor', 'messages_recorded'}
+    for name in set(card) - measured:
+        assert card[name] == flown.score[name]
+
+
+def test_report_is_that_of_the_command_line(flown, tmp_path):
+    file = flown.report(tmp_path / 'one.html')
+    options = ['report', str(flown.folder), '--out', str(tmp_path / 'other.html')]
+    assert CliRunner().invoke(app, options).exit_code == 0
+    assert file.read_bytes() == (tmp_path / 'other.html').read_bytes()
+
+
+def test_report_of_a_run_in_memory_lies_where_one_is(flown, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = glider.fly(flown.scenario, duration=60.0).report()
+    assert file.resolve() == tmp_path / 'report.html'
+    assert 'rough_water' in file.read_text()
+    assert '60.0 s' in file.read_text()
+
+
+WRONG = {
+    'scenario': (['nowhere'], {'scenario': 'nowhere'}),
+    'field': (['--set', 'current.speed_kn=99'], {'set': {'current.speed_kn': 99}}),
+    'unknown': (['--set', 'depth=9'], {'set': {'depth': 9}}),
+    'duration': (['--duration', '-1'], {'duration': -1}),
+    'seed': (['--seed', '-1'], {'seed': -1}),
+}
+
+
+@pytest.mark.parametrize('case', WRONG)
+def test_mistake_is_told_in_the_words_of_the_command_line(case):
+    options, choices = WRONG[case]
+    told = CliRunner().invoke(app, ['run', '--engine', 'direct', *options])
+    with pytest.raises(ConfigurationError) as error:
+        glider.fly(**choices)
+    assert isinstance(told.exception, glider.ConfigurationError)
+    assert str(error.value) == str(told.exception)
+
+
+@pytest.mark.parametrize(
+    ('choices', 'text'),
+    [
+        ({'engine': 'rocket'}, '--engine rocket: unknown (allowed: nodes, direct)'),
+        ({'bag': True}, '--bag: a bag needs a run folder'),
+        ({'controller': 'fuzzy'}, "control.law = 'fuzzy'"),
+    ],
+)
+def test_mistake_is_told(choices, text):
+    with pytest.raises(ConfigurationError) as error:
+        glider.fly(**choices)
+    assert text in str(error.value)
+
+
+def test_field_of_a_loaded_scenario_is_validated_too(flown):
+    with pytest.raises(ConfigurationError, match='current.speed_kn = 99'):
+        glider.fly(flown.scenario, {'current.speed_kn': 99})
+
+
+# ---------------------------------------------------------------------- other programs
+
+
+@pytest.fixture(scope='module')
+def export(flown, tmp_path_factory):
+    """Function that exports the run, and gives the file."""
+
+    def run(kind: str) -> Path:
+        file = tmp_path_factory.mktemp('export') / 'file'
+        done = CliRunner().invoke(
+            app, ['export', str(flown.folder), '--to', kind, '--out', str(file)]
+        )
+        assert done.exit_code == 0, done.output
+        return file
+
+    return run
+
+
+def test_netcdf_keeps_numbers_units_and_attributes(export, data):
+    with xarray.open_dataset(export('netcdf')) as read:
+        xarray.testing.assert_equal(read, data)
+        for name, variable in data.variables.items():
+            assert read[name].dtype == variable.dtype
+            for attribute, value in variable.attrs.items():
+                assert np.array_equal(read[name].attrs[attribute], value)
+        assert read.attrs == data.attrs
+
+
+def test_csv_has_one_row_a_tick_under_names_with_units(export, data):
+    with export('csv').open(newline='') as stream:
+        header, *rows = csv.reader(stream)
+    assert header[:4] == ['time [s]', 'odom_north [m]', 'odom_east [m]', 'odom_depth [m]']
+    assert 'wrench_roll_moment [N m]' in header
+    numbers = np.array(rows, dtype=float)
+    assert len(numbers) == 2400
+    for heading, column in zip(header, numbers.T, strict=True):
+        assert np.array_equal(column, data[heading.partition(' ')[0]])
+
+
+def test_mat_has_structs_of_numbers_units_and_names(export, data):
+    read = loadmat(export('mat'), squeeze_me=True, struct_as_record=False)
+    numbers, units, texts = read['data'], read['units'], read['long_names']
+    assert numbers._fieldnames == units._fieldnames == texts._fieldnames
+    assert set(numbers._fieldnames) == set(data.variables)
+    for name in data.variables:
+        assert np.array_equal(getattr(numbers, name), data[name])
+        assert getattr(units, name) == data[name].attrs['units']
+        assert getattr(texts, name) == data[name].attrs['long_name']
+    assert read['flags'].stage.meanings == data.stage.attrs['flag_meanings']
+    assert read['about'].controller == 'adaptive'
+    assert loadmat(export('mat'))['data']['odom_depth'][0, 0].shape == (2400, 1)
+
+
+def test_files_are_called_after_the_run_unless_they_are_given_a_name(flown):
+    done = CliRunner().invoke(app, ['export', str(flown.folder), '--to', 'netcdf'])
+    assert done.exit_code == 0
+    assert str(flown.folder / 'run.nc') in ''.join(done.stdout.split('\n'))
+
+
+def test_run_without_a_bag_says_so(tmp_path):
+    run = glider.fly(duration=1.0, out=tmp_path / 'run')
+    assert len(run.to_xarray().time) == 10
+    with pytest.raises(ConfigurationError, match='it has no bag'):
+        glider.open_run(run.folder).to_xarray()
+    done = CliRunner().invoke(app, ['export', str(run.folder), '--to', 'csv'])
+    assert isinstance(done.exception, ConfigurationError)
+    assert not (run.folder / 'run.csv').exists()
