@@ -317,6 +317,31 @@ def test_field_of_a_loaded_scenario_is_validated_too(flown):
         glider.fly(flown.scenario, {'current.speed_kn': 99})
 
 
+def test_bar_is_shown_where_it_is_asked_for(capfd):
+    glider.fly(duration=1.0)
+    assert capfd.readouterr() == ('', '')
+    glider.fly(duration=1.0, progress=True)
+    out, bar = capfd.readouterr()
+    assert (out, '100 %' in bar) == ('', True)
+
+
+def test_sweep_gives_its_file_and_goes_on_from_its_journal(tmp_path, flown):
+    plan = tmp_path / 'seeds.yaml'
+    plan.write_text(
+        f'scenario: {flown.folder}/scenario.yaml\n'
+        'dimensions:\n  seed: {kind: values, field: seed, values: [3, 4]}\n'
+    )
+    out = tmp_path / 'out'
+    result = glider.sweep(plan, workers=1, out=out)
+    assert result.sizes == {'seed': 2, 'ned': 3, 'rpy': 3, 'frd': 3}
+    assert float(result.cross_track_m_max_run[0]) == flown.score['cross_track_m']['max_run']
+    with xarray.open_dataset(out / 'sweep.nc') as file:
+        xarray.testing.assert_identical(file.load(), result)
+    xarray.testing.assert_identical(glider.sweep(plan, out=out, resume=True), result)
+    with pytest.raises(ConfigurationError, match='--resume'):
+        glider.sweep(plan, out=out)
+
+
 # ---------------------------------------------------------------------- other programs
 
 

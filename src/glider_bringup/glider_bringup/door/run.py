@@ -206,19 +206,21 @@ def fly(
     if engine == 'nodes':
         given_domain()
     flown = _scenario(scenario, chosen_fields(set or {}, controller, guidance, seed, duration))
-    scorer, rows = make_scorer(flown), Rows()
-    tracer = make_tracer(flown) if out is not None else None
-    takers = [scorer, rows, *([tracer] if tracer else [])]
+    kept = out is not None
+    scorer, rows, tracer = make_scorer(flown), Rows(), make_tracer(flown)
+    in_bag = kept and (bag or engine == 'nodes')
+    takers = [scorer, *([] if in_bag else [rows]), *([tracer] if kept else [])]
     with (
         _run_folder(flown, out, engine) as folder,
         bar(flown, planned_ticks(flown)) if progress else nullcontext((None, None)) as shown,
     ):
         flight = _fly(flown, takers, engine, folder, bag, *shown)
         card = scorecard(flown, engine, flight, scores_of(flown, scorer))
-        if tracer:
+        if kept:
             write_score(folder, card)
             tracer.result().save(folder / TRACES_FILE)
-    return Run(flown, card, None if out is None else folder, rows.result)
+    source = partial(_rows_of, folder) if in_bag else rows.result
+    return Run(flown, card, folder if kept else None, source)
 
 
 @contextmanager

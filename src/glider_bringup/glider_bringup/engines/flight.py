@@ -60,10 +60,10 @@ def fly(
         State and parameters to fly with, if they are not `mission_of` the scenario.
     """
     takers = tuple(takers)
-    state, params = mission or mission_of(scenario)
     status, reason, ticks = 'completed', '', 0
-    start = time.perf_counter()
     with interrupts_noted() as interrupts:
+        state, params = mission or mission_of(scenario)
+        start = time.perf_counter()
         try:
             for log in fly_blocks(state, params):
                 for taker in takers:
