@@ -7,6 +7,8 @@
 
 import json
 import re
+import subprocess
+from importlib.util import find_spec
 from pathlib import Path
 
 import matplotlib
@@ -95,6 +97,30 @@ def test_notebook_runs_and_has_no_outputs(run_code, tmp_path):
     assert {run.score['status'] for run in names['runs'].values()} == {'completed'}
     assert [run.score['controller'] for run in names['runs'].values()] == ['adaptive', 'pid']
     assert (tmp_path / 'first_flight.html').exists()
+
+
+def script(*arguments: str) -> subprocess.CompletedProcess:
+    """A command of the ``glider`` script, which is there by now or these tests were not."""
+    return subprocess.run(
+        [ROOT / 'glider', *arguments], capture_output=True, text=True, timeout=300
+    )
+
+
+def test_script_gives_an_interpreter_with_the_stack_in_it():
+    program = 'import sys, glider_bringup; print(glider_bringup.fly.__name__, *sys.argv[1:])'
+    done = script('python', '-c', program, '--help', 'a b')
+    assert (done.returncode, done.stdout) == (0, 'fly --help a b\n')
+    assert script('python', '-c', 'raise SystemExit(7)').returncode == 7
+
+
+def test_script_starts_jupyter_or_says_how_to_get_it():
+    done = script('jupyter', '--version')
+    if find_spec('jupyter_core'):
+        assert (done.returncode, 'jupyter' in done.stdout) == (0, True)
+    else:
+        assert (done.returncode, done.stdout) == (2, '')
+        (line,) = done.stderr.splitlines()
+        assert './glider python -m pip install jupyterlab' in line
 
 
 if __name__ == '__main__':

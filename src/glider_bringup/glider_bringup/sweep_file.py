@@ -337,8 +337,12 @@ class Plan:
         return ' '.join(['./glider run', name, '--engine direct', *sets])
 
     def first(self) -> Scenario:
-        """Scenario of the first cell, which names its vehicle without a folder."""
-        scenario = make_scenario(self.source, self.changes(0))
+        """Scenario of the first cell."""
+        return make_scenario(self.source, self.changes(0))
+
+    def told(self) -> Scenario:
+        """What is kept of the first cell: its vehicle is named without a folder."""
+        scenario = self.first()
         return scenario.model_copy(update={'vehicle': Path(scenario.vehicle).stem})
 
     @cached_property
@@ -347,7 +351,7 @@ class Plan:
         parts = {
             'code': source_digest(),
             'sweep': self.text,
-            'scenario': self.first().model_dump(mode='json'),
+            'scenario': self.told().model_dump(mode='json'),
             'coordinates': [[axis.name, axis.values] for axis in self.axes],
             'vehicles': self.vehicles,
         }

@@ -141,7 +141,7 @@ def _attributes(plan: Plan) -> dict[str, str]:
         'source': 'glider stack, direct engine',
         'sweep': plan.sweep.name,
         'sweep_yaml': plan.text,
-        'scenario_yaml': plan.first().to_yaml(),
+        'scenario_yaml': plan.told().to_yaml(),
         'vehicle_yaml': first[1],
         **{f'vehicle_{name}_yaml': text for name, text in others},
         'code_digest': source_digest(),

@@ -10,11 +10,11 @@ import typer
 from rich.table import Table
 
 from glider_bringup.console import EXIT_FAILED, Json, messages, output
-from glider_bringup.mission.scenario import load_scenario, scenario_names
+from glider_bringup.door.studies import scenarios, vehicles
 from glider_bringup.sweep_file import read_sweep, sweep_names
 from glider_model.settings import ConfigurationError
 from glider_model.trim import Trim, solve_trim
-from glider_model.vehicle import load_vehicle, vehicle_names
+from glider_model.vehicle import load_vehicle
 
 app = typer.Typer()
 
@@ -64,8 +64,8 @@ def _print_trim(vehicle: str, solution: Trim) -> None:
 def list_all(as_json: Json = False) -> None:
     """List the scenarios, vehicles and sweeps that come with the stack."""
     listed = {
-        'scenarios': {name: load_scenario(name).description for name in scenario_names()},
-        'vehicles': {name: load_vehicle(name).description for name in vehicle_names()},
+        'scenarios': scenarios(),
+        'vehicles': vehicles(),
         'sweeps': {name: read_sweep(name).description for name in sweep_names()},
     }
     if as_json:
