@@ -38,7 +38,7 @@ from glider_model.settings import (
     find_file,
     validate,
 )
-from glider_model.vehicle import vehicle_path
+from glider_model.vehicle import vehicle_file, vehicle_path
 
 SWEEP_FOLDER = Path(__file__).parent / 'sweeps'
 #: No sweep has more cells: these take days, and 0.5 GB of memory when the result is written.
@@ -238,6 +238,8 @@ class Plan:
     ----------
     path : Path
         Its file.
+    changes : dict, optional
+        Scenario fields of every cell by dotted name, before those that the file sets.
 
     Raises
     ------
@@ -245,9 +247,16 @@ class Plan:
         Naming file, field, value and what is allowed, for every value of every dimension.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, changes: dict[str, Any] | None = None) -> None:
         self.path = path
         self.sweep = _validate(path)
+        self.given = dict(changes or {})
+        #: scenario fields of every cell
+        self.common = {
+            field: value
+            for field, value in self.sweep.set.items()
+            if not any(overlap(field, other) for other in self.given)
+        } | self.given
         self.text = read_text(path)
         self.axes = [_axis(name, one) for name, one in self.sweep.dimensions.items()]
         self.shape = tuple(len(axis.values) for axis in self.axes)
@@ -262,7 +271,14 @@ class Plan:
             self.source = read_scenario(self._scenario_name())
         except ConfigurationError as error:
             raise ConfigurationError(f'{path}: {error}') from None
-        self.vehicles = self._check_values()
+        vehicles = self._check_values()
+        #: texts of the vehicle files
+        self.vehicle_texts = [vehicle_text(vehicle) for vehicle in vehicles]
+        #: name and text of a vehicle of each file as it flies, the first cell's first
+        self.vehicles = [
+            (vehicle_path(vehicle).stem, vehicle_file(vehicle).decode('utf-8-sig'))
+            for vehicle in vehicles
+        ]
 
     def _scenario_name(self) -> str:
         name = self.sweep.scenario
@@ -271,7 +287,10 @@ class Plan:
 
     def _check_overlaps(self) -> None:
         """Each field is set in one place, else one of the places would mean nothing."""
-        places = [('set', list(self.sweep.set))]
+        places = [
+            ('set', [field for field in self.common if field not in self.given]),
+            ('--set', list(self.given)),
+        ]
         for axis in self.axes:
             fields = dict.fromkeys(field for changes in axis.changes for field in changes)
             places.append((f'dimensions.{axis.name}', list(fields)))
@@ -286,15 +305,15 @@ class Plan:
                         )
             seen.update(dict.fromkeys(fields, place))
 
-    def _check_values(self) -> list[tuple[str, str]]:
+    def _check_values(self) -> list[str]:
         """Check every value of every dimension, beside the first of all others.
 
         Returns
         -------
-        list of tuple of str
-            Name and text of every vehicle that flies, the first cell's first.
+        list of str
+            A vehicle of every vehicle file, the first cell's first.
         """
-        vehicles = {}
+        vehicles: dict[Path, str] = {}
         for number, axis in enumerate(self.axes):
             for i, value in enumerate(axis.values):
                 places = [0] * len(self.axes)
@@ -307,11 +326,11 @@ class Plan:
                     raise ConfigurationError(
                         '\n'.join(f'{where}: {line}' for line in lines)
                     ) from None
-                vehicles[Path(vehicle).stem, vehicle_text(vehicle)] = None
-        return list(vehicles)
+                vehicles.setdefault(vehicle_path(vehicle), vehicle)
+        return list(vehicles.values())
 
     def _changes(self, places: Iterable[int]) -> dict[str, Any]:
-        changes = dict(self.sweep.set)
+        changes = dict(self.common)
         for axis, place in zip(self.axes, places, strict=True):
             changes.update(axis.changes[place])
         return changes
@@ -336,14 +355,15 @@ class Plan:
         name = shlex.quote(self._scenario_name())
         return ' '.join(['./glider run', name, '--engine direct', *sets])
 
+    @cached_property
     def first(self) -> Scenario:
         """Scenario of the first cell."""
         return make_scenario(self.source, self.changes(0))
 
-    def told(self) -> Scenario:
-        """What is kept of the first cell: its vehicle is named without a folder."""
-        scenario = self.first()
-        return scenario.model_copy(update={'vehicle': Path(scenario.vehicle).stem})
+    def described(self) -> Scenario:
+        """Scenario of the first cell as results tell it, whose vehicle has no folder."""
+        name = vehicle_path(self.first.vehicle).stem
+        return self.first.model_copy(update={'vehicle': name})
 
     @cached_property
     def digest(self) -> str:
@@ -351,7 +371,8 @@ class Plan:
         parts = {
             'code': source_digest(),
             'sweep': self.text,
-            'scenario': self.told().model_dump(mode='json'),
+            'scenario': self.described().model_dump(mode='json'),
+            'set': self.common,
             'coordinates': [[axis.name, axis.values] for axis in self.axes],
             'vehicles': self.vehicles,
         }
@@ -359,7 +380,7 @@ class Plan:
 
 
 def vehicle_text(vehicle: str) -> str:
-    """Text of the file of a vehicle given by name or path."""
+    """Text of the file of a vehicle given by name or path, without what is changed in it."""
     return read_text(vehicle_path(vehicle))
 
 
@@ -393,12 +414,12 @@ def read_sweep(name: str) -> Sweep:
     return _validate(find_file('sweep', name, SWEEP_FOLDER))
 
 
-def load_sweep(name: str) -> Plan:
-    """Plan of a sweep given by name or by path.
+def load_sweep(name: str, changes: dict[str, Any] | None = None) -> Plan:
+    """Plan of a sweep given by name or by path, with some fields changed; see `Plan`.
 
     Raises
     ------
     ConfigurationError
         Naming file, field, value and what is allowed.
     """
-    return Plan(find_file('sweep', name, SWEEP_FOLDER))
+    return Plan(find_file('sweep', name, SWEEP_FOLDER), changes)

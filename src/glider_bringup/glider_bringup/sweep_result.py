@@ -6,17 +6,19 @@ Every number of a scorecard is a variable over the dimensions of the sweep; its 
 scorecard with ``_`` for the dots. The file also holds what made it.
 """
 
+import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import xarray
 
-from glider_bringup.mission.scenario import Scenario
+from glider_bringup.mission.scenario import VEHICLE, Scenario
 from glider_bringup.sweep_file import Axis, Plan
 from glider_model.kernel import source_digest
 from glider_model.settings import find_field, unit_of
+from glider_model.vehicle import Vehicle
 
 #: Units by how names in a scorecard end, in the spelling of UDUNITS.
 _UNITS = {
@@ -54,19 +56,28 @@ def _unit_and_name(figure: str) -> tuple[str, str]:
     return unit, ', '.join(words)
 
 
+def _description_and_unit(name: str) -> tuple[str, str]:
+    """What a scenario field, or one of its vehicle's file, is, and its unit; empty without."""
+    of, _, inside = name.partition('.')
+    if of == VEHICLE and inside:
+        unit = find_field(Vehicle, f'{inside}.unit')
+        return '', next(iter(get_args(unit.annotation)), '') if unit is not None else ''
+    field = find_field(Scenario, name)
+    return (field.description or '', unit_of(field)) if field is not None else ('', '')
+
+
 def _coordinate(axis: Axis) -> tuple[str, np.ndarray, dict[str, str]]:
     """Dimension, values and attributes of a coordinate."""
-    field = find_field(Scenario, axis.field) if axis.field else None
+    description, unit = _description_and_unit(axis.field)
     attributes = {'long_name': axis.name.replace('_', ' ')}
     if axis.field:
         attributes['scenario_field'] = axis.field
-    if field is not None and field.description:
-        attributes['description'] = field.description
+    if description:
+        attributes['description'] = description
     if all(isinstance(value, bool) for value in axis.values):
         values = np.array(axis.values, dtype=np.int8)
     elif all(isinstance(value, int | float) for value in axis.values):
         values = np.array(axis.values, dtype=np.float64)
-        unit = unit_of(field) if field is not None else ''
         attributes['units'] = _SPELLING.get(unit, unit)
     else:
         values = np.array([str(value) for value in axis.values], dtype=object)
@@ -141,7 +152,8 @@ def _attributes(plan: Plan) -> dict[str, str]:
         'source': 'glider stack, direct engine',
         'sweep': plan.sweep.name,
         'sweep_yaml': plan.text,
-        'scenario_yaml': plan.told().to_yaml(),
+        **({'set': json.dumps(plan.given)} if plan.given else {}),
+        'scenario_yaml': plan.described().to_yaml(),
         'vehicle_yaml': first[1],
         **{f'vehicle_{name}_yaml': text for name, text in others},
         'code_digest': source_digest(),

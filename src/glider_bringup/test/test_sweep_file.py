@@ -129,7 +129,7 @@ def test_scenario_and_vehicle_are_found_beside_the_sweep(tmp_path):
     base = load_scenario('current_8deg').model_copy(update={'name': 'beside'})
     (tmp_path / 'beside.yaml').write_text(base.to_yaml(), encoding='utf-8')
     plan = plan_of(tmp_path, scenario='beside.yaml')
-    assert plan.first().name == 'beside'
+    assert plan.first.name == 'beside'
     assert str(tmp_path / 'beside.yaml') in plan.command(0)
     assert [name for name, _ in plan.vehicles] == ['zhang2021']
 

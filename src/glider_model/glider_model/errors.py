@@ -3,6 +3,7 @@
 """What is told to a person: short, printable, whatever a file or an option holds."""
 
 import reprlib
+from typing import Any
 
 #: Lines that an error has at most, but for one that says how many more there are.
 MAX_LINES = 20
@@ -10,6 +11,8 @@ MAX_LINES = 20
 MAX_LINE = 900
 #: Characters of a value in an error.
 MAX_SHOWN = 80
+#: So many of the fields that were changed are told with what is wrong.
+CHANGES_TOLD = 4
 
 
 class ConfigurationError(ValueError):
@@ -61,3 +64,10 @@ def shown(value) -> str:
 def clipped(text: str) -> str:
     """The first `MAX_SHOWN` characters of a text."""
     return text if len(text) <= MAX_SHOWN else f'{text[: MAX_SHOWN - 1]}…'
+
+
+def told_changes(changes: dict[str, Any]) -> str:
+    """The first fields that were changed since a file was read, in words."""
+    told = [f'{clipped(field)}={shown(value)}' for field, value in changes.items()]
+    more = [f'{len(told) - CHANGES_TOLD} more'] if len(told) > CHANGES_TOLD else []
+    return ' with ' + ', '.join(told[:CHANGES_TOLD] + more) if told else ''

@@ -98,6 +98,23 @@ def find_field(model: type[Settings], name: str) -> pydantic.fields.FieldInfo | 
     return field
 
 
+def holder_of(values: dict[str, Any], name: str) -> dict[str, Any]:
+    """Mapping in nested values that holds a field, given by its dotted name; made if need be.
+
+    Raises
+    ------
+    ConfigurationError
+        If something on the way is not a mapping.
+    """
+    for parent in name.split('.')[:-1]:
+        values = values.setdefault(parent, {})
+        if not isinstance(values, dict):
+            raise ConfigurationError(
+                f'--set {clipped(name)}: {clipped(parent)} is not a group of fields'
+            )
+    return values
+
+
 def unit_of(field: pydantic.fields.FieldInfo) -> str:
     """Unit of a field, from the first brackets of its description; empty without."""
     brackets = re.search(r'\(((?:[^()]|\([^()]*\))+)\)', field.description or '')

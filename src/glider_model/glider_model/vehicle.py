@@ -2,18 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Vehicles: a validated YAML file, every number with unit and source, to kernel parameters."""
 
+import json
 import math
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_model.files import read_yaml, yaml_line
+from glider_model.errors import told_changes
+from glider_model.files import read_bytes, read_yaml, yaml_line, yaml_text
 from glider_model.rigid_body import mass_matrix
-from glider_model.settings import Settings, file_names, find_file, validate
+from glider_model.settings import (
+    Settings,
+    file_names,
+    find_field,
+    find_file,
+    holder_of,
+    validate,
+)
 
 VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
 
@@ -295,6 +304,28 @@ def vehicle_names() -> list[str]:
     return file_names(VEHICLE_FOLDER)
 
 
+def changed_vehicle(name: str, changes: dict[str, Any]) -> str:
+    """Name of a vehicle of which some fields differ from its file.
+
+    `load_vehicle` takes it like any other, in every process that is handed it. No person can type
+    it, and no path looks like it: a NUL stands in it.
+
+    Parameters
+    ----------
+    name : str
+        Vehicle by name or path.
+    changes : dict
+        Values by dotted name of the field; that of a quantity is its number, in its unit.
+    """
+    return f'{name}\0{json.dumps(changes)}' if changes else name
+
+
+def _parts(name: str) -> tuple[str, dict[str, Any]]:
+    """What `changed_vehicle` was given."""
+    name, _, changes = name.partition('\0')
+    return name, json.loads(changes or '{}')
+
+
 def vehicle_path(name: str) -> Path:
     """File of a vehicle given by name, or by path.
 
@@ -303,7 +334,21 @@ def vehicle_path(name: str) -> Path:
     ConfigurationError
         If there is neither a vehicle of that name nor such a file.
     """
-    return find_file('vehicle', name, VEHICLE_FOLDER)
+    return find_file('vehicle', _parts(name)[0], VEHICLE_FOLDER)
+
+
+def vehicle_file(name: str) -> bytes:
+    """Content of a file that loads to a vehicle: its own or, if fields are changed, a new one.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no such vehicle.
+    """
+    path, (_, changes) = vehicle_path(name), _parts(name)
+    if not changes:
+        return read_bytes(path)
+    return yaml_text(_changed_values(read_yaml(path), changes)).encode()
 
 
 def load_vehicle(name: str) -> Vehicle:
@@ -316,10 +361,36 @@ def load_vehicle(name: str) -> Vehicle:
     """
     path = vehicle_path(name)
     status = path.stat()
-    return _read_vehicle(path, status.st_mtime_ns, status.st_size)
+    return _read_vehicle(path, name, status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(maxsize=16)
-def _read_vehicle(path: Path, mtime_ns: int, size: int) -> Vehicle:
+def _read_vehicle(path: Path, name: str, mtime_ns: int, size: int) -> Vehicle:
     """Vehicle of a file in this version: every block of a mission asks for it."""
-    return validate(Vehicle, read_yaml(path), str(path), line_of=partial(yaml_line, path))
+    _, changes = _parts(name)
+
+    def line_of(location: tuple[str, ...]) -> int | None:
+        where = '.'.join(location)
+        here = any(f'{where}.'.startswith(f'{field}.') for field in changes)
+        return None if here else yaml_line(path, location)
+
+    changed = told_changes({f'vehicle.{field}': value for field, value in changes.items()})
+    values = _changed_values(read_yaml(path), changes)
+    return validate(Vehicle, values, str(path), line_of=line_of, changed=changed)
+
+
+def _changed_values(values: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Values of a vehicle file with some of its fields changed, which say so as their source."""
+    whole = {'vehicle': values}
+    for field, value in changes.items():
+        name = f'vehicle.{field}'
+        holder, last = holder_of(whole, name), name.rpartition('.')[2]
+        unit = find_field(Vehicle, f'{field}.unit')
+        if unit is not None and not isinstance(value, dict):  # a quantity, given by its number
+            old = holder.get(last)
+            if not isinstance(old, dict):  # its file does not have it
+                old = {'unit': next(iter(get_args(unit.annotation)), None)}
+            source = f'--set, instead of {old["value"]}' if 'value' in old else '--set'
+            value = {**old, 'value': value, 'source': source}
+        holder[last] = value
+    return values

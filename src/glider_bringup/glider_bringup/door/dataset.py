@@ -12,14 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
-from glider_bringup.blocks import changes_to_tell
 from glider_bringup.engines.direct import COLUMNS
 from glider_bringup.mission.run_folder import VEHICLE_FILE
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import wire_of
+from glider_control.block import CONTROL
 from glider_control.control import SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL
-from glider_control.watch import ROWS, TELL_EVERY_NS
+from glider_control.watch import ROWS
 from glider_guidance.profile import STAGE_NAMES
+from glider_model.block import Telling
 from glider_model.frames import (
     euler_from_quaternion,
     odometry_from_wire,
@@ -181,7 +182,7 @@ def _numbers(log: np.ndarray) -> dict[str, tuple]:
 def _as_told(saturation: np.ndarray) -> np.ndarray:
     """Saturation masks, int16[n], as a bag has them: a change is told at most once a second."""
     stamps_ns = np.arange(len(saturation)) * TICK_NS
-    told = changes_to_tell(saturation, stamps_ns, TELL_EVERY_NS, 0, -TELL_EVERY_NS)
+    told = Telling(CONTROL).among(saturation[:, None].astype(np.int64), stamps_ns)
     values = np.append(0, saturation[told])
     lengths = np.diff(np.concatenate(([0], told, [len(saturation)])))
     return np.repeat(values, lengths).astype(np.int16)

@@ -76,8 +76,9 @@ def fly_nodes(
         When the bag is synced to disk.
     """
     attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)
+    as_flown = scenario.model_copy(update={'vehicle': str((folder / VEHICLE_FILE).resolve())})
     parameters = node_parameters(
-        scenario, speed=speed, record_to=folder, attachments=attachments, sync=sync
+        as_flown, speed=speed, record_to=folder, attachments=attachments, sync=sync
     )
     place = namespace or NAMESPACE
     write_parameters(parameters, folder / PARAMETERS_FILE, place)

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from glider_bringup.disk import write_whole
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_model.settings import ConfigurationError
-from glider_model.vehicle import vehicle_path
+from glider_model.vehicle import vehicle_file
 
 SCENARIO_FILE, VEHICLE_FILE, SCORE_FILE = 'scenario.yaml', 'vehicle.yaml', 'score.json'
 PARAMETERS_FILE, LOG_FILE = 'parameters.yaml', 'log.txt'
@@ -19,7 +19,7 @@ TRACES_FILE, REPORT_FILE = 'traces.npz', 'report.html'
 
 
 def make_run_folder(scenario: Scenario, out: Path | None) -> Path:
-    """Folder of a new run, with its scenario and vehicle in it.
+    """Folder of a new run, with its scenario and vehicle in it as they are flown.
 
     Raises
     ------
@@ -39,8 +39,7 @@ def make_run_folder(scenario: Scenario, out: Path | None) -> Path:
                 f'{folder}: not empty; a run is never written over another (allowed: a new or '
                 f'empty folder)'
             )
-        vehicle = vehicle_path(scenario.vehicle)
-        write_whole(folder / VEHICLE_FILE, vehicle.read_bytes())
+        write_whole(folder / VEHICLE_FILE, vehicle_file(scenario.vehicle))
         beside = scenario.model_copy(update={'vehicle': VEHICLE_FILE})
         write_whole(folder / SCENARIO_FILE, beside.to_yaml())
     except OSError as error:

@@ -16,7 +16,7 @@ from glider_guidance.path import PathSettings, StraightPath, path_length, path_p
 from glider_guidance.profile import ProfileSettings
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_model.current import CurrentSettings
-from glider_model.errors import clipped, shown
+from glider_model.errors import clipped, told_changes
 from glider_model.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
 from glider_model.perturb import PerturbSettings, perturbed
 from glider_model.plant import SURFACE_S, InitialSettings, PlantSettings
@@ -26,22 +26,22 @@ from glider_model.settings import (
     Settings,
     file_names,
     find_file,
+    holder_of,
     validate,
 )
-from glider_model.vehicle import load_vehicle, vehicle_names, vehicle_path
+from glider_model.vehicle import changed_vehicle, load_vehicle, vehicle_names, vehicle_path
 from glider_model.water import WaterSettings
 
 SCENARIO_FOLDER = Path(__file__).parent / 'scenarios'
 DEFAULT_SCENARIO = 'current_8deg'
+#: Field that names the vehicle, and what the names of fields in its file begin with.
+VEHICLE = 'vehicle'
 
 #: A run of this simulated time or more is a long one, with the longer settling time (s).
 LONG_RUN_S = 20000.0
 SETTLE_LONG_S, SETTLE_SHORT_S = 7200.0, 1800.0
 #: Of a short run this share is left out at most.
 SETTLE_SHARE = 0.5
-
-#: So many of the fields that were changed are told with what is wrong.
-CHANGES_TOLD = 4
 
 #: Fields of which only one can be given: setting one of them by hand replaces the other.
 _ALTERNATIVES = (
@@ -237,7 +237,8 @@ def make_scenario(
     ----------
     source : ScenarioSource
     changes : dict
-        Values by dotted field name, such as ``{'current.speed_kn': 0.5}``.
+        Values by dotted field name, such as ``{'current.speed_kn': 0.5}``. Names that begin with
+        ``vehicle.`` are fields of the vehicle's file.
     recorded : bool
         It has been flown: nobody asks any more whether the vehicle is rated for its depth.
 
@@ -247,23 +248,33 @@ def make_scenario(
         Naming file, field, value and allowed range.
     """
     path, values = source.path, deepcopy(source.values)
-    for field, value in (changes or {}).items():
+    own, in_vehicle = _split(changes or {})
+    for field, value in own.items():
         _set_field(values, field, value)
-    changed = _told_changes(changes or {})
+    changed = told_changes(changes or {})
 
     def line_of(location: tuple[str, ...]) -> int | None:
         name = '.'.join(location)
-        here = any(overlap(field, name) for field in changes or {})
+        here = any(overlap(field, name) for field in own)
         return None if here else yaml_line(path, location)
 
     scenario = validate(Scenario, values, str(path), path.parent, line_of, changed)
-    scenario = _find_vehicle(scenario, path.parent, f'{path}{changed}')
+    scenario = _find_vehicle(scenario, path.parent, in_vehicle, f'{path}{changed}')
     if not recorded:
         try:
             _check_depth(scenario)
         except ConfigurationError as error:
             raise ConfigurationError(f'{path}{changed}: {error}') from None
     return scenario
+
+
+def _split(changes: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Fields of the scenario, and those of its vehicle by their names in the vehicle's file."""
+    inside = {field for field in changes if field.startswith(f'{VEHICLE}.')}
+    return (
+        {field: value for field, value in changes.items() if field not in inside},
+        {field.partition('.')[2]: changes[field] for field in changes if field in inside},
+    )
 
 
 def _check_depth(scenario: Scenario) -> None:
@@ -277,13 +288,6 @@ def _check_depth(scenario: Scenario) -> None:
         )
 
 
-def _told_changes(changes: dict[str, Any]) -> str:
-    """The first fields that were changed since a file was read, in words."""
-    told = [f'{clipped(field)}={shown(value)}' for field, value in changes.items()]
-    more = [f'{len(told) - CHANGES_TOLD} more'] if len(told) > CHANGES_TOLD else []
-    return ' with ' + ', '.join(told[:CHANGES_TOLD] + more) if told else ''
-
-
 def load_scenario(
     name: str = DEFAULT_SCENARIO, changes: dict[str, Any] | None = None, recorded: bool = False
 ) -> Scenario:
@@ -291,7 +295,9 @@ def load_scenario(
     return make_scenario(read_scenario(name), changes, recorded)
 
 
-def _find_vehicle(scenario: Scenario, folder: Path, source: str) -> Scenario:
+def _find_vehicle(
+    scenario: Scenario, folder: Path, changes: dict[str, Any], source: str
+) -> Scenario:
     """Scenario whose vehicle is known to be good, wherever nodes are started from."""
     beside = folder / scenario.vehicle
     name = scenario.vehicle
@@ -301,14 +307,13 @@ def _find_vehicle(scenario: Scenario, folder: Path, source: str) -> Scenario:
         path = vehicle_path(name)
     except ConfigurationError as error:
         raise ConfigurationError(f'{source}: {error}') from None
-    vehicle = load_vehicle(str(path))
+    name = changed_vehicle(name if name in vehicle_names() else str(path.resolve()), changes)
+    vehicle = load_vehicle(name)
     try:
         perturbed(vehicle.params(), scenario.perturb)
     except ConfigurationError as error:
         raise ConfigurationError(f'{source}: {error}') from None
-    return scenario.model_copy(
-        update={'vehicle': name if name in vehicle_names() else str(path.resolve())}
-    )
+    return scenario.model_copy(update={'vehicle': name})
 
 
 def _alternatives(name: str) -> tuple[str, ...]:
@@ -317,7 +322,12 @@ def _alternatives(name: str) -> tuple[str, ...]:
 
 
 def overlap(field: str, other: str) -> bool:
-    """Whether setting one field, given by its dotted name, undoes what set the other."""
+    """Whether setting one field, given by its dotted name, undoes what set the other.
+
+    Which vehicle flies, and what is changed in it, are two things.
+    """
+    if VEHICLE in (field, other):
+        return field == other
     *parents, last = field.split('.')
     names = ['.'.join((*parents, name)) + '.' for name in _alternatives(last)]
     return any(name.startswith(f'{other}.') or f'{other}.'.startswith(name) for name in names)
@@ -325,16 +335,10 @@ def overlap(field: str, other: str) -> bool:
 
 def _set_field(values: dict, field: str, value) -> None:
     """Set a field by its dotted name, making the mappings on the way."""
-    *parents, last = field.split('.')
-    for parent in parents:
-        values = values.setdefault(parent, {})
-        if not isinstance(values, dict):
-            raise ConfigurationError(
-                f'--set {clipped(field)}: {clipped(parent)} is not a group of fields'
-            )
+    holder, last = holder_of(values, field), field.rpartition('.')[2]
     for other in _alternatives(last):
-        values.pop(other, None)
-    values[last] = value
+        holder.pop(other, None)
+    holder[last] = value
 
 
 def parse_assignment(text: str) -> tuple[str, Any]:

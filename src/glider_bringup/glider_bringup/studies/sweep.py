@@ -27,6 +27,7 @@ from glider_bringup.sweep_result import NOT_FIGURES, make_dataset, variable_name
 from glider_model.kernel import source_digest
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
+from glider_model.vehicle import vehicle_path
 
 JOURNAL_FILE, RESULT_FILE = 'journal.jsonl', 'sweep.nc'
 COMPLETED, INFEASIBLE, FAILED = STATUSES = ('completed', 'infeasible', 'failed')
@@ -90,7 +91,8 @@ def _fly_cell(inputs: Inputs, changes: dict[str, Any]) -> dict[str, Any]:
     try:
         scenario = make_scenario(inputs.source, changes)
         if digest(vehicle_text(scenario.vehicle)) not in inputs.vehicles:
-            raise WorkError(f'{gethostname()} has another file of {scenario.vehicle}')
+            name = vehicle_path(scenario.vehicle).stem
+            raise WorkError(f'{gethostname()} has another file of {name}')
         flight, scores = fly_scored(scenario)
         card = scorecard(scenario, 'direct', flight, scores)
     except WorkError:
@@ -162,7 +164,7 @@ def open_journal(plan: Plan, folder: Path, resume: bool) -> Journal:
         If the folder cannot be used or holds something else, or a dimension is called like what a
         result has.
     """
-    taken = result_names(plan.first())
+    taken = result_names(plan.first)
     for axis in plan.axes:
         if axis.name in taken:
             raise ConfigurationError(
@@ -195,9 +197,9 @@ def flown_cells(plan: Plan, journal: Journal) -> bytearray:
 
 def make_chunks(plan: Plan, known: bytearray, threads: int) -> Iterator[Chunk]:
     """Chunks of all cells that are not known yet, in order, for so many threads at once."""
-    vehicles = frozenset(digest(text) for _, text in plan.vehicles)
+    vehicles = frozenset(digest(text) for text in plan.vehicle_texts)
     inputs = Inputs(plan.source, vehicles)
-    cell_s = planned_ticks(plan.first()) * TICK_S
+    cell_s = planned_ticks(plan.first) * TICK_S
     share = known.count(0) // (CHUNKS_EACH * max(1, threads))
     size = max(1, min(CHUNK_CELLS, share, int(CHUNK_S / cell_s)))
     cells: list[tuple[int, dict[str, Any]]] = []
