@@ -16,19 +16,19 @@ import json
 import os
 import platform
 import sys
-from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.table import Table
 
-from glider_bringup.console import EXIT_FAILED, EXIT_INTERRUPTED, Json, messages, output
+from glider_bringup.console import Json, messages, output, picked, repeatable
+from glider_model.exits import EXIT_FAILED, EXIT_INTERRUPTED
 
 #: Modules of this folder, in the order in which they are measured.
 SECTIONS = ('compute', 'memory', 'nodes', 'nodes_memory', 'sweep', 'storage', 'fleet')
 
-Section = Enum('Section', {name: name for name in SECTIONS})
+Section = Literal[SECTIONS]
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
@@ -39,7 +39,8 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 )
 def bench(
     only: Annotated[
-        list[Section] | None, typer.Option(help='Section; can be repeated. Default: all of them.')
+        list[repeatable(Section)] | None,
+        typer.Option(help='Section; can be repeated. Default: all of them.'),
     ] = None,
     against: Annotated[
         Path | None,
@@ -57,7 +58,7 @@ def bench(
     same work costs without this stack. Use an idle machine.
     """
     figures, options = machine(), {'compute': {'against': against}} if against else {}
-    for name in dict.fromkeys(one.value for one in only or Section):
+    for name in picked(only, Section):
         section = importlib.import_module(name)
         with messages.status(name) as status:
 

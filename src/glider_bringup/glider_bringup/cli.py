@@ -26,9 +26,10 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
         vehicles,
         verify,
     )
-    from glider_bringup.console import EXIT_FAILED, EXIT_USAGE, messages
+    from glider_bringup.console import messages
     from glider_bringup.disk import DiskError
     from glider_model.errors import MAX_LINE, ConfigurationError, printable, shown
+    from glider_model.exits import EXIT_FAILED, EXIT_USAGE
 except KeyboardInterrupt:
     sys.exit(130)
 except (OSError, ImportError) as error:

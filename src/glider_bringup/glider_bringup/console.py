@@ -1,12 +1,14 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the commands share: consoles, exit codes, options, progress bars."""
+"""What the commands share: consoles, options, progress bars."""
 
 from collections.abc import Callable
 from contextlib import contextmanager
 from enum import Enum
+from functools import partial
 from pathlib import Path
-from typing import Annotated, get_args
+from time import perf_counter
+from typing import Annotated, Any, Literal, get_args
 
 import typer
 from rich.console import Console
@@ -14,18 +16,18 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    ProgressColumn,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
 from rich.text import Text
 
-from glider_bringup.mission.scenario import Scenario
+from glider_bringup.mission.scenario import parse_assignment
 from glider_control.settings import ControlLawSettings
 from glider_model.errors import ConfigurationError, printable
+from glider_model.exits import EXIT_FAILED, EXIT_INTERRUPTED
 from glider_model.signals import TICK_S
-
-EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
 
 
 class _PlainConsole(Console):
@@ -47,12 +49,22 @@ output = _PlainConsole()
 messages = _PlainConsole(stderr=True)
 
 
-def choices(name: str, model, field: str) -> type[Enum]:
+def choices(model, field: str) -> Any:
     """Choices of an option, from the settings field that it sets."""
-    return Enum(name, {text: text for text in get_args(model.model_fields[field].annotation)})
+    return Literal[get_args(model.model_fields[field].annotation)]
 
 
-Controller = choices('Controller', ControlLawSettings, 'law')
+def repeatable(choice: Any) -> type[Enum]:
+    """Choices of an option that can be repeated: of those typer takes no Literal."""
+    return Enum('Choice', {text: text for text in get_args(choice)})
+
+
+def picked(chosen: list[Enum] | None, choice: Any) -> list[str]:
+    """Choices that were picked by an option that can be repeated; without it all there are."""
+    return list(dict.fromkeys(one.value for one in chosen or repeatable(choice)))
+
+
+Controller = choices(ControlLawSettings, 'law')
 Workers = Annotated[
     int | None, typer.Option(min=1, max=1024, help='Processes. Default: one per processor.')
 ]
@@ -63,12 +75,26 @@ Scheduler = Annotated[
         help='Fly on the Dask cluster with this scheduler, such as tcp://127.0.0.1:8786.',
     ),
 ]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option(
+        '--set',
+        metavar='FIELD=VALUE',
+        help='Change a field of the scenario, such as current.speed_kn=0.5, or of its vehicle, '
+        'such as vehicle.hydrodynamics.K_D0=8.0; can be repeated.',
+    ),
+]
 Run = Annotated[
     Path, typer.Argument(metavar='RUN', help='Folder of a run or a bag, or an .mcap file.')
 ]
 Json = Annotated[
     bool, typer.Option('--json', help='Print one JSON object and nothing else on standard output.')
 ]
+
+
+def changed_fields(changes: list[str] | None) -> dict[str, Any]:
+    """Values by dotted field name, of options ``--set``."""
+    return dict(parse_assignment(text) for text in changes or ())
 
 
 def beside(run: Path, name: str) -> Path:
@@ -89,41 +115,54 @@ def number(option: str, text: str, word: str, low: float, high: float) -> float:
     return number
 
 
+#: Columns of progress bars, beside what is done and the bar itself; made anew for each bar.
+PERCENT = partial(TextColumn, '{task.percentage:3.0f} %')
+STATE = partial(TextColumn, '{task.fields[state]}')
+COUNT, ELAPSED, REMAINING = MofNCompleteColumn, TimeElapsedColumn, TimeRemainingColumn
+
+
 @contextmanager
-def progress(scenario: Scenario, ticks: int):
+def progress_bar(description: str, total: float | None, *columns: Callable[[], ProgressColumn]):
+    """Progress bar, which goes when it is done; yields its update, see `rich.progress`."""
+    made = [TextColumn('{task.description}'), BarColumn(), *(column() for column in columns)]
+    with Progress(*made, console=messages, transient=True) as bar:
+        yield partial(bar.update, bar.add_task(description, total=total, state=''))
+
+
+@contextmanager
+def progress(ticks: int):
     """Progress bar of a flight: simulated time, real-time factor and depth.
 
     Yields what is to be called in flight, with ticks and depth (m), and what while the recording
     is read back, with ticks.
     """
-    bar = Progress(
-        TextColumn('{task.description}'),
-        BarColumn(),
-        TextColumn('{task.percentage:3.0f} %'),
-        TextColumn('{task.fields[state]}'),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=messages,
-        transient=True,
-    )
-    task = bar.add_task('starting', total=ticks, state='')
+    start_s = perf_counter()
+    with progress_bar('starting', ticks, PERCENT, STATE, ELAPSED, REMAINING) as update:
 
-    def flying(flown: int, depth_m: float) -> None:
-        elapsed = bar.tasks[0].elapsed or 0.0
-        factor = flown * TICK_S / elapsed if elapsed > 0.0 else 0.0
-        bar.update(
-            task,
-            completed=min(flown, ticks),
-            description='flying',
-            state=f'{flown * TICK_S:,.0f} s  x{factor:,.0f}  depth {depth_m:6.1f} m',
-        )
+        def flying(flown: int, depth_m: float) -> None:
+            factor = flown * TICK_S / (perf_counter() - start_s)
+            state = f'{flown * TICK_S:,.0f} s  x{factor:,.0f}  depth {depth_m:6.1f} m'
+            update(completed=min(flown, ticks), description='flying', state=state)
 
-    def reading(read: int) -> None:
-        state = 'of the recording'
-        bar.update(task, completed=min(read, ticks), description='scoring', state=state)
+        def reading(read: int) -> None:
+            state = 'of the recording'
+            update(completed=min(read, ticks), description='scoring', state=state)
 
-    with bar:
         yield flying, reading
+
+
+@contextmanager
+def counter(description: str, total: int | None):
+    """Progress bar that counts, with the time left; yields its update, which may give a total."""
+    with progress_bar(description, total, COUNT, ELAPSED, REMAINING) as update:
+        yield lambda done, total=total: update(completed=done, total=total)
+
+
+@contextmanager
+def shares():
+    """Progress bar of several pieces of work; yields its update (what, share that is done)."""
+    with progress_bar('opening', 1.0, PERCENT, ELAPSED) as update:
+        yield lambda what, share: update(description=what, completed=share)
 
 
 @contextmanager
@@ -150,36 +189,3 @@ def workers_at_work(
         reason, code = str(error), EXIT_FAILED
     messages.print(reason + advice(), style='red', soft_wrap=True)
     raise typer.Exit(code)
-
-
-@contextmanager
-def counter(description: str, total: int | None):
-    """Progress bar that counts, with the time left; yields its update, which may give a total."""
-    bar = Progress(
-        TextColumn('{task.description}'),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=messages,
-        transient=True,
-    )
-    task = bar.add_task(description, total=total)
-    with bar:
-        yield lambda done, total=total: bar.update(task, completed=done, total=total)
-
-
-@contextmanager
-def shares():
-    """Progress bar of several pieces of work; yields its update (what, share that is done)."""
-    bar = Progress(
-        TextColumn('{task.description}'),
-        BarColumn(),
-        TextColumn('{task.percentage:3.0f} %'),
-        TimeElapsedColumn(),
-        console=messages,
-        transient=True,
-    )
-    task = bar.add_task('opening', total=1.0)
-    with bar:
-        yield lambda what, share: bar.update(task, description=what, completed=share)

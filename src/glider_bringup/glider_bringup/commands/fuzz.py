@@ -3,25 +3,26 @@
 """``./glider fuzz``: hostile use, counted."""
 
 import json
-from enum import Enum
 from importlib import import_module
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.table import Table
 
-from glider_bringup.console import EXIT_FAILED, Json, counter, messages, output
+from glider_bringup.console import Json, counter, messages, output, picked, repeatable
+from glider_model.exits import EXIT_FAILED
 
 app = typer.Typer()
 #: Doors, each a module of `glider_bringup.fuzzing`, with the cases tried by default.
 COUNTS = {'files': 1000, 'lines': 200, 'messages': 1000, 'bags': 500, 'flights': 500}
-Door = Enum('Door', {door: door for door in COUNTS})
+Door = Literal[tuple(COUNTS)]
 
 
 @app.command(epilog='Example: ./glider fuzz --only bags --count 100 --seed 7')
 def fuzz(
     only: Annotated[
-        list[Door] | None, typer.Option(help='Door; can be repeated. Default: all of them.')
+        list[repeatable(Door)] | None,
+        typer.Option(help='Door; can be repeated. Default: all of them.'),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**62, help='Seed of all cases.')] = 0,
     count: Annotated[
@@ -42,7 +43,7 @@ def fuzz(
     is any. The same seed tries the same cases.
     """
     found = {}
-    for door in dict.fromkeys(one.value for one in only or Door):
+    for door in picked(only, Door):
         cases = count or COUNTS[door]
         with counter(door, cases) as update:
             work = import_module(f'glider_bringup.fuzzing.{door}')

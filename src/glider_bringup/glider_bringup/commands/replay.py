@@ -3,13 +3,21 @@
 """``./glider replay``."""
 
 import json
-from contextlib import contextmanager
 from typing import Annotated
 
 import typer
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from glider_bringup.console import EXIT_INTERRUPTED, Json, Run, messages, number, output
+from glider_bringup.console import (
+    REMAINING,
+    STATE,
+    Json,
+    Run,
+    messages,
+    number,
+    output,
+    progress_bar,
+)
+from glider_model.exits import EXIT_INTERRUPTED
 
 app = typer.Typer()
 
@@ -57,8 +65,13 @@ def replay(
     if bag.cut:
         messages.print(bag.cut, soft_wrap=True)
     span_s = (plan.end_ns - plan.start_ns) / 1e9
+    bar = progress_bar('replaying', max(span_s, 1e-9), STATE, REMAINING)
     try:
-        with work.Replay(plan, factor) as player, _progress(span_s) as update:
+        with work.Replay(plan, factor) as player, bar as show:
+
+            def update(passed_s: float) -> None:
+                show(completed=passed_s, state=f'{passed_s:,.1f} of {span_s:,.1f} s')
+
             player.wait_for(wait_for, lambda text: messages.print(text, soft_wrap=True))
             played = player.run(update)
             while loop:
@@ -71,21 +84,3 @@ def replay(
     else:
         count = sum(played.counts.values())
         output.print(f'{count:,} messages, {span_s:,.1f} s in {played.wall_s:,.1f} s')
-
-
-@contextmanager
-def _progress(span_s: float):
-    """Progress bar in recorded time; yields its update."""
-    bar = Progress(
-        TextColumn('{task.description}'),
-        BarColumn(),
-        TextColumn('{task.fields[state]}'),
-        TimeRemainingColumn(),
-        console=messages,
-        transient=True,
-    )
-    task = bar.add_task('replaying', total=max(span_s, 1e-9), state='')
-    with bar:
-        yield lambda passed_s: bar.update(
-            task, completed=passed_s, state=f'{passed_s:,.1f} of {span_s:,.1f} s'
-        )

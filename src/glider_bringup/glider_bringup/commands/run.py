@@ -5,17 +5,16 @@
 import json
 from collections.abc import Callable
 from contextlib import contextmanager, nullcontext
-from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from glider_bringup.console import (
-    EXIT_FAILED,
-    EXIT_INTERRUPTED,
+    Changes,
     Controller,
     Json,
+    changed_fields,
     choices,
     messages,
     number,
@@ -28,17 +27,17 @@ from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
     load_scenario,
-    parse_assignment,
 )
 from glider_bringup.showing.scorecard import print_card, print_places
 from glider_guidance.settings import LosSettings
+from glider_model.exits import EXIT_FAILED, EXIT_INTERRUPTED
 from glider_model.settings import ConfigurationError
 from glider_model.signals import TICK_S
 
 app = typer.Typer()
-Engine = Enum('Engine', {text: text for text in ENGINES})
-When = Enum('When', {text: text for text in ('never', 'end', 'chunk')})
-Guidance = choices('Guidance', LosSettings, 'method')
+Engine = Literal[ENGINES]
+When = Literal['never', 'end', 'chunk']
+Guidance = choices(LosSettings, 'method')
 
 
 @app.command(epilog='Example: ./glider run current_8deg --engine direct --duration full --json')
@@ -51,7 +50,7 @@ def run(
         typer.Option(
             help='nodes: ROS 2 processes over topics; direct: one compiled loop. Same results.'
         ),
-    ] = Engine.nodes,
+    ] = 'nodes',
     controller: Annotated[
         Controller | None, typer.Option(help="Attitude law, instead of the scenario's.")
     ] = None,
@@ -76,12 +75,7 @@ def run(
         ),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed, instead of the scenario's.")] = None,
-    changes: Annotated[
-        list[str] | None,
-        typer.Option(
-            '--set', metavar='FIELD=VALUE', help='Change a scenario field; can be repeated.'
-        ),
-    ] = None,
+    changes: Changes = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the run's files. Default: runs/<time>-<name>.")
     ] = None,
@@ -94,7 +88,7 @@ def run(
             help='When the recording is synced to disk, to outlive a loss of power: never, at its '
             'end, or with every chunk of 12.8 s, before the flight goes on.'
         ),
-    ] = When.end,
+    ] = 'end',
     report: Annotated[
         bool,
         typer.Option('--report/--no-report', help='Write report.html, and what it is drawn from.'),
@@ -113,27 +107,27 @@ def run(
     if duration not in (None, 'full'):
         duration = number('--duration', duration, 'full', TICK_S, 1e8)
     fields = chosen_fields(
-        dict(parse_assignment(text) for text in changes or []),
-        controller and controller.value,
-        guidance and guidance.value,
+        changed_fields(changes),
+        controller,
+        guidance,
         seed,
         duration,
     )
     rate = 0.0 if speed == 'max' else number('--speed', speed, 'max', 0.01, 1e6)
-    if rate and engine is Engine.direct:
+    if rate and engine == 'direct':
         raise ConfigurationError('--speed: the direct engine knows only max')
     place = absolute_namespace(namespace) if namespace else None
-    if namespace and (place is None or engine is Engine.direct):
+    if namespace and (place is None or engine == 'direct'):
         allowed = 'nothing, with the direct engine' if place else NAMESPACE_ALLOWED
         raise ConfigurationError(f'--namespace {namespace}: not usable (allowed: {allowed})')
-    if view and engine is Engine.direct:
+    if view and engine == 'direct':
         raise ConfigurationError('--view: the direct engine has no topics to show; use nodes')
-    if engine is Engine.nodes:
+    if engine == 'nodes':
         given_domain()
     flown = load_scenario(scenario, fields)
     with _view(view_port, place) if view else nullcontext() as begin_view:
         card, folder, has_room = _fly(
-            flown, engine, rate, place, out, bag, sync.value, report, begin_view
+            flown, engine, rate, place, out, bag, sync, report, begin_view
         )
     page = folder / REPORT_FILE
     if as_json:
@@ -185,15 +179,15 @@ def _fly(
     from glider_bringup.scoring.score import make_scorer, scores_of
     from glider_bringup.scoring.traces import make_tracer
 
-    if bag or engine is Engine.nodes:  # else nothing of ROS is needed
+    if bag or engine == 'nodes':  # else nothing of ROS is needed
         from glider_bringup.engines.recorded import fly_nodes, fly_recorded
 
     folder = make_run_folder(scenario, out)
     messages.print(f'{scenario.name}: {scenario.description}')
     scorer, tracer = make_scorer(scenario), make_tracer(scenario) if report else None
     takers = [scorer, tracer] if tracer else [scorer]
-    with progress(scenario, planned_ticks(scenario)) as (flying, reading):
-        if engine is Engine.nodes:
+    with progress(planned_ticks(scenario)) as (flying, reading):
+        if engine == 'nodes':
             if begin_view:
                 flying = _after_first(begin_view, flying)
             flight = fly_nodes(
@@ -211,7 +205,7 @@ def _fly(
             flight = fly_recorded(scenario, folder, takers, flying, sync)
         else:
             flight = fly(scenario, takers, flying)
-    card = scorecard(scenario, engine.value, flight, scores_of(scenario, scorer))
+    card = scorecard(scenario, engine, flight, scores_of(scenario, scorer))
     write_score(folder, card)
     has_room = _write_report(scenario, folder, card, tracer) if tracer else True
     if card['reason']:

@@ -3,39 +3,34 @@
 """``./glider montecarlo`` and ``./glider experiments``: many flights."""
 
 import json
-from enum import Enum
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 import typer
 from rich.table import Table
 
 from glider_bringup.console import (
-    EXIT_FAILED,
+    Changes,
     Controller,
     Json,
     Scheduler,
     Workers,
+    changed_fields,
     counter,
     messages,
     number,
     output,
+    picked,
+    repeatable,
     workers_at_work,
 )
 from glider_bringup.disk import write_whole
-from glider_bringup.mission.scenario import DEFAULT_SCENARIO, parse_assignment
+from glider_bringup.mission.scenario import DEFAULT_SCENARIO
+from glider_model.exits import EXIT_FAILED
 from glider_model.signals import TICK_S
 
 app = typer.Typer()
-Group = Enum(
-    'Group',
-    {
-        text: text
-        for text in get_args(
-            Literal['current', 'yaw', 'profile', 'robustness', 'paths', 'envelope']
-        )
-    },
-)
+Group = Literal['current', 'yaw', 'profile', 'robustness', 'paths', 'envelope']
 
 
 @app.command(epilog='Example: ./glider montecarlo current_12deg --plants 200 --seed 1000')
@@ -48,7 +43,7 @@ def montecarlo(
         int, typer.Option(min=0, max=2**62, help='Plant i is drawn from seed + i.')
     ] = 0,
     controller: Annotated[
-        list[Controller] | None,
+        list[repeatable(Controller)] | None,
         typer.Option(help='Attitude law; can be repeated. Default: all of them.'),
     ] = None,
     duration: Annotated[
@@ -57,12 +52,7 @@ def montecarlo(
     ] = 'full',
     workers: Workers = None,
     scheduler: Scheduler = None,
-    changes: Annotated[
-        list[str] | None,
-        typer.Option(
-            '--set', metavar='FIELD=VALUE', help='Change a scenario field; can be repeated.'
-        ),
-    ] = None,
+    changes: Changes = None,
     out: Annotated[
         Path | None, typer.Option(help='Folder for montecarlo.json, which tells of every plant.')
     ] = None,
@@ -76,10 +66,10 @@ def montecarlo(
     from glider_bringup import montecarlo as study
     from glider_bringup.mission.run_folder import make_result_folder
 
-    fields = dict(parse_assignment(text) for text in changes or [])
+    fields = changed_fields(changes)
     if duration != 'full':
         fields['duration_s'] = number('--duration', duration, 'full', TICK_S, 1e8)
-    laws = list(dict.fromkeys(one.value for one in controller or Controller))
+    laws = picked(controller, Controller)
     scenarios = study.make_scenarios(scenario, fields, laws, plants, seed)
     if out:
         make_result_folder(out, study.RESULT_FILE)
@@ -134,7 +124,8 @@ def _print_study(study: dict) -> None:
 @app.command(epilog='Example: ./glider experiments --only robustness --only paths')
 def experiments(
     only: Annotated[
-        list[Group] | None, typer.Option(help='Group; can be repeated. Default: all of them.')
+        list[repeatable(Group)] | None,
+        typer.Option(help='Group; can be repeated. Default: all of them.'),
     ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -153,7 +144,7 @@ def experiments(
     from glider_bringup.mission.run_folder import make_result_folder
     from glider_bringup.showing import paper_figures
 
-    planned = study.make_experiments([one.value for one in only or Group])
+    planned = study.make_experiments(picked(only, Group))
     flights = study.count_flights(planned)
     if out:
         make_result_folder(out, study.RESULT_FILE)

@@ -11,15 +11,17 @@ import typer
 from rich.table import Table
 
 from glider_bringup.console import (
-    EXIT_FAILED,
+    Changes,
     Json,
     Scheduler,
     Workers,
+    changed_fields,
     counter,
     messages,
     output,
     workers_at_work,
 )
+from glider_model.exits import EXIT_FAILED
 
 app = typer.Typer()
 #: So many of the cells that failed are told one by one.
@@ -41,6 +43,7 @@ def sweep(
     out: Annotated[
         Path | None, typer.Option(help='Folder of journal and result. Default: sweeps/<name>.')
     ] = None,
+    changes: Changes = None,
     resume: Annotated[
         bool, typer.Option('--resume', help='Go on where an interrupted sweep has stopped.')
     ] = False,
@@ -55,12 +58,14 @@ def sweep(
     from glider_bringup.sweep_file import load_sweep
 
     with messages.status('checking every value of the sweep'):
-        plan = load_sweep(name)
+        plan = load_sweep(name, changed_fields(changes))
     folder = out or Path('sweeps') / plan.sweep.name
     product = ' x '.join(f'{len(axis.values)} {axis.name}' for axis in plan.axes)
     messages.print(f'{plan.sweep.name}: {product} = {plan.cells} cells', soft_wrap=True)
     words = ['./glider', 'sweep', name, '--out', str(folder), '--resume']
-    again = shlex.join([*words, *(['--scheduler', scheduler] if scheduler else [])])
+    words += [word for text in changes or () for word in ('--set', text)]
+    words += ['--scheduler', scheduler] if scheduler else []
+    again = shlex.join(words)
     with study.open_journal(plan, folder, resume) as journal:
         known = study.flown_cells(plan, journal)
         if not all(known):

@@ -9,12 +9,14 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from glider_bringup.console import EXIT_FAILED, Json, messages, output
+from glider_bringup.console import Json, changed_fields, messages, output
 from glider_bringup.door.studies import scenarios, vehicles
+from glider_bringup.mission.scenario import split_changes
 from glider_bringup.sweep_file import read_sweep, sweep_names
+from glider_model.exits import EXIT_FAILED
 from glider_model.settings import ConfigurationError
 from glider_model.trim import Trim, solve_trim
-from glider_model.vehicle import load_vehicle
+from glider_model.vehicle import changed_vehicle, load_vehicle
 
 app = typer.Typer()
 
@@ -35,11 +37,26 @@ def trim(
     roll_mass_deg: Annotated[
         float, typer.Option('--roll-mass-deg', help='Roll mass, + to starboard (deg).')
     ] = 0.0,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--set',
+            metavar='FIELD=VALUE',
+            help='Change a field of the vehicle, such as vehicle.hydrodynamics.K_D0=8.0; can be '
+            'repeated.',
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Solve the steady glide or spiral of a vehicle."""
+    others, fields = split_changes(changed_fields(changes))
+    if others:
+        raise ConfigurationError(
+            f'--set {next(iter(others))}: not a field of a vehicle (allowed: vehicle.*)'
+        )
+    changed = load_vehicle(changed_vehicle(vehicle, fields))
     solution = solve_trim(
-        load_vehicle(vehicle).params(), net_heaviness_kg, pitch_deg, pitch_mass_m, roll_mass_deg
+        changed.params(), net_heaviness_kg, pitch_deg, pitch_mass_m, roll_mass_deg
     )
     values = asdict(solution)
     if as_json:

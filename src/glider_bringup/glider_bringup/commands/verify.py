@@ -4,25 +4,17 @@
 
 import json
 import tempfile
-from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.table import Table
 
-from glider_bringup.console import (
-    EXIT_FAILED,
-    EXIT_INTERRUPTED,
-    Json,
-    Run,
-    messages,
-    output,
-    shares,
-)
+from glider_bringup.console import Json, Run, messages, output, picked, repeatable, shares
+from glider_model.exits import EXIT_FAILED, EXIT_INTERRUPTED
 
 app = typer.Typer()
-BlockName = Enum('BlockName', {name: name for name in 'plant current guidance control'.split()})
+BlockName = Literal['plant', 'current', 'guidance', 'control']
 
 
 @app.command(epilog='Example: ./glider verify runs/20260101-120000-current_8deg')
@@ -33,7 +25,8 @@ def verify(
         typer.Option(help="Scenario or parameter file, instead of the recording's own."),
     ] = None,
     only: Annotated[
-        list[BlockName] | None, typer.Option(help='Block; can be repeated. Default: all of them.')
+        list[repeatable(BlockName)] | None,
+        typer.Option(help='Block; can be repeated. Default: all of them.'),
     ] = None,
     namespace: Annotated[
         str | None, typer.Option(help='Of the nodes; needed if several are recorded.')
@@ -49,7 +42,7 @@ def verify(
     from glider_bringup.ros import verify as work
     from glider_bringup.ros.recording import Recording, read_told
 
-    wanted = [one.value for one in only or ()]
+    wanted = picked(only, BlockName)
     try:
         with tempfile.TemporaryDirectory() as scratch, shares() as update:
             bag = Bag(run)

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from glider_bringup.engines.processes import NAMESPACE, OWN_CLOCK, domain_id
+from glider_model.exits import FATAL
 from glider_model.settings import ConfigurationError
 
 #: The view has this long (s) to leave.
 _LEAVE_S = 3.0
-_READY, _FATAL = 'ready ', 'fatal: '
+_READY = 'ready '
 
 
 @contextmanager
@@ -59,7 +60,7 @@ def live_view(port: int, namespace: str | None = None) -> Iterator[tuple[str, Ca
             if not address.startswith(_READY):
                 _, said = process.communicate(timeout=_LEAVE_S)
                 lines = said.strip().splitlines() or [f'it ended with {process.returncode}']
-                raise ConfigurationError(f'--view: {lines[-1].removeprefix(_FATAL)}')
+                raise ConfigurationError(f'--view: {lines[-1].removeprefix(FATAL)}')
             yield address.removeprefix(_READY).strip(), lambda: _begin(process)
         finally:
             _end(process)

@@ -21,6 +21,7 @@ from typing import IO, Any, NamedTuple
 
 from glider_model import wiring
 from glider_model.errors import ConfigurationError, shown
+from glider_model.exits import FATAL
 from glider_model.wiring import WIRING
 
 PLANT, RECORDER = wiring.PLANT.node, 'recorder_node'
@@ -44,7 +45,6 @@ _NAMESPACE = re.compile(r'(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?/
 _DOMAINS = range(1, 102)
 #: Domains that there are ports for.
 MAX_DOMAIN = 232
-_FATAL = 'fatal: '
 _PR_SET_PDEATHSIG = 1
 _LIBC = ctypes.CDLL(None)
 #: Signals of a stop, and how long (s) a process has after each.
@@ -177,8 +177,8 @@ class _Process:
 
     def note(self, line: str) -> None:
         """Remember a line for the case that it was the last."""
-        if line.startswith(_FATAL):
-            self.fatal = line.removeprefix(_FATAL)
+        if line.startswith(FATAL):
+            self.fatal = line.removeprefix(FATAL)
         elif self.fatal:
             self.fatal += '\n' + line
         if line.strip():

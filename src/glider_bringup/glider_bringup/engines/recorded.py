@@ -19,10 +19,8 @@ from glider_bringup.ros.bag import BagWriter, Sync
 from glider_bringup.ros.bag_log import LogWriter
 from glider_bringup.ros.node_parameters import node_parameters, write_parameters
 from glider_bringup.ros.read_back import Reader, ended, read_back
+from glider_model.exits import EXIT_USAGE
 from glider_model.settings import ConfigurationError
-
-#: Exit code of a node that refuses its parameters.
-EXIT_CONFIGURATION = 2
 
 
 def fly_recorded(
@@ -93,7 +91,7 @@ def fly_nodes(
         on_progress=tell,
         on_log=on_log,
     )
-    if result.exit_code == EXIT_CONFIGURATION:
+    if result.exit_code == EXIT_USAGE:
         raise ConfigurationError(result.reason)
     completed, reason = result.status == 'completed', result.reason
     recorded, lost = 0, 0

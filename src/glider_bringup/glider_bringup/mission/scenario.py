@@ -248,7 +248,7 @@ def make_scenario(
         Naming file, field, value and allowed range.
     """
     path, values = source.path, deepcopy(source.values)
-    own, in_vehicle = _split(changes or {})
+    own, in_vehicle = split_changes(changes or {})
     for field, value in own.items():
         _set_field(values, field, value)
     changed = told_changes(changes or {})
@@ -268,7 +268,7 @@ def make_scenario(
     return scenario
 
 
-def _split(changes: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+def split_changes(changes: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Fields of the scenario, and those of its vehicle by their names in the vehicle's file."""
     inside = {field for field in changes if field.startswith(f'{VEHICLE}.')}
     return (

@@ -16,6 +16,7 @@ from std_msgs.msg import Header
 from glider_bringup.disk import DiskError
 from glider_bringup.ros.bag import BagWriter, Sync
 from glider_bringup.tick_order import TickOrder
+from glider_model.exits import EXIT_FAILED
 from glider_model.ros import health, messages, qos
 from glider_model.ros.codec import MessageError, to_cdr
 from glider_model.ros.executor import take, take_with_info
@@ -24,9 +25,6 @@ from glider_model.ros.parameters import declare_settings
 from glider_model.ros.tick import FAREWELL_S, Input, Stop, TickNode, run
 from glider_model.settings import ConfigurationError, Settings
 from glider_model.signals import TICK_NS
-
-#: Exit code where the disk takes no more.
-EXIT_DISK = 1
 
 _DRAIN_S = 0.02
 _PROGRESS_S = 0.25
@@ -179,7 +177,7 @@ class RecorderNode(TickNode):
         try:
             self.save()
         except DiskError as error:
-            raise Stop(EXIT_DISK, str(error)) from None
+            raise Stop(EXIT_FAILED, str(error)) from None
         if self.last_odom and time.monotonic() - self.progress_s > _PROGRESS_S:
             self.print_progress()
         if self.stopped or (self.final_ns is not None and self.order.written_ns >= self.final_ns):
@@ -241,7 +239,7 @@ class RecorderNode(TickNode):
             self.order.write_rest()
             self.bag.close()
         except DiskError as error:
-            raise Stop(EXIT_DISK, str(error)) from None
+            raise Stop(EXIT_FAILED, str(error)) from None
         complete = self.final_ns is not None and 0 <= self.final_ns <= self.order.written_ns
         self.print_progress(complete=complete, counts=self.bag.counts)
         if self.context.ok():

@@ -20,11 +20,11 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
 
 from glider_bringup.ros.bag import message_definition
+from glider_model.exits import EXIT_USAGE, say_fatal
 from glider_model.ros import qos
 from glider_model.ros.executor import take
 from glider_model.ros.messages import TOPICS
 from glider_model.ros.parameters import declare_settings, refuse_unknown
-from glider_model.ros.tick import EXIT_CONFIGURATION
 from glider_model.settings import ConfigurationError, Settings
 
 NAME = 'viewer_node'
@@ -156,8 +156,8 @@ def main(args=None) -> int:
         node.pass_on()
         node.server.stop()
     except ConfigurationError as error:
-        print(f'fatal: {error}', file=sys.stderr, flush=True)
-        return EXIT_CONFIGURATION
+        say_fatal(error)
+        return EXIT_USAGE
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:

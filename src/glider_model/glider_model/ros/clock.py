@@ -12,13 +12,13 @@ from pydantic import Field
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
+from glider_model.exits import EXIT_PEER
 from glider_model.ros import health, messages
 from glider_model.ros.executor import take
 from glider_model.ros.health import Report
 from glider_model.ros.messages import TOPICS
 from glider_model.ros.tick import (
     ALONE,
-    EXIT_PEER,
     MAX_TICKS_AHEAD,
     Stop,
     TickNode,

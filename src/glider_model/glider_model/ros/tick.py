@@ -10,7 +10,6 @@ same result every time. Free-running nodes act at 10 Hz on the newest inputs and
 import gc
 import os
 import signal
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +22,7 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
+from glider_model.exits import EXIT_PEER, EXIT_USAGE, say_fatal
 from glider_model.ros import health, messages, qos
 from glider_model.ros.codec import MessageError, NotFiniteError, to_cdr
 from glider_model.ros.executor import Gate, make_executor, take_with_info
@@ -40,9 +40,6 @@ MOST_LOST = 50
 
 #: A node waits this long (wall time, s) for the recorder and its peers at the end of a run.
 FAREWELL_S = 5.0
-
-#: Exit codes of a node: bad configuration, and a peer that is missing, late or wrong.
-EXIT_CONFIGURATION, EXIT_PEER = 2, 3
 
 #: Middleware forgets messages of a node that is gone: leave them this time (s) to arrive, and to
 #: be sent again if need be.
@@ -589,7 +586,7 @@ def run(node_type: Callable[[], TickNode], args=None) -> int:
     try:
         rclpy.init(args=args)
     except Exception as error:
-        return _say(Stop(EXIT_CONFIGURATION, f'bad command line: {error}'))
+        return _say(Stop(EXIT_USAGE, f'bad command line: {error}'))
     node, stop = None, Stop(0)
     try:
         node = node_type()
@@ -603,7 +600,7 @@ def run(node_type: Callable[[], TickNode], args=None) -> int:
     except Stop as reason:
         stop = reason
     except ConfigurationError as error:
-        stop = Stop(EXIT_CONFIGURATION, str(error))
+        stop = Stop(EXIT_USAGE, str(error))
     except Exception:
         if rclpy.ok():
             raise
@@ -631,5 +628,5 @@ def _leave_to_rclpy(number, frame) -> None:
 
 def _say(stop: Stop) -> int:
     if stop.code:
-        print(f'fatal: {stop}', file=sys.stderr, flush=True)
+        say_fatal(stop)
     return stop.code
