@@ -434,7 +434,7 @@ def test_largest_sweep_is_planned_as_it_is_flown(tmp_path, monkeypatch):
         'b': {**values, 'field': 'initial.east_m', 'stop': 999},
     }
     path.write_text(yaml.safe_dump({'dimensions': dimensions}))
-    monkeypatch.setattr(sweep_file.Plan, '_check_values', lambda plan: [('a', 'text')])
+    monkeypatch.setattr(sweep_file.Plan, '_check_values', lambda plan: ['zhang2021'])
     plan = load_sweep(str(path))
     assert plan.cells == sweep_file.MAX_CELLS
     chunks = make_chunks(plan, bytearray(plan.cells), 2)
