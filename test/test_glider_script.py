@@ -1,0 +1,57 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The ./glider script in terminals that have some ROS 2 or other, or only the name of one."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+WHEELS = Path(sys.prefix)
+OWN_WHEELS = WHEELS == Path(os.environ.get('GLIDER_HOME') or ROOT) / '.venv'
+
+
+def glider(distro, *prefixes):
+    """Finished ./glider list --json in a terminal with these variables."""
+    return subprocess.run(
+        [ROOT / 'glider', 'list', '--json'],
+        capture_output=True,
+        text=True,
+        env={
+            **os.environ,
+            'ROS_DISTRO': distro,
+            'AMENT_PREFIX_PATH': os.pathsep.join(map(str, prefixes)),
+        },
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.mark.skipif(not OWN_WHEELS, reason='would set up an environment from wheels')
+@pytest.mark.parametrize(
+    ('distro', 'prefixes'),
+    [('jazzy', [ROOT / 'install' / 'glider_model', WHEELS]), ('humble', [])],
+)
+def test_name_of_a_ros_without_one_is_told_and_the_wheels_are_used(distro, prefixes):
+    """As after install/setup.bash in a shell whose start-up file exports ROS_DISTRO."""
+    done = glider(distro, *prefixes)
+    assert done.returncode == 0, done.stderr
+    assert 'zhang2021' in json.loads(done.stdout)['vehicles']
+    assert done.stderr.splitlines() == [
+        f'glider: ROS_DISTRO is {distro}, but no ROS 2 is sourced here: using that of .venv'
+    ]
+
+
+def test_another_ros_that_is_sourced_is_refused(tmp_path):
+    package = tmp_path / 'share' / 'rclpy' / 'package.xml'
+    package.parent.mkdir(parents=True)
+    package.touch()
+    done = glider('humble', WHEELS, tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ''
+    (line,) = done.stderr.splitlines()
+    assert 'ROS 2 humble is sourced' in line and 'jazzy' in line
