@@ -87,6 +87,13 @@ def test_recording_of_a_changed_vehicle_verifies(flown):
     assert [block['result'] for block in report['blocks']] == ['identical'] * 4
 
 
+def test_report_tells_what_is_not_as_in_the_file_of_the_vehicle(flown, tmp_path):
+    process = glider('report', flown[1], '--out', tmp_path / 'report.html')
+    assert process.returncode == 0, process.stderr
+    page = (tmp_path / 'report.html').read_text(encoding='utf-8')
+    assert 'vehicle: seawing\nvehicle.hydrodynamics.K_D0: 8.0\n' in page
+
+
 def test_folder_flies_again_and_a_file_with_the_same_number_flies_alike(flown, tmp_path):
     """By the other engine, in the other order of options, and from an edited file."""
     (tmp_path / 'mine.yaml').write_text(
@@ -160,12 +167,19 @@ def test_depth_is_held_against_the_rating_that_was_set(tmp_path):
 def test_vector_and_source_can_be_set():
     changes = {
         'vehicle.hydrodynamics.linear_damping': [0.1, 0.2, 0.3],
-        'vehicle.hull.length': 2.5,
+        'vehicle.hull.diameter.value': 0.23,
         'vehicle.hull.length.source': 'tape measure',
+        'vehicle.hull.length': 2.5,
     }
     vehicle = load_vehicle(load_scenario('current_8deg', changes).vehicle)
     assert vehicle.params().D_w == 0.3
     assert (vehicle.hull.length.value, vehicle.hull.length.source) == (2.5, 'tape measure')
+    assert vehicle.changed() == {
+        'hull.diameter': 0.23,
+        'hydrodynamics.linear_damping': [0.1, 0.2, 0.3],
+    }
+    diameter = vehicle.hull.diameter
+    assert (diameter.value, diameter.source) == (0.23, '--set, instead of 0.22')
 
 
 def test_plants_are_drawn_around_the_changed_vehicle_and_fly_again(tmp_path):

@@ -25,6 +25,8 @@ from glider_model.settings import (
 )
 
 VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
+#: Source of a number that a person changed for a run.
+_SET = '--set'
 
 
 @cache
@@ -168,6 +170,18 @@ class Vehicle(Settings):
         if fault:
             raise ValueError(f'rigid_body, moving_mass, added_mass: {fault}')
         return self
+
+    def changed(self) -> dict[str, Any]:
+        """Numbers that were changed by ``--set`` since there was a file, by dotted field name."""
+        whole = dict(self)
+        for name, group in list(whole.items()):
+            if isinstance(group, Settings):
+                whole |= {f'{name}.{key}': value for key, value in group}
+        return {
+            name: field.value
+            for name, field in whole.items()
+            if getattr(field, 'source', '').startswith(_SET)
+        }
 
     @property
     def rated_depth_m(self) -> float:
@@ -380,9 +394,13 @@ def _read_vehicle(path: Path, name: str, mtime_ns: int, size: int) -> Vehicle:
 
 
 def _changed_values(values: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Values of a vehicle file with some of its fields changed, which say so as their source."""
+    """Values of a vehicle file with some of its fields changed, which say so as their source.
+
+    A whole is changed before its parts, in whatever order they are given.
+    """
     whole = {'vehicle': values}
-    for field, value in changes.items():
+    numbers = {field.removesuffix('.value'): value for field, value in changes.items()}
+    for field, value in sorted(numbers.items(), key=lambda change: change[0].count('.')):
         name = f'vehicle.{field}'
         holder, last = holder_of(whole, name), name.rpartition('.')[2]
         unit = find_field(Vehicle, f'{field}.unit')
@@ -390,7 +408,7 @@ def _changed_values(values: dict[str, Any], changes: dict[str, Any]) -> dict[str
             old = holder.get(last)
             if not isinstance(old, dict):  # its file does not have it
                 old = {'unit': next(iter(get_args(unit.annotation)), None)}
-            source = f'--set, instead of {old["value"]}' if 'value' in old else '--set'
+            source = f'{_SET}, instead of {old["value"]}' if 'value' in old else _SET
             value = {**old, 'value': value, 'source': source}
         holder[last] = value
     return values

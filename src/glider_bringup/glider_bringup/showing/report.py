@@ -56,11 +56,15 @@ def _tiles(run: FlownRun) -> list[tuple[str, str, str]]:
 
 
 def _what_was_set(run: FlownRun) -> str:
-    """Fields of the scenario that are not as they would be by default, as YAML."""
+    """Fields of the scenario that are not as they would be by default, as YAML.
+
+    So are those of the vehicle that are not as in its file.
+    """
     told = {'name', 'vehicle', 'description'}
     values = run.scenario.model_dump(mode='json', exclude_defaults=True, exclude=told)
     named = {'name': run.scenario.name, 'vehicle': run.card['vehicle']}
-    return yaml_text({**named, **values})
+    changed = {f'vehicle.{field}': value for field, value in run.vehicle.changed().items()}
+    return yaml_text({**named, **changed, **values})
 
 
 def report_page(run: FlownRun) -> str:
