@@ -31,7 +31,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
     from glider_model.errors import MAX_LINE, ConfigurationError, printable, shown
     from glider_model.exits import EXIT_FAILED, EXIT_USAGE
 except KeyboardInterrupt:
-    sys.exit(130)
+    sys.exit(130)  # EXIT_INTERRUPTED, which may not be there yet
 except (OSError, ImportError) as error:
     sys.exit(f'glider: cannot be loaded: {error}')
 

@@ -16,7 +16,7 @@ import yaml
 from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission import fly_direct
 from glider_bringup.montecarlo import make_scenarios
-from glider_bringup.scenario import load_scenario
+from glider_bringup.scenario import load_scenario, parse_assignment
 from glider_bringup.sweep_file import load_sweep
 from glider_model.settings import ConfigurationError
 from glider_model.trim import solve_trim
@@ -134,6 +134,15 @@ def test_field_is_checked_like_the_file(changes, words):
     told = f'{vehicle_path("zhang2021")} with {field}='
     for word in (told, *words):
         assert word in str(raised.value)
+
+
+def test_name_of_a_changed_vehicle_cannot_be_typed(tmp_path):
+    """One way to change a vehicle: its fields, which are told in every message."""
+    with pytest.raises(ConfigurationError, match='control character'):
+        parse_assignment(r'vehicle="seawing\0{}"')
+    (tmp_path / 'mine.yaml').write_text(r'vehicle: "seawing\0{}"', encoding='utf-8')
+    with pytest.raises(ConfigurationError, match='control character'):
+        load_scenario(str(tmp_path / 'mine.yaml'))
 
 
 def test_field_inside_a_text_is_refused():
