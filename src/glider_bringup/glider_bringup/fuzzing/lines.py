@@ -57,6 +57,7 @@ WORDS = (
 _FIELDS = (
     *('seed', 'name', 'description', 'dives', 'vehicle', 'profile.depth_m', 'profile', 'path'),
     *('current.components', 'current.speed_kn', 'path.waypoints', 'control.law', 'perturb'),
+    *('vehicle.hydrodynamics.K_D0', 'vehicle.hull', 'vehicle.name', 'vehicle.rated_depth.source'),
     *('a..b', '.', 'seed.x', '__class__', '', 'initial.depth_m', 'water', 'settle_s'),
 )
 #: Options that wait for somebody, or open windows.
