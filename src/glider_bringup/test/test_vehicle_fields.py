@@ -7,16 +7,15 @@ import os
 import shlex
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 import xarray
 import yaml
 
 from glider_bringup.mcap_reader import Bag
-from glider_bringup.mission import fly_direct
+from glider_bringup.mission.scenario import load_scenario, parse_assignment
 from glider_bringup.montecarlo import make_scenarios
-from glider_bringup.scenario import load_scenario, parse_assignment
+from glider_bringup.scoring.card import fly_scored
 from glider_bringup.sweep_file import load_sweep
 from glider_model.settings import ConfigurationError
 from glider_model.trim import solve_trim
@@ -56,7 +55,7 @@ def flown(tmp_path_factory):
 def fly(changes):
     """Final state of a minute with the direct engine, in this process."""
     scenario = load_scenario('current_8deg', {**changes, 'dives': 0, 'duration_s': 60.0})
-    _, scores = fly_direct(scenario, Path(), False, lambda ticks, depth_m: None)
+    _, scores = fly_scored(scenario)
     return scores['final_state']
 
 

@@ -30,7 +30,7 @@ from glider_model.frames import (
 )
 from glider_model.kernel import kernel, source_digest
 from glider_model.signals import TICK_NS, Adaptation
-from glider_model.vehicle import vehicle_text
+from glider_model.vehicle import vehicle_file
 
 NED, FRD, PATH = 'NED', 'FRD', 'path'
 _AXES = ('north', 'east', 'down')
@@ -262,7 +262,7 @@ def make_dataset(log: np.ndarray, scenario: Scenario, score: dict[str, Any]) -> 
             **{name: score[name] for name in about},
             'score_json': json.dumps(score),
             'scenario_yaml': beside.to_yaml(),
-            'vehicle_yaml': vehicle_text(scenario.vehicle),
+            'vehicle_yaml': vehicle_file(scenario.vehicle).decode(),
             'code_digest': source_digest(),
         },
     )
