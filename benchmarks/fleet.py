@@ -22,7 +22,7 @@ from pathlib import Path
 
 from nodes import fly_once
 
-from glider_model.signals import TICK_S
+from glider_model.base.signals import TICK_S
 
 DURATION_S = 15.0
 COUNTS = 5, 10, 20

@@ -16,7 +16,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from glider_model import exponential, hydrodynamics, plant, rigid_body, signals
+from glider_model.base import signals
+from glider_model.plant import exponential, motion, plant
+from glider_model.vehicle import hydrodynamics, rigid_body
 
 SOURCES = Path(__file__).parent / 'floor'
 #: As fast as IEEE arithmetic in source order allows: no -ffast-math, no fused multiply-add.
@@ -115,7 +117,7 @@ class Floor:
 
     def __init__(self, state, params) -> None:
         self._structs = Structs()
-        for value in (state, params, plant.Rates(0.0, 0.0, 0.0)):
+        for value in (state, params, motion.Rates(0.0, 0.0, 0.0)):
             self._structs.declare(value)
         with TemporaryDirectory() as folder:
             library = Path(folder) / 'floor.so'
@@ -157,7 +159,7 @@ def compare(engine: np.ndarray, in_c: np.ndarray) -> int:
         tick, column = differs[0]
         raise RuntimeError(
             f'the floor is not the arithmetic of the plant, at tick {tick}, '
-            f'{plant.Motion._fields[column]}: {float(engine[tick, column])!r} and '
+            f'{motion.Motion._fields[column]}: {float(engine[tick, column])!r} and '
             f'{float(in_c[tick, column])!r} in C'
         )
     return len(engine)

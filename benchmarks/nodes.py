@@ -23,10 +23,10 @@ from glider_bringup.engines.processes import domain_id, node_environment
 from glider_bringup.engines.recorded import fly_nodes
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter
-from glider_bringup.tick_order import TickOrder
-from glider_model.ros.messages import TOPICS
-from glider_model.signals import TICK_NS
+from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
+from glider_bringup.recording.tick_sorter import TickSorter
+from glider_model.base.signals import TICK_NS
+from glider_model.ros.wire.topics import TOPICS
 
 SCENARIO, DURATION_S = 'current_8deg', 2000.0
 REPEATS = 3
@@ -164,7 +164,7 @@ def _to_bag(ticks: list[tuple[bytes, ...]], folder: Path) -> float:
     """As `RecorderNode` does it, from the moment that a message has been taken."""
     start = time.perf_counter()
     bag = BagWriter(folder, 'bag')
-    order = TickOrder([topic.name for topic in _PER_TICK], TICK_NS, bag.write)
+    order = TickSorter([topic.name for topic in _PER_TICK], TICK_NS, bag.write)
     for payloads in ticks:
         for topic, payload in zip(_PER_TICK, payloads, strict=True):
             order.add(topic.name, topic.codec.decode_stamp(payload), payload)

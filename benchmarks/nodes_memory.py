@@ -15,7 +15,7 @@ import numpy as np
 from nodes import fly_over_topics
 
 from glider_bringup.engines.processes import MODULES
-from glider_model.signals import TICK_S
+from glider_model.base.signals import TICK_S
 
 HOURS, MISSION_HOURS = 1.0, 30.0
 #: Part of the flight before which memory may still grow: buffers fill, caches warm up.

@@ -13,10 +13,10 @@ import numpy as np
 from glider_bringup.engines.direct import COLUMNS, fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_model.frames import water_from_wire
-from glider_model.kernel import kernel
-from glider_model.plant import plant_step
-from glider_model.signals import TICK_S, Joints, Water
+from glider_model.base.frames import water_from_wire
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import TICK_S, Joints, Water
+from glider_model.plant.plant import plant_step
 
 #: Dives, turns, the surface: straight path, constant current, no noise.
 SCENARIO = 'current_8deg'

@@ -18,18 +18,18 @@ from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.ros.bag import BagWriter, Sync
+from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
 from glider_bringup.ros.bag_log import LogWriter
-from glider_bringup.studies.sweep import (
+from glider_bringup.studies.sweep.fly import (
     JOURNAL_FILE,
     RESULT_FILE,
     fly_chunk,
     make_chunks,
     open_journal,
 )
-from glider_bringup.sweep_file import MAX_CELLS, load_sweep
-from glider_model.ros.messages import TOPICS
-from glider_model.signals import TICK_S
+from glider_bringup.studies.sweep.plan import MAX_CELLS, load_sweep
+from glider_model.base.signals import TICK_S
+from glider_model.ros.wire.topics import TOPICS
 
 SCENARIO, HOUR_S = 'current_8deg', 3600.0
 #: The sweep whose result is written: of many cells, none of which is flown more than once.
@@ -59,8 +59,8 @@ MEANING = {
 _WRITE = """
 import json, sys, time
 from pathlib import Path
-from glider_bringup.studies.sweep import RESULT_FILE, open_journal, write_result
-from glider_bringup.sweep_file import load_sweep
+from glider_bringup.studies.sweep.fly import RESULT_FILE, open_journal, write_result
+from glider_bringup.studies.sweep.plan import load_sweep
 
 def memory_mb(name):
     for line in open('/proc/self/status'):

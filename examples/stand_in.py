@@ -19,9 +19,9 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
-from glider_model.frames import odometry_to_wire
-from glider_model.plant import PlantSettings, plant_joints, plant_measurement, plant_step
-from glider_model.signals import Joints, Water
+from glider_model.base.frames import odometry_to_wire
+from glider_model.base.signals import Joints, Water
+from glider_model.plant.plant import PlantSettings, plant_joints, plant_measurement, plant_step
 
 #: Parameters and what they are unless somebody says otherwise.
 PARAMETERS = {

@@ -20,9 +20,9 @@ from mcap.stream_reader import StreamReader
 
 from glider_bringup.engines.processes import MODULES, PLANT
 from glider_bringup.mission.scenario import SCENARIO_FOLDER
-from glider_model.ros.messages import TOPICS
-from glider_model.signals import TICK_NS
-from glider_model.vehicle import vehicle_path
+from glider_model.base.signals import TICK_NS
+from glider_model.ros.wire.topics import TOPICS
+from glider_model.vehicle.file import vehicle_path
 
 PER_TICK = [topic.full_name('/glider') for topic in TOPICS.values() if topic.per_tick]
 START_S = 200.0  #: for the processes to come up, at worst with every kernel to compile

@@ -21,7 +21,7 @@ import pytest
 from glider_bringup.engines.direct import COLUMNS, fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
-from glider_model.kernel import kernel
+from glider_model.base.kernel import kernel
 
 DURATION_S = 36000.0
 #: Scenario and changed fields of each mission.

@@ -21,25 +21,27 @@ from glider_bringup.engines.launch_plan import ARGUMENTS
 from glider_bringup.engines.processes import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.nodes.recorder_node import RecorderNode, RecorderSettings
-from glider_bringup.sweep_file import MAX_CELLS, MAX_VALUES, Sweep
+from glider_bringup.studies.sweep.plan import MAX_CELLS, MAX_VALUES, Sweep
 from glider_control.nodes.control_node import ControlNode
 from glider_control.settings import ControlSettings
 from glider_guidance.nodes.guidance_node import GuidanceNode
-from glider_guidance.path import PathSettings, WaypointPath
-from glider_guidance.profile import STAGE_NAMES
+from glider_guidance.path.settings import PathSettings, WaypointPath
 from glider_guidance.settings import GuidanceSettings
-from glider_model import files
-from glider_model.current import MAX_ROWS, CurrentComponent, CurrentSettings
-from glider_model.errors import MAX_LINE, MAX_LINES, MAX_SHOWN
+from glider_guidance.yo.stage import STAGE_NAMES
+from glider_model.base import files
+from glider_model.base.errors import MAX_LINE, MAX_LINES, MAX_SHOWN
+from glider_model.base.settings import Settings
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
 from glider_model.nodes.tf_node import TfSettings
-from glider_model.plant import PlantSettings
-from glider_model.ros import health, qos
-from glider_model.ros.clock import ClockSettings
-from glider_model.ros.messages import JOINTS, TOPICS
-from glider_model.ros.tick import TickSettings
-from glider_model.settings import Settings
+from glider_model.ocean.current_profile import MAX_ROWS
+from glider_model.ocean.current_settings import CurrentComponent, CurrentSettings
+from glider_model.plant.plant import PlantSettings
+from glider_model.ros.lockstep import health
+from glider_model.ros.lockstep.clock import ClockSettings
+from glider_model.ros.lockstep.node import TickSettings
+from glider_model.ros.wire import qos
+from glider_model.ros.wire.topics import JOINTS, TOPICS
 
 DOCUMENT = Path(__file__).resolve().parents[1] / 'docs' / 'interfaces.md'
 

@@ -20,7 +20,7 @@ from rosbags.typesys import Stores, get_typestore
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from glider_model.ros.messages import TOPICS
+from glider_model.ros.wire.topics import TOPICS
 
 DEADLINE_S = 200.0
 RECORDED = {topic.full_name('/glider'): topic for topic in TOPICS.values() if topic.recorded}

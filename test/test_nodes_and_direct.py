@@ -13,8 +13,8 @@ from mcap.reader import make_reader
 
 from glider_bringup.engines.processes import MODULES, node_commands, run_nodes
 from glider_bringup.mission.run_folder import PARAMETERS_FILE
-from glider_model.ros.messages import TOPICS
-from glider_model.signals import TICK_S
+from glider_model.base.signals import TICK_S
+from glider_model.ros.wire.topics import TOPICS
 
 PER_TICK = [topic.full_name('/glider') for topic in TOPICS.values() if topic.per_tick]
 
@@ -27,7 +27,7 @@ import runpy, sys
 import rclpy.executors, rclpy.node
 name = 'rclpy.impl.implementation_singleton'
 internals, sys.modules[name] = sys.modules[name], None
-from glider_model.ros import executor
+from glider_model.ros.lockstep import executor
 sys.modules[name] = internals
 assert not executor.can_take() and not executor.can_wait()
 runpy.run_module(sys.argv.pop(1), run_name='__main__', alter_sys=True)

@@ -11,17 +11,18 @@ import math
 
 import pytest
 
-from glider_bringup import experiments, montecarlo
 from glider_bringup.engines.direct import NotFiniteError, fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.experiments import Case
 from glider_bringup.fuzzing import flights
 from glider_bringup.mission.scenario import load_scenario, read_scenario
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import fly_scored, scorecard
-from glider_bringup.studies import sweep
-from glider_bringup.studies.sweep import Chunk, Inputs
-from glider_model.vehicle import vehicle_path
+from glider_bringup.studies import montecarlo
+from glider_bringup.studies.paper import flying
+from glider_bringup.studies.paper.cases import Case
+from glider_bringup.studies.sweep import fly
+from glider_bringup.studies.sweep.fly import Chunk, Inputs
+from glider_model.vehicle.file import vehicle_path
 
 DURATION_S = 600.0
 
@@ -111,11 +112,11 @@ def test_studies_count_it_as_failed(driven):
     changes = {'vehicle': str(driven), 'dives': 0, 'duration_s': DURATION_S}
     scenario = load_scenario(changes=changes)
     assert montecarlo._fly_plant(scenario)['diverged']
-    row, _ = experiments._fly_case(Case('', 'adaptive', 'observer', 'current_8deg', changes))
+    row, _ = flying._fly_case(Case('', 'adaptive', 'observer', 'current_8deg', changes))
     assert (row['status'], row['finite']) == ('failed', False)
-    vehicles = {sweep.digest(sweep.vehicle_text(scenario.vehicle))}
+    vehicles = {fly.digest(fly.vehicle_text(scenario.vehicle))}
     inputs = Inputs(source=read_scenario(), vehicles=vehicles)
-    (record,) = sweep.fly_chunk(Chunk(inputs, [(0, changes)]))
+    (record,) = fly.fly_chunk(Chunk(inputs, [(0, changes)]))
     assert (record['status'], record['figures']) == ('failed', {})
     assert 'not finite at tick' in record['reason']
 

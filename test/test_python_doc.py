@@ -16,7 +16,7 @@ import pytest
 from matplotlib import pyplot
 
 import glider_bringup as glider
-from glider_model.signals import TICK_S
+from glider_model.base.signals import TICK_S
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = ROOT / 'docs' / 'python.md'

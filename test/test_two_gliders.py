@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 
 from glider_bringup.engines.processes import domain_id, node_environment
-from glider_model.ros.messages import TOPICS
+from glider_model.ros.wire.topics import TOPICS
 
 GLIDER = [sys.executable, '-m', 'glider_bringup.cli']
 DEADLINE_S = 300.0

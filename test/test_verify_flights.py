@@ -22,13 +22,13 @@ from std_srvs.srv import SetBool, Trigger
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.processes import NAMESPACE, domain_id
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.ros.bag import BagWriter
+from glider_bringup.recording.ros.rosbag2 import BagWriter
 from glider_control import block as control
 from glider_control.control import control_step
 from glider_guidance import block as guidance
 from glider_guidance.guidance import guidance_abort, guidance_step
 from glider_guidance.nodes.guidance_node import path_message
-from glider_model.frames import (
+from glider_model.base.frames import (
     odometry_from_wire,
     odometry_to_wire,
     reference_from_wire,
@@ -36,13 +36,13 @@ from glider_model.frames import (
     water_to_wire,
     wrench_to_wire,
 )
-from glider_model.plant import plant_joints, plant_odometry, plant_step
-from glider_model.ros import health
-from glider_model.ros.codec import to_cdr
-from glider_model.ros.messages import TOPICS
-from glider_model.ros.orders import ABORT, PARAMETERS_SET
-from glider_model.ros.qos import EVENTS
-from glider_model.signals import TICK_S, Joints, Water
+from glider_model.base.signals import TICK_S, Joints, Water
+from glider_model.plant.plant import plant_joints, plant_odometry, plant_step
+from glider_model.ros.lockstep import health
+from glider_model.ros.lockstep.orders import ABORT, PARAMETERS_SET
+from glider_model.ros.wire.codec import to_cdr
+from glider_model.ros.wire.qos import EVENTS
+from glider_model.ros.wire.topics import TOPICS
 
 DEADLINE_S = 200.0
 

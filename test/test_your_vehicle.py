@@ -30,10 +30,11 @@ from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.processes import domain_id, node_commands, node_environment
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.ros.node_parameters import node_parameters, write_parameters
-from glider_model.ros import health, qos
-from glider_model.ros.codec import to_cdr
-from glider_model.ros.messages import TOPICS
-from glider_model.signals import TICK_S
+from glider_model.base.signals import TICK_S
+from glider_model.ros.lockstep import health
+from glider_model.ros.wire import qos
+from glider_model.ros.wire.codec import to_cdr
+from glider_model.ros.wire.topics import TOPICS
 
 STAND_IN = Path(__file__).resolve().parents[1] / 'examples' / 'stand_in.py'
 SPEED, LOSS = 4.0, 0.05

@@ -11,7 +11,9 @@ setup(
     name=package_name,
     version='0.1.0',
     packages=find_packages(exclude=['test']),
-    package_data={package_name: ['showing/web/*', 'mission/scenarios/*', 'sweeps/*']},
+    package_data={
+        package_name: ['showing/web/*', 'mission/scenarios/*', 'studies/sweep/sweeps/*']
+    },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

@@ -11,7 +11,7 @@ from typing import Any
 
 #: Public names: the module of each, and its name there.
 _PUBLIC = {
-    'ConfigurationError': ('glider_model.settings', 'ConfigurationError'),
+    'ConfigurationError': ('glider_model.base.settings', 'ConfigurationError'),
     'Run': ('glider_bringup.door.run', 'Run'),
     'Scenario': ('glider_bringup.mission.scenario', 'Scenario'),
     'fly': ('glider_bringup.door.run', 'fly'),

@@ -4,7 +4,7 @@
 
 from glider_control.block import CONTROL
 from glider_guidance.block import GUIDANCE
-from glider_model.current_block import CURRENT
-from glider_model.plant_block import PLANT
+from glider_model.ocean.current_block import CURRENT
+from glider_model.plant.block import PLANT
 
 BLOCKS = (PLANT, CURRENT, GUIDANCE, CONTROL)

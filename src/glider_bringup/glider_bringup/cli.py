@@ -28,8 +28,8 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
     )
     from glider_bringup.console import messages
     from glider_bringup.disk import DiskError
-    from glider_model.errors import MAX_LINE, ConfigurationError, printable, shown
-    from glider_model.exits import EXIT_FAILED, EXIT_USAGE
+    from glider_model.base.errors import MAX_LINE, ConfigurationError, printable, shown
+    from glider_model.base.exits import EXIT_FAILED, EXIT_USAGE
 except KeyboardInterrupt:
     sys.exit(130)  # EXIT_INTERRUPTED, which may not be there yet
 except (OSError, ImportError) as error:

@@ -25,9 +25,9 @@ from rich.text import Text
 
 from glider_bringup.mission.scenario import parse_assignment
 from glider_control.settings import ControlLawSettings
-from glider_model.errors import ConfigurationError, printable
-from glider_model.exits import EXIT_FAILED, EXIT_INTERRUPTED
-from glider_model.signals import TICK_S
+from glider_model.base.errors import ConfigurationError, printable
+from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_model.base.signals import TICK_S
 
 
 class _PlainConsole(Console):
@@ -173,7 +173,7 @@ def workers_at_work(
 
     What ends their work early is told, with what ``advice`` adds, and is the exit code.
     """
-    from glider_bringup.pool import WorkError, worker_pool
+    from glider_bringup.studies.workers import WorkError, worker_pool
 
     if workers and scheduler:
         raise ConfigurationError(

@@ -18,16 +18,16 @@ import numpy as np
 from glider_bringup.engines.flight import fly as fly_mission
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_bringup.montecarlo import airframe
-from glider_bringup.pool import Pool, Progress
 from glider_bringup.scoring.card import finite
 from glider_bringup.scoring.one_hertz import Record, Recorder
 from glider_bringup.scoring.score import make_scorer, scores_of, windows
+from glider_bringup.studies.montecarlo import airframe
+from glider_bringup.studies.workers import Pool, Progress
 from glider_guidance.los import crab_heading
-from glider_model.current import KNOT_MPS
-from glider_model.perturb import perturbed
-from glider_model.polar import make_polar, steady_horizontal_speed
-from glider_model.vehicle import load_vehicle
+from glider_model.ocean.current_settings import KNOT_MPS
+from glider_model.onboard.glide_polar import make_polar, steady_horizontal_speed
+from glider_model.vehicle.file import load_vehicle
+from glider_model.vehicle.perturb import perturbed
 
 RESULT_FILE = 'experiments.json'
 PASSED, FAILED = 'passed', 'failed'

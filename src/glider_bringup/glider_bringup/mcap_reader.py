@@ -27,11 +27,11 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Schema, Statistics
 
-from glider_bringup.mcap_writer import MAGIC
-from glider_model.files import read_yaml
-from glider_model.kernel import kernel
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_NS
+from glider_bringup.recording.mcap_writer import MAGIC
+from glider_model.base.files import read_yaml
+from glider_model.base.kernel import kernel
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_NS
 
 _HEAD = struct.Struct('<BQ')
 _FOOTER = struct.Struct('<BQQQI')

@@ -8,12 +8,12 @@ computes from them what its node would have published.
 
 import numpy as np
 
-from glider_model.block import Block, block_tick, put, rows_at
-from glider_model.kernel import kernel
-from glider_model.plant_block import PLANT, plant_move, plant_outputs
-from glider_model.settings import Settings
-from glider_model.signals import TICK_NS, TICK_S
-from glider_model.wiring import FIELDS
+from glider_model.base.block import Block, block_tick, put, rows_at
+from glider_model.base.kernel import kernel
+from glider_model.base.settings import Settings
+from glider_model.base.signals import TICK_NS, TICK_S
+from glider_model.base.wiring import FIELDS
+from glider_model.plant.block import PLANT, plant_move, plant_outputs
 
 
 @kernel

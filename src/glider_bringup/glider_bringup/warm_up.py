@@ -12,19 +12,19 @@ from glider_bringup.blocks import BLOCKS
 from glider_bringup.engines.direct import ROW, fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.verify import verify
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import halve, make_tracer
-from glider_model.plant_block import PLANT, plant_move, plant_outputs
-from glider_model.sensors import SensorSettings
-from glider_model.signals import TICK_S
-from glider_model.trim import solve_trim
-from glider_model.wiring import at_rest
+from glider_model.base.signals import TICK_S
+from glider_model.base.wiring import at_rest
+from glider_model.plant.block import PLANT, plant_move, plant_outputs
+from glider_model.plant.sensors import SensorSettings
+from glider_model.plant.trim import solve_trim
 
 
 def main() -> None:

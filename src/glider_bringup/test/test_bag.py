@@ -19,15 +19,20 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from glider_bringup.engines.direct import BLOCK_TICKS, COLUMNS
-from glider_bringup.mcap_reader import Bag
+from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.ros.rosbag2 import (
+    CHUNK_TICKS,
+    BagWriter,
+    message_definition,
+    type_hash,
+)
+from glider_bringup.recording.tick_sorter import TickSorter
 from glider_bringup.ros import bag_log
-from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter, message_definition, type_hash
 from glider_bringup.ros.bag_log import SCORED, RecordedLog
 from glider_bringup.scoring.traces import TRACED
-from glider_bringup.tick_order import TickOrder
-from glider_model.ros.codec import to_cdr
-from glider_model.ros.messages import TOPICS
-from glider_model.signals import TICK_NS
+from glider_model.base.signals import TICK_NS
+from glider_model.ros.wire.codec import to_cdr
+from glider_model.ros.wire.topics import TOPICS
 
 PER_TICK = {topic.name: topic for topic in TOPICS.values() if topic.per_tick}
 TICKS = 2 * CHUNK_TICKS + 40
@@ -227,7 +232,7 @@ def test_definition_and_hash_are_those_of_the_distribution(type_name):
 @given(st.permutations(6 * ['a', 'b']))
 def test_order_of_arrival_does_not_show_in_the_recording(arrivals):
     written = []
-    order = TickOrder(['a', 'b'], 1, lambda *message: written.append(message[:2]))
+    order = TickSorter(['a', 'b'], 1, lambda *message: written.append(message[:2]))
     order.add_event('event', 3, b'')
     for place, topic in enumerate(arrivals):
         order.add(topic, arrivals[:place].count(topic), b'')
@@ -240,7 +245,7 @@ def test_order_of_arrival_does_not_show_in_the_recording(arrivals):
 
 def test_incomplete_ticks_are_written_at_the_end_and_gaps_are_counted():
     written = []
-    order = TickOrder(['a', 'b'], 10, lambda *message: written.append(message))
+    order = TickSorter(['a', 'b'], 10, lambda *message: written.append(message))
     for stamp_ns in (0, 10, 40):
         order.add('a', stamp_ns, b'a')
     order.add('b', 0, b'b')

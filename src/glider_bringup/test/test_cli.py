@@ -12,8 +12,8 @@ import yaml
 
 from glider_bringup import cli
 from glider_bringup.mission.scenario import scenario_names
-from glider_bringup.sweep_file import sweep_names
-from glider_model.vehicle import vehicle_names, vehicle_path
+from glider_bringup.studies.sweep.plan import sweep_names
+from glider_model.vehicle.file import vehicle_names, vehicle_path
 
 SHORT = ('--engine', 'direct', '--controller', 'pid', '--duration', '300')
 CARD = (

@@ -17,10 +17,10 @@ from mcap.reader import make_reader
 
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.fuzzing import bags, watch
-from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter
+from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.verify import verify
 from glider_bringup.scoring.again import score_again
@@ -28,11 +28,11 @@ from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.scoring.traces import load_traces, make_tracer
 from glider_bringup.showing.flown_run import draw, keep_traces, read_run, write_report
-from glider_model.ros import health
-from glider_model.ros.codec import to_cdr
-from glider_model.ros.messages import PLANT, TOPICS
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_NS, TICK_S
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_NS, TICK_S
+from glider_model.ros.lockstep import health
+from glider_model.ros.wire.codec import to_cdr
+from glider_model.ros.wire.topics import PLANT, TOPICS
 
 TICKS = 600
 #: The end of a data section, up to its checksum: what 1980cb2 wrote had none.

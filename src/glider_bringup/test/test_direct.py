@@ -21,7 +21,7 @@ from glider_bringup.engines.direct import (
     fly_blocks,
 )
 from glider_bringup.mission.scenario import load_scenario
-from glider_model.signals import TICK_S
+from glider_model.base.signals import TICK_S
 
 #: A dive of 60 m and back within half an hour, so that a flight has everything in it.
 SHALLOW = {

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 import glider_bringup as glider
 from glider_bringup.cli import app
-from glider_model.settings import ConfigurationError
+from glider_model.base.settings import ConfigurationError
 
 #: Half of what is named north, east and down in the world of topics: x east, y north, z up.
 ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -102,11 +102,12 @@ STUDIES = """
 import sys
 
 import glider_bringup.cli
-from glider_bringup.experiments import Case, _fly_case
-from glider_bringup.montecarlo import _fly_plant, make_scenarios
-from glider_bringup.pool import worker_pool
-from glider_bringup.studies.sweep import fly_chunk, make_chunks
-from glider_bringup.sweep_file import load_sweep
+from glider_bringup.studies.paper.cases import Case
+from glider_bringup.studies.paper.flying import _fly_case
+from glider_bringup.studies.montecarlo import _fly_plant, make_scenarios
+from glider_bringup.studies.workers import worker_pool
+from glider_bringup.studies.sweep.fly import fly_chunk, make_chunks
+from glider_bringup.studies.sweep.plan import load_sweep
 
 
 def fly(study):

@@ -17,8 +17,8 @@ from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.showing.scorecard import card_rows
-from glider_model.frames import odometry_from_wire
-from glider_model.sensors import recover
+from glider_model.base.frames import odometry_from_wire
+from glider_model.plant.sensors import remove_noise
 
 
 def fly(folder, name, with_bag=False, **changes):
@@ -51,7 +51,7 @@ def true_east(folder, scenario):
             *(twist.linear.x, twist.linear.y, twist.linear.z),
             *(twist.angular.x, twist.angular.y, twist.angular.z),
         )
-        yield recover(odometry_from_wire(wire), tick, sensors).p_e
+        yield remove_noise(odometry_from_wire(wire), tick, sensors).p_e
 
 
 @pytest.mark.parametrize('name', scenario_names())

@@ -16,34 +16,29 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from glider_bringup import cli, experiments
+from glider_bringup import cli
 from glider_bringup.commands.studies import Group
-from glider_bringup.experiments import (
-    FAILED,
-    GROUPS,
-    K_MY_FACTORS,
-    PASSED,
-    RESULT_FILE,
-    Case,
-    Experiment,
-    expectation,
-    fly,
-    horizontal_speed,
-    judge_envelope,
-    judge_limits,
-    judge_survey,
-    make_experiments,
-    pid_better,
-    report,
-    steering_share,
-)
 from glider_bringup.mission.run_folder import make_result_folder
 from glider_bringup.mission.scenario import load_scenario, parse_assignment
-from glider_bringup.pool import worker_pool
 from glider_bringup.scoring.one_hertz import Recorder
-from glider_model.settings import ConfigurationError
-from glider_model.trim import solve_trim
-from glider_model.vehicle import load_vehicle
+from glider_bringup.studies.paper import flying, measures, verdicts
+from glider_bringup.studies.paper import limits as experiments
+from glider_bringup.studies.paper.cases import Case, Experiment
+from glider_bringup.studies.paper.catalogue import (
+    GROUPS,
+    K_MY_FACTORS,
+    expectation,
+    make_experiments,
+    steering_share,
+)
+from glider_bringup.studies.paper.flying import fly
+from glider_bringup.studies.paper.limits import judge_envelope, judge_limits, judge_survey
+from glider_bringup.studies.paper.measures import horizontal_speed
+from glider_bringup.studies.paper.verdicts import FAILED, PASSED, RESULT_FILE, pid_better, report
+from glider_bringup.studies.workers import worker_pool
+from glider_model.base.settings import ConfigurationError
+from glider_model.plant.trim import solve_trim
+from glider_model.vehicle.file import load_vehicle
 
 ROW_FIELDS = {'case', 'controller', 'guidance', 'status', 'finite', 'cross_track_m', 'command'}
 
@@ -278,10 +273,10 @@ def test_numbers_that_json_does_not_have_are_told_as_none():
         'cross_track_m': {'max_all': math.nan},
         'final_state': {'a': [1]},
     }
-    row = experiments._row(scores)
+    row = flying._row(scores)
     assert (row['finite'], row['cross_track_m']['max_all']) == (False, None)
     scores['cross_track_m']['max_all'] = 1.0
-    assert experiments._row(scores)['finite'] is True
+    assert flying._row(scores)['finite'] is True
 
 
 # --------------------------------------------------------------------------- measures
@@ -300,7 +295,7 @@ def survey_record(heading):
 
 
 def test_legs_of_a_calm_survey():
-    legs = list(experiments._legs(survey_record(lambda t, course: course + 10.0)))
+    legs = list(measures._legs(survey_record(lambda t, course: course + 10.0)))
     assert [round(leg['course_deg']) for leg in legs] == [0, -90, -180]
     for leg in legs:
         assert leg['heading_spread_deg'] == pytest.approx(0.0, abs=1e-9)
@@ -308,7 +303,7 @@ def test_legs_of_a_calm_survey():
 
 
 def test_heading_may_be_counted_from_anywhere():
-    legs = list(experiments._legs(survey_record(lambda t, course: course - 720.0)))
+    legs = list(measures._legs(survey_record(lambda t, course: course - 720.0)))
     assert legs[0]['heading_off_course_deg'] == pytest.approx(0.0, abs=1e-9)
 
 
@@ -316,12 +311,12 @@ def test_a_loop_shows_in_the_legs():
     def loop(t, course):
         return course + 360.0 * np.clip((t - 2100.0) / 100.0, 0.0, 1.0)
 
-    legs = list(experiments._legs(survey_record(loop)))
+    legs = list(measures._legs(survey_record(loop)))
     assert legs[1]['heading_off_course_deg'] == pytest.approx(360.0)
 
 
 def test_dithering_shows_in_the_legs():
-    legs = list(experiments._legs(survey_record(lambda t, c: c + 60.0 * np.sin(t / 30.0))))
+    legs = list(measures._legs(survey_record(lambda t, c: c + 60.0 * np.sin(t / 30.0))))
     assert all(leg['heading_spread_deg'] > 100.0 for leg in legs)
 
 
@@ -371,12 +366,12 @@ def test_command_prints_one_json_object_and_nothing_else(paths):
 def test_result_for_a_person_fits_a_narrow_terminal(paths, capsys):
     from rich.console import Console
 
-    from glider_bringup import experiment_tables
+    from glider_bringup.studies.paper import tables
 
     result = json.loads(paths.stdout)
     result['experiments'][0]['verdict'] = FAILED
     result['experiments'][0]['checks'][0].update(passed=False, value=3.0)
-    experiment_tables.show(result, Console(width=80, force_terminal=False))
+    tables.show(result, Console(width=80, force_terminal=False))
     shown = capsys.readouterr().out
     assert 'verdict: failed' in shown
     assert '= 3.000, allowed' in shown
@@ -412,7 +407,7 @@ def test_wrong_options_are_refused(options, message):
 def test_a_result_is_never_written_over(tmp_path):
     (tmp_path / RESULT_FILE).write_text('{}')
     with pytest.raises(ConfigurationError, match='never written over'):
-        make_result_folder(tmp_path, experiments.RESULT_FILE)
+        make_result_folder(tmp_path, verdicts.RESULT_FILE)
 
 
 def test_a_failed_verdict_is_exit_code_one(tmp_path, monkeypatch):

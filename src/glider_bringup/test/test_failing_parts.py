@@ -21,9 +21,8 @@ from glider_control.watch import (
     TOO_DEEP,
 )
 from glider_guidance.guidance import guidance_abort, guidance_step
-from glider_guidance.profile import GLIDING_DOWN, GLIDING_UP, INFLECTING_UP
-from glider_model.current import current_step
-from glider_model.frames import (
+from glider_guidance.yo.stage import GLIDING_DOWN, GLIDING_UP, INFLECTING_UP
+from glider_model.base.frames import (
     odometry_from_wire,
     odometry_to_wire,
     reference_from_wire,
@@ -31,8 +30,9 @@ from glider_model.frames import (
     water_from_wire,
     water_to_wire,
 )
-from glider_model.plant import plant_joints, plant_measurement, plant_step
-from glider_model.signals import TICK_S
+from glider_model.base.signals import TICK_S
+from glider_model.ocean.current import current_step
+from glider_model.plant.plant import plant_joints, plant_measurement, plant_step
 
 #: One dive to 250 m, with both turns; in a cross current, so that the track has to be held.
 FLIGHT = {'dives': 0, 'duration_s': 3600.0, 'profile.depth_m': 250.0, 'profile.prepare_s': 0.0}

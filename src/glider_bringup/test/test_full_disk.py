@@ -14,16 +14,16 @@ import pytest
 
 from glider_bringup.disk import DiskError, whole_file, write_whole
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.ros.bag import CHUNK_TICKS, BagWriter
+from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
-from glider_model.ros.messages import TOPICS
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_NS
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_NS
+from glider_model.ros.wire.topics import TOPICS
 
 #: The largest file (B) that a disk which is full allows.
 MOST = 500_000

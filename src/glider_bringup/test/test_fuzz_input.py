@@ -8,7 +8,7 @@ import pytest
 
 from glider_bringup.fuzzing import files, lines, watch
 from glider_bringup.fuzzing.counts import Counts
-from glider_model.errors import ConfigurationError
+from glider_model.base.errors import ConfigurationError
 
 
 def ignore(tried: int) -> None:

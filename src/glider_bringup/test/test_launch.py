@@ -21,7 +21,7 @@ from glider_bringup.engines.processes import MODULES, PLANT, RECORDER
 from glider_bringup.mission.scenario import scenario_names
 from glider_control.settings import ControlLawSettings
 from glider_guidance.settings import LosSettings
-from glider_model.settings import ConfigurationError
+from glider_model.base.settings import ConfigurationError
 
 LAUNCH_FILE = Path(__file__).parents[1] / 'launch' / 'glider.launch.py'
 

@@ -19,10 +19,10 @@ from glider_bringup.engines.processes import domain_id
 from glider_control.nodes.control_node import ControlNode
 from glider_control.settings import ControlSettings
 from glider_control.watch import ORDERED
-from glider_model.ros import qos
-from glider_model.ros.codec import to_cdr
-from glider_model.ros.messages import TOPICS
-from glider_model.signals import TICK_NS
+from glider_model.base.signals import TICK_NS
+from glider_model.ros.wire import qos
+from glider_model.ros.wire.codec import to_cdr
+from glider_model.ros.wire.topics import TOPICS
 
 LEVEL = (0.0, 0.0, -50.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 INPUTS = {'odom': LEVEL, 'joint_states': (0.4, 0.0, 0.0), 'reference': LEVEL}

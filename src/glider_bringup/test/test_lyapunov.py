@@ -30,10 +30,10 @@ from glider_control.laws.adaptive import (
     SCALE_SIDE,
     SCALE_V2,
 )
-from glider_model.plant import plant_joints
-from glider_model.polar import glide_speed
-from glider_model.rigid_body import GRAVITY
-from glider_model.signals import TICK_S
+from glider_model.base.signals import TICK_S
+from glider_model.onboard.glide_polar import glide_speed
+from glider_model.plant.plant import plant_joints
+from glider_model.vehicle.rigid_body import GRAVITY
 
 #: Dives of 100 m, so that the flight has several inflections.
 FLIGHT = {'dives': 0, 'duration_s': 3200.0, 'profile.depth_m': 100.0}

@@ -14,14 +14,17 @@ import time
 import numpy as np
 import pytest
 
-from glider_bringup import montecarlo
 from glider_bringup.engines.direct import COLUMNS, ROW, fly
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.run_folder import make_result_folder
 from glider_bringup.mission.scenario import load_scenario, parse_assignment
-from glider_bringup.montecarlo import (
+from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.ros.bag_log import RecordedLog
+from glider_bringup.scoring.again import score_again
+from glider_bringup.scoring.score import Scorer
+from glider_bringup.studies import montecarlo
+from glider_bringup.studies.montecarlo import (
     RESULT_FILE,
     airframe,
     judge,
@@ -29,16 +32,20 @@ from glider_bringup.montecarlo import (
     sample_plant,
     spread,
 )
-from glider_bringup.ros.bag_log import RecordedLog
-from glider_bringup.scoring.again import score_again
-from glider_bringup.scoring.score import Scorer
-from glider_model.frames import euler_from_quaternion
-from glider_model.perturb import ADDED_MASS, DAMPING, STATIC, VISCOUS, PerturbSettings, perturbed
-from glider_model.ros.messages import TOPICS
-from glider_model.sensors import SensorSettings
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_S
-from glider_model.vehicle import load_vehicle
+from glider_model.base.frames import euler_from_quaternion
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_S
+from glider_model.plant.sensors import SensorSettings
+from glider_model.ros.wire.topics import TOPICS
+from glider_model.vehicle.file import load_vehicle
+from glider_model.vehicle.perturb import (
+    ADDED_MASS,
+    DAMPING,
+    STATIC,
+    VISCOUS,
+    PerturbSettings,
+    perturbed,
+)
 
 #: A dive to 600 m and back, scored from its first minute on.
 SHORT = {'profile.depth_m': 600.0, 'settle_s': 60.0, 'duration_s': 5400.0}

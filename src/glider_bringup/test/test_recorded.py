@@ -12,16 +12,16 @@ import pytest
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.ros.bag import BagWriter
+from glider_bringup.recording.ros.rosbag2 import BagWriter
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.showing.flown_run import draw, read_run
-from glider_model.ros import health
-from glider_model.ros.codec import to_cdr
-from glider_model.ros.messages import PLANT, TOPICS
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_NS
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_NS
+from glider_model.ros.lockstep import health
+from glider_model.ros.wire.codec import to_cdr
+from glider_model.ros.wire.topics import PLANT, TOPICS
 
 #: What a score file knows and a bag does not.
 ONLY_IN_THE_FILE = {'engine', 'wall_time_s', 'real_time_factor'}
@@ -172,7 +172,7 @@ def test_what_holds_no_run_is_refused(tmp_path, name, words):
 PEAK = """
 import sys
 from pathlib import Path
-from glider_bringup.mcap_reader import Bag
+from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.ros.bag_log import RecordedLog
 
 def peak_mb():

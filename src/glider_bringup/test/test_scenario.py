@@ -16,8 +16,8 @@ from glider_bringup.mission.scenario import (
     parse_assignment,
     scenario_names,
 )
-from glider_model.settings import ConfigurationError
-from glider_model.vehicle import vehicle_path
+from glider_model.base.settings import ConfigurationError
+from glider_model.vehicle.file import vehicle_path
 
 quick = settings(max_examples=30, deadline=None)
 every_scenario = pytest.mark.parametrize('name', scenario_names())

@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 from glider_bringup.engines.direct import COLUMNS, ROW
 from glider_bringup.mission.rules import Rules
 from glider_bringup.scoring.score import Scorer
-from glider_guidance.profile import AT_END_OF_PATH
-from glider_model.signals import TICK_S
+from glider_guidance.yo.stage import AT_END_OF_PATH
+from glider_model.base.signals import TICK_S
 
 quick = settings(max_examples=20, deadline=None)
 

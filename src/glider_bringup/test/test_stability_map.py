@@ -14,9 +14,9 @@ import yaml
 
 from glider_bringup import cli
 from glider_bringup.showing.stability_map import CLASSES, CRITICAL_M, STABLE_M, load_map, shares
-from glider_bringup.studies.sweep import STATUSES, failure
-from glider_bringup.sweep_file import load_sweep
-from glider_bringup.sweep_result import make_dataset, read_dataset, write_dataset
+from glider_bringup.studies.sweep.fly import STATUSES, failure
+from glider_bringup.studies.sweep.netcdf import make_dataset, read_dataset, write_dataset
+from glider_bringup.studies.sweep.plan import load_sweep
 
 KNOT_MPS = 1852.0 / 3600.0
 SPEEDS, ANGLES = [0.0, 0.4, 0.8, 1.2], [0.0, 20.0, 60.0, 90.0, 150.0, 180.0]

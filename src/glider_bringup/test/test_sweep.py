@@ -20,10 +20,10 @@ import xarray
 import yaml
 from scipy.io import netcdf_file
 
-from glider_bringup import cli, pool, sweep_file
-from glider_bringup.journal import Journal
-from glider_bringup.pool import WorkError, worker_pool
-from glider_bringup.studies.sweep import (
+from glider_bringup import cli
+from glider_bringup.studies import workers as pool
+from glider_bringup.studies.sweep import plan as sweep_file
+from glider_bringup.studies.sweep.fly import (
     JOURNAL_FILE,
     RESULT_FILE,
     STATUSES,
@@ -33,8 +33,10 @@ from glider_bringup.studies.sweep import (
     make_chunks,
     write_result,
 )
-from glider_bringup.sweep_file import load_sweep
-from glider_bringup.sweep_result import make_dataset, write_dataset
+from glider_bringup.studies.sweep.journal import Journal
+from glider_bringup.studies.sweep.netcdf import make_dataset, write_dataset
+from glider_bringup.studies.sweep.plan import load_sweep
+from glider_bringup.studies.workers import WorkError, worker_pool
 
 #: Longer than any command here takes (s), the compilation of all kernels included.
 DEADLINE_S = 300.0

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from glider_bringup import cli
 from glider_bringup.mission.scenario import Scenario, load_scenario, overlap
-from glider_bringup.sweep_file import (
+from glider_bringup.studies.sweep.plan import (
     GridDimension,
     LogUniformDimension,
     NormalDimension,
@@ -21,7 +21,7 @@ from glider_bringup.sweep_file import (
     load_sweep,
     sweep_names,
 )
-from glider_model.settings import find_field, unit_of
+from glider_model.base.settings import find_field, unit_of
 
 SPEED = {'kind': 'values', 'field': 'current.speed_kn', 'values': [0.5, 1.0]}
 

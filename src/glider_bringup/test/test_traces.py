@@ -17,9 +17,9 @@ from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.scoring import traces
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import CURVES, Tracer, load_traces, make_tracer
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_S
-from glider_model.vehicle import load_vehicle
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_S
+from glider_model.vehicle.file import load_vehicle
 
 quick = settings(max_examples=40, deadline=None)
 VEHICLE = load_vehicle('zhang2021').params()

@@ -20,14 +20,14 @@ from typer.testing import CliRunner
 
 from glider_bringup.cli import app
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.ros.recording import Recording, read_told
 from glider_bringup.ros.verify import IDENTICAL, place_ticks, report, verify
-from glider_model.ros.messages import TOPICS
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_NS
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_NS
+from glider_model.ros.wire.topics import TOPICS
 
 PER_TICK = {t.full_name('/glider'): t for t in TOPICS.values() if t.per_tick}
 BLOCK_OF = {

@@ -7,12 +7,12 @@ import pytest
 
 from glider_bringup.engines.direct import ROW, fly
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.montecarlo import airframe, judge, make_scenarios, sample_plant
 from glider_bringup.scoring.card import fly_scored
+from glider_bringup.studies.montecarlo import airframe, judge, make_scenarios, sample_plant
 from glider_guidance.methods.observer import lookahead_stretch
-from glider_model.perturb import PerturbSettings, perturbed
-from glider_model.signals import TICK_S
-from glider_model.vehicle import load_vehicle
+from glider_model.base.signals import TICK_S
+from glider_model.vehicle.file import load_vehicle
+from glider_model.vehicle.perturb import PerturbSettings, perturbed
 
 #: Plants that the law was tuned on, with the share of their file's steering in a dive.
 PLANTS = {

@@ -13,9 +13,9 @@ with (g_x, g_y, g_z) the direction of gravity in body axes. Both are solved exac
 import math
 from typing import NamedTuple
 
-from glider_model.kernel import kernel
-from glider_model.rigid_body import GRAVITY
-from glider_model.vehicle import VehicleParams
+from glider_model.base.kernel import kernel
+from glider_model.vehicle.file import VehicleParams
+from glider_model.vehicle.rigid_body import GRAVITY
 
 #: Nose-up or nose-down beyond this, gravity gives no pitch authority: g_z is held here (-).
 SMALLEST_G_Z = 0.2

@@ -5,11 +5,11 @@
 from glider_control import watch
 from glider_control.control import ControlParams, control_step, control_surface
 from glider_control.settings import ControlSettings
-from glider_model.block import Block, Said, block_tick
-from glider_model.frames import odometry_from_wire, reference_from_wire, wrench_to_wire
-from glider_model.kernel import kernel
-from glider_model.signals import Joints
-from glider_model.wiring import CONTROL as WIRED
+from glider_model.base.block import Block, Said, block_tick
+from glider_model.base.frames import odometry_from_wire, reference_from_wire, wrench_to_wire
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import Joints
+from glider_model.base.wiring import CONTROL as WIRED
 
 #: Actuators by the bits of the saturation mask that say that they are at their limits.
 AT_LIMIT = {1: 'buoyancy engine', 2: 'pitch mass', 4: 'roll mass'}

@@ -24,11 +24,11 @@ from glider_control.watch import (
     take_in,
     watch,
 )
-from glider_model.kernel import kernel
-from glider_model.measurement import Measured, measure
-from glider_model.polar import Polar, glide_speed
-from glider_model.rigid_body import GRAVITY
-from glider_model.signals import Adaptation, Joints, Wrench
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import Adaptation, Joints, Wrench
+from glider_model.onboard.attitude_filter import Measured, measure
+from glider_model.onboard.glide_polar import Polar, glide_speed
+from glider_model.vehicle.rigid_body import GRAVITY
 
 #: Bits of ``ControlOutput.saturation``; those of `glider_control.watch` come after them.
 SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL = 1, 2, 4

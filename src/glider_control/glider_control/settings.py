@@ -14,13 +14,13 @@ from glider_control.control import ControlParams, ControlState
 from glider_control.law import HeadingSettings, LawSettings
 from glider_control.vertical_rate import Trim
 from glider_control.watch import INITIAL_WATCH, make_watch
-from glider_model import plugins
-from glider_model.gate import GateSettings
-from glider_model.measurement import Measured
-from glider_model.polar import make_polar
-from glider_model.settings import Settings
-from glider_model.signals import Joints
-from glider_model.vehicle import load_vehicle
+from glider_model.base import plugins
+from glider_model.base.settings import Settings
+from glider_model.base.signals import Joints
+from glider_model.onboard.attitude_filter import Measured
+from glider_model.onboard.gate import GateSettings
+from glider_model.onboard.glide_polar import make_polar
+from glider_model.vehicle.file import load_vehicle
 
 _TUNABLE = {'tunable': True}
 

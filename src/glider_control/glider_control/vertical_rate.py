@@ -4,8 +4,8 @@
 
 from typing import NamedTuple
 
-from glider_model.kernel import kernel
-from glider_model.polar import glide_net_heaviness
+from glider_model.base.kernel import kernel
+from glider_model.onboard.glide_polar import glide_net_heaviness
 
 #: The integrals of the vertical-rate law wait until the pump is this near to where it goes (kg).
 PUMP_ARRIVED_KG = 0.05

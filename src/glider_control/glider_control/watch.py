@@ -8,9 +8,9 @@ Some of it is told and no more; some of it brings the vehicle to the surface for
 import math
 from typing import NamedTuple
 
-from glider_model.gate import INITIAL_GATE, GateParams, GateState, gate_step, is_lost
-from glider_model.kernel import kernel
-from glider_model.signals import SURFACE_TARGET, Joints, Reference
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import SURFACE_TARGET, Joints, Reference
+from glider_model.onboard.gate import INITIAL_GATE, GateParams, GateState, gate_step, is_lost
 
 #: Told: an actuator does not follow its command; a measurement was refused.
 STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, REFUSED = 8, 16, 32, 64

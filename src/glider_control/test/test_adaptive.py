@@ -18,10 +18,10 @@ from glider_control.laws.adaptive import (
     AdaptiveSettings,
     adaptive_step,
 )
-from glider_model.command_filter import FilterParams
-from glider_model.measurement import Measured
-from glider_model.signals import Reference
-from glider_model.vehicle import load_vehicle
+from glider_model.base.signals import Reference
+from glider_model.onboard.attitude_filter import Measured
+from glider_model.onboard.command_filter import FilterParams
+from glider_model.vehicle.file import load_vehicle
 
 DT = 0.1
 SPEED, ALPHA = 0.5, 0.028

@@ -16,8 +16,8 @@ from glider_control.allocation import (
     make_allocation,
     moments,
 )
-from glider_model.rigid_body import GRAVITY
-from glider_model.vehicle import load_vehicle, vehicle_names
+from glider_model.vehicle.file import load_vehicle, vehicle_names
+from glider_model.vehicle.rigid_body import GRAVITY
 
 quick = settings(max_examples=60, deadline=None)
 every_vehicle = pytest.mark.parametrize('vehicle', vehicle_names())

@@ -17,13 +17,13 @@ from glider_control.control import (
     control_step,
 )
 from glider_control.settings import ControlSettings
-from glider_model.frames import euler_from_quaternion, quaternion_from_euler, rotate_to_ned
-from glider_model.plant import PlantSettings, plant_odometry, plant_step
-from glider_model.polar import glide_vertical_rate
-from glider_model.rigid_body import GRAVITY
-from glider_model.signals import TICK_S, Joints, Odometry, Reference, Water
-from glider_model.trim import solve_trim
-from glider_model.vehicle import load_vehicle, vehicle_names
+from glider_model.base.frames import euler_from_quaternion, quaternion_from_euler, rotate_to_ned
+from glider_model.base.signals import TICK_S, Joints, Odometry, Reference, Water
+from glider_model.onboard.glide_polar import glide_vertical_rate
+from glider_model.plant.plant import PlantSettings, plant_odometry, plant_step
+from glider_model.plant.trim import solve_trim
+from glider_model.vehicle.file import load_vehicle, vehicle_names
+from glider_model.vehicle.rigid_body import GRAVITY
 
 quick = settings(max_examples=40, deadline=None)
 

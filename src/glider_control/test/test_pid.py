@@ -19,9 +19,9 @@ from glider_control.laws.pid import (
     pid_step,
 )
 from glider_control.settings import ControlSettings
-from glider_model.command_filter import Filtered
-from glider_model.measurement import Measured
-from glider_model.signals import TICK_S, Reference
+from glider_model.base.signals import TICK_S, Reference
+from glider_model.onboard.attitude_filter import Measured
+from glider_model.onboard.command_filter import Filtered
 
 quick = settings(max_examples=60, deadline=None)
 

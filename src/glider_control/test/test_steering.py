@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glider_control.turning import caution, roll_to_kick, roll_to_turn, sure_disturbance
-from glider_model.steering import SteeringLearningSettings
+from glider_model.onboard.learnt_steering import SteeringLearningSettings
 
 PRIOR = SteeringLearningSettings().initial_state().dive
 

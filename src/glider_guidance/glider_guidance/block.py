@@ -3,12 +3,12 @@
 """Guidance as a block."""
 
 from glider_guidance.guidance import GuidanceParams, guidance_abort, guidance_step
-from glider_guidance.profile import STAGE_NAMES
 from glider_guidance.settings import GuidanceSettings
-from glider_model.block import Block, Said, block_tick
-from glider_model.frames import odometry_from_wire, reference_to_wire, water_to_wire
-from glider_model.kernel import kernel
-from glider_model.wiring import GUIDANCE as WIRED
+from glider_guidance.yo.stage import STAGE_NAMES
+from glider_model.base.block import Block, Said, block_tick
+from glider_model.base.frames import odometry_from_wire, reference_to_wire, water_to_wire
+from glider_model.base.kernel import kernel
+from glider_model.base.wiring import GUIDANCE as WIRED
 
 
 @block_tick.body(GuidanceParams)

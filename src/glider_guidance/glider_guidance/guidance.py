@@ -10,10 +10,9 @@ import math
 from typing import NamedTuple
 
 from glider_guidance.current_observer import ObserverParams, ObserverState, observer_step
-from glider_guidance.end_of_path import WayLeft, way_left
 from glider_guidance.los import target_rate
 from glider_guidance.method import Leg, Situation, method_step
-from glider_guidance.path import (
+from glider_guidance.path.curve import (
     PathParams,
     path_angles,
     path_closest,
@@ -23,29 +22,32 @@ from glider_guidance.path import (
     path_tangent,
     path_turn,
 )
-from glider_guidance.profile import (
+from glider_guidance.yo.end_of_path import WayLeft, way_left
+from glider_guidance.yo.machine import (
+    ProfileParams,
+    ProfileState,
+    coming_turn,
+    look_ahead_s,
+    profile_step,
+    profile_targets,
+)
+from glider_guidance.yo.stage import (
     AT_END_OF_PATH,
     GLIDING_DOWN,
     SURFACE_PREPARATION,
     SURFACING,
     WAITING_ON_SURFACE,
-    ProfileParams,
-    ProfileState,
-    coming_turn,
     is_descending,
     is_gliding,
-    look_ahead_s,
-    profile_step,
-    profile_targets,
-    time_to_turn,
-    turn_lead_s,
 )
-from glider_model.command_filter import Filtered, FilterParams, filter_angle
-from glider_model.frames import euler_from_quaternion, rotate_to_ned
-from glider_model.gate import GateParams, GateState, gate_step
-from glider_model.kernel import kernel
-from glider_model.measurement import Measured, measure
-from glider_model.polar import (
+from glider_guidance.yo.turns import time_to_turn, turn_lead_s
+from glider_model.base.frames import euler_from_quaternion, rotate_to_ned
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import SURFACE_TARGET, TICK_S, Reference, TrackingError, Water
+from glider_model.onboard.attitude_filter import Measured, measure
+from glider_model.onboard.command_filter import Filtered, FilterParams, filter_angle
+from glider_model.onboard.gate import GateParams, GateState, gate_step
+from glider_model.onboard.glide_polar import (
     Polar,
     glide_alpha,
     glide_horizontal_speed,
@@ -53,8 +55,7 @@ from glider_model.polar import (
     glide_vertical_rate,
     steepen,
 )
-from glider_model.signals import SURFACE_TARGET, TICK_S, Reference, TrackingError, Water
-from glider_model.steering import Steering, SteeringParams, learn
+from glider_model.onboard.learnt_steering import Steering, SteeringParams, learn
 
 #: The flight model is believed this long after a glide began (s).
 SETTLED_S = 120.0

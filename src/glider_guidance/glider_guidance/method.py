@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_model.settings import Settings
-from glider_model.signals import TrackingError, Water
-from glider_model.slot import slot
-from glider_model.steering import Steering
-from glider_model.vehicle import Vehicle
+from glider_model.base.settings import Settings
+from glider_model.base.signals import TrackingError, Water
+from glider_model.base.slot import slot
+from glider_model.onboard.learnt_steering import Steering
+from glider_model.vehicle.file import Vehicle
 
 _TUNABLE = {'tunable': True}
 
@@ -83,7 +83,7 @@ class MethodSettings(Settings):
 class Leg(NamedTuple):
     """What the vehicle is doing: the stage of the yo."""
 
-    stage: int  #: one of `glider_guidance.profile`
+    stage: int  #: one of `glider_guidance.yo.machine`
     descends: bool  #: it is to go down, or to turn down
     is_gliding: bool  #: a steady glide
     is_surfaced: bool  #: at the surface, or on the way there for good

@@ -20,9 +20,9 @@ import pydantic
 from pydantic import Field
 from scipy.interpolate import CubicSpline
 
-from glider_model.kernel import kernel
-from glider_model.settings import Settings
-from glider_model.signals import TrackingError
+from glider_model.base.kernel import kernel
+from glider_model.base.settings import Settings
+from glider_model.base.signals import TrackingError
 
 #: Paths stay this close to the origin (m, horizontally) and above this depth (m).
 MAX_DISTANCE_M = 1e6

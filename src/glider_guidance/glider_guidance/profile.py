@@ -7,11 +7,11 @@ from typing import Literal, NamedTuple
 
 from pydantic import Field
 
-from glider_guidance.end_of_path import WayLeft, lower_turn, next_dive
-from glider_model.kernel import kernel
-from glider_model.polar import Polar, glide_vertical_rate
-from glider_model.settings import Settings
-from glider_model.signals import TICK_S
+from glider_guidance.yo.end_of_path import WayLeft, lower_turn, next_dive
+from glider_model.base.kernel import kernel
+from glider_model.base.settings import Settings
+from glider_model.base.signals import TICK_S
+from glider_model.onboard.glide_polar import Polar, glide_vertical_rate
 
 SURFACE_PREPARATION = 0
 GLIDING_DOWN = 1

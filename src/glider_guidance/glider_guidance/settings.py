@@ -12,16 +12,16 @@ from glider_guidance import methods
 from glider_guidance.current_observer import ObserverParams, ObserverState
 from glider_guidance.guidance import Commanded, Followed, GuidanceParams, GuidanceState, WaterState
 from glider_guidance.method import LosGains, MethodSettings
-from glider_guidance.path import PathSettings, StraightPath
-from glider_guidance.profile import INITIAL_PROFILE, ProfileSettings
-from glider_model import plugins
-from glider_model.command_filter import Filtered, FilterParams
-from glider_model.gate import INITIAL_GATE, GateSettings
-from glider_model.measurement import Measured
-from glider_model.polar import glide_horizontal_speed, make_polar
-from glider_model.settings import ConfigurationError, Settings
-from glider_model.steering import SteeringLearningSettings
-from glider_model.vehicle import load_vehicle, vehicle_path
+from glider_guidance.path.settings import PathSettings, StraightPath
+from glider_guidance.yo.machine import INITIAL_PROFILE, ProfileSettings
+from glider_model.base import plugins
+from glider_model.base.settings import ConfigurationError, Settings
+from glider_model.onboard.attitude_filter import Measured
+from glider_model.onboard.command_filter import Filtered, FilterParams
+from glider_model.onboard.gate import INITIAL_GATE, GateSettings
+from glider_model.onboard.glide_polar import glide_horizontal_speed, make_polar
+from glider_model.onboard.learnt_steering import SteeringLearningSettings
+from glider_model.vehicle.file import load_vehicle, vehicle_path
 
 #: Other parameters of guidance: no method can have such a name.
 TAKEN = {'los', 'observer', 'filters', 'steering', 'gate', 'vehicle', 'path', 'profile'}

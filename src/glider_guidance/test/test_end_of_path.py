@@ -9,8 +9,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from glider_guidance.end_of_path import way_left
-from glider_guidance.path import HelixPath, SplinePath, StraightPath, WaypointPath, path_length
+from glider_guidance.path.curve import path_length
+from glider_guidance.path.settings import HelixPath, SplinePath, StraightPath, WaypointPath
+from glider_guidance.yo.end_of_path import way_left
 
 quick = settings(max_examples=50, deadline=None)
 

@@ -14,19 +14,19 @@ from hypothesis import strategies as st
 from glider_guidance.current_observer import ObserverState
 from glider_guidance.guidance import INFEASIBLE_S, WaterState, guidance_abort, guidance_step
 from glider_guidance.methods.observer import LOOKAHEAD_STRETCH_MAX, lookahead_stretch
-from glider_guidance.path import HelixPath, StraightPath, WaypointPath
-from glider_guidance.profile import (
+from glider_guidance.path.settings import HelixPath, StraightPath, WaypointPath
+from glider_guidance.settings import GuidanceSettings
+from glider_guidance.yo.stage import (
     GLIDING_DOWN,
     GLIDING_UP,
     INFLECTING_DOWN,
     INFLECTING_UP,
     SURFACING,
 )
-from glider_guidance.settings import GuidanceSettings
-from glider_model.frames import quaternion_from_euler, rotate_to_body
-from glider_model.polar import glide_horizontal_speed
-from glider_model.signals import TICK_S, Odometry
-from glider_model.steering import SteeringLearningSettings
+from glider_model.base.frames import quaternion_from_euler, rotate_to_body
+from glider_model.base.signals import TICK_S, Odometry
+from glider_model.onboard.glide_polar import glide_horizontal_speed
+from glider_model.onboard.learnt_steering import SteeringLearningSettings
 
 quick = settings(max_examples=25, deadline=None)
 

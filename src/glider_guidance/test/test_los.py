@@ -15,14 +15,8 @@ from glider_guidance.los import (
     desired_direction,
     target_rate,
 )
-from glider_guidance.path import (
-    HelixPath,
-    SplinePath,
-    path_angles,
-    path_errors,
-    path_point,
-    path_tangent,
-)
+from glider_guidance.path.curve import path_angles, path_errors, path_point, path_tangent
+from glider_guidance.path.settings import HelixPath, SplinePath
 
 quick = settings(max_examples=100, deadline=None)
 

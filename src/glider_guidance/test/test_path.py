@@ -13,12 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 
-from glider_guidance.path import (
-    HelixPath,
-    PathSettings,
-    SplinePath,
-    StraightPath,
-    WaypointPath,
+from glider_guidance.path.curve import (
     path_angles,
     path_closest,
     path_errors,
@@ -26,6 +21,13 @@ from glider_guidance.path import (
     path_point,
     path_tangent,
     path_turn,
+)
+from glider_guidance.path.settings import (
+    HelixPath,
+    PathSettings,
+    SplinePath,
+    StraightPath,
+    WaypointPath,
 )
 
 quick = settings(max_examples=50, deadline=None)

@@ -9,31 +9,33 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from glider_guidance.end_of_path import WayLeft
-from glider_guidance.profile import (
+from glider_guidance.yo.end_of_path import WayLeft
+from glider_guidance.yo.machine import (
+    INITIAL_PROFILE,
+    NO_END,
+    PITCH_OVER,
+    ProfileSettings,
+    ProfileState,
+    mission_time_s,
+    profile_step,
+    profile_targets,
+)
+from glider_guidance.yo.stage import (
     AT_END_OF_PATH,
     GLIDING_DOWN,
     GLIDING_UP,
     INFLECTING_DOWN,
     INFLECTING_UP,
-    INITIAL_PROFILE,
-    NO_END,
-    PITCH_OVER,
     STAGE_NAMES,
     SURFACE_PREPARATION,
     SURFACING,
     WAITING_ON_SURFACE,
-    ProfileSettings,
-    ProfileState,
     is_descending,
     is_gliding,
-    mission_time_s,
-    profile_step,
-    profile_targets,
 )
-from glider_model.polar import make_polar
-from glider_model.signals import TICK_S
-from glider_model.vehicle import load_vehicle
+from glider_model.base.signals import TICK_S
+from glider_model.onboard.glide_polar import make_polar
+from glider_model.vehicle.file import load_vehicle
 
 quick = settings(max_examples=50, deadline=None)
 

@@ -17,12 +17,12 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_model.errors import ConfigurationError, shown
-from glider_model.files import read_text
-from glider_model.kernel import kernel
-from glider_model.noise import normal_pair, random_stream
-from glider_model.settings import Settings
-from glider_model.signals import Water
+from glider_model.base.errors import ConfigurationError, shown
+from glider_model.base.files import read_text
+from glider_model.base.kernel import kernel
+from glider_model.base.noise import normal_pair, random_stream
+from glider_model.base.settings import Settings
+from glider_model.base.signals import Water
 
 #: One international knot (m/s).
 KNOT_MPS = 1852.0 / 3600.0

@@ -13,12 +13,13 @@ import pytest
 import rclpy
 from rclpy.context import Context
 
-from glider_model.frames import quaternion_from_euler
-from glider_model.plant import Motion, PlantParams, PlantState, dive_depths, plant_step
-from glider_model.sensors import SensorSettings
-from glider_model.signals import TICK_S, Joints, Water
-from glider_model.vehicle import load_vehicle
-from glider_model.water import WaterSettings
+from glider_model.base.frames import quaternion_from_euler
+from glider_model.base.signals import TICK_S, Joints, Water
+from glider_model.ocean.density import DensitySettings
+from glider_model.plant.motion import Motion
+from glider_model.plant.plant import PlantParams, PlantState, dive_depths, plant_step
+from glider_model.plant.sensors import SensorSettings
+from glider_model.vehicle.file import load_vehicle
 
 
 # Not kept between runs: a cached function remembers the name of its module, and that depends on
@@ -80,7 +81,7 @@ def _plant_params(vehicle='zhang2021', **water):
     params = load_vehicle(vehicle).params() if isinstance(vehicle, str) else vehicle
     return PlantParams(
         params,
-        WaterSettings(**water).params(),
+        DensitySettings(**water).params(),
         10**9,
         0,
         0,

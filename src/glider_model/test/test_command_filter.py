@@ -9,8 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_model.command_filter import Filtered, FilterParams, filter_angle, filter_command
-from glider_model.frames import wrap_angle
+from glider_model.base.frames import wrap_angle
+from glider_model.onboard.command_filter import (
+    Filtered,
+    FilterParams,
+    filter_angle,
+    filter_command,
+)
 
 quick = settings(max_examples=40, deadline=None)
 DT = 0.1

@@ -11,14 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_model.current import (
-    KNOT_MPS,
-    M2_PERIOD_S,
-    MAX_SPEED_MPS,
-    CurrentSettings,
-    current_initial,
-    current_step,
-)
+from glider_model.ocean.current import current_initial, current_step
+from glider_model.ocean.current_profile import MAX_SPEED_MPS
+from glider_model.ocean.current_settings import KNOT_MPS, M2_PERIOD_S, CurrentSettings
 
 DT = 0.1
 quick = settings(max_examples=50, deadline=None)

@@ -11,8 +11,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_model import files
-from glider_model.errors import (
+from glider_model.base import files
+from glider_model.base.errors import (
     MAX_LINE,
     MAX_LINES,
     MAX_SHOWN,
@@ -20,7 +20,7 @@ from glider_model.errors import (
     printable,
     shown,
 )
-from glider_model.files import (
+from glider_model.base.files import (
     is_file,
     parse_json,
     parse_yaml,
@@ -30,7 +30,7 @@ from glider_model.files import (
     yaml_line,
     yaml_text,
 )
-from glider_model.vehicle import VEHICLE_FOLDER
+from glider_model.vehicle.file import VEHICLE_FOLDER
 
 #: Some 400 bytes that stand for 400 million values.
 BOMB = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(

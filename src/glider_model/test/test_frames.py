@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from glider_model.frames import (
+from glider_model.base.frames import (
     euler_from_quaternion,
     odometry_from_wire,
     odometry_to_wire,
@@ -27,7 +27,7 @@ from glider_model.frames import (
     wrench_from_wire,
     wrench_to_wire,
 )
-from glider_model.signals import Odometry, Reference, Water, Wrench
+from glider_model.base.signals import Odometry, Reference, Water, Wrench
 
 quick = settings(max_examples=60, deadline=None)
 angles = st.floats(-math.pi, math.pi)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from glider_model.noise import normal_pair, random_stream, splitmix64
+from glider_model.base.noise import normal_pair, random_stream, splitmix64
 
 
 @numba.njit

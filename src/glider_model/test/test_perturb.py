@@ -8,7 +8,11 @@ import numpy as np
 import pydantic
 import pytest
 
-from glider_model.perturb import (
+from glider_model.base.settings import ConfigurationError
+from glider_model.plant.plant import PlantSettings
+from glider_model.plant.trim import solve_trim
+from glider_model.vehicle.file import load_vehicle, vehicle_names
+from glider_model.vehicle.perturb import (
     ADDED_MASS,
     DAMPING,
     STATIC,
@@ -16,11 +20,7 @@ from glider_model.perturb import (
     PerturbSettings,
     perturbed,
 )
-from glider_model.plant import PlantSettings
-from glider_model.rigid_body import GRAVITY
-from glider_model.settings import ConfigurationError
-from glider_model.trim import solve_trim
-from glider_model.vehicle import load_vehicle, vehicle_names
+from glider_model.vehicle.rigid_body import GRAVITY
 
 FACTORS = (*VISCOUS, *STATIC, *DAMPING, *ADDED_MASS)
 

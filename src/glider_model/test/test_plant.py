@@ -10,21 +10,20 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from glider_model.actuators import actuators_step
-from glider_model.frames import euler_from_quaternion
-from glider_model.perturb import PerturbSettings, perturbed
-from glider_model.plant import (
+from glider_model.base.frames import euler_from_quaternion
+from glider_model.base.signals import TICK_S, Joints, Water
+from glider_model.plant.motion import acceleration, integrate
+from glider_model.plant.plant import (
     PlantSettings,
-    acceleration,
-    integrate,
     plant_finished,
     plant_joints,
     plant_odometry,
     plant_step,
 )
-from glider_model.rigid_body import GRAVITY, make_inertia, solve_mass
-from glider_model.signals import TICK_S, Joints, Water
-from glider_model.vehicle import load_vehicle
+from glider_model.vehicle.actuators import actuators_step
+from glider_model.vehicle.file import load_vehicle
+from glider_model.vehicle.perturb import PerturbSettings, perturbed
+from glider_model.vehicle.rigid_body import GRAVITY, make_inertia, solve_mass
 
 # Flights are not shrunk, which would take minutes, and are the same ones each time.
 flights = settings(

@@ -20,11 +20,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from glider_model.exponential import phi_functions
-from glider_model.plant import Motion, derivative, integrate
-from glider_model.rigid_body import make_inertia
-from glider_model.signals import TICK_S, Joints, Water
-from glider_model.vehicle import load_vehicle
+from glider_model.base.signals import TICK_S, Joints, Water
+from glider_model.plant.exponential import phi_functions
+from glider_model.plant.motion import Motion, derivative, integrate
+from glider_model.vehicle.file import load_vehicle
+from glider_model.vehicle.rigid_body import make_inertia
 
 G = 9.81
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_model.hydrodynamics import hydrodynamics
-from glider_model.rigid_body import coriolis, make_inertia, rigid_body, solve_mass
-from glider_model.vehicle import load_vehicle
+from glider_model.vehicle.file import load_vehicle
+from glider_model.vehicle.hydrodynamics import hydrodynamics
+from glider_model.vehicle.rigid_body import coriolis, make_inertia, rigid_body, solve_mass
 
 quick = settings(max_examples=60, deadline=None)
 NAMES = ['zhang2021', 'zhang2021_table1', 'seawing']

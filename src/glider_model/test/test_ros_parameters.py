@@ -15,6 +15,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from glider_model.base.settings import ConfigurationError, Settings
 from glider_model.ros.parameters import (
     changed_parameters,
     declare_settings,
@@ -24,7 +25,6 @@ from glider_model.ros.parameters import (
     to_parameters,
     with_parameters,
 )
-from glider_model.settings import ConfigurationError, Settings
 
 TUNABLE = {'tunable': True}
 

@@ -12,15 +12,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from glider_model.frames import (
+from glider_model.base.frames import (
     euler_from_quaternion,
     odometry_from_wire,
     odometry_to_wire,
     quaternion_from_euler,
 )
-from glider_model.plant import PlantSettings, plant_measurement, plant_odometry
-from glider_model.sensors import SensorSettings, is_noisy, measure, noise_of_tick, recover
-from glider_model.signals import Odometry
+from glider_model.base.signals import Odometry
+from glider_model.plant.plant import PlantSettings, plant_measurement, plant_odometry
+from glider_model.plant.sensors import (
+    SensorSettings,
+    add_noise,
+    is_noisy,
+    noise_of_tick,
+    remove_noise,
+)
 
 quick = settings(max_examples=100, deadline=None)
 
@@ -74,25 +80,25 @@ def test_numbers_are_independent_of_each_other_and_from_tick_to_tick(noise):
 def test_no_noise_is_the_very_same_numbers(seed, tick):
     params = SensorSettings().params(seed)
     assert not is_noisy(params)
-    assert measure(odometry(), tick, params) == odometry()
-    assert recover(odometry(), tick, params) == odometry()
+    assert add_noise(odometry(), tick, params) == odometry()
+    assert remove_noise(odometry(), tick, params) == odometry()
 
 
 @pytest.mark.parametrize('name', NOISE)
 def test_each_kind_of_noise_alone_is_noise(name):
     params = SensorSettings(**{name: NOISE[name]}).params(0)
     assert is_noisy(params)
-    assert measure(odometry(), 3, params) != odometry()
+    assert add_noise(odometry(), 3, params) != odometry()
 
 
 @quick
 @given(seeds, ticks)
 def test_a_measurement_is_a_function_of_seed_and_tick(seed, tick):
     one, two = (SensorSettings(**NOISE).params(seed) for _ in range(2))
-    assert measure(odometry(), tick, one) == measure(odometry(), tick, two)
+    assert add_noise(odometry(), tick, one) == add_noise(odometry(), tick, two)
     other = SensorSettings(**NOISE).params((seed + 1) % 2**63)
-    assert measure(odometry(), tick, other) != measure(odometry(), tick, one)
-    assert measure(odometry(), tick + 1, one) != measure(odometry(), tick, one)
+    assert add_noise(odometry(), tick, other) != add_noise(odometry(), tick, one)
+    assert add_noise(odometry(), tick + 1, one) != add_noise(odometry(), tick, one)
 
 
 @quick
@@ -100,8 +106,8 @@ def test_a_measurement_is_a_function_of_seed_and_tick(seed, tick):
 def test_the_truth_comes_back_from_what_went_over_a_topic(seed, tick, phi, theta, psi):
     params = SensorSettings(**NOISE).params(seed)
     true = odometry(phi, theta, psi)
-    wire = odometry_to_wire(measure(true, tick, params))
-    back = recover(odometry_from_wire(wire), tick, params)
+    wire = odometry_to_wire(add_noise(true, tick, params))
+    back = remove_noise(odometry_from_wire(wire), tick, params)
     np.testing.assert_allclose(back[:3], true[:3], rtol=0.0, atol=1e-11)
     one, two = (
         Rotation.from_quat(np.roll(back[3:7], -1)),
@@ -115,7 +121,7 @@ def test_the_truth_comes_back_from_what_went_over_a_topic(seed, tick, phi, theta
 @given(seeds, st.floats(-0.6, 0.6), st.floats(-1.2, 1.2), angles)
 def test_noise_of_heading_turns_about_the_vertical(seed, phi, theta, psi):
     params = SensorSettings(heading_std_deg=0.5).params(seed)
-    measured = euler_from_quaternion(*measure(odometry(phi, theta, psi), 9, params)[3:7])
+    measured = euler_from_quaternion(*add_noise(odometry(phi, theta, psi), 9, params)[3:7])
     expected = psi + noise_of_tick(9, params).psi
     assert measured[:2] == pytest.approx((phi, theta), abs=1e-12)
     assert math.cos(measured[2] - expected) == pytest.approx(1.0, abs=1e-14)
@@ -126,21 +132,21 @@ def test_noise_of_roll_and_pitch_adds_to_roll_and_pitch():
     params = SensorSettings(attitude_std_deg=0.2).params(1)
     for tick in range(20):
         noise = noise_of_tick(tick, params)
-        phi, theta, psi = euler_from_quaternion(*measure(odometry(), tick, params)[3:7])
+        phi, theta, psi = euler_from_quaternion(*add_noise(odometry(), tick, params)[3:7])
         assert theta == pytest.approx(-0.5 + noise.theta, abs=1e-4)
         assert phi == pytest.approx(noise.phi, abs=1e-4)
         assert psi == pytest.approx(1.0, abs=1e-4)
 
 
 def test_velocity_over_ground_keeps_its_numbers_in_body_axes():
-    measured = measure(odometry(), 5, SensorSettings(**NOISE).params(0))
+    measured = add_noise(odometry(), 5, SensorSettings(**NOISE).params(0))
     assert measured[7:10] == odometry()[7:10]
 
 
 def test_attitude_stays_a_unit_quaternion():
     params = SensorSettings(attitude_std_deg=10.0, heading_std_deg=45.0).params(0)
     for tick in range(100):
-        assert np.linalg.norm(measure(odometry(), tick, params)[3:7]) == pytest.approx(
+        assert np.linalg.norm(add_noise(odometry(), tick, params)[3:7]) == pytest.approx(
             1.0, abs=1e-15
         )
 
@@ -148,7 +154,7 @@ def test_attitude_stays_a_unit_quaternion():
 def test_plant_measures_with_the_noise_of_its_tick_and_seed():
     given = PlantSettings(sensors=NOISE, seed=4)
     state = given.initial_state()._replace(tick=17)
-    expected = measure(plant_odometry(state), 17, SensorSettings(**NOISE).params(4))
+    expected = add_noise(plant_odometry(state), 17, SensorSettings(**NOISE).params(4))
     assert plant_measurement(state, given.params()) == expected
 
 

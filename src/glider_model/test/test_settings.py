@@ -8,9 +8,9 @@ import pydantic
 import pytest
 from pydantic import Field
 
-from glider_model.errors import ConfigurationError
-from glider_model.files import read_yaml
-from glider_model.settings import Settings, validate
+from glider_model.base.errors import ConfigurationError
+from glider_model.base.files import read_yaml
+from glider_model.base.settings import Settings, validate
 
 
 class Cat(Settings):

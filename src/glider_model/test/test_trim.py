@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from glider_model.frames import quaternion_from_euler
-from glider_model.settings import ConfigurationError
-from glider_model.trim import solve_trim
-from glider_model.vehicle import load_vehicle
+from glider_model.base.frames import quaternion_from_euler
+from glider_model.base.settings import ConfigurationError
+from glider_model.plant.trim import solve_trim
+from glider_model.vehicle.file import load_vehicle
 
 ZHANG = load_vehicle('zhang2021').params()
 SEAWING = load_vehicle('seawing').params()

@@ -9,9 +9,9 @@ import re
 import pytest
 import yaml
 
-from glider_model.errors import ConfigurationError
-from glider_model.files import read_yaml
-from glider_model.vehicle import VEHICLE_FOLDER, load_vehicle, vehicle_names, vehicle_path
+from glider_model.base.errors import ConfigurationError
+from glider_model.base.files import read_yaml
+from glider_model.vehicle.file import VEHICLE_FOLDER, load_vehicle, vehicle_names, vehicle_path
 
 MISSING = object()
 

@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from glider_bringup.console import Json, counter, messages, output, picked, repeatable
-from glider_model.exits import EXIT_FAILED
+from glider_model.base.exits import EXIT_FAILED
 
 app = typer.Typer()
 #: Doors, each a module of `glider_bringup.fuzzing`, with the cases tried by default.

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from glider_bringup.console import Json, Run, beside, counter, messages, output
 from glider_bringup.disk import write_whole
-from glider_model.settings import ConfigurationError
+from glider_model.base.settings import ConfigurationError
 
 app = typer.Typer()
 

@@ -30,9 +30,9 @@ from glider_bringup.mission.scenario import (
 )
 from glider_bringup.showing.scorecard import print_card, print_places
 from glider_guidance.settings import LosSettings
-from glider_model.exits import EXIT_FAILED, EXIT_INTERRUPTED
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_S
+from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_S
 
 app = typer.Typer()
 Engine = Literal[ENGINES]

@@ -26,8 +26,8 @@ from glider_bringup.console import (
 )
 from glider_bringup.disk import write_whole
 from glider_bringup.mission.scenario import DEFAULT_SCENARIO
-from glider_model.exits import EXIT_FAILED
-from glider_model.signals import TICK_S
+from glider_model.base.exits import EXIT_FAILED
+from glider_model.base.signals import TICK_S
 
 app = typer.Typer()
 Group = Literal['current', 'yaw', 'profile', 'robustness', 'paths', 'envelope']
@@ -63,8 +63,8 @@ def montecarlo(
     Each hydrodynamic coefficient differs by up to 30 %, added mass by 15 %, trim by 10 mm, roll at
     rest by 10 deg, ballast by 50 g; water is stratified. Control knows the file only.
     """
-    from glider_bringup import montecarlo as study
     from glider_bringup.mission.run_folder import make_result_folder
+    from glider_bringup.studies import montecarlo as study
 
     fields = changed_fields(changes)
     if duration != 'full':
@@ -139,29 +139,28 @@ def experiments(
     By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
     engine: 135 flights, most of them of 30 hours.
     """
-    from glider_bringup import experiment_tables
-    from glider_bringup import experiments as study
     from glider_bringup.mission.run_folder import make_result_folder
     from glider_bringup.showing import paper_figures
+    from glider_bringup.studies.paper import catalogue, flying, tables, verdicts
 
-    planned = study.make_experiments(picked(only, Group))
-    flights = study.count_flights(planned)
+    planned = catalogue.make_experiments(picked(only, Group))
+    flights = flying.count_flights(planned)
     if out:
-        make_result_folder(out, study.RESULT_FILE)
+        make_result_folder(out, verdicts.RESULT_FILE)
     messages.print(f'{len(planned)} experiments, {flights} flights')
     with workers_at_work(workers, scheduler) as pool, counter('flying', flights) as update:
-        rows, records = study.fly(planned, pool, update)
-    result = study.report(planned, rows)
+        rows, records = flying.fly(planned, pool, update)
+    result = verdicts.report(planned, rows)
     if out:
         with messages.status('drawing'):
             drawn = paper_figures.draw(planned, rows, records, out)
         text = json.dumps(result, indent=2) + '\n'
-        write_whole(out / study.RESULT_FILE, text)
+        write_whole(out / verdicts.RESULT_FILE, text)
         for file in drawn:
             messages.print(f'drawn: {file}', soft_wrap=True)
     if as_json:
         print(json.dumps(result))
     else:
-        experiment_tables.show(result, output)
-    if any(one['verdict'] == study.FAILED for one in result['experiments']):
+        tables.show(result, output)
+    if any(one['verdict'] == verdicts.FAILED for one in result['experiments']):
         raise typer.Exit(EXIT_FAILED)

@@ -21,7 +21,7 @@ from glider_bringup.console import (
     output,
     workers_at_work,
 )
-from glider_model.exits import EXIT_FAILED
+from glider_model.base.exits import EXIT_FAILED
 
 app = typer.Typer()
 #: So many of the cells that failed are told one by one.
@@ -54,8 +54,8 @@ def sweep(
     Each cell has the numbers that ./glider run gives for it. The file is the same to the last byte
     whatever the number of workers and of interruptions. Exit code 1 if a cell failed.
     """
-    from glider_bringup.studies import sweep as study
-    from glider_bringup.sweep_file import load_sweep
+    from glider_bringup.studies.sweep import fly as study
+    from glider_bringup.studies.sweep.plan import load_sweep
 
     with messages.status('checking every value of the sweep'):
         plan = load_sweep(name, changed_fields(changes))
@@ -89,7 +89,7 @@ def sweep(
 
 def _fly(plan, journal, known, workers, scheduler, again: str) -> None:
     """Fly what is missing, with a progress bar; say how to go on if something ends it early."""
-    from glider_bringup.studies import sweep as study
+    from glider_bringup.studies.sweep import fly as study
 
     def advice() -> str:
         flown = sum(study.flown_cells(plan, journal))

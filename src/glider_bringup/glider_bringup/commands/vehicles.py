@@ -12,11 +12,11 @@ from rich.table import Table
 from glider_bringup.console import Json, changed_fields, messages, output
 from glider_bringup.door.studies import scenarios, vehicles
 from glider_bringup.mission.scenario import split_changes
-from glider_bringup.sweep_file import read_sweep, sweep_names
-from glider_model.exits import EXIT_FAILED
-from glider_model.settings import ConfigurationError
-from glider_model.trim import Trim, solve_trim
-from glider_model.vehicle import changed_vehicle, load_vehicle
+from glider_bringup.studies.sweep.plan import read_sweep, sweep_names
+from glider_model.base.exits import EXIT_FAILED
+from glider_model.base.settings import ConfigurationError
+from glider_model.plant.trim import Trim, solve_trim
+from glider_model.vehicle.file import changed_vehicle, load_vehicle
 
 app = typer.Typer()
 

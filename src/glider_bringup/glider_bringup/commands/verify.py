@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from glider_bringup.console import Json, Run, messages, output, picked, repeatable, shares
-from glider_model.exits import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
 
 app = typer.Typer()
 BlockName = Literal['plant', 'current', 'guidance', 'control']
@@ -38,7 +38,7 @@ def verify(
     Exit code 1, and the first tick, topic and field that differ, unless all of them are identical.
     """
     from glider_bringup.interrupts import interrupts_at
-    from glider_bringup.mcap_reader import Bag
+    from glider_bringup.recording.mcap_reader import Bag
     from glider_bringup.ros import verify as work
     from glider_bringup.ros.recording import Recording, read_told
 

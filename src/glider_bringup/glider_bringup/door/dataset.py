@@ -3,7 +3,7 @@
 """A run as an xarray Dataset: every number of every topic over time, by name.
 
 Topics are ENU and FLU; here everything is NED (world) and FRD (body), as in the scorecard and in
-books on marine craft, SI and radians. `glider_model.frames` turns one into the other.
+books on marine craft, SI and radians. `glider_model.base.frames` turns one into the other.
 """
 
 import json
@@ -19,18 +19,18 @@ from glider_bringup.scoring.true_motion import wire_of
 from glider_control.block import CONTROL
 from glider_control.control import SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL
 from glider_control.watch import ROWS
-from glider_guidance.profile import STAGE_NAMES
-from glider_model.block import Telling
-from glider_model.frames import (
+from glider_guidance.yo.stage import STAGE_NAMES
+from glider_model.base.block import Telling
+from glider_model.base.frames import (
     euler_from_quaternion,
     odometry_from_wire,
     reference_from_wire,
     water_from_wire,
     wrench_from_wire,
 )
-from glider_model.kernel import kernel, source_digest
-from glider_model.signals import TICK_NS, Adaptation
-from glider_model.vehicle import vehicle_file
+from glider_model.base.kernel import kernel, source_digest
+from glider_model.base.signals import TICK_NS, Adaptation
+from glider_model.vehicle.file import vehicle_file
 
 NED, FRD, PATH = 'NED', 'FRD', 'path'
 _AXES = ('north', 'east', 'down')

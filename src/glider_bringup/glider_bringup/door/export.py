@@ -9,7 +9,7 @@ import xarray
 from scipy.io import savemat
 
 from glider_bringup.disk import whole_file
-from glider_bringup.sweep_result import write_dataset
+from glider_bringup.studies.sweep.netcdf import write_dataset
 
 #: Rows of a CSV file that are written at once: an hour.
 _ROWS = 36_000

@@ -17,7 +17,6 @@ from glider_bringup.engines.direct import COLUMNS, ROW
 from glider_bringup.engines.flight import Flight
 from glider_bringup.engines.flight import fly as fly_direct
 from glider_bringup.engines.processes import given_domain
-from glider_bringup.mcap_reader import Bag, has_bag
 from glider_bringup.mission.choices import ENGINES, chosen_fields
 from glider_bringup.mission.planned import planned_ticks
 from glider_bringup.mission.run_folder import (
@@ -33,12 +32,14 @@ from glider_bringup.mission.scenario import (
     load_scenario,
     make_scenario,
 )
+from glider_bringup.recording.bag_files import has_bag
+from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.scoring.traces import make_tracer
-from glider_model.files import parse_yaml
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_S
+from glider_model.base.files import parse_yaml
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_S
 
 if TYPE_CHECKING:
     import xarray

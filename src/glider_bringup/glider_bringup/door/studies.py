@@ -8,8 +8,8 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from glider_bringup.mission.scenario import load_scenario, scenario_names
-from glider_model.trim import Trim, solve_trim
-from glider_model.vehicle import load_vehicle, vehicle_names
+from glider_model.plant.trim import Trim, solve_trim
+from glider_model.vehicle.file import load_vehicle, vehicle_names
 
 if TYPE_CHECKING:
     import xarray
@@ -101,10 +101,10 @@ def sweep(
         Naming file, field, value and allowed range.
     """
     from glider_bringup.console import counter
-    from glider_bringup.pool import worker_pool
-    from glider_bringup.studies import sweep as study
-    from glider_bringup.sweep_file import load_sweep
-    from glider_bringup.sweep_result import read_dataset
+    from glider_bringup.studies.sweep import fly as study
+    from glider_bringup.studies.sweep.netcdf import read_dataset
+    from glider_bringup.studies.sweep.plan import load_sweep
+    from glider_bringup.studies.workers import worker_pool
 
     plan = load_sweep(str(name))
     bar = counter('flying', plan.cells) if progress else nullcontext(lambda done: None)

@@ -16,14 +16,14 @@ from glider_control.block import control_tick
 from glider_control.control import ControlParams, ControlState
 from glider_guidance.block import guidance_tick
 from glider_guidance.guidance import GuidanceParams, GuidanceState
-from glider_model.block import put
-from glider_model.current import CurrentParams, CurrentState, current_step_in_place
-from glider_model.frames import odometry_from_wire, water_to_wire
-from glider_model.kernel import kernel
-from glider_model.plant import PlantParams, PlantState, not_finite, state_fault
-from glider_model.plant_block import plant_move, plant_outputs
-from glider_model.signals import TICK_S, Joints
-from glider_model.wiring import FIELDS, WIRING, publisher
+from glider_model.base.block import put
+from glider_model.base.frames import odometry_from_wire, water_to_wire
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import TICK_S, Joints
+from glider_model.base.wiring import FIELDS, WIRING, publisher
+from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
+from glider_model.plant.block import plant_move, plant_outputs
+from glider_model.plant.plant import PlantParams, PlantState, not_finite, state_fault
 
 
 def _columns() -> dict[str, slice | int]:

@@ -32,9 +32,9 @@ from glider_bringup.mission.scenario import (
     scenario_names,
 )
 from glider_bringup.ros.node_parameters import node_parameters, write_parameters
-from glider_model.ros.messages import CURRENT
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_S
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_S
+from glider_model.ros.wire.topics import CURRENT
 
 #: The node that `ros2 launch` starts and `./glider run`, which nobody can watch, does not.
 TF, TF_MODULE = 'tf_node', 'glider_model.nodes.tf_node'

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from glider_bringup.engines.processes import NAMESPACE, OWN_CLOCK, domain_id
-from glider_model.exits import FATAL
-from glider_model.settings import ConfigurationError
+from glider_model.base.exits import FATAL
+from glider_model.base.settings import ConfigurationError
 
 #: The view has this long (s) to leave.
 _LEAVE_S = 3.0

@@ -19,10 +19,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from glider_model import wiring
-from glider_model.errors import ConfigurationError, shown
-from glider_model.exits import FATAL
-from glider_model.wiring import WIRING
+from glider_model.base import wiring
+from glider_model.base.errors import ConfigurationError, shown
+from glider_model.base.exits import FATAL
+from glider_model.base.wiring import WIRING
 
 PLANT, RECORDER = wiring.PLANT.node, 'recorder_node'
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from glider_bringup.engines.flight import Flight, Progress, Taker, fly
 from glider_bringup.engines.processes import NAMESPACE, node_commands, run_nodes
-from glider_bringup.mcap_reader import Bag, has_bag
 from glider_bringup.mission.run_folder import (
     LOG_FILE,
     PARAMETERS_FILE,
@@ -15,12 +14,14 @@ from glider_bringup.mission.run_folder import (
     VEHICLE_FILE,
 )
 from glider_bringup.mission.scenario import Scenario
-from glider_bringup.ros.bag import BagWriter, Sync
+from glider_bringup.recording.bag_files import has_bag
+from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
 from glider_bringup.ros.bag_log import LogWriter
 from glider_bringup.ros.node_parameters import node_parameters, write_parameters
 from glider_bringup.ros.read_back import Reader, ended, read_back
-from glider_model.exits import EXIT_USAGE
-from glider_model.settings import ConfigurationError
+from glider_model.base.exits import EXIT_USAGE
+from glider_model.base.settings import ConfigurationError
 
 
 def fly_recorded(

@@ -20,11 +20,16 @@ from mcap.opcode import Opcode
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import outcome_of
-from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.ros.republish import (
+    check_not_empty,
+    plan_replay,
+    qos_of,
+    recorded_messages,
+)
 from glider_bringup.ros.recording import Recording, read_told
-from glider_bringup.ros.replay import check_not_empty, plan_replay, qos_of, recorded_messages
 from glider_bringup.ros.verify import report, verify
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
@@ -32,7 +37,7 @@ from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.scoring.traces import make_tracer
 from glider_bringup.showing.flown_run import keep_traces, read_run
 from glider_bringup.showing.report import report_page
-from glider_model.settings import ConfigurationError
+from glider_model.base.settings import ConfigurationError
 
 #: Two minutes in which everything happens, in ten chunks.
 FLIGHT = {

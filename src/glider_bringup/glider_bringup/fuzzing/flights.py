@@ -18,9 +18,9 @@ from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.scoring.card import finite, fly_scored, scorecard
-from glider_model.current import MAX_SPEED_MPS
-from glider_model.settings import ConfigurationError
-from glider_model.vehicle import vehicle_names
+from glider_model.base.settings import ConfigurationError
+from glider_model.ocean.current_profile import MAX_SPEED_MPS
+from glider_model.vehicle.file import vehicle_names
 
 #: Sections of a scenario whose numbers are drawn.
 SECTIONS = ('perturb', 'initial', 'water', 'sensors', 'profile', 'guidance', 'control')

@@ -19,13 +19,13 @@ from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission.scenario import load_scenario
 from glider_control.control import control_step
 from glider_guidance.guidance import guidance_step
-from glider_model.current import current_step
-from glider_model.frames import odometry_from_wire, reference_from_wire
-from glider_model.plant import plant_step
-from glider_model.ros.codec import MessageError, to_cdr
-from glider_model.ros.messages import TOPICS
-from glider_model.ros.tick import Input
-from glider_model.signals import TICK_NS, TICK_S, Joints, Water
+from glider_model.base.frames import odometry_from_wire, reference_from_wire
+from glider_model.base.signals import TICK_NS, TICK_S, Joints, Water
+from glider_model.ocean.current import current_step
+from glider_model.plant.plant import plant_step
+from glider_model.ros.lockstep.inputs import Input
+from glider_model.ros.wire.codec import MessageError, to_cdr
+from glider_model.ros.wire.topics import TOPICS
 
 #: Topics that a block reads. What the plant makes of a wild current it says itself: it fails.
 READ = ('odom', 'joint_states', 'reference', 'command')

@@ -4,8 +4,8 @@
 
 from glider_bringup.mission.scenario import Scenario
 from glider_guidance.guidance import path_time_s
-from glider_guidance.profile import mission_time_s
-from glider_model.signals import TICK_S
+from glider_guidance.yo.machine import mission_time_s
+from glider_model.base.signals import TICK_S
 
 
 def planned_ticks(scenario: Scenario) -> int:

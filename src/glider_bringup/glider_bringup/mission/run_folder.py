@@ -10,8 +10,8 @@ from tempfile import TemporaryDirectory
 
 from glider_bringup.disk import write_whole
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_model.settings import ConfigurationError
-from glider_model.vehicle import vehicle_file
+from glider_model.base.settings import ConfigurationError
+from glider_model.vehicle.file import vehicle_file
 
 SCENARIO_FILE, VEHICLE_FILE, SCORE_FILE = 'scenario.yaml', 'vehicle.yaml', 'score.json'
 PARAMETERS_FILE, LOG_FILE = 'parameters.yaml', 'log.txt'

@@ -12,16 +12,13 @@ from pydantic import Field
 
 from glider_bringup.mission.rules import Rules
 from glider_control.settings import ControlLawSettings, ControlSettings
-from glider_guidance.path import PathSettings, StraightPath, path_length, path_point
-from glider_guidance.profile import ProfileSettings
+from glider_guidance.path.curve import path_length, path_point
+from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
-from glider_model.current import CurrentSettings
-from glider_model.errors import clipped, told_changes
-from glider_model.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
-from glider_model.perturb import PerturbSettings, perturbed
-from glider_model.plant import SURFACE_S, InitialSettings, PlantSettings
-from glider_model.sensors import SensorSettings
-from glider_model.settings import (
+from glider_guidance.yo.machine import ProfileSettings
+from glider_model.base.errors import clipped, told_changes
+from glider_model.base.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
+from glider_model.base.settings import (
     ConfigurationError,
     Settings,
     file_names,
@@ -29,8 +26,12 @@ from glider_model.settings import (
     holder_of,
     validate,
 )
-from glider_model.vehicle import changed_vehicle, load_vehicle, vehicle_names, vehicle_path
-from glider_model.water import WaterSettings
+from glider_model.ocean.current_settings import CurrentSettings
+from glider_model.ocean.density import DensitySettings
+from glider_model.plant.plant import SURFACE_S, InitialSettings, PlantSettings
+from glider_model.plant.sensors import SensorSettings
+from glider_model.vehicle.file import changed_vehicle, load_vehicle, vehicle_names, vehicle_path
+from glider_model.vehicle.perturb import PerturbSettings, perturbed
 
 SCENARIO_FOLDER = Path(__file__).parent / 'scenarios'
 DEFAULT_SCENARIO = 'current_8deg'
@@ -80,7 +81,7 @@ class Scenario(Settings):
     initial: InitialSettings = Field(
         InitialSettings(depth_m=0.1), description='state at the start'
     )
-    water: WaterSettings = Field(WaterSettings(), description='density of the water')
+    water: DensitySettings = Field(DensitySettings(), description='density of the water')
     current: CurrentSettings = Field(CurrentSettings(), description='current')
     sensors: SensorSettings = Field(SensorSettings(), description='noise of the odometry')
     perturb: PerturbSettings = Field(

@@ -14,17 +14,21 @@ from pydantic import Field
 from std_msgs.msg import Header
 
 from glider_bringup.disk import DiskError
-from glider_bringup.ros.bag import BagWriter, Sync
-from glider_bringup.tick_order import TickOrder
-from glider_model.exits import EXIT_FAILED
-from glider_model.ros import health, messages, qos
-from glider_model.ros.codec import MessageError, to_cdr
-from glider_model.ros.executor import take, take_with_info
-from glider_model.ros.messages import TOPICS
+from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
+from glider_bringup.recording.tick_sorter import TickSorter
+from glider_model.base.exits import EXIT_FAILED
+from glider_model.base.settings import ConfigurationError, Settings
+from glider_model.base.signals import TICK_NS
+from glider_model.ros.lockstep import health
+from glider_model.ros.lockstep.executor import take, take_with_info
+from glider_model.ros.lockstep.inputs import Input
+from glider_model.ros.lockstep.node import TickNode
+from glider_model.ros.lockstep.process import Stop, run
+from glider_model.ros.lockstep.watch import FAREWELL_S
 from glider_model.ros.parameters import declare_settings
-from glider_model.ros.tick import FAREWELL_S, Input, Stop, TickNode, run
-from glider_model.settings import ConfigurationError, Settings
-from glider_model.signals import TICK_NS
+from glider_model.ros.wire import qos, topics
+from glider_model.ros.wire.codec import MessageError, to_cdr
+from glider_model.ros.wire.topics import TOPICS
 
 _DRAIN_S = 0.02
 _PROGRESS_S = 0.25
@@ -51,7 +55,7 @@ class RecorderNode(TickNode):
     """Takes all topics raw; writes tick by tick in a fixed order."""
 
     def __init__(self, **kwargs) -> None:
-        super().__init__(messages.RECORDER, **kwargs)
+        super().__init__(topics.RECORDER, **kwargs)
         self.settings = declare_settings(self, RecorderSettings)
         try:
             self.bag = BagWriter(
@@ -63,7 +67,7 @@ class RecorderNode(TickNode):
             )
         except OSError as error:
             raise ConfigurationError(f'{error.filename}: {error.strerror}') from None
-        self.order = TickOrder(PER_TICK, TICK_NS, self.write)
+        self.order = TickSorter(PER_TICK, TICK_NS, self.write)
         self.recorded_ns = -TICK_NS  #: newest tick that outlives this process
         self.has_path = False
         self.stage, self.last_odom, self.depth_m = '', b'', 0.0
@@ -107,7 +111,7 @@ class RecorderNode(TickNode):
     def is_replayed(self) -> bool:
         """Whether what comes is a recording, published again."""
         publishers = self.get_publishers_info_by_topic('odom')
-        return any(info.node_name == messages.REPLAY for info in publishers)
+        return any(info.node_name == topics.REPLAY for info in publishers)
 
     def on_ready(self) -> None:
         """Forget what came before this run began: it is somebody else's."""
@@ -138,7 +142,7 @@ class RecorderNode(TickNode):
 
     def on_report(self, report: health.Report) -> None:
         """Learn the last tick from the plant, and keep what it says about the end."""
-        if report.node == messages.PLANT and report.phase in (health.FINISHED, health.FAILED):
+        if report.node == topics.PLANT and report.phase in (health.FINISHED, health.FAILED):
             self.over_since_s = time.monotonic()
             self.final_ns = report.stamp_ns if report.phase == health.FINISHED else -1
             name = f'{self.get_namespace().rstrip("/")}/{report.node}'

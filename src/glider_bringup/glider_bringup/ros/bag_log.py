@@ -12,17 +12,18 @@ from rclpy.serialization import deserialize_message
 
 from glider_bringup.blocks import BLOCKS
 from glider_bringup.engines.direct import BLOCK_TICKS, COLUMNS, ROW
-from glider_bringup.mcap_reader import Bag, Batch
-from glider_bringup.ros.bag import BagWriter
+from glider_bringup.recording.mcap_reader import Bag, Batch
+from glider_bringup.recording.ros.rosbag2 import BagWriter
 from glider_guidance.nodes.guidance_node import path_message
-from glider_guidance.profile import STAGE_NAMES
-from glider_model.block import Telling
-from glider_model.ros import health, messages
-from glider_model.ros.codec import Codec, to_cdr
-from glider_model.ros.messages import TOPICS
-from glider_model.signals import TICK_NS
+from glider_guidance.yo.stage import STAGE_NAMES
+from glider_model.base.block import Telling
+from glider_model.base.signals import TICK_NS
+from glider_model.ros.lockstep import health
+from glider_model.ros.wire import topics
+from glider_model.ros.wire.codec import Codec, to_cdr
+from glider_model.ros.wire.topics import TOPICS
 
-_PLANT = f'/glider/{messages.PLANT}'
+_PLANT = f'/glider/{topics.PLANT}'
 _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 
 #: Topics that the score is computed from.

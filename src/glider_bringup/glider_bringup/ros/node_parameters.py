@@ -9,8 +9,8 @@ from pathlib import Path
 from glider_bringup.blocks import BLOCKS
 from glider_bringup.disk import write_whole
 from glider_bringup.mission.scenario import Scenario
-from glider_model.ros import messages
 from glider_model.ros.parameters import parameters_yaml, to_parameters
+from glider_model.ros.wire import topics
 
 
 def node_parameters(
@@ -42,9 +42,9 @@ def node_parameters(
         block.wired.node: to_parameters(settings)
         for block, settings in zip(BLOCKS, scenario.block_settings(), strict=True)
     }
-    nodes[messages.PLANT]['speed'] = speed
+    nodes[topics.PLANT]['speed'] = speed
     if record_to is not None:
-        nodes[messages.RECORDER] = {
+        nodes[topics.RECORDER] = {
             'folder': str(record_to.resolve()),
             'name': scenario.name,
             'attachments': json.dumps([str(path.resolve()) for path in attachments]),

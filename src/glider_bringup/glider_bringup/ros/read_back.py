@@ -7,9 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
-from glider_bringup.mcap_reader import Bag
+from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.ros.bag_log import RecordedLog
-from glider_model.signals import NOT_FINITE
+from glider_model.base.signals import NOT_FINITE
 
 
 class Reader(Protocol):

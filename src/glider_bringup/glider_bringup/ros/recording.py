@@ -11,15 +11,15 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
 from glider_bringup.blocks import BLOCKS
-from glider_bringup.mcap_reader import Bag
 from glider_bringup.mission.run_folder import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE
 from glider_bringup.mission.scenario import Scenario, load_scenario
+from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.ros.bag_log import decode
-from glider_model.files import read_yaml
-from glider_model.ros.codec import Codec
-from glider_model.ros.messages import TOPICS
+from glider_model.base.files import read_yaml
+from glider_model.base.settings import ConfigurationError, Settings
 from glider_model.ros.parameters import from_parameters
-from glider_model.settings import ConfigurationError, Settings
+from glider_model.ros.wire.codec import Codec
+from glider_model.ros.wire.topics import TOPICS
 
 #: Messages of foreign layout whose bytes are kept, for each topic.
 _KEPT = 1000

@@ -18,22 +18,22 @@ from nav_msgs.msg import Path
 from rclpy.serialization import deserialize_message
 
 from glider_bringup.blocks import BLOCKS
-from glider_bringup.mcap_reader import Bag
 from glider_bringup.recorded_inputs import RecordedBlock
+from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.ros.recording import Event, Recording, Series, Told
 from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
-from glider_guidance.profile import STAGE_NAMES, SURFACING
-from glider_model import wiring
-from glider_model.block import Telling
-from glider_model.plant_block import PLANT
-from glider_model.ros import health
-from glider_model.ros.codec import cdr_places, to_cdr
-from glider_model.ros.messages import TOPICS
-from glider_model.ros.orders import ABORT, PARAMETERS_SET, SURFACE
+from glider_guidance.yo.stage import STAGE_NAMES, SURFACING
+from glider_model.base import wiring
+from glider_model.base.block import Telling
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_NS
+from glider_model.base.wiring import WIRING, Wired
+from glider_model.plant.block import PLANT
+from glider_model.ros.lockstep import health
+from glider_model.ros.lockstep.orders import ABORT, PARAMETERS_SET, SURFACE
 from glider_model.ros.parameters import with_parameters
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_NS
-from glider_model.wiring import WIRING, Wired
+from glider_model.ros.wire.codec import cdr_places, to_cdr
+from glider_model.ros.wire.topics import TOPICS
 
 IDENTICAL, DIFFERENT, SKIPPED = 'identical', 'different', 'skipped'
 

@@ -6,16 +6,17 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from glider_bringup.engines.flight import Flight
-from glider_bringup.mcap_reader import Bag, has_bag
 from glider_bringup.mission.planned import planned_ticks
 from glider_bringup.mission.run_folder import PARAMETERS_FILE, scenario_of
 from glider_bringup.mission.scenario import Scenario
+from glider_bringup.recording.bag_files import has_bag
+from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.ros.bag_log import RecordedLog
 from glider_bringup.ros.read_back import Reader, ended, read_back
 from glider_bringup.scoring.card import read_score, scorecard
 from glider_bringup.scoring.score import make_scorer, scores_of
-from glider_model.ros.health import FINISHED
-from glider_model.settings import ConfigurationError
+from glider_model.base.settings import ConfigurationError
+from glider_model.ros.lockstep.health import FINISHED
 
 #: Gets the ticks read from a bag, and about how many there are.
 Reading = Callable[[int, int], None]

@@ -10,13 +10,13 @@ from typing import Any
 
 from glider_bringup.disk import write_whole
 from glider_bringup.engines.flight import Flight, Progress, Taker, fly
-from glider_bringup.mcap_reader import has_bag
 from glider_bringup.mission.run_folder import SCORE_FILE
 from glider_bringup.mission.scenario import Scenario
+from glider_bringup.recording.bag_files import has_bag
 from glider_bringup.scoring.score import make_scorer, scores_of
-from glider_model.files import is_file, read_json
-from glider_model.settings import ConfigurationError
-from glider_model.vehicle import load_vehicle
+from glider_model.base.files import is_file, read_json
+from glider_model.base.settings import ConfigurationError
+from glider_model.vehicle.file import load_vehicle
 
 #: Fields without which a score file is not a scorecard.
 CARD_FIELDS = {

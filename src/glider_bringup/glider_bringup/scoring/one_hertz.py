@@ -7,8 +7,8 @@ from copy import copy
 import numpy as np
 
 from glider_bringup.engines.direct import COLUMNS, ROW
-from glider_model.frames import poses_from_wire
-from glider_model.signals import TICK_S
+from glider_model.base.frames import poses_from_wire
+from glider_model.base.signals import TICK_S
 
 #: Of so many ticks one is kept.
 _EVERY = round(1.0 / TICK_S)

@@ -21,13 +21,13 @@ from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import TrueMotion, wire_of
 from glider_control.watch import ROWS, SURFACES, TELL_EVERY_NS, say
-from glider_guidance.profile import AT_END_OF_PATH
-from glider_model.block import changes_to_tell
-from glider_model.frames import euler_from_quaternion, odometry_from_wire, reference_from_wire
-from glider_model.kernel import kernel
-from glider_model.plant import dive_depths
-from glider_model.sensors import SensorParams
-from glider_model.signals import TICK_NS, TICK_S
+from glider_guidance.yo.stage import AT_END_OF_PATH
+from glider_model.base.block import changes_to_tell
+from glider_model.base.frames import euler_from_quaternion, odometry_from_wire, reference_from_wire
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import TICK_NS, TICK_S
+from glider_model.plant.plant import dive_depths
+from glider_model.plant.sensors import SensorParams
 
 #: Heading fluctuation is about the mean over this time (s).
 HEADING_MEAN_S = 300.0

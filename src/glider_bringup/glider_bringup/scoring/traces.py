@@ -19,13 +19,13 @@ from glider_bringup.disk import whole_file
 from glider_bringup.engines.direct import COLUMNS
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import TrueMotion
-from glider_model.current import KNOT_MPS
-from glider_model.frames import poses_from_wire, wrap_angle
-from glider_model.kernel import kernel
-from glider_model.sensors import SensorParams
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_S, Adaptation
-from glider_model.vehicle import VehicleParams, load_vehicle
+from glider_model.base.frames import poses_from_wire, wrap_angle
+from glider_model.base.kernel import kernel
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_S, Adaptation
+from glider_model.ocean.current_settings import KNOT_MPS
+from glider_model.plant.sensors import SensorParams
+from glider_model.vehicle.file import VehicleParams, load_vehicle
 
 #: Most buckets that are kept of a run.
 BUCKETS = 2**15

@@ -5,9 +5,9 @@
 import numpy as np
 
 from glider_bringup.engines.direct import COLUMNS
-from glider_model.frames import odometry_from_wire, odometry_to_wire
-from glider_model.kernel import kernel
-from glider_model.sensors import SensorParams, is_noisy, recover
+from glider_model.base.frames import odometry_from_wire, odometry_to_wire
+from glider_model.base.kernel import kernel
+from glider_model.plant.sensors import SensorParams, is_noisy, remove_noise
 
 _ODOM_START = COLUMNS['odom'].start
 _E2 = COLUMNS['tracking_error'].start + 1
@@ -47,7 +47,7 @@ def _take_off(log, first_tick, sensors):
     sensors : SensorParams
     """
     for row in range(log.shape[0]):
-        true = recover(
+        true = remove_noise(
             odometry_from_wire(wire_of(log, row, _ODOM_START)), first_tick + row, sensors
         )
         for i, value in enumerate(odometry_to_wire(true)):

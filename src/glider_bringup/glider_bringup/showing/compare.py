@@ -11,7 +11,7 @@ from glider_bringup.showing.panels import ACTUATORS
 from glider_bringup.showing.scorecard import guard_texts, show
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page, page_data
 from glider_bringup.showing.words import small, span
-from glider_model.settings import ConfigurationError
+from glider_model.base.settings import ConfigurationError
 
 #: Curves that are laid over each other: panel, title, caption, axis, curve.
 _OVERLAID = (

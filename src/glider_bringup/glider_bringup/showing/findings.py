@@ -12,7 +12,7 @@ from glider_bringup.showing.panels import ACTUATORS, limits_of
 from glider_bringup.showing.scorecard import guard_texts
 from glider_bringup.showing.web_page import FlownRun
 from glider_bringup.showing.words import count, small, span, way
-from glider_model.signals import TICK_S
+from glider_model.base.signals import TICK_S
 
 #: A track is lost if the vehicle is farther off its path than this until the end (m).
 LOST_M = 100.0

@@ -5,18 +5,19 @@
 from pathlib import Path
 
 from glider_bringup.disk import write_whole
-from glider_bringup.mcap_reader import Bag, has_bag
 from glider_bringup.mission.run_folder import SCENARIO_FILE, TRACES_FILE, scenario_of
 from glider_bringup.mission.scenario import Scenario
+from glider_bringup.recording.bag_files import has_bag
+from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.scoring.again import Reading, score_bag
 from glider_bringup.scoring.card import read_score
 from glider_bringup.scoring.traces import Tracer, Traces, load_traces, make_tracer
 from glider_bringup.showing.figure import draw_run
 from glider_bringup.showing.report import report_page
 from glider_bringup.showing.web_page import FlownRun
-from glider_model.settings import ConfigurationError
-from glider_model.signals import TICK_NS
-from glider_model.vehicle import load_vehicle
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_NS
+from glider_model.vehicle.file import load_vehicle
 
 
 def read_run(

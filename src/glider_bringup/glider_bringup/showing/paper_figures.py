@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from glider_bringup.disk import save_figure
-from glider_bringup.experiments import Experiment
 from glider_bringup.scoring.one_hertz import Record
+from glider_bringup.studies.paper.cases import Experiment
 
 #: Flights by experiment, case, controller and guidance.
 Flights = dict[tuple[str, str, str, str], Record]

@@ -7,7 +7,7 @@ from glider_bringup.showing.panels import report_panels
 from glider_bringup.showing.scorecard import card_rows
 from glider_bringup.showing.web_page import FlownRun, make_page, page_data
 from glider_bringup.showing.words import count, span, way
-from glider_model.files import yaml_text
+from glider_model.base.files import yaml_text
 
 _BADGES = {
     'completed': '✓ Completed',

@@ -14,13 +14,13 @@ import numpy as np
 import xarray
 
 from glider_bringup.mission.scenario import Scenario
-from glider_bringup.sweep_result import read_dataset
+from glider_bringup.studies.sweep.netcdf import read_dataset
 from glider_guidance.los import crab_heading
-from glider_model.current import KNOT_MPS
-from glider_model.files import parse_yaml
-from glider_model.polar import make_polar, steady_horizontal_speed
-from glider_model.settings import ConfigurationError, validate
-from glider_model.vehicle import Vehicle
+from glider_model.base.files import parse_yaml
+from glider_model.base.settings import ConfigurationError, validate
+from glider_model.ocean.current_settings import KNOT_MPS
+from glider_model.onboard.glide_polar import make_polar, steady_horizontal_speed
+from glider_model.vehicle.file import Vehicle
 
 #: Largest steady cross-track error of a stable and of a critical flight (m).
 STABLE_M, CRITICAL_M = 10.0, 50.0

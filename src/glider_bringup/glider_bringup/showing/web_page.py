@@ -13,7 +13,7 @@ import numpy as np
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.traces import SAMPLES, Traces
-from glider_model.vehicle import Vehicle
+from glider_model.vehicle.file import Vehicle
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -22,13 +22,12 @@ from pydantic import Field
 
 from glider_control.law import Bank, LawSettings, law_learnt, law_step
 from glider_control.turning import roll_to_kick, roll_to_turn, sure_disturbance
-from glider_model.command_filter import Filtered, FilterParams, filter_command
-from glider_model.frames import wrap_angle
-from glider_model.kernel import kernel
-from glider_model.rigid_body import GRAVITY, rigid_body
-from glider_model.settings import Settings
-from glider_model.signals import Adaptation
-from glider_model.steering import (
+from glider_model.base.frames import wrap_angle
+from glider_model.base.kernel import kernel
+from glider_model.base.settings import Settings
+from glider_model.base.signals import Adaptation
+from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
+from glider_model.onboard.learnt_steering import (
     SMALLEST_KICK,
     Steering,
     SteeringLearningSettings,
@@ -36,7 +35,8 @@ from glider_model.steering import (
     learn,
     speed_ratio,
 )
-from glider_model.vehicle import Vehicle
+from glider_model.vehicle.file import Vehicle
+from glider_model.vehicle.rigid_body import GRAVITY, rigid_body
 
 _TUNABLE = {'tunable': True}
 

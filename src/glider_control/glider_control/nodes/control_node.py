@@ -5,11 +5,11 @@
 import sys
 
 from glider_control.block import CONTROL
-from glider_model.ros import health
-from glider_model.ros.block_node import DeclaredNode
-from glider_model.ros.orders import SURFACE
-from glider_model.ros.tick import run
-from glider_model.signals import TICK_S
+from glider_model.base.signals import TICK_S
+from glider_model.ros.lockstep import health
+from glider_model.ros.lockstep.declared_node import DeclaredNode
+from glider_model.ros.lockstep.orders import SURFACE
+from glider_model.ros.lockstep.process import run
 
 
 class ControlNode(DeclaredNode):

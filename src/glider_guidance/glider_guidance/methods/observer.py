@@ -16,11 +16,12 @@ from glider_guidance.los import (
     desired_direction,
 )
 from glider_guidance.method import Asked, LosGains, MethodSettings, method_step
-from glider_guidance.profile import INFLECTING_UP, turn_offset
-from glider_model.frames import wrap_angle
-from glider_model.kernel import kernel
-from glider_model.steering import followed_frequency
-from glider_model.vehicle import Vehicle
+from glider_guidance.yo.stage import INFLECTING_UP
+from glider_guidance.yo.turns import turn_offset
+from glider_model.base.frames import wrap_angle
+from glider_model.base.kernel import kernel
+from glider_model.onboard.learnt_steering import followed_frequency
+from glider_model.vehicle.file import Vehicle
 
 #: Lookahead in time, times the frequency up to which the vehicle can be steered, is no less (-).
 LOOKAHEAD_OVER_ZERO = 3.0

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from glider_guidance.los import approach_angles, crab_heading, desired_direction
 from glider_guidance.method import Asked, LosGains, MethodSettings, method_step
-from glider_model.kernel import kernel
-from glider_model.vehicle import Vehicle
+from glider_model.base.kernel import kernel
+from glider_model.vehicle.file import Vehicle
 
 
 class PaperSettings(MethodSettings):

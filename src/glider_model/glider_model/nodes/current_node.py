@@ -4,9 +4,9 @@
 
 import sys
 
-from glider_model.current_block import CURRENT
-from glider_model.ros.block_node import DeclaredNode
-from glider_model.ros.tick import run
+from glider_model.ocean.current_block import CURRENT
+from glider_model.ros.lockstep.declared_node import DeclaredNode
+from glider_model.ros.lockstep.process import run
 
 
 class CurrentNode(DeclaredNode):

@@ -5,14 +5,14 @@
 import math
 import sys
 
-from glider_model.frames import odometry_from_wire
-from glider_model.plant import state_fault
-from glider_model.plant_block import PLANT, plant_move, plant_outputs
-from glider_model.ros.clock import ClockNode
+from glider_model.base.frames import odometry_from_wire
+from glider_model.base.signals import TICK_S, Joints
+from glider_model.base.wiring import at_rest
+from glider_model.plant.block import PLANT, plant_move, plant_outputs
+from glider_model.plant.plant import state_fault
+from glider_model.ros.lockstep.clock import ClockNode
+from glider_model.ros.lockstep.process import run
 from glider_model.ros.parameters import declare_settings
-from glider_model.ros.tick import run
-from glider_model.signals import TICK_S, Joints
-from glider_model.wiring import at_rest
 
 
 class PlantNode(ClockNode):

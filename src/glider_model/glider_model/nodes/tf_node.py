@@ -16,11 +16,11 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 
-from glider_model.ros import qos
-from glider_model.ros.executor import Gate, take
+from glider_model.base.settings import ConfigurationError, Settings
+from glider_model.ros.lockstep.executor import Gate, take
+from glider_model.ros.lockstep.process import run
 from glider_model.ros.parameters import declare_settings
-from glider_model.ros.tick import run
-from glider_model.settings import ConfigurationError, Settings
+from glider_model.ros.wire import qos
 
 #: What tf2's own broadcasters offer.
 TF_QOS = QoSProfile(depth=100)

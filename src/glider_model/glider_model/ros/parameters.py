@@ -30,9 +30,9 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from glider_model.errors import clipped, shown
-from glider_model.files import parse_json, parse_yaml
-from glider_model.settings import ConfigurationError, Settings, mistakes, validate
+from glider_model.base.errors import clipped, shown
+from glider_model.base.files import parse_json, parse_yaml
+from glider_model.base.settings import ConfigurationError, Settings, mistakes, validate
 
 SettingsT = TypeVar('SettingsT', bound=Settings)
 

@@ -22,15 +22,17 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
-from glider_model.exits import EXIT_PEER, EXIT_USAGE, say_fatal
-from glider_model.ros import health, messages, qos
-from glider_model.ros.codec import MessageError, NotFiniteError, to_cdr
-from glider_model.ros.executor import Gate, make_executor, take_with_info
-from glider_model.ros.health import Report
-from glider_model.ros.messages import TOPICS, Topic
+from glider_model.base.exits import EXIT_PEER, EXIT_USAGE, say_fatal
+from glider_model.base.settings import ConfigurationError, Settings
+from glider_model.base.signals import TICK_NS, TICK_S, not_finite
+from glider_model.ros.lockstep import health
+from glider_model.ros.lockstep.executor import Gate, make_executor, take_with_info
+from glider_model.ros.lockstep.health import Report
 from glider_model.ros.parameters import declare_settings, refuse_unknown
-from glider_model.settings import ConfigurationError, Settings
-from glider_model.signals import TICK_NS, TICK_S, not_finite
+from glider_model.ros.wire import qos
+from glider_model.ros.wire import topics as messages
+from glider_model.ros.wire.codec import MessageError, NotFiniteError, to_cdr
+from glider_model.ros.wire.topics import TOPICS, Topic
 
 #: The plant is never more than this many ticks ahead of what the recorder has on disk.
 MAX_TICKS_AHEAD = 256

@@ -1,0 +1,244 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run's folder as rosbag2 (Jazzy) would have written it, with MCAP storage."""
+
+import errno
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from ament_index_python.packages import get_package_share_directory
+from rclpy.qos import QoSProfile
+
+from glider_bringup.disk import write_whole
+from glider_bringup.recording.mcap_writer import McapWriter
+from glider_model.base.signals import TICK_NS
+from glider_model.ros.wire.topics import TOPICS, Topic
+
+#: Ticks per chunk of the file. A chunk is what can be lost when the recorder is killed.
+CHUNK_TICKS = 128
+#: When a recording is synced to disk: never, when it is complete, or with every chunk too.
+Sync = Literal['never', 'end', 'chunk']
+
+_FIELD_TYPE = re.compile(r'(?:^|\n)\s*([a-zA-Z0-9_/]+)(?:\[[^\]]*\])?(?:<=[0-9]+)?\s+')
+_PRIMITIVES = {
+    *('bool', 'byte', 'char', 'float32', 'float64', 'string', 'wstring'),
+    *(f'{sign}int{bits}' for sign in ('', 'u') for bits in (8, 16, 32, 64)),
+}
+_DELIMITER = 80 * '=' + '\n'
+_INFINITE_NS = 2**63 - 1
+
+
+def _interface_file(type_name: str, suffix: str) -> Path:
+    package, name = type_name.split('/')[0], type_name.split('/')[-1]
+    return Path(get_package_share_directory(package)) / 'msg' / f'{name}{suffix}'
+
+
+def message_definition(type_name: str) -> str:
+    """Text of a message definition, followed by those of every type it needs.
+
+    Concatenated as rosbag2 does for schemas of the encoding ``ros2msg``.
+    """
+    seen: set[str] = set()
+
+    def text_of(name: str) -> str:
+        text = _interface_file(name, '.msg').read_text(encoding='utf-8')
+        package = name.split('/')[0]
+        needed = {
+            found if '/' in found else f'{package}/{found}'
+            for found in _FIELD_TYPE.findall(text)
+            if found not in _PRIMITIVES
+        }
+        for need in sorted(needed):
+            if need not in seen:
+                seen.add(need)
+                text += f'\n{_DELIMITER}MSG: {need}\n{text_of(need)}'
+        return text
+
+    return text_of(type_name)
+
+
+def type_hash(type_name: str) -> str:
+    """RIHS01 hash of a message type, or '' if the installation does not carry it."""
+    path = _interface_file(type_name, '.json')
+    if not path.is_file():
+        return ''
+    hashes = json.loads(path.read_text(encoding='utf-8'))['type_hashes']
+    return next((h['hash_string'] for h in hashes if h['type_name'] == type_name), '')
+
+
+def qos_yaml(qos: QoSProfile) -> str:
+    """Offered quality of service, as a YAML list with one profile (version 9 of rosbag2)."""
+
+    def duration(name: str, value) -> str:
+        nanoseconds = value.nanoseconds or _INFINITE_NS
+        seconds, rest = divmod(nanoseconds, 1_000_000_000)
+        return f'  {name}:\n    sec: {seconds}\n    nsec: {rest}\n'
+
+    return (
+        f'- history: {qos.history.name.lower()}\n'
+        f'  depth: {qos.depth}\n'
+        f'  reliability: {qos.reliability.name.lower()}\n'
+        f'  durability: {qos.durability.name.lower()}\n'
+        + duration('deadline', qos.deadline)
+        + duration('lifespan', qos.lifespan)
+        + '  liveliness: automatic\n'
+        + duration('liveliness_lease_duration', qos.liveliness_lease_duration)
+        + '  avoid_ros_namespace_conventions: false'
+    )
+
+
+class BagWriter:
+    """Writes ``<folder>/<name>_0.mcap`` and, when closed, ``<folder>/metadata.yaml``.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is missing.
+    name : str
+    names : mapping, optional
+        Absolute names by topic; else those that the topics have in the namespace `/glider`.
+    attachments : iterable of Path
+        Files stored in the MCAP under their own names.
+    topics : iterable of Topic
+        In the order in which a tick is written; names given to `write` are theirs.
+    sync : str
+        When the file is synced to disk; what was flushed only is safe from a kill of this process,
+        what was synced from a loss of power as well.
+
+    Raises
+    ------
+    OSError
+        If a recording is there already, or the file cannot be made. All methods that write raise
+        a `DiskError` if the disk takes no more.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        name: str,
+        names: Mapping[str, str] | None = None,
+        attachments: Iterable[Path] = (),
+        topics: Iterable[Topic] = tuple(t for t in TOPICS.values() if t.recorded),
+        sync: Sync = 'end',
+    ) -> None:
+        self._folder, self._sync = Path(folder), sync
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._file_name = f'{name}_0.mcap'
+        file = self._folder / self._file_name
+        for path in (file, self._folder / 'metadata.yaml'):
+            if path.exists():
+                reason = 'exists; a recording is never written over another'
+                raise FileExistsError(errno.EEXIST, reason, str(path))
+        self._topics = list(topics)
+        self._names = names or {topic.name: topic.full_name('/glider') for topic in self._topics}
+        self._mcap = McapWriter(file, profile='ros2')
+        schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        for topic in self._topics:
+            kind = topic.type_name
+            if kind not in schemas:
+                text = message_definition(kind).encode()
+                schemas[kind] = self._mcap.add_schema(kind, 'ros2msg', text)
+            metadata = {
+                'offered_qos_profiles': qos_yaml(topic.qos),
+                'topic_type_hash': type_hash(kind),
+            }
+            self._channels[topic.name] = self._mcap.add_channel(
+                self._names[topic.name], schemas[kind], metadata
+            )
+        for path in attachments:
+            path = Path(path)
+            self._mcap.add_attachment(path.name, 'application/yaml', path.read_bytes())
+        self.flush()
+
+    def write(self, topic: str, stamp_ns: int, payload: bytes) -> None:
+        """Add a serialized message."""
+        self._mcap.write(self._channels[topic], stamp_ns, payload)
+
+    def write_ticks(self, stamps_ns: Sequence[int], payloads: Mapping[str, np.ndarray]) -> None:
+        """Add many whole ticks, interleaved by stamp and cut into chunks as a recorder does.
+
+        Parameters
+        ----------
+        stamps_ns : int64[n]
+            Stamps of the ticks, ascending.
+        payloads : dict of uint8[n, size]
+            Serialized messages by topic, as of `Codec.encode_many`.
+        """
+        stamps_ns = np.asarray(stamps_ns, np.int64)
+        chunk_of = stamps_ns // (CHUNK_TICKS * TICK_NS)
+        edges = [0, *(np.flatnonzero(np.diff(chunk_of)) + 1), len(stamps_ns)]
+        channels = [self._channels[topic] for topic in payloads]
+        for start, end in zip(edges[:-1], edges[1:], strict=True):
+            if start:
+                self.flush()
+            blocks = [payload[start:end] for payload in payloads.values()]
+            self._mcap.write_rows(channels, stamps_ns[start:end], blocks)
+        if len(stamps_ns):
+            self.end_tick(int(stamps_ns[-1]))
+
+    def end_tick(self, stamp_ns: int) -> bool:
+        """Say that a tick is complete. True if everything up to it was flushed just now."""
+        if (stamp_ns // TICK_NS + 1) % CHUNK_TICKS:
+            return False
+        self.flush()
+        return True
+
+    def flush(self) -> None:
+        """Write everything so far into the file, and sync it if every chunk is."""
+        self._mcap.flush()
+        if self._sync == 'chunk':
+            self._mcap.sync()
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages written, by topic."""
+        return {name: self._mcap.counts[channel] for name, channel in self._channels.items()}
+
+    def close(self) -> None:
+        """Complete the file, and write metadata.yaml in one go."""
+        self._mcap.flush()
+        text = self._metadata()
+        self._mcap.add_metadata('rosbag2', {'serialized_metadata': text})
+        self._mcap.close(sync=self._sync != 'never')
+        lines = ''.join(f'  {line}\n' for line in text.splitlines())
+        write_whole(self._folder / 'metadata.yaml', f'rosbag2_bagfile_information:\n{lines}')
+
+    def _metadata(self) -> str:
+        start_ns = self._mcap.start_ns or 0
+        duration_ns = max(0, self._mcap.end_ns - start_ns)
+        total = sum(self.counts.values())
+        topics = ''.join(self._topic_metadata(topic) for topic in self._topics)
+        return (
+            'version: 9\n'
+            'storage_identifier: mcap\n'
+            f'duration:\n  nanoseconds: {duration_ns}\n'
+            f'starting_time:\n  nanoseconds_since_epoch: {start_ns}\n'
+            f'message_count: {total}\n'
+            f'topics_with_message_count:\n{topics}'
+            'compression_format: ""\n'
+            'compression_mode: ""\n'
+            f'relative_file_paths:\n  - {self._file_name}\n'
+            f'files:\n  - path: {self._file_name}\n'
+            f'    starting_time:\n      nanoseconds_since_epoch: {start_ns}\n'
+            f'    duration:\n      nanoseconds: {duration_ns}\n'
+            f'    message_count: {total}\n'
+            'custom_data: ~\n'
+            'ros_distro: jazzy\n'
+        )
+
+    def _topic_metadata(self, topic: Topic) -> str:
+        profiles = qos_yaml(topic.qos).replace('\n', '\n        ')
+        return (
+            '  - topic_metadata:\n'
+            f'      name: {self._names[topic.name]}\n'
+            f'      type: {topic.type_name}\n'
+            '      serialization_format: cdr\n'
+            f'      offered_qos_profiles:\n        {profiles}\n'
+            f'      type_description_hash: {type_hash(topic.type_name)}\n'
+            f'    message_count: {self.counts[topic.name]}\n'
+        )

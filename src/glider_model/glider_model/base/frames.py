@@ -1,0 +1,216 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Attitude mathematics and the border between NED / FRD and ENU / FLU.
+
+Inside, everything is NED (world) and FRD (body). On topics everything is ENU and FLU, by REP-103
+and REP-105. The functions ``*_to_wire`` and ``*_from_wire`` are the only conversions in the
+repository; the direct engine applies them too, so that it computes with exactly the numbers that
+a node reads from a message.
+
+World vectors swap x and y and negate z. Body vectors negate y and z.
+"""
+
+import math
+
+import numpy as np
+
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import Odometry, Reference, Water, Wrench
+
+_HALF_SQRT2 = math.sqrt(0.5)
+
+
+@kernel
+def wrap_angle(angle):
+    """Angle (rad) brought into [-pi, pi)."""
+    return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
+
+
+@kernel
+def rotate_to_ned(q_w, q_x, q_y, q_z, x, y, z):
+    """Turn a body vector into NED: ``R_NB [x, y, z]`` for the unit quaternion q_NB."""
+    t_x = 2.0 * (q_y * z - q_z * y)
+    t_y = 2.0 * (q_z * x - q_x * z)
+    t_z = 2.0 * (q_x * y - q_y * x)
+    return (
+        x + q_w * t_x + q_y * t_z - q_z * t_y,
+        y + q_w * t_y + q_z * t_x - q_x * t_z,
+        z + q_w * t_z + q_x * t_y - q_y * t_x,
+    )
+
+
+@kernel
+def rotate_to_body(q_w, q_x, q_y, q_z, x, y, z):
+    """Turn a NED vector into body axes: ``R_NB^T [x, y, z]``."""
+    return rotate_to_ned(q_w, -q_x, -q_y, -q_z, x, y, z)
+
+
+@kernel
+def quaternion_from_euler(phi, theta, psi):
+    """Unit quaternion q_NB (w, x, y, z) of roll, pitch, heading in rad (Fossen zyx)."""
+    c1, s1 = math.cos(0.5 * phi), math.sin(0.5 * phi)
+    c2, s2 = math.cos(0.5 * theta), math.sin(0.5 * theta)
+    c3, s3 = math.cos(0.5 * psi), math.sin(0.5 * psi)
+    return (
+        c1 * c2 * c3 + s1 * s2 * s3,
+        s1 * c2 * c3 - c1 * s2 * s3,
+        c1 * s2 * c3 + s1 * c2 * s3,
+        c1 * c2 * s3 - s1 * s2 * c3,
+    )
+
+
+@kernel
+def euler_from_quaternion(q_w, q_x, q_y, q_z):
+    """Roll, pitch, heading (rad) of q_NB; pitch is held within +-pi/2 against rounding."""
+    phi = math.atan2(2.0 * (q_w * q_x + q_y * q_z), 1.0 - 2.0 * (q_x * q_x + q_y * q_y))
+    sine = 2.0 * (q_w * q_y - q_z * q_x)
+    theta = math.asin(min(1.0, max(-1.0, sine)))
+    psi = math.atan2(2.0 * (q_w * q_z + q_x * q_y), 1.0 - 2.0 * (q_y * q_y + q_z * q_z))
+    return phi, theta, psi
+
+
+@kernel
+def swap_world(q_w, q_x, q_y, q_z):
+    """Quaternion of the same attitude in the other convention: q_NB (FRD) <-> q_EL (FLU).
+
+    With T turning NED into ENU and D turning FRD into FLU, both half-turns,
+    q_EL = q_T q_NB q_D. The map is its own inverse up to the sign of the quaternion, which
+    stands for the same attitude; the result is given with q_w >= 0.
+    """
+    w = _HALF_SQRT2 * (q_w + q_z)
+    x = _HALF_SQRT2 * (q_x + q_y)
+    y = _HALF_SQRT2 * (q_x - q_y)
+    z = _HALF_SQRT2 * (q_w - q_z)
+    if w < 0.0:
+        return -w, -x, -y, -z
+    return w, x, y, z
+
+
+@kernel
+def odometry_to_wire(odometry):
+    """Odometry as ENU / FLU numbers: position, quaternion w x y z, linear, angular (13)."""
+    q_w, q_x, q_y, q_z = swap_world(odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z)
+    return (
+        odometry.p_e,
+        odometry.p_n,
+        -odometry.p_d,
+        q_w,
+        q_x,
+        q_y,
+        q_z,
+        odometry.u,
+        -odometry.v,
+        -odometry.w,
+        odometry.p,
+        -odometry.q,
+        -odometry.r,
+    )
+
+
+@kernel
+def odometry_from_wire(wire):
+    """Odometry from the 13 numbers of ``odometry_to_wire``."""
+    q_w, q_x, q_y, q_z = swap_world(wire[3], wire[4], wire[5], wire[6])
+    return Odometry(
+        wire[1],
+        wire[0],
+        -wire[2],
+        q_w,
+        q_x,
+        q_y,
+        q_z,
+        wire[7],
+        -wire[8],
+        -wire[9],
+        wire[10],
+        -wire[11],
+        -wire[12],
+    )
+
+
+@kernel
+def poses_from_wire(wire):
+    """Poses of many messages, float64[n, >= 7] laid out as by ``odometry_to_wire``.
+
+    Returns
+    -------
+    float64[n, 6]
+        North, east, depth (m), roll, pitch, heading (rad).
+    """
+    poses = np.empty((wire.shape[0], 6))
+    for i in range(wire.shape[0]):
+        q_w, q_x, q_y, q_z = swap_world(wire[i, 3], wire[i, 4], wire[i, 5], wire[i, 6])
+        poses[i, 0], poses[i, 1], poses[i, 2] = wire[i, 1], wire[i, 0], -wire[i, 2]
+        poses[i, 3], poses[i, 4], poses[i, 5] = euler_from_quaternion(q_w, q_x, q_y, q_z)
+    return poses
+
+
+@kernel
+def reference_to_wire(reference):
+    """Reference as ENU / FLU numbers, laid out like odometry (13).
+
+    The twist is expressed in the world frame: linear is the desired velocity over ground,
+    angular the Euler rates (roll, pitch, yaw) in the ENU sense.
+    """
+    q = quaternion_from_euler(reference.phi, reference.theta, reference.psi)
+    q_w, q_x, q_y, q_z = swap_world(q[0], q[1], q[2], q[3])
+    return (
+        reference.p_e,
+        reference.p_n,
+        -reference.p_d,
+        q_w,
+        q_x,
+        q_y,
+        q_z,
+        reference.v_e,
+        reference.v_n,
+        -reference.v_d,
+        reference.phi_dot,
+        -reference.theta_dot,
+        -reference.psi_dot,
+    )
+
+
+@kernel
+def reference_from_wire(wire):
+    """Reference from the 13 numbers of ``reference_to_wire``."""
+    q_w, q_x, q_y, q_z = swap_world(wire[3], wire[4], wire[5], wire[6])
+    phi, theta, psi = euler_from_quaternion(q_w, q_x, q_y, q_z)
+    return Reference(
+        wire[1],
+        wire[0],
+        -wire[2],
+        phi,
+        theta,
+        psi,
+        wire[8],
+        wire[7],
+        -wire[9],
+        wire[10],
+        -wire[11],
+        -wire[12],
+    )
+
+
+@kernel
+def water_to_wire(water):
+    """Water velocity as ENU numbers (3)."""
+    return water.v_e, water.v_n, -water.v_d
+
+
+@kernel
+def water_from_wire(wire):
+    """Water velocity from ENU numbers."""
+    return Water(wire[1], wire[0], -wire[2])
+
+
+@kernel
+def wrench_to_wire(wrench):
+    """Demanded force and moments in FLU: force z, torque x, torque y (3)."""
+    return -wrench.tau_w, wrench.tau_p, -wrench.tau_q
+
+
+@kernel
+def wrench_from_wire(wire):
+    """Demanded force and moments from the 3 numbers of ``wrench_to_wire``."""
+    return Wrench(-wire[0], wire[1], -wire[2])

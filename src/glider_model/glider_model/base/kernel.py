@@ -1,0 +1,57 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The one decorator that compiles the mathematics, and where compiled code is kept.
+
+numba decides whether a cached function is stale by looking at the file that defines it, not at the
+files of the functions it calls. A change in ``hydrodynamics.py`` would go unnoticed in a cached
+``plant_step``. The cache folder is therefore named by a digest over the sources of all packages
+whose kernels call each other, those of other distributions that fill a slot among them: change any
+of them and everything is compiled afresh.
+"""
+
+import hashlib
+import importlib.util
+import os
+from functools import cache
+from pathlib import Path
+
+import numba
+
+from glider_model.base.plugins import registered, sources
+
+_PACKAGES = ('glider_model', 'glider_guidance', 'glider_control', 'glider_bringup')
+
+
+@cache
+def source_digest() -> str:
+    """Digest of the sources of our packages, and of those that registered something."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for name in _PACKAGES:
+        spec = importlib.util.find_spec(name)
+        if spec is None or not spec.submodule_search_locations:
+            continue
+        folder = Path(spec.submodule_search_locations[0])
+        for path in sorted(folder.rglob('*.py')):
+            digest.update(str(path.relative_to(folder)).encode())
+            digest.update(path.read_bytes())
+    for point in registered():
+        digest.update(f'{point.group} {point.name} {point.value}'.encode())
+    for path in sources():
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled kernels, in ``$GLIDER_CACHE`` or ``~/.cache/glider``."""
+    default = Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / 'glider'
+    return Path(os.environ.get('GLIDER_CACHE') or default) / f'kernels-{source_digest()}'
+
+
+if not os.environ.get('NUMBA_CACHE_DIR'):
+    numba.config.CACHE_DIR = str(cache_folder())
+
+#: Compiles a pure function. No fastmath: IEEE arithmetic in source order is what makes a run over
+#: topics and a direct run agree to the last bit. Inlined into its callers: a NamedTuple would
+#: otherwise be copied number by number at every call.
+kernel = numba.njit(cache=True, error_model='numpy', forceinline=True)

@@ -1,0 +1,103 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What other distributions bring: classes that they register as entry points.
+
+A package registers a class under a group, by the name by which people will call it:
+
+    [project.entry-points."glider.control_laws"]
+    sliding = "my_law.sliding:SlidingSettings"
+"""
+
+import importlib
+import importlib.util
+import pkgutil
+import sys
+from collections.abc import Iterator
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import TypeVar
+
+from glider_model.base.errors import ConfigurationError
+
+CONTROL_LAWS, GUIDANCE_METHODS = 'glider.control_laws', 'glider.guidance_methods'
+GROUPS = (CONTROL_LAWS, GUIDANCE_METHODS)
+
+ClassT = TypeVar('ClassT', bound=type)
+
+
+@cache
+def registered() -> tuple[EntryPoint, ...]:
+    """Entry points of all groups, in the order of group and name."""
+    everything = entry_points()
+    found = {
+        (point.group, point.name, point.value): point
+        for group in GROUPS
+        for point in everything.select(group=group)
+    }
+    return tuple(found[key] for key in sorted(found))
+
+
+def sources() -> Iterator[Path]:
+    """Python files of the top-level modules of everything that is registered, imported or not."""
+    for name in sorted({point.module.partition('.')[0] for point in registered()}):
+        try:
+            spec = importlib.util.find_spec(name)
+        except (ImportError, ValueError):
+            continue
+        if spec is None:
+            continue
+        for folder in spec.submodule_search_locations or ():
+            yield from sorted(Path(folder).rglob('*.py'))
+        if not spec.submodule_search_locations and spec.origin:
+            yield Path(spec.origin)
+
+
+def classes(group: str, base: ClassT, package: ModuleType, taken: set[str]) -> dict[str, ClassT]:
+    """Subclasses of ``base`` by name: one in each module of ``package``, then those registered.
+
+    What cannot be used, such as a name in ``taken``, is told on standard error, and is not there:
+    the others fly on.
+    """
+    found = {}
+    for module in pkgutil.iter_modules(package.__path__):
+        inside = importlib.import_module(f'{package.__name__}.{module.name}')
+        kinds = (one for one in vars(inside).values() if isinstance(one, type))
+        own = (one for one in kinds if issubclass(one, base) and one.__module__ == inside.__name__)
+        (found[module.name],) = own
+    for point in registered():
+        if point.group != group:
+            continue
+        try:
+            found[point.name] = _load(point, base, taken | set(found))
+        except Exception as error:  # it is not our code
+            told = f'{type(error).__name__}: {error}'.partition('\n')[0]
+            print(
+                ConfigurationError(f'glider: {_origin(point)}: not usable: {told}'),
+                file=sys.stderr,
+            )
+    return found
+
+
+def _load(point: EntryPoint, base: ClassT, taken: set[str]) -> ClassT:
+    if not point.name.isidentifier():
+        raise ValueError('its name is no identifier (allowed: letters, digits and _)')
+    if point.name in taken:
+        raise ValueError(f'its name is taken (allowed: all but {", ".join(sorted(taken))})')
+    loaded = point.load()
+    if not (isinstance(loaded, type) and issubclass(loaded, base)):
+        raise TypeError(f'it is no subclass of {base.__module__}.{base.__name__}')
+    loaded()  # every field needs a default
+    return loaded
+
+
+def _origin(point: EntryPoint) -> str:
+    owner = f'{point.dist.name} {point.dist.version}: ' if point.dist else ''
+    return f'{owner}{point.group}: {point.name} = {point.value}'
+
+
+def summary(described: type) -> str:
+    """First line of a docstring as part of a sentence."""
+    text = (described.__doc__ or described.__name__).strip().partition('\n')[0].rstrip('.')
+    return text[:1].lower() + text[1:]

@@ -1,0 +1,70 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The water's density: stratification, compression of water and hull, and the surface."""
+
+import math
+from typing import NamedTuple
+
+from pydantic import Field
+
+from glider_model.base.kernel import kernel
+from glider_model.base.settings import Settings
+
+
+class WaterSettings(Settings):
+    """Density of the water relative to the depth at which the vehicle was ballasted (surface)."""
+
+    pycnocline_rise: float = Field(
+        0.0,
+        ge=0.0,
+        le=0.05,
+        description='relative density rise across the pycnocline (-); 0.004 is 4 kg/m^3',
+    )
+    pycnocline_depth_m: float = Field(
+        100.0, ge=1.0, le=5000.0, description='e-folding depth of the pycnocline (m)'
+    )
+    compression_per_m: float = Field(
+        0.0,
+        ge=0.0,
+        le=1e-4,
+        description='relative density rise by pressure (1/m); sea water 4.5e-6',
+    )
+    hull_compression_per_m: float = Field(
+        0.0,
+        ge=0.0,
+        le=1e-4,
+        description='relative loss of hull volume with depth (1/m); aluminium 3e-6 to 5e-6',
+    )
+
+    def params(self) -> 'WaterParams':
+        """Kernel parameters."""
+        return WaterParams(
+            self.pycnocline_rise,
+            1.0 / self.pycnocline_depth_m,
+            self.compression_per_m - self.hull_compression_per_m,
+        )
+
+
+class WaterParams(NamedTuple):
+    """Density profile as the kernels see it."""
+
+    rise: float  #: relative density rise across the pycnocline
+    inverse_depth: float  #: (1/m)
+    net_compression: float  #: water less hull (1/m)
+
+
+@kernel
+def buoyancy_gain(depth, mass, water):
+    """Extra buoyancy dm(z) (kg) of a vehicle of ``mass`` kg at ``depth`` m."""
+    z = max(depth, 0.0)
+    rise = water.rise * (1.0 - math.exp(-z * water.inverse_depth)) if water.rise > 0.0 else 0.0
+    return mass * (rise + water.net_compression * z)
+
+
+@kernel
+def emerged_fraction(depth, radius):
+    """Fraction of the hull above the surface: 0 below ``radius``, 1 above ``-radius`` (m)."""
+    if depth >= radius:
+        return 0.0
+    out = min(1.0, (radius - depth) / (2.0 * radius))
+    return out * out * (3.0 - 2.0 * out)

@@ -1,0 +1,191 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is taken for measured: a wild sample of odometry is refused, the last good one serves.
+
+A sample is refused if a number is not finite, the quaternion is none, a rate or the speed is
+beyond any glider's, or if it lies so far from where the last good one leads that no glider went
+there. After ``hold_s`` of refusals a sample that is good in itself is believed again, for then the
+world has jumped (a fix, a new source); without one the measurement is lost.
+"""
+
+import math
+from typing import NamedTuple
+
+from pydantic import Field
+
+from glider_model.base.frames import rotate_to_ned
+from glider_model.base.kernel import kernel
+from glider_model.base.settings import Settings
+from glider_model.base.signals import Odometry
+
+#: Deviation of a quaternion's squared norm from 1: from here it is scaled, from there refused (-).
+NORM_SCALED, NORM_REFUSED = 1e-9, 0.02
+
+
+class GateSettings(Settings):
+    """Which samples of odometry are refused, and for how long the last good one serves."""
+
+    rate_max_radps: float = Field(
+        6.0, gt=0.0, le=100.0, description='largest angular rate about any axis (rad/s)'
+    )
+    speed_max_mps: float = Field(
+        10.0, gt=0.0, le=1000.0, description='largest speed over ground (m/s)'
+    )
+    rate_jump_radps: float = Field(
+        1.0, gt=0.0, le=200.0, description='largest change of a rate between samples (rad/s)'
+    )
+    speed_jump_mps: float = Field(
+        1.0, gt=0.0, le=2000.0, description='largest change of velocity between samples (m/s)'
+    )
+    attitude_jump_deg: float = Field(
+        60.0, gt=0.0, le=360.0, description='largest turn between samples (deg)'
+    )
+    position_jump_m: float = Field(
+        100.0,
+        gt=0.0,
+        le=1e8,
+        description='farthest from where the last sample leads, horizontally (m)',
+    )
+    depth_jump_m: float = Field(20.0, gt=0.0, le=1e5, description='the same for the depth (m)')
+    hold_s: float = Field(
+        1.0, ge=0.0, le=60.0, description='time for which the last good sample serves (s)'
+    )
+
+    def params(self) -> 'GateParams':
+        """Kernel parameters."""
+        return GateParams(
+            self.rate_max_radps,
+            self.speed_max_mps**2,
+            self.rate_jump_radps,
+            self.speed_jump_mps**2,
+            math.cos(0.5 * math.radians(self.attitude_jump_deg)),
+            self.position_jump_m**2,
+            self.depth_jump_m,
+            self.hold_s,
+        )
+
+
+class GateParams(NamedTuple):
+    """Limits as the kernels see them."""
+
+    rate_max: float  #: (rad/s)
+    speed_max2: float  #: (m^2/s^2)
+    rate_jump: float  #: (rad/s)
+    speed_jump2: float  #: (m^2/s^2)
+    attitude_cosine: float  #: cosine of half the largest turn (-)
+    position_jump2: float  #: (m^2)
+    depth_jump: float  #: (m)
+    hold_s: float  #: (s)
+
+
+class GateState(NamedTuple):
+    """The last good sample, and what has come since."""
+
+    odometry: Odometry  #: what serves
+    seen: bool  #: whether there has been a good sample
+    age_s: float  #: time since the last good sample (s)
+    refused: int  #: samples refused so far
+
+
+INITIAL_GATE = GateState(Odometry(*(3 * (0.0,)), 1.0, *(9 * (0.0,))), False, 0.0, 0)
+
+
+@kernel
+def is_plausible(odometry, params):
+    """Whether a sample is good in itself: finite, an attitude, no faster than any glider."""
+    x = odometry
+    norm2 = x.q_w * x.q_w + x.q_x * x.q_x + x.q_y * x.q_y + x.q_z * x.q_z
+    # a comparison with NaN is false: each is put such that NaN is refused
+    return (
+        math.isfinite(x.p_n)
+        and math.isfinite(x.p_e)
+        and math.isfinite(x.p_d)
+        and abs(norm2 - 1.0) < NORM_REFUSED
+        and x.u * x.u + x.v * x.v + x.w * x.w <= params.speed_max2
+        and abs(x.p) <= params.rate_max
+        and abs(x.q) <= params.rate_max
+        and abs(x.r) <= params.rate_max
+    )
+
+
+@kernel
+def has_jumped(odometry, last, velocity, age_s, params):
+    """Whether a sample lies farther from the last good one than a glider comes in ``age_s``.
+
+    ``velocity`` is that of the last good sample over ground, NED (m/s).
+    """
+    x, y = odometry, last
+    d_n = x.p_n - y.p_n - velocity[0] * age_s
+    d_e = x.p_e - y.p_e - velocity[1] * age_s
+    d_d = x.p_d - y.p_d - velocity[2] * age_s
+    d_u, d_v, d_w = x.u - y.u, x.v - y.v, x.w - y.w
+    turn = x.q_w * y.q_w + x.q_x * y.q_x + x.q_y * y.q_y + x.q_z * y.q_z
+    return (
+        d_n * d_n + d_e * d_e > params.position_jump2
+        or abs(d_d) > params.depth_jump
+        or d_u * d_u + d_v * d_v + d_w * d_w > params.speed_jump2
+        or abs(turn) < params.attitude_cosine
+        or abs(x.p - y.p) > params.rate_jump
+        or abs(x.q - y.q) > params.rate_jump
+        or abs(x.r - y.r) > params.rate_jump
+    )
+
+
+@kernel
+def _scaled(odometry):
+    """The same sample with a unit quaternion; the very same if it has one."""
+    x = odometry
+    norm2 = x.q_w * x.q_w + x.q_x * x.q_x + x.q_y * x.q_y + x.q_z * x.q_z
+    if abs(norm2 - 1.0) <= NORM_SCALED:
+        return odometry
+    s = 1.0 / math.sqrt(norm2)
+    return Odometry(
+        x.p_n,
+        x.p_e,
+        x.p_d,
+        s * x.q_w,
+        s * x.q_x,
+        s * x.q_y,
+        s * x.q_z,
+        x.u,
+        x.v,
+        x.w,
+        x.p,
+        x.q,
+        x.r,
+    )
+
+
+@kernel
+def gate_step(state, odometry, params, dt):
+    """Take in a sample, or let the last good one serve.
+
+    Parameters
+    ----------
+    state : GateState
+    odometry : Odometry
+        As measured; anything may be in it.
+    params : GateParams
+    dt : float
+        Time since the sample before (s).
+
+    Returns
+    -------
+    GateState
+        Its odometry is the sample, if that is good, else the last good one.
+    """
+    age_s = state.age_s + dt
+    good = is_plausible(odometry, params)
+    if good and state.seen and age_s <= params.hold_s:
+        last = state.odometry
+        velocity = rotate_to_ned(last.q_w, last.q_x, last.q_y, last.q_z, last.u, last.v, last.w)
+        good = not has_jumped(odometry, last, velocity, age_s, params)
+    if good:
+        return GateState(_scaled(odometry), True, 0.0, state.refused)
+    return GateState(state.odometry, state.seen, age_s, state.refused + 1)
+
+
+@kernel
+def is_lost(state, params):
+    """Whether there has been no good sample for so long that the last one serves no more."""
+    return state.age_s > params.hold_s

@@ -1,0 +1,135 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Steady glides and spirals: the equilibrium of the plant, solved for its own equations."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import root
+
+from glider_model.base.frames import quaternion_from_euler, rotate_to_ned
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import Water
+from glider_model.ocean.density import DensityParams
+from glider_model.plant.motion import Motion, acceleration
+from glider_model.vehicle.file import VehicleParams
+from glider_model.vehicle.rigid_body import make_inertia
+
+_STILL = Water(0.0, 0.0, 0.0)
+_UNIFORM = DensityParams(0.0, 1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Trim:
+    """A steady glide (turn rate 0) or spiral. Field names carry the unit."""
+
+    speed_mps: float
+    alpha_deg: float
+    beta_deg: float
+    pitch_deg: float
+    roll_deg: float
+    glide_deg: float  # angle of the path below the horizontal is negative
+    horizontal_mps: float
+    vertical_mps: float  # positive sinking
+    turn_rate_radps: float
+    turn_radius_m: float | None  # None: straight
+    pitch_mass_m: float
+    net_heaviness_kg: float
+    roll_mass_deg: float
+    converged: bool
+
+
+def solve_trim(
+    vehicle: VehicleParams,
+    net_heaviness_kg: float,
+    pitch_deg: float | None = None,
+    pitch_mass_m: float | None = None,
+    roll_mass_deg: float = 0.0,
+) -> Trim:
+    """Solve M nu' = 0 for a steady rotation about the vertical.
+
+    Give either the pitch (the pitch-mass position is solved for) or the pitch-mass position from
+    neutral (the pitch is solved for).
+
+    Raises
+    ------
+    ConfigurationError
+        If both or neither are given, or an input is outside the actuator's range.
+    """
+    if (pitch_deg is None) == (pitch_mass_m is None):
+        raise ConfigurationError('give either pitch_deg or pitch_mass_m')
+    checks = (
+        ('net heaviness', net_heaviness_kg, 'kg', vehicle.m_b_max),
+        ('roll mass', roll_mass_deg, 'deg', math.degrees(vehicle.mu_max)),
+        ('pitch', pitch_deg, 'deg', 80.0),
+        ('pitch mass', pitch_mass_m, 'm', vehicle.x_p_max),
+    )
+    for name, number, unit, limit in checks:
+        if number is not None and not abs(number) <= limit * (1.0 + 1e-12):
+            raise ConfigurationError(
+                f'{name} = {number} {unit}: out of range (allowed: -{limit:g} to {limit:g} {unit})'
+            )
+    if net_heaviness_kg == 0.0:
+        raise ConfigurationError('net heaviness = 0 kg: a neutral vehicle does not glide')
+    mu = math.radians(roll_mass_deg)
+
+    def unpack(z: np.ndarray):
+        u, v, w, fourth, phi, rate = z
+        if pitch_deg is None:
+            return u, v, w, fourth, phi, rate, pitch_mass_m
+        return u, v, w, math.radians(pitch_deg), phi, rate, 0.1 * fourth
+
+    def residual(z: np.ndarray) -> np.ndarray:
+        u, v, w, theta, phi, rate, x_p = unpack(z)
+        q = quaternion_from_euler(phi, theta, 0.0)
+        p, q_rate, r = (
+            -rate * math.sin(theta),
+            rate * math.cos(theta) * math.sin(phi),
+            rate * math.cos(theta) * math.cos(phi),
+        )
+        motion = Motion(0.0, 0.0, 100.0, *q, u, v, w, p, q_rate, r)
+        inertia = make_inertia(x_p, mu, vehicle)
+        return np.array(acceleration(motion, net_heaviness_kg, inertia, _STILL, vehicle, _UNIFORM))
+
+    sign = math.copysign(1.0, net_heaviness_kg)
+    best = None
+    # from the straight glide in small steps of roll mass, so that the branch is followed
+    for guess_deg in (-30.0, -20.0, -45.0, -10.0):
+        theta = sign * math.radians(guess_deg if pitch_deg is None else -abs(pitch_deg))
+        fourth = theta if pitch_deg is None else 0.0
+        z = np.array([0.5, 0.0, sign * 0.01, fourth, 0.0, 0.0])
+        target, solved = mu, True
+        for mu in np.linspace(0.0, target, 2 + int(abs(target) / 0.05)):  # noqa: B007
+            answer = root(residual, z, method='hybr', tol=1e-13)
+            z = answer.x
+            upright = abs(unpack(z)[3]) < 0.5 * math.pi and abs(z[4]) < 0.5 * math.pi
+            solved = upright and z[0] > 0.0 and bool(np.max(np.abs(residual(z))) < 1e-9)
+            if not solved:
+                break
+        mu = target
+        best = (z, solved)
+        if solved:
+            break
+    z, converged = best
+    u, v, w, theta, phi, rate, x_p = (float(number) for number in unpack(z))
+    speed = math.sqrt(u * u + v * v + w * w)
+    north, east, down = rotate_to_ned(*quaternion_from_euler(phi, theta, 0.0), u, v, w)
+    horizontal = math.hypot(north, east)
+    turning = abs(rate) > 1e-9
+    return Trim(
+        speed_mps=speed,
+        alpha_deg=math.degrees(math.atan2(w, u)),
+        beta_deg=math.degrees(math.asin(v / speed)) if speed > 0.0 else 0.0,
+        pitch_deg=math.degrees(theta),
+        roll_deg=math.degrees(phi),
+        glide_deg=-math.degrees(math.atan2(down, horizontal)),
+        horizontal_mps=horizontal,
+        vertical_mps=down,
+        turn_rate_radps=rate if turning else 0.0,
+        turn_radius_m=horizontal / abs(rate) if turning else None,
+        pitch_mass_m=x_p,
+        net_heaviness_kg=net_heaviness_kg,
+        roll_mass_deg=roll_mass_deg,
+        converged=converged and abs(x_p) <= vehicle.x_p_max,
+    )

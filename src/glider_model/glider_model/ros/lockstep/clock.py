@@ -1,0 +1,266 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The node that makes time: it starts the ticks, paces them, and ends the run.
+
+One node of the graph publishes the inputs of each tick and completes it when the answers are
+there. That is the plant; a replay could do the same.
+"""
+
+import time
+
+from pydantic import Field
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool
+
+from glider_model.base.exits import EXIT_PEER
+from glider_model.base.signals import TICK_NS, TICK_S
+from glider_model.base.wiring import WIRING
+from glider_model.ros.lockstep import health
+from glider_model.ros.lockstep.clock import MAX_TICKS_AHEAD
+from glider_model.ros.lockstep.executor import take
+from glider_model.ros.lockstep.health import Report, seconds
+from glider_model.ros.lockstep.node import TickNode, TickSettings
+from glider_model.ros.lockstep.peers import ALONE
+from glider_model.ros.lockstep.process import Stop
+from glider_model.ros.wire import topics
+from glider_model.ros.wire.topics import TOPICS
+
+#: Nodes of a run that is just over are out of sight within this time (s).
+_RIVALS_LEAVE_S = 5.0
+
+
+class ClockSettings(TickSettings):
+    """How the node that makes time keeps step."""
+
+    speed: float = Field(
+        0.0, ge=0.0, le=1e6, description='times real time; 0.0: as fast as possible'
+    )
+
+
+class _Pace:
+    """Wall time at which each tick is due, without drift."""
+
+    def __init__(self, speed: float) -> None:
+        self._tick_s = TICK_S / speed if speed > 0.0 else 0.0
+        self._start_s = 0.0
+
+    def restart(self, tick: int) -> None:
+        """Let ``tick`` be due now."""
+        self._start_s = time.monotonic() - tick * self._tick_s
+
+    def wait_s(self, tick: int) -> float:
+        """Wall time (s) until ``tick`` is due; not positive if it is."""
+        if not self._tick_s:
+            return 0.0
+        return self._start_s + tick * self._tick_s - time.monotonic()
+
+
+class ClockNode(TickNode):
+    """Starts, paces and ends the run.
+
+    Subclasses implement `publish_tick` and `complete_tick`, and add their inputs before
+    `start_up`.
+    """
+
+    tick_settings = ClockSettings
+
+    def __init__(self, name: str, **kwargs) -> None:
+        super().__init__(name, **kwargs)
+        self.tick = 0
+        self._published = -1
+        self._recorded_ns = -TICK_NS
+        self._paused = False
+        self._pace = _Pace(self.ticks.speed)
+        self._pace_timer = self.wall_timer(1.0, self._on_pace)
+        self._pace_timer.cancel()
+        self._clock_started_s = time.monotonic()
+        self._recorded = None
+        self._held = False
+        if self.ticks.record:
+            self._recorded = self._subscription(TOPICS['recorded'], self._on_recorded, raw=False)
+        self.create_service(SetBool, 'pause', self._on_pause)
+
+    # ------------------------------------------------------------------ for subclasses
+
+    def publish_tick(self, stamp_ns: int) -> None:
+        """Publish what the peers need to work on this tick."""
+        raise NotImplementedError
+
+    def complete_tick(self, *inputs: tuple[float, ...]) -> bool:
+        """Integrate to the next tick; return False if this one was the last."""
+        raise NotImplementedError
+
+    # ------------------------------------------------------------------ start
+
+    def start_up(self) -> None:
+        """Start looking for the peers, for a limited time."""
+        self._clock_started_s = time.monotonic()
+        super().start_up()
+        if self.ticks.lockstep:
+            self.wall_timer(0.25, self._on_startup_watch)
+
+    def _peers(self) -> list[str]:
+        peers = [wired.node for wired in WIRING if wired.node != self.get_name()]
+        return [*peers, topics.RECORDER] if self.ticks.record else peers
+
+    def unmatched(self) -> list[str]:
+        """What is missing before time can start, in words."""
+        peers = self._peers()
+        absent = [peer for peer in peers if peer not in self.reports]
+        if absent:
+            return [f'{peer} has not appeared' for peer in absent]
+        starting = [peer for peer in peers if self.reports[peer].phase == health.STARTING]
+        return super().unmatched() or [
+            f'{peer} is not ready: {self.reports[peer].message}' for peer in starting
+        ]
+
+    def _on_startup_watch(self) -> None:
+        if self.running:
+            return
+        waited_s = time.monotonic() - self._clock_started_s
+        if waited_s > _RIVALS_LEAVE_S and (rivals := self.rivals()):
+            # No report: in one namespace it would end the other run too.
+            raise Stop(EXIT_PEER, f'{rivals[0]}; {ALONE}')
+        if waited_s > self.ticks.startup_timeout_s:
+            missing = '; '.join(self.unmatched())
+            self.fail(f'not ready after {self.ticks.startup_timeout_s:g} s: {missing}')
+
+    def on_ready(self) -> None:
+        """Start time."""
+        self._due_ns = 0
+        self._pace.restart(0)
+        if self.ticks.lockstep:
+            self._release()
+        else:
+            self.publish_tick(0)
+            self._published = 0
+            self.wall_timer(TICK_S / (self.ticks.speed or 1.0), self._on_cycle)
+
+    # ------------------------------------------------------------------ ticks
+
+    def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
+        """Complete the tick that is due, and go on to the next one or end the run."""
+        if self.complete_tick(*inputs):
+            self.tick += 1
+            self._release()
+        else:
+            self.over_since_s = time.monotonic()
+            report = Report(
+                self.get_fully_qualified_name(), health.FINISHED, health.COMPLETE, stamp_ns
+            )
+            self.publish_event(health.report_array(report))
+            self.report(health.FINISHED, health.COMPLETE, stamp_ns=stamp_ns)
+
+    def _on_cycle(self) -> None:
+        """One free-running tick, with whatever inputs came last."""
+        if not self._paused and self.over_since_s is None:
+            self.step(self.tick * TICK_NS, *[item.values for item in self.inputs])
+
+    def _release(self) -> None:
+        """Publish the tick that is due, unless something holds it back."""
+        if self._paused or self._published == self.tick:
+            return
+        if self.ticks.lockstep:
+            if self._recorded is not None and self._is_ahead():
+                self._held = True
+                self.gate.awaited.add(self._recorded)
+                return
+            wait_s = self._pace.wait_s(self.tick)
+            if wait_s > 0.0:
+                self._pace_timer.timer_period_ns = max(1, int(wait_s * 1e9))
+                self._pace_timer.reset()
+                return
+        self._published = self.tick
+        self.publish_tick(self.tick * TICK_NS)
+
+    def _on_pace(self) -> None:
+        self._pace_timer.cancel()
+        self._release()
+
+    def rivals(self) -> list[str]:
+        """Who else publishes what only this node may publish, in words.
+
+        Who answers a tick that this plant has not published answers another one, which may not
+        have been discovered yet.
+        """
+        answered = any(item.stamp_ns > self.tick * TICK_NS for item in self.inputs)
+        name = self.get_fully_qualified_name()
+        hidden = [f'/clock is published by {name} too'] if answered and self.ticks.lockstep else []
+        return super().rivals() or hidden
+
+    def _is_ahead(self) -> bool:
+        limit_ns = (self.tick - MAX_TICKS_AHEAD) * TICK_NS
+        while self._recorded_ns < limit_ns and (message := take(self._recorded)) is not None:
+            self._keep_recorded(message)
+        return self._recorded_ns < limit_ns
+
+    def _keep_recorded(self, message: Header) -> None:
+        recorder = self.reports.get(topics.RECORDER)
+        if recorder is None or message.frame_id != recorder.process:
+            return  # of the recorder of a second glider
+        self._recorded_ns = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
+
+    def _on_recorded(self, message: Header) -> None:
+        self._keep_recorded(message)
+        self.gate.awaited.discard(self._recorded)
+        self._held = False
+        self._release()
+
+    def _on_pause(self, request, response):
+        self._paused = request.data
+        if not self._paused:
+            self._pace.restart(self.tick)
+            if self.running:
+                self._release()
+        response.success = True
+        response.message = f'{"paused" if self._paused else "running"} at tick {self.tick}'
+        return response
+
+    # ------------------------------------------------------------------ watching, end
+
+    def on_report(self, report: Report) -> None:
+        """Leave once everybody has said goodbye."""
+        if self.over_since_s is not None and self.may_leave():
+            raise Stop(0)
+
+    def may_leave(self) -> bool:
+        """Whether all peers have said goodbye."""
+        peers = [self.reports.get(peer) for peer in self._peers()]
+        return all(peer is not None and peer.phase == health.FINISHED for peer in peers)
+
+    def watch_tick(self) -> None:
+        """End the run, and name the culprit, if a tick takes too long."""
+        waits_for_time = self._published != self.tick and not self._held
+        if self._paused or waits_for_time:
+            self._watched_ns = None
+        elif self.stuck_s() > self.ticks.tick_timeout_s:
+            self.fail(self._blame())
+
+    def _blame(self) -> str:
+        """Find the node at which the tick hangs, by following who waits for whom."""
+        if self._held:
+            return (
+                f'{topics.RECORDER} has nothing on disk after {seconds(self._recorded_ns)}; '
+                f'the run waits at {seconds(self._due_ns)}'
+            )
+        missing = [item for item in self.inputs if not self._has(item)]
+        if not missing:
+            return f'{self.get_name()} did not act on a complete tick'
+        topic, culprit = missing[0].topic.name, missing[0].topic.publisher
+        for _ in self._peers():
+            report = self.reports.get(culprit)
+            waits = report is not None and report.phase == health.WAITING
+            if not waits or report.stamp_ns != self._due_ns:
+                break
+            if report.peer == self.get_name():
+                return f'{culprit} {report.message}, which was published: it did not arrive'
+            culprit, topic = report.peer, report.topic
+        return (
+            f'{culprit} did not publish {topic} for {seconds(self._due_ns)} within '
+            f'{self.ticks.tick_timeout_s:g} s'
+        )
+
+    def fail(self, message: str) -> None:
+        """End the run, and tell everybody why."""
+        self.report(health.FAILED, message, stamp_ns=self._due_ns or 0, level=health.ERROR)
+        raise Stop(EXIT_PEER, message)

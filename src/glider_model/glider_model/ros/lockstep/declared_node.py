@@ -1,0 +1,64 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The node of a block: everything that follows from what the block declares of itself."""
+
+from glider_model.base.block import Block, Telling
+from glider_model.base.settings import Settings
+from glider_model.base.signals import TICK_NS, TICK_S
+from glider_model.base.wiring import at_rest
+from glider_model.ros.lockstep import health
+from glider_model.ros.lockstep.block_node import BlockNode
+from glider_model.ros.lockstep.orders import PARAMETERS_SET, Orders
+from glider_model.ros.parameters import changed_parameters, declare_settings
+
+
+class DeclaredNode(BlockNode):
+    """A block that answers ticks. Subclasses call `start_up` at the end of their constructor."""
+
+    def __init__(self, block: Block, **kwargs) -> None:
+        super().__init__(block.wired.node, **kwargs)
+        self.block = block
+        self.senders = [self.add_output(topic) for topic in block.wired.outputs]
+        self.settings = declare_settings(self, block.settings, self.on_settings)
+        self.params = self.settings.params()
+        self.state = self.settings.initial_state()
+        self.orders = Orders(self)
+        self.telling = Telling(block)
+        for topic in block.wired.inputs:
+            self.add_input(topic)
+        self.compile_kernels()
+
+    def on_settings(self, settings: Settings) -> None:
+        """Fly on with tunable parameters that were set at run time."""
+        self.orders.add(PARAMETERS_SET, changed_parameters(self.settings, settings))
+        self.settings = settings
+        self.params = settings.params()
+
+    def compile_kernels(self) -> None:
+        """Call every kernel once, so that no tick waits for the compiler."""
+        inputs = tuple(at_rest(topic) for topic in self.block.wired.inputs)
+        state, _, _ = self.block.tick(self.state, 0.0, inputs, self.params, TICK_S)
+        if self.block.surface:
+            self.block.surface(state)
+
+    def surface(self, order: str) -> None:
+        """Ask for the surface, for good; ``order`` says on /diagnostics who wanted it."""
+        self.state = self.block.surface(self.state)
+        self.orders.add(order)
+
+    def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
+        """Answer one tick."""
+        self.orders.tell(stamp_ns)
+        t_s = stamp_ns // TICK_NS * TICK_S
+        self.state, outputs, flags = self.block.tick(self.state, t_s, inputs, self.params, TICK_S)
+        if self.block.say and self.telling.is_due(flags, stamp_ns):
+            self.tell(stamp_ns, flags)
+        for send, values in zip(self.senders, outputs, strict=True):
+            send(stamp_ns, values)
+
+    def tell(self, stamp_ns: int, flags: tuple[int, ...]) -> None:
+        """Put a change of the flags on /diagnostics."""
+        said = self.block.say(*flags)
+        if said.level == 'error':
+            self.get_logger().error(said.message)
+        self.publish_event(health.said_array(stamp_ns, self.get_fully_qualified_name(), said))

@@ -1,0 +1,414 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Vehicles: a validated YAML file, every number with unit and source, to kernel parameters."""
+
+import json
+import math
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, get_args
+
+import numpy as np
+import pydantic
+from pydantic import Field
+
+from glider_model.base.errors import told_changes
+from glider_model.base.files import read_bytes, read_yaml, yaml_line, yaml_text
+from glider_model.base.settings import (
+    Settings,
+    file_names,
+    find_field,
+    find_file,
+    holder_of,
+    validate,
+)
+from glider_model.vehicle.rigid_body import mass_matrix
+
+VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
+#: Source of a number that a person changed for a run.
+_SET = '--set'
+
+
+@cache
+def quantity(unit: str, **limits: float) -> type[Settings]:
+    """Model of one number with its unit and source; ``limits`` are those of pydantic's Field."""
+    return pydantic.create_model(
+        f'Quantity[{unit}]',
+        __base__=Settings,
+        value=(float, Field(strict=True, description=f'number in {unit}', **limits)),
+        unit=(Literal[unit], Field(description='unit of the value')),
+        source=(str, Field(min_length=3, description='where the number comes from')),
+    )
+
+
+Positive = {'gt': 0.0, 'le': 1e5}
+NotNegative = {'ge': 0.0, 'le': 1e5}
+Signed = {'ge': -1e5, 'le': 1e5}
+
+
+class Vector(Settings):
+    """Three numbers along x, y, z with unit and source."""
+
+    value: Annotated[list[float], Field(min_length=3, max_length=3)]
+    unit: str
+    source: Annotated[str, Field(min_length=3)]
+
+    @pydantic.field_validator('value')
+    @classmethod
+    def _bounded(cls, value: list[float]) -> list[float]:
+        if any(abs(number) > 1e5 for number in value):
+            raise ValueError('every component must be within +-1e5')
+        return value
+
+
+def _vector(unit: str, not_negative: bool = False):
+    """Vector whose unit, and if asked sign, is checked."""
+
+    def check(vector: Vector) -> Vector:
+        if vector.unit != unit:
+            raise ValueError(f'unit is {vector.unit!r} (allowed: {unit!r})')
+        if not_negative and min(vector.value) < 0.0:
+            raise ValueError(f'value = {vector.value} has a negative component (allowed: >= 0)')
+        return vector
+
+    return Annotated[Vector, pydantic.AfterValidator(check)]
+
+
+class RigidBodySettings(Settings):
+    """Hull without the moving mass. Origin at the centre of buoyancy, axes FRD."""
+
+    hull_mass: quantity('kg', **Positive)
+    hull_center_of_mass: _vector('m')
+    hull_inertia: _vector('kg m^2', not_negative=True)  # about the origin
+
+
+class AddedMassSettings(Settings):
+    """Positive added mass M_A (Fossen's -X_udot, ...), symmetric, with its two cross terms."""
+
+    linear: _vector('kg', not_negative=True)
+    angular: _vector('kg m^2', not_negative=True)
+    sway_yaw: quantity('kg m', **Signed)
+    heave_pitch: quantity('kg m', **Signed)
+
+
+class HydrodynamicsSettings(Settings):
+    """Coefficients of the viscous forces and moments (Graver 2005; Zhang et al. 2013)."""
+
+    K_D0: quantity('kg/m', **NotNegative)
+    K_D: quantity('kg/m/rad^2', **NotNegative)
+    K_L0: quantity('kg/m', **Signed)
+    K_L: quantity('kg/m/rad', **Signed)
+    K_beta: quantity('kg/m/rad', **Signed)
+    K_MR: quantity('kg/rad', **Signed)
+    K_p: quantity('kg s/rad', **Signed)
+    K_M0: quantity('kg', **Signed)
+    K_M: quantity('kg/rad', **Signed)
+    K_q: quantity('kg s/rad', **Signed)
+    K_MY: quantity('kg/rad', **Signed)
+    K_r: quantity('kg s/rad', **Signed)
+    linear_damping: _vector('kg/s')
+    linear_angular_damping: _vector('kg m^2/s')
+    quadratic_damping: _vector('kg/m')
+    quadratic_angular_damping: _vector('kg m^2')
+
+
+class MovingMassSettings(Settings):
+    """Mass that slides along x for pitch and turns about x for roll."""
+
+    mass: quantity('kg', **Positive)
+    neutral_x: quantity('m', ge=-10.0, le=10.0)
+    radius: quantity('m', gt=0.0, le=1.0)
+    inertia: _vector('kg m^2', not_negative=True)  # about its own centre, turning with it
+    travel: quantity('m', gt=0.0, le=2.0)
+    rate: quantity('m/s', gt=0.0, le=1.0)
+    rotation: quantity('deg', gt=0.0, le=180.0)
+    rotation_rate: quantity('deg/s', gt=0.0, le=180.0)
+
+
+class BuoyancyEngineSettings(Settings):
+    """Oil pump: net heaviness within +-range."""
+
+    range: quantity('kg', gt=0.0, le=50.0)
+    rate: quantity('kg/s', gt=0.0, le=10.0)
+
+
+class HullSettings(Settings):
+    """Outer shape, used where the hull breaks the surface."""
+
+    length: quantity('m', gt=0.1, le=20.0)
+    diameter: quantity('m', gt=0.01, le=5.0)
+
+
+class SteeringSettings(Settings):
+    """Turn rate (starboard +) over sine of roll in a gentle spiral, as ``glider trim`` solves it.
+
+    Its sign belongs to vehicle and phase: lift points the other way in the climb.
+    """
+
+    dive: quantity('rad/s', ge=-1.0, le=1.0)
+    climb: quantity('rad/s', ge=-1.0, le=1.0)
+
+
+class Vehicle(Settings):
+    """A vehicle file."""
+
+    name: Annotated[str, Field(pattern=r'^[a-z0-9_]+$')]
+    description: str
+    rigid_body: RigidBodySettings
+    moving_mass: MovingMassSettings
+    buoyancy_engine: BuoyancyEngineSettings
+    hull: HullSettings
+    #: Deepest that the hull is meant to go. Recordings made before there was this field lack it.
+    rated_depth: quantity('m', gt=0.0, le=12000.0) | None = None
+    added_mass: AddedMassSettings
+    hydrodynamics: HydrodynamicsSettings
+    steering: SteeringSettings
+
+    @pydantic.model_validator(mode='after')
+    def _mass_is_positive(self):
+        fault = mass_fault(self.params())
+        if fault:
+            raise ValueError(f'rigid_body, moving_mass, added_mass: {fault}')
+        return self
+
+    def changed(self) -> dict[str, Any]:
+        """Numbers that were changed by ``--set`` since there was a file, by dotted field name."""
+        whole = dict(self)
+        for name, group in list(whole.items()):
+            if isinstance(group, Settings):
+                whole |= {f'{name}.{key}': value for key, value in group}
+        return {
+            name: field.value
+            for name, field in whole.items()
+            if getattr(field, 'source', '').startswith(_SET)
+        }
+
+    @property
+    def rated_depth_m(self) -> float:
+        """Deepest that the hull is meant to go (m); infinite if its file does not say."""
+        return self.rated_depth.value if self.rated_depth else math.inf
+
+    def params(self) -> 'VehicleParams':
+        """Kernel parameters, SI and radians."""
+        body, mass, added = self.rigid_body, self.moving_mass, self.added_mass
+        hydro, pump = self.hydrodynamics, self.buoyancy_engine
+        coefficients = 'K_D0 K_D K_L0 K_L K_beta K_MR K_p K_M0 K_M K_q K_MY K_r'.split()
+        r_s = body.hull_center_of_mass.value
+        return VehicleParams(
+            m=body.hull_mass.value + mass.mass.value,
+            s_x=body.hull_mass.value * r_s[0],
+            s_y=body.hull_mass.value * r_s[1],
+            s_z=body.hull_mass.value * r_s[2],
+            i_xx=body.hull_inertia.value[0],
+            i_yy=body.hull_inertia.value[1],
+            i_zz=body.hull_inertia.value[2],
+            m_p=mass.mass.value,
+            x_p0=mass.neutral_x.value,
+            R_p=mass.radius.value,
+            i_px=mass.inertia.value[0],
+            i_py=mass.inertia.value[1],
+            i_pz=mass.inertia.value[2],
+            a_11=added.linear.value[0],
+            a_22=added.linear.value[1],
+            a_33=added.linear.value[2],
+            a_44=added.angular.value[0],
+            a_55=added.angular.value[1],
+            a_66=added.angular.value[2],
+            a_26=added.sway_yaw.value,
+            a_35=added.heave_pitch.value,
+            **{name: getattr(hydro, name).value for name in coefficients},
+            D_u=hydro.linear_damping.value[0],
+            D_v=hydro.linear_damping.value[1],
+            D_w=hydro.linear_damping.value[2],
+            D_p=hydro.linear_angular_damping.value[0],
+            D_q=hydro.linear_angular_damping.value[1],
+            D_r=hydro.linear_angular_damping.value[2],
+            D_uu=hydro.quadratic_damping.value[0],
+            D_vv=hydro.quadratic_damping.value[1],
+            D_ww=hydro.quadratic_damping.value[2],
+            D_pp=hydro.quadratic_angular_damping.value[0],
+            D_qq=hydro.quadratic_angular_damping.value[1],
+            D_rr=hydro.quadratic_angular_damping.value[2],
+            hull_radius=0.5 * self.hull.diameter.value,
+            m_b_max=pump.range.value,
+            m_b_rate=pump.rate.value,
+            x_p_max=mass.travel.value,
+            x_p_rate=mass.rate.value,
+            mu_max=math.radians(mass.rotation.value),
+            mu_rate=math.radians(mass.rotation_rate.value),
+            ballast=0.0,
+        )
+
+
+class VehicleParams(NamedTuple):
+    """A vehicle as the kernels see it: SI, radians, FRD, origin at the centre of buoyancy."""
+
+    m: float  #: total mass (kg)
+    s_x: float  #: first moment of the hull without moving mass (kg m)
+    s_y: float
+    s_z: float
+    i_xx: float  #: inertia of the hull without moving mass about the origin (kg m^2)
+    i_yy: float
+    i_zz: float
+    m_p: float  #: moving mass (kg), its neutral x (m), radius (m), own inertia (kg m^2)
+    x_p0: float
+    R_p: float
+    i_px: float
+    i_py: float
+    i_pz: float
+    a_11: float  #: added mass (kg), inertia (kg m^2) and cross terms (kg m)
+    a_22: float
+    a_33: float
+    a_44: float
+    a_55: float
+    a_66: float
+    a_26: float
+    a_35: float
+    K_D0: float  #: viscous coefficients, see HydrodynamicsSettings
+    K_D: float
+    K_L0: float
+    K_L: float
+    K_beta: float
+    K_MR: float
+    K_p: float
+    K_M0: float
+    K_M: float
+    K_q: float
+    K_MY: float
+    K_r: float
+    D_u: float  #: linear damping (kg/s, kg m^2/s)
+    D_v: float
+    D_w: float
+    D_p: float
+    D_q: float
+    D_r: float
+    D_uu: float  #: quadratic damping (kg/m, kg m^2)
+    D_vv: float
+    D_ww: float
+    D_pp: float
+    D_qq: float
+    D_rr: float
+    hull_radius: float  #: (m)
+    m_b_max: float  #: actuator ranges (kg, m, rad) and rates (per s)
+    m_b_rate: float
+    x_p_max: float
+    x_p_rate: float
+    mu_max: float
+    mu_rate: float
+    ballast: float  #: net heaviness beside that of the buoyancy engine (kg, + sinks)
+
+
+def mass_fault(vehicle: VehicleParams) -> str:
+    """What is wrong with the mass matrix of a vehicle; empty if nothing is."""
+    for x_p in (-vehicle.x_p_max, 0.0, vehicle.x_p_max):
+        for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
+            mu = share * vehicle.mu_max
+            smallest = float(np.linalg.eigvalsh(mass_matrix(x_p, mu, vehicle))[0])
+            if not smallest > 0.0:
+                return (
+                    f'the mass matrix is not positive definite at pitch_mass = {x_p:g} m, '
+                    f'roll_mass = {mu:.3g} rad, its smallest eigenvalue is {smallest:.3g} '
+                    f'(allowed: > 0)'
+                )
+    return ''
+
+
+def vehicle_names() -> list[str]:
+    """Names of the vehicles that come with the package."""
+    return file_names(VEHICLE_FOLDER)
+
+
+def changed_vehicle(name: str, changes: dict[str, Any]) -> str:
+    """Name of a vehicle of which some fields differ from its file.
+
+    `load_vehicle` takes it like any other, in every process that is handed it. No person can type
+    it, and no path looks like it: a NUL stands in it.
+
+    Parameters
+    ----------
+    name : str
+        Vehicle by name or path.
+    changes : dict
+        Values by dotted name of the field; that of a quantity is its number, in its unit.
+    """
+    return f'{name}\0{json.dumps(changes)}' if changes else name
+
+
+def _parts(name: str) -> tuple[str, dict[str, Any]]:
+    """What `changed_vehicle` was given."""
+    name, _, changes = name.partition('\0')
+    return name, json.loads(changes or '{}')
+
+
+def vehicle_path(name: str) -> Path:
+    """File of a vehicle given by name, or by path.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is neither a vehicle of that name nor such a file.
+    """
+    return find_file('vehicle', _parts(name)[0], VEHICLE_FOLDER)
+
+
+def vehicle_file(name: str) -> bytes:
+    """Content of a file that loads to a vehicle: its own or, if fields are changed, a new one.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no such vehicle.
+    """
+    path, (_, changes) = vehicle_path(name), _parts(name)
+    if not changes:
+        return read_bytes(path)
+    return yaml_text(_changed_values(read_yaml(path), changes)).encode()
+
+
+def load_vehicle(name: str) -> Vehicle:
+    """Load and validate a vehicle by name or path.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming file, field, value and allowed range.
+    """
+    path = vehicle_path(name)
+    status = path.stat()
+    return _read_vehicle(path, name, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=16)
+def _read_vehicle(path: Path, name: str, mtime_ns: int, size: int) -> Vehicle:
+    """Vehicle of a file in this version: every block of a mission asks for it."""
+    _, changes = _parts(name)
+
+    def line_of(location: tuple[str, ...]) -> int | None:
+        where = '.'.join(location)
+        here = any(f'{where}.'.startswith(f'{field}.') for field in changes)
+        return None if here else yaml_line(path, location)
+
+    changed = told_changes({f'vehicle.{field}': value for field, value in changes.items()})
+    values = _changed_values(read_yaml(path), changes)
+    return validate(Vehicle, values, str(path), line_of=line_of, changed=changed)
+
+
+def _changed_values(values: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Values of a vehicle file with some of its fields changed, which say so as their source.
+
+    A whole is changed before its parts, in whatever order they are given.
+    """
+    whole = {'vehicle': values}
+    numbers = {field.removesuffix('.value'): value for field, value in changes.items()}
+    for field, value in sorted(numbers.items(), key=lambda change: change[0].count('.')):
+        name = f'vehicle.{field}'
+        holder, last = holder_of(whole, name), name.rpartition('.')[2]
+        unit = find_field(Vehicle, f'{field}.unit')
+        if unit is not None and not isinstance(value, dict):  # a quantity, given by its number
+            old = holder.get(last)
+            if not isinstance(old, dict):  # its file does not have it
+                old = {'unit': next(iter(get_args(unit.annotation)), None)}
+            source = f'{_SET}, instead of {old["value"]}' if 'value' in old else _SET
+            value = {**old, 'value': value, 'source': source}
+        holder[last] = value
+    return values

@@ -1,0 +1,138 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The glide polar against the six-degree-of-freedom trim, and its inverse functions."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glider_model.onboard.glide_polar import (
+    LARGEST_ALPHA,
+    SHALLOWEST_PITCH,
+    glide_alpha,
+    glide_force,
+    glide_horizontal_speed,
+    glide_net_heaviness,
+    glide_speed,
+    glide_vertical_rate,
+    make_polar,
+    steepen,
+)
+from glider_model.plant.trim import solve_trim
+from glider_model.vehicle.file import load_vehicle
+
+quick = settings(max_examples=60, deadline=None)
+VEHICLES = {name: load_vehicle(name).params() for name in ('zhang2021', 'seawing')}
+polars = st.sampled_from([make_polar(vehicle) for vehicle in VEHICLES.values()])
+pitches = st.floats(SHALLOWEST_PITCH, math.radians(70.0))
+weights = st.floats(0.05, 1.0)
+phases = st.sampled_from([1.0, -1.0])
+
+
+@pytest.mark.parametrize('name', VEHICLES)
+@pytest.mark.parametrize('pitch_deg', [18.0, 25.0, 35.0, 50.0])
+@pytest.mark.parametrize('phase', [1.0, -1.0], ids=['dive', 'climb'])
+def test_polar_agrees_with_trim(name, pitch_deg, phase):
+    """Angle of attack within 0.02 deg, speeds within 0.5 %."""
+    polar, theta = make_polar(VEHICLES[name]), -phase * math.radians(pitch_deg)
+    # a mass that reaches steep pitches
+    vehicle = VEHICLES[name]._replace(x_p_max=0.5)
+    trim = solve_trim(vehicle, 0.35 * phase, pitch_deg=-phase * pitch_deg)
+    assert trim.converged
+    rate = glide_vertical_rate(theta, 0.35 * phase, polar)
+    assert math.degrees(glide_alpha(theta, polar)) == pytest.approx(trim.alpha_deg, abs=0.02)
+    assert rate == pytest.approx(trim.vertical_mps, rel=0.005)
+    assert glide_horizontal_speed(theta, rate, polar) == pytest.approx(
+        trim.horizontal_mps, rel=0.005
+    )
+    speed, alpha = glide_speed(theta, rate, polar)
+    assert speed == pytest.approx(trim.speed_mps, rel=0.005)
+    assert alpha == glide_alpha(theta, polar)
+
+
+@quick
+@given(polars, st.floats(math.radians(15.0), math.radians(70.0)), phases)
+def test_lift_and_drag_balance_a_vertical_weight(polar, pitch, phase):
+    theta = -phase * pitch
+    alpha = glide_alpha(theta, polar)
+    drag = polar.K_D0 + polar.K_D * alpha**2
+    lift = polar.K_L0 + polar.K_L * alpha
+    across = drag * math.cos(theta - alpha) + lift * math.sin(theta - alpha)
+    assert abs(across) < 0.01 * glide_force(alpha, polar)
+
+
+@quick
+@given(polars, pitches, weights, phases)
+def test_weight_comes_back_from_its_vertical_rate(polar, pitch, weight, phase):
+    theta, weight = -phase * pitch, phase * weight
+    rate = glide_vertical_rate(theta, weight, polar)
+    assert glide_net_heaviness(theta, rate, polar) == pytest.approx(weight, rel=1e-12)
+
+
+@quick
+@given(polars, pitches, st.floats(0.01, 1.0), phases)
+def test_speeds_are_one_triangle(polar, pitch, rate, phase):
+    theta, rate = -phase * pitch, phase * rate
+    assert glide_speed(theta, rate, polar)[0] == pytest.approx(
+        math.hypot(rate, glide_horizontal_speed(theta, rate, polar)), rel=1e-12
+    )
+
+
+@quick
+@given(polars, pitches, weights, phases)
+def test_path_is_steeper_than_the_hull(polar, pitch, weight, phase):
+    rate = glide_vertical_rate(-phase * pitch, phase * weight, polar)
+    path = math.atan2(rate, glide_horizontal_speed(-phase * pitch, rate, polar))
+    assert phase * path > pitch
+
+
+@quick
+@given(polars, pitches, phases)
+def test_a_dive_goes_down_and_a_climb_up(polar, pitch, phase):
+    assert phase * glide_vertical_rate(-phase * pitch, 0.4 * phase, polar) > 0.0
+
+
+@quick
+@given(polars, st.floats(-1.5, 1.5))
+def test_angle_of_attack_stays_within_belief(polar, theta):
+    assert abs(glide_alpha(theta, polar)) <= LARGEST_ALPHA
+
+
+@quick
+@given(polars, st.floats(-1.5, 1.5), st.floats(-1.0, 1.0))
+def test_everything_is_finite_at_any_pitch(polar, theta, rate):
+    numbers = [
+        glide_vertical_rate(theta, rate, polar),
+        glide_net_heaviness(theta, rate, polar),
+        glide_horizontal_speed(theta, rate, polar),
+        *glide_speed(theta, rate, polar),
+    ]
+    assert np.isfinite(numbers).all()
+
+
+@pytest.mark.parametrize(
+    ('theta', 'steep'), [(-0.1, -SHALLOWEST_PITCH), (0.1, SHALLOWEST_PITCH), (-0.5, -0.5)]
+)
+def test_a_shallow_pitch_is_steepened_to_its_side(theta, steep):
+    assert steepen(theta) == steep
+
+
+@quick
+@given(polars, weights, phases)
+def test_four_times_the_weight_is_twice_the_speed(polar, weight, phase):
+    one, four = (glide_vertical_rate(-0.5 * phase, n * weight * phase, polar) for n in (1, 4))
+    assert four == pytest.approx(2.0 * one, rel=1e-12)
+
+
+def test_polar_of_a_vehicle_without_lift_is_usable():
+    polar = make_polar(load_vehicle('zhang2021_table1').params())
+    assert min(polar.K_D0, polar.K_D, polar.K_L) > 0.0
+    assert math.isfinite(glide_alpha(-0.5, polar))
+
+
+def test_linear_drag_is_taken_at_half_a_metre_per_second():
+    vehicle = VEHICLES['zhang2021']._replace(D_u=2.0)
+    assert make_polar(vehicle).K_D0 == pytest.approx(7.5 + 2.0 / 0.5, rel=1e-15)

@@ -1,0 +1,215 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""How a vehicle steers, learnt: the estimator, and which way of steering it is for."""
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glider_model.onboard.attitude_filter import Measured
+from glider_model.onboard.learnt_steering import (
+    AT_LIMIT,
+    KEPT_S,
+    STRONG_STEERING,
+    SteeringLearningSettings,
+    choose_steering,
+    followed_frequency,
+    is_to_be_kicked,
+    learn,
+    learn_steering,
+)
+
+DT = 0.1
+SETTINGS = SteeringLearningSettings()
+PARAMS = SETTINGS.params()
+
+effectiveness = st.floats(0.005, 0.06).flatmap(lambda b: st.sampled_from([b, -b]))
+kicks = st.floats(-0.5, 0.5)
+bends = st.floats(-0.01, 0.01)
+offsets = st.floats(-0.001, 0.001)
+
+
+def turns(seconds: float, seed: int):
+    """Bank (sine of a wandering roll) and roll rate of a vehicle that turns now and then."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, seconds, DT)
+    roll = sum(
+        rng.uniform(0.02, 0.1) * np.sin(rng.uniform(0.01, 0.1) * t + rng.uniform(0, 6))
+        for _ in range(5)
+    )
+    return np.sin(roll), np.gradient(roll, DT)
+
+
+@numba.njit
+def _learn_all(state, bank, roll_rate, yaw_rate, params):
+    for i in range(len(bank)):
+        state = learn_steering(state, bank[i], bank[i] ** 3, roll_rate[i], yaw_rate[i], params, DT)
+    return state
+
+
+def learn_all(state, bank, roll_rate, yaw_rate):
+    return _learn_all(state, bank, roll_rate, yaw_rate, PARAMS)
+
+
+def prior(sign: float):
+    """Estimate of a phase whose steering is guessed to have this sign."""
+    steering = SETTINGS.initial_state()
+    return steering.dive if sign > 0.0 else steering.climb
+
+
+def covariance(state):
+    """Covariance of (b, c, k, d) as a matrix."""
+    matrix = np.zeros((4, 4))
+    matrix[np.triu_indices(4)] = state.p
+    return matrix + np.triu(matrix, 1).T
+
+
+@settings(max_examples=30, deadline=None)
+@given(effectiveness, bends, kicks, offsets, st.integers(0, 1000), st.sampled_from([-1.0, 1.0]))
+def test_estimate_comes_to_the_truth_from_either_sign(b, c, k, d, seed, first_guess):
+    """b within 10 % after 20 min of turning, from any start; c and k within their deviations."""
+    bank, roll_rate = turns(1200.0, seed)
+    yaw_rate = b * bank + c * bank**3 + k * roll_rate + d
+    state = learn_all(prior(first_guess), bank, roll_rate, yaw_rate)
+    assert state.b == pytest.approx(b, rel=0.1, abs=3e-4)
+    deviation = np.sqrt(np.diag(covariance(state)))
+    assert deviation[2] < 0.5 * SETTINGS.kick_std
+    assert state.c == pytest.approx(c, abs=2.0 * deviation[1])
+    assert state.k == pytest.approx(k, abs=2.0 * deviation[2])
+
+
+def test_rolls_of_several_sizes_tell_the_bend():
+    """From turns at 10, 20 and 30 deg of roll to either side, c is known to better than a half."""
+    sizes = np.sin(np.radians([10.0, -20.0, 30.0, -10.0, 20.0, -30.0]))
+    bank = np.tile(np.repeat(sizes, 3000), 4)
+    state = learn_all(prior(1.0), bank, np.zeros(len(bank)), 0.003 * bank - 0.006 * bank**3)
+    deviation = np.sqrt(covariance(state)[1, 1])
+    assert deviation < 0.003
+    assert state.b == pytest.approx(0.003, rel=0.1)
+    assert state.c == pytest.approx(-0.006, abs=2.0 * deviation)
+
+
+def test_one_turn_tells_the_sign():
+    """A roll of 20 deg, wrongly expected to turn to starboard, is understood within 40 s."""
+    state = prior(1.0)
+    bank = np.full(400, np.sin(np.radians(20.0)))
+    state = learn_all(state, bank, np.zeros(400), -0.02 * bank)
+    assert state.b == pytest.approx(-0.02, rel=0.3)
+
+
+def test_straight_flight_teaches_nothing_about_b():
+    """Level and without yaw, b stays and its variance grows only by the expected drift."""
+    before = prior(1.0)
+    still = np.zeros(10000)
+    after = learn_all(before, still, still, still)
+    assert after.b == before.b
+    assert after.p[0] == pytest.approx(before.p[0] + PARAMS.drift * 1000.0, rel=1e-9)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 1000), effectiveness)
+def test_covariance_stays_positive_definite(seed, b):
+    bank, roll_rate = turns(300.0, seed)
+    state = learn_all(prior(1.0), bank, roll_rate, b * bank)
+    assert np.linalg.eigvalsh(covariance(state))[0] > 0.0
+
+
+# ---------------------------------------------------------------------------- way of steering
+
+LIMIT = PARAMS.bank
+
+
+def known(b, c, k, std=1e-5, **changes):
+    """State of an estimator that is as sure of b, c and k as ``std`` says."""
+    p = (std**2, 0.0, 0.0, 0.0, std**2, 0.0, 0.0, std**2, 0.0, 1e-10)
+    return prior(1.0)._replace(b=b, c=c, k=k, p=p, **changes)
+
+
+weak = st.floats(-0.004, 0.004)
+some_kicks = st.floats(0.05, 0.5).flatmap(lambda k: st.sampled_from([k, -k]))
+
+
+@given(weak, st.floats(-0.006, 0.006), some_kicks, st.booleans())
+def test_vehicle_whose_turn_changes_sides_within_the_limit_is_kicked(b, c, k, is_kicked):
+    """Against its kick at small rolls and with it at the limit; whatever was done before."""
+    at_limit = b + c * LIMIT * LIMIT
+    state = known(b, c, k, is_kicked=is_kicked)
+    if abs(at_limit) > 1e-4 and abs(b) > 1e-4:
+        assert is_to_be_kicked(state, LIMIT) == (at_limit * k > 0.0 > b * k)
+
+
+@given(weak, st.floats(-0.006, 0.006), some_kicks, st.floats(0.0, 0.003), st.booleans())
+def test_mirrored_vehicle_is_steered_the_same_way(b, c, k, std, is_kicked):
+    state = known(b, c, k, std, is_kicked=is_kicked)
+    mirrored = known(-b, -c, -k, std, is_kicked=is_kicked)
+    assert is_to_be_kicked(state, LIMIT) == is_to_be_kicked(mirrored, LIMIT)
+
+
+@given(st.floats(2.0 * STRONG_STEERING, 0.1), st.sampled_from([1.0, -1.0]), kicks)
+def test_vehicle_that_steers_well_is_never_kicked(b, sign, k):
+    assert not is_to_be_kicked(known(sign * b, 0.0, k), LIMIT)
+    assert not is_to_be_kicked(prior(sign)._replace(k=k), LIMIT)
+
+
+@pytest.mark.parametrize('is_kicked', [True, False])
+def test_doubt_about_the_limit_changes_nothing(is_kicked):
+    """b is known, what becomes of it at the limit is not: as before."""
+    state = known(1e-3, -3.5e-3, -0.3, is_kicked=is_kicked)
+    p = (1e-8, 0.0, 0.0, 0.0, 9e-6, *state.p[5:])
+    assert is_to_be_kicked(state._replace(p=p), LIMIT) == is_kicked
+
+
+def test_vehicle_of_which_nothing_is_known_but_that_it_is_weak_is_kicked():
+    assert is_to_be_kicked(known(2e-4, 0.0, -0.3, 2e-3, is_kicked=False), LIMIT)
+
+
+@pytest.mark.parametrize('is_kicked', [True, False])
+def test_way_of_steering_is_kept_for_a_while(is_kicked):
+    """Five minutes at least, at the limit of roll too; then what is known counts."""
+    b, c = (2e-3, 0.0) if is_kicked else (1e-3, -8e-3)
+    state = known(b, c, -0.3, is_kicked=is_kicked)
+    early = choose_steering(state._replace(kept_s=KEPT_S - 1.0), LIMIT, LIMIT)
+    late = choose_steering(state._replace(kept_s=KEPT_S + 1.0), LIMIT, LIMIT)
+    assert early.is_kicked == is_kicked
+    assert late.is_kicked != is_kicked
+    assert late.kept_s == 0.0
+    assert late[:5] == state[:5]
+
+
+@given(st.floats(-1.0, 1.0))
+def test_kick_that_is_enough_is_not_given_up(sine):
+    """Only a vehicle that needs all its roll, and turns against it, is better turned."""
+    state = known(2e-3, 0.0, -0.3, is_kicked=True, kept_s=1e4)
+    kept = choose_steering(state, sine, LIMIT).is_kicked
+    assert kept == (abs(sine) < AT_LIMIT * LIMIT)
+
+
+@given(effectiveness, some_kicks)
+def test_vehicle_follows_up_to_where_its_turn_outruns_its_kick(b, k):
+    """Where the kick goes against the turn; elsewhere it follows at least as fast."""
+    frequency = followed_frequency(known(b, 0.0, k, 0.0))
+    if b * k < 0.0:
+        assert frequency == pytest.approx(abs(b / k))
+    else:
+        assert frequency >= abs(b / k) * (1.0 - 1e-9)
+
+
+@given(weak, some_kicks, st.floats(0.0, 0.02), st.floats(0.0, 0.02))
+def test_unknown_vehicle_is_not_expected_to_follow_less(b, k, one_std, other_std):
+    """Asked too slowly it would never show what it can do."""
+    less, more = sorted((one_std, other_std))
+    assert followed_frequency(known(b, 0.0, k, less)) <= followed_frequency(known(b, 0.0, k, more))
+
+
+def test_only_the_phase_that_is_flown_learns_and_only_in_a_glide():
+    before = SETTINGS.initial_state()
+    for rate, changed in ((0.27, {'dive'}), (-0.27, {'climb'}), (0.05, set()), (-0.05, set())):
+        after = before
+        now = Measured(0.2, -0.5, 0.0, 0.0, 0.0, 0.004, rate)
+        for _ in range(600):
+            after = learn(after, now, 0.5, PARAMS, DT)
+        assert {
+            phase for phase in ('dive', 'climb') if getattr(after, phase) != getattr(before, phase)
+        } == changed

@@ -1,0 +1,506 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes in step: order, exactness, readiness, blame, pause, pace, and the free-running mode."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+import rclpy
+from nav_msgs.msg import Odometry
+from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool
+
+from glider_model.base.signals import TICK_NS
+from glider_model.ros.lockstep import clock, health
+from glider_model.ros.lockstep.block_node import BlockNode
+from glider_model.ros.lockstep.clock import MAX_TICKS_AHEAD, ClockNode
+from glider_model.ros.lockstep.executor import make_executor
+from glider_model.ros.lockstep.process import Stop
+from glider_model.ros.wire.codec import MessageError, to_cdr
+from glider_model.ros.wire.topics import CONTROL, CURRENT, GUIDANCE, PLANT, RECORDER, TOPICS
+
+TIMEOUT_S = 30.0
+
+
+class Clock(ClockNode):
+    """Stands in for the plant: counts, and remembers what it was told."""
+
+    def __init__(self, last_tick: int = 50, **kwargs) -> None:
+        super().__init__(PLANT, **kwargs)
+        self.last_tick, self.log = last_tick, []
+        self.publish = [self.add_output(name) for name in ('/clock', 'odom', 'joint_states')]
+        self.add_input('command')
+        self.add_input('current_velocity')
+        self.start_up()
+
+    def publish_tick(self, stamp_ns: int) -> None:
+        publish_clock, odom, joints = self.publish
+        value = float(self.tick)
+        publish_clock(stamp_ns)
+        odom(stamp_ns, 13 * (value,))
+        joints(stamp_ns, 3 * (-value,))
+
+    def complete_tick(self, command, current) -> bool:
+        self.log.append((time.monotonic(), self.tick, command, current))
+        return self.tick < self.last_tick
+
+
+class Block(BlockNode):
+    """Stands in for a block: sends on the sum of the first numbers of its inputs."""
+
+    def __init__(self, name, inputs, outputs, mute_from=None, **kwargs) -> None:
+        super().__init__(name, **kwargs)
+        self.mute_from_ns = None if mute_from is None else mute_from * TICK_NS
+        self.steps, self.stale_steps = [], 0
+        self.publish = {name: self.add_output(name) for name in outputs}
+        for item in inputs:
+            self.add_input(item)
+        self.start_up()
+
+    def step(self, stamp_ns: int, *inputs) -> None:
+        self.steps.append(stamp_ns)
+        if self.mute_from_ns is not None and stamp_ns >= self.mute_from_ns:
+            return
+        total = sum(values[0] for values in inputs)
+        for name, publish in self.publish.items():
+            publish(stamp_ns, len(TOPICS[name].codec.fields) * (total,))
+
+    def on_stale(self, stamp_ns: int) -> None:
+        self.stale_steps += 1
+
+
+INPUTS = {
+    CURRENT: ['odom'],
+    GUIDANCE: ['odom'],
+    CONTROL: ['reference', 'odom', 'joint_states'],
+}
+OUTPUTS = {
+    CURRENT: ['current_velocity'],
+    GUIDANCE: ['tracking_error', 'current_estimate', 'reference'],
+    CONTROL: ['wrench', 'command'],
+}
+
+
+class Graph:
+    """Some of the nodes in one executor, spun until the plant stops."""
+
+    def __init__(self, context, without=(), mute=None, last_tick=50, **parameters) -> None:
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        shared = {'context': context, 'namespace': '/glider', 'use_global_arguments': False}
+        common = [p for p in overrides if p.name != 'speed']
+        self.executor = make_executor(context=context)
+        self.blocks = {
+            name: Block(
+                name,
+                INPUTS[name],
+                OUTPUTS[name],
+                (mute or {}).get(name),
+                parameter_overrides=common,
+                **shared,
+            )
+            for name in (CURRENT, GUIDANCE, CONTROL)
+            if name not in without
+        }
+        self.plant = Clock(last_tick, parameter_overrides=overrides, **shared)
+        self.nodes = [self.plant, *self.blocks.values()]
+        for node in self.nodes:
+            self.executor.add_node(node)
+
+    def spin(self, until=lambda: False) -> Stop | None:
+        """Spin until a condition holds, or until a node stops; that node's reason."""
+        deadline = time.monotonic() + TIMEOUT_S
+        while not until():
+            assert time.monotonic() < deadline, 'the graph hangs'
+            try:
+                self.executor.spin_once(timeout_sec=0.1)
+            except Stop as stop:
+                return stop
+        return None
+
+    def spin_until_over(self) -> Stop:
+        stop = self.spin(lambda: self.plant.over_since_s is not None)
+        assert stop is None or stop.code
+        return stop
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        for node in self.nodes:
+            node.destroy_node()
+
+
+@pytest.fixture
+def make_graph(context):
+    graphs = []
+
+    def make(**arguments):
+        graphs.append(Graph(context, **arguments))
+        return graphs[-1]
+
+    yield make
+    for graph in graphs:
+        graph.close()
+
+
+def test_every_tick_is_acted_on_once_and_in_order(make_graph):
+    graph = make_graph(last_tick=200)
+    assert graph.spin_until_over() is None
+    ticks = list(range(201))
+    assert [tick for _, tick, _, _ in graph.plant.log] == ticks
+    for block in graph.blocks.values():
+        assert block.steps == [tick * TICK_NS for tick in ticks]
+
+
+def test_a_node_uses_the_inputs_of_its_tick_and_no_other(make_graph):
+    graph = make_graph(last_tick=100)
+    graph.spin_until_over()
+    # reference = odom = k, joint_states = -k: control sends k + k - k
+    for _, tick, command, current in graph.plant.log:
+        assert command == 3 * (float(tick),)
+        assert current == 3 * (float(tick),)
+
+
+def test_everybody_leaves_when_the_run_is_complete(make_graph):
+    graph = make_graph(last_tick=3)
+    for _ in graph.nodes:
+        stop = graph.spin()
+        assert stop.code == 0
+
+
+@pytest.mark.parametrize('missing', [CURRENT, GUIDANCE, CONTROL])
+def test_missing_peer_is_named(make_graph, missing):
+    graph = make_graph(without=[missing], startup_timeout_s=1.0)
+    stop = graph.spin()
+    assert stop.code == 3
+    assert f'{missing} has not appeared' in str(stop)
+    assert graph.plant.log == []
+
+
+def test_missing_recorder_is_named(make_graph):
+    graph = make_graph(startup_timeout_s=1.0, record=True)
+    assert 'recorder_node has not appeared' in str(graph.spin())
+
+
+def test_second_source_of_time_is_refused_and_named(make_graph, context, monkeypatch):
+    monkeypatch.setattr(clock, '_RIVALS_LEAVE_S', 0.5)
+    graph = make_graph()
+    other = rclpy.create_node('plant_node', namespace='/beta', context=context)
+    graph.nodes.append(other)
+    other.create_publisher(TOPICS['/clock'].message_type, '/clock', 10)
+    stop = graph.spin()
+    assert stop.code == 3
+    assert str(stop).startswith('/clock is published by /beta/plant_node too')
+    assert graph.plant.log == []
+
+
+@pytest.mark.parametrize(
+    ('culprit', 'topic'),
+    [(CURRENT, 'current_velocity'), (GUIDANCE, 'reference'), (CONTROL, 'command')],
+)
+def test_node_that_falls_silent_is_named(make_graph, culprit, topic):
+    graph = make_graph(mute={culprit: 20}, tick_timeout_s=1.0)
+    stop = graph.spin()
+    assert stop.code == 3
+    assert str(stop).startswith(f'{culprit} did not publish {topic} for t = 2.0 s')
+
+
+@pytest.mark.parametrize('is_rival', [True, False])
+def test_a_plant_of_a_second_glider_does_not_end_the_run(make_graph, context, is_rival):
+    graph = make_graph(last_tick=10**9)
+    assert graph.spin(lambda: graph.plant.tick > 10) is None
+    topic = TOPICS['lockstep']
+    rival = rclpy.create_node('rival', namespace='/glider', context=context)
+    graph.nodes.append(rival)
+    publisher = rival.create_publisher(topic.message_type, topic.name, topic.qos)
+    assert graph.spin(lambda: publisher.get_subscription_count() == len(graph.nodes) - 1) is None
+    process = 'another' if is_rival else graph.plant.process
+    report = health.Report(PLANT, health.FAILED, 'it sank', process=process)
+    publisher.publish(health.report_array(report))
+    until = time.monotonic() + 1.0
+    stop = graph.spin(lambda: time.monotonic() > until)
+    assert (stop is None) == is_rival
+
+
+class Recorder(BlockNode):
+    """Stands in for the recorder: takes nothing, and says what it has on disk when it is told."""
+
+    def __init__(self, **kwargs) -> None:
+        super().__init__(RECORDER, **kwargs)
+        for topic in TOPICS.values():
+            if topic.recorded:
+                self._subscription(topic, lambda raw: None, gated=False)
+        self.recorded = self._publisher(TOPICS['recorded'])
+        self.outputs['recorded'] = (TOPICS['recorded'], self.recorded)
+        self.start_up()
+
+
+def test_only_its_own_recorder_lets_the_plant_go_on(make_graph, context):
+    parameters = {'record': True, 'tick_timeout_s': 30.0}
+    graph = make_graph(last_tick=10**9, **parameters)
+    recorder = Recorder(
+        context=context,
+        namespace='/glider',
+        use_global_arguments=False,
+        parameter_overrides=[Parameter(name, value=value) for name, value in parameters.items()],
+    )
+    graph.nodes.append(recorder)
+    graph.executor.add_node(recorder)
+    assert graph.spin(lambda: graph.plant.tick == MAX_TICKS_AHEAD) is None
+    on_disk = Header(frame_id='another')
+    on_disk.stamp.sec = 10
+    recorder.recorded.publish(on_disk)
+    until = time.monotonic() + 1.0
+    assert graph.spin(lambda: time.monotonic() > until) is None
+    assert graph.plant.tick == MAX_TICKS_AHEAD
+    on_disk.frame_id = recorder.process
+    recorder.recorded.publish(on_disk)
+    assert graph.spin(lambda: graph.plant.tick == MAX_TICKS_AHEAD + 101) is None
+
+
+INTERRUPTED = """
+import os, signal, sys
+from glider_model.ros.lockstep.node import TickNode
+from glider_model.ros.lockstep.process import run
+
+
+class Interrupted(TickNode):
+    def __init__(self):
+        super().__init__('interrupted')
+        self.wall_timer(0.01, self.act)
+
+    def act(self):
+        os.kill(os.getpid(), signal.SIGNAL)
+        sum(range(1_000_000))  # many chances for an exception
+        print('acted to the end', flush=True)
+
+
+sys.exit(run(Interrupted))
+"""
+
+
+@pytest.mark.parametrize('number', ['SIGINT', 'SIGTERM'])
+def test_signal_does_not_break_off_what_a_node_does(number):
+    """Compiled functions do not stand an exception from a signal handler."""
+    done = subprocess.run(
+        [sys.executable, '-c', INTERRUPTED.replace('SIGNAL', number)],
+        env={'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **os.environ},
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT_S,
+    )
+    assert (done.returncode, done.stderr) == (0, '')
+    assert done.stdout.startswith('acted to the end')
+
+
+def test_number_that_is_not_finite_stops_the_run(make_graph):
+    graph = make_graph()
+    guidance = graph.blocks[GUIDANCE]
+    send = guidance.publish['reference']
+    guidance.publish['reference'] = lambda stamp_ns, values: send(
+        stamp_ns, values if stamp_ns < 5 * TICK_NS else 13 * (float('nan'),)
+    )
+    stop = graph.spin()
+    assert stop.code == 3
+    assert 'reference of guidance_node' in str(stop)
+    assert 'nan' in str(stop)
+
+
+class Intruder:
+    """A node outside of the lockstep that publishes on a topic of the glider, and listens."""
+
+    def __init__(self, graph, context, topic: str) -> None:
+        self.node = rclpy.create_node('intruder', namespace='/other', context=context)
+        graph.nodes.append(self.node)
+        graph.executor.add_node(self.node)
+        self.topic, self.told = TOPICS[topic], []
+        events = TOPICS['/diagnostics']
+        self.node.create_subscription(events.message_type, events.name, self.on_event, events.qos)
+        name = self.topic.full_name('/glider')
+        self.publisher = self.node.create_publisher(self.topic.message_type, name, self.topic.qos)
+
+    def on_event(self, array) -> None:
+        self.told += [status.message for status in array.status]
+
+    def publish(self, raw: bytes) -> None:
+        self.publisher.publish(raw)
+
+    def is_heard(self) -> bool:
+        return self.publisher.get_subscription_count() >= max(1, len(self.topic.readers))
+
+    def was_named(self) -> bool:
+        said = f'/glider/{self.topic.name} is published by /other/intruder too'
+        return any(said in told for told in self.told)
+
+
+@pytest.mark.parametrize(
+    'topic', ['odom', 'joint_states', 'current_velocity', 'reference', 'command']
+)
+def test_second_publisher_in_mid_flight_is_refused_and_named(make_graph, context, topic):
+    """It says what the first one says, with other numbers, for this tick and the ones to come."""
+    graph = make_graph(last_tick=10**9)
+    assert graph.spin(lambda: graph.plant.tick > 10) is None
+    intruder = Intruder(graph, context, topic)
+    assert graph.spin(intruder.is_heard) is None
+    wild = len(intruder.topic.codec.fields) * (12345.0,)
+    for _ in range(10):
+        for ahead in range(5):
+            stamp_ns = (graph.plant.tick + ahead) * TICK_NS
+            intruder.publish(intruder.topic.codec.encode(stamp_ns, wild))
+        until = graph.plant.tick + 5
+        assert graph.spin(lambda: graph.plant.tick > until) is None  # noqa: B023
+    assert graph.spin(intruder.was_named) is None
+    for _, tick, command, current in graph.plant.log:
+        # odom is the tick, joint_states less the tick, and every block sends on the sum
+        assert (command[0], current[0]) == (float(tick), float(tick))
+
+
+def test_publisher_that_takes_the_place_of_one_that_is_gone_is_believed(make_graph):
+    """Free-running, a driver may be started again: its numbers begin at 1."""
+    graph = make_graph(lockstep=False, input_max_age_s=1.0)
+    control = graph.blocks[CONTROL]
+    assert graph.spin(lambda: len(control.steps) > 5) is None
+    guidance = graph.blocks[GUIDANCE]
+    (publisher,) = (p for topic, p in guidance.outputs.values() if topic.name == 'reference')
+    guidance.destroy_publisher(publisher)
+    assert graph.spin(lambda: not control.get_publishers_info_by_topic('reference')) is None
+    guidance.publish['reference'] = guidance.add_output('reference')
+    before = len(control.steps)
+    assert graph.spin(lambda: len(control.steps) > before + 5) is None
+    assert all(item.refused == 0 for item in control.inputs)
+
+
+@pytest.mark.parametrize('lockstep', [True, False])
+@pytest.mark.parametrize(
+    'raw',
+    [b'', b'\0\1\0\0', b'\0\1\0\0' + 40 * b'\xff', bytes(range(256)), 100_000 * b'\xff'],
+    ids=['nothing', 'a header', 'too short', 'noise', 'too long'],
+)
+def test_malformed_message_ends_no_node(make_graph, context, lockstep, raw):
+    graph = make_graph(last_tick=10**9, lockstep=lockstep)
+    control = graph.blocks[CONTROL]
+    assert graph.spin(lambda: len(control.steps) > 3) is None
+    intruder = Intruder(graph, context, 'reference')
+    assert graph.spin(intruder.is_heard) is None
+    (item,) = (item for item in control.inputs if item.topic.name == 'reference')
+
+    def is_refused() -> bool:
+        intruder.publish(raw)  # again: free-running nodes keep the newest message only
+        return item.refused >= 3
+
+    assert graph.spin(is_refused) is None
+    before = len(control.steps)
+    assert graph.spin(lambda: len(control.steps) > before + 3) is None
+
+
+@pytest.mark.parametrize(
+    ('field', 'frame'),
+    [('header.frame_id', 'map_ned'), ('header.frame_id', ''), ('child_frame_id', 'base_link_frd')],
+)
+def test_other_frames_are_refused_and_named(make_graph, context, field, frame):
+    """A driver in NED looks right to everything but the vehicle."""
+    graph = make_graph(lockstep=False, input_max_age_s=1.0, without=())
+    (item,) = graph.blocks[GUIDANCE].inputs
+    message = deserialize_message(item.topic.codec.encode(TICK_NS, 13 * (0.5,)), Odometry)
+    if field == 'child_frame_id':
+        message.child_frame_id = frame
+    else:
+        message.header.frame_id = frame
+    with pytest.raises(MessageError, match=f"{field} is '{frame}'"):
+        item.accept(to_cdr(message))
+    message.header.frame_id, message.child_frame_id = 'map', 'one/base_link'
+    item.accept(to_cdr(message))
+    assert item.values == 13 * (0.5,)
+
+
+def test_speed_is_kept_without_drift(make_graph):
+    graph = make_graph(last_tick=40, speed=10.0)
+    graph.spin_until_over()
+    times = [wall_s for wall_s, *_ in graph.plant.log]
+    # tick k is not published before start + k * 10 ms, and answered soon after
+    assert times[40] - times[0] > 0.4 - 0.05
+    assert times[40] - times[0] < 0.4 + 2.0
+
+
+def test_pause_holds_the_run_and_is_not_taken_for_a_fault(make_graph, context):
+    graph = make_graph(last_tick=10**9, tick_timeout_s=0.5)
+    client_node = rclpy.create_node('client', namespace='/glider', context=context)
+    graph.nodes.append(client_node)
+    graph.executor.add_node(client_node)
+    client = client_node.create_client(SetBool, 'pause')
+    assert graph.spin(lambda: graph.plant.tick > 10 and client.service_is_ready()) is None
+
+    future = client.call_async(SetBool.Request(data=True))
+    assert graph.spin(future.done) is None
+    held_at, until = graph.plant.tick, time.monotonic() + 1.0
+    assert graph.spin(lambda: time.monotonic() > until) is None
+    assert graph.plant.tick <= held_at + 1
+
+    future = client.call_async(SetBool.Request(data=False))
+    assert graph.spin(future.done) is None
+    assert graph.spin(lambda: graph.plant.tick > held_at + 20) is None
+
+
+def test_free_running_acts_on_the_newest_input(make_graph):
+    graph = make_graph(last_tick=10, lockstep=False, speed=2.0)
+    assert graph.spin_until_over() is None
+    assert len(graph.plant.log) == 11
+    assert graph.blocks[CONTROL].steps
+
+
+def test_free_running_node_notices_stale_input_and_recovers(make_graph):
+    graph = make_graph(last_tick=10**9, lockstep=False, input_max_age_s=0.3)
+    control, guidance = graph.blocks[CONTROL], graph.blocks[GUIDANCE]
+    assert graph.spin(lambda: len(control.steps) > 2) is None
+    guidance.mute_from_ns, before = 0, control.stale_steps
+    assert graph.spin(lambda: control.stale_steps > before + 2) is None
+    guidance.mute_from_ns, before = None, len(control.steps)
+    assert graph.spin(lambda: len(control.steps) > before + 2) is None
+
+
+@pytest.mark.parametrize(
+    ('stamps', 'kept', 'lost'),
+    [
+        ([0.1, 0.2, 0.3], 0.3, 0),
+        ([0.1, 0.2, 0.5], 0.5, 2),
+        ([0.1, 0.3, 0.2], 0.3, 1),  # overtaken on its way
+        ([0.1, 5.0], 5.0, 0),  # a silence
+        ([5.0, 0.1], 0.1, 0),  # the clock of the vehicle was set back
+    ],
+)
+def test_free_running_input_keeps_the_newest_and_counts_what_lacks(make_graph, stamps, kept, lost):
+    graph = make_graph(lockstep=False, input_max_age_s=1.0)
+    (item,) = graph.blocks[GUIDANCE].inputs
+    for stamp_s in stamps:
+        raw = item.topic.codec.encode(round(stamp_s * 1e9), 13 * (stamp_s,))
+        item.subscription.callback(raw, {})
+    assert item.stamp_ns == round(kept * 1e9)
+    assert item.values == 13 * (kept,)
+    assert item.lost == lost
+
+
+def test_reports_survive_the_way_over_a_topic():
+    report = health.Report(
+        'guidance_node', health.WAITING, 'waits', 300_000_000, PLANT, 'odom', health.WARN
+    )
+    array = health.report_array(report)
+    assert health.reports_in(array) == [report]
+
+
+@pytest.mark.parametrize(
+    ('name', 'namespace', 'expected'),
+    [
+        ('/alpha/guidance_node', '/alpha', True),
+        ('/alpha/guidance_node', '/beta', False),
+        ('/alpha/guidance_node', '/alp', False),
+        ('/alpha/guidance_node', '/', False),
+        ('/guidance_node', '/', True),
+        ('battery', '/alpha', True),
+    ],
+)
+def test_diagnostics_of_another_namespace_do_not_concern_a_glider(name, namespace, expected):
+    event = health.status_array(0, name, health.OK, 'gliding down', {'stage': 1})
+    assert health.concerns(event, namespace) is expected
