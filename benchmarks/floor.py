@@ -24,7 +24,7 @@ SOURCES = Path(__file__).parent / 'floor'
 #: As fast as IEEE arithmetic in source order allows: no -ffast-math, no fused multiply-add.
 FLAGS = ['-std=c99', '-O3', '-march=native', '-ffp-contract=off']
 
-_MODULES = (rigid_body, hydrodynamics, exponential, plant)
+_MODULES = (rigid_body, hydrodynamics, exponential, motion, plant)
 _SCALARS = {
     bool: (ctypes.c_bool, 'bool'),
     int: (ctypes.c_int64, 'int64_t'),

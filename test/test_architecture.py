@@ -3,6 +3,7 @@
 """The architecture and the dependencies, checked by reading every import in the source tree."""
 
 import ast
+import graphlib
 import re
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -19,6 +20,9 @@ MAY_IMPORT = {
     'glider_control': {'glider_model'},
     'glider_bringup': {'glider_model', 'glider_guidance', 'glider_control'},
 }
+
+#: Rooms of glider_model by floors, from below: a room imports from the floors beneath it only.
+FLOORS = (('base',), ('vehicle', 'ocean', 'ros'), ('onboard', 'plant'), ('nodes',))
 
 #: rosdep keys of modules that are no ROS packages. Each was looked up in rosdep/python.yaml of
 #: ros/rosdistro, where it names an Ubuntu package for noble.
@@ -113,6 +117,81 @@ def violations(sources: Path) -> list[str]:
                 if is_ros(module) and not (ROS_FOLDERS & set(place[1:-1]) or is_test):
                     found.append(f'{name}: only nodes/ and ros/ import {module}')
     return found
+
+
+def modules(sources: Path) -> dict[str, set[str]]:
+    """Modules of the packages by dotted name, with those that each imports, also in functions."""
+    paths = {}
+    for package in MAY_IMPORT:
+        root = sources / package
+        for path in (root / package).rglob('*.py'):
+            name = '.'.join(path.relative_to(root).with_suffix('').parts)
+            paths[name.removesuffix('.__init__')] = path
+    found = {}
+    for name, path in paths.items():
+        found[name] = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'), str(path))):
+            if isinstance(node, ast.ImportFrom):
+                named = {f'{node.module}.{alias.name}' for alias in node.names}
+                found[name] |= {one if one in paths else node.module for one in named}
+            elif isinstance(node, ast.Import):
+                found[name] |= {alias.name for alias in node.names}
+        found[name] &= paths.keys()
+    return found
+
+
+def circle(found: dict[str, set[str]]) -> list[str]:
+    """Modules that import each other in a circle; none if there is no such circle."""
+    try:
+        graphlib.TopologicalSorter(found).prepare()
+    except graphlib.CycleError as error:
+        return error.args[1]
+    return []
+
+
+def climbs(found: dict[str, set[str]]) -> list[str]:
+    """One sentence for each import between rooms of glider_model that goes up or sideways."""
+    floor = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+    said = []
+    for name, imported in sorted(found.items()):
+        for other in sorted(imported):
+            one, two = (f'{module}..'.split('.')[:2] for module in (name, other))
+            within = one[0] == two[0] == 'glider_model' and one[1] and one[1] != two[1]
+            if within and floor[two[1]] >= floor[one[1]]:
+                said.append(f'{name} must not import {other}: it is no floor below')
+    return said
+
+
+def test_no_import_goes_round_in_a_circle():
+    assert circle(modules(SOURCES)) == []
+
+
+def test_rooms_import_from_the_floors_below():
+    found = modules(SOURCES)
+    rooms = {name.split('.')[1] for name in found if name.startswith('glider_model.')}
+    assert rooms == {room for floor in FLOORS for room in floor}
+    assert climbs(found) == []
+
+
+@pytest.mark.parametrize(
+    ('one', 'other', 'is_climb'),
+    [
+        ('base/a.py', 'plant/b.py', True),
+        ('onboard/a.py', 'plant/b.py', True),
+        ('base/a.py', 'base/b.py', False),
+        ('ros/wire/a.py', 'ros/lockstep/b.py', False),
+    ],
+)
+def test_circles_and_climbs_are_found(tmp_path, one, other, is_climb):
+    """Also where the import stands in a function."""
+    for path, imported in ((one, other), (other, one)):
+        file = tmp_path / 'glider_model' / 'glider_model' / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        package, _, leaf = imported.removesuffix('.py').replace('/', '.').rpartition('.')
+        file.write_text(f'def f():\n    from glider_model.{package} import {leaf}\n')
+    found = modules(tmp_path)
+    assert len(set(circle(found))) == 2
+    assert bool(climbs(found)) == is_climb
 
 
 def test_every_package_is_checked():

@@ -46,15 +46,15 @@ static inline Vector rotate_to_body(
     return rotate_to_ned(q_w, -q_x, -q_y, -q_z, x, y, z);
 }
 
-/* ----------------------------------------------------------------------------------- water */
+/* ----------------------------------------------------------------------------------- density */
 
-static inline double buoyancy_gain(double depth, double mass, const WaterParams *water)
+static inline double buoyancy_gain(double depth, double mass, const DensityParams *density)
 {
     double z = max(depth, 0.0);
     double rise = 0.0;
-    if (water->rise > 0.0)
-        rise = water->rise * (1.0 - exp(-z * water->inverse_depth));
-    return mass * (rise + water->net_compression * z);
+    if (density->rise > 0.0)
+        rise = density->rise * (1.0 - exp(-z * density->inverse_depth));
+    return mass * (rise + density->net_compression * z);
 }
 
 static inline double emerged_fraction(double depth, double radius)
@@ -324,7 +324,7 @@ static inline double surface_damping(const Motion *motion, const VehicleParams *
 
 static inline Force acceleration(
     const Motion *motion, double m_b, const Inertia *inertia, const Water *water_rate,
-    const VehicleParams *vehicle, const WaterParams *water)
+    const VehicleParams *vehicle, const DensityParams *density)
 {
     double q_w = motion->q_w, q_x = motion->q_x, q_y = motion->q_y, q_z = motion->q_z;
     double u = motion->u, v = motion->v, w = motion->w;
@@ -336,7 +336,7 @@ static inline Force acceleration(
     double k_z = 1.0 - 2.0 * (q_x * q_x + q_y * q_y);
     double s_x = inertia->s_x, s_y = inertia->s_y, s_z = inertia->s_z;
     double weight
-        = (m_b + vehicle->ballast - buoyancy_gain(motion->p_d, vehicle->m, water)) * GRAVITY;
+        = (m_b + vehicle->ballast - buoyancy_gain(motion->p_d, vehicle->m, density)) * GRAVITY;
     if (motion->p_d < vehicle->hull_radius)
         weight += (vehicle->m * GRAVITY * emerged_fraction(motion->p_d, vehicle->hull_radius))
             - surface_damping(motion, vehicle);
@@ -358,12 +358,12 @@ static inline Force acceleration(
 
 static inline Motion derivative(
     const Motion *motion, double m_b, const Inertia *inertia, const Water *current,
-    const Water *water_rate, const VehicleParams *vehicle, const WaterParams *water)
+    const Water *water_rate, const VehicleParams *vehicle, const DensityParams *density)
 {
     double q_w = motion->q_w, q_x = motion->q_x, q_y = motion->q_y, q_z = motion->q_z;
     double p = motion->p, q = motion->q, r = motion->r;
     Vector d = rotate_to_ned(q_w, q_x, q_y, q_z, motion->u, motion->v, motion->w);
-    Force a = acceleration(motion, m_b, inertia, water_rate, vehicle, water);
+    Force a = acceleration(motion, m_b, inertia, water_rate, vehicle, density);
     return (Motion){
         d.x + current->v_n,
         d.y + current->v_e,
@@ -459,7 +459,7 @@ static inline Motion integrate(
     const PlantParams *params, double dt, int steps, double *largest)
 {
     const VehicleParams *vehicle = &params->vehicle;
-    const WaterParams *water = &params->water;
+    const DensityParams *density = &params->density;
     double h = dt / steps;
     bool fixed = start.x_p == end.x_p && start.mu == end.mu;
     Joints now = start;
@@ -478,20 +478,20 @@ static inline Motion integrate(
             inertia_middle = make_inertia(middle.x_p, middle.mu, vehicle);
             inertia_after = make_inertia(after.x_p, after.mu, vehicle);
         }
-        Motion k_1 = derivative(&x, now.m_b, &inertia_now, current, water_rate, vehicle, water);
+        Motion k_1 = derivative(&x, now.m_b, &inertia_now, current, water_rate, vehicle, density);
         Rates n_1 = inputs(&k_1, &x, poles);
         Motion x_2 = along(&x, 0.5 * h, &k_1, halfway(&x, n_1, p, q, r));
         Motion k_2
-            = derivative(&x_2, middle.m_b, &inertia_middle, current, water_rate, vehicle, water);
+            = derivative(&x_2, middle.m_b, &inertia_middle, current, water_rate, vehicle, density);
         Rates n_2 = inputs(&k_2, &x_2, poles);
         Motion x_3 = along(&x, 0.5 * h, &k_2, halfway(&x, n_2, p, q, r));
         Motion k_3
-            = derivative(&x_3, middle.m_b, &inertia_middle, current, water_rate, vehicle, water);
+            = derivative(&x_3, middle.m_b, &inertia_middle, current, water_rate, vehicle, density);
         Rates n_3 = inputs(&k_3, &x_3, poles);
         Rates n_31 = {2.0 * n_3.p - n_1.p, 2.0 * n_3.q - n_1.q, 2.0 * n_3.r - n_1.r};
         Motion x_4 = along(&x, h, &k_3, halfway(&x_2, n_31, p, q, r));
         Motion k_4
-            = derivative(&x_4, after.m_b, &inertia_after, current, water_rate, vehicle, water);
+            = derivative(&x_4, after.m_b, &inertia_after, current, water_rate, vehicle, density);
         Rates n_4 = inputs(&k_4, &x_4, poles);
         Rates n_23 = {n_2.p + n_3.p, n_2.q + n_3.q, n_2.r + n_3.r};
         double error = energy(

@@ -21,8 +21,7 @@ from glider_bringup.commands.studies import Group
 from glider_bringup.mission.run_folder import make_result_folder
 from glider_bringup.mission.scenario import load_scenario, parse_assignment
 from glider_bringup.scoring.one_hertz import Recorder
-from glider_bringup.studies.paper import flying, measures, verdicts
-from glider_bringup.studies.paper import limits as experiments
+from glider_bringup.studies.paper import catalogue, flying, measures, verdicts
 from glider_bringup.studies.paper.cases import Case, Experiment
 from glider_bringup.studies.paper.catalogue import (
     GROUPS,
@@ -414,9 +413,9 @@ def test_a_failed_verdict_is_exit_code_one(tmp_path, monkeypatch):
     from typer.testing import CliRunner
 
     one = Experiment('paths', 'helix', '', 'made up', 'not flown', [], judge_limits({}))
-    monkeypatch.setattr(experiments, 'make_experiments', lambda groups: [one])
+    monkeypatch.setattr(catalogue, 'make_experiments', lambda groups: [one])
     for rows, code in (([made_up()], 0), ([made_up(status='infeasible')], 1)):
-        monkeypatch.setattr(experiments, 'fly', lambda *a, rows=rows: ([rows], [[]]))
+        monkeypatch.setattr(flying, 'fly', lambda *a, rows=rows: ([rows], [[]]))
         out = tmp_path / str(code)
         result = CliRunner().invoke(cli.app, ['experiments', '--json', '--out', str(out)])
         assert result.exit_code == code

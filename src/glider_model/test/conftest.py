@@ -77,11 +77,11 @@ class Flight:
         )
 
 
-def _plant_params(vehicle='zhang2021', **water):
+def _plant_params(vehicle='zhang2021', **density):
     params = load_vehicle(vehicle).params() if isinstance(vehicle, str) else vehicle
     return PlantParams(
         params,
-        DensitySettings(**water).params(),
+        DensitySettings(**density).params(),
         10**9,
         0,
         0,
@@ -112,7 +112,7 @@ def _flight(params, state, seconds, commands=None, waters=(0.0, 0.0, 0.0)):
 
 @pytest.fixture(scope='session')
 def plant_params():
-    """``plant_params(vehicle, **water)``: PlantParams of a vehicle by name or parameters."""
+    """``plant_params(vehicle, **density)``: PlantParams of a vehicle by name or parameters."""
     return _plant_params
 
 

@@ -30,33 +30,33 @@ def test_water_is_uniform_unless_asked(depth):
 @quick
 @given(depths)
 def test_density_of_a_pycnocline(depth):
-    water = DensitySettings(pycnocline_rise=0.004, pycnocline_depth_m=80.0).params()
+    density = DensitySettings(pycnocline_rise=0.004, pycnocline_depth_m=80.0).params()
     expected = M * 0.004 * (1.0 - math.exp(-depth / 80.0))
-    assert buoyancy_gain(depth, M, water) == pytest.approx(expected, rel=1e-12, abs=1e-15)
+    assert buoyancy_gain(depth, M, density) == pytest.approx(expected, rel=1e-12, abs=1e-15)
 
 
 @quick
 @given(depths)
 def test_compressed_water_carries_more(depth):
-    water = DensitySettings(compression_per_m=4.5e-6).params()
-    assert buoyancy_gain(depth, M, water) == pytest.approx(M * 4.5e-6 * depth, abs=1e-14)
+    density = DensitySettings(compression_per_m=4.5e-6).params()
+    assert buoyancy_gain(depth, M, density) == pytest.approx(M * 4.5e-6 * depth, abs=1e-14)
 
 
 @quick
 @given(depths)
 def test_compressed_hull_carries_less(depth):
-    water = DensitySettings(hull_compression_per_m=5e-6).params()
-    assert buoyancy_gain(depth, M, water) == pytest.approx(-M * 5e-6 * depth, abs=1e-14)
+    density = DensitySettings(hull_compression_per_m=5e-6).params()
+    assert buoyancy_gain(depth, M, density) == pytest.approx(-M * 5e-6 * depth, abs=1e-14)
 
 
 def test_a_hull_as_soft_as_the_water_notices_nothing():
-    water = DensitySettings(compression_per_m=4.5e-6, hull_compression_per_m=4.5e-6).params()
-    assert buoyancy_gain(800.0, M, water) == 0.0
+    density = DensitySettings(compression_per_m=4.5e-6, hull_compression_per_m=4.5e-6).params()
+    assert buoyancy_gain(800.0, M, density) == 0.0
 
 
 def test_there_is_no_density_above_the_surface():
-    water = DensitySettings(pycnocline_rise=0.01, compression_per_m=1e-5).params()
-    assert buoyancy_gain(-3.0, M, water) == 0.0
+    density = DensitySettings(pycnocline_rise=0.01, compression_per_m=1e-5).params()
+    assert buoyancy_gain(-3.0, M, density) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_density_moves_a_neutral_vehicle(water, sign, fly, plant_params, start):
     """Dense water lifts, a soft hull sinks: dm(z) g / (m + a_33) at rest (m, within 1 %)."""
     params = plant_params('zhang2021', **water)
     flight = fly(params, start((0.0, 0.0, 200.0), velocity=(0.0,) * 6), 1.0)
-    gain = buoyancy_gain(200.0, M, params.water)
+    gain = buoyancy_gain(200.0, M, params.density)
     moved = flight.p_d[-1] - 200.0
     assert moved == pytest.approx(-0.5 * gain * GRAVITY / (M + 60.53), rel=0.01)
     assert moved * sign > 0.0

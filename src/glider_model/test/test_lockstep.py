@@ -17,10 +17,10 @@ from std_srvs.srv import SetBool
 
 from glider_model.base.signals import TICK_NS
 from glider_model.ros.lockstep import clock, health
-from glider_model.ros.lockstep.block_node import BlockNode
 from glider_model.ros.lockstep.clock import MAX_TICKS_AHEAD, ClockNode
 from glider_model.ros.lockstep.executor import make_executor
 from glider_model.ros.lockstep.process import Stop
+from glider_model.ros.lockstep.step_node import StepNode
 from glider_model.ros.wire.codec import MessageError, to_cdr
 from glider_model.ros.wire.topics import CONTROL, CURRENT, GUIDANCE, PLANT, RECORDER, TOPICS
 
@@ -50,7 +50,7 @@ class Clock(ClockNode):
         return self.tick < self.last_tick
 
 
-class Block(BlockNode):
+class Block(StepNode):
     """Stands in for a block: sends on the sum of the first numbers of its inputs."""
 
     def __init__(self, name, inputs, outputs, mute_from=None, **kwargs) -> None:
@@ -225,7 +225,7 @@ def test_a_plant_of_a_second_glider_does_not_end_the_run(make_graph, context, is
     assert (stop is None) == is_rival
 
 
-class Recorder(BlockNode):
+class Recorder(StepNode):
     """Stands in for the recorder: takes nothing, and says what it has on disk when it is told."""
 
     def __init__(self, **kwargs) -> None:

@@ -443,7 +443,7 @@ def test_acceleration_of_a_heavy_body_at_rest(plant_params, start):
     params = plant_params('zhang2021')
     inertia = make_inertia(0.0, 0.0, params.vehicle)
     motion = start(velocity=(0.0,) * 6).motion
-    rate = acceleration(motion, 0.5, inertia, STILL, params.vehicle, params.water)
+    rate = acceleration(motion, 0.5, inertia, STILL, params.vehicle, params.density)
     assert rate[2] == pytest.approx(0.5 * 9.81 / (69.0 + 60.53), rel=1e-12)
     assert np.abs(np.delete(rate, 2)).max() < 1e-15
 

@@ -305,7 +305,7 @@ def test_without_damping_it_is_the_classical_method(name, plant_params, start):
     inertia = make_inertia(BEGIN.x_p, BEGIN.mu, vehicle)
 
     def f(y):
-        k = derivative(Motion(*y), BEGIN.m_b, inertia, still, still, vehicle, params.water)
+        k = derivative(Motion(*y), BEGIN.m_b, inertia, still, still, vehicle, params.density)
         return np.array(k)
 
     y = np.array(x)

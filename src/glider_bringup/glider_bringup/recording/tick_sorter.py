@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 
 
-class TickOrder:
+class TickSorter:
     """Holds messages back until their tick is complete, then hands them on in a fixed order.
 
     Two recordings of one run thereby have the same bytes, whatever the order of arrival was.

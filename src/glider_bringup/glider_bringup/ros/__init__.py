@@ -1,3 +1,3 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What of a run's folder depends on ROS 2: definitions, type hashes, quality of service."""
+"""What of a run speaks ROS 2: parameters of its nodes, its bag as a log, and verification."""

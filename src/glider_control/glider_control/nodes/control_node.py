@@ -7,12 +7,12 @@ import sys
 from glider_control.block import CONTROL
 from glider_model.base.signals import TICK_S
 from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.declared_node import DeclaredNode
+from glider_model.ros.lockstep.block_node import BlockNode
 from glider_model.ros.lockstep.orders import SURFACE
 from glider_model.ros.lockstep.process import run
 
 
-class ControlNode(DeclaredNode):
+class ControlNode(BlockNode):
     """How to get there. Free-running, it surfaces the vehicle when an input is stale."""
 
     when_stale = 'commanding the safe state until then'

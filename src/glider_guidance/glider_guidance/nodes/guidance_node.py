@@ -11,7 +11,7 @@ from std_srvs.srv import Trigger
 from glider_guidance.block import GUIDANCE
 from glider_model.base.frames import water_to_wire
 from glider_model.base.signals import Water
-from glider_model.ros.lockstep.declared_node import DeclaredNode
+from glider_model.ros.lockstep.block_node import BlockNode
 from glider_model.ros.lockstep.orders import ABORT
 from glider_model.ros.lockstep.process import run
 from glider_model.ros.wire import topics
@@ -20,7 +20,7 @@ from glider_model.ros.wire import topics
 PATH_POINTS = 500
 
 
-class GuidanceNode(DeclaredNode):
+class GuidanceNode(BlockNode):
     """Where to go. The service abort brings the vehicle to the surface for good."""
 
     def __init__(self, **kwargs) -> None:

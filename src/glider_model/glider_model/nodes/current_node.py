@@ -5,11 +5,11 @@
 import sys
 
 from glider_model.ocean.current_block import CURRENT
-from glider_model.ros.lockstep.declared_node import DeclaredNode
+from glider_model.ros.lockstep.block_node import BlockNode
 from glider_model.ros.lockstep.process import run
 
 
-class CurrentNode(DeclaredNode):
+class CurrentNode(BlockNode):
     """odom in, current_velocity out."""
 
     def __init__(self, **kwargs) -> None:

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The water's density: stratification, compression of water and hull, and the surface."""
+"""Density of the water: stratification, compression of water and hull, and the surface."""
 
 import math
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
 
 
-class WaterSettings(Settings):
+class DensitySettings(Settings):
     """Density of the water relative to the depth at which the vehicle was ballasted (surface)."""
 
     pycnocline_rise: float = Field(
@@ -36,16 +36,16 @@ class WaterSettings(Settings):
         description='relative loss of hull volume with depth (1/m); aluminium 3e-6 to 5e-6',
     )
 
-    def params(self) -> 'WaterParams':
+    def params(self) -> 'DensityParams':
         """Kernel parameters."""
-        return WaterParams(
+        return DensityParams(
             self.pycnocline_rise,
             1.0 / self.pycnocline_depth_m,
             self.compression_per_m - self.hull_compression_per_m,
         )
 
 
-class WaterParams(NamedTuple):
+class DensityParams(NamedTuple):
     """Density profile as the kernels see it."""
 
     rise: float  #: relative density rise across the pycnocline
@@ -54,11 +54,13 @@ class WaterParams(NamedTuple):
 
 
 @kernel
-def buoyancy_gain(depth, mass, water):
+def buoyancy_gain(depth, mass, density):
     """Extra buoyancy dm(z) (kg) of a vehicle of ``mass`` kg at ``depth`` m."""
     z = max(depth, 0.0)
-    rise = water.rise * (1.0 - math.exp(-z * water.inverse_depth)) if water.rise > 0.0 else 0.0
-    return mass * (rise + water.net_compression * z)
+    rise = (
+        density.rise * (1.0 - math.exp(-z * density.inverse_depth)) if density.rise > 0.0 else 0.0
+    )
+    return mass * (rise + density.net_compression * z)
 
 
 @kernel

@@ -123,7 +123,7 @@ def _product(a, b):
 
 
 @kernel
-def measure(odometry, tick, params):
+def add_noise(odometry, tick, params):
     """Odometry with the noise of a tick; without noise the very same numbers.
 
     Parameters
@@ -161,8 +161,8 @@ def measure(odometry, tick, params):
 
 
 @kernel
-def recover(measured, tick, params):
-    """True odometry behind what was measured at a tick: the inverse of `measure`, to rounding."""
+def remove_noise(measured, tick, params):
+    """True odometry behind what was measured at a tick: `add_noise` undone, to rounding."""
     if not is_noisy(params):
         return measured
     x, n = measured, noise_of_tick(tick, params)

@@ -4,6 +4,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import root
@@ -40,6 +41,15 @@ class Trim:
     converged: bool
 
 
+class _Glide(NamedTuple):
+    """What a glide is asked for; one of pitch and pitch mass is None, and solved for."""
+
+    vehicle: VehicleParams
+    net_heaviness: float  #: (kg)
+    theta: float | None  #: pitch (rad)
+    x_p: float | None  #: pitch mass from neutral (m)
+
+
 def solve_trim(
     vehicle: VehicleParams,
     net_heaviness_kg: float,
@@ -72,47 +82,62 @@ def solve_trim(
             )
     if net_heaviness_kg == 0.0:
         raise ConfigurationError('net heaviness = 0 kg: a neutral vehicle does not glide')
-    mu = math.radians(roll_mass_deg)
-
-    def unpack(z: np.ndarray):
-        u, v, w, fourth, phi, rate = z
-        if pitch_deg is None:
-            return u, v, w, fourth, phi, rate, pitch_mass_m
-        return u, v, w, math.radians(pitch_deg), phi, rate, 0.1 * fourth
-
-    def residual(z: np.ndarray) -> np.ndarray:
-        u, v, w, theta, phi, rate, x_p = unpack(z)
-        q = quaternion_from_euler(phi, theta, 0.0)
-        p, q_rate, r = (
-            -rate * math.sin(theta),
-            rate * math.cos(theta) * math.sin(phi),
-            rate * math.cos(theta) * math.cos(phi),
-        )
-        motion = Motion(0.0, 0.0, 100.0, *q, u, v, w, p, q_rate, r)
-        inertia = make_inertia(x_p, mu, vehicle)
-        return np.array(acceleration(motion, net_heaviness_kg, inertia, _STILL, vehicle, _UNIFORM))
-
+    theta = None if pitch_deg is None else math.radians(pitch_deg)
+    glide = _Glide(vehicle, net_heaviness_kg, theta, pitch_mass_m)
     sign = math.copysign(1.0, net_heaviness_kg)
-    best = None
-    # from the straight glide in small steps of roll mass, so that the branch is followed
     for guess_deg in (-30.0, -20.0, -45.0, -10.0):
-        theta = sign * math.radians(guess_deg if pitch_deg is None else -abs(pitch_deg))
-        fourth = theta if pitch_deg is None else 0.0
+        guess = sign * math.radians(guess_deg if pitch_deg is None else -abs(pitch_deg))
+        fourth = guess if pitch_deg is None else 0.0
         z = np.array([0.5, 0.0, sign * 0.01, fourth, 0.0, 0.0])
-        target, solved = mu, True
-        for mu in np.linspace(0.0, target, 2 + int(abs(target) / 0.05)):  # noqa: B007
-            answer = root(residual, z, method='hybr', tol=1e-13)
-            z = answer.x
-            upright = abs(unpack(z)[3]) < 0.5 * math.pi and abs(z[4]) < 0.5 * math.pi
-            solved = upright and z[0] > 0.0 and bool(np.max(np.abs(residual(z))) < 1e-9)
-            if not solved:
-                break
-        mu = target
-        best = (z, solved)
+        z, solved = _follow_branch(z, math.radians(roll_mass_deg), glide)
         if solved:
             break
-    z, converged = best
-    u, v, w, theta, phi, rate, x_p = (float(number) for number in unpack(z))
+    return _told(z, solved, roll_mass_deg, glide)
+
+
+def _unpack(z: np.ndarray, glide: _Glide):
+    """Velocity (m/s), pitch, roll (rad), turn rate (rad/s) and pitch mass (m) of the unknowns."""
+    u, v, w, fourth, phi, rate = z
+    if glide.theta is None:
+        return u, v, w, fourth, phi, rate, glide.x_p
+    return u, v, w, glide.theta, phi, rate, 0.1 * fourth
+
+
+def _residual(z: np.ndarray, mu: float, glide: _Glide) -> np.ndarray:
+    """Acceleration (6), which a steady glide does not have."""
+    u, v, w, theta, phi, rate, x_p = _unpack(z, glide)
+    q = quaternion_from_euler(phi, theta, 0.0)
+    p, q_rate, r = (
+        -rate * math.sin(theta),
+        rate * math.cos(theta) * math.sin(phi),
+        rate * math.cos(theta) * math.cos(phi),
+    )
+    motion = Motion(0.0, 0.0, 100.0, *q, u, v, w, p, q_rate, r)
+    inertia = make_inertia(x_p, mu, glide.vehicle)
+    return np.array(
+        acceleration(motion, glide.net_heaviness, inertia, _STILL, glide.vehicle, _UNIFORM)
+    )
+
+
+def _follow_branch(z: np.ndarray, target: float, glide: _Glide) -> tuple[np.ndarray, bool]:
+    """Unknowns at a roll mass (rad), and whether they are solved.
+
+    From the straight glide in small steps of roll mass, so that the branch is followed.
+    """
+    solved = True
+    for mu in np.linspace(0.0, target, 2 + int(abs(target) / 0.05)):
+        z = root(_residual, z, args=(mu, glide), method='hybr', tol=1e-13).x
+        upright = abs(_unpack(z, glide)[3]) < 0.5 * math.pi and abs(z[4]) < 0.5 * math.pi
+        small = np.max(np.abs(_residual(z, mu, glide))) < 1e-9
+        solved = upright and z[0] > 0.0 and bool(small)
+        if not solved:
+            break
+    return z, solved
+
+
+def _told(z: np.ndarray, solved: bool, roll_mass_deg: float, glide: _Glide) -> Trim:
+    """The solution, in the units of a person."""
+    u, v, w, theta, phi, rate, x_p = (float(number) for number in _unpack(z, glide))
     speed = math.sqrt(u * u + v * v + w * w)
     north, east, down = rotate_to_ned(*quaternion_from_euler(phi, theta, 0.0), u, v, w)
     horizontal = math.hypot(north, east)
@@ -129,7 +154,7 @@ def solve_trim(
         turn_rate_radps=rate if turning else 0.0,
         turn_radius_m=horizontal / abs(rate) if turning else None,
         pitch_mass_m=x_p,
-        net_heaviness_kg=net_heaviness_kg,
+        net_heaviness_kg=glide.net_heaviness,
         roll_mass_deg=roll_mass_deg,
-        converged=converged and abs(x_p) <= vehicle.x_p_max,
+        converged=solved and abs(x_p) <= glide.vehicle.x_p_max,
     )

@@ -1,3 +1,3 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What every node shares: messages as numbers, parameters, quality of service, the tick."""
+"""What every node shares: parameters, the bytes of its topics, and how it keeps step."""

@@ -23,7 +23,7 @@ from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS
 from glider_model.ros.lockstep.clock import MAX_TICKS_AHEAD
 from glider_model.ros.lockstep.executor import take
-from glider_model.ros.wire import topics as messages
+from glider_model.ros.wire import topics
 from glider_model.ros.wire.topics import TOPICS
 
 #: Name that rclpy gives to a node of which it knows the endpoints only.
@@ -269,7 +269,7 @@ class _Brake:
         The name of a node can come later than its subscriptions.
         """
         return any(
-            info.node_name in (messages.RECORDER, _NAME_UNKNOWN)
+            info.node_name in (topics.RECORDER, _NAME_UNKNOWN)
             and info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
             for info in self._node.get_subscriptions_info_by_topic(self._odom)
         )
@@ -290,10 +290,9 @@ class Replay:
         given_domain()
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         try:
-            self._node = Node(messages.REPLAY, enable_rosout=False, start_parameter_services=False)
-            topics = plan.bag.topics
+            self._node = Node(topics.REPLAY, enable_rosout=False, start_parameter_services=False)
             self._outputs = {
-                index: _Output(self._node, name, topics[index])
+                index: _Output(self._node, name, plan.bag.topics[index])
                 for index, name in plan.names.items()
             }
             self._own_clock = None

@@ -16,7 +16,6 @@ from glider_model.base.exits import EXIT_PEER
 from glider_model.base.signals import TICK_NS, TICK_S
 from glider_model.base.wiring import WIRING
 from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.clock import MAX_TICKS_AHEAD
 from glider_model.ros.lockstep.executor import take
 from glider_model.ros.lockstep.health import Report, seconds
 from glider_model.ros.lockstep.node import TickNode, TickSettings
@@ -24,6 +23,9 @@ from glider_model.ros.lockstep.peers import ALONE
 from glider_model.ros.lockstep.process import Stop
 from glider_model.ros.wire import topics
 from glider_model.ros.wire.topics import TOPICS
+
+#: The plant is never more than this many ticks ahead of what the recorder has on disk.
+MAX_TICKS_AHEAD = 256
 
 #: Nodes of a run that is just over are out of sight within this time (s).
 _RIVALS_LEAVE_S = 5.0
@@ -232,8 +234,8 @@ class ClockNode(TickNode):
         """End the run, and name the culprit, if a tick takes too long."""
         waits_for_time = self._published != self.tick and not self._held
         if self._paused or waits_for_time:
-            self._watched_ns = None
-        elif self.stuck_s() > self.ticks.tick_timeout_s:
+            self._wait.begin_at_next_look()
+        elif self._wait.stuck_s(self._due_ns) > self.ticks.tick_timeout_s:
             self.fail(self._blame())
 
     def _blame(self) -> str:

@@ -24,6 +24,11 @@ STARTING, READY, WAITING, FINISHED, FAILED = 'starting', 'ready', 'waiting', 'fi
 COMPLETE = 'the run is complete'
 
 
+def seconds(stamp_ns: int) -> str:
+    """Simulated time, for a message."""
+    return f't = {stamp_ns / 1e9:.1f} s'
+
+
 class Report(NamedTuple):
     """State of a node in the lockstep."""
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The yo: a state machine over the paper's four stages and the inflections between them."""
+"""The yo: a state machine over its stages, and what each stage asks for."""
 
 import math
 from typing import Literal, NamedTuple
@@ -8,41 +8,30 @@ from typing import Literal, NamedTuple
 from pydantic import Field
 
 from glider_guidance.yo.end_of_path import WayLeft, lower_turn, next_dive
+from glider_guidance.yo.stage import (
+    AT_END_OF_PATH,
+    AT_SURFACE_M,
+    GLIDING_DOWN,
+    GLIDING_UP,
+    INFLECTING_DOWN,
+    INFLECTING_UP,
+    SURFACE_PREPARATION,
+    SURFACING,
+    WAITING_ON_SURFACE,
+    is_descending,
+)
+from glider_guidance.yo.turns import turn_lead_s
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_S
 from glider_model.onboard.glide_polar import Polar, glide_vertical_rate
 
-SURFACE_PREPARATION = 0
-GLIDING_DOWN = 1
-INFLECTING_UP = 2
-GLIDING_UP = 3
-INFLECTING_DOWN = 4
-WAITING_ON_SURFACE = 5
-SURFACING = 6
-AT_END_OF_PATH = 7
-
-STAGE_NAMES = (
-    'surface preparation',
-    'gliding down',
-    'inflecting up',
-    'gliding up',
-    'inflecting down',
-    'waiting on the surface',
-    'surfacing on abort',
-    'at the end of the path',
-)
-
-#: Shallower than this the vehicle has reached the surface (m).
-AT_SURFACE_M = 1.0
 #: Share of the glide's vertical rate at which the pitch goes over in a turn.
 PITCH_OVER = 0.5
 #: Largest lead that is believed, in leads by the vehicle's file.
 LEAD_RANGE = 6.0
 #: The path is looked at for so many full dives before its end.
 DIVES_AHEAD = 4.0
-#: The desired track is led between these times before a turn, and comes back in this time (s).
-LEAD_FROM_S, LEAD_TO_S, RETURN_S = 400.0, 150.0, 240.0
 
 
 class ProfileSettings(Settings):
@@ -221,33 +210,6 @@ def profile_step(state, depth, vertical_rate, left, params):
 
 
 @kernel
-def turn_lead_s(state, params):
-    """Time (s) by which the coming turn is led: a turn costs the way of so much straight glide.
-
-    The first turn goes by the pump of the vehicle's file, later ones by how long the last one, if
-    there was one of the same kind, took, so that a slow pump or a wrong ballast is led too.
-    """
-    same_s, other_s = state.lead_down_s, state.lead_up_s
-    if is_descending(state.stage):
-        same_s, other_s = other_s, same_s
-    if same_s > 0.0:
-        return same_s
-    return other_s if other_s > 0.0 else params.lead_s
-
-
-@kernel
-def is_descending(stage):
-    """Whether a stage asks the vehicle to go down."""
-    return stage == GLIDING_DOWN or stage == INFLECTING_DOWN
-
-
-@kernel
-def is_gliding(stage):
-    """Whether a stage is a steady glide, not a turn or the surface."""
-    return stage == GLIDING_DOWN or stage == GLIDING_UP
-
-
-@kernel
 def profile_targets(stage, vertical_rate, params):
     """Pitch (rad) and vertical rate (m/s, + down) that a stage asks for.
 
@@ -270,42 +232,3 @@ def mission_time_s(params: ProfileParams, dives: int) -> float:
     """Estimated time (s) of so many dives, from surface preparation to surfacing."""
     legs = 2.0 * dives * params.depth / params.glide_rate
     return params.prepare_ticks * TICK_S + legs + 2.0 * dives * params.lead_s
-
-
-@kernel
-def time_to_turn(state, depth, vertical_rate, turn_depth, params):
-    """Time (s) until the pump starts for the next turn; infinite where none is to come.
-
-    ``turn_depth`` is that of `coming_turn`.
-    """
-    rate = max(abs(vertical_rate), 0.01)
-    if state.stage == GLIDING_DOWN:
-        return (turn_depth - depth) / rate - turn_lead_s(state, params)
-    done = state.dives + 1
-    surfacing = (params.dives > 0 and done >= params.dives) or (
-        params.surface_every > 0 and done % params.surface_every == 0
-    )
-    if state.stage == GLIDING_UP and not surfacing and turn_depth > 0.0:
-        return (depth - params.top_depth) / rate - turn_lead_s(state, params)
-    return math.inf
-
-
-@kernel
-def _smooth(share):
-    """Smooth step from 0 to 1."""
-    x = min(1.0, max(0.0, share))
-    return x * x * (3.0 - 2.0 * x)
-
-
-@kernel
-def turn_offset(to_turn_s, since_turn_s, coming, past):
-    """Offset (m) of the desired track that shares a turn's drift between before and after.
-
-    In a turn the vehicle is slow and the current takes it along by a drift that is known
-    beforehand. The desired track therefore moves up-current by the ``coming`` drift (m) before the
-    turn, and from the ``past`` drift back to zero after it: of either, the part that this phase
-    bears.
-    """
-    before = _smooth((LEAD_FROM_S - to_turn_s) / (LEAD_FROM_S - LEAD_TO_S))
-    after = 1.0 - _smooth(since_turn_s / RETURN_S)
-    return past * after - coming * before

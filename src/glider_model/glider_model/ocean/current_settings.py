@@ -1,13 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Velocity of the water: a sum of simple fields of depth and time.
+"""The current of a mission as a person writes it.
 
-A person writes `CurrentSettings`; `CurrentSettings.params` flattens them into the arrays that
-`current_step` reads. The random part draws its numbers from a hash of (seed, component, tick).
+`CurrentSettings.params` flattens it into the arrays that `glider_model.ocean.current` reads.
 """
 
-import csv
-import io
 import math
 from itertools import pairwise
 from pathlib import Path
@@ -17,189 +14,35 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_model.base.errors import ConfigurationError, shown
-from glider_model.base.files import read_text
-from glider_model.base.kernel import kernel
-from glider_model.base.noise import normal_pair, random_stream
+from glider_model.base.noise import random_stream
 from glider_model.base.settings import Settings
-from glider_model.base.signals import Water
+from glider_model.ocean.current import (
+    CONSTANT,
+    EXPONENTIAL_SHEAR,
+    GAUSS_MARKOV,
+    POWER_SHEAR,
+    STEPS,
+    TABLE,
+    TIDAL,
+    CurrentParams,
+    CurrentState,
+    current_initial,
+)
+from glider_model.ocean.current_profile import (
+    MAX_DEPTH_M,
+    MAX_ROWS,
+    MAX_SPEED_MPS,
+    check_profile,
+    check_speed,
+    read_profile,
+)
 
 #: One international knot (m/s).
 KNOT_MPS = 1852.0 / 3600.0
-#: No component may be faster than this (m/s); the swiftest ocean currents reach about 2.5 m/s.
-MAX_SPEED_MPS = 3.0
-#: Rows of a profile, and components of a current: each is looked at in every tick.
-MAX_ROWS, MAX_COMPONENTS = 10_000, 100
-#: Deepest point of a profile (m).
-MAX_DEPTH_M = 12_000.0
+#: Components of a current: each is looked at in every tick.
+MAX_COMPONENTS = 100
 #: Period of the principal lunar semidiurnal tide M2, 12.4206 h (s).
 M2_PERIOD_S = 12.4206 * 3600.0
-
-_COLUMNS = ('depth_m', 'north_mps', 'east_mps', 'down_mps')
-_CONSTANT, _POWER_SHEAR, _EXPONENTIAL_SHEAR, _TABLE, _TIDAL, _GAUSS_MARKOV, _STEPS = range(7)
-#: A step counts as reached this long before its time (s): ticks of 0.1 s are not exact in binary.
-_STEP_TOLERANCE_S = 1e-6
-
-
-# ---------------------------------------------------------------------------------- what runs
-
-
-class CurrentParams(NamedTuple):
-    """Components of a current field, flattened; row ``i`` of each array is component ``i``."""
-
-    kind: np.ndarray  #: int64[n], which field it is
-    numbers: np.ndarray  #: float64[n, 6], its constants in SI units; their meaning is the kind's
-    first: np.ndarray  #: int64[n], first row in `table`, or first index in `CurrentState.values`
-    last: np.ndarray  #: int64[n], one past the last row in `table`
-    stream: np.ndarray  #: uint64[n], start of its stream of random numbers
-    table: (
-        np.ndarray
-    )  #: float64[m, 4], rows of depth (m) or time (s), then north, east, down (m/s)
-
-
-class CurrentState(NamedTuple):
-    """What a current field remembers from tick to tick."""
-
-    tick: int  #: number of steps taken
-    values: np.ndarray  #: float64[2 g], north and east velocity of each Gauss-Markov part (m/s)
-
-
-@kernel
-def current_initial(params):
-    """State before the first step, Gauss-Markov parts drawn from their stationary distribution.
-
-    Parameters
-    ----------
-    params : CurrentParams
-
-    Returns
-    -------
-    CurrentState
-    """
-    count = 0
-    for i in range(len(params.kind)):
-        if params.kind[i] == _GAUSS_MARKOV:
-            count += 2
-    values = np.zeros(count)
-    for i in range(len(params.kind)):
-        if params.kind[i] == _GAUSS_MARKOV:
-            north, east = normal_pair(params.stream[i], 0)
-            values[params.first[i]] = params.numbers[i, 0] * north
-            values[params.first[i] + 1] = params.numbers[i, 0] * east
-    return CurrentState(0, values)
-
-
-@kernel
-def _profile(depth, table, first, last):
-    """Velocity at ``depth`` by linear interpolation in rows [first, last), held at both ends."""
-    if depth <= table[first, 0]:
-        return table[first, 1], table[first, 2], table[first, 3]
-    if depth >= table[last - 1, 0]:
-        return table[last - 1, 1], table[last - 1, 2], table[last - 1, 3]
-    low, high = first, last - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if table[middle, 0] <= depth:
-            low = middle
-        else:
-            high = middle
-    part = (depth - table[low, 0]) / (table[high, 0] - table[low, 0])
-    return (
-        table[low, 1] + part * (table[high, 1] - table[low, 1]),
-        table[low, 2] + part * (table[high, 2] - table[low, 2]),
-        table[low, 3] + part * (table[high, 3] - table[low, 3]),
-    )
-
-
-@kernel
-def _latest_step(t_s, table, first, last):
-    """Velocity of the latest row in [first, last) whose time has come; none before the first."""
-    v_n, v_e = 0.0, 0.0
-    for row in range(first, last):
-        if table[row, 0] > t_s + _STEP_TOLERANCE_S:
-            break
-        v_n, v_e = table[row, 1], table[row, 2]
-    return v_n, v_e
-
-
-@kernel
-def current_step(state, position, t_s, params, dt):
-    """Water velocity at a place and time, and the state of the field one step later.
-
-    Parameters
-    ----------
-    state : CurrentState
-        State of the field at ``t_s``.
-    position : tuple of 3 float
-        Place p_NB (m, NED). Only the depth matters; above the surface counts as the surface.
-    t_s : float
-        Time since the start (s).
-    params : CurrentParams
-    dt : float
-        Time to the next step (s).
-
-    Returns
-    -------
-    state : CurrentState
-        State at ``t_s + dt``.
-    water : Water
-        Velocity of the water over ground at ``t_s`` (m/s, NED).
-    """
-    fresh = CurrentState(state.tick, state.values.copy())
-    return current_step_in_place(fresh, position, t_s, params, dt)
-
-
-@kernel
-def current_step_in_place(state, position, t_s, params, dt):
-    """`current_step` for a loop that owns its state: the values are changed where they lie.
-
-    A loop over it allocates nothing and counts no references, which takes longer than the rest.
-    """
-    depth = max(position[2], 0.0)
-    values = state.values
-    v_n, v_e, v_d = 0.0, 0.0, 0.0
-    for i in range(len(params.kind)):
-        kind = params.kind[i]
-        numbers = params.numbers[i]
-        first, last = params.first[i], params.last[i]
-        if kind == _CONSTANT:
-            v_n += numbers[0]
-            v_e += numbers[1]
-        elif kind == _POWER_SHEAR:
-            share = max(1.0 - depth / numbers[2], 0.0) ** numbers[3]
-            v_n += share * numbers[0]
-            v_e += share * numbers[1]
-        elif kind == _EXPONENTIAL_SHEAR:
-            share = math.exp(-depth / numbers[2])
-            v_n += share * numbers[0]
-            v_e += share * numbers[1]
-        elif kind == _TABLE:
-            north, east, down = _profile(depth, params.table, first, last)
-            v_n += north
-            v_e += east
-            v_d += down
-        elif kind == _TIDAL:
-            angle = numbers[4] * t_s + numbers[5]
-            along, across = math.cos(angle), math.sin(angle)
-            v_n += along * numbers[0] + across * numbers[2]
-            v_e += along * numbers[1] + across * numbers[3]
-        elif kind == _GAUSS_MARKOV:
-            v_n += values[first]
-            v_e += values[first + 1]
-            # exact for any dt, so that the statistics do not depend on it
-            keep = math.exp(-dt / numbers[1])
-            fresh = numbers[0] * math.sqrt(1.0 - keep * keep)
-            north, east = normal_pair(params.stream[i], state.tick + 1)
-            values[first] = keep * values[first] + fresh * north
-            values[first + 1] = keep * values[first + 1] + fresh * east
-        elif kind == _STEPS:
-            north, east = _latest_step(t_s, params.table, first, last)
-            v_n += north
-            v_e += east
-    return CurrentState(state.tick + 1, values), Water(v_n, v_e, v_d)
-
-
-# ------------------------------------------------------------------------- what a person writes
 
 
 class _Packed(NamedTuple):
@@ -310,7 +153,7 @@ class ConstantCurrent(_FlowComponent):
     kind: Literal['constant']
 
     def _pack(self) -> _Packed:
-        return _Packed(_CONSTANT, self._north_east())
+        return _Packed(CONSTANT, self._north_east())
 
 
 class ShearCurrent(_FlowComponent):
@@ -337,8 +180,8 @@ class ShearCurrent(_FlowComponent):
     def _pack(self) -> _Packed:
         north, east = self._north_east()
         if self.law == 'power':
-            return _Packed(_POWER_SHEAR, (north, east, self.depth_m, self.exponent))
-        return _Packed(_EXPONENTIAL_SHEAR, (north, east, self.depth_m))
+            return _Packed(POWER_SHEAR, (north, east, self.depth_m, self.exponent))
+        return _Packed(EXPONENTIAL_SHEAR, (north, east, self.depth_m))
 
 
 class TableCurrent(Settings):
@@ -374,11 +217,11 @@ class TableCurrent(Settings):
         if not isinstance(file, str):
             return values
         folder = (info.context or {}).get('folder', '')
-        return {**values, 'file': None, 'rows': _read_profile(Path(folder) / file)}
+        return {**values, 'file': None, 'rows': read_profile(Path(folder) / file)}
 
     @pydantic.model_validator(mode='after')
     def _check_rows(self):
-        _check_profile(self.rows, range(1, len(self.rows) + 1), 'rows')
+        check_profile(self.rows, range(1, len(self.rows) + 1), 'rows')
         return self
 
     def resolved(self, course_rad: float):
@@ -386,7 +229,7 @@ class TableCurrent(Settings):
         return self
 
     def _pack(self) -> _Packed:
-        return _Packed(_TABLE, rows=tuple((*row, 0.0)[:4] for row in self.rows))
+        return _Packed(TABLE, rows=tuple((*row, 0.0)[:4] for row in self.rows))
 
 
 class TidalCurrent(_FlowComponent):
@@ -413,7 +256,7 @@ class TidalCurrent(_FlowComponent):
         north, east = self._north_east()
         minor = (-self.ellipticity * east, self.ellipticity * north)
         rate = 2.0 * math.pi / self.period_s
-        return _Packed(_TIDAL, (north, east, *minor, rate, math.radians(self.phase_deg)))
+        return _Packed(TIDAL, (north, east, *minor, rate, math.radians(self.phase_deg)))
 
 
 class GaussMarkovCurrent(Settings):
@@ -439,7 +282,7 @@ class GaussMarkovCurrent(Settings):
 
     def _pack(self) -> _Packed:
         numbers = (self.std_mps, self.time_constant_s)
-        return _Packed(_GAUSS_MARKOV, numbers, seed_offset=self.seed_offset)
+        return _Packed(GAUSS_MARKOV, numbers, seed_offset=self.seed_offset)
 
 
 class CurrentStep(_Flow):
@@ -476,7 +319,7 @@ class CurrentStep(_Flow):
         elif len(parts) != 2:
             raise ValueError(f'give both north_mps and east_mps, found only {parts[0]}')
         else:
-            _check_speed(math.hypot(self.north_mps, self.east_mps), 'north_mps and east_mps')
+            check_speed(math.hypot(self.north_mps, self.east_mps), 'north_mps and east_mps')
         return self
 
     def _row(self) -> tuple[float, ...]:
@@ -509,7 +352,7 @@ class StepsCurrent(Settings):
         return self.model_copy(update={'steps': steps})
 
     def _pack(self) -> _Packed:
-        return _Packed(_STEPS, rows=tuple(step._row() for step in self.steps))
+        return _Packed(STEPS, rows=tuple(step._row() for step in self.steps))
 
 
 CurrentComponent = Annotated[
@@ -574,7 +417,7 @@ class CurrentSettings(_Flow):
             If an angle is still relative to the path.
         """
         seed = self.seed if seed is None else seed
-        packed = [_Packed(_CONSTANT, self._north_east())] if self._has_flow() else []
+        packed = [_Packed(CONSTANT, self._north_east())] if self._has_flow() else []
         packed += [component._pack() for component in self.components]
         count = len(packed)
         kind, first, last = (np.zeros(count, dtype=np.int64) for _ in range(3))
@@ -585,7 +428,7 @@ class CurrentSettings(_Flow):
         for i, part in enumerate(packed):
             kind[i] = part.kind
             numbers[i, : len(part.numbers)] = part.numbers
-            if part.kind == _GAUSS_MARKOV:
+            if part.kind == GAUSS_MARKOV:
                 first[i] = 2 * random
                 stream[i] = random_stream(seed, part.seed_offset, random)
                 random += 1
@@ -599,92 +442,3 @@ class CurrentSettings(_Flow):
     def initial_state(self, seed: int | None = None) -> CurrentState:
         """State before the first step; ``seed`` as in `params`."""
         return current_initial(self.params(seed))
-
-
-# ---------------------------------------------------------------------------------- profile files
-
-
-def _check_speed(speed_mps: float, where: str) -> None:
-    if speed_mps > MAX_SPEED_MPS:
-        raise ValueError(
-            f'{where}: the speed is {speed_mps:.3f} m/s (allowed: <= {MAX_SPEED_MPS} m/s)'
-        )
-
-
-def _check_profile(rows: list[list[float]], names, source: str) -> None:
-    """Refuse a profile that cannot be interpolated; ``names`` are the numbers of its rows."""
-    if not rows:
-        raise ValueError(f'{source}: no rows (allowed: at least 1)')
-    names = list(names)
-    for i, row in enumerate(rows):
-        where = f'{source}: row {names[i]}'
-        if len(row) not in (3, 4):
-            raise ValueError(
-                f'{where}: {len(row)} columns (allowed: {", ".join(_COLUMNS[:3])}, '
-                f'and optionally {_COLUMNS[3]})'
-            )
-        if not 0.0 <= row[0] <= MAX_DEPTH_M:
-            raise ValueError(
-                f'{where}, column depth_m = {row[0]!r} (allowed: >= 0.0 and <= {MAX_DEPTH_M})'
-            )
-        if i > 0 and row[0] <= rows[i - 1][0]:
-            raise ValueError(
-                f'{where}, column depth_m = {row[0]!r}: depths must increase '
-                f'(allowed: > {rows[i - 1][0]!r}, the depth of row {names[i - 1]})'
-            )
-        _check_speed(math.hypot(*row[1:]), where)
-
-
-def _read_profile(path: Path) -> list[list[float]]:
-    """Read and check a current profile.
-
-    Raises
-    ------
-    ValueError
-        Naming the file, and the column and row (line of the file) at fault.
-    """
-    source = f'file {path}'
-    try:
-        reader = csv.reader(io.StringIO(read_text(path), newline=''), skipinitialspace=True)
-        lines = [(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
-    except ConfigurationError as error:
-        raise ValueError(f'file {error}') from None
-    except csv.Error as error:
-        raise ValueError(f'{source}: not a CSV text file: {error}') from None
-    header = [name.strip() for name in lines[0][1]] if lines else []
-    missing = [name for name in _COLUMNS[:3] if name not in header]
-    if missing:
-        raise ValueError(
-            f'{source}: row {lines[0][0] if lines else 1}: column {missing[0]} is missing '
-            f'(allowed: {", ".join(_COLUMNS)})'
-        )
-    for name in header:
-        if name not in _COLUMNS or header.count(name) > 1:
-            wrong = 'repeated' if name in _COLUMNS else 'unknown'
-            raise ValueError(
-                f'{source}: row {lines[0][0]}: column {shown(name)} is {wrong} '
-                f'(allowed: {", ".join(_COLUMNS)})'
-            )
-    if len(lines) > MAX_ROWS + 1:
-        raise ValueError(f'{source}: {len(lines) - 1} rows (allowed: <= {MAX_ROWS})')
-    rows = []
-    for number, cells in lines[1:]:
-        if len(cells) != len(header):
-            raise ValueError(
-                f'{source}: row {number}: {len(cells)} cells for {len(header)} columns'
-            )
-        cell = dict(zip(header, cells, strict=True))
-        where = f'{source}: row {number}, column'
-        rows.append([_number(cell[name], f'{where} {name}') for name in _COLUMNS if name in cell])
-    _check_profile(rows, [number for number, _ in lines[1:]], source)
-    return rows
-
-
-def _number(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ValueError(f'{where} = {shown(text)}: not a finite number')
-    return value

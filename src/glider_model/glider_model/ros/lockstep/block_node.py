@@ -7,12 +7,12 @@ from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_NS, TICK_S
 from glider_model.base.wiring import at_rest
 from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.block_node import BlockNode
 from glider_model.ros.lockstep.orders import PARAMETERS_SET, Orders
+from glider_model.ros.lockstep.step_node import StepNode
 from glider_model.ros.parameters import changed_parameters, declare_settings
 
 
-class DeclaredNode(BlockNode):
+class BlockNode(StepNode):
     """A block that answers ticks. Subclasses call `start_up` at the end of their constructor."""
 
     def __init__(self, block: Block, **kwargs) -> None:

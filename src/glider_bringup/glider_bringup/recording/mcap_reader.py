@@ -25,19 +25,23 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Schema, Statistics
+from mcap.records import Attachment, Channel, Schema
 
+from glider_bringup.recording.bag_files import bag_files
+from glider_bringup.recording.mcap_scan import gather, scan
+from glider_bringup.recording.mcap_summary import (
+    CHECKED,
+    END_SIZE,
+    HEAD,
+    Summary,
+    checksum_to,
+    parse_summary,
+    read_footer,
+)
 from glider_bringup.recording.mcap_writer import MAGIC
-from glider_model.base.files import read_yaml
-from glider_model.base.kernel import kernel
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS
 
-_HEAD = struct.Struct('<BQ')
-_FOOTER = struct.Struct('<BQQQI')
-_END_SIZE = _FOOTER.size + len(MAGIC)  #: of a file: the footer, and the magic again
-_CHECKED = _FOOTER.size - 4  #: bytes of the footer that the checksum in it is of, too
-_CHECKED_AT_ONCE = 1 << 20  #: bytes
 _CHUNK_HEAD = struct.Struct('<QQQII')
 _LOG_TIME_AT = 6  # in a message record: channel (2), sequence (4), log time (8), publish time (8)
 _MESSAGE_HEAD = 22
@@ -73,18 +77,8 @@ class Batch(NamedTuple):
     def rows(self, chosen: np.ndarray) -> np.ndarray:
         """Payloads of equal size, uint8[n, size], of the messages with these indices."""
         rows = np.empty((len(chosen), int(self.size[chosen[0]])), np.uint8)
-        _gather(self.data, self.start[chosen], rows)
+        gather(self.data, self.start[chosen], rows)
         return rows
-
-
-class _Summary(NamedTuple):
-    """What the end of a file says is in it."""
-
-    schemas: list[Schema]
-    channels: list[Channel]
-    chunks: dict[int, ChunkIndex]  #: by place in the file
-    attachments: set[int]  #: their places
-    statistics: Statistics | None
 
 
 class _Found(NamedTuple):
@@ -105,149 +99,10 @@ class _Part(NamedTuple):
     end_ns: int
 
 
-@kernel
-def _number(data, at, size):
-    value = np.int64(0)
-    for i in range(size):
-        value |= np.int64(data[at + i]) << (8 * i)
-    return value
-
-
-@kernel
-def _scan(data, channel, log_ns, start, size, other):
-    """Find the messages of a chunk, and the places of its other records.
-
-    Returns
-    -------
-    int
-        Number of messages; -1 if a record is longer than what is left.
-    int
-        Number of other records.
-    """
-    messages = others = at = 0
-    while at < len(data):
-        if at + 9 > len(data):
-            return -1, others
-        opcode, length = data[at], _number(data, at + 1, 8)
-        body = at + 9
-        if length < 0 or length > len(data) - body or (opcode == 5 and length < 22):
-            return -1, others
-        if opcode == 5:
-            channel[messages] = _number(data, body, 2)
-            log_ns[messages] = _number(data, body + 6, 8)
-            start[messages] = body + 22
-            size[messages] = length - 22
-            messages += 1
-        else:
-            other[others] = at
-            others += 1
-        at = body + length
-    return messages, others
-
-
-@kernel
-def _gather(data, start, rows):
-    for i in range(rows.shape[0]):
-        rows[i] = data[start[i] : start[i] + rows.shape[1]]
-
-
-def _bag_files(path: Path) -> list[Path]:
-    """MCAP files of a bag, in the order in which they were written.
-
-    Raises
-    ------
-    ConfigurationError
-        If there is none, or one of those that metadata.yaml lists is missing.
-    """
-    if path.is_file():
-        return [path]
-    if not path.is_dir():
-        raise ConfigurationError(f'{path}: no such run, bag folder or .mcap file')
-    listed = _listed_files(path / 'metadata.yaml')
-    files = listed or sorted(path.glob('*.mcap'))
-    if not files:
-        raise ConfigurationError(f'{path}: no .mcap file in it')
-    for file in files:
-        if not file.is_file():
-            raise ConfigurationError(f'{file}: missing; {path / "metadata.yaml"} lists it')
-    return files
-
-
-def _listed_files(metadata: Path) -> list[Path]:
-    """Files that metadata.yaml lists; none if there is no such file."""
-    if not metadata.is_file():
-        return []
-    try:
-        values = read_yaml(metadata)
-        information = values['rosbag2_bagfile_information']
-        names = [str(name) for name in information['relative_file_paths']]
-        storage = information['storage_identifier']
-        compression = information.get('compression_format') or ''
-    except (KeyError, TypeError, AttributeError) as error:
-        raise ConfigurationError(f'{metadata}: not metadata of rosbag2: {error!r}') from None
-    if storage != 'mcap' or compression:
-        what = f'files compressed with {compression}' if compression else f'storage {storage}'
-        raise ConfigurationError(
-            f'{metadata}: {what} (allowed: storage mcap, compressed in chunks or not at all; '
-            f'ros2 bag convert makes one)'
-        )
-    return [metadata.parent / name for name in names]
-
-
 def _span(start_ns: int, end_ns: int) -> str:
     """Times from which to which messages are, in words."""
     ticks = max(0, end_ns - start_ns) // TICK_NS + 1
     return f't = {start_ns / 1e9:.1f} s to {end_ns / 1e9:.1f} s, {ticks:,} ticks'
-
-
-def _read_footer(stream: IO[bytes], size: int) -> tuple[int, int, int] | None:
-    """Start of the summary, start of its offsets, and checksum; None if a file does not end so."""
-    if size < _END_SIZE + len(MAGIC):
-        return None
-    stream.seek(size - _END_SIZE)
-    end = stream.read(_END_SIZE)
-    opcode, length, *footer = _FOOTER.unpack_from(end)
-    if (opcode, length) != (Opcode.FOOTER, 20) or not end.endswith(MAGIC):
-        return None
-    return tuple(footer)
-
-
-def _checksum(stream: IO[bytes], end: int) -> int:
-    """CRC of a file up to a place."""
-    stream.seek(0)
-    value = 0
-    while end:
-        data = stream.read(min(end, _CHECKED_AT_ONCE))
-        if not data:
-            break
-        value, end = zlib.crc32(data, value), end - len(data)
-    return value
-
-
-def _parse_summary(data: bytes) -> _Summary:
-    """Records of a summary."""
-    summary, at = _Summary([], [], {}, set(), None), 0
-    while at < len(data):
-        opcode, length = _HEAD.unpack_from(data, at)
-        stream = ReadDataStream(BytesIO(data[at + _HEAD.size : at + _HEAD.size + length]))
-        if opcode == Opcode.SCHEMA:
-            summary.schemas.append(Schema.read(stream))
-        elif opcode == Opcode.CHANNEL:
-            summary.channels.append(Channel.read(stream))
-        elif opcode == Opcode.CHUNK_INDEX:
-            index = ChunkIndex.read(stream)
-            summary.chunks[index.chunk_start_offset] = index
-        elif opcode == Opcode.ATTACHMENT_INDEX:
-            summary.attachments.add(AttachmentIndex.read(stream).offset)
-        elif opcode == Opcode.STATISTICS:
-            summary = summary._replace(statistics=Statistics.read(stream))
-        at += _HEAD.size + length
-    return summary
-
-
-def has_bag(run: Path) -> bool:
-    """Whether a run folder holds a bag, or is one: a single MCAP file."""
-    return run.is_file() or any(run.glob('*.mcap'))
 
 
 class Bag:
@@ -273,7 +128,7 @@ class Bag:
     """
 
     def __init__(self, path: Path) -> None:
-        self.files = _bag_files(Path(path))
+        self.files = bag_files(Path(path))
         self.topics: list[BagTopic] = []
         self.attachments: dict[str, bytes] = {}
         self.cut = ''
@@ -305,16 +160,16 @@ class Bag:
         """Note the chunks of a file, its topics and attachments, and test its checksums."""
         file = self.files[number]
         size = stream.seek(0, 2)
-        footer = _read_footer(stream, size)
+        footer = read_footer(stream, size)
         stream.seek(0)
         magic = stream.read(len(MAGIC))
         if not MAGIC.startswith(magic):
             raise ConfigurationError(f'{file}: not an MCAP file')
         found, at = _Found([], set()), stream.tell()
         while True:
-            head = stream.read(_HEAD.size)
-            opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, 0)
-            body = at + _HEAD.size
+            head = stream.read(HEAD.size)
+            opcode, length = HEAD.unpack(head) if len(head) == HEAD.size else (0, 0)
+            body = at + HEAD.size
             fits = opcode and body + length <= size
             if not fits or opcode in (Opcode.DATA_END, Opcode.FOOTER):
                 break
@@ -325,7 +180,7 @@ class Bag:
             at = stream.seek(body + length)
         ends = fits and opcode == Opcode.DATA_END and length == 4
         checksum = int.from_bytes(stream.read(4), 'little') if ends else 0
-        if checksum and checksum != _checksum(stream, at):
+        if checksum and checksum != checksum_to(stream, at):
             raise self._harmed(number, 'the checksum (CRC) of its data is wrong', footer, found)
         if footer and not ends:
             raise self._harmed(number, f'no record begins at byte {at:,}', footer, found)
@@ -351,7 +206,7 @@ class Bag:
             found.chunks.append(at)
             start_ns, end_ns, unpacked = struct.unpack('<QQQ', stream.read(24))
             if unpacked:
-                order, body = len(found.chunks), at + _HEAD.size
+                order, body = len(found.chunks), at + HEAD.size
                 self._parts.append(_Part(number, order, body, length, start_ns, end_ns))
         elif opcode == Opcode.MESSAGE:
             self._note_loose(number, at, stream.read(_MESSAGE_HEAD), length)
@@ -365,14 +220,14 @@ class Bag:
         parts = [part for part in self._parts if part.file == number]
         end_ns = max((part.end_ns for part in parts), default=None)
         goes = 'no message is whole' if end_ns is None else f'it goes to t = {end_ns / 1e9:.1f} s'
-        stream.seek(at + _HEAD.size)
+        stream.seek(at + HEAD.size)
         times = stream.read(16) if opcode == Opcode.CHUNK else b''
         if len(times) == 16:
             start_ns, end_ns = struct.unpack('<QQ', times)
             goes += f', and of the chunk up to t = {end_ns / 1e9:.1f} s only a part is there'
         self.cut = f'{self.files[number]} ends early, after {at:,} bytes: {goes}'
 
-    def _summary(self, number: int, footer: tuple | None, proven: bool) -> _Summary | None:
+    def _summary(self, number: int, footer: tuple | None, proven: bool) -> Summary | None:
         """Summary of a file; None if it has none.
 
         One that cannot be read does not matter where the data is ``proven`` to be whole.
@@ -382,17 +237,17 @@ class Bag:
         start, _, checksum = footer
         with self.files[number].open('rb') as stream:
             stream.seek(min(start, stream.seek(0, 2)))
-            data = stream.read()[: _CHECKED - _END_SIZE]
+            data = stream.read()[: CHECKED - END_SIZE]
         if checksum and zlib.crc32(data) != checksum:
             if proven:
                 return None
             raise self._harmed(number, 'the checksum (CRC) of its summary is wrong')
         try:
-            return _parse_summary(data[:-_CHECKED])
+            return parse_summary(data[:-CHECKED])
         except _UNREADABLE:
             raise self._harmed(number, 'its summary cannot be read') from None
 
-    def _compare(self, number: int, summary: _Summary, found: _Found) -> None:
+    def _compare(self, number: int, summary: Summary, found: _Found) -> None:
         """Refuse a file in which a summary and what was found are not the same.
 
         Raises
@@ -400,7 +255,7 @@ class Bag:
         ConfigurationError
             Naming what lacks.
         """
-        parts = {part.start - _HEAD.size: part for part in self._parts if part.file == number}
+        parts = {part.start - HEAD.size: part for part in self._parts if part.file == number}
         places = set(found.chunks)
         for order, (place, index) in enumerate(sorted(summary.chunks.items()), 1):
             times = index.message_start_time, index.message_end_time
@@ -442,7 +297,7 @@ class Bag:
     def _note_loose(self, file: int, at: int, head: bytes, length: int) -> None:
         """Note a message that is in no chunk, together with the one before it."""
         (log_ns,) = struct.unpack_from('<Q', head, _LOG_TIME_AT)
-        length += _HEAD.size
+        length += HEAD.size
         last = self._parts[-1] if self._parts else None
         if last and last.file == file and not last.number and last.start + last.length == at:
             self._parts[-1] = last._replace(
@@ -526,14 +381,14 @@ class Bag:
     def _read(self, part: _Part) -> Batch:
         """Messages of a part in the order of the file."""
         data = np.frombuffer(self._content(part), np.uint8)
-        most = len(data) // _HEAD.size + 1
+        most = len(data) // HEAD.size + 1
         channel, log_ns, start, size, other = (np.empty(most, np.int64) for _ in range(5))
-        messages, others = _scan(data, channel, log_ns, start, size, other)
+        messages, others = scan(data, channel, log_ns, start, size, other)
         if messages < 0:
             raise self._damaged(part, 'a record is longer than the chunk')
         for at in other[:others]:
-            opcode, length = _HEAD.unpack_from(data, at)
-            body = int(at) + _HEAD.size
+            opcode, length = HEAD.unpack_from(data, at)
+            body = int(at) + HEAD.size
             try:
                 self._note(part.file, opcode, data[body : body + length].tobytes())
             except _UNREADABLE as error:
@@ -580,7 +435,7 @@ class Bag:
         return content
 
     def _damaged(self, part: _Part, reason: str) -> ConfigurationError:
-        place = f'bytes {part.start - _HEAD.size:,} to {part.start + part.length:,}'
+        place = f'bytes {part.start - HEAD.size:,} to {part.start + part.length:,}'
         return ConfigurationError(
             f'{self.files[part.file]}: chunk {part.number} is damaged: {reason} ({place}, '
             f'{_span(part.start_ns, part.end_ns)})'

@@ -1,0 +1,175 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Velocity of the water: a sum of simple fields of depth and time.
+
+`current_step` reads the arrays that `CurrentSettings.params` makes of what a person writes. The
+random part draws its numbers from a hash of (seed, component, tick).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from glider_model.base.kernel import kernel
+from glider_model.base.noise import normal_pair
+from glider_model.base.signals import Water
+
+#: Kinds of components.
+CONSTANT, POWER_SHEAR, EXPONENTIAL_SHEAR, TABLE, TIDAL, GAUSS_MARKOV, STEPS = range(7)
+#: A step counts as reached this long before its time (s): ticks of 0.1 s are not exact in binary.
+_STEP_TOLERANCE_S = 1e-6
+
+
+class CurrentParams(NamedTuple):
+    """Components of a current field, flattened; row ``i`` of each array is component ``i``."""
+
+    kind: np.ndarray  #: int64[n], which field it is
+    numbers: np.ndarray  #: float64[n, 6], its constants in SI units; their meaning is the kind's
+    first: np.ndarray  #: int64[n], first row in `table`, or first index in `CurrentState.values`
+    last: np.ndarray  #: int64[n], one past the last row in `table`
+    stream: np.ndarray  #: uint64[n], start of its stream of random numbers
+    #: float64[m, 4], rows of depth (m) or time (s), then north, east, down (m/s)
+    table: np.ndarray
+
+
+class CurrentState(NamedTuple):
+    """What a current field remembers from tick to tick."""
+
+    tick: int  #: number of steps taken
+    values: np.ndarray  #: float64[2 g], north and east velocity of each Gauss-Markov part (m/s)
+
+
+@kernel
+def current_initial(params):
+    """State before the first step, Gauss-Markov parts drawn from their stationary distribution.
+
+    Parameters
+    ----------
+    params : CurrentParams
+
+    Returns
+    -------
+    CurrentState
+    """
+    count = 0
+    for i in range(len(params.kind)):
+        if params.kind[i] == GAUSS_MARKOV:
+            count += 2
+    values = np.zeros(count)
+    for i in range(len(params.kind)):
+        if params.kind[i] == GAUSS_MARKOV:
+            north, east = normal_pair(params.stream[i], 0)
+            values[params.first[i]] = params.numbers[i, 0] * north
+            values[params.first[i] + 1] = params.numbers[i, 0] * east
+    return CurrentState(0, values)
+
+
+@kernel
+def _profile(depth, table, first, last):
+    """Velocity at ``depth`` by linear interpolation in rows [first, last), held at both ends."""
+    if depth <= table[first, 0]:
+        return table[first, 1], table[first, 2], table[first, 3]
+    if depth >= table[last - 1, 0]:
+        return table[last - 1, 1], table[last - 1, 2], table[last - 1, 3]
+    low, high = first, last - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if table[middle, 0] <= depth:
+            low = middle
+        else:
+            high = middle
+    part = (depth - table[low, 0]) / (table[high, 0] - table[low, 0])
+    return (
+        table[low, 1] + part * (table[high, 1] - table[low, 1]),
+        table[low, 2] + part * (table[high, 2] - table[low, 2]),
+        table[low, 3] + part * (table[high, 3] - table[low, 3]),
+    )
+
+
+@kernel
+def _latest_step(t_s, table, first, last):
+    """Velocity of the latest row in [first, last) whose time has come; none before the first."""
+    v_n, v_e = 0.0, 0.0
+    for row in range(first, last):
+        if table[row, 0] > t_s + _STEP_TOLERANCE_S:
+            break
+        v_n, v_e = table[row, 1], table[row, 2]
+    return v_n, v_e
+
+
+@kernel
+def current_step(state, position, t_s, params, dt):
+    """Water velocity at a place and time, and the state of the field one step later.
+
+    Parameters
+    ----------
+    state : CurrentState
+        State of the field at ``t_s``.
+    position : tuple of 3 float
+        Place p_NB (m, NED). Only the depth matters; above the surface counts as the surface.
+    t_s : float
+        Time since the start (s).
+    params : CurrentParams
+    dt : float
+        Time to the next step (s).
+
+    Returns
+    -------
+    state : CurrentState
+        State at ``t_s + dt``.
+    water : Water
+        Velocity of the water over ground at ``t_s`` (m/s, NED).
+    """
+    fresh = CurrentState(state.tick, state.values.copy())
+    return current_step_in_place(fresh, position, t_s, params, dt)
+
+
+@kernel
+def current_step_in_place(state, position, t_s, params, dt):
+    """`current_step` for a loop that owns its state: the values are changed where they lie.
+
+    A loop over it allocates nothing and counts no references, which takes longer than the rest.
+    """
+    depth = max(position[2], 0.0)
+    values = state.values
+    v_n, v_e, v_d = 0.0, 0.0, 0.0
+    for i in range(len(params.kind)):
+        kind = params.kind[i]
+        numbers = params.numbers[i]
+        first, last = params.first[i], params.last[i]
+        if kind == CONSTANT:
+            v_n += numbers[0]
+            v_e += numbers[1]
+        elif kind == POWER_SHEAR:
+            share = max(1.0 - depth / numbers[2], 0.0) ** numbers[3]
+            v_n += share * numbers[0]
+            v_e += share * numbers[1]
+        elif kind == EXPONENTIAL_SHEAR:
+            share = math.exp(-depth / numbers[2])
+            v_n += share * numbers[0]
+            v_e += share * numbers[1]
+        elif kind == TABLE:
+            north, east, down = _profile(depth, params.table, first, last)
+            v_n += north
+            v_e += east
+            v_d += down
+        elif kind == TIDAL:
+            angle = numbers[4] * t_s + numbers[5]
+            along, across = math.cos(angle), math.sin(angle)
+            v_n += along * numbers[0] + across * numbers[2]
+            v_e += along * numbers[1] + across * numbers[3]
+        elif kind == GAUSS_MARKOV:
+            v_n += values[first]
+            v_e += values[first + 1]
+            # exact for any dt, so that the statistics do not depend on it
+            keep = math.exp(-dt / numbers[1])
+            fresh = numbers[0] * math.sqrt(1.0 - keep * keep)
+            north, east = normal_pair(params.stream[i], state.tick + 1)
+            values[first] = keep * values[first] + fresh * north
+            values[first + 1] = keep * values[first + 1] + fresh * east
+        elif kind == STEPS:
+            north, east = _latest_step(t_s, params.table, first, last)
+            v_n += north
+            v_e += east
+    return CurrentState(state.tick + 1, values), Water(v_n, v_e, v_d)
