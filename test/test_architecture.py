@@ -194,6 +194,92 @@ def test_circles_and_climbs_are_found(tmp_path, one, other, is_climb):
     assert bool(climbs(found)) == is_climb
 
 
+# ---------------------------------------------------------------------- sizes
+
+#: Modules that a folder may hold, and lines of a function.
+MOST_MODULES, MOST_LINES = 12, 80
+
+
+def crowded(sources: Path) -> list[str]:
+    """One sentence for each folder with too many modules, and each function that is too long.
+
+    A long function may say why in a comment ``# long: ...`` in the line above it.
+    """
+    said = []
+    for init in sorted(sources.glob('*/glider_*/**/__init__.py')):
+        count = len(list(init.parent.glob('*.py'))) - 1
+        if count > MOST_MODULES:
+            said.append(f'{init.parent.relative_to(sources)}: {count} modules')
+    for path in sorted(sources.glob('*/glider_*/**/*.py')):
+        text = path.read_text(encoding='utf-8')
+        lines = text.splitlines()
+        for node in ast.walk(ast.parse(text, str(path))):
+            if not isinstance(node, ast.FunctionDef):
+                continue
+            first = min([node.lineno, *(one.lineno for one in node.decorator_list)])
+            length = node.end_lineno - first + 1
+            if length > MOST_LINES and not lines[first - 2].lstrip().startswith('# long: '):
+                said.append(f'{path.relative_to(sources)}: {node.name} has {length} lines')
+    return said
+
+
+def test_folders_and_functions_stay_small():
+    assert crowded(SOURCES) == []
+
+
+def test_what_is_crowded_is_found(tmp_path):
+    folder = tmp_path / 'glider_model' / 'glider_model' / 'room'
+    folder.mkdir(parents=True)
+    for name in ('__init__', *(f'module_{number}' for number in range(MOST_MODULES))):
+        (folder / f'{name}.py').write_text('')
+    body = '    pass\n' * MOST_LINES
+    (folder / 'module_0.py').write_text(f'def short():\n{body[9:]}')
+    assert crowded(tmp_path) == []
+    (folder / 'module_1.py').write_text(f'# long: it is a table\ndef long():\n{body}')
+    assert crowded(tmp_path) == []
+    (folder / 'module_2.py').write_text(f'@one\ndef long():\n{body[9:]}')
+    (folder / 'one_more.py').write_text('')
+    assert crowded(tmp_path) == [
+        f'glider_model/glider_model/room: {MOST_MODULES + 1} modules',
+        f'glider_model/glider_model/room/module_2.py: long has {MOST_LINES + 1} lines',
+    ]
+
+
+# ---------------------------------------------------------------------- the map
+
+MAP = SOURCES.parent / 'docs' / 'architecture.md'
+MAP_BEGIN = '<!-- rooms: made by ./glider python test/test_architecture.py -->\n'
+MAP_END = '<!-- end of rooms -->\n'
+
+
+def rooms() -> str:
+    """The table of rooms: each folder with the sentence of its docstring."""
+    rows = ['| room | what belongs there |', '|---|---|']
+    for package in MAY_IMPORT:
+        for init in sorted((SOURCES / package / package).rglob('__init__.py')):
+            folder = init.parent.relative_to(SOURCES / package)
+            docstring = ast.get_docstring(ast.parse(init.read_text(encoding='utf-8')))
+            rows.append(f'| `{folder}` | {docstring.partition(chr(10))[0]} |')
+    return '\n'.join(rows) + '\n'
+
+
+def test_the_map_of_rooms_is_that_of_the_tree():
+    text = MAP.read_text(encoding='utf-8')
+    assert text.partition(MAP_BEGIN)[2].partition(MAP_END)[0] == rooms()
+
+
+def test_the_map_names_files_that_are_there():
+    text = MAP.read_text(encoding='utf-8')
+    named = re.findall(r'`((?:[a-z_]+/)+[a-z_]*(?:\.py)?|[a-z_]+\.py)`', text)
+    known = [str(path.relative_to(SOURCES)) for path in SOURCES.rglob('*')]
+    known += [
+        str(path.relative_to(SOURCES.parent)) for path in (SOURCES.parent / 'test').iterdir()
+    ]
+    lost = [name for name in named if not any(one.endswith(name.rstrip('/')) for one in known)]
+    assert len(named) > 30
+    assert lost == []
+
+
 def test_every_package_is_checked():
     """A package that is not in the table would escape the rules."""
     assert {path.parent.name for path in SOURCES.glob('*/package.xml')} == set(MAY_IMPORT)
@@ -309,3 +395,8 @@ def test_what_only_pip_has_is_pinned():
     used = set().union(*(needed(package) for package in MAY_IMPORT))
     assert {PYPI_NAMES.get(module, module) for module in used & ONLY_PIP} <= pinned
     assert 'pydantic' in pinned  # noble has 1.10, this needs 2
+
+
+if __name__ == '__main__':
+    before, _, rest = MAP.read_text(encoding='utf-8').partition(MAP_BEGIN)
+    MAP.write_text(before + MAP_BEGIN + rooms() + MAP_END + rest.partition(MAP_END)[2], 'utf-8')
