@@ -26,7 +26,7 @@ from glider_bringup.console import Json, messages, output, picked, repeatable
 from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
 
 #: Modules of this folder, in the order in which they are measured.
-SECTIONS = ('compute', 'memory', 'nodes', 'nodes_memory', 'sweep', 'storage', 'fleet')
+SECTIONS = ('compute', 'memory', 'nodes', 'nodes_memory', 'sweep', 'storage', 'fleet', 'against')
 
 Section = Literal[SECTIONS]
 
@@ -47,7 +47,7 @@ def bench(
         typer.Option(
             file_okay=False,
             exists=True,
-            help="Another checkout: compute times its plant's tick in the same run.",
+            help='Another checkout: the section against flies the same by both, by turns.',
         ),
     ] = None,
     as_json: Json = False,
@@ -57,7 +57,7 @@ def bench(
     Every time stands beside its ratio to a floor, which is measured in the same run: what the
     same work costs without this stack. Use an idle machine.
     """
-    figures, options = machine(), {'compute': {'against': against}} if against else {}
+    figures, options = machine(), {'against': {'checkout': against}}
     for name in picked(only, Section):
         section = importlib.import_module(name)
         with messages.status(name) as status:

@@ -10,11 +10,9 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import plant_step
 from floor import Floor, compare, compiler, compiler_version
 from plant_step import SCENARIO, SHALLOW, cost_s, flight_of, plant_steps
 
@@ -36,15 +34,13 @@ MEANING = {
     'plant_step_floor_ns': 'the same in C (ns)',
     'plant_step_over_c': 'their ratio',
     'floor_ticks_compared': 'ticks in which every number of plant and C has the same bits',
-    'plant_step_against_ns': 'one tick of the plant of the other checkout (ns)',
-    'plant_step_speed_up': 'by how much this one is faster',
     'score_30h_s': 'scoring the mission of 30 h (s)',
     'mission_real_time_factor': 'simulated time over that of mission and score',
 }
 
 
-def measure(progress: Callable[[str], None], against: Path | None = None) -> dict:
-    """Figures of the direct engine; ``against`` is another checkout, for its plant.
+def measure(progress: Callable[[str], None]) -> dict:
+    """Figures of the direct engine.
 
     Raises
     ------
@@ -71,7 +67,6 @@ def measure(progress: Callable[[str], None], against: Path | None = None) -> dic
         'floor_ticks_compared': compared,
         'score_30h_s': score_s,
         'mission_real_time_factor': DURATION_S / (mission_s + score_s),
-        **(_beside(against, progress) if against else {}),
     }
 
 
@@ -113,39 +108,6 @@ def _plant_s() -> tuple[float, float | None, int | None]:
         for name, way in ways.items():
             times[name].append(cost_s(way, *flight, motions) / len(motions))
     return min(times['plant']), min(times.get('floor', [None])), compared
-
-
-def _beside(checkout: Path, progress: Callable[[str], None]) -> dict:
-    """Time of a tick of the plant of another checkout and of this one, by turns."""
-    roots = {'this': Path(__file__).parents[1], 'other': checkout}
-    times = {name: [] for name in roots}
-    for i in range(REPEATS):
-        for name, root in roots.items():
-            progress(f'plant of {root}, {i + 1} of {REPEATS}')
-            times[name].append(_plant_step_ns(root))
-    this, other = min(times['this']), min(times['other'])
-    return {'plant_step_against_ns': other, 'plant_step_speed_up': other / this}
-
-
-def _plant_step_ns(checkout: Path) -> float:
-    """Time of a tick of the plant of a checkout (ns), in a process of its own.
-
-    Raises
-    ------
-    RuntimeError
-        If it is none, or its plant does not fly.
-    """
-    packages = [str(path) for path in checkout.resolve().glob('src/*')]
-    own = [path for path in sys.path if 'site-packages' in path]
-    done = subprocess.run(
-        [sys.executable, plant_step.__file__],
-        env={**os.environ, 'PYTHONPATH': os.pathsep.join([*packages, *own])},
-        capture_output=True,
-        text=True,
-    )
-    if done.returncode or not packages:
-        raise RuntimeError(f'{checkout}: its plant cannot be timed: {done.stderr[-500:]}')
-    return float(done.stdout)
 
 
 def _warm_up_s(cache: str) -> float:

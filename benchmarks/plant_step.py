@@ -1,9 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Time of a tick of the plant, under commands and water of a flight of the direct engine.
-
-As a program, with the packages of any checkout on PYTHONPATH, it prints the nanoseconds.
-"""
+"""Time of a tick of the plant, under commands and water of a flight of the direct engine."""
 
 import time
 from collections.abc import Callable
@@ -12,7 +9,7 @@ import numpy as np
 
 from glider_bringup.engines.direct import COLUMNS, fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import Scenario, load_scenario
+from glider_bringup.mission.scenario import Scenario
 from glider_model.base.frames import water_from_wire
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import TICK_S, Joints, Water
@@ -26,7 +23,6 @@ SHALLOW = {
     'profile.depth_m': 150.0,
     'profile.surface_every_dives': 2,
 }
-REPEATS = 10
 
 
 @kernel
@@ -58,16 +54,3 @@ def cost_s(function: Callable, *arguments) -> float:
     start = time.thread_time()
     function(*arguments)
     return time.thread_time() - start
-
-
-def main() -> None:
-    """Print the least of several times of a tick (ns)."""
-    flight = flight_of(load_scenario(SCENARIO, SHALLOW))
-    motions = np.empty((len(flight[2]), 13))
-    plant_steps(*flight, motions)
-    least_s = min(cost_s(plant_steps, *flight, motions) for _ in range(REPEATS))
-    print(1e9 * least_s / len(motions))
-
-
-if __name__ == '__main__':
-    main()
