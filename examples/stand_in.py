@@ -19,9 +19,9 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
-from glider_model.base.frames import odometry_to_wire
 from glider_model.base.signals import Joints, Water
-from glider_model.plant.plant import PlantSettings, plant_joints, plant_measurement, plant_step
+from glider_model.plant.block import plant_outputs
+from glider_model.plant.plant import PlantSettings, plant_step
 
 #: Parameters and what they are unless somebody says otherwise.
 PARAMETERS = {
@@ -55,7 +55,7 @@ class StandIn:
         """Put it somewhere."""
         settings = PlantSettings(initial={**GLIDING, 'depth_m': depth_m})
         self._params, self._state = settings.params(), settings.initial_state()
-        self._target = plant_joints(self._state)
+        self._target = self._state.joints
         self._water = Water(0.0, current_mps, 0.0)
 
     def advance(self) -> None:
@@ -69,12 +69,12 @@ class StandIn:
 
     def navigation(self) -> tuple[tuple, tuple, tuple, tuple]:
         """Position, orientation (w, x, y, z), velocity over ground and rates, ENU and FLU."""
-        wire = odometry_to_wire(plant_measurement(self._state, self._params))
+        (wire, _), _ = plant_outputs(self._state, self._params)
         return wire[:3], wire[3:7], wire[7:10], wire[10:]
 
     def actuators(self) -> list[float]:
         """Positions of the actuators."""
-        return list(plant_joints(self._state))
+        return list(self._state.joints)
 
     def move(self, targets: dict[str, float]) -> None:
         """Move actuators towards their targets."""

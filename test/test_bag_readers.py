@@ -14,7 +14,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from glider_bringup.mission.scenario import load_scenario
 from glider_model.base.signals import TICK_NS
-from glider_model.ros.wire.topics import BASE_LINK, JOINTS, MAP, TOPICS
+from glider_model.base.wiring import BASE_LINK, JOINTS, MAP
+from glider_model.ros.wire.topics import TOPICS
 
 RECORDED = {topic.full_name('/glider'): topic for topic in TOPICS.values() if topic.recorded}
 PER_TICK = [name for name, topic in RECORDED.items() if topic.per_tick]

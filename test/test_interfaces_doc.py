@@ -31,6 +31,7 @@ from glider_guidance.yo.stage import STAGE_NAMES
 from glider_model.base import files
 from glider_model.base.errors import MAX_LINE, MAX_LINES, MAX_SHOWN
 from glider_model.base.settings import Settings
+from glider_model.base.wiring import JOINTS
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
 from glider_model.nodes.tf_node import TfSettings
@@ -41,7 +42,7 @@ from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.clock import ClockSettings
 from glider_model.ros.lockstep.node import TickSettings
 from glider_model.ros.wire import qos
-from glider_model.ros.wire.topics import JOINTS, TOPICS
+from glider_model.ros.wire.topics import TOPICS
 
 DOCUMENT = Path(__file__).resolve().parents[1] / 'docs' / 'interfaces.md'
 

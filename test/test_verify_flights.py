@@ -37,7 +37,7 @@ from glider_model.base.frames import (
     wrench_to_wire,
 )
 from glider_model.base.signals import TICK_S, Joints, Water
-from glider_model.plant.plant import plant_joints, plant_odometry, plant_step
+from glider_model.plant.plant import plant_odometry, plant_step
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.orders import ABORT, PARAMETERS_SET
 from glider_model.ros.wire.codec import to_cdr
@@ -180,7 +180,7 @@ class Vehicle:
     def measure(self, stamp_ns: int) -> None:
         water = Water(0.1, 0.0, 0.0)
         self.plant = plant_step(self.plant, self.command, water, self.params.plant, TICK_S)
-        self.joints = (stamp_ns, plant_joints(self.plant))
+        self.joints = (stamp_ns, self.plant.joints)
         self.odom = (stamp_ns, odometry_to_wire(plant_odometry(self.plant)))
         self.publish('joint_states', stamp_ns, self.joints[1])
         self.publish('odom', stamp_ns, self.odom[1])

@@ -24,7 +24,6 @@ from glider_guidance.guidance import guidance_abort, guidance_step
 from glider_guidance.yo.stage import GLIDING_DOWN, GLIDING_UP, INFLECTING_UP
 from glider_model.base.frames import (
     odometry_from_wire,
-    odometry_to_wire,
     reference_from_wire,
     reference_to_wire,
     water_from_wire,
@@ -32,7 +31,8 @@ from glider_model.base.frames import (
 )
 from glider_model.base.signals import TICK_S
 from glider_model.ocean.current import current_step
-from glider_model.plant.plant import plant_joints, plant_measurement, plant_step
+from glider_model.plant.block import plant_outputs
+from glider_model.plant.plant import plant_step
 
 #: One dive to 250 m, with both turns; in a cross current, so that the track has to be held.
 FLIGHT = {'dives': 0, 'duration_s': 3600.0, 'profile.depth_m': 250.0, 'profile.prepare_s': 0.0}
@@ -53,9 +53,15 @@ WILD = {
 }
 
 
+def measured(plant, params) -> tuple[float, ...]:
+    """Odometry on the wire."""
+    (odom, _), _ = plant_outputs(plant, params)
+    return odom
+
+
 def still(state: MissionState, params):
     """Odometry that stays what it is."""
-    kept = odometry_to_wire(plant_measurement(state.plant, params.plant))
+    kept = measured(state.plant, params.plant)
     return lambda wire: kept
 
 
@@ -72,14 +78,14 @@ PHASES = {'dive': GLIDING_DOWN, 'turn': INFLECTING_UP, 'climb': GLIDING_UP}
 def tick(state: MissionState, params, corrupt) -> tuple[MissionState, int]:
     """One tick as in `fly`, with what ``corrupt`` makes of the odometry; the saturation mask."""
     plant, current, guidance, control = state
-    wire = odometry_to_wire(plant_measurement(plant, params.plant))
+    wire = measured(plant, params.plant)
     true = odometry_from_wire(wire)
     current, water = current_step(current, true[:3], plant.tick * TICK_S, params.current, TICK_S)
     seen = odometry_from_wire(tuple(corrupt(wire)))
     guidance, guided = guidance_step(guidance, seen, params.guidance, TICK_S)
     reference = reference_from_wire(reference_to_wire(guided.reference))
     control, controlled = control_step(
-        control, seen, plant_joints(plant), reference, params.control, TICK_S
+        control, seen, plant.joints, reference, params.control, TICK_S
     )
     water = water_from_wire(water_to_wire(water))
     plant = plant_step(plant, controlled.command, water, params.plant, TICK_S)

@@ -32,7 +32,6 @@ from glider_control.laws.adaptive import (
 )
 from glider_model.base.signals import TICK_S
 from glider_model.onboard.glide_polar import glide_speed
-from glider_model.plant.plant import plant_joints
 from glider_model.vehicle.rigid_body import GRAVITY
 
 #: Dives of 100 m, so that the flight has several inflections.
@@ -55,7 +54,7 @@ def record(state, params, out):
     """Fly tick by tick until the mission ends or ``out`` is full; ticks that were flown."""
     log = np.empty((1, ROW))
     for tick in range(len(out)):
-        joints = plant_joints(state.plant)
+        joints = state.plant.joints
         th_p, th_q = state.control.law.roll_theta, state.control.law.pitch_theta
         state, _, finished = fly(state, params, log, TICK_S)
         measured, adaptive = state.control.measured, state.control.law

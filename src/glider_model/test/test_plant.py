@@ -16,7 +16,6 @@ from glider_model.plant.motion import acceleration, integrate
 from glider_model.plant.plant import (
     PlantSettings,
     plant_finished,
-    plant_joints,
     plant_odometry,
     plant_step,
 )
@@ -219,10 +218,6 @@ def test_odometry_is_over_ground(plant_params, start):
 def test_odometry_repeats_pose_and_rates(start):
     state = start((1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (0.4, 0.01, 0.02, 0.03, 0.04, 0.05))
     assert plant_odometry(state) == state.motion
-
-
-def test_joints_are_where_the_actuators_are(start):
-    assert plant_joints(start(joints=(0.1, 0.02, 0.3))) == Joints(0.1, 0.02, 0.3)
 
 
 def test_attitude_of_an_odometry(start):

@@ -15,8 +15,9 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
+from glider_model.base.wiring import JOINTS
 from glider_model.ros.wire.codec import MessageError, cdr_places, to_cdr
-from glider_model.ros.wire.topics import JOINTS, TOPICS
+from glider_model.ros.wire.topics import TOPICS
 
 ODOM, COMMAND = TOPICS['odom'].codec, TOPICS['command'].codec
 

@@ -19,7 +19,8 @@ from glider_model.base.frames import (
     quaternion_from_euler,
 )
 from glider_model.base.signals import Odometry
-from glider_model.plant.plant import PlantSettings, plant_measurement, plant_odometry
+from glider_model.plant.block import plant_outputs
+from glider_model.plant.plant import PlantSettings, plant_odometry
 from glider_model.plant.sensors import (
     SensorSettings,
     add_noise,
@@ -155,13 +156,16 @@ def test_plant_measures_with_the_noise_of_its_tick_and_seed():
     given = PlantSettings(sensors=NOISE, seed=4)
     state = given.initial_state()._replace(tick=17)
     expected = add_noise(plant_odometry(state), 17, SensorSettings(**NOISE).params(4))
-    assert plant_measurement(state, given.params()) == expected
+    (odom, joints), _ = plant_outputs(state, given.params())
+    assert odom == odometry_to_wire(expected)
+    assert joints == state.joints
 
 
 def test_plant_without_noise_measures_its_odometry():
     given = PlantSettings(initial={'depth_m': 20.0, 'pitch_deg': -20.0, 'speed_mps': 0.4})
     state = given.initial_state()
-    assert plant_measurement(state, given.params()) == plant_odometry(state)
+    (odom, _), _ = plant_outputs(state, given.params())
+    assert odom == odometry_to_wire(plant_odometry(state))
 
 
 @pytest.mark.parametrize('name', NOISE)

@@ -92,7 +92,8 @@ def fly(state, params, log, dt):
     plant, current, guidance, control = state
     for row in range(log.shape[0]):
         t_s = plant.tick * dt
-        (odom, joints), finished = plant_outputs(plant, params.plant)
+        measured, finished = plant_outputs(plant, params.plant)
+        odom, joints = measured[0], measured[1]
         place = odometry_from_wire(odom)
         position = (place.p_n, place.p_e, place.p_d)
         current, velocity = current_step_in_place(current, position, t_s, params.current, dt)
@@ -101,7 +102,7 @@ def fly(state, params, log, dt):
         seen = (guided[0], odom, joints)
         control, controlled, told = control_tick(control, t_s, seen, params.control, dt)
         plant = plant_move(plant, (controlled[0], water), params.plant, dt)
-        put(log, row, 0, (odom, joints, water, *guided, *controlled, stage, told))
+        put(log, row, 0, (*measured, water, *guided, *controlled, stage, told))
         if finished:
             return MissionState(plant, current, guidance, control), row + 1, True
     return MissionState(plant, current, guidance, control), log.shape[0], False

@@ -11,10 +11,10 @@ from std_srvs.srv import Trigger
 from glider_guidance.block import GUIDANCE
 from glider_model.base.frames import water_to_wire
 from glider_model.base.signals import Water
+from glider_model.base.wiring import MAP
 from glider_model.ros.lockstep.block_node import BlockNode
 from glider_model.ros.lockstep.orders import ABORT
 from glider_model.ros.lockstep.process import run
-from glider_model.ros.wire import topics
 
 #: Number of points of the published path.
 PATH_POINTS = 500
@@ -42,10 +42,10 @@ class GuidanceNode(BlockNode):
 def path_message(points) -> Path:
     """Path in `map` (ENU) from points float64[n, 3] in NED (m)."""
     path = Path()
-    path.header.frame_id = topics.MAP
+    path.header.frame_id = MAP
     for point in points:
         pose = PoseStamped()
-        pose.header.frame_id = topics.MAP
+        pose.header.frame_id = MAP
         position = pose.pose.position
         position.x, position.y, position.z = water_to_wire(Water(*(float(x) for x in point)))
         path.poses.append(pose)

@@ -13,6 +13,9 @@ from glider_model.base.signals import Adaptation
 #: Joint names of joint_states and command, in the order of `glider_model.base.signals.Joints`.
 JOINTS = ('buoyancy_engine', 'pitch_mass', 'roll_mass')
 
+#: Frame names: the world (ENU), the body (FLU), the path frame of the tracking error.
+MAP, BASE_LINK, PATH_FRAME = 'map', 'base_link', 'path'
+
 _XYZ = ('x', 'y', 'z')
 _POSE_AND_TWIST = (
     *(f'pose.pose.position.{axis}' for axis in _XYZ),
@@ -20,23 +23,51 @@ _POSE_AND_TWIST = (
     *(f'twist.twist.linear.{axis}' for axis in _XYZ),
     *(f'twist.twist.angular.{axis}' for axis in _XYZ),
 )
-_POSITIONS = tuple(f'position[{name}]' for name in JOINTS)
 _TWIST = tuple(f'twist.linear.{axis}' for axis in _XYZ)
 
-#: Numbers that a message of each per-tick topic carries, by the names of their fields, in the
-#: conventions of the topics (ENU / FLU, SI, rad).
-FIELDS = {
-    '/clock': (),
-    'odom': _POSE_AND_TWIST,
-    'joint_states': _POSITIONS,
-    'current_velocity': _TWIST,
-    'reference': _POSE_AND_TWIST,
-    'tracking_error': tuple(f'vector.{axis}' for axis in _XYZ),
-    'current_estimate': _TWIST,
-    'command': _POSITIONS,
-    'wrench': ('wrench.force.z', 'wrench.torque.x', 'wrench.torque.y'),
-    'adaptation': tuple(f'position[{name}]' for name in Adaptation._fields),
+
+class Port(NamedTuple):
+    """What a per-tick topic carries, in the conventions of the topics (ENU / FLU, SI, rad)."""
+
+    message: str  #: its ROS type
+    fields: tuple[str, ...]  #: numbers that differ from tick to tick
+    frame: str = ''  #: in its header
+    child_frame: str = ''  #: of an odometry
+    names: tuple[str, ...] = ()  #: of a JointState
+
+
+def _odometry(child_frame: str) -> Port:
+    return Port('nav_msgs/msg/Odometry', _POSE_AND_TWIST, MAP, child_frame)
+
+
+def _named(names: tuple[str, ...]) -> Port:
+    """Numbers with names and a stamp, which every plotting tool shows by name."""
+    fields = tuple(f'position[{name}]' for name in names)
+    return Port('sensor_msgs/msg/JointState', fields, names=names)
+
+
+#: Every per-tick topic. The twist of the reference is expressed in `map`: desired velocity over
+#: ground and Euler angle rates.
+PORTS = {
+    '/clock': Port('rosgraph_msgs/msg/Clock', ()),
+    'odom': _odometry(BASE_LINK),
+    'joint_states': _named(JOINTS),
+    'current_velocity': Port('geometry_msgs/msg/TwistStamped', _TWIST, MAP),
+    'reference': _odometry(MAP),
+    'tracking_error': Port(
+        'geometry_msgs/msg/Vector3Stamped', tuple(f'vector.{axis}' for axis in _XYZ), PATH_FRAME
+    ),
+    'current_estimate': Port('geometry_msgs/msg/TwistStamped', _TWIST, MAP),
+    'command': _named(JOINTS),
+    'wrench': Port(
+        'geometry_msgs/msg/WrenchStamped',
+        ('wrench.force.z', 'wrench.torque.x', 'wrench.torque.y'),
+        BASE_LINK,
+    ),
+    'adaptation': _named(Adaptation._fields),
 }
+#: Numbers of each of them, by the names of their fields.
+FIELDS = {topic: port.fields for topic, port in PORTS.items()}
 
 
 class Wired(NamedTuple):

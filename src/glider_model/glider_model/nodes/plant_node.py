@@ -5,11 +5,10 @@
 import math
 import sys
 
-from glider_model.base.frames import odometry_from_wire
-from glider_model.base.signals import TICK_S, Joints
+from glider_model.base.signals import TICK_S
 from glider_model.base.wiring import at_rest
 from glider_model.plant.block import PLANT, plant_move, plant_outputs
-from glider_model.plant.plant import state_fault
+from glider_model.plant.plant import plant_odometry, state_fault
 from glider_model.ros.lockstep.clock import ClockNode
 from glider_model.ros.lockstep.process import run
 from glider_model.ros.parameters import declare_settings
@@ -35,8 +34,8 @@ class PlantNode(ClockNode):
         """Publish the state of the vehicle, or end the run if there is none any more."""
         outputs, _ = plant_outputs(self.state, self.params)
         if not math.isfinite(sum(map(sum, outputs))):
-            odom, joints = outputs
-            self.fail(state_fault(odometry_from_wire(odom), Joints(*joints), self.state.tick))
+            fault = state_fault(plant_odometry(self.state), self.state.joints, self.state.tick)
+            self.fail(fault)
         self.publish_clock(stamp_ns)
         for publish, values in zip(self.senders, outputs, strict=True):
             publish(stamp_ns, values)

@@ -16,7 +16,7 @@ from glider_model.ocean.density import (
     DensitySettings,
 )
 from glider_model.plant.motion import Motion, integrate
-from glider_model.plant.sensors import SensorParams, SensorSettings, add_noise
+from glider_model.plant.sensors import SensorParams, SensorSettings
 from glider_model.vehicle.actuators import actuators_step
 from glider_model.vehicle.file import VehicleParams, load_vehicle
 from glider_model.vehicle.perturb import PerturbSettings, perturbed
@@ -227,18 +227,6 @@ def plant_odometry(state):
         x.q,
         x.r,
     )
-
-
-@kernel
-def plant_measurement(state, params):
-    """What the vehicle measures: the odometry with the noise of this tick."""
-    return add_noise(plant_odometry(state), state.tick, params.sensors)
-
-
-@kernel
-def plant_joints(state):
-    """Where the actuators are."""
-    return state.joints
 
 
 def state_fault(odometry: Odometry, joints: Joints, tick: int) -> str:

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Noise of what the vehicle measures, and the way back to the truth.
+"""What the vehicle measures: its noise, and the way back to the truth.
 
 White noise, drawn anew at every tick. It is a function of (seed, tick), so that nodes and direct
 engine publish the same bits, and whoever knows the seed can take it off a recording again.
@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from glider_model.base.frames import quaternion_from_euler
+from glider_model.base.frames import odometry_to_wire, quaternion_from_euler
 from glider_model.base.kernel import kernel
 from glider_model.base.noise import normal_pair, random_stream
 from glider_model.base.settings import Settings
@@ -158,6 +158,28 @@ def add_noise(odometry, tick, params):
         x.q + n.q,
         x.r + n.r,
     )
+
+
+@kernel
+def sense(odometry, joints, tick, params):
+    """What the vehicle measures at a tick, for the topics of the plant: odom, joint_states.
+
+    Parameters
+    ----------
+    odometry : Odometry
+        Where the vehicle is.
+    joints : Joints
+        Where the actuators are.
+    tick : int
+    params : SensorParams
+
+    Returns
+    -------
+    tuple of tuple of float
+        Numbers on the wire, in the order of the plant's outputs in `glider_model.base.wiring`.
+    """
+    odom = odometry_to_wire(add_noise(odometry, tick, params))
+    return odom, (joints.m_b, joints.x_p, joints.mu)
 
 
 @kernel

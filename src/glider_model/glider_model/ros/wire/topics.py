@@ -6,58 +6,31 @@ The numbers of a message are in the conventions of the topics (ENU / FLU, SI, ra
 `glider_model.base.frames` turns them into signals and back.
 """
 
+from importlib import import_module
 from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import TwistStamped, Vector3Stamped, WrenchStamped
-from nav_msgs.msg import Odometry, Path
+from nav_msgs.msg import Path
 from rclpy.qos import QoSProfile
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from glider_model.base import wiring
-from glider_model.base.signals import Adaptation
-from glider_model.base.wiring import FIELDS, JOINTS, WIRING
+from glider_model.base.wiring import PORTS, WIRING, Port
 from glider_model.ros.wire import qos
 from glider_model.ros.wire.codec import Codec
 
-#: Frame names: the world (ENU), the body (FLU), the path frame of the tracking error.
-MAP, BASE_LINK, PATH_FRAME = 'map', 'base_link', 'path'
 
-
-def _stamped(message, frame: str):
-    message.header.frame_id = frame
-    return message
-
-
-def _odometry(child_frame: str):
-    return _stamped(Odometry(child_frame_id=child_frame), MAP)
-
-
-def _named(names: tuple[str, ...]) -> JointState:
-    """Numbers with names and a stamp, which every plotting tool shows by name."""
-    return JointState(name=list(names), position=[0.0] * len(names))
-
-
-#: Per-tick messages as they are before numbers and stamps are put in. The twist of the reference
-#: is expressed in `map`: desired velocity over ground and Euler angle rates.
-_TEMPLATES = {
-    '/clock': Clock(),
-    'odom': _odometry(BASE_LINK),
-    'joint_states': _named(JOINTS),
-    'current_velocity': _stamped(TwistStamped(), MAP),
-    'reference': _odometry(MAP),
-    'tracking_error': _stamped(Vector3Stamped(), PATH_FRAME),
-    'current_estimate': _stamped(TwistStamped(), MAP),
-    'command': _named(JOINTS),
-    'wrench': _stamped(WrenchStamped(), BASE_LINK),
-    'adaptation': _named(Adaptation._fields),
-}
-_CODECS = {
-    name: Codec(template, FIELDS[name], stamp='clock' if name == '/clock' else 'header.stamp')
-    for name, template in _TEMPLATES.items()
-}
+def _codec(port: Port) -> Codec:
+    """Codec of a per-tick message, from what the wiring says of it."""
+    package, _, name = port.message.partition('/msg/')
+    message = getattr(import_module(f'{package}.msg'), name)()
+    if port.frame:
+        message.header.frame_id = port.frame
+    if port.child_frame:
+        message.child_frame_id = port.child_frame
+    if port.names:
+        message.name, message.position = list(port.names), [0.0] * len(port.names)
+    return Codec(message, port.fields, stamp='header.stamp' if port.fields else 'clock')
 
 
 class Topic(NamedTuple):
@@ -95,7 +68,7 @@ class Topic(NamedTuple):
 
 
 def _per_tick(name: str) -> Topic:
-    codec, needed_by = _CODECS[name], (wired.node for wired in wiring.readers(name))
+    codec, needed_by = _codec(PORTS[name]), (wired.node for wired in wiring.readers(name))
     return Topic(name, codec.message_type, wiring.publisher(name).node, tuple(needed_by), codec)
 
 
