@@ -237,7 +237,7 @@ def cluster(folder):
     with started(
         *(*dask, 'scheduler', *options, '--port', 0, '--dashboard-address', '127.0.0.1:0')
     ) as scheduler:
-        wait_for(file.exists, scheduler)
+        wait_for(lambda: file.exists() and file.read_text().endswith('}'), scheduler)
         worker = [*dask, 'worker', *options, '--nthreads', 1, '--no-dashboard', '--no-nanny']
         worker += ['--local-directory', folder]
         with started(*worker) as first, started(*worker) as second:

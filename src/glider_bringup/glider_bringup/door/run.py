@@ -213,7 +213,7 @@ def fly(
     takers = [scorer, *([] if in_bag else [rows]), *([tracer] if kept else [])]
     with (
         _run_folder(flown, out, engine) as folder,
-        bar(flown, planned_ticks(flown)) if progress else nullcontext((None, None)) as shown,
+        bar(planned_ticks(flown)) if progress else nullcontext((None, None)) as shown,
     ):
         flight = _fly(flown, takers, engine, folder, bag, *shown)
         card = scorecard(flown, engine, flight, scores_of(flown, scorer))
