@@ -18,8 +18,8 @@ from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.recording.ros.log_writer import LogWriter
 from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
-from glider_bringup.ros.bag_log import LogWriter
 from glider_bringup.studies.sweep.fly import (
     JOURNAL_FILE,
     RESULT_FILE,

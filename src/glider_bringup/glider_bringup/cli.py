@@ -27,7 +27,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
         verify,
     )
     from glider_bringup.console import messages
-    from glider_bringup.disk import DiskError
+    from glider_bringup.mission.disk import DiskError
     from glider_model.base.errors import MAX_LINE, ConfigurationError, printable, shown
     from glider_model.base.exits import EXIT_FAILED, EXIT_USAGE
 except KeyboardInterrupt:

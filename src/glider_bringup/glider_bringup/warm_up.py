@@ -16,8 +16,9 @@ from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.ros.recording import Recording, read_told
-from glider_bringup.ros.verify import verify
+from glider_bringup.recording.ros.recorded_run import Recording
+from glider_bringup.recording.ros.told import read_told
+from glider_bringup.recording.ros.verify.every_block import verify
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import halve, make_tracer
 from glider_model.base.signals import TICK_S

@@ -20,6 +20,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from glider_bringup.engines.direct import BLOCK_TICKS, COLUMNS
 from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.ros import recorded_log
+from glider_bringup.recording.ros.recorded_log import SCORED, RecordedLog
 from glider_bringup.recording.ros.rosbag2 import (
     CHUNK_TICKS,
     BagWriter,
@@ -27,8 +29,6 @@ from glider_bringup.recording.ros.rosbag2 import (
     type_hash,
 )
 from glider_bringup.recording.tick_sorter import TickSorter
-from glider_bringup.ros import bag_log
-from glider_bringup.ros.bag_log import SCORED, RecordedLog
 from glider_bringup.scoring.traces import TRACED
 from glider_model.base.signals import TICK_NS
 from glider_model.ros.wire.codec import to_cdr
@@ -272,7 +272,7 @@ def write_with_gaps(folder, ticks, lost):
 @pytest.mark.parametrize('block_ticks', [20, BLOCK_TICKS])
 def test_rows_end_at_the_first_gap_of_what_is_scored(tmp_path, monkeypatch, block_ticks):
     """Ticks after the gap are whole, but not consecutive; what is only drawn may have gaps."""
-    monkeypatch.setattr(bag_log, 'BLOCK_TICKS', block_ticks)
+    monkeypatch.setattr(recorded_log, 'BLOCK_TICKS', block_ticks)
     write_with_gaps(tmp_path, range(100), {('odom', 50), ('adaptation', 20)})
     rows = np.concatenate([block.copy() for block in RecordedLog(Bag(tmp_path), TRACED).blocks()])
     assert rows[:, COLUMNS['odom'].start].tolist() == list(range(50))
@@ -282,7 +282,7 @@ def test_rows_end_at_the_first_gap_of_what_is_scored(tmp_path, monkeypatch, bloc
 
 def test_rows_are_whole_where_a_recorder_from_outside_mixed_up_ticks(tmp_path, monkeypatch):
     """It takes topic after topic as they come, so that some are ticks behind the others."""
-    monkeypatch.setattr(bag_log, 'BLOCK_TICKS', 20)
+    monkeypatch.setattr(recorded_log, 'BLOCK_TICKS', 20)
     late = np.random.default_rng(0).uniform(0.0, 5.0, (100, len(SCORED)))
     order = np.argsort(np.arange(100)[:, np.newaxis] + late, axis=None)
     bag = BagWriter(tmp_path, 'outside')

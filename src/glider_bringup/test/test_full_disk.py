@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from glider_bringup.disk import DiskError, whole_file, write_whole
 from glider_bringup.engines.recorded import fly_recorded
+from glider_bringup.mission.disk import DiskError, whole_file, write_whole
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.mcap_reader import Bag

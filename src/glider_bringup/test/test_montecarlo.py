@@ -20,7 +20,7 @@ from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.run_folder import make_result_folder
 from glider_bringup.mission.scenario import load_scenario, parse_assignment
 from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.ros.bag_log import RecordedLog
+from glider_bringup.recording.ros.recorded_log import RecordedLog
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.studies import montecarlo

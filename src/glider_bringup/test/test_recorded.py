@@ -173,7 +173,7 @@ PEAK = """
 import sys
 from pathlib import Path
 from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.ros.bag_log import RecordedLog
+from glider_bringup.recording.ros.recorded_log import RecordedLog
 
 def peak_mb():
     lines = Path('/proc/self/status').read_text().splitlines()

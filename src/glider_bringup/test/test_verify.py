@@ -23,8 +23,12 @@ from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.ros.recording import Recording, read_told
-from glider_bringup.ros.verify import IDENTICAL, place_ticks, report, verify
+from glider_bringup.recording.ros.recorded_run import Recording
+from glider_bringup.recording.ros.told import read_told
+from glider_bringup.recording.ros.verify.every_block import verify
+from glider_bringup.recording.ros.verify.report import report
+from glider_bringup.recording.ros.verify.ticks import place_ticks
+from glider_bringup.recording.ros.verify.verdict import IDENTICAL
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS
 from glider_model.ros.wire.topics import TOPICS
@@ -446,7 +450,7 @@ def test_command_names_a_difference(altered, recorded):
 INTERRUPTED = """
 import signal, sys
 from glider_bringup.cli import app
-from glider_bringup.recorded_inputs import RecordedBlock
+from glider_bringup.recording.recorded_inputs import RecordedBlock
 
 
 def shoot(compute):

@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from glider_bringup.console import Json, Run, beside, counter, messages, output
-from glider_bringup.disk import write_whole
+from glider_bringup.mission.disk import write_whole
 from glider_model.base.settings import ConfigurationError
 
 app = typer.Typer()

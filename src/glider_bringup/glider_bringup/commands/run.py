@@ -20,9 +20,9 @@ from glider_bringup.console import (
     number,
     progress,
 )
-from glider_bringup.disk import DiskError
 from glider_bringup.engines.processes import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_bringup.mission.choices import ENGINES, chosen_fields
+from glider_bringup.mission.disk import DiskError
 from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,

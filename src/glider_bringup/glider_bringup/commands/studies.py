@@ -24,7 +24,7 @@ from glider_bringup.console import (
     repeatable,
     workers_at_work,
 )
-from glider_bringup.disk import write_whole
+from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.scenario import DEFAULT_SCENARIO
 from glider_model.base.exits import EXIT_FAILED
 from glider_model.base.signals import TICK_S

@@ -37,10 +37,12 @@ def verify(
 
     Exit code 1, and the first tick, topic and field that differ, unless all of them are identical.
     """
-    from glider_bringup.interrupts import interrupts_at
+    from glider_bringup.engines.interrupts import interrupts_at
     from glider_bringup.recording.mcap_reader import Bag
-    from glider_bringup.ros import verify as work
-    from glider_bringup.ros.recording import Recording, read_told
+    from glider_bringup.recording.ros.recorded_run import Recording
+    from glider_bringup.recording.ros.told import read_told
+    from glider_bringup.recording.ros.verify.every_block import verify as verify_blocks
+    from glider_bringup.recording.ros.verify.report import report as report_of
 
     wanted = picked(only, BlockName)
     try:
@@ -49,11 +51,11 @@ def verify(
             told = read_told(bag, run, settings, Path(scratch))
             recording = Recording(bag, namespace, lambda share: update('reading', share))
             with interrupts_at(update) as update:
-                verdicts = list(work.verify(recording, told, wanted, update))
+                verdicts = list(verify_blocks(recording, told, wanted, update))
     except KeyboardInterrupt:
         messages.print('stopped by SIGINT', style='red')
         raise typer.Exit(EXIT_INTERRUPTED) from None
-    report = work.report(bag, recording, told, verdicts)
+    report = report_of(bag, recording, told, verdicts)
     if as_json:
         print(json.dumps({'run': str(run), **report}))
     else:

@@ -8,7 +8,7 @@ from pathlib import Path
 import xarray
 from scipy.io import savemat
 
-from glider_bringup.disk import whole_file
+from glider_bringup.mission.disk import whole_file
 from glider_bringup.studies.sweep.netcdf import write_dataset
 
 #: Rows of a CSV file that are written at once: an hour.

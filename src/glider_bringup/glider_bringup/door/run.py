@@ -288,7 +288,7 @@ def _rows_of(path: Path) -> np.ndarray:
             f'{path}: what was flown is not in it, it has no bag (allowed: a run over nodes, or a '
             f'direct one with --bag)'
         )
-    from glider_bringup.ros.read_back import read_back
+    from glider_bringup.recording.read_back import read_back
 
     rows = Rows()
     read_back(Bag(path), [rows])

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from glider_bringup.engines.direct import MissionParams, MissionState, NotFiniteError, fly_blocks
-from glider_bringup.interrupts import interrupts_noted
+from glider_bringup.engines.interrupts import interrupts_noted
 from glider_bringup.mission.scenario import Scenario
 
 #: Called now and then with the ticks flown and the depth (m).

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
+from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import (
     MODULES,
     NAMESPACE_ALLOWED,
@@ -31,7 +32,6 @@ from glider_bringup.mission.scenario import (
     load_scenario,
     scenario_names,
 )
-from glider_bringup.ros.node_parameters import node_parameters, write_parameters
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_S
 from glider_model.ros.wire.topics import CURRENT

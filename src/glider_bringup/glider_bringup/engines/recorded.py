@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from glider_bringup.engines.flight import Flight, Progress, Taker, fly
+from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import NAMESPACE, node_commands, run_nodes
 from glider_bringup.mission.run_folder import (
     LOG_FILE,
@@ -16,10 +17,9 @@ from glider_bringup.mission.run_folder import (
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.recording.bag_files import has_bag
 from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.read_back import Reader, ended, read_back
+from glider_bringup.recording.ros.log_writer import LogWriter
 from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
-from glider_bringup.ros.bag_log import LogWriter
-from glider_bringup.ros.node_parameters import node_parameters, write_parameters
-from glider_bringup.ros.read_back import Reader, ended, read_back
 from glider_model.base.exits import EXIT_USAGE
 from glider_model.base.settings import ConfigurationError
 

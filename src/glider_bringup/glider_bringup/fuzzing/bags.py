@@ -23,14 +23,16 @@ from glider_bringup.fuzzing.watch import outcome_of
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.ros.recorded_run import Recording
 from glider_bringup.recording.ros.republish import (
     check_not_empty,
     plan_replay,
     qos_of,
     recorded_messages,
 )
-from glider_bringup.ros.recording import Recording, read_told
-from glider_bringup.ros.verify import report, verify
+from glider_bringup.recording.ros.told import read_told
+from glider_bringup.recording.ros.verify.every_block import verify
+from glider_bringup.recording.ros.verify.report import report
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of

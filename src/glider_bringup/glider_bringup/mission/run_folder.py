@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from glider_bringup.disk import write_whole
+from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_model.base.settings import ConfigurationError
 from glider_model.vehicle.file import vehicle_file

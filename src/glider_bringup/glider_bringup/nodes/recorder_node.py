@@ -13,7 +13,7 @@ from pathlib import Path
 from pydantic import Field
 from std_msgs.msg import Header
 
-from glider_bringup.disk import DiskError
+from glider_bringup.mission.disk import DiskError
 from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
 from glider_bringup.recording.tick_sorter import TickSorter
 from glider_model.base.exits import EXIT_FAILED

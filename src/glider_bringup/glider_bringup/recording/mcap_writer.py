@@ -34,7 +34,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from glider_bringup.disk import not_written
+from glider_bringup.mission.disk import not_written
 
 MAGIC = b'\x89MCAP0\r\n'
 _MESSAGE = struct.Struct('<BQHIQQ')

@@ -11,8 +11,8 @@ from glider_bringup.mission.run_folder import PARAMETERS_FILE, scenario_of
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.recording.bag_files import has_bag
 from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.ros.bag_log import RecordedLog
-from glider_bringup.ros.read_back import Reader, ended, read_back
+from glider_bringup.recording.read_back import Reader, ended, read_back
+from glider_bringup.recording.ros.recorded_log import RecordedLog
 from glider_bringup.scoring.card import read_score, scorecard
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_model.base.settings import ConfigurationError

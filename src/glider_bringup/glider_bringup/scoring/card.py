@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from glider_bringup.disk import write_whole
 from glider_bringup.engines.flight import Flight, Progress, Taker, fly
+from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.run_folder import SCORE_FILE
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.recording.bag_files import has_bag

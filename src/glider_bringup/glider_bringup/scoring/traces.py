@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.disk import whole_file
 from glider_bringup.engines.direct import COLUMNS
+from glider_bringup.mission.disk import whole_file
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import TrueMotion
 from glider_model.base.frames import poses_from_wire, wrap_angle

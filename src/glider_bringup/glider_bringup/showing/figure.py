@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.disk import save_figure
+from glider_bringup.mission.disk import save_figure
 from glider_bringup.scoring.traces import Traces
 
 #: A picture shows at most this many values of each curve.

@@ -4,7 +4,7 @@
 
 from pathlib import Path
 
-from glider_bringup.disk import write_whole
+from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.run_folder import SCENARIO_FILE, TRACES_FILE, scenario_of
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.recording.bag_files import has_bag

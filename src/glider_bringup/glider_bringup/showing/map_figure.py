@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.disk import save_figure
+from glider_bringup.mission.disk import save_figure
 from glider_bringup.showing.stability_map import (
     CLASSES,
     CRITICAL,

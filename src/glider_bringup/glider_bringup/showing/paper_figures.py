@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.disk import save_figure
+from glider_bringup.mission.disk import save_figure
 from glider_bringup.scoring.one_hertz import Record
 from glider_bringup.studies.paper.cases import Experiment
 

@@ -23,7 +23,7 @@ from distributed import Client, Future, LocalCluster, TimeoutError, wait
 from distributed.client import ClosedClientError
 from distributed.scheduler import KilledWorker
 
-from glider_bringup.interrupts import interrupts_noted
+from glider_bringup.engines.interrupts import interrupts_noted
 from glider_model.base.kernel import source_digest
 from glider_model.base.settings import ConfigurationError
 

@@ -17,7 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from glider_bringup.engines.processes import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_bringup.recording.mcap_reader import Bag, BagTopic
-from glider_bringup.ros.recording import choose_namespace
+from glider_bringup.recording.ros.recorded_run import choose_namespace
 from glider_model.base.files import parse_yaml
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS

@@ -13,7 +13,7 @@ import numpy as np
 from ament_index_python.packages import get_package_share_directory
 from rclpy.qos import QoSProfile
 
-from glider_bringup.disk import write_whole
+from glider_bringup.mission.disk import write_whole
 from glider_bringup.recording.mcap_writer import McapWriter
 from glider_model.base.signals import TICK_NS
 from glider_model.ros.wire.topics import TOPICS, Topic

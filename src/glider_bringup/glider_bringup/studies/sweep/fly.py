@@ -13,8 +13,8 @@ from pathlib import Path
 from socket import gethostname
 from typing import Any, NamedTuple
 
-from glider_bringup.disk import whole_file
 from glider_bringup.engines.flight import Flight
+from glider_bringup.mission.disk import whole_file
 from glider_bringup.mission.planned import planned_ticks
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario, ScenarioSource, make_scenario

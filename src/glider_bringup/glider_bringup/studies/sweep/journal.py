@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from glider_bringup.disk import DiskError
+from glider_bringup.mission.disk import DiskError
 from glider_model.base.files import parse_json
 from glider_model.base.settings import ConfigurationError
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from glider_bringup.blocks import BLOCKS
-from glider_bringup.disk import write_whole
+from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.scenario import Scenario
 from glider_model.ros.parameters import parameters_yaml, to_parameters
 from glider_model.ros.wire import topics

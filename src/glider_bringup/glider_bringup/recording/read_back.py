@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.ros.bag_log import RecordedLog
+from glider_bringup.recording.ros.recorded_log import RecordedLog
 from glider_model.base.signals import NOT_FINITE
 
 
