@@ -4,8 +4,10 @@
 
 import errno
 import os
+import pkgutil
 import signal
 import sys
+from importlib import import_module
 
 try:  # imports take a second, in which Ctrl-C may come, and many files
     # ./glider blocks it until there is someone to take it; workers, which import this too, leave
@@ -14,18 +16,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     import typer
 
-    from glider_bringup.commands import (
-        export,
-        fuzz,
-        recorded,
-        replay,
-        report,
-        run,
-        studies,
-        sweeps,
-        vehicles,
-        verify,
-    )
+    from glider_bringup import commands
     from glider_bringup.console import messages
     from glider_bringup.mission.disk import DiskError
     from glider_model.base.errors import MAX_LINE, ConfigurationError, printable, shown
@@ -54,9 +45,54 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={'help_option_names': ['-h', '--help']},
 )
-# Commands in the order in which --help lists them.
-for _module in (run, studies, sweeps, recorded, report, export, replay, verify, fuzz, vehicles):
-    app.add_typer(_module.app)
+#: Commands in the order in which --help lists them; those that are not named here follow.
+ORDER = (
+    *('run', 'montecarlo', 'experiments', 'sweep', 'map', 'score', 'figure', 'report', 'compare'),
+    *('export', 'replay', 'verify', 'fuzz', 'trim', 'list'),
+)
+#: What the ./glider script does by itself, and --help has to tell of: text and example.
+OF_THE_SCRIPT = {
+    'test': ("Run all tests: each package's, then those of the whole system.", 'test'),
+    'python': (
+        'Run Python with the stack in it: a program, -m MODULE, or an interpreter.',
+        'python my_study.py',
+    ),
+    'jupyter': (
+        'Run Jupyter with the stack in it, once it is installed there.',
+        'jupyter lab examples/first_flight.ipynb',
+    ),
+    'bench': (
+        'Measure how fast this machine flies, as ratios to floors measured in the same run.',
+        'bench --only compute --json',
+    ),
+}
+
+
+def found_commands() -> dict[str, typer.Typer]:
+    """Commands by name, from the modules in commands/ and its folders, in their order."""
+    modules = pkgutil.walk_packages(commands.__path__, f'{commands.__name__}.')
+    places = {one.name.rpartition('.')[2]: one.name for one in modules if not one.ispkg}
+    named = [name for name in ORDER if name in places]
+    others = [name for name in sorted(places) if name not in ORDER]
+    return {name: import_module(places[name]).app for name in named + others}
+
+
+def _script() -> typer.Typer:
+    """Commands that --help tells of, and that are refused here."""
+    told = typer.Typer()
+
+    def refuse(called: typer.Context) -> None:
+        raise ConfigurationError(
+            f'{called.info_name}: run it through the ./glider script of the workspace'
+        )
+
+    for name, (text, example) in OF_THE_SCRIPT.items():
+        told.command(name, help=text, epilog=f'Example: ./glider {example}')(refuse)
+    return told
+
+
+for _command in (*found_commands().values(), _script()):
+    app.add_typer(_command)
 
 
 def check_words(words: list[str]) -> None:

@@ -6,13 +6,16 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+import typer
 import yaml
 
-from glider_bringup import cli
+from glider_bringup import cli, commands
 from glider_bringup.mission.scenario import scenario_names
 from glider_bringup.studies.sweep.plan import sweep_names
+from glider_model.base.settings import ConfigurationError
 from glider_model.vehicle.file import vehicle_names, vehicle_path
 
 SHORT = ('--engine', 'direct', '--controller', 'pid', '--duration', '300')
@@ -218,3 +221,22 @@ def test_mistake_in_a_vehicle_file_is_told_before_anything_is_written(tmp_path):
     for word in (str(vehicle), 'moving_mass.mass.value = -18.0', '> 0'):
         assert word in message
     assert not (tmp_path / 'out').exists()
+
+
+def test_every_file_of_commands_is_the_command_of_its_name():
+    files = [*Path(commands.__file__).parent.rglob('*.py')]
+    names = {file.stem for file in files if file.name != '__init__.py'}
+    assert set(typer.main.get_command(cli.app).commands) == names | set(cli.OF_THE_SCRIPT)
+    assert set(cli.ORDER) == names
+
+
+def test_a_new_file_is_a_new_command_after_the_others(tmp_path, monkeypatch):
+    (tmp_path / 'drift.py').write_text('import typer\n\napp = typer.Typer()\n')
+    monkeypatch.setattr(commands, '__path__', [*commands.__path__, str(tmp_path)])
+    assert list(cli.found_commands()) == [*cli.ORDER, 'drift']
+
+
+@pytest.mark.parametrize('name', cli.OF_THE_SCRIPT)
+def test_what_the_script_does_is_refused_here(name):
+    with pytest.raises(ConfigurationError, match=f'^{name}: run it through the ./glider script'):
+        cli.app([name], standalone_mode=False)

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from glider_bringup import cli
-from glider_bringup.commands.studies import Group
+from glider_bringup.commands.studies.experiments import Group
 from glider_bringup.mission.run_folder import make_result_folder
 from glider_bringup.mission.scenario import load_scenario, parse_assignment
 from glider_bringup.scoring.one_hertz import Recorder

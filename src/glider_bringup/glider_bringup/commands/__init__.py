@@ -1,3 +1,3 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The command line: a file for each command, or for a few that belong together."""
+"""The command line: a file for each command, called like it."""

@@ -1,33 +1,15 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""``./glider score`` and ``./glider figure``: what was recorded."""
+"""``./glider figure``: a run as an image."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from glider_bringup.console import Json, Run, beside, counter, output
-from glider_bringup.showing.scorecard import print_card
+from glider_bringup.console import Run, beside, counter, output
 
 app = typer.Typer()
-
-
-@app.command(epilog='Example: ./glider score runs/20260101-120000-current_8deg --json')
-def score(
-    run: Run,
-    as_json: Json = False,
-) -> None:
-    """Score a run again, from its bag; a run without a bag shows the score it was given."""
-    from glider_bringup.scoring.again import score_again
-
-    with counter('reading the bag', None) as update:
-        card = score_again(run, update)
-    if as_json:
-        print(json.dumps(card, allow_nan=False))
-    else:
-        print_card(card, run)
 
 
 @app.command(epilog='Example: ./glider figure runs/20260101-120000-current_8deg --out run.png')

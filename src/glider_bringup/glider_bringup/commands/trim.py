@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""``./glider trim`` and ``./glider list``: vehicles, scenarios and sweeps."""
+"""``./glider trim``: the steady glide of a vehicle."""
 
 import json
 from dataclasses import asdict
@@ -10,9 +10,7 @@ import typer
 from rich.table import Table
 
 from glider_bringup.console import Json, changed_fields, messages, output
-from glider_bringup.door.studies import scenarios, vehicles
 from glider_bringup.mission.scenario import split_changes
-from glider_bringup.studies.sweep.plan import read_sweep, sweep_names
 from glider_model.base.exits import EXIT_FAILED
 from glider_model.base.settings import ConfigurationError
 from glider_model.plant.trim import Trim, solve_trim
@@ -75,45 +73,3 @@ def _print_trim(vehicle: str, solution: Trim) -> None:
             value = 'straight'
         table.add_row(name, f'{value:.5g}' if isinstance(value, float) else str(value))
     output.print(table)
-
-
-@app.command('list', epilog='Example: ./glider list --json')
-def list_all(as_json: Json = False) -> None:
-    """List the scenarios, vehicles and sweeps that come with the stack."""
-    listed = {
-        'scenarios': scenarios(),
-        'vehicles': vehicles(),
-        'sweeps': {name: read_sweep(name).description for name in sweep_names()},
-    }
-    if as_json:
-        print(json.dumps(listed))
-        return
-    for title, entries in listed.items():
-        table = Table(title=title.capitalize(), show_header=False, title_justify='left')
-        for name, description in entries.items():
-            table.add_row(name, description)
-        output.print(table)
-
-
-@app.command(epilog='Example: ./glider test')
-def test() -> None:
-    """Run all tests: each package's, then those of the whole system."""
-    raise ConfigurationError('test: run it through the ./glider script of the workspace')
-
-
-@app.command(epilog='Example: ./glider python my_study.py')
-def python() -> None:
-    """Run Python with the stack in it: a program, -m MODULE, or an interpreter."""
-    raise ConfigurationError('python: run it through the ./glider script of the workspace')
-
-
-@app.command(epilog='Example: ./glider jupyter lab examples/first_flight.ipynb')
-def jupyter() -> None:
-    """Run Jupyter with the stack in it, once it is installed there."""
-    raise ConfigurationError('jupyter: run it through the ./glider script of the workspace')
-
-
-@app.command(epilog='Example: ./glider bench --only compute --json')
-def bench() -> None:
-    """Measure how fast this machine flies, as ratios to floors measured in the same run."""
-    raise ConfigurationError('bench: run it through the ./glider script of the workspace')

@@ -1,0 +1,32 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider list``: scenarios, vehicles and sweeps."""
+
+import json
+
+import typer
+from rich.table import Table
+
+from glider_bringup.console import Json, output
+from glider_bringup.door.studies import scenarios, vehicles
+from glider_bringup.studies.sweep.plan import read_sweep, sweep_names
+
+app = typer.Typer()
+
+
+@app.command('list', epilog='Example: ./glider list --json')
+def list_all(as_json: Json = False) -> None:
+    """List the scenarios, vehicles and sweeps that come with the stack."""
+    listed = {
+        'scenarios': scenarios(),
+        'vehicles': vehicles(),
+        'sweeps': {name: read_sweep(name).description for name in sweep_names()},
+    }
+    if as_json:
+        print(json.dumps(listed))
+        return
+    for title, entries in listed.items():
+        table = Table(title=title.capitalize(), show_header=False, title_justify='left')
+        for name, description in entries.items():
+            table.add_row(name, description)
+        output.print(table)

@@ -1,0 +1,71 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider experiments``: the paper's figures, and what goes beyond them."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from glider_bringup.console import (
+    Json,
+    Scheduler,
+    Workers,
+    counter,
+    messages,
+    output,
+    picked,
+    repeatable,
+    workers_at_work,
+)
+from glider_bringup.mission.disk import write_whole
+from glider_model.base.exits import EXIT_FAILED
+
+app = typer.Typer()
+Group = Literal['current', 'yaw', 'profile', 'robustness', 'paths', 'envelope']
+
+
+@app.command(epilog='Example: ./glider experiments --only robustness --only paths')
+def experiments(
+    only: Annotated[
+        list[repeatable(Group)] | None,
+        typer.Option(help='Group; can be repeated. Default: all of them.'),
+    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    out: Annotated[
+        Path | None, typer.Option(help='Folder for experiments.json and the figures.')
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fly the experiments of the paper and what goes beyond them; exit code 1 if one fails.
+
+    By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
+    engine: 135 flights, most of them of 30 hours.
+    """
+    from glider_bringup.mission.run_folder import make_result_folder
+    from glider_bringup.showing import paper_figures
+    from glider_bringup.studies.paper import catalogue, flying, tables, verdicts
+
+    planned = catalogue.make_experiments(picked(only, Group))
+    flights = flying.count_flights(planned)
+    if out:
+        make_result_folder(out, verdicts.RESULT_FILE)
+    messages.print(f'{len(planned)} experiments, {flights} flights')
+    with workers_at_work(workers, scheduler) as pool, counter('flying', flights) as update:
+        rows, records = flying.fly(planned, pool, update)
+    result = verdicts.report(planned, rows)
+    if out:
+        with messages.status('drawing'):
+            drawn = paper_figures.draw(planned, rows, records, out)
+        text = json.dumps(result, indent=2) + '\n'
+        write_whole(out / verdicts.RESULT_FILE, text)
+        for file in drawn:
+            messages.print(f'drawn: {file}', soft_wrap=True)
+    if as_json:
+        print(json.dumps(result))
+    else:
+        tables.show(result, output)
+    if any(one['verdict'] == verdicts.FAILED for one in result['experiments']):
+        raise typer.Exit(EXIT_FAILED)

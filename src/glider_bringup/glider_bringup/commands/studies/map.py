@@ -1,0 +1,60 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider map``: where over speed and angle of the current a path is held."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from glider_bringup.console import Json, messages, output
+
+app = typer.Typer()
+
+
+@app.command('map', epilog='Example: ./glider map sweeps/stability_map/sweep.nc --out map.png')
+def draw(
+    file: Annotated[
+        Path, typer.Argument(metavar='FILE', help='Result of a sweep over speed and angle.')
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help='Image file: png, svg or pdf. Default: FILE with .png.')
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Draw in which currents a path is held, and the limit of physics; print the shares.
+
+    FILE is the result of ./glider sweep over current.speed_kn, current.angle_deg and at most one
+    more dimension, such as stability_map.
+    """
+    from glider_bringup.showing import stability_map as study
+    from glider_bringup.showing.map_figure import draw_map
+
+    stability = study.load_map(file)
+    image = out or file.with_suffix('.png')
+    with messages.status('drawing'):
+        draw_map(stability, image)
+    rows = study.shares(stability)
+    if as_json:
+        print(
+            json.dumps(
+                {'image': str(image), 'horizontal_kn': stability.horizontal_kn, 'panels': rows}
+            )
+        )
+        return
+    table = Table(title=stability.title, title_justify='left')
+    for heading in ('share of the cells', *(row['panel'] or 'flights' for row in rows)):
+        table.add_column(heading)
+    for name in [name for name in rows[0] if name != 'panel']:
+        table.add_row(name.replace('_', ' '), *(_share(name, row[name]) for row in rows))
+    output.print(table)
+    output.print(f'drawn: {image}', soft_wrap=True)
+
+
+def _share(name: str, value: float | None) -> str:
+    """Text of a row of shares: a share, a number of cells, or a dash where there is none."""
+    if value is None:
+        return '-'
+    return str(value) if name == 'cells' else f'{value:.1%}'
