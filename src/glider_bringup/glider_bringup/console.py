@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the commands share: consoles, options, progress bars."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import contextmanager
 from enum import Enum
 from functools import partial
@@ -115,6 +115,11 @@ def number(option: str, text: str, word: str, low: float, high: float) -> float:
     return number
 
 
+def tell(line: str) -> None:
+    """Put a line on standard error."""
+    messages.print(line, soft_wrap=True)
+
+
 #: Columns of progress bars, beside what is done and the bar itself; made anew for each bar.
 PERCENT = partial(TextColumn, '{task.percentage:3.0f} %')
 STATE = partial(TextColumn, '{task.fields[state]}')
@@ -167,9 +172,12 @@ def shares():
 
 @contextmanager
 def workers_at_work(
-    workers: int | None, scheduler: str | None, advice: Callable[[], str] = lambda: ''
+    workers: int | None,
+    scheduler: str | None,
+    combinations: Iterable[tuple[str, str]],
+    advice: Callable[[], str] = lambda: '',
 ):
-    """Workers that fly; yields their pool.
+    """Workers that fly laws with methods; yields their pool.
 
     What ends their work early is told, with what ``advice`` adds, and is the exit code.
     """
@@ -180,7 +188,7 @@ def workers_at_work(
             f'--workers {workers}: not with --scheduler, whose cluster has workers of its own'
         )
     try:
-        with worker_pool(workers, scheduler) as pool:
+        with worker_pool(workers, scheduler, combinations, tell) as pool:
             yield pool
         return
     except KeyboardInterrupt:

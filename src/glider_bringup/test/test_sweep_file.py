@@ -140,6 +140,19 @@ def test_every_vehicle_that_flies_is_an_input(tmp_path):
     assert [name for name, _ in plan.vehicles] == ['seawing', 'zhang2021']
 
 
+def test_laws_and_methods_of_all_cells_are_known(tmp_path):
+    """Their loops are compiled before workers need them."""
+    laws = {'kind': 'values', 'field': 'control.law', 'values': ['pid', 'adaptive']}
+    variants = {'a': {}, 'b': {'guidance.los.method': 'paper'}}
+    plan = plan_of(
+        tmp_path, dimensions={'law': laws, 'los': {'kind': 'variants', 'variants': variants}}
+    )
+    assert set(plan.combinations) == {
+        (law, method) for law in ('pid', 'adaptive') for method in ('observer', 'paper')
+    }
+    assert plan_of(tmp_path).combinations == [('adaptive', 'observer')]
+
+
 def test_digest_is_that_of_the_inputs(tmp_path):
     (tmp_path / 'elsewhere').mkdir()
     digest = plan_of(tmp_path).digest

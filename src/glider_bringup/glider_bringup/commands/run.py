@@ -19,9 +19,10 @@ from glider_bringup.console import (
     messages,
     number,
     progress,
+    tell,
 )
 from glider_bringup.engines.processes import NAMESPACE_ALLOWED, absolute_namespace, given_domain
-from glider_bringup.mission.choices import ENGINES, chosen_fields
+from glider_bringup.mission.choices import ENGINES, chosen_fields, combination_of
 from glider_bringup.mission.disk import DiskError
 from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
@@ -106,24 +107,8 @@ def run(
 
     if duration not in (None, 'full'):
         duration = number('--duration', duration, 'full', TICK_S, 1e8)
-    fields = chosen_fields(
-        changed_fields(changes),
-        controller,
-        guidance,
-        seed,
-        duration,
-    )
-    rate = 0.0 if speed == 'max' else number('--speed', speed, 'max', 0.01, 1e6)
-    if rate and engine == 'direct':
-        raise ConfigurationError('--speed: the direct engine knows only max')
-    place = absolute_namespace(namespace) if namespace else None
-    if namespace and (place is None or engine == 'direct'):
-        allowed = 'nothing, with the direct engine' if place else NAMESPACE_ALLOWED
-        raise ConfigurationError(f'--namespace {namespace}: not usable (allowed: {allowed})')
-    if view and engine == 'direct':
-        raise ConfigurationError('--view: the direct engine has no topics to show; use nodes')
-    if engine == 'nodes':
-        given_domain()
+    fields = chosen_fields(changed_fields(changes), controller, guidance, seed, duration)
+    rate, place = _checked(engine, speed, namespace, view)
     flown = load_scenario(scenario, fields)
     with _view(view_port, place) if view else nullcontext() as begin_view:
         card, folder, has_room = _fly(
@@ -135,12 +120,38 @@ def run(
         print_places(messages, folder, page)
     else:
         print_card(card, folder, page)
+    raise typer.Exit(_exit_code(card, has_room))
+
+
+def _checked(
+    engine: Engine, speed: str, namespace: str | None, view: bool
+) -> tuple[float, str | None]:
+    """Speed (0.0: max) and absolute namespace of a flight, if its engine knows what is asked.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the option, and what is allowed.
+    """
+    rate = 0.0 if speed == 'max' else number('--speed', speed, 'max', 0.01, 1e6)
+    if rate and engine == 'direct':
+        raise ConfigurationError('--speed: the direct engine knows only max')
+    place = absolute_namespace(namespace) if namespace else None
+    if namespace and (place is None or engine == 'direct'):
+        allowed = 'nothing, with the direct engine' if place else NAMESPACE_ALLOWED
+        raise ConfigurationError(f'--namespace {namespace}: not usable (allowed: {allowed})')
+    if view and engine == 'direct':
+        raise ConfigurationError('--view: the direct engine has no topics to show; use nodes')
+    if engine == 'nodes':
+        given_domain()
+    return rate, place
+
+
+def _exit_code(card: dict, has_room: bool) -> int:
+    """Exit code of a flight; its score is there, whatever became of it."""
     if card['status'] in ('aborted', 'failed'):
-        raise typer.Exit(
-            EXIT_INTERRUPTED if card['reason'].startswith('stopped by') else EXIT_FAILED
-        )
-    if not has_room:
-        raise typer.Exit(EXIT_FAILED)
+        return EXIT_INTERRUPTED if card['reason'].startswith('stopped by') else EXIT_FAILED
+    return 0 if has_room else EXIT_FAILED
 
 
 @contextmanager
@@ -172,6 +183,7 @@ def _fly(
 
     Returns the scorecard, the run folder, and whether the disk had room for the report.
     """
+    from glider_bringup.engines.compiling import told
     from glider_bringup.engines.flight import fly
     from glider_bringup.mission.planned import planned_ticks
     from glider_bringup.mission.run_folder import make_run_folder
@@ -186,7 +198,10 @@ def _fly(
     messages.print(f'{scenario.name}: {scenario.description}')
     scorer, tracer = make_scorer(scenario), make_tracer(scenario) if report else None
     takers = [scorer, tracer] if tracer else [scorer]
-    with progress(planned_ticks(scenario)) as (flying, reading):
+    with (
+        progress(planned_ticks(scenario)) as (flying, reading),
+        told(combination_of(scenario), tell),
+    ):
         if engine == 'nodes':
             if begin_view:
                 flying = _after_first(begin_view, flying)
@@ -197,7 +212,7 @@ def _fly(
                 flying,
                 speed=rate,
                 namespace=namespace,
-                on_log=_print_log,
+                on_log=tell,
                 on_read=reading,
                 sync=sync,
             )
@@ -243,8 +258,3 @@ def _after_first(begin: Callable[[], None], update: Callable) -> Callable:
         update(*flown)
 
     return call
-
-
-def _print_log(line: str) -> None:
-    """Show a line that a node printed."""
-    messages.print(line, soft_wrap=True)

@@ -4,13 +4,14 @@
 
 import json
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 from rich.table import Table
 
-from glider_bringup.console import Json, Run, messages, output, picked, repeatable, shares
+from glider_bringup.console import Json, Run, messages, output, picked, repeatable, shares, tell
 from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
 
 app = typer.Typer()
@@ -43,14 +44,16 @@ def verify(
     from glider_bringup.recording.ros.told import read_told
     from glider_bringup.recording.ros.verify.every_block import verify as verify_blocks
     from glider_bringup.recording.ros.verify.report import report as report_of
+    from glider_model.base.kernel import compiling_told
 
     wanted = picked(only, BlockName)
+    compiling = partial(tell, 'compiling the mathematics of a block for these settings, once')
     try:
         with tempfile.TemporaryDirectory() as scratch, shares() as update:
             bag = Bag(run)
             told = read_told(bag, run, settings, Path(scratch))
             recording = Recording(bag, namespace, lambda share: update('reading', share))
-            with interrupts_at(update) as update:
+            with interrupts_at(update) as update, compiling_told(compiling):
                 verdicts = list(verify_blocks(recording, told, wanted, update))
     except KeyboardInterrupt:
         messages.print('stopped by SIGINT', style='red')

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from glider_bringup.engines.compiling import told
 from glider_bringup.engines.direct import COLUMNS, ROW
 from glider_bringup.engines.flight import Flight
 from glider_bringup.engines.flight import fly as fly_direct
 from glider_bringup.engines.processes import given_domain
-from glider_bringup.mission.choices import ENGINES, chosen_fields
+from glider_bringup.mission.choices import ENGINES, chosen_fields, combination_of
 from glider_bringup.mission.planned import planned_ticks
 from glider_bringup.mission.run_folder import (
     REPORT_FILE,
@@ -195,7 +196,7 @@ def fly(
     ConfigurationError
         Naming field, value and allowed range.
     """
-    from glider_bringup.console import number
+    from glider_bringup.console import number, tell
     from glider_bringup.console import progress as bar
 
     if duration not in (None, 'full'):
@@ -214,6 +215,7 @@ def fly(
     with (
         _run_folder(flown, out, engine) as folder,
         bar(planned_ticks(flown)) if progress else nullcontext((None, None)) as shown,
+        told(combination_of(flown), tell),
     ):
         flight = _fly(flown, takers, engine, folder, bag, *shown)
         card = scorecard(flown, engine, flight, scores_of(flown, scorer))

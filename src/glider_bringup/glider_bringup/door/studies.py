@@ -100,7 +100,7 @@ def sweep(
     ConfigurationError
         Naming file, field, value and allowed range.
     """
-    from glider_bringup.console import counter
+    from glider_bringup.console import counter, tell
     from glider_bringup.studies.sweep import fly as study
     from glider_bringup.studies.sweep.netcdf import read_dataset
     from glider_bringup.studies.sweep.plan import load_sweep
@@ -113,7 +113,8 @@ def sweep(
         with study.open_journal(plan, folder, resume) as journal:
             known = study.flown_cells(plan, journal)
             if not all(known):
-                with worker_pool(workers, scheduler) as pool, bar as update:
+                loops = plan.combinations
+                with worker_pool(workers, scheduler, loops, tell) as pool, bar as update:
                     study.fly_sweep(plan, journal, known, pool, update, lambda: None)
             study.write_result(plan, journal, folder / study.RESULT_FILE)
         return read_dataset(folder / study.RESULT_FILE)

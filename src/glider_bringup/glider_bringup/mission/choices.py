@@ -2,10 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a person chooses for a flight beside its scenario, as fields of the scenario."""
 
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
+
+from glider_bringup.mission.scenario import Scenario
 
 #: The engines: node processes over topics, or one compiled loop. Same results.
 ENGINES = ('nodes', 'direct')
+
+
+class Combination(NamedTuple):
+    """What the loop of a flight is compiled for: all else about a scenario is numbers."""
+
+    law: str
+    method: str
+
+
+def combination_of(scenario: Scenario) -> Combination:
+    """What the loop that flies a scenario is compiled for."""
+    return Combination(scenario.control.law, scenario.guidance.los.method)
 
 
 def chosen_fields(

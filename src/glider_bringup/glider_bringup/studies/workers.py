@@ -23,7 +23,9 @@ from distributed import Client, Future, LocalCluster, TimeoutError, wait
 from distributed.client import ClosedClientError
 from distributed.scheduler import KilledWorker
 
+from glider_bringup.engines.compiling import Tell, compile_loops
 from glider_bringup.engines.interrupts import interrupts_noted
+from glider_bringup.mission.choices import Combination
 from glider_model.base.kernel import source_digest
 from glider_model.base.settings import ConfigurationError
 
@@ -221,7 +223,12 @@ def _local_cluster(workers: int, folder: str) -> LocalCluster:
 
 
 @contextmanager
-def worker_pool(workers: int | None = None, scheduler: str | None = None) -> Iterator[Pool]:
+def worker_pool(
+    workers: int | None = None,
+    scheduler: str | None = None,
+    combinations: Iterable[Combination] = (),
+    tell: Tell = lambda line: None,
+) -> Iterator[Pool]:
     """Start worker processes, or connect to those of a cluster.
 
     Whatever ends the block ends the workers that were started for it, at once.
@@ -232,6 +239,11 @@ def worker_pool(workers: int | None = None, scheduler: str | None = None) -> Ite
         Processes on this machine; by default one per processor.
     scheduler : str, optional
         Address of the scheduler of a cluster, such as ``tcp://10.0.0.1:8786``, instead.
+    combinations : iterable of Combination
+        What they will fly. Loops for it are compiled here, so that workers of this machine do not
+        all compile the same.
+    tell : callable
+        Gets a line if a loop has to be compiled.
 
     Raises
     ------
@@ -243,6 +255,7 @@ def worker_pool(workers: int | None = None, scheduler: str | None = None) -> Ite
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(_CONFIG))
         if scheduler is None:
+            compile_loops(combinations, tell)
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='glider-'))
             with _interrupts_held_back():
                 cluster = _local_cluster(workers or os.cpu_count() or 1, folder)

@@ -12,10 +12,13 @@ of them and everything is compiled afresh.
 import hashlib
 import importlib.util
 import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
 import numba
+from numba.core import event
 
 from glider_model.base.plugins import registered, sources
 
@@ -55,3 +58,27 @@ if not os.environ.get('NUMBA_CACHE_DIR'):
 #: topics and a direct run agree to the last bit. Inlined into its callers: a NamedTuple would
 #: otherwise be copied number by number at every call.
 kernel = numba.njit(cache=True, error_model='numpy', forceinline=True)
+
+
+class _Once(event.Listener):
+    """Calls ``tell`` when numba begins to compile for the first time."""
+
+    def __init__(self, tell: Callable[[], None]) -> None:
+        self._tell = [tell]
+
+    def on_start(self, event) -> None:
+        if self._tell:
+            self._tell.pop()()
+
+    def on_end(self, event) -> None:
+        pass
+
+
+@contextmanager
+def compiling_told(tell: Callable[[], None]) -> Iterator[None]:
+    """Call ``tell`` once if something in the block has to be compiled, before it is.
+
+    What is found in the cache is not compiled.
+    """
+    with event.install_listener('numba:compile', _Once(tell)):
+        yield

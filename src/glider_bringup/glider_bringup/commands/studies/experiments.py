@@ -53,7 +53,8 @@ def experiments(
     if out:
         make_result_folder(out, verdicts.RESULT_FILE)
     messages.print(f'{len(planned)} experiments, {flights} flights')
-    with workers_at_work(workers, scheduler) as pool, counter('flying', flights) as update:
+    loops = flying.combinations(planned)
+    with workers_at_work(workers, scheduler, loops) as pool, counter('flying', flights) as update:
         rows, records = flying.fly(planned, pool, update)
     result = verdicts.report(planned, rows)
     if out:

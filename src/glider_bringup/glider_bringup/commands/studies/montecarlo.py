@@ -61,6 +61,7 @@ def montecarlo(
     Each hydrodynamic coefficient differs by up to 30 %, added mass by 15 %, trim by 10 mm, roll at
     rest by 10 deg, ballast by 50 g; water is stratified. Control knows the file only.
     """
+    from glider_bringup.mission.choices import combination_of
     from glider_bringup.mission.run_folder import make_result_folder
     from glider_bringup.studies import montecarlo as study
 
@@ -72,7 +73,11 @@ def montecarlo(
     if out:
         make_result_folder(out, study.RESULT_FILE)
     messages.print(f'{scenario}: {plants} plants, each by {" and by ".join(laws)}')
-    with workers_at_work(workers, scheduler) as pool, counter('flying', len(scenarios)) as update:
+    loops = map(combination_of, scenarios.values())
+    with (
+        workers_at_work(workers, scheduler, loops) as pool,
+        counter('flying', len(scenarios)) as update,
+    ):
         flights, airframes = study.fly_plants(scenarios, pool, update)
     name = next(iter(scenarios.values())).name
     summary = study.summarise(name, seed, flights, airframes)

@@ -96,7 +96,7 @@ def _fly(plan, journal, known, workers, scheduler, again: str) -> None:
         return f'; {flown} of {plan.cells} cells are kept, go on with\n  {again}'
 
     with (
-        workers_at_work(workers, scheduler, advice) as pool,
+        workers_at_work(workers, scheduler, plan.combinations, advice) as pool,
         counter('flying', plan.cells) as update,
     ):
         study.fly_sweep(plan, journal, known, pool, update, _tell_waiting)

@@ -6,6 +6,7 @@ from typing import Any
 
 from glider_bringup.engines.flight import fly as fly_mission
 from glider_bringup.engines.flight import mission_of
+from glider_bringup.mission.choices import Combination
 from glider_bringup.scoring.card import finite
 from glider_bringup.scoring.one_hertz import Record, Recorder
 from glider_bringup.scoring.score import make_scorer, scores_of
@@ -77,6 +78,13 @@ def fly(
         for one in experiments
     ]
     return rows, [[flown[case.key()][1] for case in one.cases] for one in experiments]
+
+
+def combinations(experiments: list[Experiment]) -> set[Combination]:
+    """What `fly` needs loops for."""
+    return {
+        Combination(case.controller, case.guidance) for one in experiments for case in one.cases
+    }
 
 
 def count_flights(experiments: list[Experiment]) -> int:

@@ -21,6 +21,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
+from glider_bringup.mission.choices import Combination
 from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
@@ -271,13 +272,22 @@ class Plan:
             self.source = read_scenario(self._scenario_name())
         except ConfigurationError as error:
             raise ConfigurationError(f'{path}: {error}') from None
-        vehicles = self._check_values()
+        checked = self._check_values()
+        #: laws and methods that cells may have
+        self.combinations = [
+            Combination(law, method)
+            for law in dict.fromkeys(one.control.law for one in checked)
+            for method in dict.fromkeys(one.guidance.los.method for one in checked)
+        ]
+        vehicles: dict[Path, str] = {}  # one of every vehicle file
+        for one in checked:
+            vehicles.setdefault(vehicle_path(one.vehicle), one.vehicle)
         #: texts of the vehicle files
-        self.vehicle_texts = [vehicle_text(vehicle) for vehicle in vehicles]
+        self.vehicle_texts = [vehicle_text(vehicle) for vehicle in vehicles.values()]
         #: name and text of a vehicle of each file as it flies, the first cell's first
         self.vehicles = [
             (vehicle_path(vehicle).stem, vehicle_file(vehicle).decode('utf-8-sig'))
-            for vehicle in vehicles
+            for vehicle in vehicles.values()
         ]
 
     def _scenario_name(self) -> str:
@@ -305,29 +315,28 @@ class Plan:
                         )
             seen.update(dict.fromkeys(fields, place))
 
-    def _check_values(self) -> list[str]:
+    def _check_values(self) -> list[Scenario]:
         """Check every value of every dimension, beside the first of all others.
 
         Returns
         -------
-        list of str
-            A vehicle of every vehicle file, the first cell's first.
+        list of Scenario
+            One for each value of each dimension, the first cell's first.
         """
-        vehicles: dict[Path, str] = {}
+        checked = []
         for number, axis in enumerate(self.axes):
             for i, value in enumerate(axis.values):
                 places = [0] * len(self.axes)
                 places[number] = i
                 try:
-                    vehicle = make_scenario(self.source, self._changes(places)).vehicle
+                    checked.append(make_scenario(self.source, self._changes(places)))
                 except ConfigurationError as error:
                     where = f'{self.path}: dimensions.{axis.name}: {value}'
                     lines = str(error).splitlines()
                     raise ConfigurationError(
                         '\n'.join(f'{where}: {line}' for line in lines)
                     ) from None
-                vehicles.setdefault(vehicle_path(vehicle), vehicle)
-        return list(vehicles.values())
+        return checked
 
     def _changes(self, places: Iterable[int]) -> dict[str, Any]:
         changes = dict(self.common)

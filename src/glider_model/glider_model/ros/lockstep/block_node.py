@@ -3,6 +3,7 @@
 """The node of a block: everything that follows from what the block declares of itself."""
 
 from glider_model.base.block import Block, Telling
+from glider_model.base.kernel import compiling_told
 from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_NS, TICK_S
 from glider_model.base.wiring import at_rest
@@ -37,9 +38,11 @@ class BlockNode(StepNode):
     def compile_kernels(self) -> None:
         """Call every kernel once, so that no tick waits for the compiler."""
         inputs = tuple(at_rest(topic) for topic in self.block.wired.inputs)
-        state, _, _ = self.block.tick(self.state, 0.0, inputs, self.params, TICK_S)
-        if self.block.surface:
-            self.block.surface(state)
+        said = f'compiling the mathematics of {self.block.wired.name} for its settings, once'
+        with compiling_told(lambda: self.get_logger().info(said)):
+            state, _, _ = self.block.tick(self.state, 0.0, inputs, self.params, TICK_S)
+            if self.block.surface:
+                self.block.surface(state)
 
     def surface(self, order: str) -> None:
         """Ask for the surface, for good; ``order`` says on /diagnostics who wanted it."""

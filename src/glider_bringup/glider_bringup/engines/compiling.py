@@ -1,0 +1,46 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The loop of a law with a method that was never flown here is compiled, once; this is told."""
+
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
+from functools import partial
+
+import numpy as np
+
+from glider_bringup.engines.direct import ROW, fly
+from glider_bringup.engines.flight import mission_of
+from glider_bringup.engines.interrupts import interrupts_noted
+from glider_bringup.mission.choices import Combination
+from glider_bringup.mission.scenario import load_scenario
+from glider_model.base.kernel import compiling_told
+from glider_model.base.signals import TICK_S
+
+#: Gets one line for a person.
+Tell = Callable[[str], None]
+
+
+def told(combination: Combination, tell: Tell) -> AbstractContextManager[None]:
+    """Tell what is compiled in the block, if anything is."""
+    law, method = combination
+    line = f'compiling the mathematics for law {law} with method {method}, once: half a minute'
+    return compiling_told(partial(tell, line))
+
+
+def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
+    """Have loops compiled that are not in the cache, before many processes need them at once.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        After the loop that was being compiled.
+    """
+    nothing = np.empty((0, ROW))
+    with interrupts_noted() as interrupts:
+        for one in dict.fromkeys(combinations):
+            changes = {'control.law': one.law, 'guidance.los.method': one.method}
+            state, params = mission_of(load_scenario(changes=changes))
+            with told(one, tell):
+                fly(state, params, nothing, TICK_S)
+            if interrupts:
+                raise KeyboardInterrupt

@@ -1,0 +1,55 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Loops of a law and a method: what they are compiled for, and when studies have it done."""
+
+import numba
+import pytest
+
+from glider_bringup.engines import direct
+from glider_bringup.engines.compiling import told
+from glider_bringup.engines.flight import mission_of
+from glider_bringup.mission.choices import Combination, combination_of
+from glider_bringup.mission.scenario import load_scenario, scenario_names
+from glider_bringup.studies import workers
+
+
+def types_of(scenario):
+    return tuple(numba.typeof(one) for one in mission_of(scenario))
+
+
+def test_loop_depends_on_law_and_method_alone():
+    """Else something is compiled of which nobody is told."""
+    chosen = [('adaptive', 'observer'), ('pid', 'observer'), ('pid', 'paper')]
+    found = set()
+    for law, method in chosen:
+        changes = {'control.law': law, 'guidance.los.method': method}
+        scenarios = [load_scenario(name, changes) for name in scenario_names()]
+        assert {combination_of(one) for one in scenarios} == {(law, method)}
+        (types,) = {types_of(one) for one in scenarios}
+        found.add(types)
+    assert len(found) == len(chosen)
+
+
+def test_line_names_law_and_method():
+    lines = []
+    with told(Combination('pid', 'paper'), lines.append):
+        numba.njit(lambda x: x + 1.0)(1.0)
+    (line,) = lines
+    assert 'law pid with method paper' in line
+
+
+def test_loops_are_there_before_workers_start(monkeypatch):
+    class StartedError(Exception):
+        """Workers would be started now."""
+
+    def start(*_):
+        raise StartedError
+
+    monkeypatch.setattr(workers, '_local_cluster', start)
+    scenario = load_scenario(changes={'control.law': 'pid'})
+    with (
+        pytest.raises(StartedError),
+        workers.worker_pool(1, None, [combination_of(scenario)] * 2),
+    ):
+        pass
+    assert types_of(scenario) in {signature[:2] for signature in direct.fly.signatures}
