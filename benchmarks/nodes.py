@@ -17,15 +17,17 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from glider_bringup.engines.direct import COLUMNS, fly_blocks
+from glider_bringup.blocks import COLUMNS
+from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import Flight, Progress, mission_of
-from glider_bringup.engines.processes import domain_id, node_environment
+from glider_bringup.engines.processes import node_environment
 from glider_bringup.engines.recorded import fly_nodes
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
 from glider_bringup.recording.tick_sorter import TickSorter
 from glider_model.base.signals import TICK_NS
+from glider_model.ros.places import domain_id
 from glider_model.ros.wire.topics import TOPICS
 
 SCENARIO, DURATION_S = 'current_8deg', 2000.0

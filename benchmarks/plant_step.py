@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from glider_bringup.engines.direct import COLUMNS, fly_blocks
+from glider_bringup.blocks import COLUMNS
+from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import Scenario
 from glider_model.base.frames import water_from_wire

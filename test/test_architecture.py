@@ -22,7 +22,22 @@ MAY_IMPORT = {
 }
 
 #: Rooms of glider_model by floors, from below: a room imports from the floors beneath it only.
-FLOORS = (('base',), ('vehicle', 'ocean', 'ros'), ('onboard', 'plant'), ('nodes',))
+FLOORS = {
+    'glider_model': (('base',), ('vehicle', 'ocean', 'ros'), ('onboard', 'plant'), ('nodes',)),
+    'glider_bringup': (
+        ('blocks', 'mission'),
+        ('recording',),
+        ('engines', 'nodes'),
+        ('scoring',),
+        ('studies',),
+        ('console', 'warm_up'),
+        ('showing',),
+        ('door',),
+        ('commands',),
+        ('cli',),
+        ('fuzzing',),
+    ),
+}
 
 #: rosdep keys of modules that are no ROS packages. Each was looked up in rosdep/python.yaml of
 #: ros/rosdistro, where it names an Ubuntu package for noble.
@@ -150,14 +165,19 @@ def circle(found: dict[str, set[str]]) -> list[str]:
 
 
 def climbs(found: dict[str, set[str]]) -> list[str]:
-    """One sentence for each import between rooms of glider_model that goes up or sideways."""
-    floor = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+    """One sentence for each import between rooms of a package that goes up or sideways."""
+    floor = {
+        (package, room): number
+        for package, floors in FLOORS.items()
+        for number, rooms in enumerate(floors)
+        for room in rooms
+    }
     said = []
     for name, imported in sorted(found.items()):
         for other in sorted(imported):
-            one, two = (f'{module}..'.split('.')[:2] for module in (name, other))
-            within = one[0] == two[0] == 'glider_model' and one[1] and one[1] != two[1]
-            if within and floor[two[1]] >= floor[one[1]]:
+            one, two = (tuple(f'{module}..'.split('.')[:2]) for module in (name, other))
+            within = one[0] == two[0] and one[0] in FLOORS and one[1] != two[1]
+            if within and one[1] and two[1] and floor[two] >= floor[one]:
                 said.append(f'{name} must not import {other}: it is no floor below')
     return said
 
@@ -168,8 +188,9 @@ def test_no_import_goes_round_in_a_circle():
 
 def test_rooms_import_from_the_floors_below():
     found = modules(SOURCES)
-    rooms = {name.split('.')[1] for name in found if name.startswith('glider_model.')}
-    assert rooms == {room for floor in FLOORS for room in floor}
+    for package, floors in FLOORS.items():
+        inside = {name.split('.')[1] for name in found if name.startswith(f'{package}.')}
+        assert inside == {room for floor in floors for room in floor}
     assert climbs(found) == []
 
 

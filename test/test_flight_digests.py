@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glider_bringup.engines.direct import COLUMNS, fly_blocks
+from glider_bringup.blocks import COLUMNS
+from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
 from glider_model.base.kernel import kernel

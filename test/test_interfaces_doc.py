@@ -18,7 +18,6 @@ from rclpy.parameter import Parameter
 
 from glider_bringup.cli import MAX_WORD
 from glider_bringup.engines.launch_plan import ARGUMENTS
-from glider_bringup.engines.processes import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.nodes.recorder_node import RecorderNode, RecorderSettings
 from glider_bringup.studies.sweep.plan import MAX_CELLS, MAX_VALUES, Sweep
@@ -41,6 +40,7 @@ from glider_model.plant.plant import PlantSettings
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.clock import ClockSettings
 from glider_model.ros.lockstep.node import TickSettings
+from glider_model.ros.places import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
 from glider_model.ros.wire import qos
 from glider_model.ros.wire.topics import TOPICS
 

@@ -13,7 +13,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 
-from glider_bringup.engines.processes import domain_id, node_environment
+from glider_bringup.engines.processes import node_environment
+from glider_model.ros.places import domain_id
 from glider_model.ros.wire.topics import TOPICS
 
 GLIDER = [sys.executable, '-m', 'glider_bringup.cli']

@@ -20,7 +20,6 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.engines.processes import NAMESPACE, domain_id
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.ros.rosbag2 import BagWriter
 from glider_control import block as control
@@ -40,6 +39,7 @@ from glider_model.base.signals import TICK_S, Joints, Water
 from glider_model.plant.plant import plant_odometry, plant_step
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.orders import ABORT, PARAMETERS_SET
+from glider_model.ros.places import NAMESPACE, domain_id
 from glider_model.ros.wire.codec import to_cdr
 from glider_model.ros.wire.qos import EVENTS
 from glider_model.ros.wire.topics import TOPICS

@@ -28,10 +28,11 @@ from std_srvs.srv import Trigger
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.engines.processes import domain_id, node_commands, node_environment
+from glider_bringup.engines.processes import node_commands, node_environment
 from glider_bringup.mission.scenario import load_scenario
 from glider_model.base.signals import TICK_S
 from glider_model.ros.lockstep import health
+from glider_model.ros.places import domain_id
 from glider_model.ros.wire import qos
 from glider_model.ros.wire.codec import to_cdr
 from glider_model.ros.wire.topics import TOPICS

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 import glider_bringup
-from glider_bringup.blocks import BLOCKS
-from glider_bringup.engines.direct import ROW, fly
+from glider_bringup.blocks import BLOCKS, ROW
+from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.rules import Rules

@@ -18,7 +18,7 @@ from nav_msgs.msg import Path as PathMessage
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from glider_bringup.engines.direct import BLOCK_TICKS, COLUMNS
+from glider_bringup.blocks import BLOCK_TICKS, COLUMNS
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros import recorded_log
 from glider_bringup.recording.ros.recorded_log import SCORED, RecordedLog

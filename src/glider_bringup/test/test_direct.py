@@ -11,15 +11,8 @@ import sys
 import numpy as np
 import pytest
 
-from glider_bringup.engines.direct import (
-    BLOCK_TICKS,
-    COLUMNS,
-    ROW,
-    MissionParams,
-    MissionState,
-    fly,
-    fly_blocks,
-)
+from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
+from glider_bringup.engines.direct import MissionParams, MissionState, fly, fly_blocks
 from glider_bringup.mission.scenario import load_scenario
 from glider_model.base.signals import TICK_S
 

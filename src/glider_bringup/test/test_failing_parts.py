@@ -7,7 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from glider_bringup.engines.direct import COLUMNS, ROW, MissionState, fly
+from glider_bringup.blocks import COLUMNS, ROW
+from glider_bringup.engines.direct import MissionState, fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
 from glider_control.control import control_step

@@ -15,11 +15,11 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from glider_bringup.engines.processes import domain_id
 from glider_control.nodes.control_node import ControlNode
 from glider_control.settings import ControlSettings
 from glider_control.watch import ORDERED
 from glider_model.base.signals import TICK_NS
+from glider_model.ros.places import domain_id
 from glider_model.ros.wire import qos
 from glider_model.ros.wire.codec import to_cdr
 from glider_model.ros.wire.topics import TOPICS

@@ -19,7 +19,8 @@ import numba
 import numpy as np
 import pytest
 
-from glider_bringup.engines.direct import ROW, fly
+from glider_bringup.blocks import ROW
+from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
 from glider_control.allocation import moments

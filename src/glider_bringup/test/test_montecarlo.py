@@ -14,7 +14,8 @@ import time
 import numpy as np
 import pytest
 
-from glider_bringup.engines.direct import COLUMNS, ROW, fly
+from glider_bringup.blocks import COLUMNS, ROW
+from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.run_folder import make_result_folder

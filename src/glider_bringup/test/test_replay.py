@@ -22,13 +22,14 @@ from typer.testing import CliRunner
 
 from glider_bringup.cli import app
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.engines.processes import RECORDER, domain_id, node_commands
+from glider_bringup.engines.processes import RECORDER, node_commands
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.mcap_reader import Bag, BagTopic
 from glider_bringup.recording.ros.recorded_log import RecordedLog
 from glider_bringup.recording.ros.republish import plan_replay, qos_of
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS
+from glider_model.ros.places import domain_id
 from glider_model.ros.wire.topics import TOPICS
 
 DEADLINE_S = 120.0

@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 
 from glider_bringup import cli, console
-from glider_bringup.engines.direct import COLUMNS, fly_blocks
+from glider_bringup.blocks import COLUMNS
+from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import Flight, mission_of
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.run_folder import make_run_folder

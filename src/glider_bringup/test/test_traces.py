@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_bringup.engines.direct import COLUMNS, ROW, fly_blocks
+from glider_bringup.blocks import COLUMNS, ROW
+from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import load_scenario

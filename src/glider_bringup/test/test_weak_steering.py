@@ -5,7 +5,8 @@
 import numpy as np
 import pytest
 
-from glider_bringup.engines.direct import ROW, fly
+from glider_bringup.blocks import ROW
+from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.studies.montecarlo import airframe, judge, make_scenarios, sample_plant

@@ -21,7 +21,6 @@ from glider_bringup.console import (
     progress,
     tell,
 )
-from glider_bringup.engines.processes import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_bringup.mission.choices import ENGINES, chosen_fields, combination_of
 from glider_bringup.mission.disk import DiskError
 from glider_bringup.mission.scenario import (
@@ -34,6 +33,7 @@ from glider_guidance.settings import LosSettings
 from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_S
+from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 
 app = typer.Typer()
 Engine = Literal[ENGINES]

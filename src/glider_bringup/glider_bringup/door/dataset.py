@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
-from glider_bringup.engines.direct import COLUMNS
+from glider_bringup.blocks import COLUMNS
 from glider_bringup.mission.run_folder import VEHICLE_FILE
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import wire_of

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.compiling import told
-from glider_bringup.engines.direct import COLUMNS, ROW
 from glider_bringup.engines.flight import Flight
 from glider_bringup.engines.flight import fly as fly_direct
-from glider_bringup.engines.processes import given_domain
 from glider_bringup.mission.choices import ENGINES, chosen_fields, combination_of
 from glider_bringup.mission.planned import planned_ticks
 from glider_bringup.mission.run_folder import (
@@ -41,6 +40,7 @@ from glider_bringup.scoring.traces import make_tracer
 from glider_model.base.files import parse_yaml
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_S
+from glider_model.ros.places import given_domain
 
 if TYPE_CHECKING:
     import xarray

@@ -8,7 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from glider_bringup.engines.direct import ROW, fly
+from glider_bringup.blocks import ROW
+from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.interrupts import interrupts_noted
 from glider_bringup.mission.choices import Combination

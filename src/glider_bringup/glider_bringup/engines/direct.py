@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_bringup.blocks import BLOCKS
+from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_control.block import control_tick
 from glider_control.control import ControlParams, ControlState
 from glider_guidance.block import guidance_tick
@@ -20,28 +20,10 @@ from glider_model.base.block import put
 from glider_model.base.frames import odometry_from_wire, water_to_wire
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import TICK_S, Joints
-from glider_model.base.wiring import FIELDS, WIRING, publisher
+from glider_model.base.wiring import FIELDS, publisher
 from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
 from glider_model.plant.block import plant_move, plant_outputs
 from glider_model.plant.plant import PlantParams, PlantState, not_finite, state_fault
-
-
-def _columns() -> dict[str, slice | int]:
-    """Columns of a log row: what the topics of one tick carry, as on the wire, then the flags."""
-    columns, start = {}, 0
-    for topic in (topic for wired in WIRING for topic in wired.outputs if FIELDS[topic]):
-        columns[topic] = slice(start, start + len(FIELDS[topic]))
-        start = columns[topic].stop
-    for flag in (flag for block in BLOCKS if block.say for flag in block.flags):
-        columns[flag] = start
-        start += 1
-    return columns
-
-
-COLUMNS = _columns()
-ROW = max(COLUMNS.values(), key=lambda place: place if isinstance(place, int) else 0) + 1
-#: Ticks that are flown before the log is handed on: one hour.
-BLOCK_TICKS = 36000
 
 
 class NotFiniteError(Exception):

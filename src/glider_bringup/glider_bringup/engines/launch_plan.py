@@ -12,14 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.engines.processes import (
-    MODULES,
-    NAMESPACE_ALLOWED,
-    OWN_CLOCK,
-    PLANT,
-    RECORDER,
-    absolute_namespace,
-)
+from glider_bringup.engines.processes import MODULES, OWN_CLOCK, PLANT, RECORDER
 from glider_bringup.mission.run_folder import (
     PARAMETERS_FILE,
     SCENARIO_FILE,
@@ -34,6 +27,7 @@ from glider_bringup.mission.scenario import (
 )
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_S
+from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace
 from glider_model.ros.wire.topics import CURRENT
 
 #: The node that `ros2 launch` starts and `./glider run`, which nobody can watch, does not.

@@ -8,9 +8,10 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from glider_bringup.engines.processes import NAMESPACE, OWN_CLOCK, domain_id
+from glider_bringup.engines.processes import OWN_CLOCK
 from glider_model.base.exits import FATAL
 from glider_model.base.settings import ConfigurationError
+from glider_model.ros.places import NAMESPACE, domain_id
 
 #: The view has this long (s) to leave.
 _LEAVE_S = 3.0

@@ -3,15 +3,12 @@
 """Flies a scenario over ROS 2: one process per node, started, watched and stopped together."""
 
 import ctypes
-import fcntl
 import json
 import os
-import re
 import selectors
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,9 +17,9 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from glider_model.base import wiring
-from glider_model.base.errors import ConfigurationError, shown
 from glider_model.base.exits import FATAL
 from glider_model.base.wiring import WIRING
+from glider_model.ros.places import NAMESPACE, domain_id
 
 PLANT, RECORDER = wiring.PLANT.node, 'recorder_node'
 
@@ -31,20 +28,8 @@ PLANT, RECORDER = wiring.PLANT.node, 'recorder_node'
 MODULES = {wired.node: wired.module for wired in WIRING if wired != wiring.PLANT}
 MODULES |= {RECORDER: 'glider_bringup.nodes.recorder_node', PLANT: wiring.PLANT.module}
 
-#: Where the nodes of a glider live, if nobody says otherwise.
-NAMESPACE = '/glider'
 #: Remapping that brings the clock into the namespace: docs/adr/0013.
 OWN_CLOCK = ('/clock', 'clock')
-#: Characters of a namespace: with it, names of topics and services have at most 255.
-MAX_NAMESPACE = 200
-NAMESPACE_ALLOWED = (
-    f'names of letters, digits and _, with / between them, up to {MAX_NAMESPACE} characters'
-)
-
-_NAMESPACE = re.compile(r'(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?/?')
-_DOMAINS = range(1, 102)
-#: Domains that there are ports for.
-MAX_DOMAIN = 232
 _PR_SET_PDEATHSIG = 1
 _LIBC = ctypes.CDLL(None)
 #: Signals of a stop, and how long (s) a process has after each.
@@ -69,12 +54,6 @@ class RunnerResult(NamedTuple):
     progress: Mapping[str, Any] = {}  #: last word of the recorder
 
 
-def absolute_namespace(text: str) -> str | None:
-    """Namespace as ROS writes it, or None if ``text`` is none."""
-    usable = len(text) <= MAX_NAMESPACE and _NAMESPACE.fullmatch(text)
-    return '/' + text.strip('/') if usable else None
-
-
 def node_commands(
     params_file: Path, namespace: str = NAMESPACE, own_clock: bool = False
 ) -> dict[str, list[str]]:
@@ -97,57 +76,6 @@ def node_environment(domain: int) -> dict[str, str]:
         'RCUTILS_COLORIZED_OUTPUT': '0',
         'PYTHONUNBUFFERED': '1',
     }
-
-
-def given_domain() -> int | None:
-    """ROS domain that $ROS_DOMAIN_ID says; None if it says nothing.
-
-    Raises
-    ------
-    ConfigurationError
-        If it is none.
-    """
-    text = os.environ.get('ROS_DOMAIN_ID')
-    if not text:
-        return None
-    if not (text.isascii() and text.isdigit() and len(text) < 9 and int(text) <= MAX_DOMAIN):
-        raise ConfigurationError(
-            f'ROS_DOMAIN_ID = {shown(text)}: no ROS domain (allowed: 0 to {MAX_DOMAIN})'
-        )
-    return int(text)
-
-
-@contextmanager
-def domain_id() -> Iterator[int]:
-    """ROS domain of a run: $ROS_DOMAIN_ID, or one that no other run on this machine uses.
-
-    Raises
-    ------
-    ConfigurationError
-        If all of them are taken, or $ROS_DOMAIN_ID is none.
-    """
-    given = given_domain()
-    if given is not None:
-        yield given
-        return
-    for offset in range(len(_DOMAINS)):
-        domain = _DOMAINS[(os.getpid() + offset) % len(_DOMAINS)]
-        path = Path(tempfile.gettempdir()) / f'glider-ros-domain-{domain}.lock'
-        try:
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        except OSError:
-            continue
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            os.close(descriptor)
-            continue
-        try:
-            yield domain
-        finally:
-            os.close(descriptor)
-        return
-    raise ConfigurationError('every ROS domain from 1 to 101 is in use by another run')
 
 
 class _Process:

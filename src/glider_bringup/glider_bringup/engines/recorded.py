@@ -7,7 +7,7 @@ from pathlib import Path
 
 from glider_bringup.engines.flight import Flight, Progress, Taker, fly
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.engines.processes import NAMESPACE, node_commands, run_nodes
+from glider_bringup.engines.processes import node_commands, run_nodes
 from glider_bringup.mission.run_folder import (
     LOG_FILE,
     PARAMETERS_FILE,
@@ -22,6 +22,7 @@ from glider_bringup.recording.ros.log_writer import LogWriter
 from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
 from glider_model.base.exits import EXIT_USAGE
 from glider_model.base.settings import ConfigurationError
+from glider_model.ros.places import NAMESPACE
 
 
 def fly_recorded(

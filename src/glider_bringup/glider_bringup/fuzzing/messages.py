@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_bringup.engines.direct import COLUMNS, ROW, MissionParams, MissionState, fly
+from glider_bringup.blocks import COLUMNS, ROW
+from glider_bringup.engines.direct import MissionParams, MissionState, fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import outcome_of, time_limit_after

@@ -6,7 +6,7 @@ from copy import copy
 
 import numpy as np
 
-from glider_bringup.engines.direct import COLUMNS, ROW
+from glider_bringup.blocks import COLUMNS, ROW
 from glider_model.base.frames import poses_from_wire
 from glider_model.base.signals import TICK_S
 

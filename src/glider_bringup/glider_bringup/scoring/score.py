@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from glider_bringup.engines.direct import COLUMNS
+from glider_bringup.blocks import COLUMNS
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import TrueMotion, wire_of

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.engines.direct import COLUMNS
+from glider_bringup.blocks import COLUMNS
 from glider_bringup.mission.disk import whole_file
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import TrueMotion

@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from glider_bringup.engines.direct import COLUMNS
+from glider_bringup.blocks import COLUMNS
 from glider_model.base.frames import odometry_from_wire, odometry_to_wire
 from glider_model.base.kernel import kernel
 from glider_model.plant.sensors import SensorParams, is_noisy, remove_noise

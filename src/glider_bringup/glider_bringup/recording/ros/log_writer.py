@@ -4,8 +4,7 @@
 
 import numpy as np
 
-from glider_bringup.blocks import BLOCKS
-from glider_bringup.engines.direct import COLUMNS
+from glider_bringup.blocks import BLOCKS, COLUMNS
 from glider_bringup.recording.ros.rosbag2 import BagWriter
 from glider_guidance.nodes.guidance_node import path_message
 from glider_model.base.block import Telling

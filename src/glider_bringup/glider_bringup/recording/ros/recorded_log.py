@@ -10,7 +10,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
-from glider_bringup.engines.direct import BLOCK_TICKS, COLUMNS, ROW
+from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.recording.mcap_reader import Bag, Batch
 from glider_guidance.yo.stage import STAGE_NAMES
 from glider_model.base.signals import TICK_NS

@@ -15,7 +15,6 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from glider_bringup.engines.processes import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_bringup.recording.mcap_reader import Bag, BagTopic
 from glider_bringup.recording.ros.recorded_run import choose_namespace
 from glider_model.base.files import parse_yaml
@@ -23,6 +22,7 @@ from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS
 from glider_model.ros.lockstep.clock import MAX_TICKS_AHEAD
 from glider_model.ros.lockstep.executor import take
+from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_model.ros.wire import topics
 from glider_model.ros.wire.topics import TOPICS
 
