@@ -21,7 +21,7 @@ MAY_IMPORT = {
     'glider_bringup': {'glider_model', 'glider_guidance', 'glider_control'},
 }
 
-#: Rooms of glider_model by floors, from below: a room imports from the floors beneath it only.
+#: Rooms of two packages by floors, from below: a room imports from the floors beneath it only.
 FLOORS = {
     'glider_model': (('base',), ('vehicle', 'ocean', 'ros'), ('onboard', 'plant'), ('nodes',)),
     'glider_bringup': (
