@@ -79,7 +79,9 @@ def fly(tmp_path, monkeypatch):
     """Start nodes of a run, by name; all of them are gone at the end."""
     scenario = load_scenario('survey', {'dives': 0, 'duration_s': TICKS / 10, 'settle_s': 0.0})
     folder = make_run_folder(scenario, tmp_path / 'flight')
-    write_parameters(node_parameters(scenario), tmp_path / 'parameters.yaml')
+    # who has no flow control needs time: at full speed beside other work, messages get lost
+    parameters = node_parameters(scenario, speed=20.0)
+    write_parameters(parameters, tmp_path / 'parameters.yaml')
     commands = node_commands(tmp_path / 'parameters.yaml')
     processes = []
 
