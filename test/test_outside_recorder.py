@@ -36,10 +36,12 @@ class OutsideRecorder:
         self.executor = SingleThreadedExecutor(context=context)
         self.executor.add_node(self.node)
         self.taken: list[tuple[str, int, bytes]] = []
-        for topic in RECORDED:
+        self.subscriptions = [
             self.node.create_subscription(
                 topic.message_type, topic.name, self._keep(topic.name), topic.qos, raw=True
             )
+            for topic in RECORDED
+        ]
 
     def _keep(self, name: str):
         return lambda raw: self.taken.append((name, time.time_ns(), raw))
@@ -111,10 +113,13 @@ def test_paused_at_its_start_a_run_is_recorded_whole_and_scored(fly):
     recorder.call(pause, SetBool.Request(data=True), processes)
     others = [name for name in node_commands(folder) if name not in (PLANT, RECORDER)]
     processes = start(*others)
-    topics = [topic.name for topic in RECORDED]
     recorder.wait_for(
-        lambda: all(recorder.node.count_publishers(name) for name in topics), processes, 'nodes'
+        lambda: all(one.get_publisher_count() for one in recorder.subscriptions),
+        processes,
+        'nodes',
     )
+    begun = time.monotonic()  # the publishers have to match, too, and nobody here hears of it
+    recorder.wait_for(lambda: time.monotonic() > begun + 1.0, processes, 'time')
     recorder.call(pause, SetBool.Request(data=False), processes)
 
     def is_whole() -> bool:
