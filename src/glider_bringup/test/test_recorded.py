@@ -150,12 +150,12 @@ def test_free_running_recording_is_no_scorecard_of_nothing(tmp_path):
             use(folder)
 
 
-def test_stored_scenario_that_cannot_be_used_is_named(tmp_path):
+def test_attached_scenario_that_cannot_be_used_is_named(tmp_path):
     (tmp_path / 'scenario.yaml').write_text('profile: {depth_m: 1.0}\n')
     bag = BagWriter(tmp_path / 'flight', 'x', attachments=[tmp_path / 'scenario.yaml'])
     bag.close()
     for use in USES:
-        with pytest.raises(ConfigurationError, match=r'flight: stored/scenario\.yaml.*depth_m'):
+        with pytest.raises(ConfigurationError, match=r'flight: attached scenario\.yaml.*depth_m'):
             use(tmp_path / 'flight')
 
 

@@ -276,7 +276,7 @@ def open_run(path: str | Path) -> Run:
     card = read_run(path, traced=False).card
     with ExitStack() as stack:
         attachments = Bag(path).attachments if has_bag(path) else {}
-        scenario, _ = stack.enter_context(scenario_of(path, attachments))
+        scenario = stack.enter_context(scenario_of(path, attachments)).scenario
         run = Run(scenario, card, path, partial(_rows_of, path))
         # what an MCAP file brings is there as long as the run is
         weakref.finalize(run, stack.pop_all().close)

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.scenario import Scenario, load_scenario
@@ -66,32 +67,66 @@ def make_result_folder(folder: Path, result: str) -> None:
         )
 
 
-@contextmanager
-def scenario_of(run: Path, attachments: Mapping[str, bytes]) -> Iterator[tuple[Scenario, str]]:
-    """Scenario of a run, and the text of its file.
+class FlownScenario(NamedTuple):
+    """Scenario of a run."""
 
-    It is the file in the run folder or, if there is none, the one attached to its bag. What it
-    names stays readable as long as the context is open.
+    scenario: Scenario
+    text: str  #: of its file
+    source: str  #: where it stands
+
+
+def find_scenario(
+    run: Path, folder: Path, attachments: Mapping[str, bytes], scratch: Path
+) -> FlownScenario | None:
+    """Scenario of a run: the file in a folder or else the one attached to its bag; or none.
+
+    Parameters
+    ----------
+    run : Path
+        As the person called it.
+    folder : Path
+        Where a file counts.
+    attachments : mapping
+        Of the bag.
+    scratch : Path
+        Folder for attached files. It has to stay as long as the scenario is used.
 
     Raises
     ------
     ConfigurationError
-        If there is neither, or it is not valid.
+        If it is not valid.
     """
-    file = run / SCENARIO_FILE
+    file = folder / SCENARIO_FILE
     if file.is_file():
-        yield load_scenario(str(file), recorded=True), file.read_text(encoding='utf-8')
-        return
+        scenario = load_scenario(str(file), recorded=True)
+        return FlownScenario(scenario, file.read_text(encoding='utf-8'), str(file))
     if SCENARIO_FILE not in attachments:
-        raise ConfigurationError(
-            f'{run}: no {SCENARIO_FILE} beside the bag, and none stored in it: put the one that '
-            f'was flown beside it'
-        )
-    with TemporaryDirectory() as folder:
-        for name in {SCENARIO_FILE, VEHICLE_FILE} & set(attachments):
-            (Path(folder) / name).write_bytes(attachments[name])
-        try:
-            scenario = load_scenario(str(Path(folder) / SCENARIO_FILE), recorded=True)
-        except ConfigurationError as error:
-            raise ConfigurationError(str(error).replace(folder, f'{run}: stored')) from None
-        yield scenario, attachments[SCENARIO_FILE].decode()
+        return None
+    for name in {SCENARIO_FILE, VEHICLE_FILE} & set(attachments):
+        (scratch / name).write_bytes(attachments[name])
+    try:
+        scenario = load_scenario(str(scratch / SCENARIO_FILE), recorded=True)
+    except ConfigurationError as error:
+        text = str(error).replace(f'{scratch}/', f'{run}: attached ')
+        raise ConfigurationError(text) from None
+    text = attachments[SCENARIO_FILE].decode()
+    return FlownScenario(scenario, text, f'{SCENARIO_FILE} attached to {run}')
+
+
+@contextmanager
+def scenario_of(run: Path, attachments: Mapping[str, bytes]) -> Iterator[FlownScenario]:
+    """Scenario of a run, see `find_scenario`: it can be used as long as the context is open.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is none, or it is not valid.
+    """
+    with TemporaryDirectory() as scratch:
+        found = find_scenario(run, run, attachments, Path(scratch))
+        if found is None:
+            raise ConfigurationError(
+                f'{run}: no {SCENARIO_FILE} beside the bag, and none attached to it: put the one '
+                f'that was flown beside it'
+            )
+        yield found

@@ -45,8 +45,8 @@ def score_again(run: Path, progress: Reading = lambda ticks, total: None) -> dic
     if not has_bag(run):
         return old
     bag = Bag(run)
-    with scenario_of(run, bag.attachments) as (scenario, _):
-        return score_bag(run, bag, scenario, old, progress)
+    with scenario_of(run, bag.attachments) as flown:
+        return score_bag(run, bag, flown.scenario, old, progress)
 
 
 def score_bag(

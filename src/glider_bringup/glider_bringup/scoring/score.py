@@ -139,18 +139,18 @@ class Scorer:
             'distance_along_path_m': _length(series(_TARGET_N), series(_TARGET_E)),
             'end_of_path_m': self._end_of_path_m(rules.path_end),
             'cross_track_m': {
-                'rms_steady': _rms(e2[steady]),
-                'max_steady': _largest(e2[steady]),
-                'max_all': _largest(e2[scored]),
-                'max_run': _largest(e2),
+                'rms_steady': rms(e2[steady]),
+                'max_steady': largest(e2[steady]),
+                'max_all': largest(e2[scored]),
+                'max_run': largest(e2),
             },
             'pitch_error_deg': {
-                'rms_steady': _rms(pitch_error[steady]),
-                'max_steady': _largest(pitch_error[steady]),
+                'rms_steady': rms(pitch_error[steady]),
+                'max_steady': largest(pitch_error[steady]),
             },
             'heading_fluctuation_deg': {
-                'rms_steady': _rms(heading[whole]),
-                'max_steady': _largest(heading[whole]),
+                'rms_steady': rms(heading[whole]),
+                'max_steady': largest(heading[whole]),
             },
             'depth_m': {
                 'max': deepest,
@@ -299,11 +299,13 @@ def _travel(position: np.ndarray) -> float:
     return float(np.sum(np.abs(np.diff(position))))
 
 
-def _rms(values: np.ndarray) -> float | None:
+def rms(values: np.ndarray) -> float | None:
+    """Root of the mean square; None of nothing."""
     return float(math.sqrt(np.mean(values * values))) if len(values) else None
 
 
-def _largest(values: np.ndarray) -> float | None:
+def largest(values: np.ndarray) -> float | None:
+    """Largest magnitude; None of nothing."""
     return float(np.max(np.abs(values))) if len(values) else None
 
 

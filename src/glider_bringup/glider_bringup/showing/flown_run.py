@@ -40,7 +40,8 @@ def read_run(
     """
     card, kept = read_score(run), run / TRACES_FILE
     bag = Bag(run) if has_bag(run) else None
-    with scenario_of(run, bag.attachments if bag else {}) as (scenario, as_flown):
+    with scenario_of(run, bag.attachments if bag else {}) as found:
+        scenario = found.scenario
         is_kept = card and (not traced or kept.is_file())
         if is_kept and (bag is None or _covers(bag, card)):
             traces = load_traces(kept) if traced else None
@@ -53,7 +54,7 @@ def read_run(
             tracer = make_tracer(scenario) if traced else None
             card = score_bag(run, bag, scenario, card, progress, [tracer] if tracer else [])
             traces = tracer.result() if tracer else None
-        return flown_run(run, scenario, as_flown, card, traces)
+        return flown_run(run, scenario, found.text, card, traces)
 
 
 def _covers(bag: Bag, card: dict) -> bool:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from glider_bringup.blocks import BLOCKS
-from glider_bringup.mission.run_folder import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE
+from glider_bringup.mission.run_folder import PARAMETERS_FILE, SCENARIO_FILE, find_scenario
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.recording.mcap_reader import Bag
 from glider_model.base.files import read_yaml
@@ -49,23 +49,13 @@ def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
         if _is_parameters(values):
             return Told(_from_parameters(values, str(file)), str(file), _lockstep(values))
         return Told(_from_scenario(load_scenario(str(file), recorded=True)), str(file), lockstep)
-    attached = bag.attachments.get(SCENARIO_FILE)
-    beside = folder / SCENARIO_FILE
-    if beside.is_file():
-        differs = attached is not None and attached != beside.read_bytes()
+    found = find_scenario(bag.files[0], folder, bag.attachments, scratch)
+    if found is not None:
+        beside, attached = folder / SCENARIO_FILE, bag.attachments.get(SCENARIO_FILE)
+        both = attached is not None and beside.is_file()
+        differs = both and attached != beside.read_bytes()
         note = f'{beside} is not the scenario that is attached to the bag' if differs else ''
-        return Told(
-            _from_scenario(load_scenario(str(beside), recorded=True)), str(beside), lockstep, note
-        )
-    if attached is not None:
-        for name in (SCENARIO_FILE, VEHICLE_FILE):
-            (scratch / name).write_bytes(bag.attachments.get(name, b''))
-        try:
-            blocks = _from_scenario(load_scenario(str(scratch / SCENARIO_FILE), recorded=True))
-        except ConfigurationError as error:
-            text = str(error).replace(f'{scratch}/', f'{bag.files[0]}: attached ')
-            raise ConfigurationError(text) from None
-        return Told(blocks, f'{SCENARIO_FILE} attached to {bag.files[0]}', lockstep)
+        return Told(_from_scenario(found.scenario), found.source, lockstep, note)
     if parameters.is_file():
         values = read_yaml(parameters)
         return Told(_from_parameters(values, str(parameters)), str(parameters), lockstep)

@@ -10,7 +10,7 @@ import numpy as np
 
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.one_hertz import Record
-from glider_bringup.scoring.score import windows
+from glider_bringup.scoring.score import largest, rms, windows
 from glider_guidance.los import crab_heading
 from glider_model.onboard.glide_polar import make_polar, steady_horizontal_speed
 from glider_model.vehicle.file import load_vehicle
@@ -19,14 +19,6 @@ from glider_model.vehicle.file import load_vehicle
 _SAMPLE_S = 1.0
 #: A leg of a survey is looked at this long after its corner (s).
 CORNER_S = 600.0
-
-
-def _rms(values: np.ndarray) -> float | None:
-    return float(np.sqrt(np.mean(values * values))) if len(values) else None
-
-
-def _largest(values: np.ndarray) -> float | None:
-    return float(np.max(np.abs(values))) if len(values) else None
 
 
 def _mean(values: np.ndarray) -> float | None:
@@ -50,10 +42,10 @@ def measure_attitude(record: Record, scenario: Scenario) -> dict[str, Any]:
     down, up = steady & record.descending, steady & ~record.descending
     pitch_mass = 1e3 * record.joints[:, 1]
     return {
-        'heading_error_deg': {'rms_steady': _rms(error), 'max_steady': _largest(error)},
+        'heading_error_deg': {'rms_steady': rms(error), 'max_steady': largest(error)},
         'roll_deg': {
-            'rms_steady': _rms(record.roll[steady]),
-            'max_steady': _largest(record.roll[steady]),
+            'rms_steady': rms(record.roll[steady]),
+            'max_steady': largest(record.roll[steady]),
         },
         'trim': {
             'pitch_dive_deg': _mean(record.pitch[down]),
@@ -70,10 +62,10 @@ def measure_path(record: Record, scenario: Scenario) -> dict[str, Any]:
     across, below = record.cross_track[scored], record.vertical_error[scored]
     return {
         'path_error_m': {
-            'e2_rms': _rms(across),
-            'e3_rms': _rms(below),
-            'e2_max': _largest(across),
-            'e3_max': _largest(below),
+            'e2_rms': rms(across),
+            'e3_rms': rms(below),
+            'e2_max': largest(across),
+            'e3_max': largest(below),
         }
     }
 

@@ -28,7 +28,7 @@ from glider_model.ros.lockstep.process import Stop
 from glider_model.ros.lockstep.watch import FAREWELL_S, REPORT_AFTER, Watch, wait_of
 from glider_model.ros.parameters import declare_settings
 from glider_model.ros.wire import qos, topics
-from glider_model.ros.wire.codec import MessageError, NotFiniteError, to_cdr
+from glider_model.ros.wire.codec import MessageError, NotFiniteFieldError, to_cdr
 from glider_model.ros.wire.topics import TOPICS, Topic
 
 _STARTUP_PERIOD_S = 0.03
@@ -256,7 +256,7 @@ class TickNode(Node):
             return
         try:
             item.accept(raw)
-        except NotFiniteError as error:
+        except NotFiniteFieldError as error:
             tick = max(0, self._due_ns or 0) // TICK_NS
             raise Stop(EXIT_PEER, not_finite(f'{error}: that', tick)) from None
         except MessageError as error:

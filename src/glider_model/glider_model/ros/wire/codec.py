@@ -42,7 +42,7 @@ class MessageError(ValueError):
     """A message that cannot be used: it is none, or of another frame, or a field is missing."""
 
 
-class NotFiniteError(MessageError):
+class NotFiniteFieldError(MessageError):
     """A message with a number that is NaN or infinite."""
 
 
@@ -220,7 +220,7 @@ class Codec:
         MessageError
             If it is no message of this type, a joint is missing, or, where frames are checked, it
             names others than the template.
-        NotFiniteError
+        NotFiniteFieldError
             If a number is NaN or infinite.
         """
         if len(raw) != self.size:
@@ -313,7 +313,7 @@ class Codec:
             return
         for path, value in zip(self.fields, values, strict=True):
             if not math.isfinite(value):
-                raise NotFiniteError(f'{path} is {value}')
+                raise NotFiniteFieldError(f'{path} is {value}')
 
 
 def _find(raw: bytes, pattern: bytes, path: str) -> int:
