@@ -21,6 +21,7 @@ import yaml
 from scipy.io import netcdf_file
 
 from glider_bringup import cli
+from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.studies import workers as pool
 from glider_bringup.studies.sweep import plan as sweep_file
 from glider_bringup.studies.sweep.fly import (
@@ -436,7 +437,7 @@ def test_largest_sweep_is_planned_as_it_is_flown(tmp_path, monkeypatch):
         'b': {**values, 'field': 'initial.east_m', 'stop': 999},
     }
     path.write_text(yaml.safe_dump({'dimensions': dimensions}))
-    monkeypatch.setattr(sweep_file.Plan, '_check_values', lambda plan: ['zhang2021'])
+    monkeypatch.setattr(sweep_file.Plan, '_check_values', lambda plan: [load_scenario()])
     plan = load_sweep(str(path))
     assert plan.cells == sweep_file.MAX_CELLS
     chunks = make_chunks(plan, bytearray(plan.cells), 2)

@@ -164,10 +164,10 @@ class StraightPath(_PathSettings):
         return math.radians(self.course_deg)
 
 
-class WaypointPath(_PathSettings):
-    """Straight legs from waypoint to waypoint."""
+class _ThroughWaypoints(_PathSettings):
+    """What paths through waypoints have in common."""
 
-    kind: Literal['waypoints']
+    kind: str
     waypoints: list[tuple[float, ...]] = Field(
         min_length=2,
         max_length=10_000,
@@ -183,34 +183,25 @@ class WaypointPath(_PathSettings):
     def _check_slopes(self):
         _check_slopes(self.params())
         return self
+
+
+class WaypointPath(_ThroughWaypoints):
+    """Straight legs from waypoint to waypoint."""
+
+    kind: Literal['waypoints']
 
     def params(self) -> PathParams:
         """Numbers that the kernels of `glider_guidance.path.curve` read."""
         return _polyline_params(np.array(self.waypoints))
 
 
-class SplinePath(_PathSettings):
+class SplinePath(_ThroughWaypoints):
     """A smooth curve through waypoints: natural cubic spline over the length of its chords.
 
     Curvature is continuous, also into the straight continuation beyond both ends.
     """
 
     kind: Literal['spline']
-    waypoints: list[tuple[float, ...]] = Field(
-        min_length=2,
-        max_length=10_000,
-        description='Waypoints [north, east] or [north, east, depth] (m).',
-    )
-
-    @pydantic.field_validator('waypoints')
-    @classmethod
-    def _check_waypoints(cls, waypoints: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-        return _check_waypoints(waypoints)
-
-    @pydantic.model_validator(mode='after')
-    def _check_slopes(self):
-        _check_slopes(self.params())
-        return self
 
     def params(self) -> PathParams:
         """Numbers that the kernels of `glider_guidance.path.curve` read."""

@@ -3,13 +3,14 @@
 """One block at work on recorded inputs, and what has been found so far."""
 
 from collections import Counter
+from collections.abc import Callable
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Path
 
 from glider_bringup.recording.recorded_inputs import RecordedBlock
-from glider_bringup.recording.ros.recorded_run import Event, Recording
+from glider_bringup.recording.ros.recorded_run import Event, Recording, Series
 from glider_bringup.recording.ros.verify.messages import field_difference, message_difference
 from glider_bringup.recording.ros.verify.ticks import TICKS_OF_THE_END, Track
 from glider_bringup.recording.ros.verify.verdict import (
@@ -35,6 +36,17 @@ from glider_model.ros.wire.codec import to_cdr
 _BYTES_ALIKE = 16
 
 
+Tracks = dict[str, Track]
+#: The track of a topic, and the messages that have no place in it.
+Place = Callable[[Series], tuple[Track, list[int]]]
+#: Whether a message without a place is right nonetheless, by name of its topic and its numbers.
+IsRight = Callable[[str, np.ndarray], bool]
+
+
+def _is_never_right(name: str, values: np.ndarray) -> bool:
+    return False
+
+
 class Check:
     """One block at work, and what has been found so far."""
 
@@ -52,6 +64,32 @@ class Check:
         """Keep a difference."""
         self.differing[difference.topic] += 1
         self.found.append(difference)
+
+    def tracks(self, place: Place, why: str, is_right: IsRight = _is_never_right) -> Tracks:
+        """Tracks of the outputs that are recorded.
+
+        Parameters
+        ----------
+        place : callable
+            Gives the track of a topic, and the messages that have no place in it.
+        why : str
+            What is wrong with those, in words.
+        is_right : callable
+            Whether nothing is, by name of the topic and numbers of the message.
+        """
+        tracks = {}
+        for name in self.block.block.wired.outputs:
+            series = self.recording.series.get(name)
+            if series is None:
+                self.notes.append(f'{name} is not recorded')
+                continue
+            tracks[name], left = place(series)
+            for i in left:
+                if not is_right(name, series.values[i]):
+                    text = f'message {i} of the topic, {why}'
+                    stamp_ns = int(series.stamps_ns[i])
+                    self.add(Difference(stamp_ns, name, WHOLE, text, 'not computed'))
+        return tracks
 
     # .................................................................. steps
 

@@ -55,17 +55,11 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
         if marker == 'command':
             stamps_ns = stamps_ns[~np.all(series[marker].values == safe, axis=1)]
     check = Check(block, recording, stamps_ns)
-    outputs = {}
-    for name in wired.outputs:
-        if name not in series:
-            check.notes.append(f'{name} is not recorded')
-            continue
-        outputs[name], left = _by_stamp(series[name], stamps_ns)
-        for i in left:
-            if name != 'command' or not np.array_equal(series[name].values[i], safe):
-                text = f'message {i} of the topic, which belongs to no step'
-                stamp_ns = int(series[name].stamps_ns[i])
-                check.add(Difference(stamp_ns, name, WHOLE, text, 'not computed'))
+    outputs = check.tracks(
+        lambda one: _by_stamp(one, stamps_ns),
+        'which belongs to no step',
+        lambda name, values: name == 'command' and np.array_equal(values, safe),
+    )
     start, cuts = 0, check.cuts(len(stamps_ns))
     first = {name: _newest(series[name], stamps_ns[0]) for name in wired.inputs}
     options = _options({name: [n, n - 1, n - 2, n - 3] for name, n in first.items()})

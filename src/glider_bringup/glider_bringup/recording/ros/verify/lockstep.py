@@ -46,16 +46,7 @@ def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict
     count = min(track.gap for track in inputs.values())
     if block.block is PLANT:  # publishes a tick before it needs the inputs of that tick
         count = min(count + 1, ticks)
-    outputs = {}
-    for name in wired.outputs:
-        if name not in series:
-            check.notes.append(f'{name} is not recorded')
-            continue
-        outputs[name], strays = by_tick(series[name], ticks)
-        for i in strays:
-            stamp_ns = int(series[name].stamps_ns[i])
-            text = f'message {i} of the topic, out of place or there twice'
-            check.add(Difference(stamp_ns, name, WHOLE, text, 'not computed'))
+    outputs = check.tracks(lambda one: by_tick(one, ticks), 'out of place or there twice')
     edges = {0, count, *range(0, count, _TICKS_AT_ONCE), *check.cuts(count)}
     for start, end in itertools.pairwise(sorted(edges)):
         check.follow_orders(start)
