@@ -200,7 +200,7 @@ def _fly(
     takers = [scorer, tracer] if tracer else [scorer]
     with (
         progress(planned_ticks(scenario)) as (flying, reading),
-        told(combination_of(scenario), tell),
+        told(combination_of(scenario), tell) if engine == 'direct' else nullcontext(),
     ):
         if engine == 'nodes':
             if begin_view:

@@ -215,7 +215,7 @@ def fly(
     with (
         _run_folder(flown, out, engine) as folder,
         bar(planned_ticks(flown)) if progress else nullcontext((None, None)) as shown,
-        told(combination_of(flown), tell),
+        told(combination_of(flown), tell) if engine == 'direct' else nullcontext(),
     ):
         flight = _fly(flown, takers, engine, folder, bag, *shown)
         card = scorecard(flown, engine, flight, scores_of(flown, scorer))
