@@ -24,7 +24,9 @@ Tell = Callable[[str], None]
 def told(combination: Combination, tell: Tell) -> AbstractContextManager[None]:
     """Tell what is compiled in the block, if anything is."""
     law, method = combination
-    line = f'compiling the mathematics for law {law} with method {method}, once: half a minute'
+    line = (
+        f'compiling the mathematics for law {law} with method {method}, once; up to half a minute'
+    )
     return compiling_told(partial(tell, line))
 
 
