@@ -29,13 +29,14 @@ from glider_guidance.settings import GuidanceSettings
 from glider_guidance.yo.stage import STAGE_NAMES
 from glider_model.base import files
 from glider_model.base.errors import MAX_LINE, MAX_LINES, MAX_SHOWN
+from glider_model.base.plugins import registered
 from glider_model.base.settings import Settings
 from glider_model.base.wiring import JOINTS
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
 from glider_model.nodes.tf_node import TfSettings
 from glider_model.ocean.current_profile import MAX_ROWS
-from glider_model.ocean.current_settings import CurrentComponent, CurrentSettings
+from glider_model.ocean.current_settings import CurrentComponent, CurrentField, CurrentSettings
 from glider_model.plant.plant import PlantSettings
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.clock import ClockSettings
@@ -70,6 +71,16 @@ def table(header: tuple[str, ...], rows) -> str:
     return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
 
 
+#: What packages of others have registered; the document is about what everybody has.
+STRANGERS = {point.name for point in registered()}
+
+
+def of_everybody(text: str) -> str:
+    """A list of names, and what each is, without those of others."""
+    parts = text.split('; ')
+    return '; '.join(part for part in parts if part.partition(':')[0] not in STRANGERS)
+
+
 def is_model(kind) -> bool:
     return isinstance(kind, type) and issubclass(kind, pydantic.BaseModel)
 
@@ -94,7 +105,7 @@ def kind_of(field) -> str:
 def allowed(field) -> str:
     """Range of a field, or the words that it can be."""
     if get_origin(field.annotation) is Literal:
-        return ', '.join(map(str, get_args(field.annotation)))
+        return ', '.join(str(w) for w in get_args(field.annotation) if w not in STRANGERS)
     limits = [
         f'{sign} {getattr(item, name)}'
         for item in field.metadata
@@ -119,14 +130,14 @@ def is_tunable(field) -> bool:
 
 def parameter_rows(model: type[Settings], only=None):
     for name, field, value in leaves(model, model()):
-        if only is None or name in only:
+        if name.partition('.')[0] not in STRANGERS and (only is None or name in only):
             yield (
                 f'`{name}`',
                 kind_of(field),
                 default_of(field, value),
                 allowed(field),
                 'tunable' if is_tunable(field) else '',
-                field.description or '',
+                of_everybody(field.description or ''),
             )
 
 
@@ -135,6 +146,8 @@ def member_rows(union):
     members = get_args(union)[0] if get_origin(union) is Annotated else union
     for model in get_args(members):
         (kind,) = get_args(model.model_fields['kind'].annotation)
+        if kind in STRANGERS:
+            continue
         for name, field, value in leaves(model, None):
             if name != 'kind':
                 default = default_of(field, value)
@@ -211,6 +224,7 @@ def tables() -> dict[str, str]:
         'clock': table(parameters, parameter_rows(ClockSettings, CLOCK_FIELDS)),
         'paths': table(fields, member_rows(PathSettings)),
         'currents': table(fields, member_rows(CurrentComponent)),
+        'current fields': table(fields, member_rows(CurrentField)),
         'tf_node': table(parameters, parameter_rows(TfSettings)),
         'limits': table(('what', 'allowed'), limit_rows()),
         'launch': table(

@@ -73,7 +73,14 @@ LAWS = plugins.classes(plugins.CONTROL_LAWS, LawSettings, laws, TAKEN)
 _LawChoice = pydantic.create_model(
     '_LawChoice',
     __base__=Settings,
-    law=(Literal[tuple(LAWS)], Field('adaptive', description='attitude law')),
+    law=(
+        Literal[tuple(LAWS)],
+        Field(
+            'adaptive',
+            description='attitude law',
+            json_schema_extra={'others': plugins.others(plugins.CONTROL_LAWS)},
+        ),
+    ),
     **{
         name: (settings, Field(settings(), description=plugins.summary(settings)))
         for name, settings in LAWS.items()
@@ -89,10 +96,24 @@ class ControlLawSettings(_LawChoice):
     filters: FilterSettings = Field(FilterSettings(), description='filters and dead bands')
     gate: GateSettings = Field(GateSettings(), description='odometry that is refused')
 
+    @pydantic.model_validator(mode='before')
+    @classmethod
+    def _tell_the_law_alone(cls, values):
+        """Leave out the gains of a law that is not there: to tell that it is not is enough."""
+        law = values.get('law') if isinstance(values, dict) else None
+        if not isinstance(law, str) or law in cls.model_fields:
+            return values
+        return {name: value for name, value in values.items() if name != law}
+
     @property
     def chosen(self) -> LawSettings:
         """Gains of the law that was chosen."""
         return getattr(self, self.law)
+
+    @property
+    def idle(self) -> set[str]:
+        """Laws of other packages that do not fly: not everybody has their sections."""
+        return plugins.of_others(LAWS, laws) - {self.law}
 
 
 class ControlSettings(ControlLawSettings):

@@ -36,9 +36,8 @@ _MethodChoice = pydantic.create_model(
         Literal[tuple(METHODS)],
         Field(
             'observer',
-            description='; '.join(
-                f'{name}: {plugins.summary(settings)}' for name, settings in METHODS.items()
-            ),
+            description=plugins.listed(METHODS),
+            json_schema_extra={'others': plugins.others(plugins.GUIDANCE_METHODS)},
         ),
     ),
 )
@@ -115,11 +114,26 @@ class GuidanceLawSettings(_MethodGains):
     )
     gate: GateSettings = Field(GateSettings(), description='odometry that is refused')
 
+    @pydantic.model_validator(mode='before')
+    @classmethod
+    def _tell_the_method_alone(cls, values):
+        """Leave out the gains of a method that is not there: to tell that it is not is enough."""
+        los = values.get('los') if isinstance(values, dict) else None
+        method = los.get('method') if isinstance(los, dict) else None
+        if not isinstance(method, str) or method in cls.model_fields:
+            return values
+        return {name: value for name, value in values.items() if name != method}
+
     @property
     def chosen(self) -> MethodSettings:
         """Gains of the method that was chosen."""
         method = METHODS[self.los.method]
         return getattr(self, self.los.method) if method.model_fields else method()
+
+    @property
+    def idle(self) -> set[str]:
+        """Methods of other packages that do not fly: not everybody has their sections."""
+        return plugins.of_others(METHODS, methods) - {self.los.method}
 
 
 class GuidanceSettings(GuidanceLawSettings):

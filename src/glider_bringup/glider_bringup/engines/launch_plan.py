@@ -25,6 +25,8 @@ from glider_bringup.mission.scenario import (
     load_scenario,
     scenario_names,
 )
+from glider_control.settings import LAWS
+from glider_guidance.settings import METHODS
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_S
 from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace
@@ -51,8 +53,8 @@ ARGUMENTS = (
         DEFAULT_SCENARIO,
         f'Scenario: {", ".join(scenario_names())}; or path of a YAML file.',
     ),
-    Argument('controller', '', "Attitude law; empty: the scenario's.", ('', 'adaptive', 'pid')),
-    Argument('guidance', '', "Line of sight; empty: the scenario's.", ('', 'observer', 'paper')),
+    Argument('controller', '', "Attitude law; empty: the scenario's.", ('', *LAWS)),
+    Argument('guidance', '', "Line of sight; empty: the scenario's.", ('', *METHODS)),
     Argument(
         'duration',
         '',

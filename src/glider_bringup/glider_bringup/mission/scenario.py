@@ -187,8 +187,13 @@ class Scenario(Settings):
         return profile.depth / profile.glide_rate
 
     def to_yaml(self) -> str:
-        """The scenario as a file that loads to the same scenario."""
-        values = self.model_dump(mode='json', exclude_none=True, exclude={'current': {'seed'}})
+        """The scenario as a file that flies the same, also where nobody has what does not fly."""
+        left_out = {
+            'current': {'seed'},
+            'guidance': self.guidance.idle,
+            'control': self.control.idle,
+        }
+        values = self.model_dump(mode='json', exclude_none=True, exclude=left_out)
         return yaml_text(values)
 
 

@@ -12,17 +12,20 @@ import importlib
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import TypeVar
 
+import pydantic
+
 from glider_model.base.errors import ConfigurationError
 
 CONTROL_LAWS, GUIDANCE_METHODS = 'glider.control_laws', 'glider.guidance_methods'
-GROUPS = (CONTROL_LAWS, GUIDANCE_METHODS)
+CURRENTS = 'glider.currents'
+GROUPS = (CONTROL_LAWS, CURRENTS, GUIDANCE_METHODS)
 
 ClassT = TypeVar('ClassT', bound=type)
 
@@ -54,11 +57,17 @@ def sources() -> Iterator[Path]:
             yield Path(spec.origin)
 
 
-def classes(group: str, base: ClassT, package: ModuleType, taken: set[str]) -> dict[str, ClassT]:
+def classes(
+    group: str,
+    base: ClassT,
+    package: ModuleType,
+    taken: set[str],
+    check: Callable[[str, type], None] = lambda name, found: None,
+) -> dict[str, ClassT]:
     """Subclasses of ``base`` by name: one in each module of ``package``, then those registered.
 
-    What cannot be used, such as a name in ``taken``, is told on standard error, and is not there:
-    the others fly on.
+    What cannot be used, such as a name in ``taken`` or a class that ``check`` raises for, is told
+    on standard error, and is not there: the others fly on.
     """
     found = {}
     for module in pkgutil.iter_modules(package.__path__):
@@ -70,14 +79,22 @@ def classes(group: str, base: ClassT, package: ModuleType, taken: set[str]) -> d
         if point.group != group:
             continue
         try:
-            found[point.name] = _load(point, base, taken | set(found))
-        except Exception as error:  # it is not our code
+            loaded = _load(point, base, taken | set(found))
+            check(point.name, loaded)
+            found[point.name] = loaded
+        except (Exception, SystemExit) as error:  # it is not our code
             told = f'{type(error).__name__}: {error}'.partition('\n')[0]
             print(
                 ConfigurationError(f'glider: {_origin(point)}: not usable: {told}'),
                 file=sys.stderr,
             )
     return found
+
+
+def of_others(found: dict[str, ClassT], package: ModuleType) -> set[str]:
+    """Names of those classes that are not from a package of ours."""
+    own = f'{package.__name__}.'
+    return {name for name, one in found.items() if not one.__module__.startswith(own)}
 
 
 def _load(point: EntryPoint, base: ClassT, taken: set[str]) -> ClassT:
@@ -88,13 +105,28 @@ def _load(point: EntryPoint, base: ClassT, taken: set[str]) -> ClassT:
     loaded = point.load()
     if not (isinstance(loaded, type) and issubclass(loaded, base)):
         raise TypeError(f'it is no subclass of {base.__module__}.{base.__name__}')
-    loaded()  # every field needs a default
+    try:
+        loaded()
+    except pydantic.ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = '.'.join(map(str, first['loc']))
+        raise ValueError(f'its field {field} has no usable default: {first["msg"]}') from None
     return loaded
 
 
 def _origin(point: EntryPoint) -> str:
     owner = f'{point.dist.name} {point.dist.version}: ' if point.dist else ''
     return f'{owner}{point.group}: {point.name} = {point.value}'
+
+
+def others(group: str) -> str:
+    """Where classes come from that are not among ours, as part of a sentence."""
+    return f'others come with packages that register them in the group {group}'
+
+
+def listed(found: dict[str, type]) -> str:
+    """Names of classes and what each is, as part of a sentence."""
+    return '; '.join(f'{name}: {summary(one)}' for name, one in found.items())
 
 
 def summary(described: type) -> str:

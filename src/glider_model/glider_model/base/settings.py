@@ -75,7 +75,7 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
         return f'allowed fields: {", ".join(name for m in models for name in m.model_fields)}'
     for key in ('expected', 'expected_tags'):
         if key in context:
-            return f'allowed: {context[key]}'
+            return f'allowed: {context[key]}' + _others(field)
     limits = [f'{word} {context[key]}' for key, word in _BOUNDS if key in context]
     if field is not None:
         limits = [
@@ -85,6 +85,12 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
             if getattr(item, key, None) is not None
         ] or limits
     return f'allowed: {" and ".join(limits)}' if limits else ''
+
+
+def _others(field: pydantic.fields.FieldInfo | None) -> str:
+    """Where words come from that a field does not accept here."""
+    extra = field.json_schema_extra if field is not None else None
+    return f'; {extra["others"]}' if isinstance(extra, dict) and 'others' in extra else ''
 
 
 def find_field(model: type[Settings], name: str) -> pydantic.fields.FieldInfo | None:

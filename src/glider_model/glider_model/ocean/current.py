@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Velocity of the water: a sum of simple fields of depth and time.
+"""Velocity of the water: a sum of components by depth and time, and one field by place too.
 
 `current_step` reads the arrays that `CurrentSettings.params` makes of what a person writes. The
 random part draws its numbers from a hash of (seed, component, tick).
@@ -14,6 +14,7 @@ import numpy as np
 from glider_model.base.kernel import kernel
 from glider_model.base.noise import normal_pair
 from glider_model.base.signals import Water
+from glider_model.ocean.field import field_velocity
 
 #: Kinds of components.
 CONSTANT, POWER_SHEAR, EXPONENTIAL_SHEAR, TABLE, TIDAL, GAUSS_MARKOV, STEPS = range(7)
@@ -31,6 +32,7 @@ class CurrentParams(NamedTuple):
     stream: np.ndarray  #: uint64[n], start of its stream of random numbers
     #: float64[m, 4], rows of depth (m) or time (s), then north, east, down (m/s)
     table: np.ndarray
+    field: NamedTuple  #: of the field by place that was chosen
 
 
 class CurrentState(NamedTuple):
@@ -107,7 +109,7 @@ def current_step(state, position, t_s, params, dt):
     state : CurrentState
         State of the field at ``t_s``.
     position : tuple of 3 float
-        Place p_NB (m, NED). Only the depth matters; above the surface counts as the surface.
+        Place p_NB (m, NED); above the surface counts as the surface.
     t_s : float
         Time since the start (s).
     params : CurrentParams
@@ -172,4 +174,5 @@ def current_step_in_place(state, position, t_s, params, dt):
             north, east = _latest_step(t_s, params.table, first, last)
             v_n += north
             v_e += east
-    return CurrentState(state.tick + 1, values), Water(v_n, v_e, v_d)
+    north, east, down = field_velocity((position[0], position[1], depth), t_s, params.field)
+    return CurrentState(state.tick + 1, values), Water(v_n + north, v_e + east, v_d + down)

@@ -8,14 +8,16 @@
 import math
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple, Union, get_args
 
 import numpy as np
 import pydantic
 from pydantic import Field
 
+from glider_model.base import plugins
 from glider_model.base.noise import random_stream
 from glider_model.base.settings import Settings
+from glider_model.ocean import fields
 from glider_model.ocean.current import (
     CONSTANT,
     EXPONENTIAL_SHEAR,
@@ -36,6 +38,7 @@ from glider_model.ocean.current_profile import (
     check_speed,
     read_profile,
 )
+from glider_model.ocean.field import FieldSettings, NoField
 
 #: One international knot (m/s).
 KNOT_MPS = 1852.0 / 3600.0
@@ -366,6 +369,18 @@ CurrentComponent = Annotated[
 ]
 
 
+def _check_kind(name: str, settings: type[FieldSettings]) -> None:
+    """Refuse a field that is not of the kind by which it is called."""
+    kind = settings.model_fields.get('kind')
+    if kind is None or kind.default != name or get_args(kind.annotation) != (name,):
+        raise TypeError(f"it needs kind: Literal['{name}'] = '{name}'")
+
+
+#: Settings of every field by place, by its kind.
+FIELDS = plugins.classes(plugins.CURRENTS, FieldSettings, fields, set(), _check_kind)
+CurrentField = Annotated[Union[tuple(FIELDS.values())], Field(discriminator='kind')]  # noqa: UP007
+
+
 class CurrentSettings(_Flow):
     """The water of a mission: one constant current, and any number of components beside it.
 
@@ -376,6 +391,12 @@ class CurrentSettings(_Flow):
         default=[],
         max_length=MAX_COMPONENTS,
         description='Further current fields; all of them are added up.',
+    )
+    field: CurrentField | None = Field(
+        default=None,
+        description='One more current, by place and time, added to the others; '
+        f'{plugins.listed(FIELDS)}.',
+        json_schema_extra={'others': plugins.others(plugins.CURRENTS)},
     )
     seed: int = Field(
         default=0, ge=0, le=2**63 - 1, description='Seed of the random components (1).'
@@ -436,7 +457,13 @@ class CurrentSettings(_Flow):
                 first[i], last[i] = row, row + len(part.rows)
                 row = last[i]
         return CurrentParams(
-            kind, numbers, first, last, stream, np.array(table, dtype=float).reshape(-1, 4)
+            kind,
+            numbers,
+            first,
+            last,
+            stream,
+            np.array(table, dtype=float).reshape(-1, 4),
+            self.field.params() if self.field else NoField(),
         )
 
     def initial_state(self, seed: int | None = None) -> CurrentState:

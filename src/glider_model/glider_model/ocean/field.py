@@ -1,0 +1,60 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a field of current is: settings, params, and a kernel that fills `field_velocity`.
+
+A field is a velocity of the water by place and time, without a memory: an eddy, a front, a model's
+output. It is added to the components of `glider_model.ocean.current`, which know depth and time
+only. docs/your_law.md builds one from nothing.
+"""
+
+from typing import NamedTuple
+
+from glider_model.base.kernel import kernel
+from glider_model.base.settings import Settings
+from glider_model.base.slot import slot
+
+
+class FieldSettings(Settings):
+    """A field; every field of it but ``kind`` is a number or a word of ``current.field``.
+
+    A subclass has ``kind: Literal['NAME'] = 'NAME'``, the name of its file in
+    `glider_model.ocean.fields` or of its entry point in the group ``glider.currents``, and
+    defaults for all else.
+    """
+
+    def params(self) -> NamedTuple:
+        """Kernel parameters, of a type of the field's own."""
+        raise NotImplementedError
+
+
+class NoField(NamedTuple):
+    """Params of a current that has no such field."""
+
+    nothing: int = 0  #: a tuple of numbers cannot be empty
+
+
+@slot
+def field_velocity(position, t_s, params):
+    """Velocity of the water at a place and time, by the type of the params.
+
+    Parameters
+    ----------
+    position : tuple of 3 float
+        North, east and depth (m). Depth is that of the place, never above the surface.
+    t_s : float
+        Time since the start (s).
+    params : NamedTuple
+        Those of `FieldSettings.params`.
+
+    Returns
+    -------
+    v_n, v_e, v_d : float
+        To the north, to the east and down (m/s).
+    """
+
+
+@field_velocity.body(NoField)
+@kernel
+def still(position, t_s, params):
+    """No velocity."""
+    return 0.0, 0.0, 0.0

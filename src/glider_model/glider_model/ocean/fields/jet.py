@@ -1,0 +1,74 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A jet: a straight band of fast water, as along a front.
+
+v(y) = V sech^2(y / L) at a distance y from the middle of the band (Bickley, Phil. Mag. 23, 1937).
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from pydantic import Field
+
+from glider_model.base.kernel import kernel
+from glider_model.ocean.field import FieldSettings, field_velocity
+
+
+class JetSettings(FieldSettings):
+    """A jet: a straight band of fast water, weaker with depth."""
+
+    kind: Literal['jet'] = 'jet'
+    north_m: float = Field(
+        0.0, ge=-1e6, le=1e6, description='A place in its middle, north of the origin (m).'
+    )
+    east_m: float = Field(
+        0.0, ge=-1e6, le=1e6, description='A place in its middle, east of the origin (m).'
+    )
+    direction_deg: float = Field(
+        0.0, ge=-360.0, le=360.0, description='Where it flows to (deg, clockwise from north).'
+    )
+    width_m: float = Field(
+        5000.0, ge=10.0, le=1e6, description='Distance where the speed has fallen to 0.42 (m).'
+    )
+    peak_mps: float = Field(
+        0.3, ge=0.0, le=3.0, description='Speed in its middle at the surface (m/s).'
+    )
+    depth_m: float = Field(
+        500.0, ge=1.0, le=12000.0, description='Depth where the speed has fallen to 1/e (m).'
+    )
+
+    def params(self) -> 'JetParams':
+        """Kernel parameters."""
+        direction = math.radians(self.direction_deg)
+        return JetParams(
+            self.north_m,
+            self.east_m,
+            math.cos(direction),
+            math.sin(direction),
+            self.width_m,
+            self.peak_mps,
+            self.depth_m,
+        )
+
+
+class JetParams(NamedTuple):
+    """A jet as the kernel sees it."""
+
+    north: float  #: of a place in its middle (m)
+    east: float
+    along_n: float  #: where it flows to, a vector of length 1
+    along_e: float
+    width: float  #: (m)
+    speed: float  #: (m/s)
+    depth: float  #: (m)
+
+
+@field_velocity.body(JetParams)
+@kernel
+def jet_velocity(position, t_s, params):
+    """Velocity in a jet (m/s): see `field_velocity`."""
+    north, east = position[0] - params.north, position[1] - params.east
+    across = (east * params.along_n - north * params.along_e) / params.width
+    tanh = math.tanh(across)
+    speed = params.speed * (1.0 - tanh * tanh) * math.exp(-position[2] / params.depth)
+    return speed * params.along_n, speed * params.along_e, 0.0
