@@ -1,0 +1,1 @@
+"""A control law of my own."""

@@ -1,0 +1,1 @@
+"""A guidance method of my own."""
