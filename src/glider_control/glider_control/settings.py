@@ -112,8 +112,9 @@ class ControlLawSettings(_LawChoice):
 
     @property
     def idle(self) -> set[str]:
-        """Laws of other packages that do not fly: not everybody has their sections."""
-        return plugins.of_others(LAWS, laws) - {self.law}
+        """Laws of other packages that do not fly, with the gains that they have anyway."""
+        names = plugins.of_others(LAWS, laws) - {self.law}
+        return {name for name in names if getattr(self, name) == LAWS[name]()}
 
 
 class ControlSettings(ControlLawSettings):

@@ -132,8 +132,9 @@ class GuidanceLawSettings(_MethodGains):
 
     @property
     def idle(self) -> set[str]:
-        """Methods of other packages that do not fly: not everybody has their sections."""
-        return plugins.of_others(METHODS, methods) - {self.los.method}
+        """Methods of other packages that do not fly, with the gains that they have anyway."""
+        names = plugins.of_others(METHODS, methods) - {self.los.method}
+        return {name for name in names if getattr(self, name, None) == METHODS[name]()}
 
 
 class GuidanceSettings(GuidanceLawSettings):

@@ -187,7 +187,11 @@ class Scenario(Settings):
         return profile.depth / profile.glide_rate
 
     def to_yaml(self) -> str:
-        """The scenario as a file that flies the same, also where nobody has what does not fly."""
+        """The scenario as a file that loads to the same scenario.
+
+        It can be loaded where nobody has the laws and methods of others that do not fly in it, if
+        it says nothing of them.
+        """
         left_out = {
             'current': {'seed'},
             'guidance': self.guidance.idle,

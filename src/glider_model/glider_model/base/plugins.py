@@ -10,6 +10,7 @@ A package registers a class under a group, by the name by which people will call
 
 import importlib
 import importlib.util
+import os
 import pkgutil
 import sys
 from collections.abc import Callable, Iterator
@@ -26,6 +27,9 @@ from glider_model.base.errors import ConfigurationError
 CONTROL_LAWS, GUIDANCE_METHODS = 'glider.control_laws', 'glider.guidance_methods'
 CURRENTS = 'glider.currents'
 GROUPS = (CONTROL_LAWS, CURRENTS, GUIDANCE_METHODS)
+
+#: Variable that says what was told already, so that the processes of a run do not say it again.
+TOLD = 'GLIDER_TOLD'
 
 ClassT = TypeVar('ClassT', bound=type)
 
@@ -83,11 +87,7 @@ def classes(
             check(point.name, loaded)
             found[point.name] = loaded
         except (Exception, SystemExit) as error:  # it is not our code
-            told = f'{type(error).__name__}: {error}'.partition('\n')[0]
-            print(
-                ConfigurationError(f'glider: {_origin(point)}: not usable: {told}'),
-                file=sys.stderr,
-            )
+            _tell(point, f'{type(error).__name__}: {error}'.partition('\n')[0])
     return found
 
 
@@ -95,6 +95,15 @@ def of_others(found: dict[str, ClassT], package: ModuleType) -> set[str]:
     """Names of those classes that are not from a package of ours."""
     own = f'{package.__name__}.'
     return {name for name, one in found.items() if not one.__module__.startswith(own)}
+
+
+def _tell(point: EntryPoint, why: str) -> None:
+    """Say on standard error that something cannot be used, unless a parent process has said it."""
+    told = os.environ.get(TOLD, '').split(os.pathsep)
+    name = f'{point.group}.{point.name}'
+    if name not in told:
+        os.environ[TOLD] = os.pathsep.join([*filter(None, told), name])
+        print(ConfigurationError(f'glider: {_origin(point)}: not usable: {why}'), file=sys.stderr)
 
 
 def _load(point: EntryPoint, base: ClassT, taken: set[str]) -> ClassT:
