@@ -12,6 +12,7 @@ import re
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -148,6 +149,13 @@ class Machine:
         done = self.glider('run', *MINE, *changes, '--out', folder, '--json', *options)
         return Flown(folder, json.loads(done.stdout))
 
+    def fly_both(self, name: str) -> tuple[Flown, Flown]:
+        """Fly directly and over nodes, at the same time: both have much to compile."""
+        ways = [f'direct_{name}', '--engine', 'direct', '--bag', '--no-report'], [f'nodes_{name}']
+        with ThreadPoolExecutor() as pool:
+            direct, nodes = (pool.submit(self.fly, *way) for way in ways)
+            return direct.result(), nodes.result()
+
     def sweep(self, name: str, **dimensions) -> xarray.Dataset:
         """Fly a sweep in workers."""
         file, folder = self.folder / f'{name}.yaml', self.folder / name
@@ -185,13 +193,18 @@ def machine(tmp_path_factory) -> Machine:
 
 
 @pytest.fixture(scope='module')
-def direct(machine) -> Flown:
-    return machine.fly('direct', '--engine', 'direct', '--bag', '--no-report')
+def both(machine) -> tuple[Flown, Flown]:
+    return machine.fly_both('first')
 
 
 @pytest.fixture(scope='module')
-def nodes(machine, direct) -> Flown:
-    return machine.fly('nodes', '--engine', 'nodes')
+def direct(both) -> Flown:
+    return both[0]
+
+
+@pytest.fixture(scope='module')
+def nodes(both) -> Flown:
+    return both[1]
 
 
 @pytest.fixture(scope='module')
@@ -319,11 +332,10 @@ def test_a_changed_line_is_what_flies_next(machine, direct, nodes, sweep):
     before = machine.compiled()
     for change in CHANGES:
         machine.change(*change)
-    changed = machine.fly('direct_changed', '--engine', 'direct', '--bag', '--no-report')
+    changed, over_nodes = machine.fly_both('changed')
     assert set(machine.compiled()) > set(before)
     flown, old = payloads(changed.folder), payloads(direct.folder)
     assert flown['/glider/wrench'][0] != old['/glider/wrench'][0]
-    over_nodes = machine.fly('nodes_changed', '--engine', 'nodes', '--no-report')
     assert payloads(over_nodes.folder) == flown
     worked = machine.sweep('sweep_changed', gain=values('control.sliding.k', 12.0))
     assert worked['final_state_position_ned_m'].values.tolist() == [changed.place]
