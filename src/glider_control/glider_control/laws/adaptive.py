@@ -312,7 +312,7 @@ def bank_to_turn(steering, disturbance, measured, reference, speed, learning, pa
     return math.asin(sine), disturbance
 
 
-# Over 80 lines: the equations stand in one place, and parts would hand on a dozen numbers each.
+# long: the equations stand in one place, and parts would hand on a dozen numbers each.
 @law_step.body(AdaptiveParams)
 @kernel
 def adaptive_step(state, seen, params, dt):
