@@ -117,7 +117,7 @@ def test_killed_node_is_named(fly, name, number):
     assert result.culprit == name
     assert result.exit_code == -number
     assert number.name in result.reason
-    assert time.monotonic() - started < 10.0
+    assert time.monotonic() - started < 30.0, 'it waited for a time-out'
 
 
 @pytest.mark.parametrize('name', ['guidance_node', PLANT])
@@ -162,7 +162,7 @@ def test_deaf_node_is_killed(fly):
     started = time.monotonic()
     result, _ = fly(commands)
     assert result.culprit == PLANT
-    assert time.monotonic() - started < 10.0
+    assert time.monotonic() - started < 30.0, 'it waited for a time-out'
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
