@@ -14,7 +14,7 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-MISSION_S, NODES_S = 108000.0, 4000.0
+MISSION_S, NODES_S = 108000.0, 2000.0
 #: A sweep of twelve missions of 30 h: the start of the workers counts little.
 SWEEP = """
 name: against
@@ -24,12 +24,12 @@ set: {dives: 0, duration_s: 108000.0}
 dimensions:
   angle: {kind: grid, field: current.angle_deg, start: 0.0, stop: 44.0, step: 4.0}
 """
-REPEATS = 5
+REPEATS = 3
 
 MEANING = {
     'against_mission_s': 'mission of 30 h with its score, by the other checkout (s)',
     'mission_over_against': 'the same by this one: the ratio',
-    'against_nodes_s': 'flight of 4,000 s over topics, by the other checkout (s)',
+    'against_nodes_s': 'flight of 2,000 s over topics, by the other checkout (s)',
     'nodes_over_against': 'the same by this one: the ratio',
     'against_sweep_s': 'twelve missions of 30 h by two workers, by the other checkout (s)',
     'sweep_over_against': 'the same by this one: the ratio',
