@@ -1,15 +1,28 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Memory of a direct run of 30 h, beside that of a Python that has only imported the stack."""
+"""Memory of a direct run of 30 h, beside that of a Python that has only imported the stack.
+
+And of what flies on board: navigation, guidance and control, in one process and in three.
+"""
 
 import subprocess
 import sys
 from collections.abc import Callable
 
+from nodes import fly_once
+from nodes_memory import memory_mb
+
+from glider_bringup.engines.processes import AUTOPILOT, ON_BOARD
+
+#: Simulated time (s) of the flights of what is on board.
+FLIGHT_S = 600.0
+
 MEANING = {
     'imported_rss_mb': 'resident memory with everything imported, the floor (MB)',
     'mission_30h_peak_rss_mb': 'most resident memory of a direct run of 30 h with its score (MB)',
     'mission_30h_rss_over_imported': 'ratio of the two',
+    'autopilot_peak_rss_mb': 'most resident memory of the autopilot, in flight over topics (MB)',
+    'three_nodes_peak_rss_mb': 'sum of the same of its three nodes, each in its own process (MB)',
 }
 
 _IMPORT = 'from glider_bringup.scoring.card import fly_scored\n'
@@ -33,11 +46,31 @@ def measure(progress: Callable[[str], None]) -> dict:
     imported = _peak_mb(_IMPORT)
     progress('30 h by the direct engine')
     flown = _peak_mb(_FLY)
+    progress('autopilot over topics')
+    autopilot = _on_board_mb(True)
+    progress('its three nodes over topics')
+    three_nodes = _on_board_mb(False)
     return {
         'imported_rss_mb': imported,
         'mission_30h_peak_rss_mb': flown,
         'mission_30h_rss_over_imported': flown / imported,
+        'autopilot_peak_rss_mb': autopilot,
+        'three_nodes_peak_rss_mb': three_nodes,
     }
+
+
+def _on_board_mb(autopilot: bool) -> float:
+    """Most resident memory (MB) of what is on board, dead reckoning, in one process or three."""
+    peaks = {}
+    fly_once(
+        FLIGHT_S,
+        0.0,
+        lambda tick, depth_m: peaks.update(memory_mb('VmHWM')),
+        navigation='dead_reckoned',
+        autopilot=autopilot,
+    )
+    names = [AUTOPILOT] if autopilot else [wired.node for wired in ON_BOARD]
+    return sum(peaks[name] for name in names)
 
 
 def _peak_mb(program: str) -> float:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from nodes import fly_over_topics
 
-from glider_bringup.engines.processes import MODULES
+from glider_bringup.engines.processes import AUTOPILOT, AUTOPILOT_MODULE, MODULES
 from glider_model.base.signals import TICK_S
 
 HOURS, MISSION_HOURS = 1.0, 30.0
@@ -34,7 +34,7 @@ def measure(progress: Callable[[str], None], hours: float = HOURS) -> dict:
     samples = {name: [] for name in MODULES}
 
     def sample(tick: int) -> None:
-        for name, megabytes in resident_mb().items():
+        for name, megabytes in memory_mb('VmRSS').items():
             samples[name].append((tick * TICK_S / 3600.0, megabytes))
 
     progress(f'{hours:g} h over topics')
@@ -51,9 +51,9 @@ def measure(progress: Callable[[str], None], hours: float = HOURS) -> dict:
     }
 
 
-def resident_mb() -> dict[str, float]:
-    """Resident memory (MB) of the nodes that this process has started."""
-    found = {}
+def memory_mb(entry: str) -> dict[str, float]:
+    """Memory (MB) of the nodes that this process has started, by an entry of /proc/PID/status."""
+    found, modules = {}, {**MODULES, AUTOPILOT: AUTOPILOT_MODULE}
     for folder in Path('/proc').glob('[0-9]*'):
         try:
             status = dict(
@@ -62,10 +62,10 @@ def resident_mb() -> dict[str, float]:
             command = (folder / 'cmdline').read_text().split('\0')
         except (FileNotFoundError, ProcessLookupError):
             continue
-        if int(status['PPid']) == os.getpid() and 'VmRSS' in status:
-            for name, module in MODULES.items():
+        if int(status['PPid']) == os.getpid() and entry in status:
+            for name, module in modules.items():
                 if module in command:
-                    found[name] = int(status['VmRSS'].split()[0]) / 1024.0
+                    found[name] = int(status[entry].split()[0]) / 1024.0
     return found
 
 

@@ -29,7 +29,7 @@ SHALLOW = {
 @kernel
 def _plant_steps(plant, params, commands, waters, dt, motions):
     for row in range(len(commands)):
-        command = Joints(commands[row, 0], commands[row, 1], commands[row, 2])
+        command = Joints(commands[row, 0], commands[row, 1], commands[row, 2], commands[row, 3])
         water = Water(waters[row, 0], waters[row, 1], waters[row, 2])
         plant = plant_step(plant, command, water, params, dt)
         for i, value in enumerate(plant.motion):

@@ -29,7 +29,7 @@ from glider_bringup.studies.sweep.fly import (
 )
 from glider_bringup.studies.sweep.plan import MAX_CELLS, load_sweep
 from glider_model.base.signals import TICK_S
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.topics import recorded_topics
 
 SCENARIO, HOUR_S = 'current_8deg', 3600.0
 #: The sweep whose result is written: of many cells, none of which is flown more than once.
@@ -79,7 +79,9 @@ with open_journal(plan, Path(folder), True) as journal:
 def measure(progress: Callable[[str], None]) -> dict:
     """Figures of a recording and of a result."""
     progress('one hour with a recording')
-    cdr_bytes = sum(topic.codec.size for topic in TOPICS.values() if topic.per_tick)
+    cdr_bytes = sum(
+        topic.codec.size for topic in recorded_topics(['measured_odom']) if topic.per_tick
+    )
     bag_bytes = _bag_bytes()
     progress('an hour recorded, flushed and synced')
     flush_ms, flushed_s = _record('never')
@@ -139,7 +141,7 @@ def _record(sync: Sync) -> tuple[float, float]:
             times.append(time.perf_counter() - start)
 
         bag.flush = timed
-        log, recorded_s = LogWriter(bag, scenario.path.points(2)), 0.0
+        log, recorded_s = LogWriter(bag, scenario.path.points(2), scenario.topics), 0.0
         for rows in fly_blocks(*mission_of(scenario)):
             start = time.perf_counter()
             log.add(rows)

@@ -1,6 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""A vehicle that is not there, on a bad line: try guidance_node and control_node against it.
+"""A vehicle that is not there, on a bad line: try the nodes on board against it.
+
+It navigates itself, or, with navigates:=false, publishes what its sensors take: attitude every
+4 s without rates, pressure every second, and a fix every second at the surface alone. Where it
+really is, is on ground_truth/odom.
 
 It keeps its own time, which begins at 1000 s. What it sends arrives up to 50 ms early or late,
 one message in twenty never, and for three seconds nothing goes either way. With a speed of more
@@ -15,11 +19,13 @@ import time
 
 import rclpy
 from driver import JOINTS, PERIOD_S, Driver
+from nav_msgs.msg import Odometry
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
 from glider_model.base.signals import Joints, Water
+from glider_model.base.wiring import PLANT, SENSORS
 from glider_model.plant.block import plant_outputs
 from glider_model.plant.plant import PlantSettings, plant_step
 
@@ -33,10 +39,13 @@ PARAMETERS = {
     'silence_at_s': 60.0,  # after the start; 0.0: never
     'silence_s': 3.0,
     'duration_s': 0.0,  # 0.0: until Ctrl-C
-    'listeners': 2,  # subscribers of odom that it waits for, guidance and control
+    'imu_period_s': 4.0,
+    'listeners': 3,  # subscriptions that it waits for; with navigates:=false there are 5
     'seed': 1,
 }
 GLIDING = {'heading_deg': 30.0, 'pitch_deg': -30.0, 'speed_mps': 0.5, 'net_heaviness_kg': 0.4}
+#: Time between two samples of pressure, and between two fixes (s).
+SAMPLE_S = 1.0
 START_NS = 1000 * 10**9
 #: The line is looked at this often in a period.
 STEPS = 4
@@ -49,11 +58,12 @@ class StandIn:
 
     def __init__(self) -> None:
         self._time_ns = START_NS
-        self.place(0.0, 0.0)
+        self.place(0.0, 0.0, PERIOD_S)
 
-    def place(self, depth_m: float, current_mps: float) -> None:
+    def place(self, depth_m: float, current_mps: float, imu_period_s: float) -> None:
         """Put it somewhere."""
-        settings = PlantSettings(initial={**GLIDING, 'depth_m': depth_m})
+        self._imu_period_s = imu_period_s
+        settings = PlantSettings(initial={**GLIDING, 'depth_m': depth_m}, fitted=SENSORS)
         self._params, self._state = settings.params(), settings.initial_state()
         self._target = self._state.joints
         self._water = Water(0.0, current_mps, 0.0)
@@ -69,16 +79,40 @@ class StandIn:
 
     def navigation(self) -> tuple[tuple, tuple, tuple, tuple]:
         """Position, orientation (w, x, y, z), velocity over ground and rates, ENU and FLU."""
-        (wire, _), _ = plant_outputs(self._state, self._params)
-        return wire[:3], wire[3:7], wire[7:10], wire[10:]
+        truth = self._says('ground_truth/odom')
+        return truth[:3], truth[3:7], truth[7:10], truth[10:]
+
+    def attitude(self) -> tuple[tuple, None] | None:
+        """Orientation, now and then; there is no gyro."""
+        return (self._says('imu')[:4], None) if self._is_due(self._imu_period_s) else None
+
+    def pressure(self) -> float | None:
+        """Absolute pressure, now and then."""
+        return self._says('pressure')[0] if self._is_due(SAMPLE_S) else None
+
+    def fix(self) -> tuple[float, float, float] | None:
+        """Where it is, at the surface."""
+        status, latitude, longitude, variance, _ = self._says('fix')
+        if status < 0.0 or not self._is_due(SAMPLE_S):
+            return None
+        return latitude, longitude, variance**0.5
+
+    def _says(self, topic: str) -> tuple[float, ...]:
+        """What a topic of the plant would say."""
+        outputs, _ = plant_outputs(self._state, self._params)
+        return outputs[PLANT.outputs.index(topic) - 1]  # the first is the clock
+
+    def _is_due(self, period_s: float) -> bool:
+        """Whether something that is done once in a period is due."""
+        return round((self._time_ns - START_NS) / 1e9 / PERIOD_S) % round(period_s / PERIOD_S) == 0
 
     def actuators(self) -> list[float]:
         """Positions of the actuators."""
-        return list(self._state.joints)
+        return list(self._state.joints[: len(JOINTS)])
 
     def move(self, targets: dict[str, float]) -> None:
         """Move actuators towards their targets."""
-        self._target = Joints(*(targets[joint] for joint in JOINTS))
+        self._target = Joints(*(targets[joint] for joint in JOINTS), 0.0)
 
 
 class BadLine(Driver):
@@ -89,12 +123,17 @@ class BadLine(Driver):
         given = {
             name: self.declare_parameter(name, value).value for name, value in PARAMETERS.items()
         }
-        self.vehicle.place(given['depth_m'], given['current_mps'])
+        self.vehicle.place(given['depth_m'], given['current_mps'], given['imu_period_s'])
         self.line, self.random = given, random.Random(given['seed'])
         self.clock = self.create_publisher(Clock, '/clock', 10) if given['speed'] > 1.0 else None
-        self.under_way: list[tuple[float, tuple]] = []
+        self.truth = self.create_publisher(Odometry, 'ground_truth/odom', 10)
+        self.under_way: list[tuple[float, dict]] = []
         self.elapsed_s = 0.0
         self.unanswered = None  # periods without a command, once there has been one
+
+    def listeners(self) -> int:
+        """Subscriptions of all that it publishes."""
+        return sum(publisher.get_subscription_count() for publisher in self.out.values())
 
     def runs_away(self) -> bool:
         """Whether the nodes do not keep up with /clock."""
@@ -120,6 +159,8 @@ class BadLine(Driver):
             self.clock.publish(Clock(clock=now.to_msg()))
         if number % STEPS == 0:
             self.vehicle.advance()
+            now = Time(nanoseconds=self.vehicle.time_ns())
+            self.truth.publish(self.odometry(now.to_msg())['odom'])
             if self.unanswered is not None:
                 self.unanswered += 1
             if self.passes():
@@ -129,7 +170,7 @@ class BadLine(Driver):
         for due_s, state in list(self.under_way):
             if due_s <= self.elapsed_s:
                 self.under_way.remove((due_s, state))
-                self.publish(*state)
+                self.publish(state)
 
 
 def wait(executor: SingleThreadedExecutor, node: BadLine, due_s: float) -> None:
@@ -149,7 +190,7 @@ def main() -> None:
     executor.add_node(node)
     step_s = PERIOD_S / STEPS / node.line['speed']
     try:
-        while node.odom.get_subscription_count() < node.line['listeners']:
+        while node.listeners() < node.line['listeners']:
             executor.spin_once(timeout_sec=0.1)
         number, due_s = 0, time.monotonic()
         while not 0.0 < node.line['duration_s'] <= node.elapsed_s:

@@ -11,21 +11,25 @@ from pathlib import Path
 
 import pytest
 
+from glider_model.base.kernel import PACKAGES
+from glider_model.base.wiring import PORTS
+
 SOURCES = Path(__file__).resolve().parents[1] / 'src'
 
 #: What each package may import from the others.
 MAY_IMPORT = {
     'glider_model': set(),
+    'glider_navigation': {'glider_model'},
     'glider_guidance': {'glider_model'},
     'glider_control': {'glider_model'},
-    'glider_bringup': {'glider_model', 'glider_guidance', 'glider_control'},
+    'glider_bringup': {'glider_model', 'glider_navigation', 'glider_guidance', 'glider_control'},
 }
 
 #: Rooms of two packages by floors, from below: a room imports from the floors beneath it only.
 FLOORS = {
     'glider_model': (('base',), ('vehicle', 'ocean', 'ros'), ('onboard', 'plant'), ('nodes',)),
     'glider_bringup': (
-        ('blocks', 'mission'),
+        ('blocks', 'mission', 'flights'),
         ('recording',),
         ('engines', 'nodes'),
         ('scoring',),
@@ -60,6 +64,8 @@ ONLY_PIP = {
     *('dask', 'distributed', 'foxglove', 'lz4', 'mcap', 'plotly', 'rosbags', 'xarray'),
     'zstandard',
 }
+#: The same, from a file of their own: what only some commands need, and say so.
+OPTIONAL = {'requirements-flights.txt': {'dbdreader', 'h5netcdf'}}
 #: Names on PyPI that are not those of the modules.
 PYPI_NAMES = {'foxglove': 'foxglove-sdk'}
 
@@ -296,6 +302,7 @@ def test_the_map_names_files_that_are_there():
     known += [
         str(path.relative_to(SOURCES.parent)) for path in (SOURCES.parent / 'test').iterdir()
     ]
+    known += PORTS  # a topic with a slash looks like a file
     lost = [name for name in named if not any(one.endswith(name.rstrip('/')) for one in known)]
     assert len(named) > 30
     assert lost == []
@@ -304,6 +311,10 @@ def test_the_map_names_files_that_are_there():
 def test_every_package_is_checked():
     """A package that is not in the table would escape the rules."""
     assert {path.parent.name for path in SOURCES.glob('*/package.xml')} == set(MAY_IMPORT)
+
+
+def test_a_change_in_any_package_makes_compiled_kernels_anew():
+    assert set(PACKAGES) == set(MAY_IMPORT)
 
 
 @pytest.mark.parametrize('package', MAY_IMPORT)
@@ -337,6 +348,9 @@ def test_imports_follow_the_architecture():
         ('glider_model/test/test_a.py', 'import glider_control', 'glider_control'),
         ('glider_guidance/glider_guidance/a.py', 'from glider_control import pid', 'control'),
         ('glider_control/glider_control/a.py', 'import glider_guidance.los', 'guidance'),
+        ('glider_guidance/glider_guidance/a.py', 'import glider_navigation.phase', 'navigation'),
+        ('glider_navigation/glider_navigation/a.py', 'import glider_guidance.los', 'guidance'),
+        ('glider_navigation/glider_navigation/a.py', 'import rclpy', 'only nodes/ and ros/'),
         ('glider_control/glider_control/a.py', 'from glider_bringup import runner', 'bringup'),
         (
             'glider_control/glider_control/a.py',
@@ -398,7 +412,7 @@ def needed(package: str) -> set[str]:
 
 @pytest.mark.parametrize('package', MAY_IMPORT)
 def test_package_declares_what_it_imports(package):
-    modules = needed(package) - {package}
+    modules = needed(package) - {package}.union(*OPTIONAL.values())
     keys = {ROSDEP_KEYS.get(module, module) for module in modules - ONLY_PIP}
     assert keys - declared(package) == set(), 'missing in package.xml'
 
@@ -416,6 +430,12 @@ def test_what_only_pip_has_is_pinned():
     used = set().union(*(needed(package) for package in MAY_IMPORT))
     assert {PYPI_NAMES.get(module, module) for module in used & ONLY_PIP} <= pinned
     assert 'pydantic' in pinned  # noble has 1.10, this needs 2
+
+
+@pytest.mark.parametrize('file', OPTIONAL)
+def test_what_only_some_commands_need_is_pinned(file):
+    text = (SOURCES.parent / file).read_text(encoding='utf-8')
+    assert OPTIONAL[file] <= set(re.findall(r'^(\w[\w-]*)==', text, re.MULTILINE))
 
 
 if __name__ == '__main__':

@@ -15,9 +15,9 @@ from rosbags.typesys import Stores, get_typestore
 from glider_bringup.mission.scenario import load_scenario
 from glider_model.base.signals import TICK_NS
 from glider_model.base.wiring import BASE_LINK, JOINTS, MAP
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.topics import recorded_topics
 
-RECORDED = {topic.full_name('/glider'): topic for topic in TOPICS.values() if topic.recorded}
+RECORDED = {topic.full_name('/glider'): topic for topic in recorded_topics(['measured_odom'])}
 PER_TICK = [name for name, topic in RECORDED.items() if topic.per_tick]
 
 

@@ -21,10 +21,12 @@ from mcap.stream_reader import StreamReader
 from glider_bringup.engines.processes import MODULES, PLANT
 from glider_bringup.mission.scenario import SCENARIO_FOLDER
 from glider_model.base.signals import TICK_NS
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.topics import recorded_topics
 from glider_model.vehicle.file import vehicle_path
 
-PER_TICK = [topic.full_name('/glider') for topic in TOPICS.values() if topic.per_tick]
+PER_TICK = [
+    topic.full_name('/glider') for topic in recorded_topics(['measured_odom']) if topic.per_tick
+]
 START_S = 200.0  #: for the processes to come up, at worst with every kernel to compile
 STOP_S = 10.0  #: within which a run ends by itself
 TICK_TIMEOUT_S = 5.0  #: after which the plant gives up a node that is silent
@@ -153,7 +155,7 @@ def lacking_when_cut(culprit: str = '') -> dict[str, int]:
     """
     return {
         topic.full_name('/glider'): 2 if topic.publisher == culprit != PLANT else 1
-        for topic in TOPICS.values()
+        for topic in recorded_topics(['measured_odom'])
         if topic.per_tick
     }
 

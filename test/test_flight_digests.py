@@ -5,7 +5,10 @@
     ./glider python test/test_flight_digests.py > test/flight_digests.json     makes it anew
 
 Whoever changes what is flown, and means it, does that and says in CHANGELOG what has changed. A
-digest is that of the numbers of all topics, tick by tick, over ten hours by the direct engine.
+digest is that of the numbers of some topics, tick by tick, over ten hours by the direct engine:
+of those that there were when the table was made first, and of no more of their numbers than they
+had then. What has been added since (the truth apart from what is believed, navigation, the
+covariance of odom) is not in it, so that the table also says that adding it changed no flight.
 Sine and exponential belong to the C library: on another one the last bits differ, and so does the
 digest of the probe, of what the library makes of some arguments.
 """
@@ -18,7 +21,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glider_bringup.blocks import COLUMNS
+from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
@@ -33,6 +36,21 @@ MISSIONS = {
     'helix': ('helix', {}),
     'survey': ('survey', {}),
     'seawing': ('current_8deg', {'vehicle': 'seawing'}),
+}
+#: Topics and flags of which a digest is made, and the numbers of each, from the first on.
+NUMBERS = {
+    'adaptation': 13,
+    'command': 3,
+    'current_estimate': 3,
+    'current_velocity': 3,
+    'infeasible': 1,
+    'joint_states': 3,
+    'odom': 13,
+    'reference': 13,
+    'saturation': 1,
+    'stage': 1,
+    'tracking_error': 3,
+    'wrench': 3,
 }
 #: Fields of the three ways in which each is flown.
 WAYS = {
@@ -62,15 +80,23 @@ def probe() -> str:
     return hashlib.sha256(np.array(numbers).tobytes()).hexdigest()[:16]
 
 
+def columns(topic: str) -> np.ndarray:
+    """Columns of a log row that belong to a topic, or to a flag."""
+    return np.atleast_1d(np.arange(ROW)[COLUMNS[topic]])
+
+
 def digest(mission: str, way: str) -> str:
-    """Digest of one flight: sha256 of its ticks, topic by topic in the order of their names."""
+    """Digest of one flight: sha256 of its ticks, topic by topic in the order of their names.
+
+    Only the first numbers of the topics in `NUMBERS` are in it.
+    """
     name, changes = MISSIONS[mission]
     ends = {'dives': 0, 'duration_s': DURATION_S}
     scenario = load_scenario(name, {**changes, **WAYS[way], **ends})
     seen = hashlib.sha256()
     for log in fly_blocks(*mission_of(scenario)):
-        for topic in sorted(COLUMNS):
-            seen.update(np.ascontiguousarray(log[:, COLUMNS[topic]]).tobytes())
+        for topic, count in NUMBERS.items():
+            seen.update(np.ascontiguousarray(log[:, columns(topic)[:count]]).tobytes())
     return seen.hexdigest()[:32]
 
 

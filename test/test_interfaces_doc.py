@@ -31,7 +31,7 @@ from glider_model.base import files
 from glider_model.base.errors import MAX_LINE, MAX_LINES, MAX_SHOWN
 from glider_model.base.plugins import registered
 from glider_model.base.settings import Settings
-from glider_model.base.wiring import JOINTS
+from glider_model.base.wiring import JOINTS, present
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
 from glider_model.nodes.tf_node import TfSettings
@@ -44,6 +44,9 @@ from glider_model.ros.lockstep.node import TickSettings
 from glider_model.ros.places import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
 from glider_model.ros.wire import qos
 from glider_model.ros.wire.topics import TOPICS
+from glider_navigation.nodes.navigation_node import NavigationNode
+from glider_navigation.phase import PHASE_NAMES
+from glider_navigation.settings import NavigationSettings
 
 DOCUMENT = Path(__file__).resolve().parents[1] / 'docs' / 'interfaces.md'
 
@@ -51,6 +54,7 @@ DOCUMENT = Path(__file__).resolve().parents[1] / 'docs' / 'interfaces.md'
 NODES = {
     'plant_node': (PlantNode, PlantSettings),
     'current_node': (CurrentNode, CurrentSettings),
+    'navigation_node': (NavigationNode, NavigationSettings),
     'guidance_node': (GuidanceNode, GuidanceSettings),
     'control_node': (ControlNode, ControlSettings),
     'recorder_node': (RecorderNode, RecorderSettings),
@@ -154,6 +158,12 @@ def member_rows(union):
                 yield kind, f'`{name}`', default, allowed(field), field.description or ''
 
 
+def messages_of(topic) -> str:
+    if not topic.per_tick:
+        return 'on change'
+    return 'one per tick' if topic.name in present(TOPICS, ()) else 'one per tick, or none'
+
+
 def topic_rows():
     names = {id(getattr(qos, name)): name for name in PROFILES}
     for topic in TOPICS.values():
@@ -162,7 +172,7 @@ def topic_rows():
             topic.type_name,
             topic.publisher,
             ', '.join(topic.readers) or '-',
-            'one per tick' if topic.per_tick else 'on change',
+            messages_of(topic),
             names[id(topic.qos)].lower(),
             'yes' if topic.recorded else 'no',
         )
@@ -330,6 +340,7 @@ def test_every_number_on_a_topic_is_explained(document, name):
     [
         *JOINTS,
         *(f'| {number} | {name} |' for number, name in enumerate(STAGE_NAMES)),
+        *PHASE_NAMES,
         *(health.STARTING, health.READY, health.WAITING, health.FINISHED, health.FAILED),
         *('`abort`', '`pause`', 'std_srvs/srv/Trigger', 'std_srvs/srv/SetBool'),
         *('`stage`', '`infeasible`', '`saturation`', '`phase`', '`peer`', '`topic`'),

@@ -5,18 +5,37 @@
 import hashlib
 import json
 import sys
+from collections import Counter, defaultdict
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from mcap.reader import make_reader
 
+from glider_bringup.blocks import COLUMNS
 from glider_bringup.engines.processes import MODULES, node_commands, run_nodes
 from glider_bringup.mission.run_folder import PARAMETERS_FILE
+from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.ros.recorded_log import RecordedLog
 from glider_model.base.signals import TICK_S
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.base.wiring import BELIEFS
+from glider_model.ros.wire.topics import TOPICS, recorded_topics
 
-PER_TICK = [topic.full_name('/glider') for topic in TOPICS.values() if topic.per_tick]
+#: Topics of a flight with position known.
+PER_TICK = [
+    topic.full_name('/glider') for topic in recorded_topics(['measured_odom']) if topic.per_tick
+]
+#: A flight by dead reckoning, with three surfacings, and what is set for it.
+RECKONED = {
+    'navigation.method': 'dead_reckoned',
+    'sensors.compass_bias_deg': 1.0,
+    'sensors.gps_first_fix_s': 30.0,
+    'profile.depth_m': 100.0,
+    'profile.surface_every_dives': 1,
+    'profile.wait_s': 200.0,
+}
+RECKONED_S = 3600
 
 #: What tells how a result came about, not what it is.
 HOW = {'engine', 'wall_time_s', 'real_time_factor', 'messages_recorded'}
@@ -36,13 +55,14 @@ runpy.run_module(sys.argv.pop(1), run_name='__main__', alter_sys=True)
 
 def digests(folder: Path) -> dict[str, tuple[int, str]]:
     """Number of messages of each per-tick topic, and a digest of their stamps and payloads."""
-    counts, hashes = dict.fromkeys(PER_TICK, 0), {name: hashlib.sha256() for name in PER_TICK}
+    counts, hashes = Counter(), defaultdict(hashlib.sha256)
+    names = [topic.full_name('/glider') for topic in TOPICS.values() if topic.per_tick]
     (file,) = folder.glob('*.mcap')
     with file.open('rb') as stream:
-        for _, channel, message in make_reader(stream).iter_messages(topics=PER_TICK):
+        for _, channel, message in make_reader(stream).iter_messages(topics=names):
             counts[channel.topic] += 1
             hashes[channel.topic].update(message.log_time.to_bytes(8, 'big') + message.data)
-    return {name: (counts[name], hashes[name].hexdigest()) for name in PER_TICK}
+    return {name: (counts[name], hashes[name].hexdigest()) for name in names if name in counts}
 
 
 def test_flight_is_what_it_was_meant_to_be(over_nodes):
@@ -67,6 +87,7 @@ def test_final_state_and_scores_are_identical(over_nodes, direct):
 
 def test_recorded_payloads_are_identical(over_nodes, direct):
     nodes = digests(over_nodes.folder)
+    assert set(nodes) == set(PER_TICK)
     assert all(count == over_nodes.card['ticks'] for count, _ in nodes.values())
     assert nodes == digests(direct.folder)
 
@@ -77,6 +98,55 @@ def test_score_from_the_bag_is_the_score_of_the_run(glider, request, flight):
     done = glider('score', recorded.folder, '--json')
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == recorded.card
+
+
+@pytest.fixture(scope='module')
+def reckoned(glider, tmp_path_factory) -> dict[str, Path]:
+    """Run folders of the flight by dead reckoning, by engine."""
+    folders = {name: tmp_path_factory.mktemp('reckoned') / name for name in ('nodes', 'direct')}
+    changes = [word for name, value in RECKONED.items() for word in ('--set', f'{name}={value}')]
+    for name, folder in folders.items():
+        done = glider(
+            *('run', 'current_12deg', '--duration', RECKONED_S, *changes),
+            *('--engine', name, '--out', folder, *['--bag'] * (name == 'direct')),
+        )
+        assert done.returncode == 0, done.stderr
+    return folders
+
+
+def test_dead_reckoning_is_the_same_over_nodes(reckoned):
+    """Sensors, beliefs and all that follows from them, to the last bit; and the score."""
+    nodes, engine = (digests(folder) for folder in reckoned.values())
+    assert nodes == engine
+    expected = set(PER_TICK) - {'/glider/measured_odom'}
+    expected |= {f'/glider/{name}' for name in ('imu', 'pressure', 'fix', *BELIEFS)}
+    assert set(nodes) == expected
+    assert {count for count, _ in nodes.values()} == {round(RECKONED_S / TICK_S)}
+    cards = [json.loads((folder / 'score.json').read_text()) for folder in reckoned.values()]
+    one, other = ({k: v for k, v in card.items() if k not in HOW} for card in cards)
+    assert one == other
+
+
+def test_dead_reckoning_had_fixes_and_lost_its_way_between_them(reckoned):
+    """What is flown is what is believed, and not what is true."""
+    blocks = RecordedLog(Bag(reckoned['direct']), ['fix']).blocks()
+    log = np.concatenate([block.copy() for block in blocks])
+    fixed = log[:, COLUMNS['fix'].start] == 0.0
+    true, believed = (log[:, COLUMNS[name]][:, :2] for name in ('ground_truth/odom', 'odom'))
+    apart_m = np.hypot(*(believed - true).T)
+    surfacings = np.count_nonzero(np.diff(fixed.astype(int)) == 1)
+    assert surfacings >= 3
+    assert np.max(apart_m[~fixed]) > 50.0
+    assert np.max(apart_m[fixed][-300:]) < 20.0
+
+
+@pytest.mark.parametrize('engine', ['nodes', 'direct'])
+def test_dead_reckoning_verifies(glider, reckoned, engine):
+    done = glider('verify', reckoned[engine], '--json')
+    assert done.returncode == 0, done.stderr
+    blocks = {one['block']: one['result'] for one in json.loads(done.stdout)['blocks']}
+    names = ('plant', 'current', 'navigation', 'guidance', 'control')
+    assert blocks == dict.fromkeys(names, 'identical')
 
 
 def test_payloads_are_the_same_without_the_internals_of_rclpy(glider, over_nodes, tmp_path):

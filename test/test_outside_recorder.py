@@ -20,12 +20,32 @@ from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.ros.rosbag2 import message_definition
 from glider_bringup.scoring.again import score_again
+from glider_model.base.wiring import readers
 from glider_model.ros.places import domain_id
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.topics import (
+    CONTROL,
+    CURRENT,
+    GUIDANCE,
+    NAVIGATION,
+    TOPICS,
+    recorded_topics,
+)
 
 TICKS = 400
 DEADLINE_S = 200.0  #: at worst with every kernel to compile
-RECORDED = [topic for topic in TOPICS.values() if topic.recorded]
+RECORDED = recorded_topics(['measured_odom'])
+#: Who listens to where the vehicle is, beside recorders: the sea alone knows the truth.
+LISTENERS = {
+    'ground_truth/odom': {CURRENT},
+    'measured_odom': {NAVIGATION},
+    'odom': {GUIDANCE, CONTROL},
+}
+
+
+def test_nobody_on_board_is_wired_to_the_truth():
+    assert [wired.node for wired in readers('ground_truth/odom')] == [CURRENT]
+    for name, nodes in LISTENERS.items():
+        assert set(TOPICS[name].readers) == nodes
 
 
 class OutsideRecorder:
@@ -120,6 +140,9 @@ def test_paused_at_its_start_a_run_is_recorded_whole_and_scored(fly):
     )
     begun = time.monotonic()  # the publishers have to match, too, and nobody here hears of it
     recorder.wait_for(lambda: time.monotonic() > begun + 1.0, processes, 'time')
+    for name, nodes in LISTENERS.items():
+        infos = recorder.node.get_subscriptions_info_by_topic(name)
+        assert {info.node_name for info in infos} == {*nodes, 'outside'}, name
     recorder.call(pause, SetBool.Request(data=False), processes)
 
     def is_whole() -> bool:

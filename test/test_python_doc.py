@@ -12,10 +12,13 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 import pytest
 from matplotlib import pyplot
 
 import glider_bringup as glider
+from glider_bringup.blocks import ROW
+from glider_bringup.door.dataset import make_dataset
 from glider_model.base.signals import TICK_S
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -26,7 +29,9 @@ MARKED = re.compile(r'(<!-- table: variables -->\n)(.*?)(<!-- end -->)', re.DOTA
 
 def with_table(text: str) -> str:
     """The document with the table as it should be."""
-    data = glider.fly(duration=TICK_S).to_xarray()
+    scenario = glider.load_scenario('current_8deg', {'navigation.method': 'dead_reckoned'})
+    score = glider.fly(duration=TICK_S).score
+    data = make_dataset(np.zeros((1, ROW)), scenario, score)
     lines = ['| variable | unit | frame | meaning |', '| --- | --- | --- | --- |']
     for name, variable in data.data_vars.items():
         about = variable.attrs

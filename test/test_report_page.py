@@ -47,6 +47,15 @@ DRAWN = """() => page.panels.map(({ id, kind }) => {
 })"""
 
 
+#: Whether the legend of a panel lies above what is drawn.
+LEGEND_IS_APART = """(id) => {
+  const element = document.getElementById(id);
+  const [legend, plot] = ['.legend', '.nsewdrag'].map(
+    (part) => element.querySelector(part).getBoundingClientRect());
+  return legend.bottom <= plot.top + 1 && legend.top >= element.getBoundingClientRect().top - 1;
+}"""
+#: What the plan shows from south to north.
+PLAN_RANGES = "document.getElementById('plan')._fullLayout.yaxis.range"
 #: Whether every chart is as wide as its place.
 FILLED = """() => page.panels.every(({ id }) => {
   const element = document.getElementById(id);
@@ -162,6 +171,18 @@ def default_run(glider, tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
+def reckoned_run(glider, tmp_path_factory):
+    """Folder of a run of an hour that reckons its place, with three surfacings."""
+    folder = tmp_path_factory.mktemp('report') / 'reckoned'
+    fields = ('navigation.method=dead_reckoned', 'profile.depth_m=100', 'profile.wait_s=200')
+    changes = (*fields, 'profile.surface_every_dives=1', 'sensors.gps_first_fix_s=30')
+    options = (f'--set={change}' for change in changes)
+    done = glider('run', '--engine', 'direct', '--duration', 3600, '--out', folder, *options)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope='module')
 def pid_run(glider, tmp_path_factory):
     """The same by the PID law, cut short."""
     folder = tmp_path_factory.mktemp('report') / 'pid'
@@ -188,7 +209,8 @@ def check_drawn(panels):
         assert panel['width'] == pytest.approx(panel['place'], abs=1.0), 'it fills its place'
         drawn = [trace for trace in panel['traces'] if len(finite(trace['y'])) > 1]
         assert drawn, panel['id']
-        assert panel['lines'] >= len(drawn) - (panel['kind'] == 'track'), panel['id']
+        markers = {'track': 1, 'plan': 3}.get(panel['kind'], 0)
+        assert panel['lines'] >= len(drawn) - markers, panel['id']
         for trace in panel['traces']:
             assert len(trace['x']) == len(trace['y']), (panel['id'], trace['name'])
             assert trace['name'] in SOMETIMES or finite(trace['y']), (panel['id'], trace['name'])
@@ -309,6 +331,50 @@ def test_report_of_a_run_over_nodes_in_a_narrow_dark_window(browser, over_nodes)
     ink = page.evaluate("document.getElementById('depth')._fullLayout.font.color")
     assert int(ink[1:3], 16) > 0xC0, 'light ink on a dark page'
     assert (said, len(asked)) == ([], 1)
+    page.close()
+
+
+@pytest.mark.parametrize(('width', 'scheme'), [(1400, 'light'), (390, 'dark')])
+def test_report_of_a_run_that_reckons_its_place(browser, reckoned_run, width, scheme):
+    page, said, asked = open_page(
+        *(browser, reckoned_run / 'report.html'),
+        viewport={'width': width, 'height': 900},
+        color_scheme=scheme,
+    )
+    panels = page.evaluate(DRAWN)
+    check_drawn(panels)
+    assert page.evaluate('document.documentElement.scrollWidth') == width, 'nothing sticks out'
+    assert {'plan', 'believed_cross_track', 'place_error'} < {panel['id'] for panel in panels}
+    reports = json.loads((reckoned_run / 'score.json').read_text())['navigation']['reports']
+    (plan,) = (panel for panel in panels if panel['kind'] == 'plan')
+    drawn = {trace['name']: trace for trace in plan['traces']}
+    shown = drawn['true place at surfacing']
+    assert shown['y'] == pytest.approx([one['true_ned_m'][0] / 1e3 for one in reports])
+    assert shown['x'] == pytest.approx([one['true_ned_m'][1] / 1e3 for one in reports])
+    ring = [[]]
+    for point in zip(*(drawn['95 % ellipse of the believed place'][i] for i in 'yx'), strict=True):
+        ring[-1].append(point) if point[0] is not None else ring.append([])
+    for one, points in zip(reports, ring, strict=False):
+        nn, ne, ee = one['covariance_m2']
+        for north, east in points:
+            n, e = 1e3 * north - one['believed_ned_m'][0], 1e3 * east - one['believed_ned_m'][1]
+            off = (ee * n * n - 2.0 * ne * n * e + nn * e * e) / (nn * ee - ne * ne)
+            assert off == pytest.approx(5.991, rel=1e-3)
+    assert page.locator('.many tbody tr').count() == len(reports)
+    assert page.evaluate(LEGEND_IS_APART, 'plan')
+    assert (said, len(asked)) == ([], 1)
+    page.close()
+
+
+def test_plan_follows_the_zoom(browser, reckoned_run):
+    page, said, _ = open_page(browser, reckoned_run / 'report.html')
+    wide = page.evaluate(PLAN_RANGES)
+    drag(page, 'place_error', 0.4, 0.6)
+    page.wait_for_function("document.getElementById('whole').disabled === false")
+    page.wait_for_function(IS_READY)
+    near = page.evaluate(PLAN_RANGES)
+    assert near[1] - near[0] < 0.6 * 1e3 * (wide[1] - wide[0]), 'now in metres'
+    assert said == []
     page.close()
 
 

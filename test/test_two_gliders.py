@@ -15,7 +15,7 @@ from rclpy.serialization import deserialize_message
 
 from glider_bringup.engines.processes import node_environment
 from glider_model.ros.places import domain_id
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.topics import recorded_topics
 
 GLIDER = [sys.executable, '-m', 'glider_bringup.cli']
 DEADLINE_S = 300.0
@@ -23,7 +23,9 @@ DURATION_S = 1000
 FLOWN_BYTES = 300_000  #: of recording: several chunks are on disk
 #: Scenario by namespace.
 GLIDERS = {'alpha': 'rough_water', 'beta': 'current_8deg'}
-PER_TICK = [topic.name.strip('/') for topic in TOPICS.values() if topic.per_tick]
+PER_TICK = [
+    topic.name.strip('/') for topic in recorded_topics(['measured_odom']) if topic.per_tick
+]
 
 
 def start(domain: int, scenario: str, out: Path, *options) -> subprocess.Popen:

@@ -1,9 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""A vehicle from outside on a bad line, flown by free-running guidance and control.
+"""A vehicle from outside on a bad line, flown by free-running nodes, or by the autopilot.
 
-The stand-in of examples/ is a process of its own, with its own clock, four times as fast as real
-time. Its line delays, loses and, for three seconds, is silent.
+It publishes odom itself, or what its sensors take, for navigation. The stand-in of examples/ is a
+process of its own, with its own clock, four times as fast as real time. Its line delays, loses
+and, for three seconds, is silent.
 """
 
 import subprocess
@@ -28,9 +29,15 @@ from std_srvs.srv import Trigger
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.engines.processes import node_commands, node_environment
+from glider_bringup.engines.processes import (
+    AUTOPILOT,
+    ON_BOARD,
+    node_commands,
+    node_environment,
+)
 from glider_bringup.mission.scenario import load_scenario
 from glider_model.base.signals import TICK_S
+from glider_model.base.wiring import NAVIGATION
 from glider_model.ros.lockstep import health
 from glider_model.ros.places import domain_id
 from glider_model.ros.wire import qos
@@ -43,6 +50,14 @@ SPEED, LOSS = 4.0, 0.05
 START_S, SILENCE_S, CHANGE_S, ABORT_S, END_S = 1000.0, 40.0, 65.0, 80.0, 95.0
 SILENT_S, MAX_AGE_S = 3.0, 2.0
 FLIGHT = {'profile.prepare_s': 0.0}
+#: What a vehicle that does not know its place has in its scenario beside that.
+RECKONED = {
+    **{'navigation.method': 'dead_reckoned'},
+    **{'sensors.imu_period_s': 4.0, 'sensors.gyro': False},
+}
+#: How far odom may be from the truth (m), horizontally and in depth: navigation knows neither the
+#: current, 4 m until the abort, nor the 0.5 m/s of the first 20 s, when it has too few samples.
+OFF_M = (15.0, 1.0)
 #: How the stand-in begins.
 GLIDING = {'heading_deg': 30.0, 'pitch_deg': -30.0, 'speed_mps': 0.5, 'net_heaviness_kg': 0.4}
 SAFE = {'buoyancy_engine': -1.0, 'pitch_mass': -0.06, 'roll_mass': 0.0}
@@ -72,10 +87,13 @@ class Watch:
         self.executor = SingleThreadedExecutor(context=context)
         self.executor.add_node(self.node)
         self.odom, self.errors, self.commands, self.told, self.ready = [], [], [], [], set()
+        self.joints, self.truth = [], []
         for kind, name, keep in (
             (Odometry, 'odom', self.odom.append),
             (Vector3Stamped, 'tracking_error', self.errors.append),
+            (Odometry, 'ground_truth/odom', self.truth.append),
             (JointState, 'command', self.commands.append),
+            (JointState, 'joint_states', self.joints.append),
         ):
             self.node.create_subscription(kind, name, keep, 1000)
         self.node.create_subscription(
@@ -128,28 +146,49 @@ def options(**parameters) -> list[str]:
     return [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
 
 
-@pytest.fixture(scope='module')
-def flight(tmp_path_factory) -> Watch:
+class Flown(NamedTuple):
+    """A flight, and whether the vehicle published odom itself."""
+
+    watch: Watch
+    navigates: bool
+
+
+def commands_on_board(file: Path, navigates: bool, autopilot: bool) -> list[list[str]]:
+    """What is started on board."""
+    commands = node_commands(file, autopilot=autopilot)
+    parts = [wired for wired in ON_BOARD if not (navigates and wired == NAVIGATION)]
+    if not autopilot:
+        return [commands[wired.node] for wired in parts]
+    python, _, module, *ros = commands[AUTOPILOT]
+    return [[python, '-m', module, *(wired.name for wired in parts), *ros]]
+
+
+@pytest.fixture(
+    scope='module',
+    params=[(True, False), (True, True), (False, False), (False, True)],
+    ids=['odom', 'odom_autopilot', 'sensors', 'sensors_autopilot'],
+)
+def flown(request, tmp_path_factory) -> Flown:
     """The flight: a silence, a gain changed on the way, an abort."""
+    navigates, autopilot = request.param
     file = tmp_path_factory.mktemp('free') / 'parameters.yaml'
-    scenario = load_scenario('current_8deg', FLIGHT)
+    scenario = load_scenario('current_8deg', {**FLIGHT, **({} if navigates else RECKONED)})
     write_parameters(node_parameters(scenario, lockstep=False), file)
-    commands, context, processes = node_commands(file), Context(), []
+    nodes = {wired.node for wired in ON_BOARD if not (navigates and wired == NAVIGATION)}
+    context, processes = Context(), []
     faults = {'speed': SPEED, 'loss': LOSS, 'silence_at_s': SILENCE_S, 'silence_s': SILENT_S}
     with domain_id() as domain:
         environment = node_environment(domain)
         rclpy.init(context=context, domain_id=domain)
         watch = Watch(context)
         try:
-            for name in ('guidance_node', 'control_node'):
-                command = [
-                    *commands[name],
-                    *options(use_sim_time='true', input_max_age_s=MAX_AGE_S),
-                ]
-                processes.append(subprocess.Popen(command, env=environment))
-            watch.until(lambda: watch.ready == {'guidance_node', 'control_node'})
+            for command in commands_on_board(file, navigates, autopilot):
+                free = options(use_sim_time='true', input_max_age_s=MAX_AGE_S)
+                processes.append(subprocess.Popen([*command, *free], env=environment))
+            watch.until(lambda: watch.ready == nodes)
             stand_in = [sys.executable, STAND_IN, '--ros-args', '-r', '__ns:=/glider']
-            stand_in += options(**faults, duration_s=END_S, listeners=3)
+            stand_in += options(**faults, duration_s=END_S, listeners=5 if navigates else 6)
+            stand_in += options(navigates=str(navigates).lower())
             processes.append(subprocess.Popen(stand_in, env=environment))
             watch.until_s(CHANGE_S)
             gain = Parameter('adaptive.heading_kp_per_s', value=0.03)
@@ -159,16 +198,22 @@ def flight(tmp_path_factory) -> Watch:
             watch.until_s(ABORT_S)
             assert watch.call(Trigger, 'abort', Trigger.Request()).success
             watch.until(lambda: processes[-1].poll() is not None)
-            for process in processes[:2]:
+            for process in processes[:-1]:
                 process.terminate()
-            assert [process.wait(DEADLINE_S) for process in processes] == [0, 0, 0]
+            assert {process.wait(DEADLINE_S) for process in processes} == {0}
         finally:
             for process in processes:
                 process.kill()
             watch.executor.shutdown()
             watch.node.destroy_node()
             rclpy.try_shutdown(context=context)
-    return watch
+    return Flown(watch, navigates)
+
+
+@pytest.fixture
+def flight(flown) -> Watch:
+    """What passed between nodes and vehicle."""
+    return flown.watch
 
 
 def undisturbed() -> np.ndarray:
@@ -187,24 +232,39 @@ def undisturbed() -> np.ndarray:
     return np.concatenate([block.copy() for block in fly_blocks(*mission_of(scenario))])
 
 
-def test_track_and_depth_are_nearly_those_of_a_perfect_line(flight):
-    """It begins 30 deg off its course, and has to turn through it to come back to its path."""
-    ideal = undisturbed()
-    codec = TOPICS['odom'].codec
-    flown = {
-        round(stamp_s(message) / TICK_S): codec.decode(to_cdr(message))[1]
-        for message in flight.odom
+def odometry_of(messages) -> dict[int, tuple[float, ...]]:
+    """Numbers of odometry until the abort, by tick."""
+    decode = TOPICS['odom'].codec.decode
+    return {
+        round(stamp_s(message) / TICK_S): decode(to_cdr(message))[1]
+        for message in messages
         if 1.0 < stamp_s(message) < ABORT_S
     }
-    assert len(flown) > 0.8 * ABORT_S / TICK_S
-    apart_m = [np.abs(np.array(flown[k][:3]) - ideal[k, :3]) for k in flown]
+
+
+def test_track_and_depth_are_nearly_those_of_a_perfect_line(flown):
+    """It begins 30 deg off its course, and has to turn through it to come back to its path."""
+    if not flown.navigates:
+        pytest.skip('without odom from the start it surfaces until there is an attitude')
+    ideal, known = undisturbed(), odometry_of(flown.watch.odom)
+    assert len(known) > 0.8 * ABORT_S / TICK_S
+    apart_m = [np.abs(np.array(known[k][:3]) - ideal[k, :3]) for k in known]
     assert np.max(apart_m) < 1.0
+
+
+def test_odom_is_where_it_is(flown):
+    known, truth = odometry_of(flown.watch.odom), odometry_of(flown.watch.truth)
+    both = sorted(known.keys() & truth.keys())
+    assert len(both) > 0.5 * ABORT_S / TICK_S
+    off_m = np.abs([np.subtract(known[k][:3], truth[k][:3]) for k in both])
+    assert np.max(np.hypot(off_m[:, 0], off_m[:, 1])) < OFF_M[0]
+    assert np.max(off_m[:, 2]) < OFF_M[1]
 
 
 def test_line_was_as_bad_as_it_is_said_to_be(flight):
     gaps_s = [
         stamp_s(after) - stamp_s(before)
-        for before, after in zip(flight.odom[:-1], flight.odom[1:], strict=True)
+        for before, after in zip(flight.joints[:-1], flight.joints[1:], strict=True)
     ]
     assert max(gaps_s) == pytest.approx(SILENT_S, abs=0.35)
     lost = sum(round(gap_s / 0.1) - 1 for gap_s in gaps_s if 0.15 < gap_s < 1.0)

@@ -29,6 +29,7 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
+            'autopilot = glider_bringup.nodes.autopilot:main',
             'recorder_node = glider_bringup.nodes.recorder_node:main',
             'viewer_node = glider_bringup.nodes.viewer_node:main',
             'glider = glider_bringup.cli:main',

@@ -7,8 +7,9 @@ from glider_guidance.block import GUIDANCE
 from glider_model.base.wiring import FIELDS, WIRING
 from glider_model.ocean.current_block import CURRENT
 from glider_model.plant.block import PLANT
+from glider_navigation.block import NAVIGATION
 
-BLOCKS = (PLANT, CURRENT, GUIDANCE, CONTROL)
+BLOCKS = (PLANT, CURRENT, NAVIGATION, GUIDANCE, CONTROL)
 
 
 def _columns() -> dict[str, slice | int]:

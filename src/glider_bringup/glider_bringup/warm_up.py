@@ -61,7 +61,7 @@ def verify_one_tick() -> None:
         fly_recorded(scenario, folder)
         bag = Bag(folder)
         told = read_told(bag, folder, None, Path(scratch))
-        recording = Recording(bag, None, lambda share: None)
+        recording = Recording(bag, None, lambda share: None, told.steers_by)
         list(verify(recording, told, [], lambda what, share: None))
 
 

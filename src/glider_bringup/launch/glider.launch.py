@@ -57,6 +57,7 @@ def node_action(node: LaunchedNode, plan: LaunchPlan) -> Node:
     return Node(
         package=node.package,
         executable=node.executable,
+        arguments=node.words,
         namespace=plan.namespace,
         remappings=plan.remappings,
         parameters=[plan.parameters_file],

@@ -40,8 +40,11 @@ TICKS = 2 * CHUNK_TICKS + 40
 
 def numbers(topic, ticks: int) -> np.ndarray:
     """A row of recognisable numbers for each tick."""
-    width = len(topic.codec.fields)
-    return np.arange(ticks)[:, None] + np.arange(width)[None, :] / 16.0
+    fields = topic.codec.fields
+    rows = np.arange(ticks)[:, None] + np.arange(len(fields))[None, :] / 16.0
+    integers = [field == 'status.status' for field in fields]
+    rows[:, integers] = np.floor(rows[:, integers] % 100.0)
+    return rows
 
 
 def write_one_by_one(folder, ticks=TICKS, close=True, attachments=()):
@@ -155,9 +158,12 @@ def test_metadata_has_the_shape_of_jazzy(folder):
     assert information['duration'] == {'nanoseconds': (TICKS - 1) * TICK_NS}
     assert information['message_count'] == TICKS * len(PER_TICK)
     assert information['relative_file_paths'] == ['run_0.mcap']
-    odom = information['topics_with_message_count'][1]
+    (odom,) = (
+        topic
+        for topic in information['topics_with_message_count']
+        if topic['topic_metadata']['name'] == '/glider/odom'
+    )
     assert odom['message_count'] == TICKS
-    assert odom['topic_metadata']['name'] == '/glider/odom'
     assert odom['topic_metadata']['type_description_hash'].startswith('RIHS01_')
     qos = odom['topic_metadata']['offered_qos_profiles'][0]
     assert (qos['history'], qos['reliability']) == ('keep_last', 'reliable')
@@ -278,6 +284,30 @@ def test_rows_end_at_the_first_gap_of_what_is_scored(tmp_path, monkeypatch, bloc
     assert rows[:, COLUMNS['odom'].start].tolist() == list(range(50))
     learnt = rows[:, COLUMNS['adaptation'].start]
     assert np.flatnonzero(np.isnan(learnt)).tolist() == [20]
+
+
+@pytest.mark.parametrize('is_registered', [True, False])
+def test_rows_are_whole_where_nobody_tells_the_truth(tmp_path, is_registered):
+    """As at sea, and as before there was navigation; that topic alone may lack, in all ticks."""
+    names = [name for name in SCORED if is_registered or name != 'ground_truth/odom']
+    bag = BagWriter(tmp_path, 'sea', topics=[TOPICS[name] for name in names])
+    for tick in range(30):
+        for name in SCORED[1:]:
+            codec = TOPICS[name].codec
+            row = np.full(len(codec.fields), float(tick))
+            bag.write(name, tick * TICK_NS, codec.encode(tick * TICK_NS, row))
+    bag.close()
+    rows = np.concatenate([block.copy() for block in RecordedLog(Bag(tmp_path)).blocks()])
+    assert rows[:, COLUMNS['odom'].start].tolist() == list(range(30))
+    assert np.all(np.isnan(rows[:, COLUMNS['ground_truth/odom']]))
+
+
+def test_rows_end_where_the_truth_is_not_told_any_more(tmp_path):
+    write_with_gaps(tmp_path, range(100), {('ground_truth/odom', 50)})
+    log = RecordedLog(Bag(tmp_path))
+    rows = np.concatenate([block.copy() for block in log.blocks()])
+    assert len(rows) == 50
+    assert 'tick 50 (t = 5.0 s) lacks ground_truth/odom: not recorded' in log.missing(100)
 
 
 def test_rows_are_whole_where_a_recorder_from_outside_mixed_up_ticks(tmp_path, monkeypatch):

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Loops of a law and a method: what they are compiled for, and when studies have it done."""
+"""Loops of a law, a method and a way to navigate: what they are compiled for, and when."""
 
 import numba
 import pytest
@@ -17,14 +17,23 @@ def types_of(scenario):
     return tuple(numba.typeof(one) for one in mission_of(scenario))
 
 
-def test_loop_depends_on_law_and_method_alone():
+def test_loop_depends_on_law_and_methods_alone():
     """Else something is compiled of which nobody is told."""
-    chosen = [('adaptive', 'observer'), ('pid', 'observer'), ('pid', 'paper')]
+    chosen = [
+        ('adaptive', 'observer', 'known'),
+        ('pid', 'observer', 'dead_reckoned'),
+        ('pid', 'paper', 'known'),
+        ('pid', 'paper', 'dead_reckoned'),
+    ]
     found = set()
-    for law, method in chosen:
-        changes = {'control.law': law, 'guidance.los.method': method}
+    for law, method, navigation in chosen:
+        changes = {
+            'control.law': law,
+            'guidance.los.method': method,
+            'navigation.method': navigation,
+        }
         scenarios = [load_scenario(name, changes) for name in scenario_names()]
-        assert {combination_of(one) for one in scenarios} == {(law, method)}
+        assert {combination_of(one) for one in scenarios} == {(law, method, navigation)}
         (types,) = {types_of(one) for one in scenarios}
         found.add(types)
     assert len(found) == len(chosen)

@@ -226,7 +226,10 @@ def test_score_file_does_not_stand_on_ticks_that_are_absent(run):
         assert again['reason'].startswith('600 of 77,000 ticks are there')
 
 
-@pytest.mark.parametrize(('topic', 'why'), [('odom', 'is not finite'), ('wrench', '')])
+@pytest.mark.parametrize(
+    ('topic', 'why'),
+    [('odom', 'is not finite'), ('ground_truth/odom', 'is not finite'), ('wrench', '')],
+)
 def test_number_that_is_none_ends_the_rows_where_it_is_scored(tmp_path, topic, why):
     """What a node refuses, the reader must not trip over, nor score."""
     folder = make_run_folder(load_scenario('helix'), tmp_path / 'flight')
@@ -244,7 +247,7 @@ def test_number_that_is_none_ends_the_rows_where_it_is_scored(tmp_path, topic, w
     json.dumps(card, allow_nan=False)
     if why:
         assert (card['status'], card['ticks']) == ('aborted', 2)
-        assert '2 of 3 ticks are there; tick 2 (t = 0.2 s) lacks odom: ' in card['reason']
+        assert f'2 of 3 ticks are there; tick 2 (t = 0.2 s) lacks {topic}: ' in card['reason']
         assert card['reason'].endswith(why)
     else:
         assert (card['status'], card['ticks']) == ('completed', 3)
@@ -331,6 +334,7 @@ def test_bag_recorded_at_1980cb2_is_scored_shown_verified_and_replayed(tmp_path,
     told = read_told(bag, file, None, tmp_path)
     recording = Recording(bag, None, lambda share: None)
     verdicts = list(verify(recording, told, [], lambda name, share: None))
-    assert [one.ticks for one in verdicts] == [30, 30, 30, 30]
+    assert [one.ticks for one in verdicts] == [30, 30, 0, 30, 30]
+    assert verdicts[2].reason == 'recorded before there was this block'
     messages, _ = bags.COMMANDS['replay'](tmp_path)
     assert len(messages) == 304

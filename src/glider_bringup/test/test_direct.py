@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
-from glider_bringup.engines.direct import MissionParams, MissionState, fly, fly_blocks
+from glider_bringup.engines.direct import fly, fly_blocks
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
 from glider_model.base.signals import TICK_S
 
@@ -25,22 +26,14 @@ SHALLOW = {
     'control.law': 'pid',
 }
 ANGLES = slice(3, 7)
+UP = COLUMNS['ground_truth/odom'].start + 2
 
 
 def mission(name, **changes):
     """State at tick 0 and parameters; ``__`` in a field's name stands for its dot."""
     fields = {field.replace('__', '.'): value for field, value in changes.items()}
     scenario = load_scenario(name, {**SHALLOW, **fields})
-    blocks = (
-        scenario.plant_settings(),
-        scenario.current_settings(),
-        scenario.guidance_settings(),
-        scenario.control_settings(),
-    )
-    return (
-        MissionState(*(block.initial_state() for block in blocks)),
-        MissionParams(*(block.params() for block in blocks)),
-    )
+    return mission_of(scenario)
 
 
 def flown(state, params, block_ticks=BLOCK_TICKS):
@@ -162,7 +155,7 @@ def test_mirrored_current_mirrors_the_flight(method):
     heading = yaw(starboard) - math.pi / 2.0
     assert yaw(port) - math.pi / 2.0 == pytest.approx(-heading, abs=1e-6)
     mass = column(starboard, 'command')
-    assert column(port, 'command') == pytest.approx(mass * [1.0, 1.0, -1.0], abs=1e-6)
+    assert column(port, 'command') == pytest.approx(mass * [1.0, 1.0, -1.0, 1.0], abs=1e-6)
 
 
 @pytest.mark.parametrize('course_deg', [90.0, 180.0, 225.0])
@@ -172,7 +165,7 @@ def test_turned_world_gives_the_same_flight(course_deg):
     north, turned = flown(*mission('current_8deg')), flown(*mission('current_8deg', **changes))
     for name, tolerance in (('tracking_error', 1e-3), ('command', 1e-5), ('joint_states', 1e-5)):
         assert column(turned, name) == pytest.approx(column(north, name), abs=tolerance), name
-    assert turned[:, 2] == pytest.approx(north[:, 2], abs=1e-3)
+    assert turned[:, UP] == pytest.approx(north[:, UP], abs=1e-3)
 
 
 def test_still_vehicle_drifts_with_the_current():
@@ -195,7 +188,7 @@ def test_still_vehicle_drifts_with_the_current():
 def test_steady_glide_sinks_as_the_polar_says():
     """After 500 s of a deep dive, against the polar of guidance: 2 % of the vertical rate."""
     log = flown(*mission('current_8deg', profile__depth_m=1000.0))
-    descent = -(log[-1, 2] - log[9000, 2]) / (TICK_S * (len(log) - 1 - 9000))
+    descent = -(log[-1, UP] - log[9000, UP]) / (TICK_S * (len(log) - 1 - 9000))
     assert descent == pytest.approx(-log[-1, COLUMNS['reference']][9], rel=0.02)
 
 
@@ -213,7 +206,8 @@ def test_actuators_go_no_faster_than_they_can(rough):
     _, params = mission('rough_water')
     vehicle = params.plant.vehicle
     rates = np.abs(np.diff(column(rough, 'joint_states'), axis=0)) / TICK_S
-    assert np.all(rates <= np.array([vehicle.m_b_rate, vehicle.x_p_rate, vehicle.mu_rate]) + 1e-9)
+    most = np.array([vehicle.m_b_rate, vehicle.x_p_rate, vehicle.mu_rate, 0.0])
+    assert np.all(rates <= most + 1e-9)
 
 
 def test_position_is_the_integral_of_the_velocity():
@@ -231,7 +225,7 @@ def test_position_is_the_integral_of_the_velocity():
 
 def test_mission_of_one_dive_ends_by_itself_at_the_surface():
     log = flown(*mission('current_8deg', dives=1, duration_s=20000.0))
-    depth = -log[:, 2]
+    depth = -log[:, UP]
     assert len(log) * TICK_S < 3000.0
     assert np.max(depth) == pytest.approx(60.0, abs=3.0)
     assert np.all(depth[-600:] < 1.5)

@@ -23,6 +23,7 @@ from glider_control.watch import (
 )
 from glider_guidance.guidance import guidance_abort, guidance_step
 from glider_guidance.yo.stage import GLIDING_DOWN, GLIDING_UP, INFLECTING_UP
+from glider_model.base import wiring
 from glider_model.base.frames import (
     odometry_from_wire,
     reference_from_wire,
@@ -31,14 +32,21 @@ from glider_model.base.frames import (
     water_to_wire,
 )
 from glider_model.base.signals import TICK_S
+from glider_model.base.wiring import at_rest
 from glider_model.ocean.current import current_step
 from glider_model.plant.block import plant_outputs
-from glider_model.plant.plant import plant_step
+from glider_model.plant.plant import plant_odometry, plant_step
+from glider_navigation.block import navigation_tick
 
 #: One dive to 250 m, with both turns; in a cross current, so that the track has to be held.
 FLIGHT = {'dives': 0, 'duration_s': 3600.0, 'profile.depth_m': 250.0, 'profile.prepare_s': 0.0}
 TICKS = 36000
 E2, COMMAND = COLUMNS['tracking_error'].start + 1, COLUMNS['command']
+UP = COLUMNS['ground_truth/odom'].start + 2
+#: Place of measured_odom among the numbers of the plant, which do not include those of /clock.
+MEASURED = wiring.PLANT.outputs.index('measured_odom') - 1
+#: What navigation hears beside it.
+SILENT = tuple(at_rest(topic) for topic in wiring.NAVIGATION.inputs[2:])
 
 #: On the wire: position 0:3, quaternion 3:7, velocity 7:10, rates 10:13.
 WILD = {
@@ -55,9 +63,9 @@ WILD = {
 
 
 def measured(plant, params) -> tuple[float, ...]:
-    """Odometry on the wire."""
-    (odom, _), _ = plant_outputs(plant, params)
-    return odom
+    """What the plant measures: odometry on the wire."""
+    outputs, _ = plant_outputs(plant, params)
+    return outputs[MEASURED]
 
 
 def still(state: MissionState, params):
@@ -77,12 +85,13 @@ PHASES = {'dive': GLIDING_DOWN, 'turn': INFLECTING_UP, 'climb': GLIDING_UP}
 
 
 def tick(state: MissionState, params, corrupt) -> tuple[MissionState, int]:
-    """One tick as in `fly`, with what ``corrupt`` makes of the odometry; the saturation mask."""
-    plant, current, guidance, control = state
-    wire = measured(plant, params.plant)
-    true = odometry_from_wire(wire)
-    current, water = current_step(current, true[:3], plant.tick * TICK_S, params.current, TICK_S)
-    seen = odometry_from_wire(tuple(corrupt(wire)))
+    """One tick as in `fly`, with what ``corrupt`` makes of a measurement; the saturation mask."""
+    plant, current, navigation, guidance, control = state
+    t_s, true = plant.tick * TICK_S, plant_odometry(plant)
+    current, water = current_step(current, true[:3], t_s, params.current, TICK_S)
+    heard = (tuple(plant.joints), tuple(corrupt(measured(plant, params.plant))), *SILENT)
+    navigation, believed, _ = navigation_tick(navigation, t_s, heard, params.navigation, TICK_S)
+    seen = odometry_from_wire(believed[0])
     guidance, guided = guidance_step(guidance, seen, params.guidance, TICK_S)
     reference = reference_from_wire(reference_to_wire(guided.reference))
     control, controlled = control_step(
@@ -90,7 +99,7 @@ def tick(state: MissionState, params, corrupt) -> tuple[MissionState, int]:
     )
     water = water_from_wire(water_to_wire(water))
     plant = plant_step(plant, controlled.command, water, params.plant, TICK_S)
-    return MissionState(plant, current, guidance, control), controlled.saturation
+    return MissionState(plant, current, navigation, guidance, control), controlled.saturation
 
 
 def flown(state: MissionState, params, ticks: int) -> tuple[MissionState, np.ndarray]:
@@ -139,7 +148,7 @@ def in_dive(law: str = 'adaptive', depth_m: float = 120.0, **changes):
     """A mission on its way down."""
     scenario = load_scenario('current_12deg', {**FLIGHT, 'control.law': law, **changes})
     state, params = mission_of(scenario)
-    at = int(np.flatnonzero(-clean(law)[:, 2] > depth_m)[0])
+    at = int(np.flatnonzero(-clean(law)[:, UP] > depth_m)[0])
     return flown(state, params, at)[0], params
 
 
@@ -181,10 +190,10 @@ def test_an_abort_uses_the_whole_pump_and_surfaces_with_a_leak():
     params = params._replace(plant=params.plant._replace(vehicle=leaky))
     state = state._replace(guidance=guidance_abort(state.guidance))
     state, log = flown(state, params, 20000)
-    assert np.all(log[0, COMMAND] == (-1.0, -0.06, 0.0))
+    assert np.all(log[0, COMMAND] == (-1.0, -0.06, 0.0, 0.0))
     assert np.all(log[:, COMMAND] == log[0, COMMAND])
-    assert np.max(-log[:, 2]) < 300.0  # 1.4 kg at 4 g/s take six minutes
-    assert -log[-1, 2] < 1.0
+    assert np.max(-log[:, UP]) < 300.0  # 1.4 kg at 4 g/s take six minutes
+    assert -log[-1, UP] < 1.0
 
 
 def test_a_heavy_vehicle_turns_by_itself():
@@ -192,8 +201,8 @@ def test_a_heavy_vehicle_turns_by_itself():
     changes = {'profile.depth_m': 200.0, 'perturb.net_heaviness_kg': 0.5, 'duration_s': 8000.0}
     state, params = mission_of(load_scenario('current_8deg', changes))
     _, log = flown(state, params, 80000)
-    assert np.max(-log[:, 2]) < 320.0
-    assert -log[-1, 2] < 1.0
+    assert np.max(-log[:, UP]) < 320.0
+    assert -log[-1, UP] < 1.0
 
 
 def test_a_vehicle_below_its_rating_surfaces_and_says_so():
@@ -206,7 +215,7 @@ def test_a_vehicle_below_its_rating_surfaces_and_says_so():
     }
     state, params = mission_of(load_scenario('current_8deg', changes))
     _, log = flown(state, params, 40000)
-    mask, depth = log[:, COLUMNS['saturation']].astype(int), -log[:, 2]
+    mask, depth = log[:, COLUMNS['saturation']].astype(int), -log[:, UP]
     first = int(np.flatnonzero(mask & TOO_DEEP)[0])
     assert depth[first] == pytest.approx(1050.0, abs=1.0)
     assert np.all(log[first:, COMMAND] == params.control.safe_command)

@@ -86,12 +86,61 @@ def test_free_running(tmp_path):
     assert not any(entry['lockstep'] for entry in parameters(plan).values())
 
 
+def test_autopilot_takes_the_place_of_its_nodes(tmp_path):
+    plan = plan_launch({'autopilot': 'true'}, tmp_path)
+    assert plan.nodes == (
+        LaunchedNode('glider_bringup', 'autopilot'),
+        LaunchedNode('glider_model', 'current_node'),
+        LaunchedNode('glider_model', 'plant_node'),
+    )
+    assert {'/glider/navigation_node', '/glider/guidance_node', '/glider/control_node'} < set(
+        parameters(plan)
+    )
+
+
 def test_vehicle_of_ones_own_has_guidance_and_control_alone(tmp_path):
     arguments = {'simulate': 'false', 'lockstep': 'false', 'record': str(tmp_path / 'flight')}
     plan = plan_launch(arguments, tmp_path)
     names = {node.executable for node in plan.nodes}
     assert names == {'guidance_node', 'control_node', RECORDER}
     assert not any(entry['lockstep'] for entry in parameters(plan).values())
+
+
+@pytest.mark.parametrize(
+    ('navigation', 'method', 'nodes'),
+    [
+        ('auto', 'known', []),
+        ('auto', 'dead_reckoned', ['navigation_node']),
+        ('true', 'known', ['navigation_node']),
+        ('false', 'dead_reckoned', []),
+    ],
+)
+def test_navigation_of_a_vehicle_can_be_left_out(tmp_path, navigation, method, nodes):
+    scenario = tmp_path / 'mine.yaml'
+    scenario.write_text(f'navigation: {{method: {method}}}\n')
+    arguments = {
+        **{'simulate': 'false', 'lockstep': 'false'},
+        **{'scenario': str(scenario), 'navigation': navigation},
+    }
+    plan = plan_launch(arguments, tmp_path)
+    assert [node.executable for node in plan.nodes] == [*nodes, 'guidance_node', 'control_node']
+    (autopilot,) = plan_launch({**arguments, 'autopilot': 'true'}, tmp_path).nodes
+    assert autopilot.executable == 'autopilot'
+    assert autopilot.words == (() if nodes else ('guidance', 'control'))
+
+
+def test_vehicle_that_does_not_know_its_place_has_navigation_too(tmp_path):
+    scenario = tmp_path / 'reckoned.yaml'
+    scenario.write_text('navigation: {method: dead_reckoned}\n')
+    arguments = {'simulate': 'false', 'lockstep': 'false', 'record': str(tmp_path / 'flight')}
+    plan = plan_launch({**arguments, 'scenario': str(scenario)}, tmp_path)
+    names = {node.executable for node in plan.nodes}
+    assert names == {'navigation_node', 'guidance_node', 'control_node', RECORDER}
+    recorded = yaml.safe_load(parameters(plan)[f'/glider/{RECORDER}']['topics'])
+    assert recorded == [
+        *('imu', 'pressure', 'fix'),
+        *('believed_current', 'believed_surface_current'),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -159,6 +208,7 @@ def test_recording_adds_the_recorder_and_makes_a_run_folder(tmp_path):
         ({'speed': 'nan'}, ['speed:=nan', 'max']),
         ({'speed': '2', 'lockstep': 'false'}, ['speed:=2', '1.0 with lockstep:=false']),
         ({'simulate': 'false'}, ['lockstep:=true', 'false with simulate:=false']),
+        ({'navigation': 'false'}, ['navigation:=false', 'auto or true with simulate:=true']),
         ({'tf': 'true'}, ['tf:=true', 'tf2_msgs is not installed']),
         ({'duration': '-5'}, ['duration:=-5', '0.1 to 1e+08, or full']),
         ({'namespace': 'a b'}, ['namespace:=a b']),

@@ -25,9 +25,11 @@ from glider_model.ros.wire.codec import to_cdr
 from glider_model.ros.wire.topics import TOPICS
 
 LEVEL = (0.0, 0.0, -50.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
-INPUTS = {'odom': LEVEL, 'joint_states': (0.4, 0.0, 0.0), 'reference': LEVEL}
+#: Covariance of the place that navigation believes (m^2).
+CERTAIN = (1.0, 0.0, 0.0, 1.0)
+INPUTS = {'odom': (*LEVEL, *CERTAIN), 'joint_states': (0.4, 0.0, 0.0), 'reference': LEVEL}
 DEADLINE_S = 60.0
-SAFE = tuple(ControlSettings().params().safe_command)
+SAFE = tuple(ControlSettings().params().safe_command)[:3]  # as its messages have it
 
 
 @pytest.fixture
@@ -133,7 +135,7 @@ def test_lost_input_surfaces_the_vehicle_for_good(flight):
 def test_quaternion_that_is_none_is_bridged_counted_and_told(flight, factor):
     """Driver of a vehicle that has no attitude for some samples; then, for good, none at all."""
     vehicle = flight.vehicle
-    none = (*LEVEL[:3], *(factor * q for q in LEVEL[3:7]), *LEVEL[7:])
+    none = (*LEVEL[:3], *(factor * q for q in LEVEL[3:7]), *LEVEL[7:], *CERTAIN)
     vehicle.says = {**INPUTS, 'odom': none}
     flight.until(lambda: vehicle.said('refused, the last good one serves: a measurement'))
     vehicle.says = INPUTS
@@ -156,6 +158,6 @@ def test_frames_of_ned_are_refused_and_named(flight):
         return to_cdr(message)
 
     vehicle.change = in_ned
-    flight.until(lambda: vehicle.said("odom of plant_node: header.frame_id is 'map_ned'"))
+    flight.until(lambda: vehicle.said("odom of navigation_node: header.frame_id is 'map_ned'"))
     flight.until(lambda: vehicle.said('missing or stale: odom'))
     flight.until(lambda: vehicle.commands[-1] == SAFE)

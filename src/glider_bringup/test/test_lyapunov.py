@@ -19,7 +19,7 @@ import numba
 import numpy as np
 import pytest
 
-from glider_bringup.blocks import ROW
+from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
@@ -31,7 +31,7 @@ from glider_control.laws.adaptive import (
     SCALE_SIDE,
     SCALE_V2,
 )
-from glider_model.base.signals import TICK_S
+from glider_model.base.signals import TICK_S, Adaptation
 from glider_model.onboard.glide_polar import glide_speed
 from glider_model.vehicle.rigid_body import GRAVITY
 
@@ -44,6 +44,7 @@ UNKNOWN = {
     },
 }  # fmt: skip
 
+LYAPUNOV_2 = COLUMNS['adaptation'].start + Adaptation._fields.index('lyapunov_2')
 #: Columns of a recorded flight: W; then for roll and pitch each body rate (rad/s), K1bar (rad),
 #: K2bar (rad/s), the diagonal of J3, tau_a and Phi^T theta_hat (N m); J3 from q to roll.
 W, RATE, K1, K2, J3 = 0, [1, 7], [2, 8], [3, 9], [4, 10]
@@ -79,7 +80,7 @@ def record(state, params, out):
             + th_q[3] * pitch.rate.value / SCALE_PITCH_RATE
         )
         tau_p, tau_q = moments(joints.x_p, joints.mu, phi, theta, params.control.allocation)
-        out[tick, W] = log[0, 56]
+        out[tick, W] = log[0, LYAPUNOV_2]
         out[tick, 1:7] = (p, roll.k1, roll.k2, 1.0, tau_p, model_p)
         out[tick, 7:13] = (q, pitch.k1, pitch.k2, c_phi, tau_q, model_q)
         out[tick, CROSS] = s_phi * math.tan(theta)

@@ -26,6 +26,7 @@ from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.studies import montecarlo
 from glider_bringup.studies.montecarlo import (
+    NAVIGATION,
     RESULT_FILE,
     airframe,
     judge,
@@ -174,6 +175,7 @@ def scores(**changes):
         'heading_fluctuation_deg': {'rms_steady': 0.1, 'max_steady': 0.2},
         'final_state': {'position_ned_m': [1.0, 2.0, 3.0], 'attitude_rpy_rad': [0.0, 0.0, 0.0]},
         'infeasible': False,
+        'navigation': dict.fromkeys(NAVIGATION),
     }
     return {**good, **changes}
 
@@ -186,6 +188,7 @@ def test_a_good_run_has_not_diverged():
         'max_run_m': 9.0,
         'heading_fluctuation_deg': 0.1,
         'pitch_error_deg': 0.1,
+        'navigation': dict.fromkeys(NAVIGATION),
     }
 
 
@@ -380,18 +383,41 @@ def test_score_with_noise_is_that_of_the_true_motion(noisy_flight):
     assert final['attitude_rpy_rad'] == pytest.approx(list(attitude), abs=1e-12)
 
 
+def of_before_navigation(log):
+    """The log as its bag would be read if it told nothing but what was measured."""
+    old = log.copy()
+    old[:, COLUMNS['ground_truth/odom']] = np.nan
+    return old
+
+
+def test_the_truth_is_as_told_as_by_the_seed_of_the_noise(noisy_flight):
+    """The score of a bag that does not tell it is the same, to rounding."""
+    scenario, log, _ = noisy_flight
+    results = []
+    for rows in (log, of_before_navigation(log)):
+        scorer = Scorer(scenario.sensors.params(scenario.seed))
+        for block in (rows[:7000], rows[7000:]):
+            scorer.add(block)
+        results.append(scorer.result(Rules(60.0, 60.0)))
+    told, by_seed = results
+    for name in ('cross_track_m', 'pitch_error_deg', 'heading_fluctuation_deg', 'depth_m'):
+        assert by_seed[name] == pytest.approx(told[name], abs=1e-9), name
+    assert (by_seed['dives'], by_seed['ticks']) == (told['dives'], told['ticks'])
+
+
 def test_what_is_recorded_is_what_was_measured(noisy_flight):
     scenario, log, truth = noisy_flight
-    noise = log[:, [1, 0]] - truth[:, :2]
+    east = COLUMNS['odom'].start
+    noise = log[:, [east + 1, east]] - truth[:, :2]
     assert np.std(noise) == pytest.approx(1.0, rel=0.02)
     apparent = Scorer()
-    apparent.add(log)
+    apparent.add(of_before_navigation(log))
     assert apparent.result(Rules(60.0, 60.0))['depth_m']['max'] > np.max(truth[:, 2]) + 0.5
 
 
 def test_without_noise_the_seed_means_nothing_to_the_score(noisy_flight):
     _, log, _ = noisy_flight
-    results = []
+    log, results = of_before_navigation(log), []
     for sensors in (None, SensorSettings().params(1)):
         scorer = Scorer(sensors)
         scorer.add(log)

@@ -193,5 +193,5 @@ def test_a_long_bag_is_read_piece_by_piece(tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
     ticks, grown_mb = done.stdout.split()
     assert int(ticks) == 36000
-    payloads_mb = 3 * 36000 * 2360 / 1e6  # docs/scale.md, t
+    payloads_mb = 3 * 36000 * 3792 / 1e6  # docs/scale.md, t
     assert float(grown_mb) < 0.5 * payloads_mb

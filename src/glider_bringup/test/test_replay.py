@@ -30,10 +30,10 @@ from glider_bringup.recording.ros.republish import plan_replay, qos_of
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS
 from glider_model.ros.places import domain_id
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.topics import TOPICS, recorded_topics
 
 DEADLINE_S = 120.0
-RECORDED = {topic.full_name('/glider'): topic for topic in TOPICS.values() if topic.recorded}
+RECORDED = {topic.full_name('/glider'): topic for topic in recorded_topics(['measured_odom'])}
 
 
 @pytest.fixture

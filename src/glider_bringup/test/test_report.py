@@ -308,7 +308,8 @@ def test_pid_shows_nothing_learnt(tmp_path):
 def drift(log, speed_mps=1.0, from_s=100.0, depth_m=100.0):
     """The vehicle is carried off its path from some time on."""
     time_s = 0.1 * np.arange(len(log))
-    log[:, 2] = -depth_m
+    for name in ('ground_truth/odom', 'odom'):
+        log[:, COLUMNS[name].start + 2] = -depth_m
     log[:, E2] = speed_mps * np.clip(time_s - from_s, 0.0, None)
     return log
 

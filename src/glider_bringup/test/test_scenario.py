@@ -17,6 +17,7 @@ from glider_bringup.mission.scenario import (
     scenario_names,
 )
 from glider_model.base.settings import ConfigurationError
+from glider_model.onboard.gate import GateSettings
 from glider_model.vehicle.file import vehicle_path
 
 quick = settings(max_examples=30, deadline=None)
@@ -71,14 +72,9 @@ def test_shipped_scenario_loads_under_its_own_name(name):
 
 
 @every_scenario
-def test_shipped_scenario_makes_parameters_of_all_four_blocks(name):
+def test_shipped_scenario_makes_parameters_of_all_blocks(name):
     scenario = load_scenario(name)
-    for block in (
-        scenario.plant_settings(),
-        scenario.current_settings(),
-        scenario.guidance_settings(),
-        scenario.control_settings(),
-    ):
+    for block in scenario.block_settings():
         assert block.params() is not None
         assert block.initial_state() is not None
 
@@ -424,3 +420,46 @@ def test_load_does_not_change_a_scenario_loaded_before():
     plain = load_scenario('current_8deg')
     load_scenario('current_8deg', {'profile.depth_m': 50.0})
     assert load_scenario('current_8deg') == plain
+
+
+@pytest.mark.parametrize(
+    ('method', 'fitted', 'told'),
+    [
+        ('known', ['measured_odom'], []),
+        (
+            'dead_reckoned',
+            ['imu', 'pressure', 'fix'],
+            ['believed_current', 'believed_surface_current'],
+        ),
+    ],
+)
+def test_sensors_and_topics_follow_from_the_way_to_navigate(method, fitted, told):
+    scenario = load_scenario('current_8deg', {'navigation.method': method})
+    assert scenario.plant_settings().fitted == fitted
+    assert list(scenario.navigation.topics) == fitted + told
+
+
+@pytest.mark.parametrize('part', ['guidance', 'control'])
+def test_a_belief_may_jump_at_a_fix_unless_somebody_says_otherwise(part):
+    def jump_m(**changes):
+        scenario = load_scenario('current_8deg', changes)
+        return getattr(scenario, f'{part}_settings')().gate.position_jump_m
+
+    reckoned = {'navigation.method': 'dead_reckoned'}
+    assert jump_m() == GateSettings().position_jump_m == 100.0
+    assert jump_m(**reckoned) > 1e7
+    assert jump_m(**reckoned, **{f'{part}.gate.position_jump_m': 77.0}) == 77.0
+
+
+def test_navigation_is_told_of_vehicle_launch_and_sensors():
+    changes = {
+        'vehicle': 'seawing',
+        'initial.north_m': 12.0,
+        'initial.east_m': -7.0,
+        'sensors.imu_period_s': 4.0,
+        'sensors.gyro': False,
+        'origin.latitude_deg': -10.0,
+    }
+    told = load_scenario('current_8deg', changes).navigation_settings()
+    assert (told.vehicle, told.north_m, told.east_m) == ('seawing', 12.0, -7.0)
+    assert (told.imu_period_s, told.gyro, told.origin.latitude_deg) == (4.0, False, -10.0)

@@ -21,6 +21,9 @@ from glider_model.base.signals import TICK_S
 quick = settings(max_examples=20, deadline=None)
 
 TARGET_M = 1000.0
+#: Where the vehicle is, and where it believes it is.
+TRUTH = COLUMNS['ground_truth/odom']
+BELIEF = slice(COLUMNS['odom'].start, COLUMNS['odom'].start + 13)
 
 
 def wire_quaternion(theta, psi):
@@ -48,9 +51,10 @@ def make_log(t, **given):
         **given,
     }
     log = np.zeros((len(t), ROW))
-    odom, reference = log[:, COLUMNS['odom']], log[:, COLUMNS['reference']]
+    odom, reference = log[:, TRUTH], log[:, COLUMNS['reference']]
     odom[:, 0], odom[:, 1], odom[:, 2] = value['east'], value['north'], -value['depth']
     odom[:, 3:7] = wire_quaternion(value['theta'], value['psi'])
+    log[:, BELIEF] = log[:, TRUTH]
     reference[:, 0], reference[:, 1] = value['target_e'], value['target_n']
     reference[:, 3:7] = wire_quaternion(value['theta_ref'], value['psi_ref'])
     reference[:, 9] = -value['rate_ref']
@@ -76,6 +80,23 @@ def test_sinusoidal_error_has_its_rms_and_its_amplitude():
     assert track['rms_steady'] == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
     assert track['max_steady'] == pytest.approx(3.0, rel=1e-6)
     assert track['max_all'] == pytest.approx(3.0, rel=1e-6)
+
+
+@pytest.mark.parametrize('heading_deg', [0.0, 90.0, -120.0])
+def test_what_is_believed_is_not_what_is_scored(heading_deg):
+    """Believed on its path, and really 30 m to starboard of it and 10 m below."""
+    t, psi = ticks(2000.0), math.radians(heading_deg)
+    way = 0.5 * t
+    n, e = math.cos(psi), math.sin(psi)
+    place = {'north': n * way - 30.0 * e, 'east': e * way + 30.0 * n, 'depth': 510.0}
+    log = make_log(t, psi=psi, target_n=n * way, target_e=e * way, **place)
+    log[:, BELIEF.start : BELIEF.start + 3] = np.stack((e * way, n * way, -500.0 + 0 * t), axis=1)
+    result = score(log)
+    assert result['cross_track_m']['rms_steady'] == pytest.approx(30.0, abs=1e-9)
+    assert result['depth_m']['max'] == pytest.approx(510.0)
+    assert result['final_state']['position_ned_m'] == pytest.approx(
+        [place['north'][-1], place['east'][-1], 510.0]
+    )
 
 
 def test_negative_error_counts_like_a_positive_one():
@@ -269,7 +290,7 @@ def test_distance_is_the_way_of_the_target():
 
 def test_final_state_is_that_of_the_last_tick():
     log = make_log(ticks(10.0), north=3.0, east=4.0, depth=5.0, theta=-0.3, psi=2.0)
-    log[-1, COLUMNS['odom']][7:10] = 0.5, 0.02, -0.03
+    log[-1, TRUTH][7:10] = 0.5, 0.02, -0.03
     final = score(log)['final_state']
     assert final['position_ned_m'] == pytest.approx([3.0, 4.0, 5.0], abs=1e-12)
     assert final['attitude_rpy_rad'] == pytest.approx([0.0, -0.3, 2.0], abs=1e-9)

@@ -136,6 +136,8 @@ def numbers(card, before=''):
             continue
         if isinstance(value, dict):
             yield from numbers(value, f'{before}{name}_')
+        elif isinstance(value, list) and before == 'navigation_':
+            continue  # one of each surfacing
         elif not isinstance(value, str):
             yield before + name, value
 

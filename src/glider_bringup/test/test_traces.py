@@ -25,19 +25,22 @@ from glider_model.vehicle.file import load_vehicle
 quick = settings(max_examples=40, deadline=None)
 VEHICLE = load_vehicle('zhang2021').params()
 E2 = COLUMNS['tracking_error'].start + 1
+TRUTH = COLUMNS['ground_truth/odom']
 
 
 def make_log(ticks, **columns):
     """Level log of so many ticks; columns by index, such as ``c33=...``, set what differs."""
     log = np.zeros((ticks, ROW))
-    log[:, COLUMNS['odom'].start + 3] = log[:, COLUMNS['reference'].start + 3] = 1.0
+    for name in ('ground_truth/odom', 'odom', 'reference'):
+        log[:, COLUMNS[name].start + 3] = 1.0
     for name, values in columns.items():
         log[:, int(name[1:])] = values
     return log
 
 
 def trace(log, *cuts, vehicle=VEHICLE):
-    """Traces of a log that comes in blocks, cut at these rows."""
+    """Traces of a log that comes in blocks, cut at these rows; what is believed is true."""
+    log[:, TRUTH] = log[:, COLUMNS['odom'].start + np.arange(13)]
     tracer = Tracer(vehicle)
     for block in np.split(log, sorted(cuts)):
         tracer.add(block)
@@ -128,7 +131,8 @@ def test_memory_does_not_grow_with_the_run(monkeypatch):
 def test_samples_are_simultaneous_and_end_at_the_last_tick(few_buckets):
     """North and east of a vehicle that goes north-east: equal at every sample."""
     way = np.arange(1000.0)
-    kept = trace(make_log(1000, c0=way, c1=way), 333)
+    east = COLUMNS['odom'].start
+    kept = trace(make_log(1000, **{f'c{east}': way, f'c{east + 1}': way}), 333)
     north, east = kept.samples['track_north_m'], kept.samples['track_east_m']
     assert np.array_equal(north, east)
     assert (north[0], north[-1]) == (0.0, 999.0)

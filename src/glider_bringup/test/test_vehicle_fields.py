@@ -83,7 +83,7 @@ def test_folder_has_the_vehicle_as_flown(flown):
 def test_recording_of_a_changed_vehicle_verifies(flown):
     report = result('verify', flown[1], '--json')
     assert report['identical']
-    assert [block['result'] for block in report['blocks']] == ['identical'] * 4
+    assert [block['result'] for block in report['blocks']] == ['identical'] * 5
 
 
 def test_report_tells_what_is_not_as_in_the_file_of_the_vehicle(flown, tmp_path):

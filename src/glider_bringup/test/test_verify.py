@@ -31,9 +31,9 @@ from glider_bringup.recording.ros.verify.ticks import place_ticks
 from glider_bringup.recording.ros.verify.verdict import IDENTICAL
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.topics import TOPICS, recorded_topics
 
-PER_TICK = {t.full_name('/glider'): t for t in TOPICS.values() if t.per_tick}
+PER_TICK = {t.full_name('/glider'): t for t in recorded_topics(['measured_odom']) if t.per_tick}
 BLOCK_OF = {
     name: topic.publisher.removesuffix('_node')
     for name, topic in {**PER_TICK, '/glider/path': TOPICS['path']}.items()
@@ -247,24 +247,35 @@ def test_damage_to_an_input_leads_to_its_source(altered, recorded, tmp_path):
     at = recorded[place].data.index(b'base_link') + 16  # position, high bits of x
     messages[place] = messages[place]._replace(data=flip(recorded[place].data, 8 * at + 50))
     blocks = results(altered(messages), tmp_path)
-    assert blocks['plant']['differing'] == {'odom': 1}
+    assert blocks['navigation']['differing'] == {'odom': 1}
     assert blocks['guidance']['first']['tick'] == 500
     assert any('odom differs at t = 50.0 s' in note for note in blocks['guidance']['notes'])
 
 
-def test_input_that_is_not_finite_ends_what_can_be_computed(altered, recorded, tmp_path):
-    topic = PER_TICK['/glider/odom']
-    place = [i for i, m in enumerate(recorded) if m.topic == '/glider/odom'][300]
+@pytest.mark.parametrize(
+    ('name', 'source', 'readers'),
+    [
+        ('ground_truth/odom', 'plant', {'current'}),
+        ('measured_odom', 'plant', {'navigation'}),
+        ('odom', 'navigation', {'guidance', 'control'}),
+    ],
+)
+def test_input_that_is_not_finite_ends_what_can_be_computed(
+    altered, recorded, tmp_path, name, source, readers
+):
+    topic = PER_TICK[f'/glider/{name}']
+    place = [i for i, m in enumerate(recorded) if m.topic == f'/glider/{name}'][300]
     messages = list(recorded)
     numbers = list(topic.codec.decode(recorded[place].data)[1])
     numbers[2] = float('inf')
     raw = topic.codec.encode(300 * TICK_NS, numbers)
     messages[place] = messages[place]._replace(data=raw)
     blocks = results(altered(messages), tmp_path)
-    assert blocks['plant']['first']['field'] == 'pose.pose.position.z'
-    for name in ('current', 'guidance', 'control'):
-        assert (blocks[name]['first']['topic'], blocks[name]['first']['tick']) == ('odom', 300)
-        assert 'not finite' in blocks[name]['first']['recorded']
+    assert blocks[source]['first']['field'] == 'pose.pose.position.z'
+    assert different(blocks) == {source, *readers}
+    for reader in readers:
+        assert (blocks[reader]['first']['topic'], blocks[reader]['first']['tick']) == (name, 300)
+        assert 'not finite' in blocks[reader]['first']['recorded']
 
 
 @pytest.mark.parametrize('compression', list(CompressionType))
@@ -349,6 +360,7 @@ def test_blocks_without_their_inputs_are_skipped_and_say_why(altered, recorded, 
     assert {name: one['result'] for name, one in blocks.items()} == {
         'plant': 'skipped',
         'current': 'skipped',
+        'navigation': IDENTICAL,
         'guidance': IDENTICAL,
         'control': IDENTICAL,
     }
@@ -391,9 +403,13 @@ def test_half_a_topic_is_a_difference(altered, recorded, tmp_path):
     cut = [m for m in recorded if m.topic != '/glider/wrench' or m.log_ns < 60_000_000_000]
     first = results(altered(cut), tmp_path)['control']['first']
     assert (first['topic'], first['tick']) == ('wrench', 600)
-    cut = [m for m in recorded if m.topic != '/glider/odom' or m.log_ns < 60_000_000_000]
-    blocks = results(altered(cut), tmp_path)
-    assert different(blocks) == {'plant', 'current', 'guidance', 'control'}
+    for name, concerned in (
+        ('ground_truth/odom', {'plant', 'current'}),
+        ('measured_odom', {'plant', 'navigation'}),
+        ('odom', {'navigation', 'guidance', 'control'}),
+    ):
+        cut = [m for m in recorded if m.topic != f'/glider/{name}' or m.log_ns < 60_000_000_000]
+        assert different(results(altered(cut), tmp_path)) == concerned
 
 
 def test_event_that_is_not_recorded_or_made_up_is_a_difference(altered, recorded, tmp_path):

@@ -29,9 +29,10 @@ class AllocationParams(NamedTuple):
     m_p: float  #: moving mass (kg)
     x_p0: float  #: its neutral position (m)
     R_p: float  #: its radius (m)
-    m_b_max: float  #: ranges (kg, m, rad)
+    m_b_max: float  #: ranges (kg, m, rad, rad)
     x_p_max: float
     mu_max: float
+    delta_max: float  #: 0 without a steering surface
 
 
 def make_allocation(vehicle: VehicleParams) -> AllocationParams:
@@ -45,6 +46,7 @@ def make_allocation(vehicle: VehicleParams) -> AllocationParams:
         vehicle.m_b_max,
         vehicle.x_p_max,
         vehicle.mu_max,
+        vehicle.delta_max,
     )
 
 
@@ -84,6 +86,12 @@ def allocate_pitch(tau_q, mu, phi, theta, params):
     s_x = (s_z * g_x - tau_q / GRAVITY) / max(g_z, SMALLEST_G_Z)
     x_p = (s_x - params.s_x) / params.m_p - params.x_p0
     return min(params.x_p_max, max(-params.x_p_max, x_p))
+
+
+@kernel
+def limit_surface(delta, params):
+    """Angle (rad) of the steering surface, held within the range."""
+    return math.copysign(params.delta_max, delta) if abs(delta) > params.delta_max else delta
 
 
 @kernel

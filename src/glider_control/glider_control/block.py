@@ -3,16 +3,30 @@
 """Control as a block."""
 
 from glider_control import watch
-from glider_control.control import ControlParams, control_step, control_surface
+from glider_control.control import (
+    SATURATED_BUOYANCY,
+    SATURATED_PITCH,
+    SATURATED_ROLL,
+    SATURATED_SURFACE,
+    ControlParams,
+    control_step,
+    control_surface,
+)
 from glider_control.settings import ControlSettings
 from glider_model.base.block import Block, Said, block_tick
 from glider_model.base.frames import odometry_from_wire, reference_from_wire, wrench_to_wire
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import Joints
 from glider_model.base.wiring import CONTROL as WIRED
+from glider_model.vehicle.file import steers_by
 
 #: Actuators by the bits of the saturation mask that say that they are at their limits.
-AT_LIMIT = {1: 'buoyancy engine', 2: 'pitch mass', 4: 'roll mass'}
+AT_LIMIT = {
+    SATURATED_BUOYANCY: 'buoyancy engine',
+    SATURATED_PITCH: 'pitch mass',
+    SATURATED_ROLL: 'roll mass',
+    SATURATED_SURFACE: 'steering surface',
+}
 
 
 @block_tick.body(ControlParams)
@@ -23,12 +37,12 @@ def control_tick(state, t_s, inputs, params, dt):
     state, out = control_step(
         state,
         odometry_from_wire(odom),
-        Joints(joints[0], joints[1], joints[2]),
+        Joints(joints[0], joints[1], joints[2], joints[3]),
         reference_from_wire(reference),
         params,
         dt,
     )
-    command = (out.command.m_b, out.command.x_p, out.command.mu)
+    command = (out.command.m_b, out.command.x_p, out.command.mu, out.command.delta)
     return state, (command, wrench_to_wire(out.wrench), out.adaptation), (out.saturation,)
 
 
@@ -52,4 +66,5 @@ CONTROL = Block(
     every_ns=watch.TELL_EVERY_NS,
     say=say,
     surface=control_surface,
+    steers_by=steers_by,
 )

@@ -1,9 +1,9 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Control: watch, measurement, attitude law, vertical-rate law and allocation put together.
+"""Control: watch, measurement, attitude law, steering, vertical-rate law and allocation.
 
 The channels cannot be swapped: buoyancy sets speed and vertical rate, the mass forward or aft sets
-pitch, the mass turned to a side sets roll and so heading.
+pitch, the mass turned to a side sets roll and so heading, unless a steering surface does.
 """
 
 from typing import NamedTuple
@@ -12,9 +12,11 @@ from glider_control.allocation import (
     AllocationParams,
     allocate_pitch,
     allocate_roll,
+    limit_surface,
     moments,
 )
 from glider_control.law import Seen, law_learnt, law_step
+from glider_control.surface import steer
 from glider_control.vertical_rate import Trim, vertical_rate_law
 from glider_control.watch import (
     ORDERED,
@@ -30,8 +32,8 @@ from glider_model.onboard.attitude_filter import Measured, measure
 from glider_model.onboard.glide_polar import Polar, glide_speed
 from glider_model.vehicle.rigid_body import GRAVITY
 
-#: Bits of ``ControlOutput.saturation``; those of `glider_control.watch` come after them.
-SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL = 1, 2, 4
+#: Bits of ``ControlOutput.saturation``; those of `glider_control.watch` are between them.
+SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL, SATURATED_SURFACE = 1, 2, 4, 4096
 
 
 class ControlParams(NamedTuple):
@@ -40,12 +42,13 @@ class ControlParams(NamedTuple):
     allocation: AllocationParams
     polar: Polar
     law: NamedTuple  #: of the law that was chosen
+    steering: NamedTuple  #: by the vehicle's steering surface
     buoyancy_ki: float  #: (kg/m)
     drag_ki: float  #: (kg/m)
     buoyancy_trim_max: float  #: (kg)
     attitude_s: float
     dead_band: Joints
-    safe_command: Joints  #: as buoyant as possible, mass at the climb stop, no roll
+    safe_command: Joints  #: as buoyant as possible, mass at the climb stop, no roll, no turn
     watch: WatchParams
 
 
@@ -55,6 +58,7 @@ class ControlState(NamedTuple):
     tick: int
     measured: Measured
     law: NamedTuple  #: of the law that was chosen
+    steering: NamedTuple  #: by the vehicle's steering surface
     trim: Trim
     command: Joints  #: last command
     watch: WatchState
@@ -104,6 +108,7 @@ def control_surface(state):
         state.tick,
         state.measured,
         state.law,
+        state.steering,
         state.trim,
         state.command,
         WatchState(
@@ -120,6 +125,7 @@ def control_surface(state):
             seen.buoyancy,
             seen.pitch,
             seen.roll,
+            seen.surface,
             seen.told | ORDERED,
         ),
     )
@@ -154,13 +160,15 @@ def control_step(state, odometry, joints, reference, params, dt):
     before = odometry if first else state.watch.gate.odometry
     watched = watch(taken, before, measured.vertical_rate, last, params.watch, dt)
 
-    law, trim = state.law, state.trim
+    law, steering, trim = state.law, state.steering, state.trim
     command, tau_p, tau_q = last, 0.0, 0.0
     m_b = last.m_b
     if watched.told & SURFACES:
         command, m_b = params.safe_command, params.safe_command.m_b
     elif taken.gate.seen:
-        law, tau_p, tau_q = law_step(law, see(measured, taken, last, params), params.law, dt)
+        seen = see(measured, taken, last, params)
+        law, tau_p, tau_q = law_step(law, seen, params.law, dt)
+        steering, delta = steer(steering, seen, params.steering, dt)
         m_b, trim = vertical_rate_law(state.trim, measured, taken.reference, joints, params, dt)
         mu = allocate_roll(tau_p, measured.phi, measured.theta, limits)
         x_p = allocate_pitch(tau_q, joints.mu, measured.phi, measured.theta, limits)
@@ -168,6 +176,9 @@ def control_step(state, odometry, joints, reference, params, dt):
             _hold(m_b, last.m_b, params.dead_band.m_b, limits.m_b_max),
             _hold(x_p, last.x_p, params.dead_band.x_p, limits.x_p_max),
             _hold(mu, last.mu, params.dead_band.mu, limits.mu_max),
+            _hold(
+                limit_surface(delta, limits), last.delta, params.dead_band.delta, limits.delta_max
+            ),
         )
     saturation = watched.told
     if abs(command.m_b) >= limits.m_b_max:
@@ -176,7 +187,9 @@ def control_step(state, odometry, joints, reference, params, dt):
         saturation |= SATURATED_PITCH
     if abs(command.mu) >= limits.mu_max:
         saturation |= SATURATED_ROLL
+    if 0.0 < limits.delta_max <= abs(command.delta):
+        saturation |= SATURATED_SURFACE
     learnt = law_learnt(law, params.law)
     output = ControlOutput(command, Wrench(m_b * GRAVITY, tau_p, tau_q), learnt, saturation)
     tick = state.tick + 1 if taken.gate.seen else 0
-    return ControlState(tick, measured, law, trim, command, watched), output
+    return ControlState(tick, measured, law, steering, trim, command, watched), output

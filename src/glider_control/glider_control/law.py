@@ -44,7 +44,7 @@ class HeadingSettings(Settings):
 class Bank(NamedTuple):
     """How a vehicle may be rolled to turn it."""
 
-    limit: float  #: largest commanded roll (rad)
+    limit: float  #: largest commanded roll (rad); 0 of a vehicle with a steering surface
     filter: FilterParams  #: command filter of the roll
 
 

@@ -8,14 +8,15 @@ from typing import Literal
 import pydantic
 from pydantic import Field
 
-from glider_control import laws
+from glider_control import laws, surfaces
 from glider_control.allocation import make_allocation
 from glider_control.control import ControlParams, ControlState
 from glider_control.law import HeadingSettings, LawSettings
+from glider_control.surface import NoSteering, SurfaceLawSettings
 from glider_control.vertical_rate import Trim
 from glider_control.watch import INITIAL_WATCH, make_watch
 from glider_model.base import plugins
-from glider_model.base.settings import Settings
+from glider_model.base.settings import ConfigurationError, Settings
 from glider_model.base.signals import Joints
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.gate import GateSettings
@@ -68,8 +69,11 @@ class FilterSettings(Settings):
 TAKEN = {'law', 'heading', 'buoyancy', 'filters', 'gate', 'vehicle', 'lost_after_s'}
 #: Settings of every control law by its name.
 LAWS = plugins.classes(plugins.CONTROL_LAWS, LawSettings, laws, TAKEN)
+#: Settings of steering by every kind of surface, by its name.
+SURFACE_LAWS = plugins.classes(plugins.SURFACE_LAWS, SurfaceLawSettings, surfaces, {*TAKEN, *LAWS})
 
-#: The choice of a law, and the gains of each, so that another one is chosen by one word.
+#: The choice of a law, and the gains of each, so that another one is chosen by one word; then
+#: those of steering by a surface, which the vehicle chooses.
 _LawChoice = pydantic.create_model(
     '_LawChoice',
     __base__=Settings,
@@ -83,7 +87,7 @@ _LawChoice = pydantic.create_model(
     ),
     **{
         name: (settings, Field(settings(), description=plugins.summary(settings)))
-        for name, settings in LAWS.items()
+        for name, settings in {**LAWS, **SURFACE_LAWS}.items()
     },
 )
 
@@ -110,11 +114,26 @@ class ControlLawSettings(_LawChoice):
         """Gains of the law that was chosen."""
         return getattr(self, self.law)
 
-    @property
-    def idle(self) -> set[str]:
-        """Laws of other packages that do not fly, with the gains that they have anyway."""
-        names = plugins.of_others(LAWS, laws) - {self.law}
-        return {name for name in names if getattr(self, name) == LAWS[name]()}
+    def steering(self, steers_by: str) -> SurfaceLawSettings | None:
+        """Gains of steering by a surface of this name; None without a name.
+
+        Raises
+        ------
+        ConfigurationError
+            If nothing steers by such a surface.
+        """
+        if steers_by and steers_by not in SURFACE_LAWS:
+            raise ConfigurationError(
+                f'the vehicle has a {steers_by}, which nothing steers by (allowed: '
+                f'{", ".join(SURFACE_LAWS)}; {plugins.others(plugins.SURFACE_LAWS)})'
+            )
+        return getattr(self, steers_by) if steers_by else None
+
+    def idle(self, steers_by: str) -> set[str]:
+        """What does not fly, with the gains that it has anyway: laws of others, surfaces."""
+        kinds = {**LAWS, **SURFACE_LAWS}
+        names = (plugins.of_others(LAWS, laws) | set(SURFACE_LAWS)) - {self.law, steers_by}
+        return {name for name in names if getattr(self, name) == kinds[name]()}
 
 
 class ControlSettings(ControlLawSettings):
@@ -133,11 +152,15 @@ class ControlSettings(ControlLawSettings):
         """Kernel parameters."""
         vehicle = load_vehicle(self.vehicle)
         kernel_vehicle = vehicle.params()
-        filters = self.filters
+        filters, bank = self.filters, self.heading.params()
+        surface = self.steering(vehicle.steers_by)
+        if surface:
+            bank = bank._replace(limit=0.0)  # it is held level
         return ControlParams(
             make_allocation(kernel_vehicle),
             make_polar(kernel_vehicle),
-            self.chosen.params(vehicle, self.heading.params()),
+            self.chosen.params(vehicle, bank),
+            surface.params(vehicle) if surface else NoSteering(),
             self.buoyancy.ki_kg_per_m,
             self.buoyancy.drag_ki_kg_per_m,
             self.buoyancy.trim_limit_kg,
@@ -146,18 +169,21 @@ class ControlSettings(ControlLawSettings):
                 filters.buoyancy_dead_band_kg,
                 filters.pitch_dead_band_m,
                 math.radians(filters.roll_dead_band_deg),
+                math.radians(surface.dead_band_deg) if surface else 0.0,
             ),
-            Joints(-kernel_vehicle.m_b_max, -kernel_vehicle.x_p_max, 0.0),
+            Joints(-kernel_vehicle.m_b_max, -kernel_vehicle.x_p_max, 0.0, 0.0),
             make_watch(kernel_vehicle, vehicle.rated_depth_m, self.gate.params()),
         )
 
     def initial_state(self) -> 'ControlState':
         """State before the first tick."""
+        surface = self.steering(load_vehicle(self.vehicle).steers_by)
         return ControlState(
             0,
             Measured(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             self.chosen.initial_state(),
+            surface.initial_state() if surface else NoSteering(),
             Trim(0.0, 0.0),
-            Joints(0.0, 0.0, 0.0),
+            Joints(0.0, 0.0, 0.0, 0.0),
             INITIAL_WATCH,
         )

@@ -17,8 +17,10 @@ STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, REFUSED = 8, 16, 32, 64
 #: Told, and a reason to surface for good: it was ordered; deeper than the vehicle is rated for;
 #: the depth does not follow the vertical rate, or nothing that is measured moves; no measurement.
 ORDERED, TOO_DEEP, FROZEN, LOST = 128, 256, 512, 1024
+#: Told as of the three other actuators.
+STUCK_SURFACE = 2048
 SURFACES = ORDERED | TOO_DEEP | FROZEN | LOST
-STUCK = STUCK_BUOYANCY | STUCK_PITCH | STUCK_ROLL
+STUCK = STUCK_BUOYANCY | STUCK_PITCH | STUCK_ROLL | STUCK_SURFACE
 #: What the bits are called, and what they say.
 ROWS = {
     STUCK_BUOYANCY: ('buoyancy_engine_stuck', 'buoyancy engine'),
@@ -29,6 +31,7 @@ ROWS = {
     TOO_DEEP: ('too_deep', 'deeper than the vehicle is rated for'),
     FROZEN: ('measurement_frozen', 'the measured depth, or all that is measured, stands still'),
     LOST: ('measurement_lost', 'nothing usable is measured'),
+    STUCK_SURFACE: ('steering_surface_stuck', 'steering surface'),
 }
 #: A change of what is told is told at most once in this time (ns).
 TELL_EVERY_NS = 1_000_000_000
@@ -83,13 +86,14 @@ class WatchState(NamedTuple):
     buoyancy: Follower
     pitch: Follower
     roll: Follower
+    surface: Follower  #: the steering surface
     told: int  #: sum of the bits above; those of SURFACES stay
 
 
 _STILL = Follower(0.0, 0.0)
 INITIAL_WATCH = WatchState(
     INITIAL_GATE,
-    Joints(0.0, 0.0, 0.0),
+    Joints(0.0, 0.0, 0.0, 0.0),
     0.0,
     Reference(*(12 * (0.0,))),
     0.0,
@@ -101,6 +105,7 @@ INITIAL_WATCH = WatchState(
     _STILL,
     _STILL,
     _STILL,
+    _STILL,
     0,
 )
 
@@ -108,8 +113,8 @@ INITIAL_WATCH = WatchState(
 def make_watch(vehicle, rated_depth_m: float, gate: GateParams) -> WatchParams:
     """Limits of a vehicle (VehicleParams) that is rated for a depth, infinite if nobody says."""
     margin_m = max(DEPTH_MARGIN_M, DEPTH_MARGIN_SHARE * rated_depth_m)
-    ranges = Joints(vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max)
-    rates = Joints(vehicle.m_b_rate, vehicle.x_p_rate, vehicle.mu_rate)
+    ranges = Joints(vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max, vehicle.delta_max)
+    rates = Joints(vehicle.m_b_rate, vehicle.x_p_rate, vehicle.mu_rate, vehicle.delta_rate)
     progress = (
         min(FOLLOW_SHARE * most, STALL_RATE_SHARE * rate * STALL_S)
         for most, rate in zip(ranges, rates, strict=True)
@@ -138,6 +143,7 @@ def _are_believed(joints, ranges):
         abs(joints.m_b) <= JOINT_RANGES * ranges.m_b
         and abs(joints.x_p) <= JOINT_RANGES * ranges.x_p
         and abs(joints.mu) <= JOINT_RANGES * ranges.mu
+        and abs(joints.delta) <= JOINT_RANGES * ranges.delta
     )
 
 
@@ -218,6 +224,7 @@ def take_in(state, odometry, joints, reference, params, dt):
         state.buoyancy,
         state.pitch,
         state.roll,
+        state.surface,
         state.told,
     )
 
@@ -258,6 +265,9 @@ def watch(state, before, vertical_rate, command, params, dt):
         state.pitch, joints.x_p, command.x_p, FOLLOW_SHARE * most.x_p, progress.x_p, dt
     )
     roll = _follow(state.roll, joints.mu, command.mu, FOLLOW_SHARE * most.mu, progress.mu, dt)
+    surface = _follow(
+        state.surface, joints.delta, command.delta, FOLLOW_SHARE * most.delta, progress.delta, dt
+    )
 
     told = state.told & SURFACES
     if buoyancy.waits_s > STALL_S:
@@ -266,6 +276,8 @@ def watch(state, before, vertical_rate, command, params, dt):
         told |= STUCK_PITCH
     if roll.waits_s > STALL_S:
         told |= STUCK_ROLL
+    if surface.waits_s > STALL_S:
+        told |= STUCK_SURFACE
     if state.refused_s < REFUSAL_TOLD_S:
         told |= REFUSED
     if state.reference.p_d <= SURFACE_TARGET:
@@ -291,5 +303,6 @@ def watch(state, before, vertical_rate, command, params, dt):
         buoyancy,
         pitch,
         roll,
+        surface,
         told,
     )

@@ -46,7 +46,7 @@ def _fly(plant, control, references, noise, ballast, plant_params, params, rows,
             true.u, true.v, true.w,
             true.p + noise[i, 3], true.q + noise[i, 4], true.r + noise[i, 5],
         )  # fmt: skip
-        said = Joints(plant.joints.m_b + ballast, plant.joints.x_p, plant.joints.mu)
+        said = Joints(plant.joints.m_b + ballast, plant.joints.x_p, plant.joints.mu, 0.0)
         a = references[i]
         reference = Reference(0.0, 0.0, 0.0, 0.0, a[0], a[1], 0.0, 0.0, a[2], 0.0, 0.0, 0.0)
         control, output = control_step(control, seen, said, reference, params, dt)
@@ -58,7 +58,7 @@ def _fly(plant, control, references, noise, ballast, plant_params, params, rows,
         )  # fmt: skip
         for j, number in enumerate(row):
             rows[i, j] = number
-        moved = Joints(command.m_b - ballast, command.x_p, command.mu)
+        moved = Joints(command.m_b - ballast, command.x_p, command.mu, 0.0)
         plant = plant_step(plant, moved, still, plant_params, dt)
     return plant, control
 
@@ -85,7 +85,7 @@ class Flight:
         )
         self.plant_params, self.plant = plant.params(), plant.initial_state()
         trim = solve_trim(load_vehicle(vehicle).params(), sign * net, math.degrees(self.pitch))
-        joints = Joints(sign * net - ballast, trim.pitch_mass_m, 0.0)
+        joints = Joints(sign * net - ballast, trim.pitch_mass_m, 0.0, 0.0)
         self.plant = self.plant._replace(joints=joints)
         self.ballast = ballast
         self.log = np.empty((0, len(COLUMNS)))
@@ -226,7 +226,7 @@ def test_commands_stay_still_in_a_settled_glide():
         assert moves < 0.05 * len(late), name
 
 
-def step(odometry, reference, joints=(0.0, 0.0, 0.0), vehicle='zhang2021', ticks=1):
+def step(odometry, reference, joints=(0.0, 0.0, 0.0, 0.0), vehicle='zhang2021', ticks=1):
     """Output after some ticks at one and the same measurement."""
     model = ControlSettings(vehicle=vehicle, law='pid')
     state, params = model.initial_state(), model.params()
@@ -295,7 +295,7 @@ def test_pump_ignores_changes_within_its_dead_band(change):
     """5 g around where the buoyancy engine is when control starts."""
     _, params = step(LEVEL, reference())
     rate = glide_vertical_rate(-0.5, 0.4, params.polar)
-    output, _ = step(LEVEL, reference(v_d=rate), joints=(0.4 + change, 0.0, 0.0))
+    output, _ = step(LEVEL, reference(v_d=rate), joints=(0.4 + change, 0.0, 0.0, 0.0))
     assert output.command.m_b == 0.4 + change
 
 
@@ -304,7 +304,7 @@ def test_pump_ignores_changes_within_its_dead_band(change):
 def test_pump_follows_changes_beyond_its_dead_band(change, side):
     _, params = step(LEVEL, reference())
     rate = glide_vertical_rate(-0.5, 0.4, params.polar)
-    output, _ = step(LEVEL, reference(v_d=rate), joints=(0.4 + side * change, 0.0, 0.0))
+    output, _ = step(LEVEL, reference(v_d=rate), joints=(0.4 + side * change, 0.0, 0.0, 0.0))
     assert output.command.m_b == pytest.approx(0.4, abs=2e-3)
 
 
@@ -312,7 +312,7 @@ def test_wrench_is_the_demand_before_the_dead_band():
     """The engine starts 4 g off: the pump stays, the demand is still told."""
     _, params = step(LEVEL, reference())
     rate = glide_vertical_rate(-0.5, 0.4, params.polar)
-    output, _ = step(LEVEL, reference(v_d=rate), joints=(0.396, 0.0, 0.0))
+    output, _ = step(LEVEL, reference(v_d=rate), joints=(0.396, 0.0, 0.0, 0.0))
     assert output.wrench.tau_w == pytest.approx(0.4 * GRAVITY, abs=1e-4 * GRAVITY)
     assert output.command.m_b == 0.396
 

@@ -197,7 +197,7 @@ class GuidanceSettings(GuidanceLawSettings):
             ObserverParams(self.observer.k3_per_s, self.observer.k4_per_s2),
             FilterParams(filters.heading_frequency_radps, filters.heading_rate_radps),
             FilterParams(filters.pitch_frequency_radps, filters.pitch_rate_radps),
-            self.steering.params(),
+            self.steering.params(banks=not vehicle.steers_by),
             self.gate.params(),
         )
 

@@ -17,8 +17,8 @@ from glider_model.base.frames import quaternion_from_euler
 from glider_model.base.signals import TICK_S, Joints, Water
 from glider_model.ocean.density import DensitySettings
 from glider_model.plant.motion import Motion
-from glider_model.plant.plant import PlantParams, PlantState, dive_depths, plant_step
-from glider_model.plant.sensors import SensorSettings
+from glider_model.plant.plant import LAUNCHED, PlantParams, PlantState, dive_depths, plant_step
+from glider_model.plant.sensors import NO_SAMPLE, SensorSettings
 from glider_model.vehicle.file import load_vehicle
 
 
@@ -27,14 +27,15 @@ from glider_model.vehicle.file import load_vehicle
 @numba.njit(error_model='numpy')
 def _fly(state, commands, waters, params, dt):
     count = len(commands)
-    rows = np.empty((count + 1, 16))
+    rows = np.empty((count + 1, 17))
     for i in range(count + 1):
         motion, joints = state.motion, state.joints
         for j, number in enumerate(motion):
             rows[i, j] = number
-        rows[i, 13], rows[i, 14], rows[i, 15] = joints.m_b, joints.x_p, joints.mu
+        for j, number in enumerate(joints):
+            rows[i, 13 + j] = number
         if i < count:
-            command = Joints(commands[i, 0], commands[i, 1], commands[i, 2])
+            command = Joints(commands[i, 0], commands[i, 1], commands[i, 2], commands[i, 3])
             water = Water(waters[i, 0], waters[i, 1], waters[i, 2])
             state = plant_step(state, command, water, params, dt)
     return rows, state
@@ -96,16 +97,23 @@ def _start(position=(0.0, 0.0, 100.0), euler=(0.0, 0.0, 0.0), velocity=(), joint
     motion = Motion(
         *(float(number) for number in position), *quaternion_from_euler(*euler), *velocity
     )
-    joints = Joints(*(float(number) for number in joints))
-    return PlantState(motion, joints, Water(0.0, 0.0, 0.0), 0, False, 0, 0, -1)
+    joints = Joints(*(float(number) for number in _with_surface(joints)))
+    water = Water(0.0, 0.0, 0.0)
+    return PlantState(motion, joints, water, 0, False, 0, 0, -1, NO_SAMPLE, LAUNCHED)
+
+
+def _with_surface(joints):
+    """Positions of all actuators; without that of a steering surface, it is at 0."""
+    joints = np.asarray(joints, dtype=float)
+    return joints if joints.shape[-1] == 4 else np.insert(joints, 3, 0.0, axis=-1)
 
 
 def _flight(params, state, seconds, commands=None, waters=(0.0, 0.0, 0.0)):
     count = round(seconds / TICK_S)
     commands = state.joints if commands is None else commands
     arrays = (
-        np.ascontiguousarray(np.broadcast_to(np.asarray(array, dtype=float), (count, 3)))
-        for array in (commands, waters)
+        np.ascontiguousarray(np.broadcast_to(array, (count, array.shape[-1])))
+        for array in (_with_surface(commands), np.asarray(waters, dtype=float))
     )
     return Flight(*_fly(state, *arrays, params, TICK_S))
 

@@ -10,7 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from glider_model.ocean.density import DensitySettings, buoyancy_gain, emerged_fraction
+from glider_model.ocean.density import (
+    DensitySettings,
+    buoyancy_gain,
+    depth_at,
+    emerged_fraction,
+    pressure_at,
+)
 from glider_model.vehicle.rigid_body import GRAVITY
 
 quick = settings(max_examples=60, deadline=None)
@@ -163,3 +169,29 @@ def test_a_neutral_vehicle_at_depth_stays(fly, plant_params, start):
 def test_a_heavy_vehicle_leaves_the_surface(fly, plant_params, start):
     state = start((0, 0, 0), velocity=(0.0,) * 6, joints=(0.4, 0.016, 0.0))
     assert fly(plant_params(), state, 120.0).p_d[-1] > 10.0  # m
+
+
+# ------------------------------------------------------------------------------------- pressure
+
+
+@quick
+@given(st.floats(-10.0, 12000.0))
+def test_depth_comes_back_from_pressure(depth):
+    assert depth_at(pressure_at(depth)) == pytest.approx(depth, abs=1e-8)
+
+
+def depth_in_the_sea(decibar, latitude_deg):
+    """Depth (m) of a pressure: Fofonoff and Millard (1983), Unesco 44, algorithm 4."""
+    p, x = decibar, math.sin(math.radians(latitude_deg)) ** 2
+    gravity = 9.780318 * (1.0 + (5.2788e-3 + 2.36e-5 * x) * x) + 1.092e-6 * p
+    depth = (((-1.82e-15 * p + 2.279e-10) * p - 2.2512e-5) * p + 9.72659) * p
+    return depth / gravity
+
+
+def test_pressure_is_that_of_the_air_and_of_the_water_above():
+    """The standard atmosphere; and the sea, which is compressed, down to 1000 m within 1 %."""
+    assert depth_in_the_sea(10000.0, 30.0) == pytest.approx(9712.653, abs=1e-3)  # their check
+    assert pressure_at(0.0) == 101325.0
+    for decibar in (1.0, 100.0, 500.0, 1000.0):
+        depth = depth_in_the_sea(decibar, 36.0)
+        assert pressure_at(depth) - 101325.0 == pytest.approx(1e4 * decibar, rel=0.01)

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from glider_model.base.frames import (
+    OriginSettings,
     euler_from_quaternion,
+    from_geodetic,
     odometry_from_wire,
     odometry_to_wire,
     poses_from_wire,
@@ -21,6 +23,7 @@ from glider_model.base.frames import (
     rotate_to_body,
     rotate_to_ned,
     swap_world,
+    to_geodetic,
     water_from_wire,
     water_to_wire,
     wrap_angle,
@@ -269,3 +272,78 @@ def test_poses_of_many_messages_are_those_of_each():
     poses = poses_from_wire(np.array(wire))
     np.testing.assert_array_equal(poses[:, :3], places)
     np.testing.assert_allclose(poses[:, 3:], angles, rtol=0.0, atol=1e-12)
+
+
+# ------------------------------------------------------------------------------ on the Earth
+
+
+def earth_centred(latitude_deg, longitude_deg):
+    """Place on the ellipsoid of WGS 84, in axes that turn with the Earth (m)."""
+    a, f = 6378137.0, 1.0 / 298.257223563
+    phi, lam = math.radians(latitude_deg), math.radians(longitude_deg)
+    e2 = f * (2.0 - f)
+    n = a / math.sqrt(1.0 - e2 * math.sin(phi) ** 2)
+    across = n * math.cos(phi)
+    return np.array(
+        [across * math.cos(lam), across * math.sin(lam), n * (1.0 - e2) * math.sin(phi)]
+    )
+
+
+@pytest.mark.parametrize(
+    ('latitude_deg', 'north_m', 'east_m'),
+    [
+        (0.0, 110_574.0, 111_320.0),
+        (15.0, 110_649.0, 107_550.0),
+        (30.0, 110_852.0, 96_486.0),
+        (45.0, 111_132.0, 78_847.0),
+        (60.0, 111_412.0, 55_800.0),
+        (-60.0, 111_412.0, 55_800.0),
+        (75.0, 111_618.0, 28_902.0),
+    ],
+)
+def test_a_degree_is_as_long_as_tables_say(latitude_deg, north_m, east_m):
+    """Lengths of a degree on WGS 84, to the metre that tables give."""
+    origin = OriginSettings(latitude_deg=latitude_deg, longitude_deg=20.0).params()
+    north, _ = from_geodetic(latitude_deg + 1e-3, 20.0, origin)
+    _, east = from_geodetic(latitude_deg, 20.0 + 1e-3, origin)
+    assert 1e3 * north == pytest.approx(north_m, abs=1.0)
+    assert 1e3 * east == pytest.approx(east_m, abs=1.0)
+
+
+@quick
+@given(
+    st.floats(-60.0, 60.0), st.floats(-180.0, 180.0), st.floats(-1e4, 1e4), st.floats(-1e4, 1e4)
+)
+def test_a_place_is_where_the_ellipsoid_has_it(latitude_deg, longitude_deg, p_n, p_e):
+    """Distance from the origin within what the docstring says of the projection."""
+    settings_ = OriginSettings(latitude_deg=latitude_deg, longitude_deg=longitude_deg)
+    place = to_geodetic(p_n, p_e, settings_.params())
+    chord = earth_centred(*place) - earth_centred(latitude_deg, longitude_deg)
+    share = (math.tan(math.radians(abs(latitude_deg))) * abs(p_n) + 1e3) / 6378e3
+    assert np.linalg.norm(chord) == pytest.approx(math.hypot(p_n, p_e), rel=share, abs=1e-3)
+
+
+@quick
+@given(
+    st.floats(-85.0, 85.0),
+    st.floats(-180.0, 180.0),
+    st.floats(-1e5, 1e5),
+    st.floats(-1e5, 1e5),
+)
+def test_a_place_comes_back_from_its_latitude_and_longitude(latitude_deg, longitude_deg, n, e):
+    """Also across the antimeridian, where longitudes go on from -180 deg."""
+    settings_ = OriginSettings(latitude_deg=latitude_deg, longitude_deg=longitude_deg)
+    origin = settings_.params()
+    latitude, longitude = to_geodetic(n, e, origin)
+    assert -180.0 <= longitude <= 180.0
+    assert from_geodetic(latitude, longitude, origin) == pytest.approx((n, e), abs=1e-6)
+
+
+def test_north_is_north_and_east_is_east():
+    origin = OriginSettings(latitude_deg=36.0, longitude_deg=179.999).params()
+    latitude, longitude = to_geodetic(1000.0, 0.0, origin)
+    assert latitude > 36.0
+    assert longitude == 179.999
+    latitude, longitude = to_geodetic(0.0, 1000.0, origin)
+    assert latitude == 36.0
+    assert -180.0 <= longitude < -179.98

@@ -22,9 +22,19 @@ from glider_model.ros.lockstep.executor import make_executor
 from glider_model.ros.lockstep.process import Stop
 from glider_model.ros.lockstep.step_node import StepNode
 from glider_model.ros.wire.codec import MessageError, to_cdr
-from glider_model.ros.wire.topics import CONTROL, CURRENT, GUIDANCE, PLANT, RECORDER, TOPICS
+from glider_model.ros.wire.topics import (
+    CONTROL,
+    CURRENT,
+    GUIDANCE,
+    NAVIGATION,
+    PLANT,
+    RECORDER,
+    TOPICS,
+)
 
 TIMEOUT_S = 30.0
+#: What the plant says of a tick.
+SAID = ('/clock', 'ground_truth/odom', 'measured_odom', 'joint_states')
 
 
 class Clock(ClockNode):
@@ -33,16 +43,17 @@ class Clock(ClockNode):
     def __init__(self, last_tick: int = 50, **kwargs) -> None:
         super().__init__(PLANT, **kwargs)
         self.last_tick, self.log = last_tick, []
-        self.publish = [self.add_output(name) for name in ('/clock', 'odom', 'joint_states')]
+        self.publish = [self.add_output(name) for name in SAID]
         self.add_input('command')
         self.add_input('current_velocity')
         self.start_up()
 
     def publish_tick(self, stamp_ns: int) -> None:
-        publish_clock, odom, joints = self.publish
+        publish_clock, truth, measured, joints = self.publish
         value = float(self.tick)
         publish_clock(stamp_ns)
-        odom(stamp_ns, 13 * (value,))
+        truth(stamp_ns, 13 * (value,))
+        measured(stamp_ns, 13 * (2.0 * value,))
         joints(stamp_ns, 3 * (-value,))
 
     def complete_tick(self, command, current) -> bool:
@@ -75,12 +86,14 @@ class Block(StepNode):
 
 
 INPUTS = {
-    CURRENT: ['odom'],
+    CURRENT: ['ground_truth/odom'],
+    NAVIGATION: ['joint_states', 'measured_odom'],
     GUIDANCE: ['odom'],
     CONTROL: ['reference', 'odom', 'joint_states'],
 }
 OUTPUTS = {
     CURRENT: ['current_velocity'],
+    NAVIGATION: ['odom'],
     GUIDANCE: ['tracking_error', 'current_estimate', 'reference'],
     CONTROL: ['wrench', 'command'],
 }
@@ -103,7 +116,7 @@ class Graph:
                 parameter_overrides=common,
                 **shared,
             )
-            for name in (CURRENT, GUIDANCE, CONTROL)
+            for name in INPUTS
             if name not in without
         }
         self.plant = Clock(last_tick, parameter_overrides=overrides, **shared)
@@ -158,9 +171,9 @@ def test_every_tick_is_acted_on_once_and_in_order(make_graph):
 def test_a_node_uses_the_inputs_of_its_tick_and_no_other(make_graph):
     graph = make_graph(last_tick=100)
     graph.spin_until_over()
-    # reference = odom = k, joint_states = -k: control sends k + k - k
+    # joint_states = -k, measured_odom = 2 k, odom = reference = k: control sends k + k - k
     for _, tick, command, current in graph.plant.log:
-        assert command == 3 * (float(tick),)
+        assert command == (*3 * (float(tick),), 0.0)
         assert current == 3 * (float(tick),)
 
 
@@ -171,7 +184,7 @@ def test_everybody_leaves_when_the_run_is_complete(make_graph):
         assert stop.code == 0
 
 
-@pytest.mark.parametrize('missing', [CURRENT, GUIDANCE, CONTROL])
+@pytest.mark.parametrize('missing', INPUTS)
 def test_missing_peer_is_named(make_graph, missing):
     graph = make_graph(without=[missing], startup_timeout_s=1.0)
     stop = graph.spin()
@@ -199,7 +212,12 @@ def test_second_source_of_time_is_refused_and_named(make_graph, context, monkeyp
 
 @pytest.mark.parametrize(
     ('culprit', 'topic'),
-    [(CURRENT, 'current_velocity'), (GUIDANCE, 'reference'), (CONTROL, 'command')],
+    [
+        (CURRENT, 'current_velocity'),
+        (NAVIGATION, 'odom'),
+        (GUIDANCE, 'reference'),
+        (CONTROL, 'command'),
+    ],
 )
 def test_node_that_falls_silent_is_named(make_graph, culprit, topic):
     graph = make_graph(mute={culprit: 20}, tick_timeout_s=1.0)
@@ -337,7 +355,11 @@ class Intruder:
 
 
 @pytest.mark.parametrize(
-    'topic', ['odom', 'joint_states', 'current_velocity', 'reference', 'command']
+    'topic',
+    [
+        *('ground_truth/odom', 'measured_odom', 'odom', 'joint_states', 'current_velocity'),
+        *('reference', 'command'),
+    ],
 )
 def test_second_publisher_in_mid_flight_is_refused_and_named(make_graph, context, topic):
     """It says what the first one says, with other numbers, for this tick and the ones to come."""
@@ -354,7 +376,7 @@ def test_second_publisher_in_mid_flight_is_refused_and_named(make_graph, context
         assert graph.spin(lambda: graph.plant.tick > until) is None  # noqa: B023
     assert graph.spin(intruder.was_named) is None
     for _, tick, command, current in graph.plant.log:
-        # odom is the tick, joint_states less the tick, and every block sends on the sum
+        # odom is the tick, joint_states less the tick, and each block sends on the sum
         assert (command[0], current[0]) == (float(tick), float(tick))
 
 
@@ -404,7 +426,7 @@ def test_other_frames_are_refused_and_named(make_graph, context, field, frame):
     """A driver in NED looks right to everything but the vehicle."""
     graph = make_graph(lockstep=False, input_max_age_s=1.0, without=())
     (item,) = graph.blocks[GUIDANCE].inputs
-    message = deserialize_message(item.topic.codec.encode(TICK_NS, 13 * (0.5,)), Odometry)
+    message = deserialize_message(item.topic.codec.encode(TICK_NS, 17 * (0.5,)), Odometry)
     if field == 'child_frame_id':
         message.child_frame_id = frame
     else:
@@ -413,7 +435,7 @@ def test_other_frames_are_refused_and_named(make_graph, context, field, frame):
         item.accept(to_cdr(message))
     message.header.frame_id, message.child_frame_id = 'map', 'one/base_link'
     item.accept(to_cdr(message))
-    assert item.values == 13 * (0.5,)
+    assert item.values == 17 * (0.5,)
 
 
 def test_speed_is_kept_without_drift(make_graph):
@@ -475,10 +497,10 @@ def test_free_running_input_keeps_the_newest_and_counts_what_lacks(make_graph, s
     graph = make_graph(lockstep=False, input_max_age_s=1.0)
     (item,) = graph.blocks[GUIDANCE].inputs
     for stamp_s in stamps:
-        raw = item.topic.codec.encode(round(stamp_s * 1e9), 13 * (stamp_s,))
+        raw = item.topic.codec.encode(round(stamp_s * 1e9), 17 * (stamp_s,))
         item.subscription.callback(raw, {})
     assert item.stamp_ns == round(kept * 1e9)
-    assert item.values == 13 * (kept,)
+    assert item.values == 17 * (kept,)
     assert item.lost == lost
 
 

@@ -59,7 +59,7 @@ def glides(draw):
 
 def energies(flight, vehicle):
     """Kinetic (with added mass) plus potential energy of weight and metacentre (J), per row."""
-    joints = Joints(*flight.rows[0, 13:16])
+    joints = Joints(*flight.rows[0, 13:17])
     inertia = make_inertia(joints.x_p, joints.mu, vehicle)
     M = np.linalg.inv(np.array([solve_mass(*load, inertia, vehicle) for load in np.eye(6)]))
     nu = flight.velocity
@@ -123,7 +123,7 @@ def test_port_and_starboard_are_mirror_images(name, glide, fly, plant_params, st
         (0.1, -0.2, 0.0),
     )
     # p, q as quaternion x and z, y position, v, p, r, mu change sign
-    mirror = np.array([1, -1, 1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, 1, -1])
+    mirror = np.array([1, -1, 1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, 1, -1, -1])
     np.testing.assert_allclose(other.rows * mirror, one.rows, rtol=0, atol=1e-10)
 
 
@@ -279,8 +279,10 @@ def test_side_to_which_a_roll_turns(name, m_b, turn, fly, plant_params, start):
 
 # ----------------------------------------------------------------------------------- actuators
 
-joints = st.builds(Joints, st.floats(-1.0, 1.0), st.floats(-0.06, 0.06), st.floats(-1.0, 1.0))
-targets = st.builds(Joints, *3 * [st.floats(-1e3, 1e3)])
+joints = st.builds(
+    Joints, st.floats(-1.0, 1.0), st.floats(-0.06, 0.06), st.floats(-1.0, 1.0), st.just(0.0)
+)
+targets = st.builds(Joints, *4 * [st.floats(-1e3, 1e3)])
 
 
 @quick
@@ -288,7 +290,7 @@ targets = st.builds(Joints, *3 * [st.floats(-1e3, 1e3)])
 def test_actuators_keep_to_their_rates(position, target):
     vehicle = load_vehicle('zhang2021').params()
     moved = np.array(actuators_step(position, target, vehicle, TICK_S)) - np.array(position)
-    rates = np.array([0.004, 0.003, math.radians(6.0)])
+    rates = np.array([0.004, 0.003, math.radians(6.0), 0.0])
     assert np.all(np.abs(moved) <= rates * TICK_S * (1.0 + 1e-9))
 
 
@@ -297,13 +299,13 @@ def test_actuators_keep_to_their_rates(position, target):
 def test_actuators_keep_to_their_ranges(position, target):
     vehicle = load_vehicle('zhang2021').params()
     moved = actuators_step(position, target, vehicle, 1e6)
-    limits = (1.0, 0.06, math.radians(60.0))
+    limits = (1.0, 0.06, math.radians(60.0), 0.0)
     expected = np.clip(target, np.negative(limits), limits)
     np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-12)
 
 
 def test_actuators_stay_where_they_are_wanted():
-    vehicle, position = load_vehicle('zhang2021').params(), Joints(0.123, -0.0456, 0.789)
+    vehicle, position = load_vehicle('zhang2021').params(), Joints(0.123, -0.0456, 0.789, 0.0)
     assert actuators_step(position, position, vehicle, TICK_S) == position
 
 
@@ -422,7 +424,7 @@ def test_initial_state_is_the_one_asked_for():
         (0.0, math.radians(-20.0), 0.5 * math.pi), abs=1e-14
     )
     assert state.motion[7:] == (0.4, 0.0, 0.0, 0.0, 0.0, 0.0)
-    assert state.joints == Joints(0.3, 0.0, 0.0)
+    assert state.joints == Joints(0.3, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -438,7 +440,9 @@ def test_acceleration_of_a_heavy_body_at_rest(plant_params, start):
     params = plant_params('zhang2021')
     inertia = make_inertia(0.0, 0.0, params.vehicle)
     motion = start(velocity=(0.0,) * 6).motion
-    rate = acceleration(motion, 0.5, inertia, STILL, params.vehicle, params.density)
+    rate = acceleration(
+        motion, Joints(0.5, 0.0, 0.0, 0.0), inertia, STILL, params.vehicle, params.density
+    )
     assert rate[2] == pytest.approx(0.5 * 9.81 / (69.0 + 60.53), rel=1e-12)
     assert np.abs(np.delete(rate, 2)).max() < 1e-15
 

@@ -114,7 +114,7 @@ class Reference:
 
     def derivative(self, x, joints, v_c, v_c_rate):
         """Of path through the water, q, nu over ground."""
-        m_b, x_p, mu = joints
+        m_b, x_p, mu, _ = joints
         q, v, omega = x[3:7], x[7:10], x[10:13]
         R = R_NB(q)
         r_p, r_g, I_o = self.bodies(x_p, mu)
@@ -186,7 +186,7 @@ def manoeuvre():
 def reference_flight(name, flight, waters, tolerance=1e-10):
     """Reference states at the ends of the segments: tick, path over ground, q, nu_r."""
     reference = Reference(name)
-    joints = flight.rows[:, 13:16]
+    joints = flight.rows[:, 13:17]
     held = np.vstack([np.zeros(3), np.cumsum(waters * TICK_S, axis=0)])
     # velocity at each tick; before the first there is no difference to take
     v_c = np.vstack([waters[0], waters])
@@ -242,7 +242,7 @@ def test_manoeuvre_is_one(both):
 
 #: A second in which everything moves, far from a glide, and its actuators and water.
 SECOND = {'euler': (0.2, -0.4, 1.0), 'velocity': (0.5, 0.05, -0.03, 0.2, -0.1, 0.05)}
-BEGIN, END = Joints(0.3, 0.01, -0.2), Joints(0.31, 0.013, -0.1)
+BEGIN, END = Joints(0.3, 0.01, -0.2, 0.0), Joints(0.31, 0.013, -0.1, 0.0)
 WATER, WATER_RATE = np.array([0.2, 0.1, 0.0]), np.array([0.01, -0.02, 0.0])
 
 
@@ -305,7 +305,7 @@ def test_without_damping_it_is_the_classical_method(name, plant_params, start):
     inertia = make_inertia(BEGIN.x_p, BEGIN.mu, vehicle)
 
     def f(y):
-        k = derivative(Motion(*y), BEGIN.m_b, inertia, still, still, vehicle, params.density)
+        k = derivative(Motion(*y), BEGIN, inertia, still, still, vehicle, params.density)
         return np.array(k)
 
     y = np.array(x)
@@ -338,7 +338,7 @@ def test_phi_functions(z):
 def test_a_single_tick_agrees_with_dop853(name, plant_params, start):
     """Everything moves at once, far from a glide: alpha 25 deg, beta 20 deg, roll 60 deg."""
     state = start(euler=(1.0, 0.7, -2.0), velocity=(0.5, 0.2, 0.25, 0.3, -0.2, 0.25))
-    begin, end = Joints(-0.3, 0.02, 0.6), Joints(-0.25, 0.03, 0.7)
+    begin, end = Joints(-0.3, 0.02, 0.6, 0.0), Joints(-0.25, 0.03, 0.7, 0.0)
     water, rate = np.array([0.3, -0.2, 0.0]), np.array([0.1, 0.2, 0.0])
     motion, _ = integrate(
         state.motion, begin, end, Water(*water), Water(*rate), plant_params(name), TICK_S, 1024

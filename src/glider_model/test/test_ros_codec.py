@@ -13,17 +13,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_msgs.msg import Odometry, Path
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, NavSatFix
 
 from glider_model.base.wiring import JOINTS
-from glider_model.ros.wire.codec import MessageError, cdr_places, to_cdr
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.codec import MessageError, cdr_places, set_field, to_cdr
+from glider_model.ros.wire.topics import TOPICS, topic_of
 
-ODOM, COMMAND = TOPICS['odom'].codec, TOPICS['command'].codec
+ODOM, COMMAND = TOPICS['measured_odom'].codec, TOPICS['command'].codec
 
 PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 STAMPS = st.integers(0, (2**31 - 1) * 10**9)
 FINITE = st.floats(-1e300, 1e300, allow_nan=False)
+#: What a field can hold that is no float64.
+INTEGERS = {'status.status': st.integers(-128, 127).map(float)}
 
 
 def bits(values) -> list[bytes]:
@@ -31,8 +33,10 @@ def bits(values) -> list[bytes]:
 
 
 def numbers_for(topic, data):
-    size = len(topic.codec.fields)
-    return tuple(data.draw(st.lists(FINITE, min_size=size, max_size=size)))
+    """Numbers of a message; 0.0 for those that it does not carry."""
+    fields, width = topic.codec.fields, topic.codec.width
+    drawn = [data.draw(INTEGERS.get(field, FINITE)) for field in fields]
+    return (*drawn, *(width - len(fields)) * (0.0,))
 
 
 @pytest.mark.parametrize('topic', PER_TICK, ids=lambda topic: topic.name)
@@ -94,6 +98,75 @@ def test_covariances_do_not_disturb():
     assert ODOM.decode(serialize_message(message)) == (7, 13 * (0.5,))
 
 
+def message_of(name, *numbers):
+    """What a subscriber gets, of these numbers."""
+    topic = TOPICS[name]
+    return deserialize_message(topic.codec.encode(0, numbers), topic.message_type)
+
+
+@pytest.mark.parametrize('topic', PER_TICK, ids=lambda topic: topic.name)
+def test_bytes_are_whole_words_and_are_read_without_their_padding_too(topic):
+    """As they are on the way from node to node, and as others may have recorded them."""
+    numbers = tuple(float(i) for i, _ in enumerate(topic.codec.fields))
+    raw = topic.codec.encode(7, numbers)
+    message = deserialize_message(raw, topic.message_type)
+    bare = to_cdr(message)
+    assert len(raw) % 4 == 0
+    assert raw == bare + bytes(len(raw) - len(bare))
+    assert len(raw) - len(bare) < 4
+    whole = (*numbers, *(topic.codec.width - len(numbers)) * (0.0,))
+    for one in (raw, bare, serialize_message(message)):
+        assert topic.codec.decode(one) == (7, whole)
+
+
+@given(status=st.integers(-128, 127), place=st.tuples(*4 * [FINITE]))
+@settings(max_examples=50, deadline=None)
+def test_a_fix_carries_an_integer_beside_its_numbers(status, place):
+    fix = message_of('fix', float(status), *place)
+    assert (fix.status.status, fix.status.service, fix.position_covariance_type) == (status, 1, 2)
+    assert (fix.latitude, fix.longitude, fix.altitude) == (*place[:2], 0.0)
+    expected = np.zeros(9)
+    expected[[0, 4]] = place[2:]
+    assert np.array_equal(fix.position_covariance, expected)
+    codec = TOPICS['fix'].codec
+    numbers = (float(status), *place)
+    fix.header.frame_id = 'gps_antenna'
+    for raw in (codec.encode(0, numbers), serialize_message(fix)):
+        decoded = codec.decode(raw)[1]
+        assert bits(decoded) == bits(numbers)
+        assert {type(number) for number in decoded} == {float}
+
+
+def test_fields_in_arrays_lie_where_the_message_has_them():
+    odom = message_of('odom', *range(17))
+    covariance = np.zeros(36)
+    covariance[[0, 1, 6, 7]] = 13.0, 14.0, 15.0, 16.0  # rows of east and north
+    assert np.array_equal(odom.pose.covariance, covariance)
+    assert odom.twist.twist.angular.z == 12.0
+    current = message_of('believed_current', *range(6))
+    covariance[[0, 1, 6, 7]] = 2.0, 3.0, 4.0, 5.0
+    assert np.array_equal(current.twist.covariance, covariance)
+    assert (current.twist.twist.linear.x, current.twist.twist.linear.y) == (0.0, 1.0)
+    imu = message_of('imu', *range(7), -1.0)
+    assert (imu.angular_velocity_covariance[0], imu.linear_acceleration_covariance[0]) == (-1, -1)
+    assert not any(imu.angular_velocity_covariance[1:])
+    assert imu.orientation.w == 0.0
+    assert imu.angular_velocity.z == 6.0
+    other = message_of('odom', *range(17))
+    other.pose.covariance[35] = 9.0
+    assert TOPICS['odom'].codec.decode(serialize_message(other))[1] == tuple(range(17))
+
+
+def test_fields_are_set_by_their_paths():
+    fix = NavSatFix()
+    set_field(fix, 'status.service', 3)
+    set_field(fix, 'position_covariance_type', 2)
+    set_field(fix, 'position_covariance[8]', 4)
+    assert (fix.status.service, fix.position_covariance_type) == (3, 2)
+    assert fix.position_covariance[8] == 4.0
+    assert not any(fix.position_covariance[:8])
+
+
 @given(order=st.permutations([*JOINTS, 'rudder']))
 @settings(deadline=None)
 def test_joints_are_found_by_name(order):
@@ -102,7 +175,9 @@ def test_joints_are_found_by_name(order):
         name=list(order), position=[0.0, 1.0, 2.0, 3.0], velocity=[0.0], effort=[1.0]
     )
     _, decoded = COMMAND.decode(serialize_message(message))
-    assert decoded == tuple(float(places[joint]) for joint in JOINTS)
+    assert decoded == (*(float(places[joint]) for joint in JOINTS), 0.0)
+    _, decoded = topic_of('command', 'rudder').codec.decode(serialize_message(message))
+    assert decoded == tuple(float(places[joint]) for joint in (*JOINTS, 'rudder'))
 
 
 def test_missing_joint_is_named():
@@ -211,3 +286,20 @@ def test_places_cover_every_field_of_a_message():
         'status[0].values[0].key': b'stage',
         'status[0].values[0].value': b'gliding',
     }
+
+
+def test_a_steering_surface_is_the_last_name_of_those_vehicles_that_have_one():
+    """Its number is 0.0 of a vehicle that has none, and stands in no message of it."""
+    numbers = (0.1, 0.02, -0.3, 0.4)
+    for name in ('joint_states', 'command'):
+        without, steered = (topic_of(name, fin).codec for fin in ('', 'fin'))
+        plain, raw = without.encode(7, numbers), steered.encode(7, numbers)
+        assert deserialize_message(plain, JointState).name == list(JOINTS)
+        assert deserialize_message(raw, JointState).name == [*JOINTS, 'fin']
+        assert steered.decode(raw) == (7, numbers)
+        assert without.decode(plain) == without.decode(raw) == (7, (*numbers[:3], 0.0))
+        with pytest.raises(MessageError, match="'fin' is missing"):
+            steered.decode(plain)
+        rows = np.frombuffer(plain, np.uint8)[None]
+        assert without.decode_many(rows)[1].tolist() == [[*numbers[:3], 0.0]]
+    assert topic_of('odom', 'fin') is TOPICS['odom']

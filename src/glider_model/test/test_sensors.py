@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Noise of the odometry: its size, its independence, and that it can be taken off again."""
+"""Sensors: size and independence of noise, and that it can be taken off; errors that stay."""
 
 import math
 
@@ -13,20 +13,30 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from glider_model.base.frames import (
+    OriginSettings,
     euler_from_quaternion,
+    from_geodetic,
     odometry_from_wire,
     odometry_to_wire,
     quaternion_from_euler,
 )
-from glider_model.base.signals import Odometry
-from glider_model.plant.block import plant_outputs
+from glider_model.base.signals import TICK_S, Joints, Odometry
+from glider_model.base.wiring import PLANT
+from glider_model.ocean.density import depth_at
+from glider_model.plant.block import plant_move, plant_outputs
 from glider_model.plant.plant import PlantSettings, plant_odometry
 from glider_model.plant.sensors import (
+    HAS_FIX,
+    NO_FIX,
+    NO_RATES,
+    NO_SAMPLE,
     SensorSettings,
     add_noise,
     is_noisy,
     noise_of_tick,
     remove_noise,
+    sense,
+    take_sample,
 )
 
 quick = settings(max_examples=100, deadline=None)
@@ -38,6 +48,12 @@ NOISE = {
     'position_std_m': 1.0,
 }
 COUNT = 100_000
+#: Sensors of a vehicle that navigates by itself.
+PARTS = ['imu', 'pressure', 'fix']
+UNDER_WATER = {'depth_m': 20.0, 'pitch_deg': -20.0, 'speed_mps': 0.4, 'heading_deg': 50.0}
+ORIGIN = OriginSettings(latitude_deg=60.0, longitude_deg=179.99)
+#: Places among the numbers of the plant.
+MEASURED, IMU, FIX = (PLANT.outputs.index(name) - 1 for name in ('measured_odom', 'imu', 'fix'))
 angles = st.floats(-math.pi, math.pi)
 seeds = st.integers(0, 2**63 - 1)
 ticks = st.integers(0, 10**9)
@@ -152,20 +168,242 @@ def test_attitude_stays_a_unit_quaternion():
         )
 
 
+def said(state, params):
+    """What the plant says of a tick, by topic."""
+    outputs, _ = plant_outputs(state, params)
+    return dict(zip(PLANT.outputs[1:], outputs, strict=True))
+
+
 def test_plant_measures_with_the_noise_of_its_tick_and_seed():
     given = PlantSettings(sensors=NOISE, seed=4)
     state = given.initial_state()._replace(tick=17)
     expected = add_noise(plant_odometry(state), 17, SensorSettings(**NOISE).params(4))
-    (odom, joints), _ = plant_outputs(state, given.params())
-    assert odom == odometry_to_wire(expected)
-    assert joints == state.joints
+    told = said(state, given.params())
+    assert told['measured_odom'] == odometry_to_wire(expected)
+    assert told['joint_states'] == state.joints
+
+
+@pytest.mark.parametrize('sensors', [{}, NOISE, {'compass_bias_deg': 9.0, 'imu_period_s': 3.0}])
+@pytest.mark.parametrize('fitted', [['measured_odom'], PARTS])
+def test_plant_tells_the_truth_whatever_it_measures(sensors, fitted):
+    given = PlantSettings(sensors=sensors, initial=UNDER_WATER, fitted=fitted)
+    state = given.initial_state()._replace(tick=5)
+    told = said(state, given.params())
+    assert told['ground_truth/odom'] == odometry_to_wire(plant_odometry(state))
 
 
 def test_plant_without_noise_measures_its_odometry():
-    given = PlantSettings(initial={'depth_m': 20.0, 'pitch_deg': -20.0, 'speed_mps': 0.4})
+    given = PlantSettings(initial=UNDER_WATER)
     state = given.initial_state()
-    (odom, _), _ = plant_outputs(state, given.params())
-    assert odom == odometry_to_wire(plant_odometry(state))
+    assert said(state, given.params())['measured_odom'] == odometry_to_wire(plant_odometry(state))
+
+
+def test_only_what_is_fitted_measures():
+    for fitted, silent in ((['measured_odom'], PARTS), (PARTS, ['measured_odom'])):
+        given = PlantSettings(initial=UNDER_WATER, fitted=fitted)
+        told = said(given.initial_state(), given.params())
+        assert all(any(told[name]) for name in fitted), fitted
+        for name in silent:
+            assert not any(x for x in told[name] if x != NO_FIX), name
+
+
+# ---------------------------------------------------------------------- errors that stay
+
+
+def test_parts_without_errors_measure_what_is_true():
+    given = PlantSettings(initial=UNDER_WATER, fitted=PARTS)
+    state = given.initial_state()
+    told, true = said(state, given.params()), odometry_to_wire(plant_odometry(state))
+    assert told['imu'] == (*true[3:7], *true[10:], 0.0)
+    assert depth_at(*told['pressure']) == pytest.approx(20.0, abs=1e-9)
+    assert told['fix'][0] == NO_FIX
+
+
+def measured_angles(phi_deg, theta_deg, psi_deg, **errors):
+    """Roll, pitch and heading (deg) as the compass shows them."""
+    params = SensorSettings(**errors).params(0)
+    sample = take_sample(
+        odometry(*np.radians([phi_deg, theta_deg, psi_deg])), NO_SAMPLE, 0, params
+    )
+    return np.degrees(euler_from_quaternion(*sample[:4]))
+
+
+def turned_deg(one, other):
+    """Differences of angles, the short way (deg)."""
+    return (np.asarray(one) - np.asarray(other) + 180.0) % 360.0 - 180.0
+
+
+@quick
+@given(st.floats(-40.0, 40.0), st.floats(-60.0, 60.0), st.floats(-180.0, 180.0))
+def test_errors_of_the_compass_stay(phi_deg, theta_deg, psi_deg):
+    true = (phi_deg, theta_deg, psi_deg)
+    errors = {
+        'compass_bias_deg': -3.0,
+        'compass_deviation_deg': 5.0,
+        'compass_deviation_phase_deg': 30.0,
+        'pitch_scale': 1.1,
+        'pitch_offset_deg': -2.0,
+        'roll_bias_deg': 4.0,
+    }
+    deviation = 5.0 * math.sin(math.radians(psi_deg + 30.0))
+    expected = (phi_deg + 4.0, 1.1 * theta_deg - 2.0, psi_deg - 3.0 + deviation)
+    assert turned_deg(measured_angles(*true, **errors), expected) == pytest.approx(0.0, abs=1e-9)
+    for name, value in errors.items():
+        alone = measured_angles(*true, **{name: value})
+        off = {
+            'compass_bias_deg': (0.0, 0.0, -3.0),
+            'compass_deviation_deg': (0.0, 0.0, 5.0 * math.sin(math.radians(psi_deg))),
+            'compass_deviation_phase_deg': (0.0, 0.0, 0.0),
+            'pitch_scale': (0.0, 0.1 * theta_deg, 0.0),
+            'pitch_offset_deg': (0.0, -2.0, 0.0),
+            'roll_bias_deg': (4.0, 0.0, 0.0),
+        }[name]
+        assert turned_deg(alone, true) == pytest.approx(off, abs=1e-9), name
+
+
+@quick
+@given(st.floats(-1.0, 1200.0), st.sampled_from([0.0, 0.1, 0.5, 2.0]), st.floats(-5.0, 5.0))
+def test_depth_has_its_offset_and_comes_in_steps(depth_m, step_m, offset_m):
+    params = SensorSettings(depth_offset_m=offset_m, depth_resolution_m=step_m).params(0)
+    shown = take_sample(odometry(position=(0.0, 0.0, depth_m)), NO_SAMPLE, 0, params).p_d
+    assert abs(shown - depth_m - offset_m) <= 0.5 * step_m + 1e-9
+    if step_m:
+        assert shown / step_m == pytest.approx(round(shown / step_m), abs=1e-9)
+
+
+def test_without_a_gyro_there_are_no_rates():
+    truth, joints = odometry(), Joints(0.0, 0.0, 0.0, 0.0)
+    for gyro, rates in ((True, (0.01, 0.02, -0.03, 0.0)), (False, (0.0, 0.0, 0.0, NO_RATES))):
+        params = SensorSettings(gyro=gyro).params(0)
+        told = sense(truth, joints, NO_SAMPLE, 0, 0, 0, params)
+        assert told[IMU][4:] == pytest.approx(rates, abs=1e-15)
+        assert told[MEASURED][10:] == pytest.approx(rates[:3], abs=1e-15)
+
+
+# ---------------------------------------------------------------------- samples
+
+
+def shown(count, **sensors):
+    """What the plant shows in ``count`` ticks of a glide, by topic: float64[count, n]."""
+    given = PlantSettings(initial=UNDER_WATER, fitted=[*PARTS, 'measured_odom'], sensors=sensors)
+    state, params = given.initial_state(), given.params()
+    rows = {name: [] for name in PLANT.outputs[1:]}
+    for tick in range(count):
+        for name, numbers in said(state, params).items():
+            rows[name].append(numbers)
+        pump = 0.4 * math.sin(0.05 * tick)
+        state = plant_move(state, ((pump, 0.01, 0.1, 0.0), (0.1, 0.0, 0.0)), params, TICK_S)
+    return {name: np.array(numbers) for name, numbers in rows.items()}
+
+
+@pytest.mark.parametrize('period_s', [0.1, 0.5, 4.0])
+def test_a_sample_is_shown_until_the_next(period_s):
+    """Attitude, rates, depth; the horizontal position and the velocity are measured always."""
+    noise = {'attitude_std_deg': 0.2, 'position_std_m': 1.0}
+    every, held = shown(100, **noise), shown(100, **noise, imu_period_s=period_s)
+    last = np.arange(100) // round(period_s / TICK_S) * round(period_s / TICK_S)
+    for name in ('imu', 'pressure'):
+        assert len(np.unique(every[name], axis=0)) == 100, 'something is to be held'
+        assert np.array_equal(held[name], every[name][last]), name
+    columns = [2, *range(3, 7), *range(10, 13)]
+    one, other = held['measured_odom'], every['measured_odom']
+    assert np.array_equal(one[:, columns], other[last][:, columns])
+    assert np.array_equal(np.delete(one, columns, 1), np.delete(other, columns, 1))
+    assert np.array_equal(held['ground_truth/odom'], every['ground_truth/odom'])
+
+
+def test_some_samples_drop_out():
+    every, some = shown(2000), shown(2000, imu_missed_share=0.3)
+    assert np.array_equal(some['imu'][0], every['imu'][0])
+    is_new = np.all(some['imu'] == every['imu'], axis=1)
+    assert np.mean(~is_new) == pytest.approx(0.3, abs=0.04)
+    before = np.flatnonzero(~is_new) - 1
+    assert np.array_equal(some['imu'][before + 1], some['imu'][before])
+
+
+# ---------------------------------------------------------------------- fixes
+
+TEN_S = round(10.0 / TICK_S)
+
+
+def fix_of(depth_m, surfaced_ticks, dives=1, tick=0, seed=0, **sensors):
+    """Numbers of a fix 4000 m north and 300 m west of the origin."""
+    params = SensorSettings(gps_first_fix_s=10.0, **sensors).params(seed, ORIGIN, ('fix',))
+    truth = odometry(position=(4000.0, -300.0, depth_m))
+    return sense(
+        truth, Joints(0.0, 0.0, 0.0, 0.0), NO_SAMPLE, surfaced_ticks, dives, tick, params
+    )[FIX]
+
+
+@pytest.mark.parametrize(
+    ('depth_m', 'surfaced_ticks', 'has_fix'),
+    [
+        (0.1, 0, False),
+        (0.1, TEN_S - 1, False),
+        (0.1, TEN_S, True),
+        (-0.2, 100 * TEN_S, True),
+        (0.49, TEN_S, True),
+        (0.51, 100 * TEN_S, False),
+        (20.0, 100 * TEN_S, False),
+    ],
+)
+def test_a_fix_needs_the_antenna_out_and_its_time(depth_m, surfaced_ticks, has_fix):
+    status, *place = fix_of(depth_m, surfaced_ticks)
+    assert status == (HAS_FIX if has_fix else NO_FIX)
+    assert any(place) == has_fix
+
+
+def test_a_fix_is_where_the_vehicle_is():
+    _, latitude, longitude, *variances = fix_of(0.1, TEN_S, gps_std_m=0.0)
+    place = from_geodetic(latitude, longitude, ORIGIN.params())
+    assert place == pytest.approx((4000.0, -300.0), abs=1e-6)
+    assert variances == [0.0, 0.0]
+
+
+def test_the_error_of_fixes_is_as_told_and_stays_for_a_minute():
+    places = [
+        from_geodetic(*fix_of(0.1, TEN_S, tick=tick, gps_std_m=4.0)[1:3], ORIGIN.params())
+        for tick in range(0, 600 * 600, 300)
+    ]
+    off = np.array(places) - (4000.0, -300.0)
+    assert np.array_equal(off[::2], off[1::2])
+    assert off.std(axis=0) == pytest.approx(4.0, rel=0.12)
+    assert np.abs(off.mean(axis=0)) == pytest.approx(0.0, abs=0.6)
+    assert fix_of(0.1, TEN_S, gps_std_m=4.0)[3:] == (16.0, 16.0)
+
+
+@pytest.mark.parametrize('pattern', ['0', '1', '01', '110', '00001'])
+def test_surfacings_without_a_fix_follow_their_pattern(pattern):
+    found = [fix_of(0.1, TEN_S, n, fix_missed_pattern=pattern)[0] for n in range(15)]
+    expected = [NO_FIX if pattern[n % len(pattern)] == '1' else HAS_FIX for n in range(15)]
+    assert found == expected
+
+
+@pytest.mark.parametrize(('pattern', 'missed'), [('01', {1, 3}), ('100', {0, 3}), ('0', set())])
+def test_each_time_at_the_surface_is_one_surfacing(pattern, missed):
+    """However deep it has been, and however it bobs: up and down by hand, a tick at each depth."""
+    sensors = {'gps_first_fix_s': 2.0, 'fix_missed_pattern': pattern}
+    given = PlantSettings(fitted=PARTS, sensors=sensors, initial={'depth_m': 0.1})
+    state, params = given.initial_state(), given.params()
+    stay = [0.1] * 30 + [0.6] + [0.2] * 10 + [1.2, 2.0, 0.1] + [0.1] * 30
+    dive = [1.0, 4.0, 20.0, 200.0, 2.0, 1.6, 1.4, 0.6]
+    found = []
+    for depth in 4 * [*stay, *dive]:
+        motion = state.motion._replace(p_d=depth, u=0.0, w=0.0)
+        state = state._replace(motion=motion)
+        found.append(said(state, params)['fix'][0] == HAS_FIX)
+        state = plant_move(state, (4 * (0.0,), 3 * (0.0,)), params, TICK_S)
+    expected = [*range(20, 30), *range(63, len(stay))]
+    for number, has in enumerate(np.split(np.array(found), 4)):
+        assert np.flatnonzero(has).tolist() == ([] if number in missed else expected), number
+
+
+def test_surfacings_without_a_fix_are_drawn_by_their_share():
+    """A surfacing has fixes, or has none, from its first tick to its last."""
+    found = [fix_of(0.1, TEN_S, n, fix_missed_share=0.25)[0] for n in range(2000)]
+    later = [fix_of(0.1, 9 * TEN_S, n, 777, fix_missed_share=0.25)[0] for n in range(2000)]
+    assert found == later
+    assert np.mean(np.array(found) == NO_FIX) == pytest.approx(0.25, abs=0.04)
 
 
 @pytest.mark.parametrize('name', NOISE)

@@ -56,7 +56,9 @@ def test_vehicle_is_called_like_its_file(name):
 
 @pytest.mark.parametrize('name', vehicle_names())
 def test_parameters_are_finite(name):
-    assert all(math.isfinite(number) for number in load_vehicle(name).params())
+    numbers = load_vehicle(name).params()._asdict()
+    numbers.pop('surface')
+    assert all(math.isfinite(number) for number in numbers.values())
 
 
 @pytest.mark.parametrize('name', vehicle_names())

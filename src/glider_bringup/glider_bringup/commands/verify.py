@@ -15,7 +15,7 @@ from glider_bringup.console import Json, Run, messages, output, picked, repeatab
 from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
 
 app = typer.Typer()
-BlockName = Literal['plant', 'current', 'guidance', 'control']
+BlockName = Literal['plant', 'current', 'navigation', 'guidance', 'control']
 
 
 @app.command(epilog='Example: ./glider verify runs/20260101-120000-current_8deg')
@@ -52,7 +52,9 @@ def verify(
         with tempfile.TemporaryDirectory() as scratch, shares() as update:
             bag = Bag(run)
             told = read_told(bag, run, settings, Path(scratch))
-            recording = Recording(bag, namespace, lambda share: update('reading', share))
+            recording = Recording(
+                bag, namespace, lambda share: update('reading', share), told.steers_by
+            )
             with interrupts_at(update) as update, compiling_told(compiling):
                 verdicts = list(verify_blocks(recording, told, wanted, update))
     except KeyboardInterrupt:

@@ -17,20 +17,27 @@ from glider_bringup.mission.run_folder import VEHICLE_FILE
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import wire_of
 from glider_control.block import CONTROL
-from glider_control.control import SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL
+from glider_control.control import (
+    SATURATED_BUOYANCY,
+    SATURATED_PITCH,
+    SATURATED_ROLL,
+    SATURATED_SURFACE,
+)
 from glider_control.watch import ROWS
 from glider_guidance.yo.stage import STAGE_NAMES
 from glider_model.base.block import Telling
 from glider_model.base.frames import (
     euler_from_quaternion,
+    from_geodetic,
     odometry_from_wire,
+    poses_from_wire,
     reference_from_wire,
     water_from_wire,
     wrench_from_wire,
 )
 from glider_model.base.kernel import kernel, source_digest
 from glider_model.base.signals import TICK_NS, Adaptation
-from glider_model.vehicle.file import vehicle_file
+from glider_model.vehicle.file import steers_by, vehicle_file
 
 NED, FRD, PATH = 'NED', 'FRD', 'path'
 _AXES = ('north', 'east', 'down')
@@ -46,11 +53,11 @@ _UNKNOWN_STAGE = -1
 
 _ODOM, _REFERENCE = COLUMNS['odom'].start, COLUMNS['reference'].start
 _CURRENT, _ESTIMATE = COLUMNS['current_velocity'].start, COLUMNS['current_estimate'].start
-_WRENCH = COLUMNS['wrench'].start
+_WRENCH, _TRUTH = COLUMNS['wrench'].start, COLUMNS['ground_truth/odom'].start
 
 
 class _Variable(NamedTuple):
-    """One variable; its name is that of the topic, ``_``, and that of the quantity."""
+    """One variable; its name is that of the topic, with ``_`` for ``/``, and of the quantity."""
 
     topic: str
     quantity: str
@@ -60,7 +67,7 @@ class _Variable(NamedTuple):
 
     @property
     def name(self) -> str:
-        return f'{self.topic}_{self.quantity}'
+        return f'{self.topic.replace("/", "_")}_{self.quantity}'
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -88,12 +95,16 @@ def _velocity(topic: str, what: str, before: str = '') -> list[_Variable]:
     return [_Variable(topic, f'{before}{axis}', 'm/s', f'{what}, {axis}', NED) for axis in _AXES]
 
 
-def _joints(topic: str, what: str) -> list[_Variable]:
-    return [
+def _joints(topic: str, what: str, steers_by: str) -> list[_Variable]:
+    found = [
         _Variable(topic, 'buoyancy_engine', 'kg', f'{what} net heaviness, positive sinks'),
         _Variable(topic, 'pitch_mass', 'm', f'{what} pitch mass, positive forward', FRD),
         _Variable(topic, 'roll_mass', 'rad', f'{what} roll mass about the x axis', FRD),
     ]
+    if steers_by:
+        text = f'{what} angle, positive turns the nose to starboard'
+        found.append(_Variable(topic, steers_by, 'rad', text, FRD))
+    return found
 
 
 def _learnt() -> list[_Variable]:
@@ -108,7 +119,7 @@ def _learnt() -> list[_Variable]:
 
 #: What `_turn` writes, in its order.
 _TURNED = (
-    *_position('odom', 'measured position'),
+    *_position('odom', 'believed position'),
     *(
         _Variable('odom', f'q_{part}', '1', f'attitude quaternion, FRD to NED, {part}', NED)
         for part in 'wxyz'
@@ -119,7 +130,7 @@ _TURNED = (
     _Variable('odom', 'p', 'rad/s', 'angular rate about the x axis', FRD),
     _Variable('odom', 'q', 'rad/s', 'angular rate about the y axis', FRD),
     _Variable('odom', 'r', 'rad/s', 'angular rate about the z axis', FRD),
-    *_euler('odom', 'measured'),
+    *_euler('odom', 'believed'),
     *_position('reference', 'virtual target'),
     *_euler('reference', 'desired'),
     *_velocity('reference', 'desired velocity over ground', 'velocity_'),
@@ -129,19 +140,65 @@ _TURNED = (
     ),
     *_velocity('current_velocity', 'velocity of the water over ground'),
     *_velocity('current_estimate', 'velocity of the water, as guidance estimates it'),
+    *_position('ground_truth/odom', 'true position'),
+    *_euler('ground_truth/odom', 'true'),
     _Variable('wrench', 'heave_force', 'N', 'demanded force, down', FRD),
     _Variable('wrench', 'roll_moment', 'N m', 'demanded moment about the x axis', FRD),
     _Variable('wrench', 'pitch_moment', 'N m', 'demanded moment about the y axis', FRD),
 )
-#: What topics carry in the same numbers.
-_SAME = (
-    *_joints('joint_states', 'position:'),
-    *_joints('command', 'commanded:'),
-    _Variable('tracking_error', 'along', 'm', 'ahead of the virtual target', PATH),
-    _Variable('tracking_error', 'across', 'm', 'starboard of the virtual target', PATH),
-    _Variable('tracking_error', 'below', 'm', 'below the virtual target', PATH),
-    *_learnt(),
-)
+
+
+def _same(steers_by: str) -> list[_Variable]:
+    """What topics carry in the same numbers."""
+    return [
+        *_joints('joint_states', 'position:', steers_by),
+        *_joints('command', 'commanded:', steers_by),
+        _Variable('tracking_error', 'along', 'm', 'ahead of the virtual target', PATH),
+        _Variable('tracking_error', 'across', 'm', 'starboard of the virtual target', PATH),
+        _Variable('tracking_error', 'below', 'm', 'below the virtual target', PATH),
+        *_learnt(),
+    ]
+
+
+def _covariance(topic: str, what: str, unit: str) -> list[_Variable]:
+    texts = ('variance to the north', 'covariance of north and east', 'variance to the east')
+    names = ('north_variance', 'north_east_covariance', 'east_variance')
+    return [
+        _Variable(topic, name, unit, f'{what}, {text}', NED)
+        for name, text in zip(names, texts, strict=True)
+    ]
+
+
+def _water(topic: str, what: str) -> list[_Variable]:
+    return [*_velocity(topic, what)[:2], *_covariance(topic, what, 'm2 s-2')]
+
+
+#: What the covariance of a believed place is called.
+_PLACE = _covariance('odom', 'believed position', 'm2')
+#: What there is of sensors and beliefs, by topic: nothing of it where navigation has none.
+_BESIDE = {
+    'imu': (
+        *_euler('imu', 'measured'),
+        *(
+            _Variable('imu', rate, 'rad/s', f'measured angular rate about the {axis} axis', FRD)
+            for rate, axis in zip('pqr', 'xyz', strict=True)
+        ),
+    ),
+    'pressure': (
+        _Variable('pressure', 'absolute', 'Pa', 'measured pressure, with the air above'),
+    ),
+    'fix': (
+        _Variable('fix', 'latitude', 'degrees_north', 'fix, latitude'),
+        _Variable('fix', 'longitude', 'degrees_east', 'fix, longitude'),
+        _Variable('fix', 'north', 'm', 'fix, north', NED),
+        _Variable('fix', 'east', 'm', 'fix, east', NED),
+        _Variable('fix', 'variance', 'm2', 'fix, variance to the north and to the east each', NED),
+    ),
+    'believed_current': _water('believed_current', 'believed current under water'),
+    'believed_surface_current': _water(
+        'believed_surface_current', 'believed drift at the surface'
+    ),
+}
 
 
 @kernel
@@ -161,22 +218,75 @@ def _turn(log, out):
         _put(out, row, 16, reference_from_wire(wire_of(log, row, _REFERENCE)))
         _put(out, row, 28, water_from_wire(log[row, _CURRENT : _CURRENT + 3]))
         _put(out, row, 31, water_from_wire(log[row, _ESTIMATE : _ESTIMATE + 3]))
-        _put(out, row, 34, wrench_from_wire(log[row, _WRENCH : _WRENCH + 3]))
+        true = odometry_from_wire(wire_of(log, row, _TRUTH))
+        _put(out, row, 34, (true.p_n, true.p_e, true.p_d))
+        _put(out, row, 37, euler_from_quaternion(true.q_w, true.q_x, true.q_y, true.q_z))
+        _put(out, row, 40, wrench_from_wire(log[row, _WRENCH : _WRENCH + 3]))
 
 
-def _numbers(log: np.ndarray) -> dict[str, tuple]:
+def _numbers(log: np.ndarray, steers_by: str) -> dict[str, tuple]:
     """Variables that are numbers, as xarray takes them."""
     out = np.empty((len(_TURNED), len(log)))
     _turn(log, out)
     found = dict(zip(_TURNED, out, strict=True))
     place: dict[str, int] = {}
-    for variable in _SAME:
+    for variable in _same(steers_by):
         first = COLUMNS[variable.topic].start
         place[variable.topic] = place.get(variable.topic, first - 1) + 1
         found[variable] = log[:, place[variable.topic]].copy()
     return {
         variable.name: ('time', values, variable.attributes) for variable, values in found.items()
     }
+
+
+def _beside(log: np.ndarray, scenario: Scenario) -> dict[str, tuple]:
+    """Covariance of the place, and what there is of sensors and beliefs, as xarray takes them."""
+
+    def of(topic: str) -> np.ndarray:
+        return log[:, COLUMNS[topic]].T
+
+    xx, xy, _, yy = of('odom')[13:]
+    found = dict(zip(_PLACE, (yy, xy, xx), strict=True))
+    for topic in (topic for topic in _BESIDE if topic in scenario.topics):
+        values = _AS_NUMBERS[topic](of(topic), scenario)
+        found |= dict(zip(_BESIDE[topic], values, strict=True))
+    return {
+        variable.name: ('time', values.copy(), variable.attributes)
+        for variable, values in found.items()
+    }
+
+
+def _imu(wire: np.ndarray, scenario: Scenario) -> tuple[np.ndarray, ...]:
+    """Attitude and rates; rates are NaN where they are not measured."""
+    quaternion, (p, q, r, gyro) = wire[:4], wire[4:]
+    nowhere = np.zeros((3, wire.shape[1]))
+    angles = poses_from_wire(np.concatenate((nowhere, quaternion)).T)[:, 3:].T
+    return (*angles, *np.where(gyro >= 0.0, (p, -q, -r), np.nan))
+
+
+def _fix(wire: np.ndarray, scenario: Scenario) -> tuple[np.ndarray, ...]:
+    """Fixes; NaN where there is none."""
+    status, *values = wire
+    latitude, longitude, east_variance, north_variance = np.where(status >= 0.0, values, np.nan)
+    origin, place = scenario.origin.params(), np.full((2, len(status)), np.nan)
+    for tick in np.flatnonzero(status >= 0.0):
+        place[:, tick] = from_geodetic(latitude[tick], longitude[tick], origin)
+    return latitude, longitude, *place, 0.5 * (east_variance + north_variance)
+
+
+def _water_numbers(wire: np.ndarray, scenario: Scenario) -> tuple[np.ndarray, ...]:
+    east, north, xx, xy, _, yy = wire
+    return north, east, yy, xy, xx
+
+
+#: Numbers of the variables of `_BESIDE` from those of a topic, float64[m, n].
+_AS_NUMBERS = {
+    'imu': _imu,
+    'pressure': lambda wire, scenario: wire,
+    'fix': _fix,
+    'believed_current': _water_numbers,
+    'believed_surface_current': _water_numbers,
+}
 
 
 def _as_told(saturation: np.ndarray) -> np.ndarray:
@@ -196,6 +306,7 @@ def _flags(log: np.ndarray) -> dict[str, tuple]:
         SATURATED_BUOYANCY: 'buoyancy_engine_at_limit',
         SATURATED_PITCH: 'pitch_mass_at_limit',
         SATURATED_ROLL: 'roll_mass_at_limit',
+        SATURATED_SURFACE: 'steering_surface_at_limit',
         **{bit: name for bit, (name, _) in ROWS.items()},
     }
     names = ['unknown', *(name.replace(' ', '_') for name in STAGE_NAMES)]
@@ -244,13 +355,17 @@ def make_dataset(log: np.ndarray, scenario: Scenario, score: dict[str, Any]) -> 
     -------
     xarray.Dataset
         One-dimensional variables over ``time`` (s), each with ``units``, ``long_name``, ``topic``
-        and, if it has one, ``frame``.
+        and, if it has one, ``frame``. Those of sensors and beliefs that navigation does not have
+        are not there.
     """
-    beside = scenario.model_copy(update={'vehicle': VEHICLE_FILE})  # as in a run folder
     time_s = np.arange(len(log)) * TICK_NS / 1e9
     about = ('scenario', 'vehicle', 'controller', 'guidance', 'seed', 'status')
     return xarray.Dataset(
-        {**_numbers(log), **_flags(log)},
+        {
+            **_numbers(log, steers_by(scenario)),
+            **_beside(log, scenario),
+            **_flags(log),
+        },
         coords={
             'time': ('time', time_s, {'units': 's', 'long_name': 'simulated time of the tick'})
         },
@@ -261,7 +376,7 @@ def make_dataset(log: np.ndarray, scenario: Scenario, score: dict[str, Any]) -> 
             'frames': 'world NED, body FRD, SI and radians; path: along, to starboard, below',
             **{name: score[name] for name in about},
             'score_json': json.dumps(score),
-            'scenario_yaml': beside.to_yaml(),
+            'scenario_yaml': scenario.to_yaml(vehicle=VEHICLE_FILE),  # as in a run folder
             'vehicle_yaml': vehicle_file(scenario.vehicle).decode(),
             'code_digest': source_digest(),
         },

@@ -222,7 +222,7 @@ def fly(
         if kept:
             write_score(folder, card)
             tracer.result().save(folder / TRACES_FILE)
-    source = partial(_rows_of, folder) if in_bag else rows.result
+    source = partial(_rows_of, folder, flown.vehicle) if in_bag else rows.result
     return Run(flown, card, folder if kept else None, source)
 
 
@@ -277,13 +277,13 @@ def open_run(path: str | Path) -> Run:
     with ExitStack() as stack:
         attachments = Bag(path).attachments if has_bag(path) else {}
         scenario = stack.enter_context(scenario_of(path, attachments)).scenario
-        run = Run(scenario, card, path, partial(_rows_of, path))
+        run = Run(scenario, card, path, partial(_rows_of, path, scenario.vehicle))
         # what an MCAP file brings is there as long as the run is
         weakref.finalize(run, stack.pop_all().close)
     return run
 
 
-def _rows_of(path: Path) -> np.ndarray:
+def _rows_of(path: Path, vehicle: str) -> np.ndarray:
     """Rows of the bag of a run, float64[ticks, ROW]."""
     if not has_bag(path):
         raise ConfigurationError(
@@ -293,5 +293,5 @@ def _rows_of(path: Path) -> np.ndarray:
     from glider_bringup.recording.read_back import read_back
 
     rows = Rows()
-    read_back(Bag(path), [rows])
+    read_back(Bag(path), vehicle, [rows])
     return rows.result()

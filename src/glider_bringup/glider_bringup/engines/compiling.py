@@ -23,9 +23,10 @@ Tell = Callable[[str], None]
 
 def told(combination: Combination, tell: Tell) -> AbstractContextManager[None]:
     """Tell what is compiled in the block, if anything is."""
-    law, method = combination
+    law, method, navigation = combination
     line = (
-        f'compiling the mathematics for law {law} with method {method}, once; up to half a minute'
+        f'compiling the mathematics for law {law} with method {method}, position '
+        f'{navigation.replace("_", " ")}, once; up to half a minute'
     )
     return compiling_told(partial(tell, line))
 
@@ -41,7 +42,11 @@ def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
     nothing = np.empty((0, ROW))
     with interrupts_noted() as interrupts:
         for one in dict.fromkeys(combinations):
-            changes = {'control.law': one.law, 'guidance.los.method': one.method}
+            changes = {
+                'control.law': one.law,
+                'guidance.los.method': one.method,
+                'navigation.method': one.navigation,
+            }
             state, params = mission_of(load_scenario(changes=changes))
             with told(one, tell):
                 fly(state, params, nothing, TICK_S)

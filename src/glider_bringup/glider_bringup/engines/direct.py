@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The direct engine: the four steps of the nodes in one compiled loop.
+"""The direct engine: the steps of the five nodes in one compiled loop.
 
 What a message would do to the numbers (NED to ENU and back, through a quaternion) is done here
 too, so that a run over topics and a direct run of one scenario agree to the last bit.
@@ -24,6 +24,8 @@ from glider_model.base.wiring import FIELDS, publisher
 from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
 from glider_model.plant.block import plant_move, plant_outputs
 from glider_model.plant.plant import PlantParams, PlantState, not_finite, state_fault
+from glider_navigation.block import navigation_tick
+from glider_navigation.settings import NavigationParams
 
 
 class NotFiniteError(Exception):
@@ -31,19 +33,21 @@ class NotFiniteError(Exception):
 
 
 class MissionParams(NamedTuple):
-    """Parameters of the four blocks."""
+    """Parameters of the five blocks."""
 
     plant: PlantParams
     current: CurrentParams
+    navigation: NavigationParams
     guidance: GuidanceParams
     control: ControlParams
 
 
 class MissionState(NamedTuple):
-    """States of the four blocks."""
+    """States of the five blocks."""
 
     plant: PlantState
     current: CurrentState
+    navigation: NamedTuple  #: of the method that was chosen
     guidance: GuidanceState
     control: ControlState
 
@@ -71,23 +75,28 @@ def fly(state, params, log, dt):
     bool
         Whether the mission has ended.
     """
-    plant, current, guidance, control = state
+    plant, current, navigation, guidance, control = state
     for row in range(log.shape[0]):
         t_s = plant.tick * dt
         measured, finished = plant_outputs(plant, params.plant)
-        odom, joints = measured[0], measured[1]
-        place = odometry_from_wire(odom)
+        joints, sensors = measured[-1], measured[1:-1]
+        place = odometry_from_wire(measured[0])
         position = (place.p_n, place.p_e, place.p_d)
         current, velocity = current_step_in_place(current, position, t_s, params.current, dt)
         water = water_to_wire(velocity)
+        navigation, believed, phase = navigation_tick(
+            navigation, t_s, (joints, *sensors), params.navigation, dt
+        )
+        odom = believed[0]
         guidance, guided, stage = guidance_tick(guidance, t_s, (odom,), params.guidance, dt)
         seen = (guided[0], odom, joints)
         control, controlled, told = control_tick(control, t_s, seen, params.control, dt)
         plant = plant_move(plant, (controlled[0], water), params.plant, dt)
-        put(log, row, 0, (*measured, water, *guided, *controlled, stage, told))
+        put(log, row, 0, (*measured, water, *believed, *guided, *controlled, phase, stage, told))
         if finished:
-            return MissionState(plant, current, guidance, control), row + 1, True
-    return MissionState(plant, current, guidance, control), log.shape[0], False
+            state = MissionState(plant, current, navigation, guidance, control)
+            return state, row + 1, True
+    return MissionState(plant, current, navigation, guidance, control), log.shape[0], False
 
 
 def _finite_rows(log: np.ndarray) -> int:
@@ -100,7 +109,7 @@ def _finite_rows(log: np.ndarray) -> int:
 
 def _fault(row: np.ndarray, tick: int) -> str:
     """What of a log row is not finite, in words; the first in the order of the blocks."""
-    odometry = odometry_from_wire(tuple(row[COLUMNS['odom']]))
+    odometry = odometry_from_wire(tuple(row[COLUMNS['ground_truth/odom']]))
     fault = state_fault(odometry, Joints(*row[COLUMNS['joint_states']]), tick)
     topics = (name for name in COLUMNS if name in FIELDS)
     wrong = (name for name in topics if not np.isfinite(row[COLUMNS[name]]).all())

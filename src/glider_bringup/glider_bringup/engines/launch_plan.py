@@ -12,7 +12,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.engines.processes import MODULES, OWN_CLOCK, PLANT, RECORDER
+from glider_bringup.engines.processes import (
+    AUTOPILOT,
+    ON_BOARD,
+    OWN_CLOCK,
+    PLANT,
+    RECORDER,
+    process_modules,
+)
 from glider_bringup.mission.run_folder import (
     PARAMETERS_FILE,
     SCENARIO_FILE,
@@ -30,7 +37,7 @@ from glider_guidance.settings import METHODS
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_S
 from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace
-from glider_model.ros.wire.topics import CURRENT
+from glider_model.ros.wire.topics import CURRENT, NAVIGATION
 
 #: The node that `ros2 launch` starts and `./glider run`, which nobody can watch, does not.
 TF, TF_MODULE = 'tf_node', 'glider_model.nodes.tf_node'
@@ -80,8 +87,21 @@ ARGUMENTS = (
     Argument(
         'simulate',
         'true',
-        'true: with plant and current; false: guidance and control alone, for a vehicle of yours '
-        'that publishes odom and joint_states. Needs lockstep:=false.',
+        'true: with plant and current; false: for a vehicle of yours. It publishes joint_states '
+        'and odom, or what the navigation method of the scenario reads. Needs lockstep:=false.',
+        tuple(_TRUTH),
+    ),
+    Argument(
+        'navigation',
+        'auto',
+        'With simulate:=false. false: without navigation, the vehicle publishes odom itself; '
+        'auto: without it if the navigation method of the scenario is one that knows the place.',
+        ('auto', *_TRUTH),
+    ),
+    Argument(
+        'autopilot',
+        'false',
+        'true: navigation, guidance and control in one process, which takes the memory of one.',
         tuple(_TRUTH),
     ),
     Argument(
@@ -104,6 +124,7 @@ class LaunchedNode(NamedTuple):
 
     package: str
     executable: str
+    words: tuple[str, ...] = ()  #: of its command line
 
 
 class LaunchPlan(NamedTuple):
@@ -165,6 +186,8 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     simulate = _TRUTH[text['simulate']]
     if lockstep and not simulate:
         _refuse('lockstep', text, 'false with simulate:=false, a vehicle has its own clock')
+    if simulate and text['navigation'] == 'false':
+        _refuse('navigation', text, 'auto or true with simulate:=true, whose plant has no odom')
     with_tf = _TRUTH.get(text['tf'], find_spec('tf2_msgs') is not None)
     if with_tf and not find_spec('tf2_msgs'):
         _refuse('tf', text, 'false; tf2_msgs is not installed (Debian: ros-jazzy-tf2-msgs)')
@@ -182,20 +205,41 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     )
     if record_to:
         parameters[RECORDER]['progress'] = False
-    modules = dict(MODULES)
-    if not simulate:
-        del modules[PLANT], modules[CURRENT]
+    # a vehicle whose place is measured knows it, and publishes odom itself
+    knows_place = not simulate and 'measured_odom' in scenario.navigation.topics
+    nodes = _nodes(
+        simulate,
+        _TRUTH.get(text['navigation'], not knows_place),
+        _TRUTH[text['autopilot']],
+        record_to is not None,
+        with_tf,
+    )
     if with_tf:
-        modules[TF] = TF_MODULE
         parameters[TF] = {'frame_prefix': text['frame_prefix']}
     write_parameters(parameters, folder / PARAMETERS_FILE, namespace)
-    nodes = tuple(
-        LaunchedNode(module.partition('.')[0], name)
-        for name, module in modules.items()
-        if name in parameters
-    )
     remappings = (OWN_CLOCK,) if text['clock'] == OWN_CLOCK[1] else ()
     return LaunchPlan(scenario, folder / PARAMETERS_FILE, namespace, remappings, lockstep, nodes)
+
+
+def _nodes(
+    simulate: bool, navigation: bool, autopilot: bool, record: bool, with_tf: bool
+) -> tuple[LaunchedNode, ...]:
+    """Nodes to start."""
+    modules, words = process_modules(autopilot), {}
+    if not simulate:
+        del modules[PLANT], modules[CURRENT]
+    if not navigation and autopilot:
+        words[AUTOPILOT] = tuple(wired.name for wired in ON_BOARD if wired.node != NAVIGATION)
+    elif not navigation:
+        del modules[NAVIGATION]
+    if not record:
+        del modules[RECORDER]
+    if with_tf:
+        modules[TF] = TF_MODULE
+    return tuple(
+        LaunchedNode(module.partition('.')[0], name, words.get(name, ()))
+        for name, module in modules.items()
+    )
 
 
 def _changes(text: dict[str, str]) -> dict:

@@ -48,6 +48,7 @@ def node_parameters(
             'folder': str(record_to.resolve()),
             'name': scenario.name,
             'attachments': json.dumps([str(path.resolve()) for path in attachments]),
+            'topics': json.dumps(scenario.topics),
             'progress': True,
             'sync': sync,
         }

@@ -28,6 +28,10 @@ PLANT, RECORDER = wiring.PLANT.node, 'recorder_node'
 MODULES = {wired.node: wired.module for wired in WIRING if wired != wiring.PLANT}
 MODULES |= {RECORDER: 'glider_bringup.nodes.recorder_node', PLANT: wiring.PLANT.module}
 
+#: The process that has the nodes of these blocks in it, and its module.
+AUTOPILOT, AUTOPILOT_MODULE = 'autopilot', 'glider_bringup.nodes.autopilot'
+ON_BOARD = (wiring.NAVIGATION, wiring.GUIDANCE, wiring.CONTROL)
+
 #: Remapping that brings the clock into the namespace: docs/adr/0013.
 OWN_CLOCK = ('/clock', 'clock')
 _PR_SET_PDEATHSIG = 1
@@ -54,17 +58,31 @@ class RunnerResult(NamedTuple):
     progress: Mapping[str, Any] = {}  #: last word of the recorder
 
 
+def process_modules(autopilot: bool = False) -> dict[str, str]:
+    """Module of every process: of each node, or of the autopilot in the place of three of them."""
+    if not autopilot:
+        return dict(MODULES)
+    aboard = {wired.node for wired in ON_BOARD}
+    others = {name: module for name, module in MODULES.items() if name not in aboard}
+    return {AUTOPILOT: AUTOPILOT_MODULE, **others}
+
+
 def node_commands(
-    params_file: Path, namespace: str = NAMESPACE, own_clock: bool = False
+    params_file: Path,
+    namespace: str = NAMESPACE,
+    own_clock: bool = False,
+    autopilot: bool = False,
 ) -> dict[str, list[str]]:
-    """Command line of every node.
+    """Command line of every process.
 
     With ``own_clock`` the clock lies in the namespace, so that gliders can share a ROS domain.
+    With ``autopilot`` navigation, guidance and control are one process.
     """
     ros = ['--ros-args', '--params-file', str(params_file), '-r', f'__ns:={namespace}']
     if own_clock:
         ros += ['-r', ':='.join(OWN_CLOCK)]
-    return {name: [sys.executable, '-m', module, *ros] for name, module in MODULES.items()}
+    modules = process_modules(autopilot)
+    return {name: [sys.executable, '-m', module, *ros] for name, module in modules.items()}
 
 
 def node_environment(domain: int) -> dict[str, str]:

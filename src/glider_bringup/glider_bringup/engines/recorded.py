@@ -23,6 +23,8 @@ from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
 from glider_model.base.exits import EXIT_USAGE
 from glider_model.base.settings import ConfigurationError
 from glider_model.ros.places import NAMESPACE
+from glider_model.ros.wire.topics import recorded_topics
+from glider_model.vehicle.file import steers_by
 
 
 def fly_recorded(
@@ -35,8 +37,10 @@ def fly_recorded(
     """Fly with the direct engine, as `fly` does, and write the bag of the run."""
     attachments = [folder / SCENARIO_FILE, folder / VEHICLE_FILE]
     points = scenario.path.points(500)
-    writer = BagWriter(folder, scenario.name, attachments=attachments, sync=sync)
-    bag = LogWriter(writer, points)
+    topics = scenario.topics
+    recorded = recorded_topics(topics)
+    writer = BagWriter(folder, scenario.name, attachments=attachments, topics=recorded, sync=sync)
+    bag = LogWriter(writer, points, topics, steers_by(scenario))
     flight = fly(scenario, [*takers, bag], progress)
     if flight.status != 'aborted':
         bag.finish(flight.reason)
@@ -54,6 +58,7 @@ def fly_nodes(
     on_log: Callable[[str], None] = lambda line: None,
     on_read: Callable[[int], None] = lambda ticks: None,
     sync: Sync = 'end',
+    autopilot: bool = False,
 ) -> Flight:
     """Fly over node processes and topics; what takers are given is read back from the bag.
 
@@ -74,6 +79,8 @@ def fly_nodes(
         Gets the ticks that have been read back.
     sync : str
         When the bag is synced to disk.
+    autopilot : bool
+        Navigation, guidance and control are three nodes in one process.
     """
     attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)
     as_flown = scenario.model_copy(update={'vehicle': str((folder / VEHICLE_FILE).resolve())})
@@ -88,7 +95,7 @@ def fly_nodes(
             progress(said['tick'], said['depth_m'])
 
     result = run_nodes(
-        node_commands(folder / PARAMETERS_FILE, place, own_clock=namespace is not None),
+        node_commands(folder / PARAMETERS_FILE, place, namespace is not None, autopilot),
         folder / LOG_FILE,
         on_progress=tell,
         on_log=on_log,
@@ -98,7 +105,7 @@ def fly_nodes(
     completed, reason = result.status == 'completed', result.reason
     recorded, lost = 0, 0
     if has_bag(folder):  # else it ended before the recorder was up
-        log = read_back(Bag(folder), takers, on_read)
+        log = read_back(Bag(folder), scenario.vehicle, takers, on_read)
         if completed and (missing := log.missing(None)):
             completed, reason = False, missing
         recorded, lost = sum(log.counts.values()), log.lost(completed)

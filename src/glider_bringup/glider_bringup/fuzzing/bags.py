@@ -152,7 +152,7 @@ def _verify(folder: Path) -> Answer:
     with tempfile.TemporaryDirectory() as scratch:
         bag = Bag(folder)
         told = read_told(bag, folder, None, Path(scratch))
-        recording = Recording(bag, None, lambda share: None)
+        recording = Recording(bag, None, lambda share: None, told.steers_by)
         verdicts = list(verify(recording, told, [], lambda name, share: None))
     found = report(bag, recording, told, verdicts)
     return found, bool(found['notes']) or not found['identical']

@@ -9,6 +9,7 @@ every vehicle and either attitude law; half of the flights turn over at a shallo
 import math
 from collections.abc import Iterator
 from functools import partial
+from itertools import product
 from typing import Any, get_args
 
 import numpy as np
@@ -120,7 +121,15 @@ def _fly(changes: dict[str, Any]) -> tuple[str, str]:
 def fuzz(seed: int, count: int, tell: Tell) -> Counts:
     """Fly ``count`` cases; refused before the flight, or finite to its end, is well."""
     counter = Counter(tell)
-    _fly({'dives': 0, 'duration_s': 1.0})  # loads the kernels, which is no case's fault
+    for law, method in product(LAWS, GUIDANCES):  # has kernels compiled, which is no case's fault
+        _fly(
+            {
+                'dives': 0,
+                'duration_s': 1.0,
+                'control.law': law,
+                'guidance.los.method': method,
+            }
+        )
     for case in range(count):
         changes = draw_changes(seed, case)
         told = ' '.join(f'--set {name}={value}' for name, value in changes.items())

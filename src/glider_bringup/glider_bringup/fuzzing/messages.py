@@ -22,18 +22,28 @@ from glider_control.control import control_step
 from glider_guidance.guidance import guidance_step
 from glider_model.base.frames import odometry_from_wire, reference_from_wire
 from glider_model.base.signals import TICK_NS, TICK_S, Joints, Water
+from glider_model.base.wiring import NAVIGATION, SENSORS
 from glider_model.ocean.current import current_step
 from glider_model.plant.plant import plant_step
 from glider_model.ros.lockstep.inputs import Input
 from glider_model.ros.wire.codec import MessageError, to_cdr
 from glider_model.ros.wire.topics import TOPICS
+from glider_navigation.block import navigation_tick
 
 #: Topics that a block reads. What the plant makes of a wild current it says itself: it fails.
-READ = ('odom', 'joint_states', 'reference', 'command')
+READ = ('odom', 'joint_states', 'reference', 'command', *SENSORS)
+#: Missions by their names, and what is changed in them.
+SCENES = {
+    'adaptive': {'control.law': 'adaptive'},
+    'pid': {'control.law': 'pid'},
+    'dead reckoned': {'navigation.method': 'dead_reckoned'},
+}
 #: The message comes after this many ticks of a dive.
 TICKS = 3000
 #: Good messages after it.
 AFTER = 10
+#: Fields that cannot hold such numbers.
+_INTEGERS = {'status.status'}
 _WILD = (np.nan, np.inf, -np.inf, 0.0, 1e308, -1e308, 1e6, -1e6, 5e-324, 10.0, -10.0, 1e4, 2.0)
 
 
@@ -45,9 +55,9 @@ class Scene(NamedTuple):
     wires: dict[str, tuple[float, ...]]
 
 
-def make_scene(law: str) -> Scene:
-    """The scene under one of the attitude laws."""
-    scenario = load_scenario('current_12deg', {'dives': 0, 'control.law': law})
+def make_scene(name: str) -> Scene:
+    """One of `SCENES`."""
+    scenario = load_scenario('current_12deg', {'dives': 0, **SCENES[name]})
     state, params = mission_of(scenario)
     log = np.empty((TICKS, ROW))
     state, _, _ = fly(state, params, log, TICK_S)
@@ -57,7 +67,8 @@ def make_scene(law: str) -> Scene:
 
 def _with_wild_numbers(draw: np.random.Generator, codec, values) -> bytes:
     numbers = list(values)
-    for place in draw.choice(len(numbers), draw.integers(1, len(numbers) + 1), replace=False):
+    places = [i for i, field in enumerate(codec.fields) if field not in _INTEGERS]
+    for place in draw.choice(places, draw.integers(1, len(places) + 1), replace=False):
         numbers[place] = float(draw.choice(_WILD))
     return codec.encode(TICKS * TICK_NS, numbers)
 
@@ -93,11 +104,16 @@ MUTATIONS = (_with_wild_numbers, _flipped, _cut_or_longer, _noise, _of_another_l
 
 def _outputs(scene: Scene, name: str, values: tuple[float, ...]) -> list[float]:
     """Numbers that the readers of a topic make of a message and of good ones after it."""
-    plant, current, guidance, control = scene.state
+    plant, current, navigation, guidance, control = scene.state
     made: list[float] = []
     limits = scene.params.control.allocation
     for tick in range(1 + AFTER):
         wires = {**scene.wires, name: values} if tick == 0 else scene.wires
+        heard = tuple(wires[topic] for topic in NAVIGATION.inputs)
+        navigation, believed, _ = navigation_tick(
+            navigation, 0.0, heard, scene.params.navigation, TICK_S
+        )
+        made += [number for numbers in believed for number in numbers]
         odometry = odometry_from_wire(wires['odom'])
         reference = reference_from_wire(wires['reference'])
         guidance, guided = guidance_step(guidance, odometry, scene.params.guidance, TICK_S)
@@ -110,7 +126,7 @@ def _outputs(scene: Scene, name: str, values: tuple[float, ...]) -> list[float]:
         _, water = current_step(current, odometry[:3], 0.0, scene.params.current, TICK_S)
         made += [*guided.reference, *guided.error, *out.command, *out.wrench, *plant.motion]
         made += water if np.all(np.isfinite(odometry[:3])) else ()
-        most = (limits.m_b_max, limits.x_p_max, limits.mu_max)
+        most = (limits.m_b_max, limits.x_p_max, limits.mu_max, limits.delta_max)
         made += [np.nan for x, limit in zip(out.command, most, strict=True) if not abs(x) <= limit]
     return made
 
@@ -129,14 +145,14 @@ def _try(draw: np.random.Generator, scene: Scene, name: str, mutate) -> tuple[st
 def fuzz(seed: int, count: int, tell: Tell) -> Counts:
     """Send ``count`` messages; refused, or answered within all limits, is well."""
     counter = Counter(tell)
-    scenes = {law: make_scene(law) for law in ('adaptive', 'pid')}
+    scenes = {name: make_scene(name) for name in SCENES}
     _outputs(scenes['pid'], 'odom', scenes['pid'].wires['odom'])  # loads the kernels
     for case in range(count):
         draw = np.random.Generator(np.random.PCG64([seed, case]))
-        law, name = str(draw.choice(list(scenes))), str(draw.choice(READ))
+        scene, name = str(draw.choice(list(scenes))), str(draw.choice(READ))
         mutate = MUTATIONS[draw.integers(len(MUTATIONS))]
-        attempt = partial(_try, draw, scenes[law], name, mutate)
+        attempt = partial(_try, draw, scenes[scene], name, mutate)
         outcome, why = outcome_of(attempt, time_limit_after)
-        case_text = f'seed {seed}, case {case}: {name}{mutate.__name__.replace("_", " ")}, {law}'
+        case_text = f'seed {seed}, case {case}: {name}{mutate.__name__.replace("_", " ")}, {scene}'
         counter.add(case_text, outcome, why)
     return counter.result()

@@ -15,11 +15,14 @@ class Combination(NamedTuple):
 
     law: str
     method: str
+    navigation: str = 'known'
 
 
 def combination_of(scenario: Scenario) -> Combination:
     """What the loop that flies a scenario is compiled for."""
-    return Combination(scenario.control.law, scenario.guidance.los.method)
+    return Combination(
+        scenario.control.law, scenario.guidance.los.method, scenario.navigation.method
+    )
 
 
 def chosen_fields(

@@ -18,6 +18,7 @@ class Rules(NamedTuple):
     settle_s: float = 0.0  #: settling time (s)
     depth_m: float = 1000.0  #: depth of the lower turn (m)
     glide_s: float = math.inf  #: time of one dive or climb (s)
+    navigation: str = 'known'  #: method by which the vehicle navigates
     path_end: tuple[float, float] | None = None  #: last point of the path, north and east (m)
 
     @property

@@ -41,8 +41,7 @@ def make_run_folder(scenario: Scenario, out: Path | None) -> Path:
                 f'empty folder)'
             )
         write_whole(folder / VEHICLE_FILE, vehicle_file(scenario.vehicle))
-        beside = scenario.model_copy(update={'vehicle': VEHICLE_FILE})
-        write_whole(folder / SCENARIO_FILE, beside.to_yaml())
+        write_whole(folder / SCENARIO_FILE, scenario.to_yaml(vehicle=VEHICLE_FILE))
     except OSError as error:
         raise ConfigurationError(f'{folder}: {error.strerror}') from None
     return folder

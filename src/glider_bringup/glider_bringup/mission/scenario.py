@@ -18,6 +18,7 @@ from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
 from glider_model.base.errors import clipped, told_changes
 from glider_model.base.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
+from glider_model.base.frames import OriginSettings
 from glider_model.base.settings import (
     ConfigurationError,
     Settings,
@@ -26,17 +27,23 @@ from glider_model.base.settings import (
     holder_of,
     validate,
 )
+from glider_model.base.wiring import SENSORS
 from glider_model.ocean.current_settings import CurrentSettings
 from glider_model.ocean.density import DensitySettings
+from glider_model.onboard.gate import GateSettings
 from glider_model.plant.plant import SURFACE_S, InitialSettings, PlantSettings
 from glider_model.plant.sensors import SensorSettings
 from glider_model.vehicle.file import changed_vehicle, load_vehicle, vehicle_names, vehicle_path
 from glider_model.vehicle.perturb import PerturbSettings, perturbed
+from glider_navigation.settings import NavigationLawSettings, NavigationSettings
 
 SCENARIO_FOLDER = Path(__file__).parent / 'scenarios'
 DEFAULT_SCENARIO = 'current_8deg'
 #: Field that names the vehicle, and what the names of fields in its file begin with.
 VEHICLE = 'vehicle'
+
+#: The farthest that a belief may jump at a fix (m).
+JUMP_M = 1e8
 
 #: A run of this simulated time or more is a long one, with the longer settling time (s).
 LONG_RUN_S = 20000.0
@@ -83,7 +90,13 @@ class Scenario(Settings):
     )
     water: DensitySettings = Field(DensitySettings(), description='density of the water')
     current: CurrentSettings = Field(CurrentSettings(), description='current')
-    sensors: SensorSettings = Field(SensorSettings(), description='noise of the odometry')
+    sensors: SensorSettings = Field(SensorSettings(), description='errors of the sensors')
+    origin: OriginSettings = Field(
+        OriginSettings(), description='where the origin of the path lies on the Earth'
+    )
+    navigation: NavigationLawSettings = Field(
+        NavigationLawSettings(), description='where the vehicle believes it is'
+    )
     perturb: PerturbSettings = Field(
         PerturbSettings(), description='what the plant differs in from its vehicle file'
     )
@@ -113,8 +126,15 @@ class Scenario(Settings):
             afloat_s=self._afloat_s(),
             seed=self.seed,
             sensors=self.sensors,
+            fitted=[name for name in SENSORS if name in self.topics],
+            origin=self.origin,
             perturb=self.perturb,
         )
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Those of the topics that not every run has that there are in a run of this."""
+        return tuple(dict.fromkeys((*self.navigation.topics, *self.sensors.also_fitted)))
 
     def _afloat_s(self) -> float:
         """Time (s) afloat that ends a run: longer than any wait of its mission; 0: never."""
@@ -140,6 +160,18 @@ class Scenario(Settings):
             current.speed_mps * math.sin(direction),
         )
 
+    def navigation_settings(self) -> NavigationSettings:
+        """What the navigation node is told."""
+        return NavigationSettings(
+            vehicle=self.vehicle,
+            origin=self.origin,
+            north_m=self.initial.north_m,
+            east_m=self.initial.east_m,
+            imu_period_s=self.sensors.imu_period_s,
+            gyro=self.sensors.gyro,
+            **dict(self.navigation),
+        )
+
     def guidance_settings(self) -> GuidanceSettings:
         """What the guidance node is told."""
         return GuidanceSettings(
@@ -148,18 +180,29 @@ class Scenario(Settings):
             profile=self.profile,
             dives=self.dives,
             duration_s=self.duration_s,
-            **dict(self.guidance),
+            **self._believing(self.guidance),
         )
+
+    def _believing(self, law: GuidanceLawSettings | ControlLawSettings) -> dict[str, Any]:
+        """Fields of a law that is told where the vehicle believes it is.
+
+        A belief may jump at a fix as far as it was off: that is no fault, unless somebody said so.
+        """
+        fields = dict(law)
+        if not self.navigation.jumps or law.gate.position_jump_m != GateSettings().position_jump_m:
+            return fields
+        return {**fields, 'gate': law.gate.model_copy(update={'position_jump_m': JUMP_M})}
 
     def control_settings(self) -> ControlSettings:
         """What the control node is told."""
-        return ControlSettings(vehicle=self.vehicle, **dict(self.control))
+        return ControlSettings(vehicle=self.vehicle, **self._believing(self.control))
 
     def block_settings(self) -> tuple[Settings, ...]:
         """What the node of each block is told, in the order of `glider_bringup.blocks`."""
         return (
             self.plant_settings(),
             self.current_settings(),
+            self.navigation_settings(),
             self.guidance_settings(),
             self.control_settings(),
         )
@@ -176,7 +219,11 @@ class Scenario(Settings):
         """By what a run that lasted ``sim_time_s`` is scored."""
         end = path_point(path_length(self.path.params()), self.path.params())
         return Rules(
-            self.settle_time_s(sim_time_s), self.profile.depth_m, self._glide_s(), end[:2]
+            self.settle_time_s(sim_time_s),
+            self.profile.depth_m,
+            self._glide_s(),
+            self.navigation.method,
+            end[:2],
         )
 
     def _glide_s(self) -> float:
@@ -186,19 +233,25 @@ class Scenario(Settings):
         profile = self.guidance_settings().params().profile
         return profile.depth / profile.glide_rate
 
-    def to_yaml(self) -> str:
+    def to_yaml(self, vehicle: str = '') -> str:
         """The scenario as a file that loads to the same scenario.
 
         It can be loaded where nobody has the laws and methods of others that do not fly in it, if
         it says nothing of them.
+
+        Parameters
+        ----------
+        vehicle : str
+            What the file calls the vehicle, if something else than the scenario does.
         """
         left_out = {
             'current': {'seed'},
+            'navigation': self.navigation.idle,
             'guidance': self.guidance.idle,
-            'control': self.control.idle,
+            'control': self.control.idle(load_vehicle(self.vehicle).steers_by),
         }
         values = self.model_dump(mode='json', exclude_none=True, exclude=left_out)
-        return yaml_text(values)
+        return yaml_text({**values, 'vehicle': vehicle or self.vehicle})
 
 
 def scenario_names() -> list[str]:
@@ -321,6 +374,7 @@ def _find_vehicle(
     vehicle = load_vehicle(name)
     try:
         perturbed(vehicle.params(), scenario.perturb)
+        scenario.control.steering(vehicle.steers_by)
     except ConfigurationError as error:
         raise ConfigurationError(f'{source}: {error}') from None
     return scenario.model_copy(update={'vehicle': name})

@@ -9,6 +9,7 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Literal
 
 from pydantic import Field
 from std_msgs.msg import Header
@@ -19,6 +20,7 @@ from glider_bringup.recording.tick_sorter import TickSorter
 from glider_model.base.exits import EXIT_FAILED
 from glider_model.base.settings import ConfigurationError, Settings
 from glider_model.base.signals import TICK_NS
+from glider_model.base.wiring import BELIEFS, SENSORS
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.executor import take, take_with_info
 from glider_model.ros.lockstep.inputs import Input
@@ -28,13 +30,10 @@ from glider_model.ros.lockstep.watch import FAREWELL_S
 from glider_model.ros.parameters import declare_settings
 from glider_model.ros.wire import qos, topics
 from glider_model.ros.wire.codec import MessageError, to_cdr
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.topics import TOPICS, recorded_topics
 
 _DRAIN_S = 0.02
 _PROGRESS_S = 0.25
-
-RECORDED = [topic.name for topic in TOPICS.values() if topic.recorded]
-PER_TICK = [topic.name for topic in TOPICS.values() if topic.per_tick]
 
 
 class RecorderSettings(Settings):
@@ -48,6 +47,9 @@ class RecorderSettings(Settings):
         description='when the recording is synced to disk, to outlive a loss of power: never, at '
         'its end, or with every chunk too, before its ticks are acknowledged',
     )
+    topics: list[Literal[(*SENSORS, *BELIEFS)]] = Field(
+        ['measured_odom'], description='those of the topics that not every run has'
+    )
     progress: bool = Field(False, description='print progress as JSON lines on standard output')
 
 
@@ -57,17 +59,20 @@ class RecorderNode(TickNode):
     def __init__(self, **kwargs) -> None:
         super().__init__(topics.RECORDER, **kwargs)
         self.settings = declare_settings(self, RecorderSettings)
+        recorded = recorded_topics(self.settings.topics)
+        per_tick = [topic.name for topic in recorded if topic.per_tick]
         try:
             self.bag = BagWriter(
                 Path(self.settings.folder),
                 self.settings.name,
-                {name: self.resolve_topic_name(name) for name in RECORDED},
+                {topic.name: self.resolve_topic_name(topic.name) for topic in recorded},
                 self.settings.attachments,
+                recorded,
                 sync=self.settings.sync,
             )
         except OSError as error:
             raise ConfigurationError(f'{error.filename}: {error.strerror}') from None
-        self.order = TickSorter(PER_TICK, TICK_NS, self.write)
+        self.order = TickSorter(per_tick, TICK_NS, self.write)
         self.recorded_ns = -TICK_NS  #: newest tick that outlives this process
         self.has_path = False
         self.stage, self.last_odom, self.depth_m = '', b'', 0.0
@@ -75,7 +80,7 @@ class RecorderNode(TickNode):
         self.stopped = False
         self.begun = False
         self.progress_s = 0.0
-        for name in PER_TICK:
+        for name in per_tick:
             self.add_input(name)
         self._subscription(TOPICS['path'], self.on_path, gated=False)
         self.events = self._subscription(TOPICS['/diagnostics'], self.on_event, raw=False)

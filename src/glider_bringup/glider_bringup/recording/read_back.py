@@ -10,6 +10,7 @@ import numpy as np
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros.recorded_log import RecordedLog
 from glider_model.base.signals import NOT_FINITE
+from glider_model.vehicle.file import load_vehicle
 
 
 class Reader(Protocol):
@@ -22,9 +23,12 @@ class Reader(Protocol):
 
 
 def read_back(
-    bag: Bag, takers: Iterable[Reader], progress: Callable[[int], None] = lambda ticks: None
+    bag: Bag,
+    vehicle: str,
+    takers: Iterable[Reader],
+    progress: Callable[[int], None] = lambda ticks: None,
 ) -> RecordedLog:
-    """Give the rows of a bag to takers; ``progress`` gets the ticks read.
+    """Give the rows of a bag of a vehicle to takers; ``progress`` gets the ticks read.
 
     Raises
     ------
@@ -32,7 +36,8 @@ def read_back(
         If the bag is damaged.
     """
     takers = tuple(takers)
-    log = RecordedLog(bag, {topic for taker in takers for topic in taker.topics})
+    also = {topic for taker in takers for topic in taker.topics}
+    log = RecordedLog(bag, also, load_vehicle(vehicle).steers_by)
     for rows in log.blocks():
         for taker in takers:
             taker.add(rows)

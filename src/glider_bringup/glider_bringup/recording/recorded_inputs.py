@@ -8,11 +8,11 @@ computes from them what its node would have published.
 
 import numpy as np
 
-from glider_model.base.block import Block, block_tick, put, rows_at
+from glider_model.base.block import Block, block_tick, optional_topics, put, rows_at
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_NS, TICK_S
-from glider_model.base.wiring import FIELDS
+from glider_model.base.wiring import FIELDS, at_rest, present
 from glider_model.plant.block import PLANT, plant_move, plant_outputs
 
 
@@ -64,6 +64,16 @@ class RecordedBlock:
         """Do what it does when the surface is asked for."""
         self.state = self.block.surface(self.state)
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Topics that it needs."""
+        return present(self.block.wired.inputs, optional_topics(self.settings))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Topics that it fills."""
+        return present(self.block.wired.outputs, optional_topics(self.settings))
+
     def run(
         self, stamps_ns: np.ndarray, inputs: dict[str, np.ndarray]
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -81,13 +91,17 @@ class RecordedBlock:
             Numbers by topic.
         flags : int64[n, k]
         """
-        widths = {name: len(FIELDS[name]) for name in self.block.wired.outputs}
+        wired = self.block.wired
+        widths = {name: len(FIELDS[name]) for name in wired.outputs}
         table = np.empty((len(stamps_ns), sum(widths.values()) + len(self.block.flags)))
-        rows = tuple(np.ascontiguousarray(inputs[name]) for name in self.block.wired.inputs)
+        absent = set(wired.inputs).difference(self.inputs)
+        inputs = inputs | {name: np.tile(at_rest(name), (len(table), 1)) for name in absent}
+        rows = tuple(np.ascontiguousarray(inputs[name]) for name in wired.inputs)
         if self.block is PLANT:
             self.state = _move(self.state, self.params, rows, table, TICK_S)
         else:
             self.state = _answer(self.state, self.params, stamps_ns, rows, table, TICK_S)
         ends = np.cumsum([*widths.values()])
         outputs = dict(zip(widths, np.split(table, ends, axis=1)[:-1], strict=True))
+        outputs = {name: outputs[name] for name in self.outputs}
         return outputs, table[:, ends[-1] :].astype(np.int64)

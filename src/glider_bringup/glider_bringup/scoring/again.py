@@ -60,7 +60,9 @@ def score_bag(
     """Scorecard of a bag, whose rows takers are given too; ``old`` is the one it has, or empty."""
     scorer = make_scorer(scenario)
     total = old.get('ticks') or planned_ticks(scenario)
-    log = read_back(bag, [scorer, *takers], lambda ticks: progress(ticks, max(ticks, total)))
+    log = read_back(
+        bag, scenario.vehicle, [scorer, *takers], lambda ticks: progress(ticks, max(ticks, total))
+    )
     missing = log.missing(old.get('ticks'))
     if old:
         complete, reason = old['status'] not in ('aborted', 'failed'), old['reason']

@@ -6,7 +6,9 @@ import json
 import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from glider_bringup.engines.flight import Flight, Progress, Taker, fly
 from glider_bringup.mission.disk import write_whole
@@ -34,6 +36,8 @@ CARD_GROUPS = {
     'actuator_travel': {'buoyancy_engine_kg', 'pitch_mass_m', 'roll_mass_deg'},
     'final_state': {'position_ned_m', 'attitude_rpy_rad', 'velocity_mps'},
 }
+#: North and east.
+_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 STATUSES = ('completed', 'infeasible', 'aborted', 'failed')
 
 
@@ -137,6 +141,7 @@ def _is_card(card) -> bool:
             if card['ticks'] or group != 'final_state'  # a run without a tick has none
         )
         and _is_guard(card.get('guard', {}))
+        and _is_navigation(card.get('navigation'))
     )
 
 
@@ -149,6 +154,73 @@ def _is_guard(guard) -> bool:
         and isinstance(event.get('t_s'), int | float)
         for event in events
     )
+
+
+class _Checked(BaseModel):
+    """Part of a score file, which may hold anything."""
+
+    model_config = ConfigDict(strict=True)
+
+
+class _Report(_Checked):
+    """One surfacing."""
+
+    t_s: float
+    dive_t_s: float
+    true_ned_m: _Pair
+    believed_ned_m: _Pair
+    covariance_m2: Annotated[list[float], Field(min_length=3, max_length=3)]
+    fix_ned_m: _Pair | None
+    cross_track_m: float
+    believed_cross_track_m: float
+    error_m: float
+    inside_95: bool | None
+    dac_true_mps: _Pair | None
+    dac_believed_mps: _Pair | None
+
+
+class _PlaceError(_Checked):
+    """How far the believed place was off at surfacings."""
+
+    p50: float | None
+    p95: float | None
+    worst: float | None
+
+
+class _CurrentError(_Checked):
+    """How far the believed current was off."""
+
+    rms: float | None
+    worst: float | None
+
+
+class _CrossTrack(_Checked):
+    """How far off the path the vehicle believed to be."""
+
+    rms_steady: float | None
+    max_steady: float | None
+
+
+class _Navigation(_Checked):
+    """What is shown of how well the vehicle knew its place."""
+
+    method: str
+    surfacings: int
+    fixed: int
+    error_m: _PlaceError
+    dac_error_mps: _CurrentError
+    believed_cross_track_m: _CrossTrack
+    surfacing_cross_track_m: list[float]
+    ellipse_95_share: float | None
+    reports: list[_Report] = []
+
+
+def _is_navigation(told) -> bool:
+    """Whether a value is how well the vehicle knew its place; older runs tell nothing of it."""
+    try:
+        return told is None or bool(_Navigation.model_validate(told))
+    except ValidationError:
+        return False
 
 
 def _is_figure(value) -> bool:

@@ -9,7 +9,7 @@ nothing, away from inflections by `MARGIN_SHARE` of the time between two of them
 `STEADY_DEPTH_SHARE` of their depth. An inflection is where the desired vertical rate changes its
 sign.
 
-What was measured with noise is scored by the true motion, which the noise's seed gives back.
+What is scored is the true motion, whatever the vehicle believes.
 """
 
 import math
@@ -19,15 +19,23 @@ import numpy as np
 from glider_bringup.blocks import COLUMNS
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
+from glider_bringup.scoring.navigation import NavigationScorer
 from glider_bringup.scoring.true_motion import TrueMotion, wire_of
 from glider_control.watch import ROWS, SURFACES, TELL_EVERY_NS, say
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_model.base.block import changes_to_tell
-from glider_model.base.frames import euler_from_quaternion, odometry_from_wire, reference_from_wire
+from glider_model.base.frames import (
+    Origin,
+    OriginSettings,
+    euler_from_quaternion,
+    odometry_from_wire,
+    reference_from_wire,
+)
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import TICK_NS, TICK_S
 from glider_model.plant.plant import dive_depths
 from glider_model.plant.sensors import SensorParams
+from glider_model.vehicle.file import steers_by
 
 #: Heading fluctuation is about the mean over this time (s).
 HEADING_MEAN_S = 300.0
@@ -37,10 +45,10 @@ INFEASIBLE_SHARE = 0.5
 #: So many events of the watch are kept.
 EVENTS_KEPT = 100
 
-_SERIES = 13
+_SERIES = 15
 _DEPTH, _E2, _PITCH, _PITCH_REF, _HEADING, _RATE_REF = range(6)
 _TARGET_N, _TARGET_E, _INFEASIBLE, _NET_HEAVINESS, _PITCH_MASS, _ROLL_MASS = range(6, 12)
-_MASK = 12
+_MASK, _TOLD_E2, _SURFACE = 12, 13, 14
 
 _ODOM, _REFERENCE = COLUMNS['odom'], COLUMNS['reference']
 _E2_COLUMN = COLUMNS['tracking_error'].start + 1
@@ -72,6 +80,7 @@ def _extract(log, series):
         series[_PITCH_MASS, row] = log[row, _JOINTS_START + 1]
         series[_ROLL_MASS, row] = log[row, _JOINTS_START + 2]
         series[_MASK, row] = log[row, _MASK_COLUMN]
+        series[_SURFACE, row] = log[row, _JOINTS_START + 3]
 
 
 class Scorer:
@@ -80,13 +89,27 @@ class Scorer:
     Parameters
     ----------
     sensors : SensorParams, optional
-        Noise of the odometry; without it the odometry is taken for the truth.
+        Noise of the odometry, for runs that do not tell the truth.
+    origin : Origin, optional
+        To which fixes are relative.
+    topics : tuple of str
+        What there is of navigation in the run; empty of a vehicle that knows its place.
+    steers_by : str
+        Name of the vehicle's steering surface, whose travel is scored; empty without.
     """
 
-    topics = ()  # it needs none beside those that are always read
-
-    def __init__(self, sensors: SensorParams | None = None) -> None:
+    def __init__(
+        self,
+        sensors: SensorParams | None = None,
+        origin: Origin | None = None,
+        topics: tuple[str, ...] = (),
+        steers_by: str = '',
+    ) -> None:
+        self.topics = topics  #: that it needs, beside those that are always read
+        self._steers_by = steers_by
         self._truth = TrueMotion(sensors)
+        origin = origin or OriginSettings().params()
+        self._navigation = NavigationScorer(origin, reckons=bool(topics))
         self._blocks: list[np.ndarray] = []
         self._last: np.ndarray | None = None
         self._end: np.ndarray | None = None
@@ -95,9 +118,11 @@ class Scorer:
         """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
         if not len(log):
             return
-        log = self._truth.of(log)
+        told, log = log, self._truth.of(log)
+        self._navigation.add(told, log)
         series = np.empty((_SERIES, len(log)))
         _extract(log, series)
+        series[_TOLD_E2] = told[:, _E2_COLUMN]
         self._blocks.append(series)
         self._last = log[-1].copy()
         at_end = np.flatnonzero(log[:, _STAGE_COLUMN] == AT_END_OF_PATH)
@@ -121,7 +146,7 @@ class Scorer:
         dict
             The run's part of ``score.json``: ticks, settle_s, dives, distance_along_path_m,
             end_of_path_m, cross_track_m, pitch_error_deg, heading_fluctuation_deg, depth_m,
-            actuator_travel, guard, final_state, and ``infeasible``.
+            actuator_travel, guard, navigation, final_state, and ``infeasible``.
             A figure without data is None.
         """
         series, ticks = self._series, self.ticks
@@ -138,12 +163,7 @@ class Scorer:
             'dives': _count_dives(depth, *dive_depths(rules.depth_m)),
             'distance_along_path_m': _length(series(_TARGET_N), series(_TARGET_E)),
             'end_of_path_m': self._end_of_path_m(rules.path_end),
-            'cross_track_m': {
-                'rms_steady': rms(e2[steady]),
-                'max_steady': largest(e2[steady]),
-                'max_all': largest(e2[scored]),
-                'max_run': largest(e2),
-            },
+            'cross_track_m': _cross_track(e2, steady, scored),
             'pitch_error_deg': {
                 'rms_steady': rms(pitch_error[steady]),
                 'max_steady': largest(pitch_error[steady]),
@@ -156,17 +176,27 @@ class Scorer:
                 'max': deepest,
                 'overshoot': None if deepest is None else max(0.0, deepest - rules.depth_m),
             },
-            'actuator_travel': {
-                'buoyancy_engine_kg': _travel(series(_NET_HEAVINESS)),
-                'pitch_mass_m': _travel(series(_PITCH_MASS)),
-                'roll_mass_deg': math.degrees(_travel(series(_ROLL_MASS))),
-            },
+            'actuator_travel': self._actuator_travel(),
             'guard': _guard(series(_MASK)),
+            'navigation': self._navigation.result(
+                rules.navigation, _cross_track(series(_TOLD_E2), steady, scored)
+            ),
             'final_state': self._final_state(),
             'infeasible': bool(
                 scored.any() and np.mean(series(_INFEASIBLE)[scored]) >= INFEASIBLE_SHARE
             ),
         }
+
+    def _actuator_travel(self) -> dict:
+        """Ways that the actuators have gone, to and fro."""
+        travel = {
+            'buoyancy_engine_kg': _travel(self._series(_NET_HEAVINESS)),
+            'pitch_mass_m': _travel(self._series(_PITCH_MASS)),
+            'roll_mass_deg': math.degrees(_travel(self._series(_ROLL_MASS))),
+        }
+        if self._steers_by:
+            travel[f'{self._steers_by}_deg'] = math.degrees(_travel(self._series(_SURFACE)))
+        return travel
 
     def _end_of_path_m(self, path_end: tuple[float, float] | None) -> float | None:
         """Horizontal distance from the path's end when the mission ended there, at the surface."""
@@ -190,12 +220,26 @@ class Scorer:
 
 def make_scorer(scenario: Scenario) -> Scorer:
     """Scorer of a run of a scenario."""
-    return Scorer(scenario.sensors.params(scenario.seed))
+    topics = ()
+    if scenario.navigation.jumps:
+        topics = ('fix', 'believed_current', 'current_velocity')
+    sensors, origin = scenario.sensors.params(scenario.seed), scenario.origin.params()
+    return Scorer(sensors, origin, topics, steers_by(scenario))
 
 
 def scores_of(scenario: Scenario, scorer: Scorer) -> dict:
     """Scores of what a scorer has taken in, by the rules of its scenario."""
     return scorer.result(scenario.score_rules(scorer.ticks * TICK_S))
+
+
+def _cross_track(e2: np.ndarray, steady: np.ndarray, scored: np.ndarray) -> dict:
+    """Figures of a cross-track error, float64[ticks] (m), in masks bool[ticks]."""
+    return {
+        'rms_steady': rms(e2[steady]),
+        'max_steady': largest(e2[steady]),
+        'max_all': largest(e2[scored]),
+        'max_run': largest(e2),
+    }
 
 
 def _guard(mask: np.ndarray) -> dict:

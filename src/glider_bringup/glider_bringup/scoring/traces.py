@@ -18,6 +18,7 @@ import numpy as np
 from glider_bringup.blocks import COLUMNS
 from glider_bringup.mission.disk import whole_file
 from glider_bringup.mission.scenario import Scenario
+from glider_bringup.scoring.navigation import ELLIPSE_95
 from glider_bringup.scoring.true_motion import TrueMotion
 from glider_model.base.frames import poses_from_wire, wrap_angle
 from glider_model.base.kernel import kernel
@@ -32,9 +33,12 @@ BUCKETS = 2**15
 #: Topics that traces are made from, beside those that the score needs.
 TRACED = ('current_velocity', 'current_estimate', 'command', 'adaptation')
 #: Of what is kept: changes with names and meaning.
-VERSION = 1
+VERSION = 2
 
-_FLAGS = ('buoyancy_engine_at_limit', 'pitch_mass_at_limit', 'roll_mass_at_limit', 'infeasible')
+_FLAGS = (
+    *('buoyancy_engine_at_limit', 'pitch_mass_at_limit', 'roll_mass_at_limit'),
+    *('surface_at_limit', 'infeasible'),
+)
 _MEASURED = ('depth_m', 'cross_track_m', 'roll_deg', 'pitch_deg', 'heading_deg')
 #: Quantities of which extremes are kept.
 CURVES = (
@@ -43,15 +47,18 @@ CURVES = (
     *('current_north_kn', 'current_east_kn', 'estimate_north_kn', 'estimate_east_kn'),
     *('buoyancy_engine_kg', 'pitch_mass_mm', 'roll_mass_deg'),
     *('buoyancy_engine_ref_kg', 'pitch_mass_ref_mm', 'roll_mass_ref_deg'),
+    *('surface_deg', 'surface_ref_deg'),  # of a vehicle with a steering surface
     *('descending', *_FLAGS),
     *Adaptation._fields,
     *(f'measured_{name}' for name in _MEASURED),
+    *('place_error_m', 'place_bound_m'),
 )
 #: Quantities that are sampled at the beginning of each bucket, all at the same time.
 SAMPLES = (
     *('track_north_m', 'track_east_m', 'track_depth_m'),
     *('target_north_m', 'target_east_m', 'target_depth_m'),
     *('water_north_kn', 'water_east_kn'),
+    *('believed_north_m', 'believed_east_m'),
 )
 
 
@@ -165,14 +172,20 @@ class Tracer:
     vehicle : VehicleParams
         Whose actuators have limits.
     sensors : SensorParams, optional
-        Noise of the odometry; what was measured is then kept beside the truth.
+        Noise of the odometry, for runs that do not tell the truth. What was measured, or
+        believed, is kept beside the truth where it is another.
+    reckons : bool
+        Whether the vehicle has to reckon its place: how far off it is is kept, too.
     """
 
     topics = TRACED
 
-    def __init__(self, vehicle: VehicleParams, sensors: SensorParams | None = None) -> None:
-        self._limits = np.array([vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max])
-        self._truth = TrueMotion(sensors)
+    def __init__(
+        self, vehicle: VehicleParams, sensors: SensorParams | None = None, reckons: bool = False
+    ) -> None:
+        limits = [vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max, vehicle.delta_max or np.nan]
+        self._limits = np.array(limits)
+        self._truth, self._reckons = TrueMotion(sensors), reckons
         self._ticks, self._size, self._heading = 0, 2, np.nan
         self._points = {name: np.full(2 * BUCKETS, np.nan, np.float32) for name in CURVES}
         self._samples = np.full((BUCKETS, len(SAMPLES)), np.nan, np.float32)
@@ -186,10 +199,12 @@ class Tracer:
             return
         true = self._truth.of(log)
         curves = _curves(true, self._limits, self._heading)
-        if self._truth.differs:
+        if true is not log:
             measured = _curves(log, self._limits, self._heading)
             curves.update({f'measured_{name}': measured[name] for name in _MEASURED})
-        samples = _samples(true)
+        if self._reckons:
+            curves.update(_place(log))
+        samples = _samples(true, log if self._reckons else None)
         for name in _FLAGS:
             self._flagged[name] += int(np.count_nonzero(curves[name] > 0.0))
         known = curves['heading_deg'][np.isfinite(curves['heading_deg'])]
@@ -233,7 +248,8 @@ class Tracer:
 def make_tracer(scenario: Scenario) -> Tracer:
     """Tracer of a run of a scenario."""
     vehicle = load_vehicle(scenario.vehicle).params()
-    return Tracer(vehicle, scenario.sensors.params(scenario.seed))
+    sensors = scenario.sensors.params(scenario.seed)
+    return Tracer(vehicle, sensors, scenario.navigation.jumps)
 
 
 def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[str, np.ndarray]:
@@ -249,6 +265,12 @@ def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[
     estimate = log[:, COLUMNS['current_estimate']] / KNOT_MPS
     command = log[:, COLUMNS['command']]
     held = (np.abs(command) >= limits).astype(float).T
+    surface = {}
+    if np.isfinite(limits[3]):  # there is one
+        surface = {
+            'surface_deg': np.degrees(joints[:, 3]),
+            'surface_ref_deg': np.degrees(command[:, 3]),
+        }
     _unwrap(odom[:, 5], reference[:, 5], heading_before)
     return {
         'depth_m': odom[:, 2],
@@ -270,24 +292,42 @@ def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[
         'buoyancy_engine_ref_kg': command[:, 0],
         'pitch_mass_ref_mm': 1e3 * command[:, 1],
         'roll_mass_ref_deg': np.degrees(command[:, 2]),
+        **surface,
         'descending': np.where(np.isfinite(rising), rising < 0.0, np.nan),
         'buoyancy_engine_at_limit': held[0],
         'pitch_mass_at_limit': held[1],
         'roll_mass_at_limit': held[2],
+        'surface_at_limit': held[3],
         'infeasible': log[:, COLUMNS['infeasible']],
         **dict(zip(Adaptation._fields, log[:, COLUMNS['adaptation']].T, strict=True)),
     }
 
 
-def _samples(log: np.ndarray) -> np.ndarray:
-    """What is sampled of log rows, float64[n, len(SAMPLES)]."""
+def _place(log: np.ndarray) -> dict[str, np.ndarray]:
+    """How far the believed place is off the true one, and how far it may be: by name, float64[n].
+
+    The bound is the longer half axis of the 95 % ellipse of what is believed.
+    """
+    odom, truth = log[:, COLUMNS['odom']], log[:, COLUMNS['ground_truth/odom']]
+    xx, xy, yy = odom[:, 13], odom[:, 14], odom[:, 16]
+    largest = 0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)
+    return {
+        'place_error_m': np.hypot(odom[:, 0] - truth[:, 0], odom[:, 1] - truth[:, 1]),
+        'place_bound_m': np.sqrt(ELLIPSE_95 * largest),
+    }
+
+
+def _samples(log: np.ndarray, told: np.ndarray | None) -> np.ndarray:
+    """What is sampled of log rows, float64[n, len(SAMPLES)]; ``told`` tells the believed place."""
     position, target = log[:, COLUMNS['odom']], log[:, COLUMNS['reference']]
     current = log[:, COLUMNS['current_velocity']] / KNOT_MPS
+    believed = np.full((len(log), 2), np.nan) if told is None else told[:, COLUMNS['odom']]
     return np.stack(
         (
             *(position[:, 1], position[:, 0], -position[:, 2]),
             *(target[:, 1], target[:, 0], -target[:, 2]),
             *(current[:, 1], current[:, 0]),
+            *(believed[:, 1], believed[:, 0]),
         ),
         axis=1,
     )

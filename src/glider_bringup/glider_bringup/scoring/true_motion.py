@@ -1,6 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The true motion behind noisy odometry, whose noise follows from seed and tick."""
+"""The true motion, and what it says of the cross-track error.
+
+A run tells it on ground_truth/odom. Those of before there was this topic tell it by the noise of
+their odometry, which follows from seed and tick.
+"""
 
 import numpy as np
 
@@ -9,7 +13,8 @@ from glider_model.base.frames import odometry_from_wire, odometry_to_wire
 from glider_model.base.kernel import kernel
 from glider_model.plant.sensors import SensorParams, is_noisy, remove_noise
 
-_ODOM_START = COLUMNS['odom'].start
+_TRUTH, _ODOM_START = COLUMNS['ground_truth/odom'], COLUMNS['odom'].start
+_ODOM = slice(_ODOM_START, _ODOM_START + 13)
 _E2 = COLUMNS['tracking_error'].start + 1
 #: Of the virtual target.
 _EAST, _NORTH = COLUMNS['reference'].start, COLUMNS['reference'].start + 1
@@ -55,12 +60,13 @@ def _take_off(log, first_tick, sensors):
 
 
 class TrueMotion:
-    """Gives the log as it would be without noise on the odometry, block by block.
+    """Gives the log as it would be if the odometry were the truth, block by block.
 
     Parameters
     ----------
     sensors : SensorParams, optional
-        Noise of the odometry; without it the odometry is the truth.
+        Noise of the odometry, for runs that do not tell the truth; without it they are taken at
+        their word.
     """
 
     def __init__(self, sensors: SensorParams | None = None) -> None:
@@ -68,11 +74,6 @@ class TrueMotion:
         self._tick = 0
         self._target: np.ndarray | None = None
         self._course = 0.0
-
-    @property
-    def differs(self) -> bool:
-        """Whether the truth is another than what was measured."""
-        return self._sensors is not None
 
     def of(self, log: np.ndarray) -> np.ndarray:
         """Log rows with true odometry and cross-track error.
@@ -85,12 +86,18 @@ class TrueMotion:
         Returns
         -------
         float64[n, ROW]
-            ``log`` itself if there is no noise.
+            ``log`` itself if the odometry is the truth.
         """
-        if self._sensors is None or not len(log):
+        is_told = len(log) and not np.isnan(log[0, _TRUTH.start])
+        if not is_told and self._sensors is None or not len(log):
+            return log
+        if is_told and np.array_equal(log[:, _TRUTH], log[:, _ODOM]):
             return log
         true = log.copy()
-        _take_off(true, self._tick, self._sensors)
+        if is_told:
+            true[:, _ODOM] = log[:, _TRUTH]
+        else:
+            _take_off(true, self._tick, self._sensors)
         course = self._course_of_target(log[:, [_EAST, _NORTH]])
         east, north = (true[:, i] - log[:, i] for i in (_ODOM_START, _ODOM_START + 1))
         true[:, _E2] += np.cos(course) * east - np.sin(course) * north

@@ -7,11 +7,12 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from glider_bringup.showing.panels import ACTUATORS
-from glider_bringup.showing.scorecard import guard_texts, show
+from glider_bringup.showing.panels import ACTUATORS, SURFACE
+from glider_bringup.showing.scorecard import guard_texts, reckoned, show
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page, page_data
 from glider_bringup.showing.words import small, span
 from glider_model.base.settings import ConfigurationError
+from glider_model.ocean.current_settings import KNOT_MPS
 
 #: Curves that are laid over each other: panel, title, caption, axis, curve.
 _OVERLAID = (
@@ -22,6 +23,13 @@ _OVERLAID = (
         'Distance from its own path, + to starboard of it.',
         'off the path (m)',
         'cross_track_m',
+    ),
+    (
+        'place_error',
+        'Error of the believed place',
+        'Horizontal distance between the true and the believed place.',
+        'error (m)',
+        'place_error_m',
     ),
     ('pitch', 'Pitch', 'Nose up is positive.', 'pitch (deg)', 'pitch_deg'),
     ('heading', 'Heading', 'Clockwise from north.', 'heading (deg)', 'heading_deg'),
@@ -34,7 +42,7 @@ _OVERLAID = (
             f'{one.title.lower()} ({one.unit})',
             one.position,
         )
-        for one in ACTUATORS
+        for one in (*ACTUATORS, SURFACE)
     ),
 )
 #: Colours before they come again, then dashed.
@@ -114,6 +122,7 @@ class Figure(NamedTuple):
     unit: str  #: s: said as a time
     digits: int
     less_is_better: bool = False  #: else neither more nor less is
+    scale: float = 1.0  #: unit of the card in that which is shown
 
 
 class Cell(NamedTuple):
@@ -125,6 +134,10 @@ class Cell(NamedTuple):
 
 
 _TRACK, _PITCH, _HEADING = 'cross_track_m', 'pitch_error_deg', 'heading_fluctuation_deg'
+#: Said of vehicles that reckon their place alone.
+_NAVIGATION = 'navigation'
+_PLACE, _DAC = (_NAVIGATION, 'error_m'), (_NAVIGATION, 'dac_error_mps')
+_BELIEVED = (_NAVIGATION, 'believed_cross_track_m')
 FIGURES = (
     Figure('simulated time', ('sim_time_s',), 's', 1),
     Figure('real-time factor', ('real_time_factor',), '', 0),
@@ -137,6 +150,13 @@ FIGURES = (
     Figure('cross-track, steady, max', (_TRACK, 'max_steady'), 'm', 3, True),
     Figure('cross-track, after settling, max', (_TRACK, 'max_all'), 'm', 2, True),
     Figure('cross-track, whole run, max', (_TRACK, 'max_run'), 'm', 2, True),
+    Figure('surfacings', (_NAVIGATION, 'surfacings'), '', 0),
+    Figure('believed place, surfacing, p50', (*_PLACE, 'p50'), 'm', 1, True),
+    Figure('believed place, surfacing, p95', (*_PLACE, 'p95'), 'm', 1, True),
+    Figure('believed place, surfacing, worst', (*_PLACE, 'worst'), 'm', 1, True),
+    Figure('cross-track believed, steady, max', (*_BELIEVED, 'max_steady'), 'm', 3),
+    Figure('mean current learnt, error, rms', (*_DAC, 'rms'), 'kn', 3, True, 1.0 / KNOT_MPS),
+    Figure('inside the 95 % ellipse', (_NAVIGATION, 'ellipse_95_share'), '%', 0, False, 100.0),
     Figure('pitch error, steady, rms', (_PITCH, 'rms_steady'), 'deg', 3, True),
     Figure('pitch error, steady, max', (_PITCH, 'max_steady'), 'deg', 3, True),
     Figure('heading fluctuation, rms', (_HEADING, 'rms_steady'), 'deg', 3, True),
@@ -163,10 +183,12 @@ HOW_TO_READ = (
 
 def _value(card: dict[str, Any], figure: Figure) -> float | None:
     """A figure of a card, rounded as it is shown; cards of before lack some."""
+    if figure.keys[0] == _NAVIGATION and reckoned(card) is None:
+        return None
     value: Any = card
     for key in figure.keys:
         value = value.get(key) if isinstance(value, dict) else None
-    return None if value is None else round(value, figure.digits)
+    return None if value is None else round(figure.scale * value, figure.digits)
 
 
 def _change(figure: Figure, value: float | None, first: float | None) -> str:
@@ -222,6 +244,10 @@ def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
         ),
         told('engine', lambda card: f'{card["engine"] or "not known"}, seed {card["seed"]}'),
     ]
+    if any(map(reckoned, cards)):
+        rows.append(
+            told('navigation', lambda card: (reckoned(card) or {'method': 'known'})['method'])
+        )
     if any(guard_texts(card) for card in cards):
         rows.append(
             told('control noticed', lambda card: '; '.join(guard_texts(card)) or 'nothing')
@@ -301,6 +327,7 @@ def _panels(runs: list[FlownRun]) -> dict[str, list[Panel]]:
 
     if not flown:
         return {}
+    panels = [overlaid(*row) for row in _OVERLAID]
     return {
         'Where they went': [
             Panel('track', 'Tracks', 'From above, to scale.', kind='track'),
@@ -308,7 +335,7 @@ def _panels(runs: list[FlownRun]) -> dict[str, list[Panel]]:
                 'space', 'In three dimensions', 'Drag to turn. Depth is stretched.', kind='space'
             ),
         ],
-        'How they flew': [overlaid(*row) for row in _OVERLAID],
+        'How they flew': [panel for panel in panels if panel.curves],
     }
 
 

@@ -34,6 +34,9 @@ def draw_run(traces: Traces, title: str, file: Path) -> None:
     curves = traces.curves
     hours = traces.time_s() / 3600.0
     _draw_track(axes['track'], traces.samples)
+    believed = ()
+    if traces.has('place_error_m'):
+        believed = (('believed', curves['measured_cross_track_m'], _ORANGE),)
     _draw_curves(
         axes['depth'], hours, 'Depth', 'depth (m)', (('depth', curves['depth_m'], _BLUE),)
     )
@@ -43,7 +46,7 @@ def draw_run(traces: Traces, title: str, file: Path) -> None:
         hours,
         'Cross-track error',
         'off the path, + to starboard (m)',
-        (('cross-track error', curves['cross_track_m'], _BLUE),),
+        (*believed, ('cross-track error', curves['cross_track_m'], _BLUE)),
     )
     for turn_s in traces.inflections_s():
         axes['cross'].axvline(turn_s / 3600.0, color=_GREY, linewidth=0.8, linestyle=':')
@@ -100,6 +103,9 @@ def _draw_track(axis, samples: dict[str, np.ndarray]) -> None:
     target_north, target_east = samples['target_north_m'] / 1e3, samples['target_east_m'] / 1e3
     axis.plot(target_east, target_north, color=_ORANGE, label='desired path')
     axis.plot(east, north, color=_BLUE, label='track')
+    believed = samples['believed_north_m'] / 1e3, samples['believed_east_m'] / 1e3
+    if np.any(np.isfinite(believed[0])):
+        axis.plot(*believed[::-1], color=_GREEN, linestyle='--', label='believed track')
     if len(east):
         axis.plot(east[0], north[0], 'o', color=_BLUE, label='start')
         pick = np.linspace(0, len(east) - 1, ARROWS).astype(int)

@@ -2,20 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """What happened in a run, in words: the verdict, and what went wrong."""
 
+import math
 from typing import Any
 
 import numpy as np
 
 from glider_bringup.mission.rules import STEADY_DEPTH_M
 from glider_bringup.scoring.traces import Traces
-from glider_bringup.showing.panels import ACTUATORS, limits_of
-from glider_bringup.showing.scorecard import guard_texts
+from glider_bringup.showing.panels import actuators_of
+from glider_bringup.showing.scorecard import guard_texts, reckoned
 from glider_bringup.showing.web_page import FlownRun
 from glider_bringup.showing.words import count, small, span, way
 from glider_model.base.signals import TICK_S
+from glider_model.ocean.current_settings import KNOT_MPS
 
 #: A track is lost if the vehicle is farther off its path than this until the end (m).
 LOST_M = 100.0
+#: A current is learnt from the surfacing on after which the vehicle comes up no farther off its
+#: path than this share of the first time.
+LEARNT_SHARE = 0.1
+#: With fewer surfacings inside their 95 % ellipses than by chance in one of a thousand runs, what
+#: is believed is too sure.
+UNLIKELY = 1e-3
 
 
 def verdict(card: dict[str, Any], settle_s: float) -> str:
@@ -63,6 +71,61 @@ def lost_since_s(traces: Traces) -> float | None:
     return float(deep[first]) * traces.spacing_s if first < len(deep) else None
 
 
+def navigation_notes(told: dict[str, Any], learns: bool) -> list[str]:
+    """How well a vehicle knew where it was that reckons its place, in sentences.
+
+    Parameters
+    ----------
+    told : dict
+        Part ``navigation`` of a scorecard.
+    learns : bool
+        Whether it believes in a current.
+    """
+    off = [abs(value) for value in told['surfacing_cross_track_m']]
+    if not off:
+        return ['It never came up, so where it believed to be was never put to the proof.']
+    notes = [_came_up(off, learns)]
+    error = told['error_m']
+    if len(off) > 1:
+        notes.append(
+            f'It came up off the place it believed to be at: by {small(error["p50"])} or less '
+            f'half of the times, by {small(error["worst"])} at worst.'
+        )
+    else:
+        notes.append(f'It came up {small(error["worst"])} off the place it believed to be at.')
+    if told['ellipse_95_share'] is not None:
+        inside = round(told['ellipse_95_share'] * len(off))
+        text = f'The 95 % ellipses hold {inside} of {count(len(off), "true place")}'
+        # by chance, were each in its ellipse in 95 % of all cases
+        chance = sum(
+            math.comb(len(off), k) * 0.95**k * 0.05 ** (len(off) - k) for k in range(inside + 1)
+        )
+        too_sure = ': it is too sure of what it believes' if chance < UNLIKELY else ''
+        notes.append(f'{text}{too_sure}.')
+    if told['dac_error_mps']['rms'] is not None:
+        rms, worst = (told['dac_error_mps'][name] / KNOT_MPS for name in ('rms', 'worst'))
+        notes.append(
+            'What it believed of the mean current of a way after its fixes was off by '
+            f'{rms:.3f} kn (rms), {worst:.3f} kn at worst.'
+        )
+    return notes
+
+
+def _came_up(off: list[float], learns: bool) -> str:
+    """How far beside its path it came up, each time (m)."""
+    text = f'Came up {small(off[0])} beside its path'
+    if len(off) == 1:
+        return f'{text}.'
+    rest = (i for i in range(1, len(off) - 1) if max(off[i:]) <= LEARNT_SHARE * off[0])
+    since = next(rest, None)
+    if since is None or not learns:
+        return f'{text} the first time, later at most {small(max(off[1:]))}.'
+    return (
+        f'{text} the first time, from surfacing {since + 1} on at most {small(max(off[since:]))}: '
+        'the current was learnt.'
+    )
+
+
 def findings(run: FlownRun) -> list[tuple[str, str]]:
     """What went wrong, and what is worth a look: kind (problem, note, fine) and sentence."""
     card, traces = run.card, run.traces
@@ -73,7 +136,10 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
     def share(ticks: int) -> str:
         return f'{span(ticks * TICK_S)} ({100.0 * ticks / traces.ticks:.2g} % of the time)'
 
+    told = reckoned(card)
     problems, notes = [], []
+    if told:
+        notes += navigation_notes(told, run.scenario.navigation.current != 'none')
     if card['status'] in ('aborted', 'failed'):
         ended = 'was aborted' if card['status'] == 'aborted' else 'failed'
         problems.append(f'The run {ended} at {at(card["sim_time_s"])}: {card["reason"]}.')
@@ -98,7 +164,7 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
         text = f'The course could not be held against the estimated current for {share(ticks)}, '
         text += f'first at {at(traces.first_s("infeasible"))}.'
         (problems if card['status'] == 'infeasible' else notes).append(text)
-    for actuator, limit in zip(ACTUATORS, limits_of(run), strict=True):
+    for actuator, limit in actuators_of(run):
         ticks = traces.flagged[actuator.flag]
         if ticks:
             notes.append(

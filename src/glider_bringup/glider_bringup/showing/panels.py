@@ -5,7 +5,9 @@
 import math
 from typing import NamedTuple
 
-from glider_bringup.showing.web_page import Curve, FlownRun, Panel
+from glider_bringup.showing.scorecard import reckoned
+from glider_bringup.showing.web_page import Curve, FlownRun, Panel, Steps
+from glider_model.ocean.current_settings import KNOT_MPS
 
 
 class Actuator(NamedTuple):
@@ -37,6 +39,7 @@ ACTUATORS = (
     Actuator('pitch_mass', 'mm', 'Pitch mass', 'Position from neutral, + forward: nose down'),
     Actuator('roll_mass', 'deg', 'Roll mass', 'Rotation, + to starboard; 0 hangs straight down'),
 )
+SURFACE = Actuator('surface', 'deg', 'Steering surface', 'Angle, + turns the nose to starboard')
 #: Groups of what the adaptive law has learnt: panel, title, caption, axis, curves.
 _LEARNT = (
     (
@@ -79,10 +82,15 @@ _LEARNT = (
 _ROLES = ('measured', 'reference', 'third', 'fourth')
 
 
-def limits_of(run: FlownRun) -> tuple[float, float, float]:
-    """Limits of the actuators, in the units of `ACTUATORS`."""
-    vehicle = run.vehicle.params()
-    return vehicle.m_b_max, 1e3 * vehicle.x_p_max, math.degrees(vehicle.mu_max)
+def actuators_of(run: FlownRun) -> list[tuple[Actuator, float]]:
+    """Actuators of the vehicle, each with its limit in its unit."""
+    vehicle, name = run.vehicle.params(), run.vehicle.steers_by
+    limits = vehicle.m_b_max, 1e3 * vehicle.x_p_max, math.degrees(vehicle.mu_max)
+    found = list(zip(ACTUATORS, limits, strict=True))
+    if name:
+        surface = SURFACE._replace(title=name.replace('_', ' ').capitalize())
+        found.append((surface, math.degrees(vehicle.delta_max)))
+    return found
 
 
 def _maps() -> list[Panel]:
@@ -108,10 +116,11 @@ def _flight_panels(run: FlownRun) -> list[Panel]:
     """How it flew: depth, errors, attitude."""
     traces = run.traces
     noisy = traces.has('measured_depth_m')
+    told = 'believed' if reckoned(run.card) else 'measured, with noise'
 
     def curves(name: str, *others: Curve) -> tuple[Curve, ...]:
         label = 'true' if noisy else 'flown'
-        measured = (Curve(f'measured_{name}', 'measured, with noise', 'faint'),) if noisy else ()
+        measured = (Curve(f'measured_{name}', told, 'faint'),) if noisy else ()
         return (*measured, Curve(name, label, 'measured'), *others)
 
     follows_path = run.scenario.profile.mode == 'path'
@@ -162,10 +171,74 @@ def _flight_panels(run: FlownRun) -> list[Panel]:
     ]
 
 
+def _navigation_panels(run: FlownRun) -> list[Panel]:
+    """Where the vehicle was, and where it believed to be; nothing of one that knows its place."""
+    told = reckoned(run.card)
+    if told is None:
+        return []
+    believed = Curve('measured_cross_track_m', 'believed', 'reference', dashed=True)
+    return [
+        Panel(
+            'plan',
+            'True and believed track',
+            'From above; north and east each have a scale of their own. Drag a box to zoom in. '
+            'Numbers: surfacings, as in the table.',
+            kind='plan',
+        ),
+        Panel(
+            'believed_cross_track',
+            'Cross-track error, true and believed',
+            'Distance from the path, + to starboard of it. It steers by what it believes.',
+            'off the path (m)',
+            (Curve('cross_track_m', 'true', 'measured'), believed),
+            surfacings=0,
+        ),
+        Panel(
+            'place_error',
+            'Error of the believed place',
+            'Horizontal distance between the true and the believed place, and the bound that it '
+            'should keep to 95 % of the time: the longer half axis of the ellipse.',
+            'error (m)',
+            (
+                Curve('place_error_m', 'error', 'measured'),
+                Curve('place_bound_m', '95 % bound, as believed', 'reference', dashed=True),
+            ),
+            surfacings=0,
+            log=True,
+        ),
+        *(_mean_current_panel(told.get('reports', []), i) for i in (0, 1)),
+    ]
+
+
+def _mean_current_panel(reports: list[dict], axis: int) -> Panel:
+    """Mean current to the north (0) or east (1) of every way under water."""
+    name = ('north', 'east')[axis]
+
+    def steps(label: str, role: str, key: str, dashed: bool) -> Steps:
+        spans = tuple(
+            (one['dive_t_s'], one['t_s'], one[key][axis] / KNOT_MPS) for one in reports if one[key]
+        )
+        return Steps(label, role, spans, dashed)
+
+    return Panel(
+        f'mean_current_{name}',
+        f'Mean current of each way under water, {name}',
+        'Depth-averaged current (DAC): the true mean from dive to surfacing, and what was '
+        'believed of it after the fixes.',
+        'current (kn)',
+        (Curve(f'current_{name}_kn', 'true, where it is', 'faint'),),
+        steps=(
+            steps('true mean of the way', 'measured', 'dac_true_mps', False),
+            steps('believed of it, after fixes', 'reference', 'dac_believed_mps', True),
+        ),
+        surfacings=0,
+    )
+
+
 def _actuator_panels(run: FlownRun) -> list[Panel]:
     """What the actuators did."""
     panels = []
-    for one, limit in zip(ACTUATORS, limits_of(run), strict=True):
+    for one, limit in actuators_of(run):
         used = run.traces.largest(one.position) / limit
         panels.append(
             Panel(
@@ -191,7 +264,8 @@ def _current_panels(run: FlownRun) -> list[Panel]:
         Panel(
             f'current_{axis}',
             f'Current, {axis}',
-            f'Velocity of the water to the {axis}, and what guidance estimates from its drift.',
+            f'Velocity of the water to the {axis}, and what guidance estimates from '
+            f'{"what navigation tells of the motion" if reckoned(run.card) else "its drift"}.',
             'current (kn)',
             (
                 Curve(f'current_{axis}_kn', 'true', 'measured'),
@@ -234,6 +308,7 @@ def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
         return {}
     groups = {
         'Where it went': _maps(),
+        'How it knew where it was': _navigation_panels(run),
         'How it flew': _flight_panels(run),
         'What the actuators did': _actuator_panels(run),
         'The current': _current_panels(run),

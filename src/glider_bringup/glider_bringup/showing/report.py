@@ -2,12 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report of a run: one web page that says what happened, to someone who was not there."""
 
+from typing import Any
+
 from glider_bringup.showing.findings import findings, verdict
 from glider_bringup.showing.panels import report_panels
-from glider_bringup.showing.scorecard import card_rows
+from glider_bringup.showing.scorecard import card_rows, reckoned
 from glider_bringup.showing.web_page import FlownRun, make_page, page_data
 from glider_bringup.showing.words import count, span, way
 from glider_model.base.files import yaml_text
+from glider_model.ocean.current_settings import KNOT_MPS
 
 _BADGES = {
     'completed': '✓ Completed',
@@ -67,6 +70,46 @@ def _what_was_set(run: FlownRun) -> str:
     return yaml_text({**named, **changed, **values})
 
 
+def _pair(values: list[float] | None, digits: int) -> str:
+    """North and east in one cell."""
+    if values is None:
+        return '-'
+    return ' / '.join(f'{round(value, digits) + 0.0:,.{digits}f}' for value in values)
+
+
+#: Head of the table of surfacings.
+_SURFACING = (
+    *('', 'time', 'believed place, N / E (m)', 'true place, N / E (m)', 'error (m)'),
+    *('in the 95 % ellipse', 'off the path (m)'),
+    *('mean current, N / E (kn)', 'believed of it, N / E (kn)'),
+)
+
+
+def _surfacings(card: dict[str, Any]) -> list[list[str]]:
+    """Head and lines of the table of surfacings; empty of a vehicle that knows its place."""
+    reports = (reckoned(card) or {}).get('reports', [])
+    inside = {True: 'yes', False: 'no', None: '-'}
+    lines = []
+    for number, one in enumerate(reports, 1):
+        currents = (
+            one[name] and [value / KNOT_MPS for value in one[name]]
+            for name in ('dac_true_mps', 'dac_believed_mps')
+        )
+        lines.append(
+            [
+                str(number),
+                span(one['t_s']),
+                _pair(one['believed_ned_m'], 0),
+                _pair(one['true_ned_m'], 0),
+                f'{one["error_m"]:,.1f}',
+                inside[one['inside_95']],
+                f'{one["cross_track_m"]:+,.1f}',
+                *(_pair(current, 3) for current in currents),
+            ]
+        )
+    return [list(_SURFACING), *lines] if lines else []
+
+
 def report_page(run: FlownRun) -> str:
     """Text of the report of a run."""
     card, rules = run.card, run.rules
@@ -82,6 +125,7 @@ def report_page(run: FlownRun) -> str:
         tiles=_tiles(run),
         findings=findings(run),
         sections=sections,
+        surfacings=_surfacings(card),
         card=card_rows(card),
         settle=span(rules.settle_s),
         margin=span(rules.margin_s),

@@ -9,11 +9,40 @@ from rich.console import Console
 from rich.table import Table
 
 from glider_bringup.console import output
+from glider_bringup.scoring.card import CARD_GROUPS
+from glider_model.ocean.current_settings import KNOT_MPS
 
 
 def show(value: float | None, unit: str, digits: int = 2) -> str:
     """Number with its unit; a dash if there is none."""
     return '-' if value is None else f'{value:,.{digits}f} {unit}'.rstrip()
+
+
+def reckoned(card: dict) -> dict | None:
+    """What a card tells of navigation, where the vehicle had to reckon its place; else None."""
+    told = card.get('navigation') or {'method': 'known'}
+    return None if told['method'] == 'known' else told
+
+
+def _navigation_rows(told: dict) -> list[tuple[str, str]]:
+    """Lines of how well a vehicle that reckons its place knew it."""
+    error, dac = told['error_m'], told['dac_error_mps']
+    off, believed = told['surfacing_cross_track_m'], told['believed_cross_track_m']
+    within, surfacings = told['ellipse_95_share'], told['surfacings']
+    rms, worst = (None if dac[name] is None else dac[name] / KNOT_MPS for name in ('rms', 'worst'))
+    inside = '-' if within is None else f'{round(within * surfacings)} of {surfacings} true places'
+    return [
+        ('navigation', f'{told["method"]}, {surfacings} surfacings, {told["fixed"]} with a fix'),
+        ('believed place, surfacing', f'off by {show(error["p50"], "m", 1)} (p50), '
+         f'{show(error["p95"], "m", 1)} (p95), {show(error["worst"], "m", 1)} (worst)'),
+        ('cross-track, surfacing', f'max {show(max(map(abs, off), default=None), "m", 1)}, last '
+         f'{show(abs(off[-1]) if off else None, "m", 1)}'),
+        ('cross-track, believed', f'steady: rms {show(believed["rms_steady"], "m", 3)}, max '
+         f'{show(believed["max_steady"], "m", 3)}'),
+        ('mean current learnt (DAC)', f'off by rms {show(rms, "kn", 3)}, worst '
+         f'{show(worst, "kn", 3)}'),
+        ('inside the 95 % ellipse', inside),
+    ]  # fmt: skip
 
 
 def card_rows(card: dict) -> list[tuple[str, str]]:
@@ -22,7 +51,7 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
     heading, depth = card['heading_fluctuation_deg'], card['depth_m']
     travel, settle_s = card['actuator_travel'], card.get('settle_s')
     settling = 'after settling' + ('' if settle_s is None else f', the first {settle_s:,.0f} s')
-    end_m = card.get('end_of_path_m')
+    end_m, navigation = card.get('end_of_path_m'), reckoned(card)
     return [
         ('status', card['status'] + (f' ({card["reason"]})' if card['reason'] else '')),
         ('flown', f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}'),
@@ -42,6 +71,7 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
          f'{show(track["max_steady"], "m", 3)}'),
         ('cross-track, all', f'max {show(track["max_all"], "m")} ({settling})'),
         ('cross-track, whole run', f'max {show(track.get("max_run"), "m")}'),
+        *(_navigation_rows(navigation) if navigation else []),
         ('pitch error, steady', f'rms {show(pitch["rms_steady"], "deg", 3)}, max '
          f'{show(pitch["max_steady"], "deg", 3)}'),
         ('heading fluctuation', f'rms {show(heading["rms_steady"], "deg", 3)}, max '
@@ -50,8 +80,16 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
          f'{show(depth["overshoot"], "m", 1)}'),
         ('actuator travel', f'pump {show(travel["buoyancy_engine_kg"], "kg", 1)}, pitch mass '
          f'{show(travel["pitch_mass_m"], "m")}, roll mass '
-         f'{show(travel["roll_mass_deg"], "deg", 0)}'),
+         f'{show(travel["roll_mass_deg"], "deg", 0)}' + _surface_travel(travel)),
     ]  # fmt: skip
+
+
+def _surface_travel(travel: dict) -> str:
+    """Travel of a steering surface, whatever its name, in words; empty without."""
+    others = sorted(set(travel) - CARD_GROUPS['actuator_travel'])
+    return ''.join(
+        f', {name.removesuffix("_deg")} {show(travel[name], "deg", 0)}' for name in others
+    )
 
 
 def guard_texts(card: dict) -> list[str]:

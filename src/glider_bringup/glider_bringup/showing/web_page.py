@@ -13,6 +13,7 @@ import numpy as np
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.traces import SAMPLES, Traces
+from glider_bringup.showing.scorecard import reckoned
 from glider_model.vehicle.file import Vehicle
 
 if TYPE_CHECKING:
@@ -26,6 +27,15 @@ _LEVEL = 1
 _PATH_POINTS = 500
 #: Units of a time axis: from which duration on, name, length (s).
 _TIME_UNITS = ((7200.0, 'h', 3600.0), (600.0, 'min', 60.0), (0.0, 's', 1.0))
+
+
+class Steps(NamedTuple):
+    """One line of a panel that is level for some time, then for some other."""
+
+    label: str
+    role: str  #: colour, as page.css names it
+    spans: tuple[tuple[float, float, float], ...]  #: from and until when (s), value
+    dashed: bool = False
 
 
 class Curve(NamedTuple):
@@ -48,15 +58,19 @@ class Panel(NamedTuple):
     axis: str = ''  #: name and unit of the vertical axis
     curves: tuple[Curve, ...] = ()
     limits: tuple[float, ...] = ()  #: horizontal lines
-    kind: str = 'time'  #: time, track or space
+    kind: str = 'time'  #: time, track, space or plan
     inflections: int = -1  #: run whose inflections are marked
+    surfacings: int = -1  #: run whose surfacings are marked
+    steps: tuple[Steps, ...] = ()
     inverted: bool = False
     log: bool = False
 
     @property
     def shape(self) -> str:
-        """How the style calls its shape: low, map, or none."""
-        return 'low' if self.id.startswith('learnt') else 'map' if self.kind != 'time' else ''
+        """How the style calls its shape: low, map, map plan, or none."""
+        if self.kind == 'time':
+            return 'low' if self.id.startswith('learnt') else ''
+        return 'map plan' if self.kind == 'plan' else 'map'
 
 
 def pack(data: bytes) -> str:
@@ -89,7 +103,9 @@ class FlownRun(NamedTuple):
         """What the page's script needs of it: the curves of these names, track and path."""
         traces = self.traces
         arrays = {name: traces.curves[name] for name in sorted(names)} | {
-            name: traces.samples[name] for name in SAMPLES
+            name: traces.samples[name]
+            for name in SAMPLES
+            if not name.startswith('believed_') or np.any(np.isfinite(traces.samples[name]))
         }
         points = self.scenario.path.points(_PATH_POINTS)
         return {
@@ -99,6 +115,7 @@ class FlownRun(NamedTuple):
             'inflections': [round(float(time), 3) for time in traces.inflections_s()],
             'path': np.round(points, 2).tolist(),
             'own_path': own_path,
+            'surfacings': (reckoned(self.card) or {}).get('reports', []),
         }
 
 
@@ -119,7 +136,11 @@ def page_data(runs: list[FlownRun], panels: list[Panel]) -> dict[str, Any]:
         'duration': duration_s,
         'unit': {'name': unit, 'seconds': seconds},
         'panels': [
-            panel._asdict() | {'curves': [curve._asdict() for curve in panel.curves]}
+            panel._asdict()
+            | {
+                'curves': [curve._asdict() for curve in panel.curves],
+                'steps': [steps._asdict() for steps in panel.steps],
+            }
             for panel in panels
         ],
         'runs': [

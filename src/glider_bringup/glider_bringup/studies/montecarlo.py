@@ -16,6 +16,7 @@ import numpy as np
 
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.scoring.card import fly_scored
+from glider_bringup.scoring.navigation import FOURTH
 from glider_bringup.studies.workers import Pool, Progress
 from glider_model.ocean.density import DensitySettings
 from glider_model.plant.sensors import SensorSettings
@@ -43,6 +44,21 @@ SENSORS = {
     'position_std_m': 1.0,
 }
 
+#: Errors of the sensors of a vehicle that reckons, uniformly in these ranges. A compass swung on
+#: shore is left with 1 to 5 deg; an attack angle or a buoyancy that is not known, with 5 % of
+#: speed; first fixes take as long as in recorded Slocum and Seaglider flights.
+ERRORS = {
+    'compass_bias_deg': (-3.0, 3.0),
+    'compass_deviation_deg': (-2.0, 2.0),
+    'compass_deviation_phase_deg': (-180.0, 180.0),
+    'pitch_scale': (0.95, 1.05),
+    'pitch_offset_deg': (-1.0, 1.0),
+    'roll_bias_deg': (-2.0, 2.0),
+    'depth_offset_m': (-0.3, 0.3),
+    'gps_std_m': (2.0, 8.0),
+    'gps_first_fix_s': (5.0, 150.0),
+}
+
 #: A run this far off its path has lost it (m).
 DIVERGED_M = 1000.0
 #: A plant whose turn rate over sin(roll) falls to this share of its file's steers weakly.
@@ -58,13 +74,23 @@ FIGURES = {
     'heading_fluctuation_deg': ('heading_fluctuation_deg', 'rms_steady'),
     'pitch_error_deg': ('pitch_error_deg', 'rms_steady'),
 }
+#: What is told of the navigation of each flight.
+NAVIGATION = (
+    'surfacings',
+    'surfacing_error_m',
+    'surfacing_cross_track_m',
+    'dac_error_mps',
+    'ellipse_95_share',
+    'fixed',
+    'innovation_squared',
+)
 RESULT_FILE = 'montecarlo.json'
 
 
 # ---------------------------------------------------------------------------------- plants
 
 
-def sample_plant(seed: int, vehicle: VehicleParams) -> dict[str, Any]:
+def sample_plant(seed: int, vehicle: VehicleParams, reckons: bool = False) -> dict[str, Any]:
     """Draw a plant.
 
     Numbers are rounded, so that they can be typed. Factors on numbers that are zero in this
@@ -75,6 +101,8 @@ def sample_plant(seed: int, vehicle: VehicleParams) -> dict[str, Any]:
     seed : int
         Seed of the study plus number of the plant.
     vehicle : VehicleParams
+    reckons : bool
+        It does not measure where it is: its sensors have `ERRORS` too.
 
     Returns
     -------
@@ -90,6 +118,7 @@ def sample_plant(seed: int, vehicle: VehicleParams) -> dict[str, Any]:
     net_heaviness = draw(-NET_HEAVINESS_KG, NET_HEAVINESS_KG)
     rise, depth = draw(*PYCNOCLINE_RISE), draw(*PYCNOCLINE_DEPTH_M)
     compression = draw(-NET_COMPRESSION_PER_M, NET_COMPRESSION_PER_M)
+    errors = {name: round(draw(*within), 4) for name, within in ERRORS.items()}
     return {
         'seed': seed,
         'perturb': {
@@ -104,7 +133,7 @@ def sample_plant(seed: int, vehicle: VehicleParams) -> dict[str, Any]:
             'compression_per_m': WATER_COMPRESSION_PER_M,
             'hull_compression_per_m': round(WATER_COMPRESSION_PER_M - compression, 9),
         },
-        'sensors': dict(SENSORS),
+        'sensors': SENSORS | (errors if reckons else {}),
     }
 
 
@@ -180,7 +209,7 @@ def make_scenarios(
     vehicle = load_vehicle(base.vehicle).params()
     scenarios = {}
     for plant in range(plants):
-        sampled = sample_plant(seed + plant, vehicle)
+        sampled = sample_plant(seed + plant, vehicle, base.navigation.jumps)
         sections = {
             'seed': sampled['seed'],
             'perturb': PerturbSettings(**sampled['perturb']),
@@ -203,13 +232,29 @@ def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
     final = scores['final_state'] or {}
     numbers += [number for vector in final.values() for number in vector]
     finite = all(math.isfinite(number) for number in numbers)
-    far = (figures['max_all_m'] or 0.0) > DIVERGED_M
+    far = _farthest_m(scores) > DIVERGED_M
     figures = {
         name: number if number is not None and math.isfinite(number) else None
         for name, number in figures.items()
     }
     failed = status == 'failed' or not finite
-    return {'diverged': failed or far or scores['infeasible'], **figures}
+    told = scores['navigation']
+    return {
+        'diverged': failed or far or scores['infeasible'],
+        **figures,
+        'navigation': {name: told[name] for name in NAVIGATION},
+    }
+
+
+def _farthest_m(scores: dict) -> float:
+    """How far a flight was off its path (m); one that reckons, where it came up.
+
+    The first ways of such a flight are not counted: nobody has told it of the current.
+    """
+    told = scores['navigation']
+    if told['ellipse_95_share'] is None:
+        return scores['cross_track_m']['max_all'] or 0.0
+    return max(map(abs, told['surfacing_cross_track_m'][FOURTH:]), default=0.0)
 
 
 def _fly_plant(scenario: Scenario) -> dict[str, Any]:
@@ -276,10 +321,31 @@ def summarise(
                 **{name: spread([flight[name] for flight in of.values()]) for name in FIGURES},
                 'statically_unstable': sum(one['unstable'] for one in airframes.values()),
                 'weak_steering': sum(one['weak_steering'] for one in airframes.values()),
+                'navigation': _navigation([flight['navigation'] for flight in of.values()]),
                 'worst_plant': max(of, key=lambda plant: _badness(of[plant])),
             }
         )
     return {'scenario': scenario, 'plants': len(airframes), 'seed': seed, 'rows': rows}
+
+
+def _navigation(flights: list[dict]) -> dict[str, Any]:
+    """How well the vehicles of a controller knew where they were, over all surfacings."""
+    known = [one for one in flights if one['ellipse_95_share'] is not None]
+    fixed = [one for one in flights if one['fixed']]
+    surfacings, fixes = (
+        sum(one[name] for one in some) for some, name in ((known, 'surfacings'), (fixed, 'fixed'))
+    )
+    later = [one['surfacing_error_m'][FOURTH:] for one in flights]
+    beside = [one['surfacing_cross_track_m'][FOURTH:] for one in flights]
+    return {
+        'surfacings': sum(one['surfacings'] for one in flights),
+        'error_m': spread([error for one in later for error in one]) if any(later) else None,
+        'cross_track_m': spread([abs(e) for one in beside for e in one]) if any(beside) else None,
+        'ellipse_95_share': surfacings
+        and sum(one['ellipse_95_share'] * one['surfacings'] for one in known) / surfacings,
+        'innovation_squared': fixes
+        and sum(one['innovation_squared'] * one['fixed'] for one in fixed) / fixes,
+    }
 
 
 def _badness(flight: dict) -> tuple[bool, float]:
@@ -304,10 +370,11 @@ def report(
     airframes: dict[int, dict],
 ) -> dict[str, Any]:
     """Result of a study with every plant in it: what it is, how it flew, how to fly it again."""
-    vehicle = load_vehicle(load_scenario(name, changes).vehicle).params()
+    base = load_scenario(name, changes)
+    vehicle, reckons = load_vehicle(base.vehicle).params(), base.navigation.jumps
     plants = []
     for plant, frame in airframes.items():
-        sampled = sample_plant(summary['seed'] + plant, vehicle)
+        sampled = sample_plant(summary['seed'] + plant, vehicle, reckons)
         runs = {controller: flight for (i, controller), flight in flights.items() if i == plant}
         plants.append(
             {

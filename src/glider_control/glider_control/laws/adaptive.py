@@ -147,7 +147,7 @@ class AdaptiveSettings(LawSettings):
 
     def params(self, vehicle: Vehicle, bank: Bank) -> 'AdaptiveParams':
         """Kernel parameters for a vehicle whose masses, but nothing else, are known."""
-        kernel_vehicle, steering = vehicle.params(), self.steering.params()
+        kernel_vehicle, steering = vehicle.params(), self.steering.params(bank.limit > 0.0)
         _, _, _, i_xx, i_yy, *_ = rigid_body(0.0, 0.0, kernel_vehicle)
         return AdaptiveParams(
             self.roll.params(i_xx + kernel_vehicle.a_44),

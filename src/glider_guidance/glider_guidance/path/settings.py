@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 import numpy as np
 import pydantic
 from pydantic import Field
-from scipy.interpolate import CubicSpline
 
 from glider_guidance.path.curve import CUBIC, HELIX, SAMPLES_PER_PIECE, PathParams, path_point
 from glider_model.base.settings import Settings
@@ -205,6 +204,8 @@ class SplinePath(_ThroughWaypoints):
 
     def params(self) -> PathParams:
         """Numbers that the kernels of `glider_guidance.path.curve` read."""
+        from scipy.interpolate import CubicSpline  # 38 MB, which other paths do not need
+
         waypoints = np.array(self.waypoints)
         knots = _polyline_params(waypoints).knots
         spline = CubicSpline(knots, waypoints, bc_type='natural')

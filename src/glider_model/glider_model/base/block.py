@@ -38,6 +38,8 @@ class Block(NamedTuple):
     every_ns: int = 0  #: a change of the flags is told at most once in this time
     say: Callable[..., Said] | None = None  #: what flags say
     surface: Callable | None = None  #: kernel: state of a block that asks for the surface
+    steers_by: Callable[[Settings], str] = lambda settings: ''
+    #: name of the steering surface among the joints on its topics, by its settings
 
 
 @slot
@@ -62,6 +64,11 @@ def block_tick(state, t_s, inputs, params, dt):
         Numbers of its output topics, as on the wire.
     flags : tuple of int
     """
+
+
+def optional_topics(settings: Settings) -> tuple[str, ...]:
+    """Those of the topics that not every run has with which a block of such settings works."""
+    return getattr(settings, 'topics', ())
 
 
 def rows_at(arrays, row):
@@ -145,19 +152,20 @@ class Telling:
 
     def __init__(self, block: Block, start_ns: int = 0) -> None:
         self.block = block
-        self._told, self._told_ns = np.array(block.quiet, np.int64), start_ns - block.every_ns
+        self._told, self._told_ns = tuple(block.quiet), start_ns - block.every_ns
 
     def among(self, flags: np.ndarray, stamps_ns: np.ndarray) -> np.ndarray:
         """Indices of the ticks at which something is told; flags int64[n, m], stamps int64[n]."""
         every_ns = self.block.every_ns
-        found = changes_to_tell(flags, stamps_ns, every_ns, self._told, self._told_ns)
+        told = np.array(self._told, np.int64)
+        found = changes_to_tell(flags, stamps_ns, every_ns, told, self._told_ns)
         if len(found):
-            self._told_ns = int(stamps_ns[found[-1]])
+            self._told, self._told_ns = tuple(told.tolist()), int(stamps_ns[found[-1]])
         return found
 
     def is_due(self, flags: tuple[int, ...], stamp_ns: int) -> bool:
         """Whether flags of one tick are told."""
-        if stamp_ns - self._told_ns < self.block.every_ns or np.array_equal(flags, self._told):
+        if flags == self._told or stamp_ns - self._told_ns < self.block.every_ns:
             return False
-        self._told[:], self._told_ns = flags, stamp_ns
+        self._told, self._told_ns = flags, stamp_ns
         return True

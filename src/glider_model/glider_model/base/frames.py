@@ -11,13 +11,18 @@ World vectors swap x and y and negate z. Body vectors negate y and z.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from glider_model.base.kernel import kernel
+from glider_model.base.settings import Settings
 from glider_model.base.signals import Odometry, Reference, Water, Wrench
 
 _HALF_SQRT2 = math.sqrt(0.5)
+#: WGS 84: semi-major axis (m), and the first eccentricity squared (-).
+_AXIS, _ECCENTRICITY2 = 6378137.0, 6.69437999014e-3
 
 
 @kernel
@@ -214,3 +219,56 @@ def wrench_to_wire(wrench):
 def wrench_from_wire(wire):
     """Demanded force and moments from the 3 numbers of ``wrench_to_wire``."""
     return Wrench(-wire[0], wire[1], -wire[2])
+
+
+class OriginSettings(Settings):
+    """Where the origin of `map` lies on the Earth.
+
+    Latitude and longitude on WGS 84 are turned into metres by an equirectangular projection with
+    the two radii of curvature at the origin: exact there, and its own inverse to rounding
+    everywhere. Away from the origin lengths eastward are wrong by tan(latitude) north / 6378 km:
+    at 36 degrees 0.1 % for 9 km, 1 % for 88 km.
+    """
+
+    latitude_deg: float = Field(36.0, ge=-85.0, le=85.0, description='latitude (deg, + north)')
+    longitude_deg: float = Field(122.0, ge=-180.0, le=180.0, description='longitude (deg, + east)')
+
+    def params(self) -> 'Origin':
+        """Kernel parameters."""
+        sine = math.sin(math.radians(self.latitude_deg))
+        share = 1.0 - _ECCENTRICITY2 * sine * sine
+        meridian = _AXIS * (1.0 - _ECCENTRICITY2) / share**1.5
+        parallel = _AXIS / math.sqrt(share) * math.cos(math.radians(self.latitude_deg))
+        degree = math.radians(1.0)
+        return Origin(self.latitude_deg, self.longitude_deg, meridian * degree, parallel * degree)
+
+
+class Origin(NamedTuple):
+    """The origin as kernels see it."""
+
+    latitude: float  #: (deg)
+    longitude: float
+    north: float  #: length of a degree (m)
+    east: float
+
+
+@kernel
+def to_geodetic(p_n, p_e, origin):
+    """Latitude and longitude (deg) of a place north and east of the origin (m)."""
+    longitude = origin.longitude + p_e / origin.east
+    if longitude > 180.0:
+        longitude -= 360.0
+    elif longitude < -180.0:
+        longitude += 360.0
+    return origin.latitude + p_n / origin.north, longitude
+
+
+@kernel
+def from_geodetic(latitude, longitude, origin):
+    """North and east of the origin (m) of a latitude and a longitude (deg)."""
+    d_longitude = longitude - origin.longitude
+    if d_longitude > 180.0:
+        d_longitude -= 360.0
+    elif d_longitude < -180.0:
+        d_longitude += 360.0
+    return (latitude - origin.latitude) * origin.north, d_longitude * origin.east

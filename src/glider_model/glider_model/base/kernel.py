@@ -22,14 +22,18 @@ from numba.core import event
 
 from glider_model.base.plugins import registered, sources
 
-_PACKAGES = ('glider_model', 'glider_guidance', 'glider_control', 'glider_bringup')
+#: Packages whose kernels call each other.
+PACKAGES = (
+    *('glider_model', 'glider_navigation', 'glider_guidance', 'glider_control'),
+    'glider_bringup',
+)
 
 
 @cache
 def source_digest() -> str:
     """Digest of the sources of our packages, and of those that registered something."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for name in _PACKAGES:
+    for name in PACKAGES:
         spec = importlib.util.find_spec(name)
         if spec is None or not spec.submodule_search_locations:
             continue

@@ -41,3 +41,9 @@ def normal_pair(stream, tick):
     angle = (np.float64(second >> np.uint64(11)) + 0.5) * 2.0**-53
     radius = math.sqrt(-2.0 * math.log(radius))
     return radius * math.cos(2.0 * math.pi * angle), radius * math.sin(2.0 * math.pi * angle)
+
+
+@kernel
+def uniform(stream, number):
+    """A number, even over (0, 1), that belongs to a number of a stream."""
+    return (np.float64(splitmix64(stream ^ splitmix64(number)) >> np.uint64(11)) + 0.5) * 2.0**-53

@@ -25,8 +25,16 @@ import pydantic
 from glider_model.base.errors import ConfigurationError
 
 CONTROL_LAWS, GUIDANCE_METHODS = 'glider.control_laws', 'glider.guidance_methods'
-CURRENTS = 'glider.currents'
-GROUPS = (CONTROL_LAWS, CURRENTS, GUIDANCE_METHODS)
+CURRENTS, NAVIGATION_METHODS = 'glider.currents', 'glider.navigation_methods'
+SURFACES, SURFACE_LAWS = 'glider.surfaces', 'glider.surface_laws'
+GROUPS = (
+    CONTROL_LAWS,
+    CURRENTS,
+    GUIDANCE_METHODS,
+    NAVIGATION_METHODS,
+    SURFACE_LAWS,
+    SURFACES,
+)
 
 #: Variable that says what was told already, so that the processes of a run do not say it again.
 TOLD = 'GLIDER_TOLD'
@@ -67,11 +75,13 @@ def classes(
     package: ModuleType,
     taken: set[str],
     check: Callable[[str, type], None] = lambda name, found: None,
+    complete: bool = True,
 ) -> dict[str, ClassT]:
     """Subclasses of ``base`` by name: one in each module of ``package``, then those registered.
 
     What cannot be used, such as a name in ``taken`` or a class that ``check`` raises for, is told
-    on standard error, and is not there: the others fly on.
+    on standard error, and is not there: the others fly on. Every field has a default, unless
+    they need not be ``complete``.
     """
     found = {}
     for module in pkgutil.iter_modules(package.__path__):
@@ -83,7 +93,7 @@ def classes(
         if point.group != group:
             continue
         try:
-            loaded = _load(point, base, taken | set(found))
+            loaded = _load(point, base, taken | set(found), complete)
             check(point.name, loaded)
             found[point.name] = loaded
         except (Exception, SystemExit) as error:  # it is not our code
@@ -106,7 +116,7 @@ def _tell(point: EntryPoint, why: str) -> None:
         print(ConfigurationError(f'glider: {_origin(point)}: not usable: {why}'), file=sys.stderr)
 
 
-def _load(point: EntryPoint, base: ClassT, taken: set[str]) -> ClassT:
+def _load(point: EntryPoint, base: ClassT, taken: set[str], complete: bool) -> ClassT:
     if not point.name.isidentifier():
         raise ValueError('its name is no identifier (allowed: letters, digits and _)')
     if point.name in taken:
@@ -115,7 +125,8 @@ def _load(point: EntryPoint, base: ClassT, taken: set[str]) -> ClassT:
     if not (isinstance(loaded, type) and issubclass(loaded, base)):
         raise TypeError(f'it is no subclass of {base.__module__}.{base.__name__}')
     try:
-        loaded()
+        if complete:
+            loaded()
     except pydantic.ValidationError as error:
         first = error.errors(include_url=False)[0]
         field = '.'.join(map(str, first['loc']))

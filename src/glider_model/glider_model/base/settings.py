@@ -69,13 +69,15 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
     """Say in words what the field of an error would accept."""
     context = error.get('ctx') or {}
     if error['type'] == 'extra_forbidden':
-        return f'allowed fields: {", ".join(name for m in holders for name in m.model_fields)}'
+        names = ', '.join(name for m in holders for name in m.model_fields)
+        return f'allowed fields: {names}' + ''.join(_others(m.model_config) for m in holders)
     if error['type'] in _NOT_A_MAPPING:
         models = _models(field.annotation) if field is not None else holders
         return f'allowed fields: {", ".join(name for m in models for name in m.model_fields)}'
     for key in ('expected', 'expected_tags'):
         if key in context:
-            return f'allowed: {context[key]}' + _others(field)
+            extra = field.json_schema_extra if field is not None else None
+            return f'allowed: {context[key]}' + _others({'json_schema_extra': extra})
     limits = [f'{word} {context[key]}' for key, word in _BOUNDS if key in context]
     if field is not None:
         limits = [
@@ -87,9 +89,9 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
     return f'allowed: {" and ".join(limits)}' if limits else ''
 
 
-def _others(field: pydantic.fields.FieldInfo | None) -> str:
-    """Where words come from that a field does not accept here."""
-    extra = field.json_schema_extra if field is not None else None
+def _others(about: dict[str, Any]) -> str:
+    """Where words come from that a field, or fields that a model, does not accept here."""
+    extra = about.get('json_schema_extra')
     return f'; {extra["others"]}' if isinstance(extra, dict) and 'others' in extra else ''
 
 

@@ -32,11 +32,12 @@ class Odometry(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """Positions of the three actuators, or the targets commanded to them."""
+    """Positions of the actuators, or the targets commanded to them."""
 
     m_b: float  #: net heaviness from the buoyancy engine (kg, + sinks)
     x_p: float  #: pitch mass from its neutral position (m, + forward: nose down)
     mu: float  #: roll mass rotation about the x axis (rad, 0 hangs straight down)
+    delta: float  #: steering surface (rad, + nose to starboard); 0 of a vehicle without one
 
 
 class Water(NamedTuple):

@@ -6,12 +6,16 @@ From it follow the table of topics, who waits for whom in lockstep, the columns 
 modules that are started, and what a recorded run is checked by.
 """
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from glider_model.base.signals import Adaptation
 
 #: Joint names of joint_states and command, in the order of `glider_model.base.signals.Joints`.
 JOINTS = ('buoyancy_engine', 'pitch_mass', 'roll_mass')
+#: Field of a joint that comes after them: the steering surface, called as in the vehicle's file.
+#: A vehicle without one has no such name in its messages, and the number 0.0 beside them.
+SURFACE = 'position[<surface>]'
 
 #: Frame names: the world (ENU), the body (FLU), the path frame of the tracking error.
 MAP, BASE_LINK, PATH_FRAME = 'map', 'base_link', 'path'
@@ -24,6 +28,8 @@ _POSE_AND_TWIST = (
     *(f'twist.twist.angular.{axis}' for axis in _XYZ),
 )
 _TWIST = tuple(f'twist.linear.{axis}' for axis in _XYZ)
+#: Covariance of the horizontal part, row by row, in a matrix of 6 x 6.
+_XX_XY_YX_YY = (0, 1, 6, 7)
 
 
 class Port(NamedTuple):
@@ -34,10 +40,20 @@ class Port(NamedTuple):
     frame: str = ''  #: in its header
     child_frame: str = ''  #: of an odometry
     names: tuple[str, ...] = ()  #: of a JointState
+    constants: tuple[tuple[str, int], ...] = ()  #: other fields, the same in every message
 
 
-def _odometry(child_frame: str) -> Port:
-    return Port('nav_msgs/msg/Odometry', _POSE_AND_TWIST, MAP, child_frame)
+def _odometry(child_frame: str, more: tuple[str, ...] = ()) -> Port:
+    return Port('nav_msgs/msg/Odometry', (*_POSE_AND_TWIST, *more), MAP, child_frame)
+
+
+def _current() -> Port:
+    """Horizontal current with its covariance."""
+    fields = (
+        *(f'twist.twist.linear.{axis}' for axis in ('x', 'y')),
+        *(f'twist.covariance[{i}]' for i in _XX_XY_YX_YY),
+    )
+    return Port('geometry_msgs/msg/TwistWithCovarianceStamped', fields, MAP)
 
 
 def _named(names: tuple[str, ...]) -> Port:
@@ -46,19 +62,51 @@ def _named(names: tuple[str, ...]) -> Port:
     return Port('sensor_msgs/msg/JointState', fields, names=names)
 
 
+def _joints() -> Port:
+    """Positions of the actuators."""
+    return Port('sensor_msgs/msg/JointState', (*_named(JOINTS).fields, SURFACE), names=JOINTS)
+
+
 #: Every per-tick topic. The twist of the reference is expressed in `map`: desired velocity over
 #: ground and Euler angle rates.
 PORTS = {
     '/clock': Port('rosgraph_msgs/msg/Clock', ()),
-    'odom': _odometry(BASE_LINK),
-    'joint_states': _named(JOINTS),
+    'ground_truth/odom': _odometry(BASE_LINK),
+    'measured_odom': _odometry(BASE_LINK),
+    'imu': Port(
+        'sensor_msgs/msg/Imu',
+        (
+            *(f'orientation.{axis}' for axis in ('w', *_XYZ)),
+            *(f'angular_velocity.{axis}' for axis in _XYZ),
+            'angular_velocity_covariance[0]',
+        ),
+        BASE_LINK,
+        constants=(('linear_acceleration_covariance[0]', -1),),
+    ),
+    'pressure': Port('sensor_msgs/msg/FluidPressure', ('fluid_pressure',), BASE_LINK),
+    'fix': Port(
+        'sensor_msgs/msg/NavSatFix',
+        (
+            'status.status',
+            'latitude',
+            'longitude',
+            'position_covariance[0]',
+            'position_covariance[4]',
+        ),
+        BASE_LINK,
+        constants=(('status.service', 1), ('position_covariance_type', 2)),
+    ),
+    'joint_states': _joints(),
     'current_velocity': Port('geometry_msgs/msg/TwistStamped', _TWIST, MAP),
+    'odom': _odometry(BASE_LINK, tuple(f'pose.covariance[{i}]' for i in _XX_XY_YX_YY)),
+    'believed_current': _current(),
+    'believed_surface_current': _current(),
     'reference': _odometry(MAP),
     'tracking_error': Port(
         'geometry_msgs/msg/Vector3Stamped', tuple(f'vector.{axis}' for axis in _XYZ), PATH_FRAME
     ),
     'current_estimate': Port('geometry_msgs/msg/TwistStamped', _TWIST, MAP),
-    'command': _named(JOINTS),
+    'command': _joints(),
     'wrench': Port(
         'geometry_msgs/msg/WrenchStamped',
         ('wrench.force.z', 'wrench.torque.x', 'wrench.torque.y'),
@@ -89,13 +137,36 @@ class Wired(NamedTuple):
         return f'{self.package}.nodes.{self.node}'
 
 
+#: What a vehicle may be able to measure. Each way to navigate reads some of it, and of this alone
+#: there are messages in a run; where a table has a column for each topic, the others are zero.
+SENSORS = ('measured_odom', 'imu', 'pressure', 'fix')
+#: Those of them of which a vehicle has samples now and then, and not in every tick.
+SAMPLED = ('imu', 'pressure', 'fix')
+#: What stands for a topic that may be silent for as long as it likes: under water there is no fix.
+WHEN_SILENT = {'fix': (-1.0, 0.0, 0.0, 0.0, 0.0)}
+#: What ways to navigate may tell beside odom; the same holds for them.
+BELIEFS = ('believed_current', 'believed_surface_current')
+
 PLANT = Wired(
     'plant',
     'glider_model',
     inputs=('command', 'current_velocity'),
-    outputs=('/clock', 'odom', 'joint_states'),
+    outputs=(
+        '/clock',
+        'ground_truth/odom',
+        *SENSORS,
+        'joint_states',
+    ),
 )
-CURRENT = Wired('current', 'glider_model', inputs=('odom',), outputs=('current_velocity',))
+CURRENT = Wired(
+    'current', 'glider_model', inputs=('ground_truth/odom',), outputs=('current_velocity',)
+)
+NAVIGATION = Wired(
+    'navigation',
+    'glider_navigation',
+    inputs=('joint_states', *SENSORS),
+    outputs=('odom', *BELIEFS),
+)
 GUIDANCE = Wired(
     'guidance',
     'glider_guidance',
@@ -111,7 +182,13 @@ CONTROL = Wired(
 
 #: In the order in which they act in a tick. The plant acts at both ends: what it measures begins
 #: the tick, and it moves when all others have answered.
-WIRING = (PLANT, CURRENT, GUIDANCE, CONTROL)
+WIRING = (PLANT, CURRENT, NAVIGATION, GUIDANCE, CONTROL)
+
+
+def present(names: Iterable[str], topics: Iterable[str]) -> tuple[str, ...]:
+    """Those of the names that there are in a run with these of `SENSORS` and `BELIEFS`."""
+    left_out = {*SENSORS, *BELIEFS}.difference(topics)
+    return tuple(name for name in names if name not in left_out)
 
 
 def publisher(topic: str) -> Wired:

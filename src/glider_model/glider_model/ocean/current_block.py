@@ -13,7 +13,7 @@ from glider_model.ocean.current_settings import CurrentSettings
 @block_tick.body(CurrentParams)
 @kernel
 def current_tick(state, t_s, inputs, params, dt):
-    """One tick: odom in, current_velocity out; see `block_tick`."""
+    """One tick: ground_truth/odom in, current_velocity out; see `block_tick`."""
     odometry = odometry_from_wire(inputs[0])
     position = (odometry.p_n, odometry.p_e, odometry.p_d)
     state, water = current_step(state, position, t_s, params, dt)

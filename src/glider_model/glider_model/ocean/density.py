@@ -10,6 +10,9 @@ from pydantic import Field
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
 
+#: Pressure of the air (Pa), and weight of sea water, 1025 kg/m^3 under 9.81 m/s^2 (N/m^3).
+SURFACE_PRESSURE, SPECIFIC_WEIGHT = 101325.0, 1025.0 * 9.81
+
 
 class DensitySettings(Settings):
     """Density of the water relative to the depth at which the vehicle was ballasted (surface)."""
@@ -70,3 +73,15 @@ def emerged_fraction(depth, radius):
         return 0.0
     out = min(1.0, (radius - depth) / (2.0 * radius))
     return out * out * (3.0 - 2.0 * out)
+
+
+@kernel
+def pressure_at(depth):
+    """Absolute pressure (Pa) at a depth (m), in water of one density."""
+    return SURFACE_PRESSURE + SPECIFIC_WEIGHT * depth
+
+
+@kernel
+def depth_at(pressure):
+    """Depth (m) of an absolute pressure (Pa), in water of one density."""
+    return (pressure - SURFACE_PRESSURE) / SPECIFIC_WEIGHT

@@ -97,15 +97,15 @@ class SteeringLearningSettings(Settings):
         description='roll at which a vehicle has to turn, or else is steered by its kick (deg)',
     )
 
-    def params(self) -> 'SteeringParams':
-        """Kernel parameters."""
+    def params(self, banks: bool = True) -> 'SteeringParams':
+        """Kernel parameters; for a vehicle that does not bank to turn, which learns nothing."""
         return SteeringParams(
             self.drift_radps**2 / 1000.0,
             self.bend_drift_radps**2 / 1000.0,
             self.kick_drift**2 / 1000.0,
             self.disturbance_drift_radps**2 / 1000.0,
             self.noise_radps**2 * self.correlation_s,
-            self.after_s,
+            self.after_s if banks else math.inf,
             self.smoothing_s,
             math.sin(math.radians(self.bank_deg)),
         )

@@ -9,13 +9,21 @@ from glider_model.base.signals import Joints
 from glider_model.base.wiring import PLANT as WIRED
 from glider_model.plant.plant import PlantSettings, plant_finished, plant_odometry, plant_step
 from glider_model.plant.sensors import sense
+from glider_model.vehicle.file import steers_by
 
 
 @kernel
 def plant_outputs(state, params):
     """What the plant says of a tick: the numbers of its topics, and whether it is the last one."""
-    odometry = plant_odometry(state)
-    outputs = sense(odometry, state.joints, state.tick, params.sensors)
+    outputs = sense(
+        plant_odometry(state),
+        state.joints,
+        state.sample,
+        state.surfacing.out_ticks,
+        state.surfacing.count,
+        state.tick,
+        params.sensors,
+    )
     return outputs, plant_finished(state, params)
 
 
@@ -23,8 +31,8 @@ def plant_outputs(state, params):
 def plant_move(state, inputs, params, dt):
     """State a tick later, under command and current_velocity."""
     command, water = inputs
-    target = Joints(command[0], command[1], command[2])
+    target = Joints(command[0], command[1], command[2], command[3])
     return plant_step(state, target, water_from_wire(water), params, dt)
 
 
-PLANT = Block(WIRED, PlantSettings, plant_move, ('finished',))
+PLANT = Block(WIRED, PlantSettings, plant_move, ('finished',), steers_by=steers_by)

@@ -20,6 +20,7 @@ from glider_model.ocean.density import buoyancy_gain, emerged_fraction
 from glider_model.plant.exponential import decay_weights
 from glider_model.vehicle.hydrodynamics import hydrodynamics, rate_damping
 from glider_model.vehicle.rigid_body import GRAVITY, coriolis, make_inertia, solve_mass
+from glider_model.vehicle.surface import surface_loads
 
 #: Damping ratio of heave at the surface, where the hull radiates waves (-).
 SURFACE_DAMPING = 0.2
@@ -52,21 +53,26 @@ class Rates(NamedTuple):
 
 
 @kernel
-def acceleration(motion, m_b, inertia, water_rate, vehicle, density):
-    """Acceleration nu' (6) of a motion with net heaviness ``m_b`` (kg).
+def acceleration(motion, joints, inertia, water_rate, vehicle, density):
+    """Acceleration nu' (6) of a motion with actuators at ``joints``, of which is the inertia.
 
     ``water_rate`` is v_c' (NED, m/s^2).
     """
     q_w, q_x, q_y, q_z = motion.q_w, motion.q_x, motion.q_y, motion.q_z
     u, v, w, p, q, r = motion.u, motion.v, motion.w, motion.p, motion.q, motion.r
-    h_x, h_y, h_z, l_x, l_y, l_z = hydrodynamics(u, v, w, p, q, r, vehicle)
+    hull = hydrodynamics(u, v, w, p, q, r, vehicle)
+    h_x, h_y, h_z, l_x, l_y, l_z = surface_loads(
+        hull, u, v, w, p, q, r, joints.delta, vehicle.surface
+    )
     c_x, c_y, c_z, n_x, n_y, n_z = coriolis(u, v, w, p, q, r, inertia, vehicle)
     # direction of gravity in body axes: third row of R_NB
     k_x = 2.0 * (q_x * q_z - q_w * q_y)
     k_y = 2.0 * (q_y * q_z + q_w * q_x)
     k_z = 1.0 - 2.0 * (q_x * q_x + q_y * q_y)
     s_x, s_y, s_z = inertia.s_x, inertia.s_y, inertia.s_z
-    weight = (m_b + vehicle.ballast - buoyancy_gain(motion.p_d, vehicle.m, density)) * GRAVITY
+    weight = (
+        joints.m_b + vehicle.ballast - buoyancy_gain(motion.p_d, vehicle.m, density)
+    ) * GRAVITY
     if motion.p_d < vehicle.hull_radius:
         weight += (
             vehicle.m * GRAVITY * emerged_fraction(motion.p_d, vehicle.hull_radius)
@@ -102,12 +108,12 @@ def _surface_damping(motion, vehicle):
 
 
 @kernel
-def derivative(motion, m_b, inertia, current, water_rate, vehicle, density):
+def derivative(motion, joints, inertia, current, water_rate, vehicle, density):
     """Time derivative of a motion."""
     q_w, q_x, q_y, q_z = motion.q_w, motion.q_x, motion.q_y, motion.q_z
     p, q, r = motion.p, motion.q, motion.r
     d_n, d_e, d_d = rotate_to_ned(q_w, q_x, q_y, q_z, motion.u, motion.v, motion.w)
-    a = acceleration(motion, m_b, inertia, water_rate, vehicle, density)
+    a = acceleration(motion, joints, inertia, water_rate, vehicle, density)
     return Motion(
         d_n + current.v_n,
         d_e + current.v_e,
@@ -152,6 +158,7 @@ def _between(start, end, share):
         start.m_b + share * (end.m_b - start.m_b),
         start.x_p + share * (end.x_p - start.x_p),
         start.mu + share * (end.mu - start.mu),
+        start.delta + share * (end.delta - start.delta),
     )
 
 
@@ -261,17 +268,17 @@ def integrate(motion, start, end, current, water_rate, params, dt, steps):
         if not fixed:
             inertia_middle = make_inertia(middle.x_p, middle.mu, vehicle)
             inertia_after = make_inertia(after.x_p, after.mu, vehicle)
-        k_1 = derivative(x, now.m_b, inertia_now, current, water_rate, vehicle, density)
+        k_1 = derivative(x, now, inertia_now, current, water_rate, vehicle, density)
         n_1 = _inputs(k_1, x, poles)
         x_2 = _along(x, 0.5 * h, k_1, _halfway(x, n_1, p, q, r))
-        k_2 = derivative(x_2, middle.m_b, inertia_middle, current, water_rate, vehicle, density)
+        k_2 = derivative(x_2, middle, inertia_middle, current, water_rate, vehicle, density)
         n_2 = _inputs(k_2, x_2, poles)
         x_3 = _along(x, 0.5 * h, k_2, _halfway(x, n_2, p, q, r))
-        k_3 = derivative(x_3, middle.m_b, inertia_middle, current, water_rate, vehicle, density)
+        k_3 = derivative(x_3, middle, inertia_middle, current, water_rate, vehicle, density)
         n_3 = _inputs(k_3, x_3, poles)
         n_31 = Rates(2.0 * n_3.p - n_1.p, 2.0 * n_3.q - n_1.q, 2.0 * n_3.r - n_1.r)
         x_4 = _along(x, h, k_3, _halfway(x_2, n_31, p, q, r))
-        k_4 = derivative(x_4, after.m_b, inertia_after, current, water_rate, vehicle, density)
+        k_4 = derivative(x_4, after, inertia_after, current, water_rate, vehicle, density)
         n_4 = _inputs(k_4, x_4, poles)
         n_23 = Rates(n_2.p + n_3.p, n_2.q + n_3.q, n_2.r + n_3.r)
         error = _energy(

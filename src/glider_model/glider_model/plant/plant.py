@@ -3,20 +3,29 @@
 """The plant: the vehicle in the water, from its start tick by tick to the end of a run."""
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.frames import quaternion_from_euler, rotate_to_body
+from glider_model.base.frames import OriginSettings, quaternion_from_euler, rotate_to_body
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_S, Joints, Odometry, Water, not_finite
+from glider_model.base.wiring import SENSORS
 from glider_model.ocean.density import (
     DensityParams,
     DensitySettings,
 )
 from glider_model.plant.motion import Motion, integrate
-from glider_model.plant.sensors import SensorParams, SensorSettings
+from glider_model.plant.sensors import (
+    ANTENNA_M,
+    NO_SAMPLE,
+    Sample,
+    SensorParams,
+    SensorSettings,
+    add_noise,
+    take_sample,
+)
 from glider_model.vehicle.actuators import actuators_step
 from glider_model.vehicle.file import VehicleParams, load_vehicle
 from glider_model.vehicle.perturb import PerturbSettings, perturbed
@@ -38,6 +47,14 @@ SURFACE_M = 1.5
 DIVED_M = 3.0
 
 
+class Surfacing(NamedTuple):
+    """What a receiver for satellites has of the surface."""
+
+    count: int  #: surfacings so far, each after a dive
+    is_under: bool  #: has dived since
+    out_ticks: int  #: ticks with the antenna out of the water without a break
+
+
 class PlantState(NamedTuple):
     """State of the plant at a tick."""
 
@@ -49,6 +66,11 @@ class PlantState(NamedTuple):
     dives: int  #: completed dives
     surface_ticks: int  #: ticks at the surface without a break
     afloat_ticks: int  #: those in which the pump was not filled; -1: has not dived yet
+    sample: Sample  #: what the sensors showed at the tick before
+    surfacing: Surfacing
+
+
+LAUNCHED = Surfacing(0, False, 0)
 
 
 class PlantParams(NamedTuple):
@@ -113,10 +135,21 @@ class PlantSettings(Settings):
         'without filling its pump (s); 0.0: never',
     )
     seed: int = Field(0, ge=0, le=2**63 - 1, description='seed of the noise')
-    sensors: SensorSettings = Field(SensorSettings(), description='noise of the odometry')
+    sensors: SensorSettings = Field(SensorSettings(), description='errors of the sensors')
+    fitted: list[Literal[SENSORS]] = Field(
+        ['measured_odom'], description='topics of the sensors that the vehicle has'
+    )
+    origin: OriginSettings = Field(
+        OriginSettings(), description='where the origin of map lies on the Earth'
+    )
     perturb: PerturbSettings = Field(
         PerturbSettings(), description='what this vehicle differs in from its file'
     )
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Topics of the sensors that are fitted."""
+        return tuple(self.fitted)
 
     def params(self) -> PlantParams:
         """Kernel parameters."""
@@ -128,7 +161,7 @@ class PlantSettings(Settings):
             round(self.surface_s / TICK_S),
             round(self.afloat_s / TICK_S),
             *dive_depths(self.dive_depth_m),
-            self.sensors.params(self.seed),
+            self.sensors.params(self.seed, self.origin, tuple(self.fitted)),
         )
 
     def initial_state(self) -> PlantState:
@@ -142,7 +175,40 @@ class PlantSettings(Settings):
             start.north_m, start.east_m, start.depth_m, *q, start.speed_mps, *(5 * (0.0,))
         )
         m_b = min(limit, max(-limit, start.net_heaviness_kg))
-        return PlantState(motion, Joints(m_b, 0.0, 0.0), Water(0.0, 0.0, 0.0), 0, False, 0, 0, -1)
+        return PlantState(
+            motion,
+            Joints(m_b, 0.0, 0.0, 0.0),
+            Water(0.0, 0.0, 0.0),
+            0,
+            False,
+            0,
+            0,
+            -1,
+            NO_SAMPLE,
+            LAUNCHED,
+        )
+
+
+@kernel
+def plant_odometry(state):
+    """Where the vehicle is and how it moves: what it would measure without error."""
+    x, water = state.motion, state.water
+    u, v, w = rotate_to_body(x.q_w, x.q_x, x.q_y, x.q_z, water.v_n, water.v_e, water.v_d)
+    return Odometry(
+        x.p_n,
+        x.p_e,
+        x.p_d,
+        x.q_w,
+        x.q_x,
+        x.q_y,
+        x.q_z,
+        x.u + u,
+        x.v + v,
+        x.w + w,
+        x.p,
+        x.q,
+        x.r,
+    )
 
 
 @kernel
@@ -182,9 +248,30 @@ def plant_step(state, command, water, params, dt):
     dives = state.dives + 1 if state.deep and not deep else state.dives
     surface_ticks = state.surface_ticks + 1 if motion.p_d < SURFACE_M else 0
     afloat_ticks = _afloat(state.afloat_ticks, motion.p_d, command.m_b > joints.m_b)
+    sample = state.sample
+    if params.sensors.is_held:
+        measured = add_noise(plant_odometry(state), state.tick, params.sensors)
+        sample = take_sample(measured, sample, state.tick, params.sensors)
     return PlantState(
-        motion, joints, water, state.tick + 1, deep, dives, surface_ticks, afloat_ticks
+        motion,
+        joints,
+        water,
+        state.tick + 1,
+        deep,
+        dives,
+        surface_ticks,
+        afloat_ticks,
+        sample,
+        _surface(state.surfacing, motion.p_d),
     )
+
+
+@kernel
+def _surface(surfacing, depth):
+    """What there is of the surface a tick later, at a depth (m)."""
+    is_under = depth > DIVED_M or (surfacing.is_under and depth >= SURFACE_M)
+    count = surfacing.count + 1 if surfacing.is_under and not is_under else surfacing.count
+    return Surfacing(count, is_under, surfacing.out_ticks + 1 if depth <= ANTENNA_M else 0)
 
 
 @kernel
@@ -205,28 +292,6 @@ def plant_finished(state, params):
     )
     afloat = 0 < params.stop_afloat_ticks <= state.afloat_ticks
     return state.tick + 1 >= params.max_ticks or surfaced or afloat
-
-
-@kernel
-def plant_odometry(state):
-    """Where the vehicle is and how it moves: what it would measure without error."""
-    x, water = state.motion, state.water
-    u, v, w = rotate_to_body(x.q_w, x.q_x, x.q_y, x.q_z, water.v_n, water.v_e, water.v_d)
-    return Odometry(
-        x.p_n,
-        x.p_e,
-        x.p_d,
-        x.q_w,
-        x.q_x,
-        x.q_y,
-        x.q_z,
-        x.u + u,
-        x.v + v,
-        x.w + w,
-        x.p,
-        x.q,
-        x.r,
-    )
 
 
 def state_fault(odometry: Odometry, joints: Joints, tick: int) -> str:

@@ -1,39 +1,61 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the vehicle measures: its noise, and the way back to the truth.
+"""What the vehicle measures: sensors with their errors.
 
-White noise, drawn anew at every tick. It is a function of (seed, tick), so that nodes and direct
-engine publish the same bits, and whoever knows the seed can take it off a recording again.
+White noise, drawn anew at every tick, is a function of (seed, tick), so that nodes and direct
+engine publish the same bits:
 
     p      = p + n_p
     q_NB   = q(0, 0, n_psi) (x) q_NB (x) q(n_phi, n_theta, 0)
     omega  = omega + n_omega
 
 Heading noise turns about the vertical, roll and pitch noise about the body axes: no attitude is
-singular. The velocity over ground keeps its numbers in body axes. The current field is asked at
-the measured place, since its node knows no other.
+singular. The velocity over ground keeps its numbers in body axes. Errors that stay are those of
+compass and pitch sensor:
+
+    psi_m   = psi + bias + deviation sin(psi + phase)
+    theta_m = scale theta + offset
+    phi_m   = phi + bias
+
+A sensor that is sampled less often than each tick shows its last sample until the next.
 """
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from glider_model.base.frames import odometry_to_wire, quaternion_from_euler
+from glider_model.base.frames import (
+    Origin,
+    OriginSettings,
+    euler_from_quaternion,
+    odometry_to_wire,
+    quaternion_from_euler,
+    swap_world,
+    to_geodetic,
+)
 from glider_model.base.kernel import kernel
-from glider_model.base.noise import normal_pair, random_stream
+from glider_model.base.noise import normal_pair, random_stream, uniform
 from glider_model.base.settings import Settings
-from glider_model.base.signals import Odometry
+from glider_model.base.signals import TICK_S, Odometry
+from glider_model.base.wiring import SENSORS
+from glider_model.ocean.density import pressure_at
 
 #: Sets the streams of the sensors apart from those of the current, whose offsets are smaller.
 _STREAM_OFFSET = 2**32
 #: Pairs of random numbers in a tick: nine numbers, and one to spare.
 _PAIRS = 5
+#: Shallower than this the antenna is out of the water (m).
+ANTENNA_M = 0.5
+#: The error of a fix stays the same for so many ticks: that of satellites changes slowly.
+FIX_ERROR_TICKS = 600
+#: What a sensor_msgs/Imu and a NavSatFix say where there is no rate, and no fix.
+NO_RATES, NO_FIX, HAS_FIX = -1.0, -1.0, 0.0
 
 
 class SensorSettings(Settings):
-    """Noise of the odometry, as standard deviations; white, without bias."""
+    """Errors of the sensors. Standard deviations are those of white noise."""
 
     attitude_std_deg: float = Field(
         0.0, ge=0.0, le=10.0, description='noise of roll and of pitch (deg)'
@@ -43,28 +65,160 @@ class SensorSettings(Settings):
         0.0, ge=0.0, le=10.0, description='noise of each angular rate (deg/s)'
     )
     position_std_m: float = Field(
-        0.0, ge=0.0, le=1000.0, description='noise of north, of east and of depth (m)'
+        0.0,
+        ge=0.0,
+        le=1000.0,
+        description='noise of depth and, where they are measured, of north and of east (m)',
+    )
+    compass_bias_deg: float = Field(
+        0.0,
+        ge=-180.0,
+        le=180.0,
+        description='error of the heading that stays, a wrong declination included (deg)',
+    )
+    compass_deviation_deg: float = Field(
+        0.0, ge=-45.0, le=45.0, description='error that goes as the sine of the heading (deg)'
+    )
+    compass_deviation_phase_deg: float = Field(
+        0.0, ge=-180.0, le=180.0, description='phase of that sine (deg)'
+    )
+    pitch_scale: float = Field(1.0, ge=0.5, le=1.5, description='measured pitch over true (-)')
+    pitch_offset_deg: float = Field(
+        0.0, ge=-10.0, le=10.0, description='error of pitch that stays (deg, + nose up)'
+    )
+    roll_bias_deg: float = Field(
+        0.0, ge=-10.0, le=10.0, description='error of roll that stays (deg)'
+    )
+    imu_period_s: float = Field(
+        0.1, ge=0.1, le=30.0, description='time between two samples of attitude and pressure (s)'
+    )
+    imu_missed_share: float = Field(
+        0.0, ge=0.0, le=0.9, description='share of those samples that drop out (-)'
+    )
+    gyro: bool = Field(True, description='angular rates are measured')
+    depth_offset_m: float = Field(
+        0.0, ge=-50.0, le=50.0, description='error of depth that stays (m)'
+    )
+    depth_resolution_m: float = Field(
+        0.0, ge=0.0, le=10.0, description='steps in which depth is measured (m); 0: none'
+    )
+    gps_std_m: float = Field(
+        4.0, ge=0.0, le=1000.0, description='error of a fix, north and east each (m)'
+    )
+    gps_first_fix_s: float = Field(
+        60.0, ge=0.0, le=3600.0, description='time with the antenna out until the first fix (s)'
+    )
+    fix_missed_share: float = Field(
+        0.0, ge=0.0, le=1.0, description='share of surfacings without a fix, at random (-)'
+    )
+    fix_missed_pattern: str = Field(
+        '0',
+        pattern='^[01]{1,60}$',
+        description='which surfacings have no fix, over and over from the launch on: 1 has none',
     )
 
-    def params(self, seed: int) -> 'SensorParams':
-        """Kernel parameters for the noise under one seed."""
+    also_fitted: list[Literal[SENSORS]] = Field(
+        [], description='topics of sensors beside those that navigation reads'
+    )
+
+    def params(
+        self, seed: int, origin: OriginSettings | None = None, fitted: tuple[str, ...] = SENSORS
+    ) -> 'SensorParams':
+        """Kernel parameters for the errors under one seed, for the sensors that are fitted."""
+        pattern = self.fix_missed_pattern
         return SensorParams(
             np.uint64(random_stream(seed, _STREAM_OFFSET, 0)),
             math.radians(self.attitude_std_deg),
             math.radians(self.heading_std_deg),
             math.radians(self.rate_std_dps),
             self.position_std_m,
+            ImuErrors(
+                math.radians(self.compass_bias_deg),
+                math.radians(self.compass_deviation_deg),
+                math.radians(self.compass_deviation_phase_deg),
+                self.pitch_scale,
+                math.radians(self.pitch_offset_deg),
+                math.radians(self.roll_bias_deg),
+            ),
+            round(self.imu_period_s / TICK_S),
+            self.imu_missed_share,
+            self.gyro,
+            self.depth_offset_m,
+            self.depth_resolution_m,
+            GpsParams(
+                np.uint64(random_stream(seed, _STREAM_OFFSET, 1)),
+                self.gps_std_m,
+                round(self.gps_first_fix_s / TICK_S),
+                self.fix_missed_share,
+                int(pattern[::-1], 2),
+                len(pattern),
+                (origin or OriginSettings()).params(),
+            ),
+            'measured_odom' in fitted,
+            bool({'imu', 'pressure', 'fix'} & set(fitted)),
+            self.imu_period_s > TICK_S or self.imu_missed_share > 0.0,
         )
 
 
+class ImuErrors(NamedTuple):
+    """Errors of compass and tilt sensor that stay (rad; scale -)."""
+
+    compass_bias: float
+    compass_deviation: float
+    compass_phase: float
+    pitch_scale: float
+    pitch_offset: float
+    roll_bias: float
+
+
+class GpsParams(NamedTuple):
+    """The receiver as the kernels see it."""
+
+    stream: np.uint64  #: start of the random stream
+    std: float  #: (m)
+    first_fix_ticks: int
+    missed_share: float
+    missed_bits: int  #: pattern of surfacings without a fix, and its length
+    missed_count: int
+    origin: Origin
+
+
 class SensorParams(NamedTuple):
-    """Noise as the kernels see it."""
+    """Sensors as the kernels see them."""
 
     stream: np.uint64  #: start of the random stream
     attitude: float  #: standard deviations (rad, rad, rad/s, m)
     heading: float
     rate: float
     position: float
+    errors: ImuErrors
+    period_ticks: int  #: from sample to sample
+    missed_share: float
+    gyro: bool
+    depth_offset: float  #: (m)
+    depth_resolution: float
+    gps: GpsParams
+    has_position: bool  #: measured_odom is fitted
+    has_parts: bool  #: imu, pressure and fix are
+    is_held: bool  #: samples are shown for longer than a tick
+
+
+class Sample(NamedTuple):
+    """The last sample of attitude, rates and depth (m)."""
+
+    q_w: float
+    q_x: float
+    q_y: float
+    q_z: float
+    p: float
+    q: float
+    r: float
+    p_d: float
+
+
+#: What stands in the place of sensors that are not fitted.
+NO_POSITION, NO_IMU = 13 * (0.0,), 8 * (0.0,)
+NO_SAMPLE = Sample(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Noise(NamedTuple):
@@ -161,8 +315,82 @@ def add_noise(odometry, tick, params):
 
 
 @kernel
-def sense(odometry, joints, tick, params):
-    """What the vehicle measures at a tick, for the topics of the plant: odom, joint_states.
+def _with_errors(q_w, q_x, q_y, q_z, errors):
+    """Attitude with the errors that stay; without any the very same numbers."""
+    e = errors
+    if (
+        e.compass_bias == 0.0
+        and e.compass_deviation == 0.0
+        and e.pitch_scale == 1.0
+        and e.pitch_offset == 0.0
+        and e.roll_bias == 0.0
+    ):
+        return q_w, q_x, q_y, q_z
+    phi, theta, psi = euler_from_quaternion(q_w, q_x, q_y, q_z)
+    return quaternion_from_euler(
+        phi + e.roll_bias,
+        e.pitch_scale * theta + e.pitch_offset,
+        psi + e.compass_bias + e.compass_deviation * math.sin(psi + e.compass_phase),
+    )
+
+
+@kernel
+def _is_sampled(tick, params):
+    """Whether attitude and pressure are sampled at a tick."""
+    if tick % params.period_ticks != 0:
+        return False
+    if params.missed_share <= 0.0 or tick == 0:
+        return True
+    return uniform(params.gps.stream, np.uint64(2 * tick + 1)) >= params.missed_share
+
+
+@kernel
+def take_sample(measured, sample, tick, params):
+    """Sample of attitude, rates and depth that is shown at a tick: a new one, or ``sample``.
+
+    Parameters
+    ----------
+    measured : Odometry
+        With noise.
+    sample : Sample
+        That of the tick before.
+    tick : int
+    params : SensorParams
+    """
+    if not _is_sampled(tick, params):
+        return sample
+    x = measured
+    q_w, q_x, q_y, q_z = _with_errors(x.q_w, x.q_x, x.q_y, x.q_z, params.errors)
+    depth = x.p_d
+    if params.depth_offset != 0.0:
+        depth += params.depth_offset
+    if params.depth_resolution > 0.0:
+        depth = params.depth_resolution * math.floor(depth / params.depth_resolution + 0.5)
+    if not params.gyro:
+        return Sample(q_w, q_x, q_y, q_z, 0.0, 0.0, 0.0, depth)
+    return Sample(q_w, q_x, q_y, q_z, x.p, x.q, x.r, depth)
+
+
+@kernel
+def _take_fix(odometry, out_ticks, surfacings, tick, params):
+    """Numbers of the topic fix at a tick, by the true place of the vehicle."""
+    gps = params.gps
+    bit = np.int64(1) << np.int64(surfacings % gps.missed_count)
+    missed = (np.int64(gps.missed_bits) & bit) != 0 or (
+        uniform(gps.stream, np.uint64(2 * surfacings)) < gps.missed_share
+    )
+    if odometry.p_d > ANTENNA_M or out_ticks < gps.first_fix_ticks or missed:
+        return NO_FIX, 0.0, 0.0, 0.0, 0.0
+    n_n, n_e = normal_pair(gps.stream, np.uint64(tick // FIX_ERROR_TICKS))
+    latitude, longitude = to_geodetic(
+        odometry.p_n + gps.std * n_n, odometry.p_e + gps.std * n_e, gps.origin
+    )
+    return HAS_FIX, latitude, longitude, gps.std * gps.std, gps.std * gps.std
+
+
+@kernel
+def sense(odometry, joints, sample, out_ticks, surfacings, tick, params):
+    """What the vehicle measures at a tick, for the topics of the plant.
 
     Parameters
     ----------
@@ -170,16 +398,56 @@ def sense(odometry, joints, tick, params):
         Where the vehicle is.
     joints : Joints
         Where the actuators are.
+    sample : Sample
+        That of the tick before.
+    out_ticks, surfacings : int
+        Ticks with the antenna out of the water without a break; surfacings so far.
     tick : int
     params : SensorParams
 
     Returns
     -------
     tuple of tuple of float
-        Numbers on the wire, in the order of the plant's outputs in `glider_model.base.wiring`.
+        Numbers on the wire, in the order of the plant's outputs in `glider_model.base.wiring`;
+        zeros for what is not fitted.
     """
-    odom = odometry_to_wire(add_noise(odometry, tick, params))
-    return odom, (joints.m_b, joints.x_p, joints.mu)
+    truth = odometry_to_wire(odometry)
+    measured = add_noise(odometry, tick, params)
+    sample = take_sample(measured, sample, tick, params)
+    position, imu, pressure = NO_POSITION, NO_IMU, 0.0
+    fix = (NO_FIX, 0.0, 0.0, 0.0, 0.0)
+    if params.has_position:
+        position = odometry_to_wire(
+            Odometry(
+                measured.p_n,
+                measured.p_e,
+                sample.p_d,
+                sample.q_w,
+                sample.q_x,
+                sample.q_y,
+                sample.q_z,
+                measured.u,
+                measured.v,
+                measured.w,
+                sample.p,
+                sample.q,
+                sample.r,
+            )
+        )
+    if params.has_parts:
+        q = swap_world(sample.q_w, sample.q_x, sample.q_y, sample.q_z)
+        rates = 0.0 if params.gyro else NO_RATES
+        imu = (q[0], q[1], q[2], q[3], sample.p, -sample.q, -sample.r, rates)
+        pressure = pressure_at(sample.p_d)
+        fix = _take_fix(odometry, out_ticks, surfacings, tick, params)
+    return (
+        truth,
+        position,
+        imu,
+        (pressure,),
+        fix,
+        (joints.m_b, joints.x_p, joints.mu, joints.delta),
+    )
 
 
 @kernel

@@ -11,7 +11,7 @@ from scipy.optimize import root
 
 from glider_model.base.frames import quaternion_from_euler, rotate_to_ned
 from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import Water
+from glider_model.base.signals import Joints, Water
 from glider_model.ocean.density import DensityParams
 from glider_model.plant.motion import Motion, acceleration
 from glider_model.vehicle.file import VehicleParams
@@ -114,9 +114,8 @@ def _residual(z: np.ndarray, mu: float, glide: _Glide) -> np.ndarray:
     )
     motion = Motion(0.0, 0.0, 100.0, *q, u, v, w, p, q_rate, r)
     inertia = make_inertia(x_p, mu, glide.vehicle)
-    return np.array(
-        acceleration(motion, glide.net_heaviness, inertia, _STILL, glide.vehicle, _UNIFORM)
-    )
+    joints = Joints(glide.net_heaviness, x_p, mu, 0.0)
+    return np.array(acceleration(motion, joints, inertia, _STILL, glide.vehicle, _UNIFORM))
 
 
 def _follow_branch(z: np.ndarray, target: float, glide: _Glide) -> tuple[np.ndarray, bool]:

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Buoyancy engine, pitch mass and roll mass: limited in range and in rate."""
+"""Buoyancy engine, pitch mass, roll mass and steering surface: limited in range and in rate."""
 
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import Joints
@@ -20,4 +20,5 @@ def actuators_step(joints, command, vehicle, dt):
         _toward(joints.m_b, command.m_b, vehicle.m_b_max, vehicle.m_b_rate * dt),
         _toward(joints.x_p, command.x_p, vehicle.x_p_max, vehicle.x_p_rate * dt),
         _toward(joints.mu, command.mu, vehicle.mu_max, vehicle.mu_rate * dt),
+        _toward(joints.delta, command.delta, vehicle.delta_max, vehicle.delta_rate * dt),
     )

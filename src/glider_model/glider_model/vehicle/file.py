@@ -4,14 +4,15 @@
 
 import json
 import math
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, NamedTuple, get_args
 
 import numpy as np
 import pydantic
 from pydantic import Field
 
+from glider_model.base import plugins
 from glider_model.base.errors import told_changes
 from glider_model.base.files import read_bytes, read_yaml, yaml_line, yaml_text
 from glider_model.base.settings import (
@@ -22,71 +23,30 @@ from glider_model.base.settings import (
     holder_of,
     validate,
 )
+from glider_model.base.wiring import JOINTS
+from glider_model.vehicle import surfaces
+from glider_model.vehicle.quantity import NotNegative, Positive, Signed, quantity, vector
 from glider_model.vehicle.rigid_body import mass_matrix
+from glider_model.vehicle.surface import NoSurface, SurfaceSettings
 
 VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
 #: Source of a number that a person changed for a run.
 _SET = '--set'
 
 
-@cache
-def quantity(unit: str, **limits: float) -> type[Settings]:
-    """Model of one number with its unit and source; ``limits`` are those of pydantic's Field."""
-    return pydantic.create_model(
-        f'Quantity[{unit}]',
-        __base__=Settings,
-        value=(float, Field(strict=True, description=f'number in {unit}', **limits)),
-        unit=(Literal[unit], Field(description='unit of the value')),
-        source=(str, Field(min_length=3, description='where the number comes from')),
-    )
-
-
-Positive = {'gt': 0.0, 'le': 1e5}
-NotNegative = {'ge': 0.0, 'le': 1e5}
-Signed = {'ge': -1e5, 'le': 1e5}
-
-
-class Vector(Settings):
-    """Three numbers along x, y, z with unit and source."""
-
-    value: Annotated[list[float], Field(min_length=3, max_length=3)]
-    unit: str
-    source: Annotated[str, Field(min_length=3)]
-
-    @pydantic.field_validator('value')
-    @classmethod
-    def _bounded(cls, value: list[float]) -> list[float]:
-        if any(abs(number) > 1e5 for number in value):
-            raise ValueError('every component must be within +-1e5')
-        return value
-
-
-def _vector(unit: str, not_negative: bool = False):
-    """Vector whose unit, and if asked sign, is checked."""
-
-    def check(vector: Vector) -> Vector:
-        if vector.unit != unit:
-            raise ValueError(f'unit is {vector.unit!r} (allowed: {unit!r})')
-        if not_negative and min(vector.value) < 0.0:
-            raise ValueError(f'value = {vector.value} has a negative component (allowed: >= 0)')
-        return vector
-
-    return Annotated[Vector, pydantic.AfterValidator(check)]
-
-
 class RigidBodySettings(Settings):
     """Hull without the moving mass. Origin at the centre of buoyancy, axes FRD."""
 
     hull_mass: quantity('kg', **Positive)
-    hull_center_of_mass: _vector('m')
-    hull_inertia: _vector('kg m^2', not_negative=True)  # about the origin
+    hull_center_of_mass: vector('m')
+    hull_inertia: vector('kg m^2', not_negative=True)  # about the origin
 
 
 class AddedMassSettings(Settings):
     """Positive added mass M_A (Fossen's -X_udot, ...), symmetric, with its two cross terms."""
 
-    linear: _vector('kg', not_negative=True)
-    angular: _vector('kg m^2', not_negative=True)
+    linear: vector('kg', not_negative=True)
+    angular: vector('kg m^2', not_negative=True)
     sway_yaw: quantity('kg m', **Signed)
     heave_pitch: quantity('kg m', **Signed)
 
@@ -106,10 +66,10 @@ class HydrodynamicsSettings(Settings):
     K_q: quantity('kg s/rad', **Signed)
     K_MY: quantity('kg/rad', **Signed)
     K_r: quantity('kg s/rad', **Signed)
-    linear_damping: _vector('kg/s')
-    linear_angular_damping: _vector('kg m^2/s')
-    quadratic_damping: _vector('kg/m')
-    quadratic_angular_damping: _vector('kg m^2')
+    linear_damping: vector('kg/s')
+    linear_angular_damping: vector('kg m^2/s')
+    quadratic_damping: vector('kg/m')
+    quadratic_angular_damping: vector('kg m^2')
 
 
 class MovingMassSettings(Settings):
@@ -118,7 +78,7 @@ class MovingMassSettings(Settings):
     mass: quantity('kg', **Positive)
     neutral_x: quantity('m', ge=-10.0, le=10.0)
     radius: quantity('m', gt=0.0, le=1.0)
-    inertia: _vector('kg m^2', not_negative=True)  # about its own centre, turning with it
+    inertia: vector('kg m^2', not_negative=True)  # about its own centre, turning with it
     travel: quantity('m', gt=0.0, le=2.0)
     rate: quantity('m/s', gt=0.0, le=1.0)
     rotation: quantity('deg', gt=0.0, le=180.0)
@@ -149,8 +109,8 @@ class SteeringSettings(Settings):
     climb: quantity('rad/s', ge=-1.0, le=1.0)
 
 
-class Vehicle(Settings):
-    """A vehicle file."""
+class _Body(Settings):
+    """What every vehicle file says."""
 
     name: Annotated[str, Field(pattern=r'^[a-z0-9_]+$')]
     description: str
@@ -163,6 +123,35 @@ class Vehicle(Settings):
     added_mass: AddedMassSettings
     hydrodynamics: HydrodynamicsSettings
     steering: SteeringSettings
+
+
+#: Settings of every kind of steering surface, by its name and that of its section.
+SURFACES = plugins.classes(
+    plugins.SURFACES, SurfaceSettings, surfaces, {*_Body.model_fields, *JOINTS}, complete=False
+)
+_Steered = pydantic.create_model(
+    '_Steered',
+    __base__=_Body,
+    **{
+        name: (kind | None, Field(None, description=plugins.summary(kind)))
+        for name, kind in SURFACES.items()
+    },
+)
+
+
+class Vehicle(_Steered):
+    """A vehicle file."""
+
+    model_config = pydantic.ConfigDict(
+        json_schema_extra={'others': plugins.others(plugins.SURFACES)}
+    )
+
+    @pydantic.model_validator(mode='after')
+    def _has_one_surface(self):
+        there = [name for name in SURFACES if getattr(self, name) is not None]
+        if len(there) > 1:
+            raise ValueError(f'{", ".join(there)}: a vehicle has one of them at most')
+        return self
 
     @pydantic.model_validator(mode='after')
     def _mass_is_positive(self):
@@ -184,6 +173,11 @@ class Vehicle(Settings):
         }
 
     @property
+    def steers_by(self) -> str:
+        """Name of its steering surface, and of that joint; empty if it banks to turn."""
+        return next((name for name in SURFACES if getattr(self, name) is not None), '')
+
+    @property
     def rated_depth_m(self) -> float:
         """Deepest that the hull is meant to go (m); infinite if its file does not say."""
         return self.rated_depth.value if self.rated_depth else math.inf
@@ -194,6 +188,7 @@ class Vehicle(Settings):
         hydro, pump = self.hydrodynamics, self.buoyancy_engine
         coefficients = 'K_D0 K_D K_L0 K_L K_beta K_MR K_p K_M0 K_M K_q K_MY K_r'.split()
         r_s = body.hull_center_of_mass.value
+        surface = getattr(self, self.steers_by) if self.steers_by else None
         return VehicleParams(
             m=body.hull_mass.value + mass.mass.value,
             s_x=body.hull_mass.value * r_s[0],
@@ -237,6 +232,9 @@ class Vehicle(Settings):
             mu_max=math.radians(mass.rotation.value),
             mu_rate=math.radians(mass.rotation_rate.value),
             ballast=0.0,
+            surface=surface.params() if surface else NoSurface(),
+            delta_max=math.radians(surface.range.value) if surface else 0.0,
+            delta_rate=math.radians(surface.rate.value) if surface else 0.0,
         )
 
 
@@ -296,6 +294,9 @@ class VehicleParams(NamedTuple):
     mu_max: float
     mu_rate: float
     ballast: float  #: net heaviness beside that of the buoyancy engine (kg, + sinks)
+    surface: NamedTuple  #: of its steering surface, by its kind
+    delta_max: float  #: range (rad) and rate (rad/s) of the steering surface; 0 without
+    delta_rate: float
 
 
 def mass_fault(vehicle: VehicleParams) -> str:
@@ -376,6 +377,11 @@ def load_vehicle(name: str) -> Vehicle:
     path = vehicle_path(name)
     status = path.stat()
     return _read_vehicle(path, name, status.st_mtime_ns, status.st_size)
+
+
+def steers_by(settings: Settings) -> str:
+    """Name of the steering surface of the vehicle that settings name; empty without."""
+    return load_vehicle(settings.vehicle).steers_by
 
 
 @lru_cache(maxsize=16)

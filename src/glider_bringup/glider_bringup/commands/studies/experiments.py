@@ -23,7 +23,7 @@ from glider_bringup.mission.disk import write_whole
 from glider_model.base.exits import EXIT_FAILED
 
 app = typer.Typer()
-Group = Literal['current', 'yaw', 'profile', 'robustness', 'paths', 'envelope']
+Group = Literal['current', 'yaw', 'profile', 'robustness', 'paths', 'envelope', 'navigation']
 
 
 @app.command(epilog='Example: ./glider experiments --only robustness --only paths')
@@ -42,7 +42,7 @@ def experiments(
     """Fly the experiments of the paper and what goes beyond them; exit code 1 if one fails.
 
     By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
-    engine: 135 flights, most of them of 30 hours.
+    engine: 158 flights, most of them of 30 hours.
     """
     from glider_bringup.mission.run_folder import make_result_folder
     from glider_bringup.showing import paper_figures

@@ -59,7 +59,8 @@ def montecarlo(
     """Fly many plants that differ from their vehicle file, with noise, by the direct engine.
 
     Each hydrodynamic coefficient differs by up to 30 %, added mass by 15 %, trim by 10 mm, roll at
-    rest by 10 deg, ballast by 50 g; water is stratified. Control knows the file only.
+    rest by 10 deg, ballast by 50 g; water is stratified. Control knows the file only. Where the
+    vehicle reckons (navigation.method), its compass, pitch, depth and fixes are off too.
     """
     from glider_bringup.mission.choices import combination_of
     from glider_bringup.mission.run_folder import make_result_folder
@@ -91,6 +92,16 @@ def montecarlo(
         _print_study(whole)
 
 
+#: Lines about vehicles that do not measure where they are.
+_RECKONED = (
+    'surfacings',
+    'error of place, from the 4th (m)',
+    'came up beside, from the 4th (m)',
+    'inside the 95 % ellipse',
+    'innovation squared',
+)
+
+
 def _print_study(study: dict) -> None:
     """Print the result of a Monte Carlo study for a person."""
 
@@ -112,12 +123,19 @@ def _print_study(study: dict) -> None:
         ('max whole run (m)', lambda row: show(row['max_run_m'])),
         ('heading rms (deg)', lambda row: show(row['heading_fluctuation_deg'])),
         ('pitch rms (deg)', lambda row: show(row['pitch_error_deg'])),
+        ('surfacings', lambda row: f'{row["navigation"]["surfacings"]:,}'),
+        ('error of place, from the 4th (m)', lambda row: show(row['navigation']['error_m'])),
+        ('came up beside, from the 4th (m)', lambda row: show(row['navigation']['cross_track_m'])),
+        ('inside the 95 % ellipse', lambda row: f'{row["navigation"]["ellipse_95_share"]:.3f}'),
+        ('innovation squared', lambda row: f'{row["navigation"]["innovation_squared"]:.2f}'),
         ('plants statically unstable', lambda row: str(row['statically_unstable'])),
         ('plants that steer weakly', lambda row: str(row['weak_steering'])),
         ('worst', lambda row: f'plant {row["worst_plant"]}'),
     )
+    reckoned = any(row['navigation']['ellipse_95_share'] for row in rows)
     for name, text in lines:
-        table.add_row(name, *map(text, rows))
+        if reckoned or name not in _RECKONED:
+            table.add_row(name, *map(text, rows))
     output.print(table)
     for row in study['rows']:
         worst = study['flown'][row['worst_plant']]['commands'][row['controller']]

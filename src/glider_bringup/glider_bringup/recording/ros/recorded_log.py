@@ -14,14 +14,22 @@ from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.recording.mcap_reader import Bag, Batch
 from glider_guidance.yo.stage import STAGE_NAMES
 from glider_model.base.signals import TICK_NS
+from glider_model.base.wiring import BELIEFS, SENSORS
 from glider_model.ros.lockstep import health
 from glider_model.ros.wire.codec import Codec
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.topics import TOPICS, topic_of
 
 _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 
-#: Topics that the score is computed from.
-SCORED = ('odom', 'joint_states', 'reference', 'tracking_error')
+#: Topics that the score is computed from. Bags from before there was navigation lack the first,
+#: and so do those from the sea, where nobody knows the truth.
+SCORED = ('ground_truth/odom', 'odom', 'joint_states', 'reference', 'tracking_error')
+
+
+def is_before_navigation(recorded: Iterable[str]) -> bool:
+    """Whether topics were recorded when the plant still published odom, as it measured it."""
+    recorded = set(recorded)
+    return 'odom' in recorded and recorded.isdisjoint({'ground_truth/odom', *SENSORS})
 
 
 def _known_name(topic: str) -> str:
@@ -63,7 +71,7 @@ def decode(codec: Codec, batch: Batch, chosen: np.ndarray) -> Decoded:
     """Messages of a batch, given by their indices, as a node would take them."""
     count = len(chosen)
     stamps, own = np.full(count, -1), np.zeros(count, bool)
-    values, unusable = np.full((count, len(codec.fields)), np.nan), {}
+    values, unusable = np.full((count, codec.width), np.nan), {}
     regular = np.flatnonzero(batch.size[chosen] == codec.size)
     if len(regular):
         stamps[regular], values[regular], own[regular] = codec.decode_many(
@@ -89,6 +97,8 @@ class RecordedLog:
     also : iterable of str
         Topics to read beside `SCORED`, NaN in ticks that lack them. The columns of all other
         topics are NaN.
+    steers_by : str
+        Name of the vehicle's steering surface; empty without.
 
     Attributes
     ----------
@@ -100,12 +110,14 @@ class RecordedLog:
         What the plant said about the end of the run.
     """
 
-    def __init__(self, bag: Bag, also: Iterable[str] = ()) -> None:
+    def __init__(self, bag: Bag, also: Iterable[str] = (), steers_by: str = '') -> None:
         self._bag = bag
         self.ticks = 0
         self.counts: Counter[str] = Counter()
         self.end: health.Report | None = None
+        self._recorded = {_known_name(topic.name) for topic in bag.topics}
         self._names = (*SCORED, *also)
+        self._codecs = {name: topic_of(name, steers_by).codec for name in self._names}
         #: Tick, column and new value, in the order in which they were told.
         self._flags: list[tuple[int, str, float]] = []
         self._unusable: dict[tuple[str, int], str] = {}
@@ -136,11 +148,16 @@ class RecordedLog:
                 self.counts[name] += len(chosen)
                 if name == '/diagnostics':
                     self._hear(batch, chosen)
-                elif name in self._names and not self._over:
-                    found[name] = decode(TOPICS[name].codec, batch, chosen)
+                elif name in self._codecs and not self._over:
+                    found[name] = decode(self._codecs[name], batch, chosen)
             yield from self._put(found)
         while not self._over:
             yield self._shift()
+
+    @property
+    def _needed(self) -> tuple[str, ...]:
+        """Of `SCORED`, those that every tick has to have."""
+        return SCORED if self.counts['ground_truth/odom'] else SCORED[1:]
 
     def _hear(self, batch: Batch, chosen: np.ndarray) -> None:
         """Note what events say about the flags of a row, and about the end of the run."""
@@ -179,7 +196,8 @@ class RecordedLog:
 
     def _shift(self) -> np.ndarray:
         """The first block up to a tick that lacks something; then the second takes its place."""
-        missing = np.flatnonzero(self._has[:BLOCK_TICKS] != 2 ** len(SCORED) - 1)
+        whole = sum(1 << SCORED.index(name) for name in self._needed)
+        missing = np.flatnonzero(self._has[:BLOCK_TICKS] != whole)
         rows = int(missing[0]) if len(missing) else BLOCK_TICKS
         block = self._log[:rows].copy()
         block[:, [COLUMNS['infeasible'], COLUMNS['saturation']]] = 0.0
@@ -196,7 +214,8 @@ class RecordedLog:
     def _what_lacks(self, row: int) -> str:
         """Why a tick is not whole, in words."""
         tick = self._start + row
-        names = [name for bit, name in enumerate(SCORED) if not self._has[row] >> bit & 1]
+        has = self._has[row]
+        names = [name for name in self._needed if not has >> SCORED.index(name) & 1]
         why = self._unusable.get((names[0], tick), 'not recorded')
         return f'tick {tick:,} (t = {tick * TICK_NS / 1e9:.1f} s) lacks {names[0]}: {why}'
 
@@ -223,7 +242,11 @@ class RecordedLog:
         which is not a loss: a node that ended within a tick may have let the others begin the
         next one.
         """
-        per_tick = [self.counts[topic.name] for topic in _PER_TICK]
+        names = [topic.name for topic in _PER_TICK]
+        left_out = {*SENSORS, *BELIEFS} - self._recorded
+        if not self.counts['ground_truth/odom']:
+            left_out |= {'ground_truth/odom'}
+        per_tick = [self.counts[name] for name in names if name not in left_out]
         ticks = max(per_tick)
         expected = ticks if complete else ticks - 2
         return sum(max(0, expected - count) for count in per_tick)

@@ -10,10 +10,10 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
 from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.ros.recorded_log import decode
+from glider_bringup.recording.ros.recorded_log import decode, is_before_navigation
 from glider_model.base.settings import ConfigurationError
 from glider_model.ros.wire.codec import Codec
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.topics import TOPICS, topic_of
 
 #: Messages of foreign layout whose bytes are kept, for each topic.
 _KEPT = 1000
@@ -88,6 +88,8 @@ class Recording:
         Namespace of the nodes; may be left out if there is only one.
     progress : callable
         Called now and then with the share that is read, 0 to 1.
+    steers_by : str
+        Name of the vehicle's steering surface; empty without.
 
     Raises
     ------
@@ -95,7 +97,13 @@ class Recording:
         If the bag holds no topic of ours or those of several namespaces, or is damaged.
     """
 
-    def __init__(self, bag: Bag, namespace: str | None, progress: Callable[[float], None]) -> None:
+    def __init__(
+        self,
+        bag: Bag,
+        namespace: str | None,
+        progress: Callable[[float], None],
+        steers_by: str = '',
+    ) -> None:
         self.namespace = choose_namespace(bag, namespace)
         known = {topic.full_name(self.namespace): topic for topic in TOPICS.values()}
         known[self.node('clock')] = TOPICS['/clock']  # several gliders have a clock each
@@ -104,7 +112,7 @@ class Recording:
         self.events: list[Event] = []
         self.recorded = set()  #: names of topics that are there, with or without messages
         self.ignored: list[str] = []  #: topics that are not ours, or of another type
-        takers: dict[int, Callable] = {}
+        takers: dict[int, list[Callable]] = {}
         for index, recorded in enumerate(bag.topics):
             topic = known.get(recorded.name)
             if topic is None or recorded.type_name != topic.type_name:
@@ -112,20 +120,27 @@ class Recording:
                 continue
             self.recorded.add(topic.name)
             if topic.per_tick:
-                self.series[topic.name] = Series(topic.codec)
-                takers[index] = self.series[topic.name].add
+                self.series[topic.name] = Series(topic_of(topic.name, steers_by).codec)
+                takers[index] = [self.series[topic.name].add]
             elif topic.name == 'path':
-                takers[index] = self._add_paths
+                takers[index] = [self._add_paths]
             elif topic.name == '/diagnostics':
-                takers[index] = self._add_events
+                takers[index] = [self._add_events]
+        #: what the plant measured went straight to guidance and control, as odom
+        self.before_navigation = is_before_navigation(self.recorded)
+        if self.before_navigation:
+            measured = Series(TOPICS['measured_odom'].codec)
+            self.series['measured_odom'] = self.series['ground_truth/odom'] = measured
+            odom = self.series['odom'].add
+            next(found for found in takers.values() if odom in found).append(measured.add)
         for batch in bag.batches():
-            for index, take in takers.items():
+            for index, found in takers.items():
                 chosen = np.flatnonzero(batch.topic == index)
-                if len(chosen):
+                for take in found if len(chosen) else ():
                     take(batch, chosen)
             progress((batch.log_ns[-1] - bag.start_ns) / max(1, bag.end_ns - bag.start_ns))
         self.series = {name: series for name, series in self.series.items() if len(series)}
-        for series in self.series.values():
+        for series in {id(one): one for one in self.series.values()}.values():
             series.close()
 
     def node(self, name: str) -> str:
@@ -159,6 +174,7 @@ def choose_namespace(bag: Bag, given: str | None) -> str:
                 continue
             if recorded.name.endswith('/' + topic.name):
                 found.add(recorded.name.removesuffix(topic.name).rstrip('/') or '/')
+                break
     named = ', '.join(sorted(found))
     if given is not None:
         wanted = '/' + given.strip('/')

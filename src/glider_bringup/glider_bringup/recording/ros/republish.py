@@ -20,6 +20,7 @@ from glider_bringup.recording.ros.recorded_run import choose_namespace
 from glider_model.base.files import parse_yaml
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS
+from glider_model.base.wiring import present
 from glider_model.ros.lockstep.clock import MAX_TICKS_AHEAD
 from glider_model.ros.lockstep.executor import take
 from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
@@ -239,8 +240,9 @@ class _Brake:
 
     def __init__(self, node: Node, plan: Plan) -> None:
         topic = TOPICS['recorded']
-        per_tick = {t.full_name(plan.namespace) for t in TOPICS.values() if t.per_tick}
-        self._whole = per_tick <= set(plan.names.values())
+        needed = present((topic.name for topic in TOPICS.values() if topic.per_tick), ())
+        names = {TOPICS[name].full_name(plan.namespace) for name in needed}
+        self._whole = names <= set(plan.names.values())
         self._node, self._odom = node, TOPICS['odom'].full_name(plan.namespace)
         self._subscription = node.create_subscription(
             topic.message_type,

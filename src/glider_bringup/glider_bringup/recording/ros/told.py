@@ -22,6 +22,13 @@ class Told(NamedTuple):
     lockstep: bool | None  #: None: it does not say
     note: str = ''
 
+    @property
+    def steers_by(self) -> str:
+        """Name of the vehicle's steering surface; empty without, or if nobody knows."""
+        known = (block for block in BLOCKS if self.blocks[block.wired.name] is not None)
+        names = (block.steers_by(self.blocks[block.wired.name]) for block in known)
+        return next(filter(None, names), '')
+
 
 def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
     """Settings of the blocks of a recorded run.

@@ -1,6 +1,6 @@
 // Draws the panels, zooms into all of them, fits them to their places, and puts them on paper.
 
-const DRAW = { time: drawTime, track: drawTrack, space: drawSpace, side: drawSide };
+const DRAW = { time: drawTime, track: drawTrack, space: drawSpace, side: drawSide, plan: drawPlan };
 const root = document.documentElement;
 /** How far away the eye is on paper, where a view is half a page wide; see farOf. */
 const FAR_ON_PAPER = 1.65;

@@ -33,17 +33,31 @@ function curveData(panel, curve, from, to, width) {
   return thin(page.runs[curve.run], curve.name, curve.flag, from, to, width);
 }
 
-/** Dotted vertical lines at the inflections, over the whole height. */
-function inflectionTrace(run) {
+/** Dotted vertical lines at some times (s), over the whole height. */
+function markTrace(times, name) {
   const x = [];
   const y = [];
-  for (const time of run.inflections) {
+  for (const time of times) {
     x.push(time / page.unit.seconds, time / page.unit.seconds, null);
     y.push(0, 1, null);
   }
   return {
-    x, y, yaxis: 'y2', mode: 'lines', name: 'inflection', hoverinfo: 'skip',
+    x, y, yaxis: 'y2', mode: 'lines', name, hoverinfo: 'skip',
     line: { color: values('--limit'), width: 1, dash: 'dot' },
+  };
+}
+
+/** Level lines, with gaps between them. */
+function stepTrace(steps) {
+  const x = [];
+  const y = [];
+  for (const [from, to, value] of steps.spans) {
+    x.push(from / page.unit.seconds, to / page.unit.seconds, null);
+    y.push(value, value, null);
+  }
+  return {
+    x, y, mode: 'lines', name: steps.label,
+    line: { color: values(`--${steps.role}`), width: 2.4, dash: steps.dashed ? 'dash' : 'solid' },
   };
 }
 
@@ -64,12 +78,21 @@ function drawTime(panel, element, from, to) {
     },
     opacity: curve.flag ? 0.75 : 1,
   }));
+  traces.push(...panel.steps.map(stepTrace));
   const reach = extent(traces.map((trace) => trace.y.map(Math.abs)))[1];
+  const [low, high] = extent(traces.map((trace) => trace.y.filter((value) => value > 0)));
+  const decades = panel.log && low > 0 ? Math.max(1, Math.ceil(Math.log10(high / low) / 5)) : 1;
   const limits = panel.limits.filter((value) => reach > 0.5 * Math.abs(value)).map((value) => ({
     type: 'line', xref: 'paper', x0: 0, x1: 1, y0: value, y1: value, layer: 'below',
     line: { color: values('--limit'), width: 1.5, dash: 'longdash' },
   }));
-  if (panel.inflections >= 0) traces.push(inflectionTrace(page.runs[panel.inflections]));
+  if (panel.inflections >= 0) {
+    traces.push(markTrace(page.runs[panel.inflections].inflections, 'inflection'));
+  }
+  if (panel.surfacings >= 0) {
+    const times = page.runs[panel.surfacings].surfacings.map((one) => one.t_s);
+    traces.push(markTrace(times, 'surfacing'));
+  }
   return Plotly.react(element, traces, {
     ...look(element),
     margin: { l: isNarrow(element) ? 64 : 76, r: 14, t: 24, b: 38 },
@@ -83,7 +106,7 @@ function drawTime(panel, element, from, to) {
     yaxis: axis(panel.axis, {
       fixedrange: true, automargin: false, nticks: 6, type: panel.log ? 'log' : 'linear',
       autorange: panel.inverted ? 'reversed' : true,
-      ...(panel.log ? { dtick: 3, exponentformat: 'power' } : {}),
+      ...(panel.log ? { dtick: decades, exponentformat: low < 1e-4 ? 'power' : 'none' } : {}),
     }),
     yaxis2: { overlaying: 'y', range: [0, 1], visible: false, fixedrange: true },
   }, { displayModeBar: false });

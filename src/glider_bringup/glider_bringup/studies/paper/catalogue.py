@@ -20,11 +20,13 @@ from glider_bringup.studies.paper.limits import (
     PATH_LIMITS,
     PROFILE_LIMITS,
     ROBUST_LIMITS,
+    SPARSE_LIMIT_M,
     STRAIGHT_LIMITS,
     TURN_MARGIN_M,
     TURN_S,
     judge_envelope,
     judge_limits,
+    judge_reckoned,
     judge_survey,
 )
 from glider_bringup.studies.paper.measures import (
@@ -156,6 +158,13 @@ def _robustness_experiments() -> list[Experiment]:
     ]
 
 
+#: Errors of sensors that dead reckoning is flown with.
+SENSOR_ERRORS = {
+    'sensors.compass_bias_deg': 1.0,
+    'sensors.compass_deviation_deg': 1.0,
+    'sensors.pitch_scale': 0.96,
+    'sensors.gps_std_m': 5.0,
+}
 #: Depth that every helix descends to, at its slope of 31.6 deg (m).
 _HELIX_DEPTH_M, _HELIX_SLOPE_DEG = 800.0, 31.6
 
@@ -266,6 +275,105 @@ def _envelope_experiments() -> list[Experiment]:
     ]
 
 
+#: Ways to believe the current, in the same sea.
+_CURRENTS = ('none', 'persistence', 'tidal')
+
+
+def _reckoned(scenario: str, changes: dict) -> list[Case]:
+    """Position known and reckoned, without and with errors of the sensors."""
+    surfaces = {'profile.surface_every_dives': 1, **changes}
+    known = {**surfaces, 'navigation.method': 'known'}
+    reckons = {**surfaces, 'navigation.method': 'dead_reckoned'}
+    return [
+        *_both_laws(scenario, 'position known', known),
+        *_both_laws(scenario, 'reckoned, no errors', reckons),
+        *_both_laws(scenario, 'reckoned', {**reckons, **SENSOR_ERRORS}),
+        *(
+            Case(f'reckoned, {current}', 'adaptive', 'observer', scenario, changes)
+            for current in _CURRENTS
+            if current != 'persistence'
+            for changes in ({**reckons, **SENSOR_ERRORS, 'navigation.current': current},)
+        ),
+    ]
+
+
+def _missed() -> list[Case]:
+    """Surfacings without a fix, for a week."""
+    changes = {
+        'profile.surface_every_dives': 1,
+        'navigation.method': 'dead_reckoned',
+        'duration_s': 604800.0,
+        **SENSOR_ERRORS,
+    }
+    patterns = {'every fix': '0', 'every second missed': '01', 'three of four missed': '0111'}
+    return [
+        Case(
+            case,
+            'adaptive',
+            'observer',
+            'current_12deg',
+            {**changes, 'sensors.fix_missed_pattern': pattern, 'path.length_m': 200000.0},
+        )
+        for case, pattern in patterns.items()
+    ]
+
+
+def _sparse() -> list[Case]:
+    """Attitude sampled now and then, without a gyro, where position is known."""
+    return [
+        case
+        for period in (0.1, 4.4, 10.0)
+        for case in _both_laws(
+            'current_8deg',
+            f'attitude every {period:g} s, no gyro',
+            {'sensors.imu_period_s': period, 'sensors.gyro': False},
+        )
+    ]
+
+
+def _navigation_experiments() -> list[Experiment]:
+    assumed = 'position measured all the time'
+    return [
+        Experiment(
+            'navigation',
+            'reckoned_12deg',
+            '',
+            'current_12deg, up after every dive, 30 h: compass 1 deg off and 1 deg of deviation, '
+            'pitch read 4 % too small, fixes 5 m',
+            assumed,
+            _reckoned('current_12deg', {}),
+            judge_reckoned,
+        ),
+        Experiment(
+            'navigation',
+            'reckoned_rough',
+            '',
+            'rough_water, the same errors: shear and tide that no navigation knows beforehand',
+            assumed,
+            _reckoned('rough_water', {}),
+            judge_limits({}),
+        ),
+        Experiment(
+            'navigation',
+            'missed_fixes',
+            '',
+            'current_12deg for a week, surfacings without a fix',
+            assumed,
+            _missed(),
+            judge_limits({}),
+        ),
+        Experiment(
+            'navigation',
+            'sparse_attitude',
+            '',
+            'current_8deg, position known, 30 h',
+            assumed,
+            _sparse(),
+            judge_limits({'cross_track_m.max_steady': SPARSE_LIMIT_M}),
+        ),
+    ]
+
+
 GROUPS = {
     'current': _current_experiments,
     'yaw': _yaw_experiments,
@@ -273,6 +381,7 @@ GROUPS = {
     'robustness': _robustness_experiments,
     'paths': _paths_experiments,
     'envelope': _envelope_experiments,
+    'navigation': _navigation_experiments,
 }
 
 

@@ -83,7 +83,13 @@ def fly(
 def combinations(experiments: list[Experiment]) -> set[Combination]:
     """What `fly` needs loops for."""
     return {
-        Combination(case.controller, case.guidance) for one in experiments for case in one.cases
+        Combination(
+            case.controller,
+            case.guidance,
+            case.changes.get('navigation.method', case.facts.get('navigated', 'known')),
+        )
+        for one in experiments
+        for case in one.cases
     }
 
 

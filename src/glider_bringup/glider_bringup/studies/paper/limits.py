@@ -29,6 +29,15 @@ PROFILE_LIMITS = {
 ROBUST_LIMITS = {'cross_track_m.max_steady': 3.0}
 PATH_LIMITS = {'path_error_m.e2_rms': 0.5, 'path_error_m.e3_rms': 1.7}
 WAYPOINT_LIMIT_M = 10.0
+#: From the fourth surfacing on, where a vehicle came up and how it went under water (m), with
+#: errors of the sensors and without.
+RECKONED_LIMITS = {
+    'navigation.from_fourth.surfacing_cross_track_m': 50.0,
+    'navigation.from_fourth.under_water_rms_m': 30.0,
+}
+FAULTLESS_LIMITS = {'navigation.from_fourth.surfacing_cross_track_m': 20.0}
+#: Attitude that is sampled now and then (m).
+SPARSE_LIMIT_M = 3.0
 #: In a leg, after its corner: spread of the heading, and how far it may be from the course (deg).
 HEADING_SPREAD_LIMIT_DEG, OFF_COURSE_LIMIT_DEG = 45.0, 90.0
 #: Envelope: cross current over U_h up to which a course must be held; error allowed with turns.
@@ -81,6 +90,17 @@ def judge_limits(
         return [check for row in _flown(rows, controller) for check in within(row, limits)]
 
     return judge
+
+
+def judge_reckoned(rows: list[dict]) -> list[Check]:
+    """The default way to reckon keeps near its path once the current has been met."""
+    limits = {'reckoned': RECKONED_LIMITS, 'reckoned, no errors': FAULTLESS_LIMITS}
+    return [
+        check
+        for row in _flown(rows, 'adaptive')
+        if row['case'] in limits
+        for check in within(row, limits[row['case']])
+    ]
 
 
 def judge_survey(rows: list[dict]) -> list[Check]:

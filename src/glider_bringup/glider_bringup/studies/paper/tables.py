@@ -155,6 +155,16 @@ _PROFILE = _by_flight(
         'roll_deg.max_steady': 'max\n(deg)',
     }
 )
+_RECKONED = _by_flight(
+    {
+        'navigation.error_m.p50': 'error\np50 (m)',
+        'navigation.error_m.worst': 'error\nworst',
+        'navigation.from_fourth.surfacing_cross_track_m': 'beside\nfrom 4th',
+        'navigation.from_fourth.under_water_rms_m': 'under\nwater rms',
+        'navigation.dac_error_mps.rms': 'DAC rms\n(m/s)',
+        'navigation.ellipse_95_share': 'inside\n95 %',
+    }
+)
 _TABLES: dict[str, Callable[[list[dict]], Table]] = {
     'yaw_10deg_pid': _YAW,
     'yaw_10deg_adaptive': _YAW,
@@ -164,8 +174,19 @@ _TABLES: dict[str, Callable[[list[dict]], Table]] = {
     'spline': _side_by_side,
     'survey': _survey,
     'envelope': _envelope,
+    'reckoned_12deg': _RECKONED,
+    'reckoned_rough': _RECKONED,
+    'missed_fixes': _RECKONED,
 }
+_RECKONED_REMARK = (
+    'Error: of the believed place when it comes up. Beside: largest true distance from the path '
+    'where it comes up, from the fourth surfacing on; under water from then on. DAC: how far the '
+    'mean current of a way, as it is believed after its fixes, is off the true one.'
+)
 _REMARKS = {
+    'reckoned_12deg': _RECKONED_REMARK,
+    'reckoned_rough': _RECKONED_REMARK,
+    'missed_fixes': _RECKONED_REMARK,
     'robustness': (
         'The PID is told the steering of the vehicle file, also where the plant differs from it; '
         'PID of zhang2021: that of another vehicle. '

@@ -23,6 +23,7 @@ from glider_bringup.scoring.score import Scorer
 from glider_bringup.studies.sweep.journal import Journal
 from glider_bringup.studies.sweep.netcdf import (
     NOT_FIGURES,
+    VECTORS,
     make_dataset,
     variable_name,
     write_dataset,
@@ -135,13 +136,13 @@ def judge(card: dict[str, Any]) -> dict[str, Any]:
 
 
 def _figures(card: dict[str, Any], before: str = '') -> Iterator[tuple[str, Any]]:
-    """Numbers of a scorecard by dotted name; None where one has no data."""
+    """Numbers and vectors of a scorecard by dotted name; None where one has no data."""
     for name, value in card.items():
         if name in NOT_RESULTS:
             continue
         if isinstance(value, dict):
             yield from _figures(value, f'{before}{name}.')
-        elif not isinstance(value, str):
+        elif not isinstance(value, str | list) or before + name in VECTORS:
             yield before + name, value
 
 

@@ -32,13 +32,13 @@ _UNITS = {
 #: Units of settings that UDUNITS spells otherwise.
 _SPELLING = {'deg': 'degree', 'deg/s': 'degree/s', 'knots': 'knot', '-': '1', '': '1'}
 #: Dimension and coordinates of vectors in a scorecard.
-_VECTORS = {
+VECTORS = {
     'final_state.position_ned_m': ('ned', ('north', 'east', 'down')),
     'final_state.attitude_rpy_rad': ('rpy', ('roll', 'pitch', 'yaw')),
     'final_state.velocity_mps': ('frd', ('forward', 'starboard', 'down')),
 }
 #: Names in a result that are no figures, apart from its dimensions.
-NOT_FIGURES = {'status', 'reason', *(dimension for dimension, _ in _VECTORS.values())}
+NOT_FIGURES = {'status', 'reason', *(dimension for dimension, _ in VECTORS.values())}
 
 
 def variable_name(figure: str) -> str:
@@ -106,7 +106,7 @@ def make_dataset(
         reasons[cell] = record['reason']
         for name, figure in record['figures'].items():
             if name not in figures:
-                vector = np.shape(_VECTORS[name][1]) if name in _VECTORS else ()
+                vector = np.shape(VECTORS[name][1]) if name in VECTORS else ()
                 figures[name] = np.full((plan.cells, *vector), np.nan)
             if figure is not None:
                 figures[name][cell] = figure
@@ -136,7 +136,7 @@ def make_dataset(
         attributes = {'long_name': long_name, 'units': unit, 'scorecard': name}
         values, over = figures[name].reshape(*plan.shape, *figures[name].shape[1:]), dimensions
         if values.ndim > len(dimensions):
-            dimension, labels = _VECTORS[name]
+            dimension, labels = VECTORS[name]
             over = [*dimensions, dimension]
             dataset = dataset.assign_coords({dimension: np.array(labels, dtype=object)})
         dataset[variable_name(name)] = (over, values, attributes)
@@ -153,7 +153,7 @@ def _attributes(plan: Plan) -> dict[str, str]:
         'sweep': plan.sweep.name,
         'sweep_yaml': plan.text,
         **({'set': json.dumps(plan.given)} if plan.given else {}),
-        'scenario_yaml': plan.described().to_yaml(),
+        'scenario_yaml': plan.first.to_yaml(vehicle=plan.described().vehicle),
         'vehicle_yaml': first[1],
         **{f'vehicle_{name}_yaml': text for name, text in others},
         'code_digest': source_digest(),

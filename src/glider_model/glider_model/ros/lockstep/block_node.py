@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node of a block: everything that follows from what the block declares of itself."""
 
-from glider_model.base.block import Block, Telling
+from glider_model.base.block import Block, Telling, optional_topics
 from glider_model.base.kernel import compiling_told
 from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_NS, TICK_S
-from glider_model.base.wiring import at_rest
+from glider_model.base.wiring import at_rest, present
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.orders import PARAMETERS_SET, Orders
 from glider_model.ros.lockstep.step_node import StepNode
@@ -19,13 +19,24 @@ class BlockNode(StepNode):
     def __init__(self, block: Block, **kwargs) -> None:
         super().__init__(block.wired.node, **kwargs)
         self.block = block
-        self.senders = [self.add_output(topic) for topic in block.wired.outputs]
         self.settings = declare_settings(self, block.settings, self.on_settings)
+        self.steers_by = block.steers_by(self.settings)
+        topics = optional_topics(self.settings)
+        outputs = present(block.wired.outputs, topics)
+        #: senders, and the places of what they send among the outputs of the block
+        self.senders = [self.add_output(topic) for topic in outputs]
+        self.sent = [block.wired.outputs.index(topic) for topic in outputs]
+        #: what stands for inputs that there are not
+        self.absent = [
+            (i, at_rest(topic))
+            for i, topic in enumerate(block.wired.inputs)
+            if topic not in present(block.wired.inputs, topics)
+        ]
         self.params = self.settings.params()
         self.state = self.settings.initial_state()
         self.orders = Orders(self)
         self.telling = Telling(block)
-        for topic in block.wired.inputs:
+        for topic in present(block.wired.inputs, topics):
             self.add_input(topic)
         self.compile_kernels()
 
@@ -53,11 +64,13 @@ class BlockNode(StepNode):
         """Answer one tick."""
         self.orders.tell(stamp_ns)
         t_s = stamp_ns // TICK_NS * TICK_S
+        for place, values in self.absent:
+            inputs = (*inputs[:place], values, *inputs[place:])
         self.state, outputs, flags = self.block.tick(self.state, t_s, inputs, self.params, TICK_S)
         if self.block.say and self.telling.is_due(flags, stamp_ns):
             self.tell(stamp_ns, flags)
-        for send, values in zip(self.senders, outputs, strict=True):
-            send(stamp_ns, values)
+        for send, place in zip(self.senders, self.sent, strict=True):
+            send(stamp_ns, outputs[place])
 
     def tell(self, stamp_ns: int, flags: tuple[int, ...]) -> None:
         """Put a change of the flags on /diagnostics."""

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a node hears: one subscription with what it brought last, and what of it is believed."""
 
+import math
 import time
 
 from glider_model.base.signals import TICK_NS
@@ -10,6 +11,9 @@ from glider_model.ros.wire.topics import Topic
 
 #: Messages that may be lost on their way without their publisher being taken for another.
 MOST_LOST = 50
+
+#: The norm of a quaternion that is further from 1 is that of no attitude (-).
+NOT_UNIT = 0.1
 
 #: A topic whose messages are refused is told of at most so often (s of wall time).
 _REFUSED_EVERY_S = 1.0
@@ -41,10 +45,13 @@ class Input:
             Naming topic and publisher, if it cannot be used.
         """
         try:
-            self.stamp_ns, self.values = self.topic.codec.decode(raw, check_frames=True)
+            stamp_ns, values = self.topic.codec.decode(raw, check_frames=True)
+            if self.topic.name == 'imu' and abs(math.hypot(*values[:4]) - 1.0) > NOT_UNIT:
+                raise MessageError(f'orientation is {values[:4]} (allowed: unit quaternions)')
         except MessageError as error:
             said = f'{self.topic.name} of {self.topic.publisher}: {error}'
             raise type(error)(said) from None
+        self.stamp_ns, self.values = stamp_ns, values
 
     def accept_newest(self, raw: bytes, now_s: float, max_age_s: float) -> bool:
         """Keep a message in free-running mode; False if it was overtaken on its way.

@@ -19,6 +19,7 @@ from rclpy.node import Node
 from glider_model.base.exits import EXIT_PEER
 from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_NS, not_finite
+from glider_model.base.wiring import WHEN_SILENT
 from glider_model.ros.lockstep import health, peers
 from glider_model.ros.lockstep.executor import Gate, take_with_info
 from glider_model.ros.lockstep.health import Report, seconds
@@ -29,7 +30,7 @@ from glider_model.ros.lockstep.watch import FAREWELL_S, REPORT_AFTER, Watch, wai
 from glider_model.ros.parameters import declare_settings
 from glider_model.ros.wire import qos, topics
 from glider_model.ros.wire.codec import MessageError, NotFiniteFieldError, to_cdr
-from glider_model.ros.wire.topics import TOPICS, Topic
+from glider_model.ros.wire.topics import TOPICS, Topic, topic_of
 
 _STARTUP_PERIOD_S = 0.03
 #: Who starts a node by hand is told what it waits for, after this time and then this often (s).
@@ -64,6 +65,8 @@ class TickNode(Node):
 
     #: Settings class of the parameters that concern ticks.
     tick_settings = TickSettings
+    #: Name of the vehicle's steering surface, which its joints are read and published with.
+    steers_by = ''
 
     def __init__(self, name: str, **kwargs) -> None:
         super().__init__(name, **kwargs)
@@ -110,7 +113,7 @@ class TickNode(Node):
 
     def add_output(self, name: str) -> Callable[..., None]:
         """Publisher of a topic, as a function of (stamp_ns, numbers) for per-tick topics."""
-        topic = TOPICS[name]
+        topic = topic_of(name, self.steers_by)
         publisher = self._publisher(topic)
         self.outputs[name] = (topic, publisher)
         if not topic.per_tick:
@@ -120,7 +123,7 @@ class TickNode(Node):
 
     def add_input(self, name: str) -> Input:
         """Subscribe to a per-tick topic. Add the one that comes last in a tick first."""
-        item = Input(TOPICS[name])
+        item = Input(topic_of(name, self.steers_by))
         if self.ticks.lockstep:
             item.subscription = self._subscription(
                 item.topic, lambda raw, info: self._on_message(item, raw, info)
@@ -354,6 +357,10 @@ class TickNode(Node):
             return
         try:
             kept = item.accept_newest(raw, self.now_s(), self.ticks.input_max_age_s)
+        except NotFiniteFieldError as error:
+            if item.topic.name not in WHEN_SILENT:  # a receiver without a fix has no place
+                self.refuse(item, str(error))
+            return
         except MessageError as error:
             self.refuse(item, str(error))
             return

@@ -6,7 +6,7 @@ import gc
 import os
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import rclpy
@@ -34,7 +34,19 @@ class Stop(Exception):  # noqa: N818
 
 
 def run(node_type: Callable[[], Node], args=None) -> int:
-    """Life of a node process: init, node, spin, clean end.
+    """Life of the process of one node; see `run_together`."""
+    return run_together([node_type], args)
+
+
+def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
+    """Life of a process: init, nodes, spin, clean end. The first node to stop ends them all.
+
+    Parameters
+    ----------
+    node_types : sequence of callable
+        What makes the nodes, in the order in which they act in a tick.
+    args : list of str, optional
+        Command line; that of the process by default.
 
     Returns
     -------
@@ -49,13 +61,15 @@ def run(node_type: Callable[[], Node], args=None) -> int:
         rclpy.init(args=args)
     except Exception as error:
         return _say(Stop(EXIT_USAGE, f'bad command line: {error}'))
-    node, stop = None, Stop(0)
+    nodes, stop = [], Stop(0)
     try:
-        node = node_type()
-        refuse_unknown(node)
+        for node_type in node_types:
+            nodes.append(node_type())
+            refuse_unknown(nodes[-1])
         gc.freeze()  # compilers and libraries, which stay: else every full collection visits them
         with make_executor() as executor:
-            executor.add_node(node)
+            for node in nodes:
+                executor.add_node(node)
             executor.spin()
     except ExternalShutdownException:
         pass
@@ -69,12 +83,14 @@ def run(node_type: Callable[[], Node], args=None) -> int:
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        if node is not None:
+        for node in nodes:
             try:
                 node.close()
             except Stop as reason:
                 stop = stop if stop.code else reason
+        if nodes:
             time.sleep(_LINGER_S)
+        for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
     return _say(stop)

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages as flat tuples of floats, without building message objects.
 
-A per-tick message differs from tick to tick in its stamp and in some float64 fields; everything
-else in its CDR bytes never changes. A `Codec` finds out where those numbers lie by serializing a
-template with recognisable values in them. From then on encoding is writing numbers into a copy of
+A per-tick message differs from tick to tick in its stamp and in some numbers; everything else in
+its CDR bytes never changes. A `Codec` knows where those numbers lie in the bytes of a template.
+From then on encoding is writing numbers into a copy of
 the template, and decoding is reading them, once the rest has been compared with the template. A
 message that is laid out otherwise (another publisher, other frame names, joints in another order,
 covariances filled) is deserialized and its fields are read by name: slower, same numbers.
@@ -117,43 +117,45 @@ class Codec:
         A message with every constant field (frame names, joint names) filled in, and with
         sequences of the length they have in flight.
     fields : sequence of str
-        The float64 fields that carry the numbers, in the order of the tuple, as dotted paths
-        (``'pose.pose.position.x'``). ``'position[pitch_mass]'`` is the entry of a JointState that
-        belongs to that joint.
+        The fields that carry the numbers, in the order of the tuple, as dotted paths
+        (``'pose.pose.position.x'``): floats or integers. ``'position[pitch_mass]'`` is
+        the entry of a JointState that belongs to that joint, ``'covariance[7]'`` that of an array.
     stamp : str
         Path of the builtin_interfaces/Time field.
+    width : int, optional
+        Numbers of the tuple, if it has more than there are fields: those after them are 0.0, and
+        not in the message.
     """
 
-    def __init__(self, template, fields, stamp: str = 'header.stamp') -> None:
+    def __init__(self, template, fields, stamp: str = 'header.stamp', width: int = 0) -> None:
         self.message_type = type(template)
         self.fields = tuple(fields)
+        self.width = max(width, len(self.fields))
+        self._absent = (self.width - len(self.fields)) * (0.0,)
         frames = {path: _value_at(template, path) for path in _FRAMES}
         self._frames = {path: name for path, name in frames.items() if name}
         self._stamp_path = stamp
-        numbers = [1.0e6 + index + 0.123456789 for index in range(len(self.fields))]
-        for path, number in zip(self.fields, numbers, strict=True):
-            _set(template, path, number)
-        time = operator.attrgetter(stamp)(template)
-        time.sec, time.nanosec = 0x01234567, 0x89ABCDEF
         raw = to_cdr(template)
-        self._stamp_at = _find(raw, struct.pack('<iI', time.sec, time.nanosec), stamp)
-        self._offsets = [
-            _find(raw, struct.pack('<d', number), path)
-            for path, number in zip(self.fields, numbers, strict=True)
-        ]
+        raw += bytes(-len(raw) % 4)  # the middleware sends whole words
+        places = {place.path: place for place in cdr_places(template)}
+        self._stamp_at = places[f'{stamp}.sec'].start
+        found = [places[_indexed(template, path)] for path in self.fields]
+        self._offsets = [place.start for place in found]
+        self._codes = [place.code for place in found]
         self._lay_out(raw)
 
     def _lay_out(self, raw: bytes) -> None:
         """Group the numbers into runs of neighbours and keep the constant rest."""
         order = sorted(range(len(self.fields)), key=self._offsets.__getitem__)
-        runs: list[list[int]] = []
+        runs: list[tuple[str, int, list[int]]] = []
         for index in order:
-            at = self._offsets[index]
-            if runs and at == runs[-1][0] + 8 * runs[-1][1]:
-                runs[-1][1] += 1
+            at, code = self._offsets[index], self._codes[index]
+            if runs and (code, at) == (runs[-1][0], runs[-1][1] + _size(code, len(runs[-1][2]))):
+                runs[-1][2].append(index)
             else:
-                runs.append([at, 1])
-        holes = sorted([(self._stamp_at, 8)] + [(at, 8 * count) for at, count in runs])
+                runs.append((code, at, [index]))
+        holes = [(at, _size(code, len(picked))) for code, at, picked in runs]
+        holes = sorted([(self._stamp_at, 8), *holes])
         template = bytearray(raw)
         for at, size in holes:
             template[at : at + size] = bytes(size)
@@ -166,12 +168,11 @@ class Codec:
                 self._constants.append((start, at, self._template[start:at]))
             start = at + size
         self._stamp_format = struct.Struct('<iI')
-        self._runs = []
-        position = 0
-        for at, count in runs:
-            picked = order[position : position + count]
-            self._runs.append((struct.Struct(f'<{count}d'), at, tuple(picked)))
-            position += count
+        self._runs = [
+            (struct.Struct(f'<{len(picked)}{code}'), at, tuple(picked), code)
+            for code, at, picked in runs
+        ]
+        self._has_integers = any(code != 'd' for code in self._codes)
         in_memory_order = order == list(range(len(order)))
         inverse = [order.index(index) for index in range(len(order))]
         self._reorder = None if in_memory_order else operator.itemgetter(*inverse)
@@ -182,7 +183,10 @@ class Codec:
         self._stamp_format.pack_into(
             buffer, self._stamp_at, stamp_ns // _SECOND_NS, stamp_ns % _SECOND_NS
         )
-        for run, at, picked in self._runs:
+        if self._has_integers:
+            kinds = zip(self._codes, values, strict=True)
+            values = [value if code in 'df' else int(value) for code, value in kinds]
+        for run, at, picked, _ in self._runs:
             run.pack_into(buffer, at, *[values[index] for index in picked])
         return bytes(buffer)
 
@@ -194,7 +198,7 @@ class Codec:
         stamps_ns : int64[n]
             Stamps in ns.
         values : float64[n, m]
-            One row per message, columns in the order of ``fields``.
+            One row per message, the first columns in the order of ``fields``.
 
         Returns
         -------
@@ -207,9 +211,9 @@ class Codec:
         stamps = np.stack((stamps_ns // _SECOND_NS, stamps_ns % _SECOND_NS), axis=1)
         at = self._stamp_at
         out[:, at : at + 8] = stamps.astype('<u4').view(np.uint8).reshape(-1, 8)
-        for _, at, picked in self._runs:
-            block = np.ascontiguousarray(values[:, list(picked)], '<f8')
-            out[:, at : at + 8 * len(picked)] = block.view(np.uint8).reshape(len(out), -1)
+        for run, at, picked, code in self._runs:
+            block = np.ascontiguousarray(values[:, list(picked)].astype(f'<{code}'))
+            out[:, at : at + run.size] = block.view(np.uint8).reshape(len(out), -1)
         return out
 
     def decode(self, raw: bytes, check_frames: bool = False) -> tuple[int, tuple[float, ...]]:
@@ -229,13 +233,15 @@ class Codec:
             if raw[start:end] != constant:
                 return self._decode_foreign(raw, check_frames)
         values: tuple[float, ...] = ()
-        for run, at, _ in self._runs:
+        for run, at, _, _ in self._runs:
             values += run.unpack_from(raw, at)
+        if self._has_integers:
+            values = tuple(map(float, values))
         if self._reorder is not None:
             values = self._reorder(values)
         self._refuse_non_finite(values)
         sec, nanosec = self._stamp_format.unpack_from(raw, self._stamp_at)
-        return sec * _SECOND_NS + nanosec, values
+        return sec * _SECOND_NS + nanosec, values + self._absent
 
     def decode_many(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Stamps and numbers of n messages at once.
@@ -262,10 +268,10 @@ class Codec:
         stamps = np.ascontiguousarray(rows[:, at : at + 8]).view('<u4').astype(np.int64)
         own &= stamps[:, 1] < _SECOND_NS
         seconds = stamps[:, 0].astype(np.int32).astype(np.int64)
-        values = np.empty((len(rows), len(self.fields)))
-        for _, at, picked in self._runs:
-            block = np.ascontiguousarray(rows[:, at : at + 8 * len(picked)])
-            values[:, list(picked)] = block.view('<f8')
+        values = np.zeros((len(rows), self.width))
+        for run, at, picked, code in self._runs:
+            block = np.ascontiguousarray(rows[:, at : at + run.size])
+            values[:, list(picked)] = block.view(f'<{code}')
         return seconds * _SECOND_NS + stamps[:, 1], values, own
 
     def decode_stamp(self, raw: bytes) -> int:
@@ -302,7 +308,7 @@ class Codec:
             self._check_frames(message)
         values = tuple(float(_get(message, path)) for path in self.fields)
         self._refuse_non_finite(values)
-        return self._stamp_of(message), values
+        return self._stamp_of(message), values + self._absent
 
     def _stamp_of(self, message) -> int:
         time = operator.attrgetter(self._stamp_path)(message)
@@ -316,10 +322,9 @@ class Codec:
                 raise NotFiniteFieldError(f'{path} is {value}')
 
 
-def _find(raw: bytes, pattern: bytes, path: str) -> int:
-    if raw.count(pattern) != 1:
-        raise ValueError(f'{path} cannot be located in the serialized message')
-    return raw.index(pattern)
+def _size(code: str, count: int) -> int:
+    """Bytes of so many numbers."""
+    return count * struct.calcsize(f'<{code}')
 
 
 def _value_at(message, path: str) -> str:
@@ -334,19 +339,31 @@ def _split(path: str) -> tuple[str, str]:
     return name, joint.rstrip(']')
 
 
-def _set(message, path: str, value: float) -> None:
+def _indexed(message, path: str) -> str:
+    """Path with the number of a joint in the place of its name."""
     name, joint = _split(path)
-    if joint:
-        getattr(message, name)[list(message.name).index(joint)] = value
-        return
-    *owner, leaf = path.split('.')
-    setattr(operator.attrgetter('.'.join(owner))(message) if owner else message, leaf, value)
+    if not joint or joint.isdigit():
+        return path
+    return f'{name}[{list(message.name).index(joint)}]'
+
+
+def set_field(message, path: str, value: int) -> None:
+    """Set the field at a dotted path; an entry of an array of float64 by its number."""
+    name, index = _split(path)
+    *owner, leaf = name.split('.')
+    holder = operator.attrgetter('.'.join(owner))(message) if owner else message
+    if index:
+        getattr(holder, leaf)[int(index)] = float(value)
+    else:
+        setattr(holder, leaf, value)
 
 
 def _get(message, path: str) -> float:
     name, joint = _split(path)
     if not joint:
         return operator.attrgetter(path)(message)
+    if joint.isdigit():
+        return operator.attrgetter(name)(message)[int(joint)]
     names, values = list(message.name), getattr(message, name)
     if joint not in names:
         raise MessageError(f'joint {joint!r} is missing; the message has {names}')

@@ -6,6 +6,8 @@ The numbers of a message are in the conventions of the topics (ENU / FLU, SI, ra
 `glider_model.base.frames` turns them into signals and back.
 """
 
+from collections.abc import Iterable
+from functools import cache
 from importlib import import_module
 from typing import NamedTuple
 
@@ -15,22 +17,28 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 
 from glider_model.base import wiring
-from glider_model.base.wiring import PORTS, WIRING, Port
+from glider_model.base.wiring import PORTS, SURFACE, WIRING, Port, present
 from glider_model.ros.wire import qos
-from glider_model.ros.wire.codec import Codec
+from glider_model.ros.wire.codec import Codec, set_field
 
 
-def _codec(port: Port) -> Codec:
-    """Codec of a per-tick message, from what the wiring says of it."""
+def _codec(port: Port, steers_by: str = '') -> Codec:
+    """Codec of a per-tick message, from what the wiring and the vehicle say of it."""
     package, _, name = port.message.partition('/msg/')
     message = getattr(import_module(f'{package}.msg'), name)()
     if port.frame:
         message.header.frame_id = port.frame
     if port.child_frame:
         message.child_frame_id = port.child_frame
+    fields = port.fields
     if port.names:
-        message.name, message.position = list(port.names), [0.0] * len(port.names)
-    return Codec(message, port.fields, stamp='header.stamp' if port.fields else 'clock')
+        names = [*port.names, *([steers_by] if steers_by else [])]
+        message.name, message.position = names, [0.0] * len(names)
+        fields = tuple(f'position[{name}]' for name in names)
+    for path, value in port.constants:
+        set_field(message, path, value)
+    stamp = 'header.stamp' if port.fields else 'clock'
+    return Codec(message, fields, stamp, len(port.fields))
 
 
 class Topic(NamedTuple):
@@ -72,8 +80,13 @@ def _per_tick(name: str) -> Topic:
     return Topic(name, codec.message_type, wiring.publisher(name).node, tuple(needed_by), codec)
 
 
+def recorded_topics(optional: Iterable[str]) -> tuple['Topic', ...]:
+    """What is recorded of a run with these of the topics that not every run has."""
+    return tuple(TOPICS[name] for name in present(TOPICS, optional) if TOPICS[name].recorded)
+
+
 #: Names of the nodes.
-PLANT, CURRENT, GUIDANCE, CONTROL = (wired.node for wired in WIRING)
+PLANT, CURRENT, NAVIGATION, GUIDANCE, CONTROL = (wired.node for wired in WIRING)
 RECORDER = 'recorder_node'
 #: Stands for all of them to a recorder.
 REPLAY = 'replay_node'
@@ -89,3 +102,11 @@ TOPICS = {
         Topic('recorded', Header, RECORDER, (PLANT,), recorded=False),
     )
 }
+
+
+@cache
+def topic_of(name: str, steers_by: str = '') -> Topic:
+    """Topic of a vehicle with a steering surface of this name, which is the name of its joint."""
+    if not steers_by or name not in PORTS or SURFACE not in PORTS[name].fields:
+        return TOPICS[name]
+    return TOPICS[name]._replace(codec=_codec(PORTS[name], steers_by))

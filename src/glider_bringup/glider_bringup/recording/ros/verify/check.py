@@ -78,7 +78,9 @@ class Check:
             Whether nothing is, by name of the topic and numbers of the message.
         """
         tracks = {}
-        for name in self.block.block.wired.outputs:
+        for name in self.block.outputs:
+            if self.recording.before_navigation and name == 'ground_truth/odom':
+                continue  # what is taken for it may have been measured with noise
             series = self.recording.series.get(name)
             if series is None:
                 self.notes.append(f'{name} is not recorded')
@@ -139,7 +141,9 @@ class Check:
             row = int(found[0])
             raw = track.series.payload(int(index[row]))
             stamp_ns = int(self.stamps_ns[start + row])
-            self.found.append(message_difference(name, stamp_ns, values[row], raw))
+            self.found.append(
+                message_difference(name, track.series.codec, stamp_ns, values[row], raw)
+            )
         for row in np.flatnonzero(index < 0):
             if start + row < track.end or track.end + TICKS_OF_THE_END < len(track.index):
                 self.miss(name, start + int(row))

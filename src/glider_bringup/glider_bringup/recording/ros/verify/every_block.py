@@ -18,8 +18,9 @@ from glider_bringup.recording.ros.verify.free_running import free_running
 from glider_bringup.recording.ros.verify.lockstep import in_lockstep
 from glider_bringup.recording.ros.verify.verdict import Verdict, skipped
 from glider_model.base import wiring
+from glider_model.base.block import optional_topics
 from glider_model.base.signals import TICK_NS
-from glider_model.base.wiring import Wired
+from glider_model.base.wiring import Wired, present
 
 
 def is_lockstep(recording: Recording, told: Told) -> bool:
@@ -40,11 +41,15 @@ def _keeps_step(recording: Recording) -> bool:
 def _reason_to_skip(wired: Wired, settings, recording: Recording, lockstep: bool) -> str:
     if settings is None:
         return 'the settings say nothing about it'
-    missing = [name for name in wired.inputs if name not in recording.series]
+    if wired == wiring.NAVIGATION and recording.before_navigation:
+        return 'recorded before there was this block'
+    topics = optional_topics(settings)
+    missing = [name for name in present(wired.inputs, topics) if name not in recording.series]
     if missing:
         return f'its input {" and ".join(missing)} is not recorded'
-    if not any(name in recording.series for name in wired.outputs):
-        return f'none of {", ".join(wired.outputs)} is recorded'
+    outputs = present(wired.outputs, topics)
+    if not any(name in recording.series for name in outputs):
+        return f'none of {", ".join(outputs)} is recorded'
     if not lockstep and wired in (wiring.PLANT, wiring.CURRENT):
         return 'free-running: which inputs it had at a tick is not on record'
     return ''

@@ -33,7 +33,7 @@ def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict
         int(placed[placed < 2 * most + 1000].max(initial=0))
         for placed in (place_ticks(one.stamps_ns) for one in series.values())
     )
-    inputs = {name: by_tick(series[name], ticks)[0] for name in wired.inputs}
+    inputs = {name: by_tick(series[name], ticks)[0] for name in block.inputs}
     late = [name for name, track in inputs.items() if track.index[0] < 0]
     if late:
         first_ns = int(series[late[0]].stamps_ns[0])

@@ -7,8 +7,7 @@ import struct
 from rclpy.serialization import deserialize_message
 
 from glider_bringup.recording.ros.verify.verdict import WHOLE, Difference
-from glider_model.ros.wire.codec import cdr_places, to_cdr
-from glider_model.ros.wire.topics import TOPICS
+from glider_model.ros.wire.codec import Codec, cdr_places, to_cdr
 
 
 def field_difference(expected, recorded: bytes) -> tuple[str, str, str]:
@@ -63,8 +62,9 @@ def _value(place, data: bytes) -> str:
     return repr(text[:-1].decode(errors='backslashreplace') if text[-1:] == b'\0' else text)
 
 
-def message_difference(topic: str, stamp_ns: int, values, recorded: bytes) -> Difference:
+def message_difference(
+    topic: str, codec: Codec, stamp_ns: int, values, recorded: bytes
+) -> Difference:
     """Where a recorded message differs from the numbers that are computed."""
-    codec = TOPICS[topic].codec
     expected = deserialize_message(codec.encode(stamp_ns, values), codec.message_type)
     return Difference(stamp_ns, topic, *field_difference(expected, recorded))

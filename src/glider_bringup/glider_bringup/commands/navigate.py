@@ -1,0 +1,136 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider navigate``: our navigation over a recorded flight of a real glider."""
+
+import json
+import math
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from glider_bringup.console import Json, counter, output
+
+app = typer.Typer()
+#: Characters of the name of a file in the table: its end tells files of a flight apart.
+MAX_NAME = 12
+#: What the rows of the small table say.
+MEANING = {
+    'none': 'no current',
+    'persistence': 'the last current',
+    'ours': 'ours, of dives before',
+    'on_board': "the vehicle's own belief",
+}
+
+
+@app.command(epilog='Example: ./glider navigate flights/delayed/raw --cache flights/cache')
+def navigate(
+    flight: Annotated[
+        Path,
+        typer.Argument(
+            metavar='FLIGHT',
+            help='Folder of dbd files of a Slocum (or mbd, sbd, dcd, mcd, scd), folder of p*.nc '
+            'of a Seaglider, or one p*.nc.',
+        ),
+    ],
+    cache: Annotated[
+        Path | None,
+        typer.Option(
+            metavar='FOLDER',
+            help="Caches (.cac) of a Slocum's files. Default: beside them, or in a folder cache "
+            'or cac there or above.',
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Navigate a recorded flight of a real glider; compare with what it made of it itself.
+
+    Depth-averaged current, way through the water, and where it would surface next.
+    """
+    from glider_bringup.flights.comparison import navigate as navigated
+    from glider_bringup.flights.comparison import summary
+    from glider_bringup.flights.reading import read_flight
+
+    with counter('reading', None) as update:
+        found = read_flight(flight, cache, update)
+    with counter('navigating', len(found.segments)) as update:
+        rows = navigated(found, update)
+    report = summary(found, rows)
+    if as_json:
+        print(json.dumps({'flight': str(flight), **report}))
+        return
+    output.print(_segments_table(found, rows))
+    output.print(_figures_table(report))
+    for note in report['notes']:
+        output.print(note, soft_wrap=True)
+
+
+def _segments_table(flight, rows) -> Table:
+    begin, end = (
+        datetime.fromtimestamp(one, timezone.utc)
+        for one in (rows[0].reckoned.dived_s, rows[-1].reckoned.surfaced_s)
+    )
+    title = (
+        f'{flight.kind.capitalize()}, {len(flight.files)} files, {begin:%Y-%m-%d %H:%M} to '
+        f'{end:%Y-%m-%d %H:%M} UTC\n'
+        'Mean current of the dive to north, east in cm/s: ours, on board, how far off\n'
+        'Surfaced so far off the forecast, in m: with the last current, with ours'
+    )
+    table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column('dive', no_wrap=True)
+    for name in ('h', 'depth', 'way', 'current', 'on board', 'off', 'last', 'ours'):
+        table.add_column(name, justify='right', no_wrap=True)
+    for row in rows:
+        own, other = row.comparable_mps, row.segment.on_board.dac_mps
+        table.add_row(
+            _short(row.segment.name),
+            f'{row.reckoned.seconds / 3600.0:.1f}',
+            f'{row.segment.samples.depth_m.max():.0f}',
+            f'{np.hypot(*row.reckoned.way_m):.0f}',
+            _current(own),
+            _current(other),
+            _number(100.0 * float(np.hypot(*(own - other))), 1),
+            _number(row.missed_m['persistence'], 0),
+            _number(row.missed_m['ours'], 0),
+        )
+    return table
+
+
+def _short(name: str) -> str:
+    stem = Path(name).stem
+    return stem if len(stem) <= MAX_NAME else f'…{stem[1 - MAX_NAME :]}'
+
+
+def _current(mps: np.ndarray) -> str:
+    return '-' if np.isnan(mps).any() else f'{100.0 * mps[0]:.1f}, {100.0 * mps[1]:.1f}'
+
+
+def _number(value: float | None, digits: int) -> str:
+    known = value is not None and math.isfinite(value)
+    return f'{value:,.{digits}f}' if known else '-'
+
+
+def _figures_table(report: dict) -> Table:
+    title = f'{report["segments"]} dives, {report["under_water_s"] / 3600.0:.1f} h under water'
+    table = Table(title=title, title_justify='left')
+    table.add_column('')
+    for name in ('median', '9 of 10', 'dives'):
+        table.add_column(name, justify='right')
+    over = report['on_board_current_is_mean']
+    lines = [
+        (f'current off that on board (cm/s; {over})', report['dac_difference_mps'], 100.0, 2),
+        ('way through the water off (m)', report['way_difference_m'], 1.0, 0),
+    ]
+    for name, spread in report['prediction_m'].items():
+        lines.append((f'surfaced off (m): {MEANING[name]}', spread, 1.0, 0))
+    for text, spread, scale, digits in lines:
+        numbers = [
+            _number(None if spread[key] is None else scale * spread[key], digits)
+            for key in ('median', 'p90')
+        ]
+        table.add_row(text, *numbers, str(spread['segments']))
+    return table

@@ -1,0 +1,49 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reading a recorded flight, of whichever kind of vehicle its files are."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from glider_bringup.flights.record import Flight
+from glider_bringup.flights.seaglider import read_seaglider, seaglider_files
+from glider_bringup.flights.slocum import read_slocum, slocum_files
+from glider_model.base.errors import ConfigurationError
+
+
+def read_flight(place: Path, cache: Path | None, progress: Callable[[int, int], None]) -> Flight:
+    """Read a flight with at least one segment.
+
+    Parameters
+    ----------
+    place : Path
+        Folder, or one file.
+    cache : Path or None
+        Folder of a Slocum's caches; without it they are looked for.
+    progress : callable
+        Gets how many files are read, and how many there are.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    if not place.exists():
+        raise ConfigurationError(f'{place}: there is no such folder or file')
+    if cache is not None and not cache.is_dir():
+        raise ConfigurationError(f'--cache {cache}: there is no such folder')
+    if slocum_files(place):
+        flight = read_slocum(place, cache, progress)
+    elif seaglider_files(place):
+        flight = read_seaglider(place, progress)
+    else:
+        raise ConfigurationError(
+            f'{place}: no files of a flight in it (allowed: .dbd, .mbd, .sbd, .dcd, .mcd, .scd of '
+            'a Slocum, p*.nc of a Seaglider)'
+        )
+    if not flight.segments:
+        why = '; '.join(flight.notes)
+        raise ConfigurationError(
+            f'{place}: no dive between two fixes in its {len(flight.files)} files'
+            + (f': {why}' if why else '')
+        )
+    return flight

@@ -1,0 +1,279 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flights of a Seaglider: NetCDF files of its base station, one a dive, ``p1710100.nc``.
+
+``log_gps_*`` has three fixes a dive: two before it and one after it. ``depth_avg_curr_*`` is in
+m/s; the base station has it from buoyancy and pitch, and so has this where buoyancy is there.
+"""
+
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from glider_bringup.flights.folders import files_in
+from glider_bringup.flights.record import (
+    NOT_KNOWN,
+    Fixes,
+    Flight,
+    OnBoard,
+    Polar,
+    Samples,
+    Segment,
+    angles_at_times,
+    at_times,
+    local_metres,
+)
+from glider_bringup.flights.segments import cut
+from glider_model.base.errors import ConfigurationError
+
+#: Files of dives: the number of the vehicle, three digits, and of the dive, four.
+DIVE_FILE = re.compile(r'p(\d{3})(\d{4}).*\.nc.*', re.IGNORECASE)
+SUFFIXES = ('.nc', '.ncdf', '.nc4')
+#: What a file must have, by any of the names: first the base station's, then the vehicle's own.
+NEEDED = {
+    'time': ('time',),
+    'depth': ('depth', 'eng_depth'),  # m, cm
+    'pitch': ('eng_pitchAng', 'pitch'),
+    'heading': ('eng_head', 'heading', 'head'),
+    'fix_time': ('log_gps_time',),
+    'fix_latitude': ('log_gps_lat',),
+    'fix_longitude': ('log_gps_lon',),
+}
+WANTED = {
+    'declination': ('magnetic_variation', 'log_gps_magvar'),
+    'buoyancy': ('buoyancy',),
+    'buoyancy_time': ('ctd_time',),
+    'fix_quality': ('log_gps_qc',),
+    'dac_east': ('depth_avg_curr_east', 'depth_avg_curr_east_gsm'),
+    'dac_north': ('depth_avg_curr_north', 'depth_avg_curr_north_gsm'),
+    'speed_east': ('flight_avg_speed_east', 'flight_avg_speed_east_gsm'),
+    'speed_north': ('flight_avg_speed_north', 'flight_avg_speed_north_gsm'),
+    'flight_time': ('total_flight_time_s',),
+    'a': ('sg_cal_hd_a', 'log_HD_A'),
+    'b': ('sg_cal_hd_b', 'log_HD_B'),
+    'c': ('sg_cal_hd_c', 'log_HD_C'),
+    's': ('sg_cal_hd_s',),
+    'length': ('sg_cal_glider_length',),
+}
+#: Eriksen et al. (2001), doi:10.1109/48.972073: a (1/deg), b (Pa^1/4), c (1/deg^2), s, length (m).
+ERIKSEN = {'a': 0.003836, 'b': 0.010078, 'c': 2.1e-6, 's': -0.25, 'length': 1.8}
+#: At shallower pitch the base station takes a Seaglider for stalled (rad).
+SHALLOWEST_RAD = math.radians(5.0)
+#: Marks of the base station for values that are bad, or missing.
+BAD = ('4', '9', '4.0', '9.0')
+
+
+class Dive(NamedTuple):
+    """What one file says."""
+
+    name: str
+    #: Numbers of the vehicle and of the dive; '' and 0 if the name of the file does not say.
+    vehicle: str
+    number: int
+    #: Shape (n, 3): time (s since 1970), latitude, longitude (degrees).
+    fixes: np.ndarray
+    samples: Samples
+    #: Of shape (2,), north and east: depth-averaged current (m/s), way through the water (m).
+    dac_mps: np.ndarray
+    way_m: np.ndarray
+    polar: Polar
+
+
+def seaglider_files(place: Path) -> list[Path]:
+    """Files of dives; where none has the name of one, all NetCDF files."""
+    files = files_in(place, lambda path: path.suffix.lower() in SUFFIXES)
+    return [path for path in files if DIVE_FILE.fullmatch(path.name)] or files
+
+
+def read_seaglider(place: Path, progress: Callable[[int, int], None]) -> Flight:
+    """Read a flight.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    dives, notes = [], []
+    files = seaglider_files(place)
+    for number, path in enumerate(files):
+        progress(number, len(files))
+        try:
+            dives.append(_read_dive(path, notes))
+        except ConfigurationError as error:
+            if len(files) == 1 or 'not installed' in str(error):
+                raise
+            notes.append(f'left out: {error}')
+    vehicles = sorted({dive.vehicle for dive in dives if dive.vehicle})
+    if len(vehicles) > 1:
+        raise ConfigurationError(
+            f'{place}: dives of several vehicles, {", ".join(vehicles)} (allowed: one)'
+        )
+    if not dives:
+        raise ConfigurationError(f'{place}: no file of a dive could be read; {notes[0]}')
+    dives.sort(key=lambda dive: dive.fixes[0, 0])
+    origin = dives[0].fixes[0, 1:]
+    segments, left_out = [], []
+    for run in _runs(dives):
+        found, said = _segments(run, origin)
+        segments += found
+        left_out += [one for one in said if one not in left_out]
+    return Flight('seaglider', [path.name for path in files], segments, notes + left_out)
+
+
+def _runs(dives: list[Dive]) -> list[list[Dive]]:
+    """Dives that follow each other: where one is missing a vehicle may have been anywhere."""
+    runs = [[dives[0]]]
+    for last, dive in zip(dives[:-1], dives[1:], strict=True):
+        if dive.number == last.number + 1 or not dive.number:
+            runs[-1].append(dive)
+        else:
+            runs.append([dive])
+    return runs
+
+
+def _segments(dives: list[Dive], origin: np.ndarray) -> tuple[list[Segment], list[str]]:
+    table = np.concatenate([dive.fixes for dive in dives])
+    fixes = Fixes(table[:, 0], local_metres(origin, *table.T[1:]))
+    samples = Samples(*np.concatenate([np.stack(dive.samples) for dive in dives], axis=1))
+    cuts, notes = cut(fixes, samples)
+    segments = []
+    for one in cuts:
+        middle = 0.5 * (one.before.time_s[-1] + one.after.time_s[0])
+        dive = [dive for dive in dives if dive.fixes[0, 0] <= middle][-1]
+        on_board = OnBoard(dive.dac_mps, dive.way_m, NOT_KNOWN)
+        segments.append(Segment(dive.name, *one, on_board, dive.polar))
+    return segments, notes
+
+
+def _read_dive(path: Path, notes: list[str]) -> Dive:
+    found = _read_variables(path)
+    missing = [names for key, names in NEEDED.items() if not len(found.get(key, ()))]
+    if missing:
+        raise ConfigurationError(
+            f'{path}: no variable {", ".join(" or ".join(names) for names in missing)} '
+            '(needed of a dive of a Seaglider)'
+        )
+    fixes = np.stack([found['fix_time'], found['fix_latitude'], found['fix_longitude']], axis=-1)
+    good = np.isfinite(fixes).all(axis=-1) & (np.abs(fixes[:, 1:]) <= (90.0, 180.0)).all(axis=-1)
+    quality = found.get('fix_quality', ())
+    if len(quality) == len(fixes):
+        good &= ~np.isin(quality.astype('U8'), BAD)
+    if not good.any():
+        raise ConfigurationError(f'{path}: log_gps_lat, log_gps_lon: no usable fix (needed: 1)')
+    declination = _number(found, 'declination')
+    if math.isnan(declination):
+        notes.append(f'{path.name}: magnetic_variation is missing: 0 deg is taken')
+        declination = 0.0
+    return Dive(
+        path.name,
+        *_numbers(path),
+        fixes[good],
+        _samples(found, math.radians(declination)),
+        np.array([_number(found, 'dac_north'), _number(found, 'dac_east')]),
+        np.array([_number(found, 'speed_north'), _number(found, 'speed_east')])
+        * _number(found, 'flight_time'),
+        _polar(found),
+    )
+
+
+def _numbers(path: Path) -> tuple[str, int]:
+    named = DIVE_FILE.fullmatch(path.name)
+    return (named[1], int(named[2])) if named else ('', 0)
+
+
+def _samples(found: dict[str, np.ndarray], declination: float) -> Samples:
+    time_s = found['time']
+    buoyancy = np.full(len(time_s), math.nan)
+    grams = found.get('buoyancy', ())
+    own_s = found.get('buoyancy_time', time_s)
+    if len(grams) == len(own_s):
+        buoyancy = 1e-3 * at_times(time_s, own_s, grams)
+    pitch, heading = (np.radians(found[name]) for name in ('pitch', 'heading'))
+    heading = angles_at_times(time_s, time_s, heading) + declination
+    return Samples(time_s, found['depth'], at_times(time_s, time_s, pitch), heading, buoyancy)
+
+
+def _polar(found: dict[str, np.ndarray]) -> Polar:
+    """The file's own constants of lift and drag, else Eriksen's; angles in degrees there."""
+    own = {name: _number(found, name) for name in ERIKSEN}
+    used = {name: ERIKSEN[name] if math.isnan(own[name]) else own[name] for name in ERIKSEN}
+    if any(math.isnan(own[name]) for name in 'abc'):
+        used |= {name: ERIKSEN[name] for name in 'abc'}
+    return Polar(
+        lift=math.degrees(used['a']),
+        drag=used['b'],
+        induced=math.degrees(math.degrees(used['c'])),
+        exponent=used['s'],
+        area_m2=used['length'] ** 2,
+        shallowest_rad=SHALLOWEST_RAD,
+    )
+
+
+def _number(found: dict[str, np.ndarray], name: str) -> float:
+    """The usual value of a variable; NaN if it is missing."""
+    values = np.asarray(found.get(name, ()), float)
+    values = values[np.isfinite(values)]
+    return float(np.median(values)) if len(values) else math.nan
+
+
+def _read_variables(path: Path) -> dict[str, np.ndarray]:
+    """Variables as flat arrays, by our names; times in s since 1970, depth in m."""
+    import xarray
+
+    found = {}
+    try:
+        for dataset in _open(path):
+            with dataset:
+                for key, names in (NEEDED | WANTED).items():
+                    name = next((name for name in names if name in dataset.variables), None)
+                    if name is None or key in found:
+                        continue
+                    variable = dataset[name]
+                    values = np.atleast_1d(variable.values).ravel()
+                    if key.endswith('time') and key != 'flight_time':
+                        values = _seconds(xarray, variable)
+                    elif name == 'eng_depth':
+                        values = values / 100.0
+                    found[key] = values if values.dtype.kind in 'SUO' else values.astype(float)
+    except (OSError, ValueError, TypeError, KeyError, RuntimeError) as error:
+        raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
+    for key in ('time', 'pitch', 'heading', 'depth'):
+        if key in found and len(found[key]) != len(found.get('time', ())):
+            raise ConfigurationError(
+                f'{path}: {" or ".join(NEEDED[key])} has {len(found[key])} values '
+                f'(allowed: as many as time, {len(found.get("time", ()))})'
+            )
+    return found
+
+
+def _open(path: Path) -> list:
+    """The datasets of all groups of a file, of NetCDF 3 or 4."""
+    import xarray
+
+    with path.open('rb') as file:
+        start = file.read(4)
+    if start[:3] == b'CDF':
+        return [xarray.open_dataset(path, engine='scipy', decode_times=False)]
+    if start != b'\x89HDF':
+        raise ValueError('it is neither NetCDF 3 nor NetCDF 4')
+    try:
+        import h5netcdf  # noqa: F401 - xarray reads NetCDF 4 through it
+    except ImportError:
+        raise ConfigurationError(
+            f'{path}: h5netcdf, which reads NetCDF 4, is not installed; install it with: '
+            './glider python -m pip install --no-deps -r requirements-flights.txt'
+        ) from None
+    return list(xarray.open_groups(path, engine='h5netcdf', decode_times=False).values())
+
+
+def _seconds(xarray, variable) -> np.ndarray:
+    """Times as s since 1970, whatever their unit."""
+    units = str(variable.attrs.get('units', 'seconds since 1970-1-1'))
+    values = np.atleast_1d(variable.values).ravel().astype(float)
+    if re.match(r'seconds\s+since\s+1970-0?1-0?1\b', units):
+        return values
+    decoded = xarray.coding.times.decode_cf_datetime(values, units)
+    return np.asarray(decoded, 'datetime64[ns]').astype(np.int64) * 1e-9

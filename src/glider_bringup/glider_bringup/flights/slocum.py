@@ -1,0 +1,295 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flights of a Slocum: a folder of dbd files (or of their kind) and the caches they need.
+
+Names of sensors are those of the vehicle's masterdata. Its local mission coordinates (lmc) have
+magnetic north as y. ``m_gps_mag_var`` is what is subtracted from a magnetic heading.
+"""
+
+import math
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from glider_bringup.flights.folders import files_in
+from glider_bringup.flights.record import (
+    NOT_KNOWN,
+    Fixes,
+    Flight,
+    OnBoard,
+    Polar,
+    Samples,
+    Segment,
+    angles_at_times,
+    at_times,
+    local_metres,
+)
+from glider_bringup.flights.segments import DIVE_DEPTH_M, Cut, cut
+from glider_model.base.errors import ConfigurationError
+
+#: Kinds of files of the flight computer, fullest first: all that is measured, then what is sent.
+KINDS = (('.dbd', '.dcd'), ('.mbd', '.mcd'), ('.sbd', '.scd'))
+#: Folders in which the caches of a flight are, beside its files or above them.
+CACHE_FOLDERS = ('cache', 'cac', '.dinkumcache', 'dinkumcache')
+CACHES = '.cac'
+#: So many folders above a flight may hold the folder of its caches.
+CACHES_ABOVE = 2
+#: A file with its header has no fewer bytes.
+SMALLEST_FILE = 100
+#: Without these nothing can be reckoned.
+NEEDED = ('m_depth', 'm_pitch', 'm_heading', 'm_gps_lat', 'm_gps_lon')
+WANTED = (
+    *('m_gps_mag_var', 'm_speed', 'm_lat', 'm_lon', 'm_dr_time'),
+    *('m_final_water_vx', 'm_final_water_vy', 'm_water_vx', 'm_water_vy'),
+)
+#: Merckelbach, Smeed and Griffiths (2010), doi:10.1175/2009JTECHO710.1: lift slopes 3.8 of the
+#: hull and 3.73 of the wings, drag 0.15 + 10.5 alpha^2, area 0.1 m^2.
+POLAR = Polar(
+    lift=7.53,
+    drag=0.15,
+    induced=10.5,
+    exponent=0.0,
+    area_m2=0.1,
+    shallowest_rad=math.radians(11.3),
+)
+#: Longer steps of a reckoned place are its corrections (m/s).
+FASTEST_STEP_MPS = 2.0
+#: The vehicle's own current is of the same dive if the time it reckoned for is, up to this share.
+SAME_TIME = 0.2
+#: The current of a segment is told until so long after the next dive has begun (s).
+LATE_S = 60.0
+
+Sensors = dict[str, tuple[np.ndarray, np.ndarray]]
+
+
+def slocum_files(place: Path) -> list[Path]:
+    """Files of the flight computer, of the fullest kind that is there; plain before compressed."""
+    suffixes = {suffix for kind in KINDS for suffix in kind}
+    files = files_in(place, lambda path: path.suffix.lower() in suffixes)
+    for kind in KINDS:
+        by_stem: dict[str, Path] = {}
+        for suffix in kind:
+            for path in files:
+                if path.suffix.lower() == suffix:
+                    by_stem.setdefault(path.stem.lower(), path)
+        if by_stem:
+            return sorted(by_stem.values())
+    return []
+
+
+def read_slocum(place: Path, cache: Path | None, progress: Callable[[int, int], None]) -> Flight:
+    """Read a flight; without a folder of caches they are looked for.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    files = slocum_files(place)
+    sensors, names, notes = _read_files(files, cache, progress)
+    missing = [name for name in NEEDED if not len(sensors[name][0])]
+    if missing:
+        raise ConfigurationError(
+            f'{place}: no value of {", ".join(missing)} in its {len(files)} files '
+            f'*{files[0].suffix} (needed: {", ".join(NEEDED)})'
+        )
+    declined = _value(sensors, 'm_gps_mag_var')
+    if math.isnan(declined):
+        declined = _turned(sensors)
+        told = f'{-math.degrees(declined):.0f} deg east is how m_lat, m_lon turn from m_heading'
+        if math.isnan(declined):
+            told, declined = 'magnetic north is taken for true north', 0.0
+        notes.append(f'm_gps_mag_var is not recorded: {told}')
+    origin, fixes = _fixes(sensors)
+    cuts, left_out = cut(fixes, _samples(sensors, declined))
+    ends = [one.before.time_s[-1] for one in cuts[1:]] + [math.inf]
+    segments = [
+        Segment(
+            _file_at(names, one.before.time_s[-1]),
+            *one,
+            on_board=_on_board(sensors, one, end, declined, origin),
+            polar=POLAR,
+        )
+        for one, end in zip(cuts, ends, strict=True)
+    ]
+    return Flight('slocum', [path.name for path in files], segments, notes + left_out)
+
+
+def _read_files(
+    files: list[Path], cache: Path | None, progress: Callable[[int, int], None]
+) -> tuple[Sensors, list[tuple[float, str]], list[str]]:
+    """Sensors by name, when each file begins, and what is to be said of files left out."""
+    try:
+        from dbdreader import DBD, DbdError
+    except ImportError:
+        raise ConfigurationError(
+            f'{files[0]}: dbdreader, which reads the files of a Slocum, is not installed; install '
+            'it with: ./glider python -m pip install --no-deps -r requirements-flights.txt'
+        ) from None
+
+    parts: dict[str, list] = {name: [] for name in NEEDED + WANTED}
+    names, unread = [], []
+    with tempfile.TemporaryDirectory() as scratch:
+        _gather_caches(files[0].parent, cache, Path(scratch))
+        for number, path in enumerate(files):
+            progress(number, len(files))
+            if path.stat().st_size < SMALLEST_FILE:
+                unread.append(f'{path.name}: cannot be read: it has no whole header')
+                continue
+            try:
+                file = DBD(str(path), scratch)
+                known = [name for name in parts if file.has_parameter(name)]
+                read = dict(zip(known, file.get(*known), strict=True)) if len(known) > 1 else {}
+            except DbdError as error:
+                if getattr(error.data, 'missing_cache_files', None):
+                    raise ConfigurationError(
+                        f'{path}: its cache {"".join(error.data.missing_cache_files)}.cac is '
+                        f'neither beside it nor in a folder {" or ".join(CACHE_FOLDERS[:2])} '
+                        'there or above; give the folder that has it with --cache'
+                    ) from None
+                unread.append(f'{path.name}: cannot be read: {error}')
+                continue
+            except Exception as error:  # noqa: BLE001 - of a damaged file dbdreader says anything
+                unread.append(f'{path.name}: cannot be read: {type(error).__name__}: {error}')
+                continue
+            for name, pair in read.items():
+                parts[name].append(pair)
+            if 'm_depth' in read and len(read['m_depth'][0]):
+                names.append((float(read['m_depth'][0][0]), path.name))
+    if len(unread) == len(files):
+        raise ConfigurationError(f'{files[0].parent}: no file could be read; {unread[0]}')
+    sensors = {name: _joined(pairs) for name, pairs in parts.items()}
+    return sensors, sorted(names), unread
+
+
+def _gather_caches(folder: Path, cache: Path | None, into: Path) -> None:
+    """Link all caches that may be meant into one folder, by lower-case names as are looked for."""
+    places = [cache]
+    if cache is None:
+        above = [folder.resolve(), *folder.resolve().parents[:CACHES_ABOVE]]
+        places = [folder, *(one / name for one in above for name in CACHE_FOLDERS)]
+    for place in places:
+        for path in sorted(place.iterdir()) if place.is_dir() else ():
+            link = into / path.name.lower()
+            if path.suffix.lower() == CACHES and not link.exists():
+                link.symlink_to(path.resolve())
+
+
+def _joined(pairs: list) -> tuple[np.ndarray, np.ndarray]:
+    """Times and finite values of one sensor from all files, in the order of time."""
+    times = np.concatenate([np.asarray(pair[0], float) for pair in pairs] or [np.empty(0)])
+    values = np.concatenate([np.asarray(pair[1], float) for pair in pairs] or [np.empty(0)])
+    good = np.isfinite(times) & np.isfinite(values) & (times > 0.0)
+    order = np.argsort(times[good], kind='stable')
+    return times[good][order], values[good][order]
+
+
+def _value(sensors: Sensors, name: str) -> float:
+    """The usual value of a sensor; NaN if it was never recorded."""
+    values = sensors[name][1]
+    return float(np.median(values)) if len(values) else math.nan
+
+
+def _places(sensors: Sensors, latitude: str, longitude: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times and degrees, shape (n, 2), of what was recorded as latitude and longitude."""
+    (time_s, north), (own_s, east) = sensors[latitude], sensors[longitude]
+    _, first, second = np.intersect1d(time_s, own_s, return_indices=True)
+    degrees = np.stack([north[first], east[second]], axis=-1)
+    good = (np.abs(degrees) <= (90.0, 180.0)).all(axis=-1)
+    return time_s[first][good], degrees[good]
+
+
+def _fixes(sensors: Sensors) -> tuple[np.ndarray, Fixes]:
+    """The first fix (degrees), and all of them in metres of it."""
+    time_s, degrees = _places(sensors, 'm_gps_lat', 'm_gps_lon')
+    if not len(time_s):
+        return np.zeros(2), Fixes(time_s, np.empty((0, 2)))
+    return degrees[0], Fixes(time_s, local_metres(degrees[0], *degrees.T))
+
+
+def _turned(sensors: Sensors) -> float:
+    """What ``m_gps_mag_var`` was (rad), from the steps by which the vehicle reckoned; NaN if none.
+
+    Turned into local mission coordinates and less the vehicle's own current, they lie along its
+    heading.
+    """
+    time_s, degrees = _places(sensors, 'm_lat', 'm_lon')
+    deep = at_times(time_s, *sensors['m_depth']) > DIVE_DEPTH_M
+    if len(time_s) < 2:
+        return math.nan
+    steps = np.diff(local_metres(degrees[0], *degrees.T), axis=0) / np.diff(time_s)[:, None]
+    under = deep[1:] & deep[:-1] & (np.hypot(*steps.T) < FASTEST_STEP_MPS)
+    if not under.any():
+        return math.nan
+    north, east = steps[under].T
+    middle_s = 0.5 * (time_s[1:] + time_s[:-1])[under]
+    heading = angles_at_times(middle_s, *sensors['m_heading'])
+    x, y = (
+        np.nan_to_num(_before(middle_s, *sensors[name])) for name in ('m_water_vx', 'm_water_vy')
+    )
+    turns = np.radians(np.arange(-60.0, 60.0, 0.5))[:, None]
+    ahead = north * np.cos(turns) - east * np.sin(turns) - y
+    abeam = north * np.sin(turns) + east * np.cos(turns) - x
+    beside = np.abs(abeam * np.cos(heading) - ahead * np.sin(heading))
+    return float(turns[np.nanmedian(beside, axis=1).argmin(), 0])
+
+
+def _before(time_s: np.ndarray, own_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """The last of values with times of their own before other times, NaN before the first."""
+    return np.append(values, math.nan)[np.searchsorted(own_s, time_s) - 1]
+
+
+def _samples(sensors: Sensors, declined: float) -> Samples:
+    time_s, depth_m = sensors['m_depth']
+    heading = angles_at_times(time_s, *sensors['m_heading']) - declined
+    pitch = at_times(time_s, *sensors['m_pitch'])
+    return Samples(time_s, depth_m, pitch, heading, np.full(len(time_s), math.nan))
+
+
+def _on_board(
+    sensors: Sensors, one: Cut, end_s: float, declined: float, origin: np.ndarray
+) -> OnBoard:
+    """What the vehicle made of a segment: its last current before the next dive is the one."""
+    begin_s, surfaced_s = one.before.time_s[-1], one.after.time_s[0]
+    dac = NOT_KNOWN
+    for pair in (('m_final_water_vx', 'm_final_water_vy'), ('m_water_vx', 'm_water_vy')):
+        if np.isnan(dac).any():
+            told = [_last(sensors[name], surfaced_s - LATE_S, end_s + LATE_S) for name in pair]
+            dac = _true(told[0], told[1], declined)
+    reckoned_s = _last(sensors['m_dr_time'], surfaced_s - LATE_S, end_s + LATE_S, above=0.0)
+    if abs(reckoned_s - (surfaced_s - begin_s)) > SAME_TIME * (surfaced_s - begin_s):
+        dac = NOT_KNOWN
+    speed_s, speed = sensors['m_speed']
+    way = NOT_KNOWN
+    inside = (speed_s >= begin_s) & (speed_s <= surfaced_s)
+    if inside.sum() > 1:
+        time_s, level = speed_s[inside], np.maximum(speed[inside], 0.0)
+        heading = at_times(time_s, one.samples.time_s, np.unwrap(one.samples.heading_rad))
+        velocity = np.stack([level * np.cos(heading), level * np.sin(heading)])
+        velocity = np.nan_to_num(velocity)
+        way = (0.5 * (velocity[:, 1:] + velocity[:, :-1]) * np.diff(time_s)).sum(axis=1)
+    time_s, degrees = _places(sensors, 'm_lat', 'm_lon')
+    under = (time_s > begin_s) & (time_s < surfaced_s)
+    believed = local_metres(origin, *degrees[under][-1]) if under.any() else NOT_KNOWN
+    return OnBoard(dac, way, believed)
+
+
+def _true(x: float, y: float, declined: float) -> np.ndarray:
+    """North and east of a vector in local mission coordinates."""
+    cosine, sine = math.cos(declined), math.sin(declined)
+    return np.array([y * cosine + x * sine, x * cosine - y * sine])
+
+
+def _last(
+    pair: tuple[np.ndarray, np.ndarray], begin_s: float, end_s: float, above: float = -math.inf
+) -> float:
+    """The last value in a time that is above a limit; NaN if there is none."""
+    inside = (pair[0] > begin_s) & (pair[0] < end_s) & (pair[1] > above)
+    return float(pair[1][inside][-1]) if inside.any() else math.nan
+
+
+def _file_at(names: list[tuple[float, str]], time_s: float) -> str:
+    """Name of the file that was being written at a time."""
+    begun = [name for begin_s, name in names if begin_s <= time_s]
+    return begun[-1] if begun else names[0][1]

@@ -1,0 +1,443 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider navigate`` on flights that are made up here, with a current that is known."""
+
+import json
+import math
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from scipy.optimize import brentq
+from typer.testing import CliRunner
+
+from glider_bringup.cli import app
+from glider_bringup.flights.comparison import navigate, summary
+from glider_bringup.flights.reading import read_flight
+from glider_bringup.flights.slocum import slocum_files
+from glider_model.base.errors import ConfigurationError
+
+START_S = 1.6e9
+#: Of the flights made up here: current below and at the surface (m/s north, east), pitch (rad).
+CURRENT, SURFACE = np.array([0.08, -0.05]), np.array([0.2, 0.1])
+PITCH, RATE = math.radians(26.0), 0.15
+DECLINED = 0.3
+ORIGIN = np.array([49.5, -50.2])
+
+
+def quiet(*_):
+    pass
+
+
+def navigated(flight):
+    return navigate(flight, quiet)
+
+
+def slocum_speed(pitch: float, rate: float) -> float:
+    """Horizontal speed (m/s) of a glide with Merckelbach's coefficients, by a root of its own."""
+
+    def balance(alpha):
+        lift, drag = 7.53 * alpha, 0.15 + 10.5 * alpha**2
+        return drag * math.cos(pitch + alpha) - lift * math.sin(pitch + alpha)
+
+    return rate / math.tan(pitch + brentq(balance, 0.0, math.radians(8.0)))
+
+
+def made_up(dives: int, period_s: float = 4.0, currents=None):
+    """Samples (t, depth, pitch, heading) and fixes (t, north, east) of dives to 150 m.
+
+    Ten minutes at the surface before each, with a fix each minute from the second on.
+    """
+    speed = slocum_speed(PITCH, RATE)
+    place, now = np.zeros(2), START_S
+    samples, fixes = [], []
+    currents = [CURRENT] * dives if currents is None else currents
+    for number in range(dives + 1):
+        for step in np.arange(0.0, 600.0, 60.0):
+            samples.append((now + step, 0.3, 0.0, 0.0))
+            if 120.0 <= step:
+                fixes.append((now + step, *(place + SURFACE * step)))
+        place, now = place + SURFACE * 600.0, now + 600.0
+        if number == dives:
+            break
+        heading = 0.4 + 0.5 * number
+        for sign in (-1.0, 1.0):
+            for step in np.arange(0.0, 1000.0, period_s):
+                depth = RATE * step if sign < 0.0 else 150.0 - RATE * step
+                samples.append((now + step, depth, sign * PITCH, heading))
+            along = speed * np.array([math.cos(heading), math.sin(heading)])
+            place, now = place + 1000.0 * (along + currents[number]), now + 1000.0
+    return np.array(samples), np.array(fixes)
+
+
+def degrees(fixes: np.ndarray) -> np.ndarray:
+    """Latitude and longitude of north and east (m), on the same sphere."""
+    metres = math.radians(1.0) * 6_371_000.0
+    latitude = ORIGIN[0] + fixes[:, 1] / metres
+    scale = np.cos(np.radians(0.5 * (latitude + ORIGIN[0])))
+    return np.stack([latitude, ORIGIN[1] + fixes[:, 2] / metres / scale], axis=-1)
+
+
+def to_nmea(values: np.ndarray) -> np.ndarray:
+    whole = np.trunc(values)
+    return whole * 100.0 + (values - whole) * 60.0
+
+
+def write_dbd(file: Path, table: dict[str, tuple[np.ndarray, np.ndarray]], cached: bool) -> None:
+    """Write a dbd file, and its cache in ``cache`` beside it, in capitals as some tools do."""
+    names = ['m_present_time', *table]
+    listed = ''.join(f's: T {n:4d} {n:4d} 8 {name} nodim\n' for n, name in enumerate(names))
+    state_bytes = (len(names) + 3) // 4
+    header = {
+        'dbd_label': 'DBD(dinkum_binary_data)file',
+        'encoding_ver': 5,
+        'num_ascii_tags': 14,
+        'all_sensors': 'F',
+        'the8x3_filename': '00010000',
+        'full_filename': 'unit-2026-001-0-0',
+        'filename_extension': 'dbd',
+        'mission_name': 'test.mi',
+        'fileopen_time': 'Sun_Sep_13_12:26:40_2020',
+        'total_num_sensors': len(names),
+        'sensors_per_cycle': len(names),
+        'state_bytes_per_cycle': state_bytes,
+        'sensor_list_crc': 'AB12CD34',
+        'sensor_list_factored': int(cached),
+    }
+    text = ''.join(f'{name}:    {value}\n' for name, value in header.items())
+    if cached:
+        cache = file.parent / 'cache'
+        cache.mkdir(exist_ok=True)
+        (cache / 'AB12CD34.CAC').write_text(listed)
+    data = [(text if cached else text + listed).encode(), b'sa']
+    data += [struct.pack('<Hfd', 0x1234, 123.456, 123456789.12345678), b'd']
+    cycles: dict[float, dict[str, float]] = {START_S - 1.0: {}}
+    for name, (times, values) in table.items():
+        for time_s, value in zip(times, values, strict=True):
+            cycles.setdefault(float(time_s), {})[name] = float(value)
+    for time_s in sorted(cycles):
+        row = {'m_present_time': time_s, **cycles[time_s]}
+        bits = 0
+        for name in names:
+            bits = bits << 2 | (2 if name in row else 0)
+        bits <<= 2 * (4 * state_bytes - len(names))
+        data.append(bits.to_bytes(state_bytes, 'big'))
+        data += [struct.pack('<d', row[name]) for name in names if name in row]
+        data.append(b'd')
+    file.write_bytes(b''.join(data)[:-1] + b'X')
+
+
+def sensors(dives: int, **kwargs) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Sensors of a made-up Slocum, whose own current is off by 2 cm/s to magnetic north."""
+    samples, fixes = made_up(dives, **kwargs)
+    time_s, depth, pitch, heading = samples.T
+    latitude, longitude = degrees(fixes).T
+    told_s = START_S + 2600.0 * np.arange(1, dives + 1) + 400.0
+    cosine, sine = math.cos(DECLINED), math.sin(DECLINED)
+    north, east = CURRENT
+    magnetic = np.array([[east * cosine + north * sine], [north * cosine - east * sine + 0.02]])
+    magnetic = np.repeat(magnetic, dives, axis=1)
+    return {
+        'm_depth': (time_s, depth),
+        'm_pitch': (time_s, pitch),
+        'm_heading': (time_s, (heading + DECLINED) % (2.0 * math.pi)),
+        'm_gps_lat': (fixes[:, 0], to_nmea(latitude)),
+        'm_gps_lon': (fixes[:, 0], to_nmea(longitude)),
+        'm_gps_mag_var': (fixes[:, 0], np.full(len(fixes), DECLINED)),
+        'm_final_water_vx': (told_s, magnetic[0]),
+        'm_final_water_vy': (told_s, magnetic[1]),
+    }
+
+
+def write_dive(file: Path, number: int, dives: int, engine: str = 'scipy', **changes) -> None:
+    """Write the NetCDF file of one of several dives as a base station does."""
+    samples, fixes = made_up(dives)
+    begin, end = START_S + 2600.0 * number, START_S + 2600.0 * (number + 1)
+    inside = (samples[:, 0] >= begin + 600.0) & (samples[:, 0] < end)
+    time_s, depth, pitch, heading = samples[inside].T
+    mine = (fixes[:, 0] >= begin) & (fixes[:, 0] <= end + 120.0)
+    three = fixes[mine][[0, 7, 8]]
+    latitude, longitude = degrees(three).T
+    point, fix = 'sg_data_point', 'gps_info'
+    data = {
+        'time': (point, time_s, {'units': 'seconds since 1970-1-1 00:00:00'}),
+        'depth': (point, depth),
+        'eng_pitchAng': (point, np.degrees(pitch)),
+        'eng_head': (point, np.degrees(heading + DECLINED)),
+        'magnetic_variation': ((), -math.degrees(DECLINED)),
+        'log_gps_time': (fix, three[:, 0], {'units': 'seconds since 1970-1-1 00:00:00'}),
+        'log_gps_lat': (fix, latitude),
+        'log_gps_lon': (fix, longitude),
+        'depth_avg_curr_north': ((), CURRENT[0] + 0.03),
+        'depth_avg_curr_east': ((), CURRENT[1]),
+        # As Merckelbach's of a Slocum: angles in degrees, an area of 0.1 m^2.
+        'sg_cal_hd_a': ((), math.radians(7.53)),
+        'sg_cal_hd_b': ((), 0.15),
+        'sg_cal_hd_c': ((), math.radians(math.radians(10.5))),
+        'sg_cal_hd_s': ((), 0.0),
+        'sg_cal_glider_length': ((), math.sqrt(0.1)),
+    }
+    data |= changes
+    dataset = xarray.Dataset({name: value for name, value in data.items() if value is not None})
+    dataset.to_netcdf(file, engine=engine)
+
+
+def told(*words: str) -> str:
+    """What the command says when it refuses."""
+    with pytest.raises(ConfigurationError) as error:
+        CliRunner().invoke(app, ['navigate', *words], catch_exceptions=False)
+    assert '\n' not in str(error.value)
+    return str(error.value)
+
+
+# ---------------------------------------------------------------------- Slocum
+
+
+@pytest.mark.parametrize('cached', [True, False])
+def test_a_slocum_finds_the_current_it_drifted_with(tmp_path, cached):
+    pytest.importorskip('dbdreader')
+    write_dbd(tmp_path / '00010000.DBD', sensors(4), cached)
+    flight = read_flight(tmp_path, None, quiet)
+    rows = navigated(flight)
+    report = summary(flight, rows)
+    assert (report['vehicle'], report['segments']) == ('slocum', 4)
+    for row in rows:
+        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
+        assert row.reckoned.seconds == pytest.approx(2000.0, abs=40.0)
+    # The current of the vehicle is 2 cm/s off, in its magnetic coordinates.
+    assert report['dac_difference_mps']['median'] == pytest.approx(0.02, abs=0.003)
+    assert report['dac_difference_mps']['segments'] == 4
+
+
+def test_declination_follows_from_the_way_a_slocum_reckons(tmp_path):
+    """Files that are sent have no m_gps_mag_var; the vehicle knew it."""
+    pytest.importorskip('dbdreader')
+    table = sensors(3)
+    del table['m_gps_mag_var'], table['m_final_water_vx'], table['m_final_water_vy']
+    time_s, heading = table['m_heading']
+    steps = slocum_speed(PITCH, RATE) * np.diff(time_s, prepend=time_s[0])
+    true = heading - DECLINED
+    along = [np.cumsum(steps * part(true)) for part in (np.cos, np.sin)]
+    latitude, longitude = degrees(np.stack([time_s, *along], axis=-1)).T
+    table |= {'m_lat': (time_s, to_nmea(latitude)), 'm_lon': (time_s, to_nmea(longitude))}
+    write_dbd(tmp_path / '00010000.sbd', table, True)
+    flight = read_flight(tmp_path, None, quiet)
+    assert '-17 deg east' in flight.notes[0]
+    for row in navigated(flight):
+        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
+
+
+def test_a_fix_far_off_and_one_under_water_are_left_out(tmp_path):
+    pytest.importorskip('dbdreader')
+    table = sensors(2)
+    time_s, latitude = table['m_gps_lat']
+    latitude[3] += 30.0
+    deep_s = START_S + 1500.0
+    for name, value in (('m_gps_lat', latitude[0]), ('m_gps_lon', table['m_gps_lon'][1][0])):
+        table[name] = (np.append(time_s, deep_s), np.append(table[name][1], value))
+    write_dbd(tmp_path / '00010000.dbd', table, True)
+    rows = navigated(read_flight(tmp_path, None, quiet))
+    assert len(rows) == 2
+    for row in rows:
+        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.003)
+
+
+def test_a_current_of_another_time_is_not_compared(tmp_path):
+    """A fix in between starts a vehicle's reckoning anew, but not the clock of its current."""
+    pytest.importorskip('dbdreader')
+    table = sensors(2)
+    told_s = table['m_final_water_vx'][0]
+    table['m_dr_time'] = (told_s, np.array([2000.0, 9000.0]))
+    write_dbd(tmp_path / '00010000.dbd', table, True)
+    flight = read_flight(tmp_path, None, quiet)
+    assert summary(flight, navigated(flight))['dac_difference_mps']['segments'] == 1
+
+
+def test_the_fullest_kind_of_file_is_read(tmp_path):
+    for name in ('a.sbd', 'A.DCD', 'a.dbd', 'b.dcd', 'a.ebd', 'a.txt'):
+        (tmp_path / name).touch()
+    assert [path.name for path in slocum_files(tmp_path)] == ['a.dbd', 'b.dcd']
+
+
+def test_what_a_slocum_lacks_is_told(tmp_path):
+    pytest.importorskip('dbdreader')
+    file = tmp_path / '00010000.dbd'
+    table = sensors(1)
+    write_dbd(file, table, True)
+    (tmp_path / 'cache' / 'AB12CD34.CAC').rename(tmp_path / 'cache' / 'other.cac')
+    assert 'ab12cd34.cac' in told(str(tmp_path))
+    assert '--cache' in told(str(tmp_path))
+    del table['m_pitch']
+    write_dbd(file, table, False)
+    assert 'no value of m_pitch' in told(str(tmp_path))
+    file.write_bytes(b'dbd_label: DBD')
+    assert 'no file could be read' in told(str(tmp_path))
+
+
+def test_a_damaged_file_is_left_out_and_named(tmp_path):
+    pytest.importorskip('dbdreader')
+    write_dbd(tmp_path / '00010000.dbd', sensors(2), True)
+    (tmp_path / '00020000.dbd').write_bytes(b'\0' * 1000)
+    flight = read_flight(tmp_path, None, quiet)
+    assert len(flight.segments) == 2
+    assert flight.notes[0].startswith('00020000.dbd: cannot be read')
+
+
+# ---------------------------------------------------------------------- Seaglider
+
+
+def test_a_seaglider_finds_the_current_of_each_dive(tmp_path):
+    for number in range(3):
+        write_dive(tmp_path / f'p123{number + 7:04d}.nc', number, 3)
+    flight = read_flight(tmp_path, None, quiet)
+    rows = navigated(flight)
+    for row in rows[:-1]:
+        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
+    # After the last dive a single fix says nothing of the drift: it counts as under water.
+    assert rows[-1].reckoned.seconds == pytest.approx(2120.0, abs=40.0)
+    # From fix to fix the drift at the surface counts too: 180 s of 2180.
+    mean = (2000.0 * CURRENT + 180.0 * SURFACE) / 2180.0
+    assert rows[1].comparable_mps == pytest.approx(mean, abs=0.004)
+    off = np.hypot(*(mean - CURRENT - [0.03, 0.0]))
+    report = summary(flight, rows)
+    assert report['dac_difference_mps']['median'] == pytest.approx(off, abs=0.004)
+    assert report['prediction_m']['persistence']['segments'] == 2
+
+
+def test_buoyancy_is_taken_where_it_is_recorded(tmp_path):
+    """A glide with so much buoyancy is as fast as drag times speed squared has it."""
+    speed = slocum_speed(PITCH, RATE)
+    total = math.hypot(speed, RATE)
+    alpha = math.atan2(RATE, speed) - PITCH
+    drag = 0.5 * 1027.5 * total**2 * 0.1 * (0.15 + 10.5 * alpha**2)
+    grams = 1000.0 * drag / 9.81 / math.sin(PITCH + alpha)
+    samples, _ = made_up(1)
+    under = samples[samples[:, 0] >= START_S + 600.0]
+    under = under[under[:, 0] < START_S + 2600.0]
+    # A vertical rate of the water would mislead what goes by the vertical rate of the vehicle.
+    waves = under[:, 1] + 10.0 * np.sin((under[:, 0] - START_S - 600.0) * math.pi / 250.0)
+    write_dive(
+        tmp_path / 'p1230001.nc',
+        0,
+        1,
+        depth=('sg_data_point', np.abs(waves)),
+        buoyancy=('sg_data_point', np.sign(under[:, 2]) * grams),
+    )
+    flight = read_flight(tmp_path / 'p1230001.nc', None, quiet)
+    (row,) = navigated(flight)
+    assert np.hypot(*row.reckoned.way_m) == pytest.approx(2000.0 * speed, rel=0.02)
+
+
+def test_a_missing_dive_is_not_bridged(tmp_path):
+    for number in (0, 1, 3):
+        write_dive(tmp_path / f'p123{number + 7:04d}.nc', number, 4)
+    flight = read_flight(tmp_path, None, quiet)
+    assert [segment.name for segment in flight.segments] == [
+        *('p1230007.nc', 'p1230008.nc', 'p1230010.nc'),
+    ]
+    assert len(flight.segments[1].after.time_s) == 1
+
+
+def test_a_group_of_netcdf_4_is_read_too(tmp_path):
+    pytest.importorskip('h5netcdf')
+    write_dive(tmp_path / 'plain.nc', 0, 1)
+    with xarray.open_dataset(tmp_path / 'plain.nc', decode_times=False) as dataset:
+        parts = {name: name.startswith('log_gps') for name in dataset.variables}
+        fixes = dataset[[name for name, is_fix in parts.items() if is_fix]].load()
+        rest = dataset[[name for name, is_fix in parts.items() if not is_fix]].load()
+    (tmp_path / 'plain.nc').unlink()
+    rest.to_netcdf(tmp_path / 'p1230001.nc', engine='h5netcdf')
+    fixes.to_netcdf(tmp_path / 'p1230001.nc', engine='h5netcdf', group='gps', mode='a')
+    (row,) = navigated(read_flight(tmp_path, None, quiet))
+    assert row.comparable_mps == pytest.approx(CURRENT, abs=0.03)
+
+
+def test_what_a_dive_lacks_is_told(tmp_path):
+    file = tmp_path / 'p1230001.nc'
+    write_dive(file, 0, 1, eng_head=None)
+    assert 'no variable eng_head' in told(str(tmp_path))
+    write_dive(file, 0, 1, log_gps_lat=('gps_info', np.full(3, np.nan)))
+    assert 'no usable fix' in told(str(tmp_path))
+    file.write_text('no NetCDF')
+    assert 'cannot be read as NetCDF' in told(str(file))
+    write_dive(file, 0, 1)
+    write_dive(tmp_path / 'p1240001.nc', 0, 1)
+    assert 'several vehicles, 123, 124' in told(str(tmp_path))
+
+
+def test_missing_numbers_in_a_dive_do_not_spread(tmp_path):
+    samples, _ = made_up(1)
+    pitch = np.degrees(samples[10:510, 2])
+    pitch[::3] = np.nan
+    write_dive(tmp_path / 'p1230001.nc', 0, 1, eng_pitchAng=('sg_data_point', pitch))
+    (row,) = navigated(read_flight(tmp_path, None, quiet))
+    assert np.isfinite(row.reckoned.dac_mps).all()
+
+
+# ---------------------------------------------------------------------- forecasts and the command
+
+
+def test_no_forecast_knows_what_comes_after_it(tmp_path):
+    for number in range(10):
+        write_dive(tmp_path / f'p123{number + 1:04d}.nc', number, 10)
+    whole = navigated(read_flight(tmp_path, None, quiet))
+    for number in range(8, 11):
+        (tmp_path / f'p123{number:04d}.nc').unlink()
+    part = navigated(read_flight(tmp_path, None, quiet))
+    for row, again in zip(whole[:6], part[:6], strict=True):
+        assert again.missed_m == pytest.approx(row.missed_m, nan_ok=True)
+
+
+def test_errors_of_single_dives_are_averaged_once_that_has_proven_itself():
+    from glider_bringup.flights.forecast import Forecaster
+
+    generator = np.random.default_rng(7)
+    missed = {'none': [], 'persistence': [], 'ours': []}
+    forecaster = Forecaster()
+    for dive in range(60):
+        current = CURRENT + 0.006 * generator.standard_normal(2)
+        for name, forecast in forecaster.forecast(9000.0 * dive).items():
+            missed[name].append(np.hypot(*(current - forecast)))
+        forecaster.tell(9000.0 * dive, current, 8000.0)
+    ours, persistence = np.mean(missed['ours']), np.mean(missed['persistence'])
+    # The error of a mean of many is 1 / sqrt(2) of that of a difference of two.
+    assert ours < 0.9 * persistence
+    assert missed['ours'][:5] == missed['persistence'][:5]
+
+
+def test_the_command_prints_what_was_agreed(tmp_path):
+    for number in range(3):
+        write_dive(tmp_path / f'p123{number + 1:04d}.nc', number, 3)
+    done = CliRunner().invoke(app, ['navigate', str(tmp_path), '--json'])
+    assert done.exit_code == 0
+    report = json.loads(done.stdout)
+    assert report['segments'] == 3
+    assert {'median', 'p90'} <= report['dac_difference_mps'].keys()
+    for name in ('none', 'persistence', 'ours'):
+        assert report['prediction_m'][name]['median'] >= 0.0
+        assert report['prediction_m'][name]['p90'] >= report['prediction_m'][name]['median']
+    shown = CliRunner().invoke(app, ['navigate', str(tmp_path)])
+    assert shown.exit_code == 0
+    assert '3 dives' in shown.stdout
+    assert 'p1230002' in shown.stdout
+
+
+def test_what_is_no_flight_is_refused(tmp_path):
+    assert 'no files of a flight' in told(str(tmp_path))
+    assert 'no such folder or file' in told(str(tmp_path / 'lost'))
+    for folder in ('one', 'two'):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / '00010000.dbd').touch()
+    assert '2 folders below it' in told(str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ('module', 'name'), [('dbdreader', '00010000.dbd'), ('h5netcdf', 'p1230001.nc')]
+)
+def test_a_library_that_is_not_there_is_named(tmp_path, monkeypatch, module, name):
+    monkeypatch.setitem(__import__('sys').modules, module, None)
+    (tmp_path / name).write_bytes(b'\x89HDF\r\n\x1a\n' + b'\0' * 200)
+    assert f'{module}, which reads' in told(str(tmp_path))
+    assert 'requirements-flights.txt' in told(str(tmp_path))

@@ -1,0 +1,216 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Navigation, free-running, with sensors at their own pace, or with none that can be believed."""
+
+import math
+import signal
+import time
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import FluidPressure, Imu, JointState, NavSatFix
+
+from glider_model.base.frames import OriginSettings
+from glider_model.ocean.density import pressure_at
+from glider_model.ros.places import domain_id
+from glider_model.ros.wire import qos
+from glider_navigation.nodes.navigation_node import OLD_AFTER, NavigationNode
+
+JOINTS = ['buoyancy_engine', 'pitch_mass', 'roll_mass']
+IMU_PERIOD_S, MAX_AGE_S = 0.5, 0.3
+PARAMETERS = {
+    **{'lockstep': False, 'input_max_age_s': MAX_AGE_S},
+    **{'method': 'dead_reckoned', 'imu_period_s': IMU_PERIOD_S, 'gyro': False},
+}
+HERE = OriginSettings()
+DEADLINE_S = 60.0
+
+
+@pytest.fixture
+def context(monkeypatch):
+    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    context = Context()
+    with domain_id() as domain:
+        rclpy.init(context=context, domain_id=domain)
+        yield context
+        rclpy.try_shutdown(context=context)
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+class Vehicle:
+    """Publishes joint_states at 10 Hz, imu every 0.5 s, pressure every second; hears odom."""
+
+    def __init__(self, context) -> None:
+        self.node = rclpy.create_node('vehicle', namespace='/glider', context=context)
+        kinds = {'joint_states': JointState, 'imu': Imu}
+        kinds |= {'pressure': FluidPressure, 'fix': NavSatFix}
+        self.out = {
+            name: self.node.create_publisher(kind, name, 10) for name, kind in kinds.items()
+        }
+        self.odom, self.told = [], []
+        self.quaternion, self.depth_m, self.silent, self.fix = (
+            (1.0, 0.0, 0.0, 0.0),
+            0.0,
+            set(),
+            None,
+        )
+        self.number = 0
+        self.node.create_subscription(Odometry, 'odom', self.odom.append, 10)
+        self.node.create_subscription(
+            DiagnosticArray, '/diagnostics', self.on_diagnostics, qos.EVENTS
+        )
+        self.node.create_timer(0.1, self.publish)
+
+    def on_diagnostics(self, array) -> None:
+        self.told += [status.message for status in array.status]
+
+    def publish(self) -> None:
+        self.number += 1
+        self.send('joint_states', JointState(name=JOINTS, position=[0.0, 0.0, 0.0]))
+        if self.number % 5 == 0:
+            imu = Imu()
+            imu.orientation.w, imu.orientation.x, imu.orientation.y, imu.orientation.z = (
+                self.quaternion
+            )
+            imu.angular_velocity_covariance[0] = -1.0
+            imu.orientation.x += 1e-6 * (self.number % 2)  # no two samples are the same
+            self.send('imu', imu)
+        if self.number % 10 == 0:
+            pressure = FluidPressure(fluid_pressure=float(pressure_at(self.depth_m)))
+            self.send('pressure', pressure)
+            if self.fix:
+                self.send('fix', self.fix)
+
+    def send(self, name: str, message) -> None:
+        if name in self.silent:
+            return
+        message.header.stamp = self.node.get_clock().now().to_msg()
+        if name != 'joint_states':
+            message.header.frame_id = 'base_link'
+        self.out[name].publish(message)
+
+    def said(self, text: str) -> bool:
+        return any(text in told for told in self.told)
+
+    def north_m(self) -> float:
+        return self.odom[-1].pose.pose.position.y
+
+
+class Flight:
+    """Navigation, free-running, and a vehicle that has begun to talk to it."""
+
+    def __init__(self, context) -> None:
+        overrides = [Parameter(name, value=value) for name, value in PARAMETERS.items()]
+        self.vehicle = Vehicle(context)
+        self.navigation = NavigationNode(
+            context=context, namespace='/glider', parameter_overrides=overrides
+        )
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(self.vehicle.node)
+        self.executor.add_node(self.navigation)
+
+    def until(self, condition) -> None:
+        end = time.monotonic() + DEADLINE_S
+        while not condition():
+            assert time.monotonic() < end
+            self.executor.spin_once(timeout_sec=0.1)
+
+    def go_on(self, count: int) -> None:
+        """Until so many more odom have come."""
+        before = len(self.vehicle.odom)
+        self.until(lambda: len(self.vehicle.odom) >= before + count)
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.navigation.close()
+        self.navigation.destroy_node()
+        self.vehicle.node.destroy_node()
+
+
+@pytest.fixture
+def flight(context):
+    flight = Flight(context)
+    try:
+        flight.until(lambda: flight.vehicle.odom)
+        flight.vehicle.told.clear()
+        yield flight
+    finally:
+        flight.close()
+
+
+def a_fix(north_m: float, status: int = 0) -> NavSatFix:
+    """Fix north of the origin."""
+    fix = NavSatFix(latitude=HERE.latitude_deg + north_m / HERE.params().north)
+    fix.longitude, fix.status.status = HERE.longitude_deg, status
+    fix.position_covariance[0] = fix.position_covariance[4] = 1.0
+    return fix
+
+
+def test_slow_sensors_and_no_fix_at_all_are_neither_stale_nor_lost(flight):
+    start_s = time.monotonic()
+    flight.go_on(60)
+    assert time.monotonic() - start_s < 12.0
+    assert not flight.vehicle.said('missing')
+    stamps = [message.header.stamp for message in flight.vehicle.odom]
+    assert len({(stamp.sec, stamp.nanosec) for stamp in stamps[-50:]}) > 40
+    counted = [item.topic.name for item in flight.navigation.inputs if item.lost or item.late]
+    assert not {'imu', 'pressure', 'fix'} & set(counted)
+
+
+@pytest.mark.parametrize('name', ['imu', 'pressure'])
+def test_sensor_that_is_silent_for_long_makes_navigation_silent(flight, name):
+    vehicle = flight.vehicle
+    vehicle.silent = {name}
+    start_s = time.monotonic()
+    flight.until(lambda: vehicle.said(f'missing or stale: {name}; silent until then'))
+    assert time.monotonic() - start_s > OLD_AFTER * IMU_PERIOD_S - 2 * IMU_PERIOD_S
+    count, until_s = len(vehicle.odom), time.monotonic() + 1.0
+    flight.until(lambda: time.monotonic() > until_s)
+    assert len(vehicle.odom) <= count + 1  # which was under way
+    vehicle.silent = set()
+    flight.until(lambda: vehicle.said('inputs are fresh again'))
+    flight.go_on(3)
+
+
+def test_fix_counts_at_the_surface_and_is_forgotten_when_it_is_old(flight):
+    vehicle, heard, step = flight.vehicle, [], flight.navigation.step
+    flight.navigation.step = lambda stamp_ns, *inputs: (
+        heard.append(inputs) or step(stamp_ns, *inputs)
+    )
+    vehicle.depth_m = 6.0
+    flight.until(lambda: vehicle.odom[-1].pose.pose.position.z < -4.0)
+    vehicle.fix = a_fix(100.0)
+    flight.go_on(20)
+    assert abs(vehicle.north_m()) < 20.0  # nobody believes it under water
+    vehicle.depth_m = 0.0
+    flight.until(lambda: vehicle.north_m() > 50.0)
+    assert heard[-1][-1][0] == 0.0
+    vehicle.fix = None
+    flight.until(lambda: heard[-1][-1] == (-1.0, 0.0, 0.0, 0.0, 0.0))
+    assert not vehicle.said('missing')
+
+
+@pytest.mark.parametrize('number', [0.0, math.nan])
+def test_receiver_without_a_fix_is_heard_in_peace(flight, number):
+    vehicle = flight.vehicle
+    vehicle.fix = a_fix(100.0, status=-1)
+    vehicle.fix.latitude = vehicle.fix.longitude = number
+    flight.go_on(30)
+    assert not vehicle.said('refused')
+    assert not vehicle.said('missing')
+    assert abs(vehicle.north_m()) < 20.0
+
+
+def test_attitude_that_is_none_is_refused_and_named(flight):
+    vehicle = flight.vehicle
+    vehicle.quaternion = (0.0, 0.0, 0.0, 0.0)
+    flight.until(lambda: vehicle.said('message refused: imu of plant_node: orientation is'))
+    flight.until(lambda: vehicle.said('missing or stale: imu'))

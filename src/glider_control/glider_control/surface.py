@@ -1,0 +1,70 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""How a steering surface is steered by: settings, params, state, and a kernel that fills `steer`.
+
+The other half of `glider_model.vehicle.surface`, under the same name: in a file of
+`glider_control.surfaces`, or in the group ``glider.surface_laws``. A vehicle with a surface does
+not bank to turn: the control law holds it level, and `steer` has the heading.
+"""
+
+from typing import NamedTuple
+
+from pydantic import Field
+
+from glider_model.base.kernel import kernel
+from glider_model.base.settings import Settings
+from glider_model.base.slot import slot
+from glider_model.vehicle.file import Vehicle
+
+
+class SurfaceLawSettings(Settings):
+    """Gains of steering by a surface; every field has a default.
+
+    Its fields are those of ``control.NAME``.
+    """
+
+    dead_band_deg: float = Field(
+        0.2, ge=0.0, le=10.0, description='change of command that the surface ignores (deg)'
+    )
+
+    def params(self, vehicle: Vehicle) -> NamedTuple:
+        """Kernel parameters, of a type of its own, for a vehicle that has the surface."""
+        raise NotImplementedError
+
+    def initial_state(self) -> NamedTuple:
+        """State before the first tick, of the type that `steer` returns."""
+        raise NotImplementedError
+
+
+class NoSteering(NamedTuple):
+    """Params and state of a vehicle without a steering surface."""
+
+
+@slot
+def steer(state, seen, params, dt):
+    """One tick of steering by a surface, by the type of its params.
+
+    Parameters
+    ----------
+    state : NamedTuple
+        Of the steering; the surface of the sea and a refused odometry leave it as it is.
+    seen : Seen
+        As a control law sees it.
+    params : NamedTuple
+        Those of `SurfaceLawSettings.params`.
+    dt : float
+        Length of the tick (s).
+
+    Returns
+    -------
+    state : NamedTuple
+    delta : float
+        Angle of the surface (rad), + turns the nose to starboard.
+    """
+
+
+@steer.body(NoSteering)
+@kernel
+def _bank_to_turn(state, seen, params, dt):
+    """The control law turns the vehicle."""
+    return state, 0.0

@@ -1,0 +1,99 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Steering by a tail fin: the law alone, and control of a vehicle that has one."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glider_control.control import SATURATED_SURFACE, control_step
+from glider_control.law import Seen
+from glider_control.settings import ControlSettings
+from glider_control.surfaces.fin import INTEGRAL_MAX, FinLawState, steer_by_fin
+from glider_control.watch import LOST, REFUSED, STUCK_ROLL, STUCK_SURFACE
+from glider_model.base.frames import quaternion_from_euler
+from glider_model.base.signals import TICK_S, Joints, Odometry, Reference
+from glider_model.onboard.attitude_filter import Measured
+from glider_model.vehicle.file import changed_vehicle
+
+FIN = {'range': 26.0, 'rate': 1.2, 'area': 0.05, 'lift_slope': 3.0, 'x': -1.2, 'turn_rate': 0.5}
+VEHICLE = changed_vehicle('zhang2021', {f'fin.{name}': value for name, value in FIN.items()})
+LIMIT = math.radians(26.0)
+LAWS = ('adaptive', 'pid')
+quick = settings(max_examples=60, deadline=None)
+LAW = ControlSettings(vehicle=VEHICLE).params().steering
+NOTHING_YET = FinLawState(0.0)
+
+
+def steer(psi=0.0, psi_dot=0.0, wanted=0.0, wanted_dot=0.0, w=0.25, speed=0.5, state=NOTHING_YET):
+    """State and angle (rad) after one tick."""
+    measured = Measured(0.0, -0.5, psi, 0.0, 0.0, psi_dot, w)
+    reference = Reference(0.0, 0.0, 0.0, 0.0, -0.5, wanted, 0.0, 0.0, w, 0.0, 0.0, wanted_dot)
+    seen = Seen(measured, reference, speed, 0.03, 0.4, 0.0, 0.0, False, False)
+    return steer_by_fin(state, seen, LAW, TICK_S)
+
+
+@pytest.mark.parametrize('w', [0.25, -0.25], ids=['dive', 'climb'])
+def test_it_turns_to_the_side_of_the_reference_in_dive_and_climb(w):
+    assert steer(wanted=0.05, w=w)[1] > 0.0 > steer(wanted=-0.05, w=w)[1]
+    assert steer(psi=3.1, wanted=-3.1, w=w)[1] > 0.0  # the short way round
+
+
+def test_a_turn_that_is_asked_for_is_that_of_the_file():
+    """r = c sin(delta) V^2, with psi' already what is asked for."""
+    for speed in (0.3, 0.5):
+        _, delta = steer(psi_dot=0.01, wanted_dot=0.01, speed=speed)
+        assert 0.5 * math.sin(delta) * speed * speed == pytest.approx(0.01, rel=1e-12)
+
+
+@quick
+@given(*4 * [st.floats(-3.0, 3.0)], st.floats(-0.5, 0.5), st.floats(0.0, 2.0))
+def test_angle_and_integral_keep_to_their_limits(psi, psi_dot, wanted, wanted_dot, w, speed):
+    state, delta = steer(psi, psi_dot, wanted, wanted_dot, w, speed, FinLawState(INTEGRAL_MAX))
+    assert abs(delta) <= LIMIT * (1.0 + 1e-15)
+    assert abs(state.heading_integral) <= INTEGRAL_MAX
+
+
+def test_while_it_turns_over_the_fin_is_level_and_the_integral_waits():
+    assert steer(wanted=1.0, w=0.01, state=FinLawState(0.001)) == (FinLawState(0.001), 0.0)
+
+
+def control(law='pid', joints=(0.4, 0.0, 0.0, 0.0), psi=0.0, ticks=1, vehicle=VEHICLE):
+    """Outputs of control in a glide to the south, tick by tick; heading ``psi`` is wanted."""
+    settings = ControlSettings(vehicle=vehicle, law=law)
+    state, params = settings.initial_state(), settings.params()
+    outputs = []
+    for tick in range(ticks):
+        place = (0.0, 0.0, 50.0 + 0.02 * tick)
+        odometry = Odometry(*place, *quaternion_from_euler(0.0, -0.4, 0.0), 0.5, 0, 0, 0, 0, 0)
+        odometry = Odometry(*(float(number) for number in odometry))
+        reference = Reference(0.0, 0.0, 0.0, 0.0, -0.4, psi, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0)
+        state, output = control_step(state, odometry, Joints(*joints), reference, params, TICK_S)
+        outputs.append(output)
+    return outputs
+
+
+@pytest.mark.parametrize('law', LAWS)
+def test_both_laws_hold_the_vehicle_level_and_leave_the_heading_to_the_fin(law):
+    output = control(law, psi=1.5, ticks=600)[-1]
+    assert abs(output.command.mu) < 1e-3
+    assert output.command.delta == pytest.approx(LIMIT, rel=1e-12)
+    assert output.saturation & SATURATED_SURFACE
+    banking = control(law, psi=1.5, ticks=600, vehicle='zhang2021', joints=(0.4, 0.0, 0.0, 0.0))
+    assert abs(banking[-1].command.mu) > 0.01 and banking[-1].command.delta == 0.0
+    assert not banking[-1].saturation & (SATURATED_SURFACE | STUCK_SURFACE)
+
+
+def test_a_fin_that_does_not_move_is_told():
+    told = control(psi=1.5, ticks=700)[-1].saturation
+    assert told & STUCK_SURFACE and not told & STUCK_ROLL
+    follows = control(psi=1.5, ticks=700, joints=(0.4, 0.0, 0.0, LIMIT))[-1].saturation
+    assert not follows & STUCK_SURFACE
+
+
+def test_a_fin_that_says_it_is_far_out_of_its_range_is_not_believed():
+    told = control(joints=(0.4, 0.0, 0.0, 1.6 * LIMIT), ticks=20)
+    assert told[0].saturation & REFUSED and told[-1].saturation & LOST
+    assert not control(joints=(0.4, 0.0, 0.0, 1.4 * LIMIT))[0].saturation & REFUSED

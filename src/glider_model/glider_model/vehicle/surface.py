@@ -1,0 +1,62 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a steering surface is: a section of the vehicle file, params, and the loads it makes.
+
+A vehicle has one such surface, or none and banks to turn. Its section is called like the file of
+its kind in `glider_model.vehicle.surfaces`, or like its entry point in the group
+``glider.surfaces``, and so is its joint on the topics. How it is steered by is the other half:
+`glider_control.surface`.
+"""
+
+from typing import NamedTuple
+
+from glider_model.base.kernel import kernel
+from glider_model.base.settings import Settings
+from glider_model.base.slot import slot
+from glider_model.vehicle.quantity import quantity
+
+
+class SurfaceSettings(Settings):
+    """A steering surface: as far as it goes to each side, and how fast."""
+
+    range: quantity('deg', gt=0.0, le=90.0)
+    rate: quantity('deg/s', gt=0.0, le=180.0)
+
+    def params(self) -> NamedTuple:
+        """Kernel parameters, of a type of its own, for `surface_loads`."""
+        raise NotImplementedError
+
+
+class NoSurface(NamedTuple):
+    """A vehicle without a steering surface."""
+
+
+@slot
+def surface_loads(loads, u, v, w, p, q, r, delta, params):
+    """Loads of the water on the hull and on a steering surface, by the type of its params.
+
+    Parameters
+    ----------
+    loads : tuple of float
+        Viscous force (N) and moment (N m) on the hull about the origin, in FRD; 6 numbers.
+    u, v, w : float
+        Velocity through the water (m/s), FRD.
+    p, q, r : float
+        Angular rates (rad/s).
+    delta : float
+        Angle of the surface (rad), + turns the nose to starboard.
+    params : NamedTuple
+        Those of `SurfaceSettings.params`.
+
+    Returns
+    -------
+    tuple of float
+        The loads with those on the surface added; 6 numbers.
+    """
+
+
+@surface_loads.body(NoSurface)
+@kernel
+def _hull_alone(loads, u, v, w, p, q, r, delta, params):
+    """The very same numbers: not even zeros are added, which could change a sign."""
+    return loads

@@ -1,0 +1,219 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Attitude between samples, and angular rates where there is no gyro.
+
+Between two samples roll and pitch go where the moving mass takes them, whose position is known all
+the time: to the angles at which gravity has no moment,
+
+    tan phi = S_y / S_z,    tan theta = -S_x / S_z,
+    S_x = s_x + m_p (x_0 + x_p),    S_y = m_p R sin mu,    S_z = s_z + m_p R cos mu,
+
+with a lag. Only the change of these angles since the sample is used: what else turns the vehicle
+is in the sample. The heading goes where that roll turns it, psi' = k sin(phi) + d, with a k for
+dive and climb each. From one sample to the next the heading has changed by k times the integral of
+sin(phi): that tells k, by a Kalman filter that begins with the vehicle's file. A rate made of two
+samples would be as old as half the time between them, and by it whoever learns how the vehicle
+steers learns it wrong. Only where samples are dense, that rate is used.
+"""
+
+import math
+from typing import NamedTuple
+
+from glider_model.base.frames import euler_from_quaternion, wrap_angle
+from glider_model.base.kernel import kernel
+from glider_model.vehicle.file import Vehicle, VehicleParams
+
+#: Samples that come faster than this (s) are dense: rates are differences.
+DENSE_S = 1.0
+#: Standard deviation by which a change of heading from sample to sample is off (rad); share of
+#: itself by which k wanders from one to the next; share by which d follows what is left.
+TURN_STD, K_WANDERS, D_SHARE = math.radians(0.5), 0.01, 0.05
+#: The vehicle's file may be wrong by all of k, and by this (rad/s) where it says next to nothing.
+LEAST_K_STD = 0.005
+#: Time constants with which roll and pitch follow the moving mass (s).
+ROLL_S, PITCH_S = 2.0, 2.0
+#: Time constant with which differences of samples are believed as rates (s).
+RATE_S = 2.0
+
+
+class Angles(NamedTuple):
+    """Roll, pitch, heading (rad), or their rates (rad/s)."""
+
+    phi: float
+    theta: float
+    psi: float
+
+
+class MovingMass(NamedTuple):
+    """What a scale and a ruler tell of the moving mass."""
+
+    m_p: float  #: (kg)
+    lever: float  #: m_p R (kg m)
+    s_x: float  #: first moment of all else, with the mass in neutral (kg m)
+    s_z: float
+
+
+def make_moving_mass(vehicle: VehicleParams) -> MovingMass:
+    """Moving mass of a vehicle."""
+    s_x = vehicle.s_x + vehicle.m_p * vehicle.x_p0
+    return MovingMass(vehicle.m_p, vehicle.m_p * vehicle.R_p, s_x, vehicle.s_z)
+
+
+class Turning(NamedTuple):
+    """How roll turns the vehicle in one phase, dive or climb."""
+
+    k: float  #: turn rate over sine of roll (rad/s)
+    p: float  #: variance of k
+
+
+class Turn(NamedTuple):
+    """How roll turns the vehicle, and how far it has since the last sample."""
+
+    dive: Turning
+    climb: Turning
+    d: float  #: turn rate without roll (rad/s)
+    roll_s: float  #: integral of the sine of roll since the sample (s)
+    turned: float  #: heading since the sample (rad)
+
+
+def make_turn(vehicle: Vehicle) -> Turn:
+    """What the vehicle's file says of its steering."""
+    dive, climb = (
+        Turning(k, max(k * k, LEAST_K_STD * LEAST_K_STD))
+        for k in (vehicle.steering.dive.value, vehicle.steering.climb.value)
+    )
+    return Turn(dive, climb, 0.0, 0.0, 0.0)
+
+
+class AttitudeState(NamedTuple):
+    """The last sample, and how it moves."""
+
+    sample: Angles
+    rates: Angles
+    balance: Angles  #: that the moving mass makes, the heading of no account
+    balance_then: Angles  #: that it made at the sample
+    turn: Turn
+    age_s: float
+    seen: bool
+    dense: bool  #: it came soon after the one before
+
+
+def initial_attitude(vehicle: Vehicle) -> AttitudeState:
+    """Nothing is measured yet."""
+    level = Angles(0.0, 0.0, 0.0)
+    return AttitudeState(level, level, level, level, make_turn(vehicle), 0.0, False, False)
+
+
+class Attitude(NamedTuple):
+    """Attitude and rates at a tick."""
+
+    angles: Angles
+    p: float  #: body rates (rad/s)
+    q: float
+    r: float
+
+
+@kernel
+def euler_rates(angles, p, q, r):
+    """Rates of the Euler angles (rad/s) from those about the body axes."""
+    s_phi, c_phi = math.sin(angles.phi), math.cos(angles.phi)
+    c_theta = max(0.1, math.cos(angles.theta))
+    psi_dot = (s_phi * q + c_phi * r) / c_theta
+    return Angles(p + math.sin(angles.theta) * psi_dot, c_phi * q - s_phi * r, psi_dot)
+
+
+@kernel
+def body_rates(angles, rates):
+    """Rates about the body axes (rad/s) from those of the Euler angles."""
+    s_phi, c_phi = math.sin(angles.phi), math.cos(angles.phi)
+    s_theta, c_theta = math.sin(angles.theta), math.cos(angles.theta)
+    return (
+        rates.phi - s_theta * rates.psi,
+        c_phi * rates.theta + s_phi * c_theta * rates.psi,
+        -s_phi * rates.theta + c_phi * c_theta * rates.psi,
+    )
+
+
+@kernel
+def _follow_mass(balance, joints, mass, dt):
+    """Angles that the moving mass makes a tick later, and their rates."""
+    s_z = mass.s_z + mass.lever * math.cos(joints.mu)
+    phi = math.atan2(mass.lever * math.sin(joints.mu), s_z)
+    theta = -math.atan2(mass.s_x + mass.m_p * joints.x_p, s_z)
+    rates = Angles((phi - balance.phi) / ROLL_S, (theta - balance.theta) / PITCH_S, 0.0)
+    return Angles(balance.phi + dt * rates.phi, balance.theta + dt * rates.theta, 0.0), rates
+
+
+@kernel
+def _learn(turning, roll_s, off):
+    """How roll turns the vehicle, by how far off its heading was after a time of roll."""
+    p = turning.p + (K_WANDERS * turning.k) ** 2
+    gain = p * roll_s / (p * roll_s * roll_s + TURN_STD * TURN_STD)
+    return Turning(turning.k + gain * off, p * (1.0 - gain * roll_s))
+
+
+@kernel
+def _take_turn(turn, turned, age_s, dives):
+    """What a change of heading (rad) over ``age_s`` since the sample before tells of turning."""
+    off = wrap_angle(turned - turn.turned)
+    dive, climb = turn.dive, turn.climb
+    if dives:
+        dive = _learn(dive, turn.roll_s, off)
+    else:
+        climb = _learn(climb, turn.roll_s, off)
+    return Turn(dive, climb, turn.d + D_SHARE * off / age_s, 0.0, 0.0)
+
+
+@kernel
+def _go_on_turning(turn, phi, theta, dt):
+    """Heading a tick later by roll and pitch (rad), and its rate."""
+    sine = math.sin(phi)
+    rate = (turn.dive.k if theta < 0.0 else turn.climb.k) * sine + turn.d
+    roll_s, turned = turn.roll_s + dt * sine, turn.turned + dt * rate
+    return Turn(turn.dive, turn.climb, turn.d, roll_s, turned), rate
+
+
+@kernel
+def attitude_step(state, imu, joints, mass, dt):
+    """One tick of ``dt`` s with the actuators at ``joints``.
+
+    Returns
+    -------
+    AttitudeState
+    Attitude
+    bool
+        Whether there is a new sample.
+    """
+    balance, tilts = _follow_mass(state.balance, joints, mass, dt)
+    phi, theta, psi = euler_from_quaternion(imu.q_w, imu.q_x, imu.q_y, imu.q_z)
+    sample, before = Angles(phi, theta, psi), state.sample
+    age_s = state.age_s + dt
+    is_new = not state.seen or phi != before.phi or theta != before.theta or psi != before.psi
+    phi = wrap_angle(before.phi + balance.phi - state.balance_then.phi)
+    turn, turn_rate = _go_on_turning(state.turn, phi, before.theta, dt)
+    dense = state.dense and age_s <= DENSE_S
+    if dense:
+        turn_rate = state.rates.psi
+    rates, then = Angles(tilts.phi, tilts.theta, turn_rate), state.balance_then
+    if is_new:
+        then, dense = balance, state.seen and age_s <= DENSE_S
+        change = wrap_angle(sample.psi - before.psi)
+        if state.seen and age_s > DENSE_S:
+            turn = _take_turn(turn, change, age_s, before.theta < 0.0)
+        else:
+            turn = Turn(turn.dive, turn.climb, turn.d, 0.0, 0.0)
+        if imu.has_rates:
+            rates = euler_rates(sample, imu.p, imu.q, imu.r)
+        elif dense:
+            share = 1.0 - math.exp(-age_s / RATE_S)
+            psi = state.rates.psi + share * (change / age_s - state.rates.psi)
+            rates = Angles(tilts.phi, tilts.theta, psi)
+        before, age_s = sample, 0.0
+    state = AttitudeState(before, rates, balance, then, turn, age_s, True, dense)
+    angles = Angles(
+        wrap_angle(before.phi + balance.phi - then.phi),
+        before.theta + balance.theta - then.theta,
+        wrap_angle(before.psi + turn.turned),
+    )
+    p, q, r = body_rates(angles, state.rates)
+    return state, Attitude(angles, p, q, r), is_new

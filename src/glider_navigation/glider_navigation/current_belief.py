@@ -1,0 +1,157 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is believed of the current, from the mean over each way under water.
+
+A mean and, if that is asked for, a tide: c(t) = m + a cos(w t) + b sin(w t) on each axis. A
+Kalman filter takes in the mean over each way under water between fixes (the depth-averaged
+current, DAC). The mean wanders: over a way of T s after one of T' s its variance grows by
+q (T + T') / 3. How much it wanders, q, is learnt from how far the means were off so far, so that
+what is told of the errors holds (innovation-based adaptive estimation, Mehra 1970). With the tide
+left out this is persistence: the last mean holds for the next way.
+"""
+
+import math
+from typing import NamedTuple
+
+from glider_model.base.kernel import kernel
+from glider_navigation.method import Vector
+
+#: Principal lunar tide M2 (rad/s).
+TIDE = 2.0 * math.pi / (12.4206012 * 3600.0)
+#: Before the first way: standard deviation of the mean and of the amplitude of a tide (m/s).
+MEAN_STD, TIDE_STD = 0.3, 0.05
+#: How far a mean over 1.5 hours is off that of the 1.5 hours before, at first (m/s); by what
+#: number of ways that is outweighed; and over how many at most q is learnt.
+FIRST_CHANGE, FIRST_WEIGHT, MOST_WEIGHT = 0.035, 0.5, 3.0
+#: The mean over a way is no better known than this, however steady the sea: turn-overs, where the
+#: flight model does not hold, are not all alike (m/s).
+LEAST_STD = 0.0007
+FIRST_Q = 3.0 * FIRST_CHANGE * FIRST_CHANGE / (2.0 * 5400.0)
+
+
+class Regressors(NamedTuple):
+    """Mean of 1, cos(w t) and sin(w t) over a way."""
+
+    one: float
+    cos: float
+    sin: float
+
+
+class Uncertainty(NamedTuple):
+    """Covariance of mean, cosine and sine, the same for both axes (m^2/s^2)."""
+
+    mm: float
+    ma: float
+    mb: float
+    aa: float
+    ab: float
+    bb: float
+
+
+class CurrentBelief(NamedTuple):
+    """What is believed of the current."""
+
+    mean: Vector  #: (m/s)
+    cos: Vector
+    sin: Vector
+    p: Uncertainty
+    q: float  #: growth of the variance of the mean (m^2/s^3)
+    weight: float  #: ways that q was learnt from
+    glide: Vector  #: mean velocity through the water in the last way that was taken in (m/s)
+    way_s: float  #: its time; 0.0: none yet
+
+
+def initial_belief(tide: bool) -> CurrentBelief:
+    """Nothing is known yet."""
+    still, tide2 = Vector(0.0, 0.0), TIDE_STD * TIDE_STD if tide else 0.0
+    p = Uncertainty(MEAN_STD * MEAN_STD, 0.0, 0.0, tide2, 0.0, tide2)
+    return CurrentBelief(still, still, still, p, FIRST_Q, FIRST_WEIGHT, still, 0.0)
+
+
+@kernel
+def current_at(belief, t_s):
+    """Current (m/s) that is believed for a time since the start (s)."""
+    if belief.p.aa <= 0.0:
+        return belief.mean
+    c, s = math.cos(TIDE * t_s), math.sin(TIDE * t_s)
+    return Vector(
+        belief.mean.n + c * belief.cos.n + s * belief.sin.n,
+        belief.mean.e + c * belief.cos.e + s * belief.sin.e,
+    )
+
+
+@kernel
+def wandered(belief, way_s):
+    """Variance (m^2/s^2) by which the mean over a way differs from that of the way before."""
+    if belief.way_s <= 0.0:
+        return 0.0
+    return belief.q * (belief.way_s + way_s) / 3.0 + LEAST_STD * LEAST_STD
+
+
+@kernel
+def _loaded(p, h):
+    """P h for the regressors of a way."""
+    return (
+        p.mm * h.one + p.ma * h.cos + p.mb * h.sin,
+        p.ma * h.one + p.aa * h.cos + p.ab * h.sin,
+        p.mb * h.one + p.ab * h.cos + p.bb * h.sin,
+    )
+
+
+@kernel
+def mean_variance(belief, h):
+    """Variance (m^2/s^2) of the mean current over a way, by what is known."""
+    m, a, b = _loaded(belief.p, h)
+    return h.one * m + h.cos * a + h.sin * b
+
+
+@kernel
+def take_in(belief, off, h, way_s, glide, variance, bias):
+    """What is believed after a way.
+
+    Parameters
+    ----------
+    belief : CurrentBelief
+        Before the way.
+    off : Vector
+        Mean current over the way less what was believed (m/s).
+    h : Regressors
+    way_s : float
+        Time under water (s).
+    glide : Vector
+        Mean velocity through the water (m/s).
+    variance : float
+        Of the measured mean, by that of the fixes (m^2/s^2).
+    bias : float
+        Variance of what speed and compass errors seem to be of current, and was not in the way
+        before (m^2/s^2).
+    """
+    wander = wandered(belief, way_s)
+    p = belief.p
+    grown = Uncertainty(p.mm + wander + bias, p.ma, p.mb, p.aa, p.ab, p.bb)
+    m, a, b = _loaded(grown, h)
+    s = h.one * m + h.cos * a + h.sin * b + variance
+    k_m, k_a, k_b = m / s, a / s, b / s
+    q, weight = belief.q, belief.weight
+    if belief.way_s > 0.0:
+        known = s - wander
+        seen = (0.5 * (off.n * off.n + off.e * off.e) - known) / ((belief.way_s + way_s) / 3.0)
+        q = max(0.0, (weight * q + max(0.0, seen)) / (weight + 1.0))
+        weight = min(MOST_WEIGHT, weight + 1.0)
+    return CurrentBelief(
+        Vector(belief.mean.n + k_m * off.n, belief.mean.e + k_m * off.e),
+        Vector(belief.cos.n + k_a * off.n, belief.cos.e + k_a * off.e),
+        Vector(belief.sin.n + k_b * off.n, belief.sin.e + k_b * off.e),
+        Uncertainty(
+            grown.mm - k_m * m,
+            grown.ma - k_m * a,
+            grown.mb - k_m * b,
+            grown.aa - k_a * a,
+            grown.ab - k_a * b,
+            grown.bb - k_b * b,
+        ),
+        q,
+        weight,
+        glide,
+        way_s,
+    )

@@ -1,0 +1,65 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""How fast the vehicle goes through the water, by pressure and pitch alone.
+
+U_h = w / tan(theta - alpha(theta)) by the glide polar holds in a steady glide. In a turn-over,
+where pitch and vertical rate do not belong together, the last speed is held, and fades.
+"""
+
+import math
+from typing import NamedTuple
+
+from glider_model.base.kernel import kernel
+from glider_model.onboard.glide_polar import glide_horizontal_speed
+
+#: Shallower pitch (rad), or a slower vertical rate (m/s), is no glide.
+LEAST_PITCH, LEAST_RATE = math.radians(11.3), 0.02
+#: Time constant with which a speed fades that nothing tells any more (s).
+FADES_S = 7.5
+#: No glider is faster (m/s).
+FASTEST = 1.5
+#: Time constant of the vertical rate (s).
+RATE_S = 4.0
+
+
+class Flight(NamedTuple):
+    """What pressure and pitch tell."""
+
+    depth: float  #: (m)
+    rate: float  #: vertical rate (m/s, + down)
+    speed: float  #: horizontal, through the water (m/s)
+    age_s: float  #: since the last sample
+    seen: bool
+
+
+INITIAL_FLIGHT = Flight(0.0, 0.0, 0.0, 0.0, False)
+
+
+@kernel
+def follow_depth(flight, depth, is_new, dt):
+    """Follow the depth (m) by a filter of second order; between samples it goes on at its rate."""
+    if not flight.seen:
+        return Flight(depth, 0.0, 0.0, 0.0, True)
+    age_s = flight.age_s + dt
+    ahead = flight.depth + dt * flight.rate
+    if not is_new:
+        return Flight(ahead, flight.rate, flight.speed, age_s, True)
+    fade = math.exp(-age_s / RATE_S)
+    off = depth - ahead
+    return Flight(
+        ahead + (1.0 - fade * fade) * off,
+        flight.rate + (1.0 - fade) * (1.0 - fade) * off / age_s,
+        flight.speed,
+        0.0,
+        True,
+    )
+
+
+@kernel
+def reckon_speed(flight, theta, polar, dt):
+    """Speed through the water at a pitch (rad)."""
+    if abs(theta) > LEAST_PITCH and abs(flight.rate) > LEAST_RATE and theta * flight.rate < 0.0:
+        speed = min(FASTEST, glide_horizontal_speed(theta, flight.rate, polar))
+    else:
+        speed = flight.speed * (1.0 - dt / FADES_S)
+    return Flight(flight.depth, flight.rate, speed, flight.age_s, flight.seen)

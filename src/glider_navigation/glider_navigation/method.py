@@ -1,0 +1,134 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a navigation method is: settings, params, state, and a kernel that fills `method_step`.
+
+A method makes the odometry that guidance and control act on, of what the sensors say.
+"""
+
+from typing import ClassVar, NamedTuple
+
+from glider_model.base.frames import Origin
+from glider_model.base.settings import Settings
+from glider_model.base.signals import Joints
+from glider_model.base.slot import slot
+from glider_model.vehicle.file import Vehicle
+
+
+class Start(NamedTuple):
+    """What is known before the first tick."""
+
+    vehicle: Vehicle
+    origin: Origin
+    p_n: float  #: where the vehicle is put into the water (m)
+    p_e: float
+    imu_period_s: float
+    gyro: bool
+    current: str  #: how the current is to be believed
+
+
+class NavigationMethodSettings(Settings):
+    """Settings of a navigation method; every field has a default.
+
+    A subclass is called by the name of its file in `glider_navigation.methods`, or by that of its
+    entry point in the group ``glider.navigation_methods``. Its fields are those of
+    ``navigation.NAME``; the first line of its docstring says what it does.
+    """
+
+    #: Topics of sensors that it needs, of `glider_model.base.wiring.SENSORS`.
+    reads: ClassVar[tuple[str, ...]] = ()
+    #: Topics that it fills beside odom, of `glider_model.base.wiring.BELIEFS`.
+    tells: ClassVar[tuple[str, ...]] = ()
+
+    def params(self, start: Start) -> NamedTuple:
+        """Kernel parameters, of a type of the method's own."""
+        raise NotImplementedError
+
+    def initial_state(self, start: Start) -> NamedTuple:
+        """State before the first tick, of the type that `method_step` returns."""
+        raise NotImplementedError
+
+
+class Imu(NamedTuple):
+    """Attitude q_NB, and rates in body axes (rad/s)."""
+
+    q_w: float
+    q_x: float
+    q_y: float
+    q_z: float
+    p: float
+    q: float
+    r: float
+    has_rates: bool
+
+
+class Fix(NamedTuple):
+    """A place by satellite, relative to the origin (m)."""
+
+    is_fix: bool
+    p_n: float
+    p_e: float
+    variance: float  #: north and east each (m^2)
+
+
+class Heard(NamedTuple):
+    """What the sensors say at a tick; zero for what is not fitted.
+
+    A sensor that is sampled less often shows its last sample again.
+    """
+
+    joints: Joints
+    odom: tuple[float, ...]  #: measured_odom as on the wire
+    imu: Imu
+    depth: float  #: (m)
+    fix: Fix
+
+
+class Covariance(NamedTuple):
+    """Of a horizontal vector."""
+
+    nn: float
+    ne: float
+    ee: float
+
+
+class Vector(NamedTuple):
+    """A horizontal vector."""
+
+    n: float
+    e: float
+
+
+class Believed(NamedTuple):
+    """What navigation believes."""
+
+    odom: tuple[float, ...]  #: odometry as on the wire
+    place: Covariance  #: of its horizontal position (m^2)
+    current: Vector  #: mean of the water column (m/s)
+    current_covariance: Covariance
+    surface: Vector  #: current at the surface, the drift of wind included (m/s)
+    surface_covariance: Covariance
+    phase: int  #: of `glider_navigation.phase`
+
+
+NONE = Covariance(0.0, 0.0, 0.0)
+
+
+@slot
+def method_step(state, heard, params, dt):
+    """One tick of a navigation method, by the type of its params.
+
+    Parameters
+    ----------
+    state : NamedTuple
+        Of the method.
+    heard : Heard
+    params : NamedTuple
+        Those of `NavigationMethodSettings.params`.
+    dt : float
+        Length of the tick (s).
+
+    Returns
+    -------
+    NamedTuple, Believed
+        Its state after the tick, and what it believes.
+    """

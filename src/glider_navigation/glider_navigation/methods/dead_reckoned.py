@@ -1,0 +1,310 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Dead reckoning between fixes, as gliders navigate.
+
+Under water the place goes on with speed through the water, by pitch and depth, on the measured
+heading, and with the current that is believed. At the surface, fixes tell where the vehicle came
+up and how it drifts; what is left between that and the dead reckoning is current, and is believed
+in the way to come. A surfacing without a fix is one point of a longer way.
+"""
+
+import math
+from typing import ClassVar, NamedTuple
+
+from pydantic import Field
+
+from glider_model.base.frames import odometry_to_wire, quaternion_from_euler, rotate_to_body
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import Odometry
+from glider_model.onboard.glide_polar import Polar, make_polar
+from glider_navigation.attitude import (
+    AttitudeState,
+    MovingMass,
+    attitude_step,
+    initial_attitude,
+    make_moving_mass,
+)
+from glider_navigation.current_belief import (
+    TIDE,
+    CurrentBelief,
+    Regressors,
+    current_at,
+    initial_belief,
+    mean_variance,
+    take_in,
+    wandered,
+)
+from glider_navigation.flight_model import INITIAL_FLIGHT, Flight, follow_depth, reckon_speed
+from glider_navigation.method import (
+    Believed,
+    Covariance,
+    NavigationMethodSettings,
+    Start,
+    Vector,
+    method_step,
+)
+from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
+from glider_navigation.surface_stay import (
+    DRIFT_STD,
+    Stay,
+    begin,
+    counts,
+    now,
+    take_fix,
+    variance_now,
+    wait,
+)
+
+#: A vehicle that has been below the first depth dives, above the second it has come up (m).
+DIVES_M, SURFACES_M = 3.0, 1.5
+#: Shorter than this (s) a way under water tells no current.
+SHORTEST_WAY_S = 300.0
+
+
+class DeadReckonedSettings(NavigationMethodSettings):
+    """Dead reckoning between fixes."""
+
+    reads: ClassVar[tuple[str, ...]] = ('imu', 'pressure', 'fix')
+    tells: ClassVar[tuple[str, ...]] = ('believed_current', 'believed_surface_current')
+
+    start_std_m: float = Field(
+        5.0, ge=0.1, le=1e5, description='error of the place where the vehicle is launched (m)'
+    )
+    speed_error_share: float = Field(
+        0.05, ge=0.0, le=1.0, description='error of the speed through the water (-)'
+    )
+    heading_error_deg: float = Field(
+        2.0, ge=0.0, le=90.0, description='error of the compass (deg)'
+    )
+
+    def params(self, start: Start) -> 'DeadReckonedParams':
+        """Kernel parameters."""
+        vehicle = start.vehicle.params()
+        return DeadReckonedParams(
+            make_polar(vehicle),
+            make_moving_mass(vehicle),
+            start.current != 'none',
+            self.speed_error_share**2,
+            math.radians(self.heading_error_deg) ** 2,
+        )
+
+    def initial_state(self, start: Start) -> 'DeadReckonedState':
+        """At the surface, where the vehicle was put into the water."""
+        place, still = Vector(start.p_n, start.p_e), Vector(0.0, 0.0)
+        way = Way(place, self.start_std_m**2, still, still, 0.0, 0.0, 0.0)
+        stay = Stay(0.0, place, still, self.start_std_m**2, 0.0, DRIFT_STD * DRIFT_STD, 1, 0.0)
+        current = initial_belief(start.current == 'tidal')
+        return DeadReckonedState(
+            0,
+            initial_attitude(start.vehicle),
+            INITIAL_FLIGHT,
+            False,
+            place,
+            way,
+            stay,
+            current,
+            0.0,
+        )
+
+
+class DeadReckonedParams(NamedTuple):
+    """What dead reckoning needs to know of vehicle and errors."""
+
+    polar: Polar
+    mass: MovingMass
+    believes_current: bool
+    speed_variance: float  #: of the share by which speed is off
+    heading_variance: float  #: (rad^2)
+
+
+class Way(NamedTuple):
+    """The way under water since the last fix."""
+
+    begun: Vector  #: where that was (m)
+    variance: float  #: (m^2)
+    through: Vector  #: way through the water, and by drift where nothing fixed it (m)
+    believed: Vector  #: way by the current that was believed (m)
+    t_s: float  #: time under water
+    cos_s: float  #: integrals of cos(w t) and sin(w t) over it (s)
+    sin_s: float
+
+
+class DeadReckonedState(NamedTuple):
+    """Dead reckoning between two ticks."""
+
+    tick: int
+    attitude: AttitudeState
+    flight: Flight
+    is_under: bool
+    place: Vector  #: where the vehicle believes it is (m)
+    way: Way
+    stay: Stay
+    current: CurrentBelief
+    depth: float  #: that was shown last (m)
+
+
+@kernel
+def _regressors(way):
+    """Means over the way."""
+    t = max(1.0, way.t_s)
+    return Regressors(1.0, way.cos_s / t, way.sin_s / t)
+
+
+@kernel
+def _unlike(way, current):
+    """Mean velocity through the water less that of the last way: its errors are new (m/s)."""
+    t = max(1.0, way.t_s)
+    return Vector(way.through.n / t - current.glide.n, way.through.e / t - current.glide.e)
+
+
+@kernel
+def place_covariance(way, current, params):
+    """Covariance of the place after a way (m^2)."""
+    t = way.t_s
+    known = way.variance + t * t * (
+        mean_variance(current, _regressors(way)) + wandered(current, t)
+    )
+    unlike = _unlike(way, current)
+    n, e = t * unlike.n, t * unlike.e
+    along, across = params.speed_variance, params.heading_variance
+    return Covariance(
+        known + along * n * n + across * e * e,
+        (along - across) * n * e,
+        known + along * e * e + across * n * n,
+    )
+
+
+@kernel
+def _learn(current, way, stay, params):
+    """What is believed of the current after the fixes of a stay."""
+    if way.t_s < SHORTEST_WAY_S or not params.believes_current:
+        return current
+    t = way.t_s
+    off = Vector(
+        (stay.place.n - way.begun.n - way.through.n - way.believed.n) / t,
+        (stay.place.e - way.begun.e - way.through.e - way.believed.e) / t,
+    )
+    unlike = _unlike(way, current)
+    bias = 0.5 * (params.speed_variance + params.heading_variance)
+    return take_in(
+        current,
+        off,
+        _regressors(way),
+        t,
+        Vector(way.through.n / t, way.through.e / t),
+        (way.variance + stay.pp) / (t * t),
+        bias * (unlike.n * unlike.n + unlike.e * unlike.e),
+    )
+
+
+@kernel
+def _dive(way, stay):
+    """The way that begins with a dive: a new one, if the stay had a fix."""
+    here = now(stay)
+    if stay.fixes > 0:
+        still = Vector(0.0, 0.0)
+        return Way(here, variance_now(stay), still, still, 0.0, 0.0, 0.0)
+    drifted = Vector(
+        way.through.n + stay.drift.n * stay.t_s,
+        way.through.e + stay.drift.e * stay.t_s,
+    )
+    more = stay.t_s * stay.t_s * stay.vv
+    return Way(
+        way.begun, way.variance + more, drifted, way.believed, way.t_s, way.cos_s, way.sin_s
+    )
+
+
+@kernel
+def _go_on(way, through, current, t_s, dt):
+    """The way a tick later, at velocities through the water and of the current (m/s)."""
+    return Way(
+        way.begun,
+        way.variance,
+        Vector(way.through.n + dt * through.n, way.through.e + dt * through.e),
+        Vector(way.believed.n + dt * current.n, way.believed.e + dt * current.e),
+        way.t_s + dt,
+        way.cos_s + dt * math.cos(TIDE * t_s),
+        way.sin_s + dt * math.sin(TIDE * t_s),
+    )
+
+
+@method_step.body(DeadReckonedParams)
+@kernel
+def dead_reckoned_step(state, heard, params, dt):
+    """Reckon on, or take fixes; see `method_step`."""
+    t_s = state.tick * dt
+    attitude, is_, is_new = attitude_step(state.attitude, heard.imu, heard.joints, params.mass, dt)
+    psi = is_.angles.psi
+    flight = follow_depth(state.flight, heard.depth, is_new or heard.depth != state.depth, dt)
+    flight = reckon_speed(flight, is_.angles.theta, params.polar, dt)
+    way, stay, current = state.way, state.stay, state.current
+    is_under = flight.depth > (SURFACES_M if state.is_under else DIVES_M)
+    if is_under and not state.is_under:
+        if stay.fixes > 0:
+            current = _learn(current, way, stay, params)
+        way = _dive(way, stay)
+    elif state.is_under and not is_under:
+        covariance = place_covariance(way, current, params)
+        drift = stay.drift if stay.fixes > 1 else current_at(current, t_s)
+        stay = begin(state.place, 0.5 * (covariance.nn + covariance.ee), drift)
+
+    through, water = Vector(0.0, 0.0), stay.drift
+    if is_under:
+        through = Vector(flight.speed * math.cos(psi), flight.speed * math.sin(psi))
+        water = current_at(current, t_s)
+        way = _go_on(way, through, water, t_s, dt)
+        place = Vector(
+            way.begun.n + way.through.n + way.believed.n,
+            way.begun.e + way.through.e + way.believed.e,
+        )
+        covariance, phase = place_covariance(way, current, params), UNDER_WATER
+    else:
+        stay = wait(stay, dt)
+        if counts(stay, heard.fix):
+            stay = take_fix(stay, heard.fix)
+        place, variance = now(stay), variance_now(stay)
+        covariance = Covariance(variance, 0.0, variance)
+        phase = FIXED if stay.fixes > 0 else AT_SURFACE
+        water = stay.drift
+
+    q = quaternion_from_euler(is_.angles.phi, is_.angles.theta, psi)
+    u, v, w = rotate_to_body(
+        q[0], q[1], q[2], q[3], through.n + water.n, through.e + water.e, flight.rate
+    )
+    odometry = Odometry(
+        place.n,
+        place.e,
+        flight.depth,
+        q[0],
+        q[1],
+        q[2],
+        q[3],
+        u,
+        v,
+        w,
+        is_.p,
+        is_.q,
+        is_.r,
+    )
+    mean = current_at(current, t_s)
+    variance = current.p.mm + wandered(current, current.way_s)
+    believed = Believed(
+        odometry_to_wire(odometry),
+        covariance,
+        mean,
+        Covariance(variance, 0.0, variance),
+        stay.drift,
+        Covariance(stay.vv, 0.0, stay.vv),
+        phase,
+    )
+    return DeadReckonedState(
+        state.tick + 1,
+        attitude,
+        flight,
+        is_under,
+        place,
+        way,
+        stay,
+        current,
+        heard.depth,
+    ), believed

@@ -1,0 +1,94 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Position is measured, as by acoustics and a Doppler log: what is measured is believed.
+
+Where attitude is sampled less often than each tick, or rates are not measured, both are made of
+the samples; see `glider_navigation.attitude`.
+"""
+
+from typing import ClassVar, NamedTuple
+
+from glider_model.base.frames import (
+    odometry_from_wire,
+    odometry_to_wire,
+    quaternion_from_euler,
+)
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import TICK_S, Odometry
+from glider_navigation.attitude import (
+    AttitudeState,
+    MovingMass,
+    attitude_step,
+    initial_attitude,
+    make_moving_mass,
+)
+from glider_navigation.method import (
+    NONE,
+    Believed,
+    Imu,
+    NavigationMethodSettings,
+    Start,
+    Vector,
+    method_step,
+)
+from glider_navigation.phase import KNOWN
+
+
+class KnownSettings(NavigationMethodSettings):
+    """Position is measured in every tick."""
+
+    reads: ClassVar[tuple[str, ...]] = ('measured_odom',)
+
+    def params(self, start: Start) -> 'KnownParams':
+        """Kernel parameters."""
+        as_measured = start.gyro and start.imu_period_s <= TICK_S
+        return KnownParams(as_measured, start.gyro, make_moving_mass(start.vehicle.params()))
+
+    def initial_state(self, start: Start) -> 'KnownState':
+        """Nothing is kept of what is measured in every tick."""
+        return KnownState(initial_attitude(start.vehicle))
+
+
+class KnownParams(NamedTuple):
+    """What of the odometry can be taken as it is."""
+
+    as_measured: bool  #: all of it
+    gyro: bool  #: rates are measured
+    mass: MovingMass
+
+
+class KnownState(NamedTuple):
+    """What is kept from tick to tick."""
+
+    attitude: AttitudeState
+
+
+@method_step.body(KnownParams)
+@kernel
+def known_step(state, heard, params, dt):
+    """Believe what is measured; see `method_step`."""
+    odom, attitude = heard.odom, state.attitude
+    if not params.as_measured:
+        x = odometry_from_wire(heard.odom)
+        imu = Imu(x.q_w, x.q_x, x.q_y, x.q_z, x.p, x.q, x.r, params.gyro)
+        attitude, now, _ = attitude_step(state.attitude, imu, heard.joints, params.mass, dt)
+        q = quaternion_from_euler(now.angles.phi, now.angles.theta, now.angles.psi)
+        odom = odometry_to_wire(
+            Odometry(
+                x.p_n,
+                x.p_e,
+                x.p_d,
+                q[0],
+                q[1],
+                q[2],
+                q[3],
+                x.u,
+                x.v,
+                x.w,
+                now.p,
+                now.q,
+                now.r,
+            )
+        )
+    nothing = Vector(0.0, 0.0)
+    return KnownState(attitude), Believed(odom, NONE, nothing, NONE, nothing, NONE, KNOWN)

@@ -1,0 +1,112 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of navigation, and what the kernels are told by them."""
+
+from typing import Literal, NamedTuple
+
+import pydantic
+from pydantic import Field
+
+from glider_model.base import plugins
+from glider_model.base.frames import Origin, OriginSettings
+from glider_model.base.settings import Settings
+from glider_model.vehicle.file import load_vehicle
+from glider_navigation import methods
+from glider_navigation.method import NavigationMethodSettings, Start
+
+#: Other parameters of navigation: no method can have such a name.
+TAKEN = {'method', 'current', 'vehicle', 'origin', 'north_m', 'east_m', 'imu_period_s', 'gyro'}
+#: Settings of every way to navigate by its name.
+METHODS = plugins.classes(plugins.NAVIGATION_METHODS, NavigationMethodSettings, methods, TAKEN)
+
+_MethodChoice = pydantic.create_model(
+    '_MethodChoice',
+    __base__=Settings,
+    method=(
+        Literal[tuple(METHODS)],
+        Field(
+            'known',
+            description=plugins.listed(METHODS),
+            json_schema_extra={'others': plugins.others(plugins.NAVIGATION_METHODS)},
+        ),
+    ),
+    **{
+        name: (settings, Field(settings(), description=plugins.summary(settings)))
+        for name, settings in METHODS.items()
+        if settings.model_fields
+    },
+)
+
+
+class NavigationLawSettings(_MethodChoice):
+    """How to navigate, whatever the vehicle: the navigation section of a scenario."""
+
+    current: Literal['none', 'persistence', 'tidal'] = Field(
+        'persistence',
+        description='current under water. none: still water; persistence: that of the last way '
+        'between fixes; tidal: a mean and the tide M2, learnt from all of them',
+    )
+
+    @property
+    def chosen(self) -> NavigationMethodSettings:
+        """Settings of the method that was chosen."""
+        method = METHODS[self.method]
+        return getattr(self, self.method) if method.model_fields else method()
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Topics of sensors and beliefs that there are in a run."""
+        return (*self.chosen.reads, *self.chosen.tells)
+
+    @property
+    def jumps(self) -> bool:
+        """Whether what is believed may jump, as it does at a fix."""
+        return 'fix' in self.chosen.reads
+
+    @property
+    def idle(self) -> set[str]:
+        """Methods of other packages that do not fly, with the settings that they have anyway."""
+        names = plugins.of_others(METHODS, methods) - {self.method}
+        return {name for name in names if getattr(self, name, None) == METHODS[name]()}
+
+
+class NavigationSettings(NavigationLawSettings):
+    """Everything the navigation node is told."""
+
+    vehicle: str = Field('zhang2021', description='vehicle whose glide polar is used')
+    origin: OriginSettings = Field(
+        OriginSettings(), description='where the origin of map lies on the Earth'
+    )
+    north_m: float = Field(0.0, ge=-1e7, le=1e7, description='place of the launch, north (m)')
+    east_m: float = Field(0.0, ge=-1e7, le=1e7, description='place of the launch, east (m)')
+    imu_period_s: float = Field(
+        0.1, ge=0.1, le=30.0, description='time between two samples of attitude (s)'
+    )
+    gyro: bool = Field(True, description='angular rates are measured')
+
+    @property
+    def _start(self) -> Start:
+        return Start(
+            load_vehicle(self.vehicle),
+            self.origin.params(),
+            self.north_m,
+            self.east_m,
+            self.imu_period_s,
+            self.gyro,
+            self.current,
+        )
+
+    def params(self) -> 'NavigationParams':
+        """Kernel parameters."""
+        return NavigationParams(self.origin.params(), self.chosen.params(self._start))
+
+    def initial_state(self) -> NamedTuple:
+        """State before the first tick."""
+        return self.chosen.initial_state(self._start)
+
+
+class NavigationParams(NamedTuple):
+    """Navigation as the kernels see it."""
+
+    origin: Origin
+    method: NamedTuple  #: of the method that was chosen

@@ -1,0 +1,239 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Dead reckoning over dives that are known, in a constant current; its covariance by lot."""
+
+import math
+
+import numba
+import numpy as np
+import pytest
+
+from glider_model.base.frames import odometry_from_wire
+from glider_model.base.signals import TICK_S, Joints
+from glider_model.onboard.glide_polar import make_polar
+from glider_model.vehicle.file import load_vehicle
+from glider_navigation.current_belief import Uncertainty, initial_belief
+from glider_navigation.method import Fix, Heard, Imu, Vector, method_step
+from glider_navigation.methods.dead_reckoned import Way, place_covariance
+from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
+from glider_navigation.settings import NavigationSettings
+
+#: Current and drift at the surface (m/s, north and east), and how the vehicle flies.
+CURRENT, DRIFT = np.array([0.12, -0.09]), np.array([0.20, -0.02])
+PITCH, RATE = math.radians(25.0), 0.16
+#: Time at the surface, and of a way to 400 m and back (s); variance of a fix (m^2).
+STAY_S, WAY_S, FIX_VARIANCE = 600.0, 5000.0, 25.0
+COLUMNS = ('n', 'e', 'depth', 'nn', 'ne', 'ee', 'current_n', 'current_e', 'current_nn', 'phase')
+
+
+@numba.njit(error_model='numpy')
+def _navigate(state, q, depths, has_fix, places, variance, params, dt):
+    rows = np.empty((len(q), 10))
+    odom = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for i in range(len(q)):
+        heard = Heard(
+            Joints(0.0, 0.0, 0.0, 0.0),
+            odom,
+            Imu(q[i, 0], q[i, 1], q[i, 2], q[i, 3], 0.0, 0.0, 0.0, False),
+            depths[i],
+            Fix(has_fix[i], places[i, 0], places[i, 1], variance),
+        )
+        state, is_ = method_step(state, heard, params, dt)
+        x = odometry_from_wire(is_.odom)
+        rows[i, 0], rows[i, 1], rows[i, 2] = x.p_n, x.p_e, x.p_d
+        rows[i, 3], rows[i, 4], rows[i, 5] = is_.place.nn, is_.place.ne, is_.place.ee
+        rows[i, 6], rows[i, 7] = is_.current.n, is_.current.e
+        rows[i, 8], rows[i, 9] = is_.current_covariance.nn, is_.phase
+    return rows, state
+
+
+class Dives:
+    """Ways under water, each after a stay at the surface; what the sensors say, tick by tick."""
+
+    def __init__(self, headings_deg, speed, has_fixes, quaternions):
+        stay, way = round(STAY_S / TICK_S), round(WAY_S / TICK_S)
+        count = len(headings_deg)
+        half = RATE * TICK_S * np.arange(way // 2)
+        down_up = np.concatenate([half, half[-1] - half])
+        self.depths = np.tile(np.concatenate([np.zeros(stay), down_up]), count)
+        glides = np.concatenate([np.zeros(stay), np.ones(way)])
+        pitch = PITCH * np.concatenate([np.zeros(stay), -np.ones(way // 2), np.ones(way // 2)])
+        self.glides = np.tile(glides, count) > 0.0
+        psi = np.radians(np.repeat(headings_deg, stay + way))
+        through = speed * np.tile(glides, count)[:, None] * np.stack([np.cos(psi), np.sin(psi)], 1)
+        ground = through + np.where(self.glides[:, None], CURRENT, DRIFT)
+        self.places = np.concatenate([np.zeros((1, 2)), np.cumsum(TICK_S * ground, axis=0)[:-1]])
+        self.has_fix = ~self.glides & np.repeat(np.broadcast_to(has_fixes, count), stay + way)
+        # a fix takes its time after coming up
+        self.has_fix &= np.tile(np.arange(stay + way), count) * TICK_S > 120.0
+        # no two samples are alike: a little sea in roll
+        phi = np.radians(np.random.default_rng(6).normal(0.0, 0.2, len(psi)))
+        last = np.arange(len(psi)) // 40 * 40
+        q = quaternions(phi, np.tile(pitch, count), psi)
+        self.q, self.seen_depths = q[last], self.depths[last]
+        self.cycle, self.stay = stay + way, stay
+
+    def before(self, way):
+        """Tick just before a way begins, at the surface."""
+        return way * self.cycle + self.stay - 1
+
+    def end(self, way):
+        """Tick a quarter of a minute before a way ends: deep enough that nothing has come up."""
+        return (way + 1) * self.cycle - 151
+
+    def begun(self, way):
+        """Tick half a minute after a way has begun."""
+        return way * self.cycle + self.stay + 400
+
+
+class Track:
+    """What is believed, tick by tick, by name."""
+
+    def __init__(self, rows, state):
+        self.state = state
+        for name, column in zip(COLUMNS, rows.T, strict=True):
+            setattr(self, name, column)
+
+    def place(self, tick):
+        return np.array([self.n[tick], self.e[tick]])
+
+    def current(self, tick):
+        return np.array([self.current_n[tick], self.current_e[tick]])
+
+
+@pytest.fixture(scope='module')
+def dives(quaternions, steady_speed):
+    """``dives(headings_deg, has_fixes)``: truth of ways, in steady glides by the polar."""
+    polar = make_polar(load_vehicle('zhang2021').params())
+    speed = steady_speed(-PITCH, RATE, polar)
+
+    def make(headings_deg, has_fixes=True):
+        return Dives(np.array(headings_deg), speed, has_fixes, quaternions)
+
+    return make
+
+
+def navigate(dives, **settings):
+    settings = NavigationSettings(method='dead_reckoned', imu_period_s=4.0, gyro=False, **settings)
+    state, params = settings.initial_state(), settings.params().method
+    q = np.ascontiguousarray(dives.q)
+    return Track(
+        *_navigate(
+            state, q, dives.seen_depths, dives.has_fix, dives.places, FIX_VARIANCE, params, TICK_S
+        )
+    )
+
+
+@pytest.mark.parametrize('current', ['persistence', 'tidal'])
+def test_the_first_way_tells_the_current_and_the_second_is_reckoned_with_it(dives, current):
+    truth = dives([30.0, 40.0, 200.0])
+    track = navigate(truth, current=current)
+    still = truth.end(0)
+    lost = np.linalg.norm(truth.places[still] - track.place(still))
+    assert track.current(still).tolist() == [0.0, 0.0]
+    assert lost == pytest.approx(np.linalg.norm(CURRENT) * WAY_S, rel=0.05)
+    assert track.current(truth.begun(1)) == pytest.approx(CURRENT, abs=0.003)
+    for way in (1, 2):
+        error = np.linalg.norm(truth.places[truth.end(way)] - track.place(truth.end(way)))
+        assert error < 0.05 * lost
+
+
+def test_no_current_is_believed_where_none_is_asked_for(dives):
+    truth = dives([30.0, 40.0])
+    track = navigate(truth, current='none')
+    assert not track.current_n.any() and not track.current_e.any()
+    for way in (0, 1):
+        error = truth.places[truth.end(way)] - track.place(truth.end(way))
+        assert error == pytest.approx(CURRENT * WAY_S, abs=25.0)
+
+
+def test_a_surfacing_without_a_fix_is_a_point_of_one_longer_way(dives):
+    """After the second way without a fix between: the current is learnt from both at once."""
+    truth = dives([30.0, 120.0, 40.0], [True, False, True])
+    track = navigate(truth)
+    at_surface = slice(truth.cycle + 200, truth.cycle + truth.stay)
+    assert np.all(track.phase[at_surface] == AT_SURFACE)
+    assert track.current(truth.end(1)).tolist() == [0.0, 0.0]
+    drifted = STAY_S * (DRIFT - CURRENT) / (2.0 * WAY_S)
+    assert np.linalg.norm(drifted) > 0.005
+    assert track.current(truth.begun(2)) == pytest.approx(CURRENT, abs=0.003)
+    assert track.state.current.way_s == pytest.approx(2.0 * WAY_S, rel=0.02)
+    error = truth.places[truth.end(2)] - track.place(truth.end(2))
+    assert np.linalg.norm(error) < 40.0
+
+
+def test_covariance_of_the_place_grows_under_water_and_falls_at_a_fix(dives):
+    truth = dives([30.0, 120.0, 40.0])
+    track = navigate(truth)
+    trace = track.nn + track.ee
+    assert np.all(track.nn * track.ee - track.ne**2 > 0.0)
+    for way in range(3):
+        under = slice(truth.begun(way), truth.end(way))
+        assert np.all(track.phase[under] == UNDER_WATER)
+        assert np.all(np.diff(trace[under]) > 0.0)
+    for way in (1, 2):
+        fixed = way * truth.cycle + np.argmax(truth.has_fix[way * truth.cycle :])
+        before, after = trace[fixed - 10], trace[fixed + 10]
+        assert after < 1.01 * 2.0 * FIX_VARIANCE < 0.1 * before
+        assert np.all(track.phase[fixed + 1 : truth.before(way)] == FIXED)
+    assert np.all(track.current_nn[truth.begun(1) :] < track.current_nn[truth.end(0)])
+
+
+def test_where_it_believes_it_is_is_as_far_off_as_it_says(dives):
+    """At fixes and at the end of ways, in a constant current: within 3 sigma on each axis."""
+    truth = dives([30.0, 120.0, 200.0])
+    track = navigate(truth)
+    for way in range(3):
+        for tick in (truth.before(way), truth.end(way)):
+            error = truth.places[tick] - track.place(tick)
+            sigma = np.sqrt([track.nn[tick], track.ee[tick]])
+            assert np.all(np.abs(error) < 3.0 * sigma)
+
+
+def test_depth_and_phase_are_those_of_the_dives(dives):
+    truth = dives([30.0])
+    track = navigate(truth)
+    steady = np.r_[truth.begun(0) : truth.stay + 24000, truth.stay + 26000 : truth.end(0)]
+    assert track.depth[steady] == pytest.approx(truth.depths[steady], abs=0.05)
+    assert np.all(track.phase[: truth.before(0)] == FIXED)
+
+
+@pytest.mark.parametrize('tide', [True, False], ids=['tidal', 'persistence'])
+def test_covariance_of_a_place_is_that_of_its_errors_drawn_by_lot(tide):
+    """Where a way began, mean and tide, how far the sea wandered, speed and compass.
+
+    Errors of speed and compass were in the way before, too, and were taken for current then: what
+    they do to this way is what they do to both, less that.
+    """
+    params = NavigationSettings(method='dead_reckoned').params().method
+    t_s, before_s, glide, before = 5000.0, 4000.0, np.array([0.3, -0.1]), np.array([-0.1, 0.35])
+    root = np.array([[0.02, 0.0, 0.0], [0.004, 0.01, 0.0], [-0.006, 0.003, 0.015]])
+    P = root @ root.T if tide else np.diag([4e-4, 0.0, 0.0])
+    h = np.array([1.0, 0.7, -0.4])
+    belief = initial_belief(tide)._replace(
+        p=Uncertainty(*(float(P[i, j]) for i in range(3) for j in range(i, 3))),
+        q=2e-8,
+        glide=Vector(*before.tolist()),
+        way_s=before_s,
+    )
+    through = Vector(*(t_s * glide).tolist())
+    way = Way(Vector(0.0, 0.0), 900.0, through, Vector(0.0, 0.0), t_s, h[1] * t_s, h[2] * t_s)
+
+    rng, count = np.random.default_rng(8), 400_000
+    start = rng.normal(0.0, 30.0, (count, 2))
+    sea = np.stack([rng.multivariate_normal(np.zeros(3), P, count) @ h for _ in range(2)], axis=1)
+    sea += rng.normal(0.0, math.sqrt(2e-8 * (t_s + before_s) / 3.0 + 0.0007**2), (count, 2))
+    share, turn = rng.normal(0.0, 0.05, count), rng.normal(0.0, math.radians(2.0), count)
+
+    def flown(velocity):
+        """How far a velocity through the water is off, by speed and compass."""
+        wrong = (1.0 + share) * np.exp(1j * turn) * (velocity[0] + 1j * velocity[1])
+        return np.stack([wrong.real, wrong.imag], axis=1) - velocity
+
+    errors = start + t_s * (sea + flown(glide) - flown(before))
+    drawn = np.cov(errors.T)
+    told = place_covariance(way, belief, params)
+    assert [told.nn, told.ee] == pytest.approx(np.diag(drawn), rel=0.012)
+    scale = math.sqrt(told.nn * told.ee)
+    assert told.ne == pytest.approx(drawn[0, 1], abs=0.01 * scale)
+    assert abs(told.ne) > 0.05 * scale

@@ -1,0 +1,146 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Navigation, guidance and control in one process: the same flight, the same ways to end."""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from glider_bringup.engines.node_parameters import node_parameters, write_parameters
+from glider_bringup.engines.processes import (
+    AUTOPILOT,
+    AUTOPILOT_MODULE,
+    node_commands,
+    node_environment,
+)
+from glider_bringup.engines.recorded import fly_nodes, fly_recorded
+from glider_bringup.mission.run_folder import make_run_folder
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_model.ros.places import domain_id
+
+CHANGES = {'dives': 0, 'duration_s': 200.0, 'navigation.method': 'dead_reckoned'}
+DEADLINE_S = 120.0
+
+
+def digest(folder: Path) -> str:
+    """Of the recording of a run, to the last byte."""
+    (file,) = folder.glob('*.mcap')
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+@pytest.fixture(scope='module')
+def flights(tmp_path_factory) -> dict:
+    """Folder and scores of one flight: three nodes in one process, each in its own, none."""
+    scenario, parent = load_scenario('rough_water', CHANGES), tmp_path_factory.mktemp('autopilot')
+    flown = {}
+    for name, options in (('together', {'autopilot': True}), ('alone', {}), ('direct', None)):
+        folder, scorer = make_run_folder(scenario, parent / name), make_scorer(scenario)
+        if options is None:
+            flight = fly_recorded(scenario, folder, [scorer])
+        else:
+            flight = fly_nodes(scenario, folder, [scorer], **options)
+        assert (flight.status, flight.reason) == ('completed', '')
+        assert not flight.messages_lost
+        flown[name] = (folder, scores_of(scenario, scorer))
+    return flown
+
+
+@pytest.mark.parametrize('other', ['alone', 'direct'])
+def test_scores_are_the_same(flights, other):
+    assert flights['together'][1] == flights[other][1]
+
+
+def test_recording_is_the_same_to_the_last_byte(flights):
+    assert digest(flights['together'][0]) == digest(flights['alone'][0])
+
+
+def test_recording_verifies(glider, flights):
+    done = glider('verify', flights['together'][0])
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+class Started(NamedTuple):
+    """A process and what it says."""
+
+    process: subprocess.Popen
+    log: Path
+
+    def has_said(self, *words: str) -> bool:
+        """Wait until it has said all of these."""
+        end = time.monotonic() + DEADLINE_S
+        while not all(word in self.log.read_text() for word in words):
+            if time.monotonic() > end:
+                return False
+            time.sleep(0.1)
+        return True
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Start a process of a flight by its name, with more words."""
+    file = tmp_path / 'parameters.yaml'
+    write_parameters(node_parameters(load_scenario('current_8deg'), speed=1.0), file)
+    commands, started = node_commands(file, autopilot=True), []
+
+    def run(name: str, *words: str) -> Started:
+        log = tmp_path / name
+        with log.open('w') as out:
+            command = [*commands[name], *words]
+            started.append(subprocess.Popen(command, env=environment, stdout=out, stderr=out))
+        return Started(started[-1], log)
+
+    with domain_id() as domain:
+        environment = node_environment(domain)
+        yield run
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_signal_ends_it_cleanly(start, number):
+    autopilot = start(AUTOPILOT)
+    assert autopilot.has_said('navigation_node', 'control_node')  # that they wait for the plant
+    autopilot.process.send_signal(number)
+    assert autopilot.process.wait(DEADLINE_S) == 0
+    assert 'Traceback' not in autopilot.log.read_text()
+
+
+def test_it_leaves_when_the_plant_gives_up(start):
+    autopilot = start(AUTOPILOT)
+    plant = start('plant_node', '-p', 'startup_timeout_s:=10.0')
+    assert plant.process.wait(DEADLINE_S) == 3
+    assert 'current_node has not appeared' in plant.log.read_text()
+    assert 'navigation_node has not' not in plant.log.read_text()
+    assert autopilot.process.wait(DEADLINE_S) == 0
+
+
+@pytest.mark.parametrize(
+    ('words', 'said'),
+    [
+        (['--ros-args', '-p', 'control_node:law:=bang'], "control_node: parameter law = 'bang'"),
+        (['--ros-args', '-p', 'law:=pid'], 'navigation_node: parameter law: unknown'),
+        (['--ros-args', '--params-file', 'nix.yaml'], 'bad command line'),
+        (['--ros-args', '-p', 'nonsense'], 'bad command line'),
+        (['plant'], 'autopilot: plant: no such part (allowed: navigation, guidance, control)'),
+    ],
+)
+def test_what_it_cannot_use_is_named(words, said):
+    done = subprocess.run(
+        [sys.executable, '-m', AUTOPILOT_MODULE, *words],
+        env={'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **os.environ},
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+    )
+    assert done.returncode == 2
+    assert f'fatal: {said}' in done.stderr
+    assert 'Traceback' not in done.stderr
