@@ -22,7 +22,14 @@ MAY_IMPORT = {
     'glider_navigation': {'glider_model'},
     'glider_guidance': {'glider_model'},
     'glider_control': {'glider_model'},
-    'glider_bringup': {'glider_model', 'glider_navigation', 'glider_guidance', 'glider_control'},
+    'glider_guard': {'glider_model'},
+    'glider_bringup': {
+        'glider_model',
+        'glider_navigation',
+        'glider_guidance',
+        'glider_control',
+        'glider_guard',
+    },
 }
 
 #: Rooms of two packages by floors, from below: a room imports from the floors beneath it only.

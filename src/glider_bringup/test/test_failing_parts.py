@@ -12,10 +12,11 @@ from glider_bringup.engines.direct import MissionState, fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
 from glider_control.control import control_step
-from glider_control.watch import (
+from glider_control.intake import REFUSED
+from glider_guard.guard import Heard, guard_step
+from glider_guard.rows import (
     FROZEN,
     LOST,
-    REFUSED,
     STUCK_BUOYANCY,
     STUCK_ROLL,
     SURFACES,
@@ -85,8 +86,8 @@ PHASES = {'dive': GLIDING_DOWN, 'turn': INFLECTING_UP, 'climb': GLIDING_UP}
 
 
 def tick(state: MissionState, params, corrupt) -> tuple[MissionState, int]:
-    """One tick as in `fly`, with what ``corrupt`` makes of a measurement; the saturation mask."""
-    plant, current, navigation, guidance, control = state
+    """One tick as in `fly`, with what ``corrupt`` makes of a measurement; what is told of it."""
+    plant, current, navigation, guidance, control, guard = state
     t_s, true = plant.tick * TICK_S, plant_odometry(plant)
     current, water = current_step(current, true[:3], t_s, params.current, TICK_S)
     heard = (tuple(plant.joints), tuple(corrupt(measured(plant, params.plant))), *SILENT)
@@ -97,9 +98,12 @@ def tick(state: MissionState, params, corrupt) -> tuple[MissionState, int]:
     control, controlled = control_step(
         control, seen, plant.joints, reference, params.control, TICK_S
     )
+    heard = Heard(controlled.command, seen, plant.joints, reference.p_d, 0.0)
+    guard, guarded = guard_step(guard, heard, params.guard, TICK_S)
     water = water_from_wire(water_to_wire(water))
-    plant = plant_step(plant, controlled.command, water, params.plant, TICK_S)
-    return MissionState(plant, current, navigation, guidance, control), controlled.saturation
+    plant = plant_step(plant, guarded.command, water, params.plant, TICK_S, guarded.drops)
+    state = MissionState(plant, current, navigation, guidance, control, guard)
+    return state, controlled.saturation | guarded.told
 
 
 def flown(state: MissionState, params, ticks: int) -> tuple[MissionState, np.ndarray]:
@@ -132,7 +136,7 @@ def test_a_wild_sample_does_not_show_in_the_track(law, phase, kind):
     apart_m = np.abs(after[:, E2] - expected[at + 1 :, E2])
     assert np.max(apart_m) < 1.0
     assert abs(np.max(np.abs(after[:, E2])) - np.max(np.abs(expected[at + 1 :, E2]))) < 1.0
-    assert not np.any(after[:, COLUMNS['saturation']].astype(int) & SURFACES)
+    assert not np.any(after[:, COLUMNS['guard']])
 
 
 def flown_with(state: MissionState, params, ticks: int, corrupt) -> tuple[MissionState, list, int]:
@@ -169,9 +173,9 @@ def test_a_measurement_that_fails_brings_the_vehicle_up_for_good(law, kind, reas
     assert mask & reason
     assert max(depths) < 200.0
     assert depths[-1] < 1.0
-    assert state.control.command == params.control.safe_command
+    assert state.guard.command == params.guard.safe_command
     _, after = flown(state, params, 3000)  # the measurement is good again, the order stays
-    assert np.all(after[:, COMMAND] == params.control.safe_command)
+    assert np.all(after[:, COMMAND] == params.guard.safe_command)
 
 
 def test_a_second_of_bad_measurements_is_bridged():
@@ -180,7 +184,8 @@ def test_a_second_of_bad_measurements_is_bridged():
     assert mask & REFUSED
     assert not mask & SURFACES
     _, after = flown(state, params, 1000)
-    assert not np.any(after[50:, COLUMNS['saturation']].astype(int) & (REFUSED | SURFACES))
+    assert not np.any(after[50:, COLUMNS['saturation']].astype(int) & REFUSED)
+    assert not np.any(after[:, COLUMNS['guard']])
 
 
 def test_an_abort_uses_the_whole_pump_and_surfaces_with_a_leak():
@@ -215,10 +220,10 @@ def test_a_vehicle_below_its_rating_surfaces_and_says_so():
     }
     state, params = mission_of(load_scenario('current_8deg', changes))
     _, log = flown(state, params, 40000)
-    mask, depth = log[:, COLUMNS['saturation']].astype(int), -log[:, UP]
+    mask, depth = log[:, COLUMNS['guard']].astype(int), -log[:, UP]
     first = int(np.flatnonzero(mask & TOO_DEEP)[0])
     assert depth[first] == pytest.approx(1050.0, abs=1.0)
-    assert np.all(log[first:, COMMAND] == params.control.safe_command)
+    assert np.all(log[first:, COMMAND] == params.guard.safe_command)
     assert depth[-1] < np.max(depth) - 20.0
 
 
@@ -232,9 +237,10 @@ def test_a_vehicle_below_its_rating_surfaces_and_says_so():
 def test_an_actuator_that_does_not_move_is_told(changes, bit):
     state, params = mission_of(load_scenario('current_12deg', {**FLIGHT, **changes}))
     _, log = flown(state, params, 6000)
-    assert log[-1, COLUMNS['saturation']].astype(int) & bit
+    assert log[-1, COLUMNS['guard']].astype(int) & bit
 
 
 def test_a_clean_flight_says_nothing():
     for law in ('adaptive', 'pid'):
         assert not np.any(clean(law)[:, COLUMNS['saturation']].astype(int) & ~7)
+        assert not np.any(clean(law)[:, COLUMNS['guard']])

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Control, free-running, whose inputs fail or stop: what it bridges, and what surfaces it."""
+"""Control and guard, free-running, whose inputs fail: what they bridge, and what surfaces."""
 
 import signal
 import time
@@ -16,8 +16,9 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from glider_control.nodes.control_node import ControlNode
-from glider_control.settings import ControlSettings
-from glider_control.watch import ORDERED
+from glider_guard.nodes.guard_node import GuardNode
+from glider_guard.rows import LOST, ORDERED
+from glider_guard.settings import GuardSettings
 from glider_model.base.signals import TICK_NS
 from glider_model.ros.places import domain_id
 from glider_model.ros.wire import qos
@@ -29,7 +30,7 @@ LEVEL = (0.0, 0.0, -50.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 CERTAIN = (1.0, 0.0, 0.0, 1.0)
 INPUTS = {'odom': (*LEVEL, *CERTAIN), 'joint_states': (0.4, 0.0, 0.0), 'reference': LEVEL}
 DEADLINE_S = 60.0
-SAFE = tuple(ControlSettings().params().safe_command)[:3]  # as its messages have it
+SAFE = tuple(GuardSettings().params().safe_command)[:3]  # as its messages have it
 
 
 @pytest.fixture
@@ -47,7 +48,7 @@ def context(monkeypatch):
 
 
 class Vehicle:
-    """Publishes the inputs of control, and hears what it says."""
+    """Publishes their inputs, and hears what they say."""
 
     def __init__(self, context) -> None:
         self.node = rclpy.create_node('vehicle', namespace='/glider', context=context)
@@ -80,18 +81,20 @@ class Vehicle:
 
 
 class Flight:
-    """Control, free-running, and a vehicle that has begun to talk to it."""
+    """Both, free-running, and a vehicle that has begun to talk to them."""
 
     def __init__(self, context) -> None:
-        parameters = {'lockstep': False, 'input_max_age_s': 0.5, 'lost_after_s': 1.0}
-        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        overrides = [Parameter('lockstep', value=False), Parameter('input_max_age_s', value=0.5)]
         self.vehicle = Vehicle(context)
-        self.control = ControlNode(
-            context=context, namespace='/glider', parameter_overrides=overrides
-        )
+        said = {'context': context, 'namespace': '/glider'}
+        self.control = ControlNode(parameter_overrides=overrides, **said)
+        overrides.append(Parameter('lost_after_s', value=1.0))
+        self.guard = GuardNode(parameter_overrides=overrides, **said)
+        self.nodes = (self.control, self.guard)
         self.executor = SingleThreadedExecutor(context=context)
         self.executor.add_node(self.vehicle.node)
-        self.executor.add_node(self.control)
+        for node in self.nodes:
+            self.executor.add_node(node)
 
     def until(self, condition) -> None:
         end = time.monotonic() + DEADLINE_S
@@ -101,8 +104,9 @@ class Flight:
 
     def close(self) -> None:
         self.executor.shutdown()
-        self.control.close()
-        self.control.destroy_node()
+        for node in self.nodes:
+            node.close()
+            node.destroy_node()
         self.vehicle.node.destroy_node()
 
 
@@ -127,8 +131,8 @@ def test_lost_input_surfaces_the_vehicle_for_good(flight):
     before = len(vehicle.commands)
     flight.until(lambda: len(vehicle.commands) > before + 10)
     assert set(vehicle.commands[before:]) == {SAFE}
-    flight.until(lambda: vehicle.said('surfacing for good: ordered'))
-    assert flight.control.state.watch.told & ORDERED
+    flight.until(lambda: vehicle.said('surface: ordered to the surface'))
+    assert flight.guard.state.told & ORDERED
 
 
 @pytest.mark.parametrize('factor', [0.0, 2.0])
@@ -137,14 +141,15 @@ def test_quaternion_that_is_none_is_bridged_counted_and_told(flight, factor):
     vehicle = flight.vehicle
     none = (*LEVEL[:3], *(factor * q for q in LEVEL[3:7]), *LEVEL[7:], *CERTAIN)
     vehicle.says = {**INPUTS, 'odom': none}
-    flight.until(lambda: vehicle.said('refused, the last good one serves: a measurement'))
+    flight.until(lambda: vehicle.said('refused a measurement, the last good one serves'))
     vehicle.says = INPUTS
     flight.until(lambda: vehicle.said('samples refused so far'))
     assert not vehicle.said('surfacing')
     assert vehicle.commands[-1] != SAFE
     vehicle.says = {**INPUTS, 'odom': none}
-    flight.until(lambda: vehicle.said('surfacing for good: nothing usable is measured'))
+    flight.until(lambda: vehicle.said('surface: nothing usable is measured'))
     assert vehicle.commands[-1] == SAFE
+    assert flight.guard.state.told & LOST
 
 
 def test_frames_of_ned_are_refused_and_named(flight):

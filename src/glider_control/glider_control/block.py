@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Control as a block."""
 
-from glider_control import watch
 from glider_control.control import (
     SATURATED_BUOYANCY,
     SATURATED_PITCH,
@@ -10,8 +9,8 @@ from glider_control.control import (
     SATURATED_SURFACE,
     ControlParams,
     control_step,
-    control_surface,
 )
+from glider_control.intake import REFUSED, TELL_EVERY_NS
 from glider_control.settings import ControlSettings
 from glider_model.base.block import Block, Said, block_tick
 from glider_model.base.frames import odometry_from_wire, reference_from_wire, wrench_to_wire
@@ -32,7 +31,7 @@ AT_LIMIT = {
 @block_tick.body(ControlParams)
 @kernel
 def control_tick(state, t_s, inputs, params, dt):
-    """One tick: reference, odom, joint_states in; command, wrench, adaptation out."""
+    """One tick: reference, odom, joint_states in; demand, wrench, adaptation out."""
     reference, odom, joints = inputs
     state, out = control_step(
         state,
@@ -49,11 +48,12 @@ def control_tick(state, t_s, inputs, params, dt):
 def say(saturation: int) -> Said:
     """What control has noticed, and which actuators are at their limits."""
     at_limit = ', '.join(name for bit, name in AT_LIMIT.items() if saturation & bit)
-    said = [watch.say(saturation), f'at its limit: {at_limit}' if at_limit else '']
+    said = [
+        'refused a measurement, the last good one serves' if saturation & REFUSED else '',
+        f'at its limit: {at_limit}' if at_limit else '',
+    ]
     message = '; '.join(text for text in said if text)
     level = 'warn' if message else 'ok'
-    if saturation & (watch.SURFACES | watch.STUCK):
-        level = 'error'
     return Said(level, message or 'no actuator at its limit', {'saturation': saturation})
 
 
@@ -63,8 +63,7 @@ CONTROL = Block(
     control_tick,
     flags=('saturation',),
     quiet=(0,),
-    every_ns=watch.TELL_EVERY_NS,
+    every_ns=TELL_EVERY_NS,
     say=say,
-    surface=control_surface,
     steers_by=steers_by,
 )

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Control: watch, measurement, attitude law, steering, vertical-rate law and allocation.
+"""Control: intake, measurement, attitude law, steering, vertical-rate law and allocation.
 
 The channels cannot be swapped: buoyancy sets speed and vertical rate, the mass forward or aft sets
 pitch, the mass turned to a side sets roll and so heading, unless a steering surface does.
@@ -15,24 +15,24 @@ from glider_control.allocation import (
     limit_surface,
     moments,
 )
+from glider_control.intake import (
+    REFUSED,
+    IntakeParams,
+    IntakeState,
+    is_blind,
+    is_refusing,
+    take_in,
+)
 from glider_control.law import Seen, law_learnt, law_step
 from glider_control.surface import steer
 from glider_control.vertical_rate import Trim, vertical_rate_law
-from glider_control.watch import (
-    ORDERED,
-    SURFACES,
-    WatchParams,
-    WatchState,
-    take_in,
-    watch,
-)
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import Adaptation, Joints, Wrench
 from glider_model.onboard.attitude_filter import Measured, measure
 from glider_model.onboard.glide_polar import Polar, glide_speed
 from glider_model.vehicle.rigid_body import GRAVITY
 
-#: Bits of ``ControlOutput.saturation``; those of `glider_control.watch` are between them.
+#: Bits of ``ControlOutput.saturation``; REFUSED, and those of `glider_guard.rows`, are others.
 SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL, SATURATED_SURFACE = 1, 2, 4, 4096
 
 
@@ -49,7 +49,7 @@ class ControlParams(NamedTuple):
     attitude_s: float
     dead_band: Joints
     safe_command: Joints  #: as buoyant as possible, mass at the climb stop, no roll, no turn
-    watch: WatchParams
+    intake: IntakeParams
 
 
 class ControlState(NamedTuple):
@@ -61,7 +61,7 @@ class ControlState(NamedTuple):
     steering: NamedTuple  #: by the vehicle's steering surface
     trim: Trim
     command: Joints  #: last command
-    watch: WatchState
+    intake: IntakeState
 
 
 class ControlOutput(NamedTuple):
@@ -70,7 +70,7 @@ class ControlOutput(NamedTuple):
     command: Joints
     wrench: Wrench
     adaptation: Adaptation
-    saturation: int  #: sum of SATURATED_* bits and of those of `glider_control.watch`
+    saturation: int  #: sum of SATURATED_* bits and of REFUSED
 
 
 @kernel
@@ -83,7 +83,7 @@ def _hold(command, last, band, limit):
 
 @kernel
 def see(measured, taken, last, params):
-    """What a law sees of what was taken in, the `WatchState` of this tick."""
+    """What a law sees of what was taken in, the `IntakeState` of this tick."""
     limits, joints = params.allocation, taken.joints
     speed, alpha = glide_speed(measured.theta, measured.vertical_rate, params.polar)
     tau_p, tau_q = moments(joints.x_p, joints.mu, measured.phi, measured.theta, limits)
@@ -97,37 +97,6 @@ def see(measured, taken, last, params):
         tau_q,
         abs(last.mu) >= limits.mu_max,
         abs(last.x_p) >= limits.x_p_max,
-    )
-
-
-@kernel
-def control_surface(state):
-    """Bring the vehicle to the surface, now and for good."""
-    seen = state.watch
-    return ControlState(
-        state.tick,
-        state.measured,
-        state.law,
-        state.steering,
-        state.trim,
-        state.command,
-        WatchState(
-            seen.gate,
-            seen.joints,
-            seen.joints_s,
-            seen.reference,
-            seen.reference_s,
-            seen.lag_m,
-            seen.lag_s,
-            seen.still_s,
-            seen.deep_s,
-            seen.refused_s,
-            seen.buoyancy,
-            seen.pitch,
-            seen.roll,
-            seen.surface,
-            seen.told | ORDERED,
-        ),
     )
 
 
@@ -152,18 +121,16 @@ def control_step(state, odometry, joints, reference, params, dt):
     ControlState, ControlOutput
     """
     first = state.tick == 0
-    taken = take_in(state.watch, odometry, joints, reference, params.watch, dt)
+    taken = take_in(state.intake, odometry, joints, reference, params.intake, dt)
     odometry, joints = taken.gate.odometry, taken.joints
     last = joints if first else state.command
     limits = params.allocation
     measured = measure(state.measured, odometry, first, params.attitude_s, dt)
-    before = odometry if first else state.watch.gate.odometry
-    watched = watch(taken, before, measured.vertical_rate, last, params.watch, dt)
 
     law, steering, trim = state.law, state.steering, state.trim
     command, tau_p, tau_q = last, 0.0, 0.0
     m_b = last.m_b
-    if watched.told & SURFACES:
+    if is_blind(taken, params.intake):
         command, m_b = params.safe_command, params.safe_command.m_b
     elif taken.gate.seen:
         seen = see(measured, taken, last, params)
@@ -180,7 +147,7 @@ def control_step(state, odometry, joints, reference, params, dt):
                 limit_surface(delta, limits), last.delta, params.dead_band.delta, limits.delta_max
             ),
         )
-    saturation = watched.told
+    saturation = REFUSED if is_refusing(taken) else 0
     if abs(command.m_b) >= limits.m_b_max:
         saturation |= SATURATED_BUOYANCY
     if abs(command.x_p) >= limits.x_p_max:
@@ -192,4 +159,4 @@ def control_step(state, odometry, joints, reference, params, dt):
     learnt = law_learnt(law, params.law)
     output = ControlOutput(command, Wrench(m_b * GRAVITY, tau_p, tau_q), learnt, saturation)
     tick = state.tick + 1 if taken.gate.seen else 0
-    return ControlState(tick, measured, law, steering, trim, command, watched), output
+    return ControlState(tick, measured, law, steering, trim, command, taken), output

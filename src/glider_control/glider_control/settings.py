@@ -11,10 +11,10 @@ from pydantic import Field
 from glider_control import laws, surfaces
 from glider_control.allocation import make_allocation
 from glider_control.control import ControlParams, ControlState
+from glider_control.intake import INITIAL_INTAKE, make_intake
 from glider_control.law import HeadingSettings, LawSettings
 from glider_control.surface import NoSteering, SurfaceLawSettings
 from glider_control.vertical_rate import Trim
-from glider_control.watch import INITIAL_WATCH, make_watch
 from glider_model.base import plugins
 from glider_model.base.settings import ConfigurationError, Settings
 from glider_model.base.signals import Joints
@@ -66,7 +66,7 @@ class FilterSettings(Settings):
 
 
 #: Other parameters of control: no law can have such a name.
-TAKEN = {'law', 'heading', 'buoyancy', 'filters', 'gate', 'vehicle', 'lost_after_s'}
+TAKEN = {'law', 'heading', 'buoyancy', 'filters', 'gate', 'vehicle'}
 #: Settings of every control law by its name.
 LAWS = plugins.classes(plugins.CONTROL_LAWS, LawSettings, laws, TAKEN)
 #: Settings of steering by every kind of surface, by its name.
@@ -140,13 +140,6 @@ class ControlSettings(ControlLawSettings):
     """Everything the control node is told."""
 
     vehicle: str = Field('zhang2021', description='vehicle: masses, ranges, polar, steering')
-    lost_after_s: float = Field(
-        10.0,
-        ge=0.1,
-        le=3600.0,
-        description='free-running: an input that has been stale for so long is lost, and the '
-        'vehicle surfaces for good (s)',
-    )
 
     def params(self) -> 'ControlParams':
         """Kernel parameters."""
@@ -172,7 +165,7 @@ class ControlSettings(ControlLawSettings):
                 math.radians(surface.dead_band_deg) if surface else 0.0,
             ),
             Joints(-kernel_vehicle.m_b_max, -kernel_vehicle.x_p_max, 0.0, 0.0),
-            make_watch(kernel_vehicle, vehicle.rated_depth_m, self.gate.params()),
+            make_intake(kernel_vehicle, self.gate.params()),
         )
 
     def initial_state(self) -> 'ControlState':
@@ -185,5 +178,5 @@ class ControlSettings(ControlLawSettings):
             surface.initial_state() if surface else NoSteering(),
             Trim(0.0, 0.0),
             Joints(0.0, 0.0, 0.0, 0.0),
-            INITIAL_WATCH,
+            INITIAL_INTAKE,
         )

@@ -70,8 +70,6 @@ class Flight:
         net, pitch_deg = GLIDES[vehicle]
         model = ControlSettings.model_validate({'vehicle': vehicle, 'law': 'pid', **fields})
         self.params, self.control = model.params(), model.initial_state()
-        bottomless = self.params.watch._replace(depth_max=math.inf)  # these glides have no turn
-        self.params = self.params._replace(watch=bottomless)
         self.pitch = -sign * math.radians(pitch_deg)
         self.rate = glide_vertical_rate(self.pitch, sign * net, self.params.polar)
         start = {

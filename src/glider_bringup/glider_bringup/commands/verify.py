@@ -13,9 +13,10 @@ from rich.table import Table
 
 from glider_bringup.console import Json, Run, messages, output, picked, repeatable, shares, tell
 from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_model.base.wiring import WIRING
 
 app = typer.Typer()
-BlockName = Literal['plant', 'current', 'navigation', 'guidance', 'control']
+BlockName = Literal[tuple(block.name for block in WIRING)]
 
 
 @app.command(epilog='Example: ./glider verify runs/20260101-120000-current_8deg')

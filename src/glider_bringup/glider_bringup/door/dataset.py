@@ -23,9 +23,11 @@ from glider_control.control import (
     SATURATED_ROLL,
     SATURATED_SURFACE,
 )
-from glider_control.watch import ROWS
+from glider_control.intake import REFUSED
+from glider_guard.block import GUARD
+from glider_guard.rows import ROWS
 from glider_guidance.yo.stage import STAGE_NAMES
-from glider_model.base.block import Telling
+from glider_model.base.block import Block, Telling
 from glider_model.base.frames import (
     euler_from_quaternion,
     from_geodetic,
@@ -152,7 +154,9 @@ def _same(steers_by: str) -> list[_Variable]:
     """What topics carry in the same numbers."""
     return [
         *_joints('joint_states', 'position:', steers_by),
+        *_joints('demand', 'demanded by control:', steers_by),
         *_joints('command', 'commanded:', steers_by),
+        _Variable('drop_weight', 'release', '1', '1 where the guard lets the weight go'),
         _Variable('tracking_error', 'along', 'm', 'ahead of the virtual target', PATH),
         _Variable('tracking_error', 'across', 'm', 'starboard of the virtual target', PATH),
         _Variable('tracking_error', 'below', 'm', 'below the virtual target', PATH),
@@ -289,13 +293,25 @@ _AS_NUMBERS = {
 }
 
 
-def _as_told(saturation: np.ndarray) -> np.ndarray:
-    """Saturation masks, int16[n], as a bag has them: a change is told at most once a second."""
-    stamps_ns = np.arange(len(saturation)) * TICK_NS
-    told = Telling(CONTROL).among(saturation[:, None].astype(np.int64), stamps_ns)
-    values = np.append(0, saturation[told])
-    lengths = np.diff(np.concatenate(([0], told, [len(saturation)])))
-    return np.repeat(values, lengths).astype(np.int16)
+def _as_told(block: Block, flag: str, log: np.ndarray) -> np.ndarray:
+    """Bits of a flag, int32[n], as a bag has them: a change is told at most once a second."""
+    bits = log[:, COLUMNS[flag]].astype(np.int64)
+    told = Telling(block).among(bits[:, None], np.arange(len(bits)) * TICK_NS)
+    values = np.append(0, bits[told])
+    lengths = np.diff(np.concatenate(([0], told, [len(bits)])))
+    return np.repeat(values, lengths).astype(np.int32)
+
+
+def _bits(block: Block, flag: str, log: np.ndarray, what: str, names: dict[int, str]) -> tuple:
+    """Variable of a flag that is a sum of bits, with their names."""
+    about = {
+        'units': '1',
+        'topic': '/diagnostics',
+        'long_name': f'{what}, bit by bit, told once a second at most',
+        'flag_masks': np.array(list(names), dtype=np.int32),
+        'flag_meanings': ' '.join(names.values()),
+    }
+    return 'time', _as_told(block, flag, log), about
 
 
 def _flags(log: np.ndarray) -> dict[str, tuple]:
@@ -307,7 +323,7 @@ def _flags(log: np.ndarray) -> dict[str, tuple]:
         SATURATED_PITCH: 'pitch_mass_at_limit',
         SATURATED_ROLL: 'roll_mass_at_limit',
         SATURATED_SURFACE: 'steering_surface_at_limit',
-        **{bit: name for bit, (name, _) in ROWS.items()},
+        REFUSED: 'measurement_refused',
     }
     names = ['unknown', *(name.replace(' ', '_') for name in STAGE_NAMES)]
     told = {'units': '1', 'topic': '/diagnostics'}
@@ -327,15 +343,9 @@ def _flags(log: np.ndarray) -> dict[str, tuple]:
             log[:, COLUMNS['infeasible']].astype(np.int8),
             {**told, 'long_name': '1 where the course cannot be held in this current'},
         ),
-        'saturation': (
-            'time',
-            _as_told(log[:, COLUMNS['saturation']].astype(np.int64)),
-            {
-                **told,
-                'long_name': 'what control notices, bit by bit, told once a second at most',
-                'flag_masks': np.array(list(bits), dtype=np.int16),
-                'flag_meanings': ' '.join(bits.values()),
-            },
+        'saturation': _bits(CONTROL, 'saturation', log, 'what control notices', bits),
+        'guard': _bits(
+            GUARD, 'guard', log, 'what the guard tells', {row.bit: row.name for row in ROWS}
         ),
     }
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The direct engine: the steps of the five nodes in one compiled loop.
+"""The direct engine: the steps of the six nodes in one compiled loop.
 
 What a message would do to the numbers (NED to ENU and back, through a quaternion) is done here
 too, so that a run over topics and a direct run of one scenario agree to the last bit.
@@ -14,18 +14,23 @@ import numpy as np
 from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_control.block import control_tick
 from glider_control.control import ControlParams, ControlState
+from glider_guard.block import guard_tick
+from glider_guard.guard import GuardParams, GuardState
 from glider_guidance.block import guidance_tick
 from glider_guidance.guidance import GuidanceParams, GuidanceState
 from glider_model.base.block import put
 from glider_model.base.frames import odometry_from_wire, water_to_wire
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import TICK_S, Joints
-from glider_model.base.wiring import FIELDS, publisher
+from glider_model.base.wiring import FIELDS, PLANT, publisher
 from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
 from glider_model.plant.block import plant_move, plant_outputs
 from glider_model.plant.plant import PlantParams, PlantState, not_finite, state_fault
 from glider_navigation.block import navigation_tick
 from glider_navigation.settings import NavigationParams
+
+#: Place of pressure among what the plant measures, which does not include /clock.
+PRESSURE = PLANT.outputs.index('pressure') - 1
 
 
 class NotFiniteError(Exception):
@@ -33,23 +38,25 @@ class NotFiniteError(Exception):
 
 
 class MissionParams(NamedTuple):
-    """Parameters of the five blocks."""
+    """Parameters of the six blocks."""
 
     plant: PlantParams
     current: CurrentParams
     navigation: NavigationParams
     guidance: GuidanceParams
     control: ControlParams
+    guard: GuardParams
 
 
 class MissionState(NamedTuple):
-    """States of the five blocks."""
+    """States of the six blocks."""
 
     plant: PlantState
     current: CurrentState
     navigation: NamedTuple  #: of the method that was chosen
     guidance: GuidanceState
     control: ControlState
+    guard: GuardState
 
 
 @kernel
@@ -75,7 +82,7 @@ def fly(state, params, log, dt):
     bool
         Whether the mission has ended.
     """
-    plant, current, navigation, guidance, control = state
+    plant, current, navigation, guidance, control, guard = state
     for row in range(log.shape[0]):
         t_s = plant.tick * dt
         measured, finished = plant_outputs(plant, params.plant)
@@ -90,13 +97,17 @@ def fly(state, params, log, dt):
         odom = believed[0]
         guidance, guided, stage = guidance_tick(guidance, t_s, (odom,), params.guidance, dt)
         seen = (guided[0], odom, joints)
-        control, controlled, told = control_tick(control, t_s, seen, params.control, dt)
-        plant = plant_move(plant, (controlled[0], water), params.plant, dt)
-        put(log, row, 0, (*measured, water, *believed, *guided, *controlled, phase, stage, told))
+        control, controlled, limits = control_tick(control, t_s, seen, params.control, dt)
+        seen = (controlled[0], guided[0], odom, joints, measured[PRESSURE])
+        guard, guarded, told = guard_tick(guard, t_s, seen, params.guard, dt)
+        plant = plant_move(plant, (guarded[0], water, guarded[1]), params.plant, dt)
+        said = (phase, stage, limits, told)
+        put(log, row, 0, (*measured, water, *believed, *guided, *controlled, *guarded, *said))
         if finished:
-            state = MissionState(plant, current, navigation, guidance, control)
+            state = MissionState(plant, current, navigation, guidance, control, guard)
             return state, row + 1, True
-    return MissionState(plant, current, navigation, guidance, control), log.shape[0], False
+    state = MissionState(plant, current, navigation, guidance, control, guard)
+    return state, log.shape[0], False
 
 
 def _finite_rows(log: np.ndarray) -> int:

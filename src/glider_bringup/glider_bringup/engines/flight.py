@@ -34,7 +34,7 @@ class Taker(Protocol):
 
 
 def mission_of(scenario: Scenario) -> tuple[MissionState, MissionParams]:
-    """State at tick 0 and parameters of the five blocks."""
+    """State at tick 0 and parameters of the six blocks."""
     blocks = scenario.block_settings()
     state = MissionState(*(block.initial_state() for block in blocks))
     return state, MissionParams(*(block.params() for block in blocks))

@@ -30,7 +30,7 @@ MODULES |= {RECORDER: 'glider_bringup.nodes.recorder_node', PLANT: wiring.PLANT.
 
 #: The process that has the nodes of these blocks in it, and its module.
 AUTOPILOT, AUTOPILOT_MODULE = 'autopilot', 'glider_bringup.nodes.autopilot'
-ON_BOARD = (wiring.NAVIGATION, wiring.GUIDANCE, wiring.CONTROL)
+ON_BOARD = (wiring.NAVIGATION, wiring.GUIDANCE, wiring.CONTROL, wiring.GUARD)
 
 #: Remapping that brings the clock into the namespace: docs/adr/0013.
 OWN_CLOCK = ('/clock', 'clock')
@@ -59,7 +59,7 @@ class RunnerResult(NamedTuple):
 
 
 def process_modules(autopilot: bool = False) -> dict[str, str]:
-    """Module of every process: of each node, or of the autopilot in the place of three of them."""
+    """Module of every process: of each node, or of the autopilot in the place of four of them."""
     if not autopilot:
         return dict(MODULES)
     aboard = {wired.node for wired in ON_BOARD}
@@ -76,7 +76,7 @@ def node_commands(
     """Command line of every process.
 
     With ``own_clock`` the clock lies in the namespace, so that gliders can share a ROS domain.
-    With ``autopilot`` navigation, guidance and control are one process.
+    With ``autopilot`` navigation, guidance, control and guard are one process.
     """
     ros = ['--ros-args', '--params-file', str(params_file), '-r', f'__ns:={namespace}']
     if own_clock:

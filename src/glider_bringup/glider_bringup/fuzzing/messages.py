@@ -19,10 +19,11 @@ from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission.scenario import load_scenario
 from glider_control.control import control_step
+from glider_guard.block import guard_tick
 from glider_guidance.guidance import guidance_step
 from glider_model.base.frames import odometry_from_wire, reference_from_wire
 from glider_model.base.signals import TICK_NS, TICK_S, Joints, Water
-from glider_model.base.wiring import NAVIGATION, SENSORS
+from glider_model.base.wiring import GUARD, NAVIGATION, SENSORS
 from glider_model.ocean.current import current_step
 from glider_model.plant.plant import plant_step
 from glider_model.ros.lockstep.inputs import Input
@@ -31,7 +32,7 @@ from glider_model.ros.wire.topics import TOPICS
 from glider_navigation.block import navigation_tick
 
 #: Topics that a block reads. What the plant makes of a wild current it says itself: it fails.
-READ = ('odom', 'joint_states', 'reference', 'command', *SENSORS)
+READ = ('odom', 'joint_states', 'reference', 'demand', 'command', 'drop_weight', *SENSORS)
 #: Missions by their names, and what is changed in them.
 SCENES = {
     'adaptive': {'control.law': 'adaptive'},
@@ -104,7 +105,7 @@ MUTATIONS = (_with_wild_numbers, _flipped, _cut_or_longer, _noise, _of_another_l
 
 def _outputs(scene: Scene, name: str, values: tuple[float, ...]) -> list[float]:
     """Numbers that the readers of a topic make of a message and of good ones after it."""
-    plant, current, navigation, guidance, control = scene.state
+    plant, current, navigation, guidance, control, guard = scene.state
     made: list[float] = []
     limits = scene.params.control.allocation
     for tick in range(1 + AFTER):
@@ -121,13 +122,21 @@ def _outputs(scene: Scene, name: str, values: tuple[float, ...]) -> list[float]:
         control, out = control_step(
             control, odometry, joints, reference, scene.params.control, TICK_S
         )
-        target = Joints(*wires['command'])
-        plant = plant_step(plant, target, Water(0.0, 0.0, 0.0), scene.params.plant, TICK_S)
+        heard = tuple(wires[topic] for topic in GUARD.inputs)
+        guard, guarded, _ = guard_tick(guard, 0.0, heard, scene.params.guard, TICK_S)
+        target, drops = Joints(*wires['command']), wires['drop_weight'][0] > 0.5
+        plant = plant_step(plant, target, Water(0.0, 0.0, 0.0), scene.params.plant, TICK_S, drops)
         _, water = current_step(current, odometry[:3], 0.0, scene.params.current, TICK_S)
         made += [*guided.reference, *guided.error, *out.command, *out.wrench, *plant.motion]
         made += water if np.all(np.isfinite(odometry[:3])) else ()
         most = (limits.m_b_max, limits.x_p_max, limits.mu_max, limits.delta_max)
-        made += [np.nan for x, limit in zip(out.command, most, strict=True) if not abs(x) <= limit]
+        made += guarded[0]
+        made += [
+            np.nan
+            for command in (out.command, guarded[0])
+            for x, limit in zip(command, most, strict=True)
+            if not abs(x) <= limit
+        ]
     return made
 
 

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from glider_bringup.mission.rules import Rules
 from glider_control.settings import ControlLawSettings, ControlSettings
+from glider_guard.settings import GuardLimitSettings, GuardSettings
 from glider_guidance.path.curve import path_length, path_point
 from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
@@ -106,6 +107,9 @@ class Scenario(Settings):
     profile: ProfileSettings = Field(ProfileSettings(), description='sawtooth')
     guidance: GuidanceLawSettings = Field(GuidanceLawSettings(), description='guidance')
     control: ControlLawSettings = Field(ControlLawSettings(), description='control')
+    guard: GuardLimitSettings = Field(
+        GuardLimitSettings(), description='when the guard acts, which has the last word'
+    )
 
     @pydantic.field_validator('current')
     @classmethod
@@ -183,7 +187,9 @@ class Scenario(Settings):
             **self._believing(self.guidance),
         )
 
-    def _believing(self, law: GuidanceLawSettings | ControlLawSettings) -> dict[str, Any]:
+    def _believing(
+        self, law: GuidanceLawSettings | ControlLawSettings | GuardLimitSettings
+    ) -> dict[str, Any]:
         """Fields of a law that is told where the vehicle believes it is.
 
         A belief may jump at a fix as far as it was off: that is no fault, unless somebody said so.
@@ -197,6 +203,15 @@ class Scenario(Settings):
         """What the control node is told."""
         return ControlSettings(vehicle=self.vehicle, **self._believing(self.control))
 
+    def guard_settings(self) -> GuardSettings:
+        """What the guard node is told."""
+        return GuardSettings(
+            vehicle=self.vehicle,
+            pressure='pressure' in self.topics,
+            imu_period_s=self.sensors.imu_period_s,
+            **self._believing(self.guard),
+        )
+
     def block_settings(self) -> tuple[Settings, ...]:
         """What the node of each block is told, in the order of `glider_bringup.blocks`."""
         return (
@@ -205,6 +220,7 @@ class Scenario(Settings):
             self.navigation_settings(),
             self.guidance_settings(),
             self.control_settings(),
+            self.guard_settings(),
         )
 
     def settle_time_s(self, sim_time_s: float) -> float:

@@ -1,10 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Navigation, guidance and control as three nodes in one process, for a computer on board.
+"""Navigation, guidance, control and guard as four nodes in one process, for a computer on board.
 
-``autopilot guidance control`` leaves navigation out, for a vehicle that publishes odom itself.
-Names, topics and parameters are those of the nodes: a parameter file serves as it serves them, and
-``-p control_node:law:=pid`` sets the parameter of one.
+``autopilot guidance control guard`` leaves navigation out, for a vehicle that publishes odom
+itself. Names, topics and parameters are those of the nodes: a parameter file serves as it serves
+them, and ``-p control_node:law:=pid`` sets the parameter of one.
 """
 
 import sys
@@ -12,13 +12,19 @@ import sys
 from rclpy.utilities import remove_ros_args
 
 from glider_control.nodes.control_node import ControlNode
+from glider_guard.nodes.guard_node import GuardNode
 from glider_guidance.nodes.guidance_node import GuidanceNode
 from glider_model.base.exits import EXIT_USAGE, say_fatal
 from glider_model.ros.lockstep.process import run_together
 from glider_navigation.nodes.navigation_node import NavigationNode
 
 #: Nodes by the names of their blocks, in the order in which they act in a tick.
-PARTS = {'navigation': NavigationNode, 'guidance': GuidanceNode, 'control': ControlNode}
+PARTS = {
+    'navigation': NavigationNode,
+    'guidance': GuidanceNode,
+    'control': ControlNode,
+    'guard': GuardNode,
+}
 
 
 def main(args=None) -> int:

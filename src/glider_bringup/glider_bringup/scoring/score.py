@@ -21,7 +21,9 @@ from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.navigation import NavigationScorer
 from glider_bringup.scoring.true_motion import TrueMotion, wire_of
-from glider_control.watch import ROWS, SURFACES, TELL_EVERY_NS, say
+from glider_control.intake import REFUSED
+from glider_guard.block import TELL_EVERY_NS
+from glider_guard.rows import ALL, LATCHED, NOTE, REACTIONS, ROWS, reaction_of
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_model.base.block import changes_to_tell
 from glider_model.base.frames import (
@@ -42,8 +44,10 @@ HEADING_MEAN_S = 300.0
 #: A run is infeasible if the course could not be held for this share of the scored time.
 INFEASIBLE_SHARE = 0.5
 
-#: So many events of the watch are kept.
+#: So many events of the guard are kept.
 EVENTS_KEPT = 100
+#: What the event of a refused measurement says.
+REFUSED_SAYS = 'a measurement was refused, the last good one serves'
 
 _SERIES = 15
 _DEPTH, _E2, _PITCH, _PITCH_REF, _HEADING, _RATE_REF = range(6)
@@ -53,7 +57,8 @@ _MASK, _TOLD_E2, _SURFACE = 12, 13, 14
 _ODOM, _REFERENCE = COLUMNS['odom'], COLUMNS['reference']
 _E2_COLUMN = COLUMNS['tracking_error'].start + 1
 _INFEASIBLE_COLUMN = COLUMNS['infeasible']
-_STAGE_COLUMN, _MASK_COLUMN = COLUMNS['stage'], COLUMNS['saturation']
+_STAGE_COLUMN = COLUMNS['stage']
+_MASK_COLUMN, _GUARD_COLUMN = COLUMNS['saturation'], COLUMNS['guard']
 _ODOM_START, _REFERENCE_START = _ODOM.start, _REFERENCE.start
 _JOINTS_START = COLUMNS['joint_states'].start
 
@@ -79,7 +84,7 @@ def _extract(log, series):
         series[_NET_HEAVINESS, row] = log[row, _JOINTS_START]
         series[_PITCH_MASS, row] = log[row, _JOINTS_START + 1]
         series[_ROLL_MASS, row] = log[row, _JOINTS_START + 2]
-        series[_MASK, row] = log[row, _MASK_COLUMN]
+        series[_MASK, row] = np.int64(log[row, _MASK_COLUMN]) | np.int64(log[row, _GUARD_COLUMN])
         series[_SURFACE, row] = log[row, _JOINTS_START + 3]
 
 
@@ -243,19 +248,23 @@ def _cross_track(e2: np.ndarray, steady: np.ndarray, scored: np.ndarray) -> dict
 
 
 def _guard(mask: np.ndarray) -> dict:
-    """What control noticed in flight, as it told it.
+    """What the guard noticed in flight and did, and what control refused, as they told it.
 
     Parameters
     ----------
     mask : float64[ticks]
-        Sum of the bits of `glider_control.watch` and of actuators at their limits.
+        Sum of the bits of `glider_guard.rows` and of `glider_control`. Before there was a guard
+        they were told together.
 
     Returns
     -------
     dict
-        state, reaction, and the first `EVENTS_KEPT` events {t_s, row, reaction, message}.
+        state: flying, or latched; reaction at the end; and the first `EVENTS_KEPT` events
+        {t_s, row, reaction, message}.
     """
-    bits = mask.astype(np.int64) & sum(ROWS)
+    rows = {row.bit: (row.name, REACTIONS[row.reaction], row.says) for row in ROWS}
+    rows[REFUSED] = ('measurement_refused', REACTIONS[NOTE], REFUSED_SAYS)
+    bits = mask.astype(np.int64) & (ALL | REFUSED)
     stamps_ns = np.arange(len(bits)) * TICK_NS
     events, before = [], 0
     told = np.zeros(1, np.int64)
@@ -263,19 +272,13 @@ def _guard(mask: np.ndarray) -> dict:
         new = int(bits[tick]) & ~before
         before = int(bits[tick])
         events += [
-            {
-                't_s': _round(tick * TICK_S),
-                'row': row,
-                'reaction': 'surface' if bit & SURFACES else 'none',
-                'message': say(bit),
-            }
-            for bit, (row, _) in ROWS.items()
+            {'t_s': _round(tick * TICK_S), 'row': row, 'reaction': reaction, 'message': says}
+            for bit, (row, reaction, says) in rows.items()
             if new & bit
         ]
-    surfaces = bool(before & SURFACES)
     return {
-        'state': 'surfacing' if surfaces else 'flying',
-        'reaction': 'surface' if surfaces else 'none',
+        'state': 'latched' if before & LATCHED else 'flying',
+        'reaction': REACTIONS[reaction_of(before)],
         'events': events[:EVENTS_KEPT],
     }
 

@@ -1,51 +1,31 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Control as a node: odom, joint_states and reference in; command and wrench out."""
+"""Control as a node: odom, joint_states and reference in; demand and wrench out."""
 
 import sys
 
 from glider_control.block import CONTROL
-from glider_model.base.signals import TICK_S
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.block_node import BlockNode
-from glider_model.ros.lockstep.orders import SURFACE
 from glider_model.ros.lockstep.process import run
 
 
 class ControlNode(BlockNode):
-    """How to get there. Free-running, it surfaces the vehicle when an input is stale."""
-
-    when_stale = 'commanding the safe state until then'
+    """How to get there. Free-running, it is silent while an input is stale."""
 
     def __init__(self, **kwargs) -> None:
         super().__init__(CONTROL, **kwargs)
         self.refused = 0
-        self.stale_ticks = 0
         self.start_up()
-
-    def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
-        """Answer one tick."""
-        self.stale_ticks = 0
-        super().step(stamp_ns, *inputs)
 
     def tell(self, stamp_ns: int, flags: tuple[int, ...]) -> None:
         """Put a change of saturation on /diagnostics."""
         super().tell(stamp_ns, flags)
-        refused = self.state.watch.gate.refused
+        refused = self.state.intake.gate.refused
         if refused != self.refused:
             self.refused = refused
             said = f'odometry: {refused} samples refused so far'
             self.event(stamp_ns, health.WARN, said, odom_refused=refused)
-
-    def on_stale(self, stamp_ns: int) -> None:
-        """Command what surfaces the vehicle, after a while for good."""
-        self.stale_ticks += 1
-        if self.stale_ticks == round(self.settings.lost_after_s / TICK_S):
-            self.surface(SURFACE)
-            said = f'input lost for {self.settings.lost_after_s:g} s: surfacing for good'
-            self.event(stamp_ns, health.ERROR, said)
-        publish_command = self.senders[0]
-        publish_command(stamp_ns, self.params.safe_command)
 
 
 def main(args=None) -> int:

@@ -106,13 +106,15 @@ PORTS = {
         'geometry_msgs/msg/Vector3Stamped', tuple(f'vector.{axis}' for axis in _XYZ), PATH_FRAME
     ),
     'current_estimate': Port('geometry_msgs/msg/TwistStamped', _TWIST, MAP),
-    'command': _joints(),
+    'demand': _joints(),
     'wrench': Port(
         'geometry_msgs/msg/WrenchStamped',
         ('wrench.force.z', 'wrench.torque.x', 'wrench.torque.y'),
         BASE_LINK,
     ),
     'adaptation': _named(Adaptation._fields),
+    'command': _joints(),
+    'drop_weight': _named(('release',)),
 }
 #: Numbers of each of them, by the names of their fields.
 FIELDS = {topic: port.fields for topic, port in PORTS.items()}
@@ -150,7 +152,7 @@ BELIEFS = ('believed_current', 'believed_surface_current')
 PLANT = Wired(
     'plant',
     'glider_model',
-    inputs=('command', 'current_velocity'),
+    inputs=('command', 'current_velocity', 'drop_weight'),
     outputs=(
         '/clock',
         'ground_truth/odom',
@@ -177,12 +179,18 @@ CONTROL = Wired(
     'control',
     'glider_control',
     inputs=('reference', 'odom', 'joint_states'),
-    outputs=('command', 'wrench', 'adaptation'),
+    outputs=('demand', 'wrench', 'adaptation'),
+)
+GUARD = Wired(
+    'guard',
+    'glider_guard',
+    inputs=('demand', 'reference', 'odom', 'joint_states', 'pressure'),
+    outputs=('command', 'drop_weight'),
 )
 
 #: In the order in which they act in a tick. The plant acts at both ends: what it measures begins
 #: the tick, and it moves when all others have answered.
-WIRING = (PLANT, CURRENT, NAVIGATION, GUIDANCE, CONTROL)
+WIRING = (PLANT, CURRENT, NAVIGATION, GUIDANCE, CONTROL, GUARD)
 
 
 def present(names: Iterable[str], topics: Iterable[str]) -> tuple[str, ...]:

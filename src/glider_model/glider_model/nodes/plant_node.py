@@ -23,8 +23,9 @@ class PlantNode(ClockNode):
         self.steers_by = PLANT.steers_by(settings)
         self.params = settings.params()
         self.state = settings.initial_state()
-        #: newest command and water velocity; none moves the actuators before the first command
-        self.newest = [tuple(self.state.joints), at_rest('current_velocity')]
+        #: newest of each input; none moves the actuators before the first command
+        self.newest = [at_rest(topic) for topic in PLANT.wired.inputs]
+        self.newest[PLANT.wired.inputs.index('command')] = tuple(self.state.joints)
         self.is_last = False  #: the tick that was published last ends the run
         outputs = PLANT.wired.outputs
         self.publish_clock, *self.senders = map(self.add_output, present(outputs, settings.topics))

@@ -18,6 +18,8 @@ from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
 from glider_model.base.signals import Odometry
 
+#: Actuators that say they are farther out than this many ranges are not believed (-).
+JOINT_RANGES = 1.5
 #: Deviation of a quaternion's squared norm from 1: from here it is scaled, from there refused (-).
 NORM_SCALED, NORM_REFUSED = 1e-9, 0.02
 
@@ -105,6 +107,17 @@ def is_plausible(odometry, params):
         and abs(x.p) <= params.rate_max
         and abs(x.q) <= params.rate_max
         and abs(x.r) <= params.rate_max
+    )
+
+
+@kernel
+def are_believed(joints, ranges):
+    """Whether actuators can be where somebody says; false for NaN."""
+    return (
+        abs(joints.m_b) <= JOINT_RANGES * ranges.m_b
+        and abs(joints.x_p) <= JOINT_RANGES * ranges.x_p
+        and abs(joints.mu) <= JOINT_RANGES * ranges.mu
+        and abs(joints.delta) <= JOINT_RANGES * ranges.delta
     )
 
 

@@ -29,10 +29,10 @@ def plant_outputs(state, params):
 
 @kernel
 def plant_move(state, inputs, params, dt):
-    """State a tick later, under command and current_velocity."""
-    command, water = inputs
+    """State a tick later, under command, current_velocity and drop_weight."""
+    command, water, drop = inputs
     target = Joints(command[0], command[1], command[2], command[3])
-    return plant_step(state, target, water_from_wire(water), params, dt)
+    return plant_step(state, target, water_from_wire(water), params, dt, drop[0] > 0.5)
 
 
 PLANT = Block(WIRED, PlantSettings, plant_move, ('finished',), steers_by=steers_by)

@@ -68,6 +68,7 @@ class PlantState(NamedTuple):
     afloat_ticks: int  #: those in which the pump was not filled; -1: has not dived yet
     sample: Sample  #: what the sensors showed at the tick before
     surfacing: Surfacing
+    is_dropped: bool  #: the drop weight is gone
 
 
 LAUNCHED = Surfacing(0, False, 0)
@@ -186,6 +187,7 @@ class PlantSettings(Settings):
             -1,
             NO_SAMPLE,
             LAUNCHED,
+            False,
         )
 
 
@@ -212,7 +214,7 @@ def plant_odometry(state):
 
 
 @kernel
-def plant_step(state, command, water, params, dt):
+def plant_step(state, command, water, params, dt, drops=False):
     """Advance the plant by one tick.
 
     Parameters
@@ -225,6 +227,8 @@ def plant_step(state, command, water, params, dt):
     params : PlantParams
     dt : float
         Length of the tick (s).
+    drops : bool
+        The drop weight, if there is one, is let go.
 
     Returns
     -------
@@ -238,10 +242,15 @@ def plant_step(state, command, water, params, dt):
             (water.v_e - state.water.v_e) / dt,
             (water.v_d - state.water.v_d) / dt,
         )
+    is_dropped = state.is_dropped or drops
+    before, after = (
+        _relieved(state.joints, state.is_dropped, params.vehicle),
+        _relieved(joints, is_dropped, params.vehicle),
+    )
     steps, motion, error = 1, state.motion, math.inf
     while error > LARGEST_ERROR_J and steps <= MOST_STEPS:
         motion, error = integrate(
-            state.motion, state.joints, joints, water, water_rate, params, dt, steps
+            state.motion, before, after, water, water_rate, params, dt, steps
         )
         steps *= 2
     deep = motion.p_d > params.dive_below or (state.deep and motion.p_d >= params.dive_above)
@@ -263,7 +272,16 @@ def plant_step(state, command, water, params, dt):
         afloat_ticks,
         sample,
         _surface(state.surfacing, motion.p_d),
+        is_dropped,
     )
+
+
+@kernel
+def _relieved(joints, is_dropped, vehicle):
+    """Actuators of a vehicle, its net heaviness less the drop weight if that is gone."""
+    if not is_dropped or vehicle.drop_weight == 0.0:
+        return joints
+    return Joints(joints.m_b - vehicle.drop_weight, joints.x_p, joints.mu, joints.delta)
 
 
 @kernel

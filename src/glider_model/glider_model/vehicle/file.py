@@ -120,6 +120,10 @@ class _Body(Settings):
     hull: HullSettings
     #: Deepest that the hull is meant to go. Recordings made before there was this field lack it.
     rated_depth: quantity('m', gt=0.0, le=12000.0) | None = None
+    #: Deeper than this the hull may give way.
+    crush_depth: quantity('m', gt=0.0, le=15000.0) | None = None
+    #: Weight in water of what is let go in need.
+    drop_weight: quantity('kg', gt=0.0, le=100.0) | None = None
     added_mass: AddedMassSettings
     hydrodynamics: HydrodynamicsSettings
     steering: SteeringSettings
@@ -154,6 +158,15 @@ class Vehicle(_Steered):
         return self
 
     @pydantic.model_validator(mode='after')
+    def _crushes_below_its_rating(self):
+        if self.rated_depth and self.crush_depth_m <= self.rated_depth.value:
+            raise ValueError(
+                f'crush_depth: {self.crush_depth_m:g} m (allowed: > {self.rated_depth.value:g} m, '
+                'its rated_depth)'
+            )
+        return self
+
+    @pydantic.model_validator(mode='after')
     def _mass_is_positive(self):
         fault = mass_fault(self.params())
         if fault:
@@ -181,6 +194,11 @@ class Vehicle(_Steered):
     def rated_depth_m(self) -> float:
         """Deepest that the hull is meant to go (m); infinite if its file does not say."""
         return self.rated_depth.value if self.rated_depth else math.inf
+
+    @property
+    def crush_depth_m(self) -> float:
+        """Depth at which the hull may give way (m); infinite if its file does not say."""
+        return self.crush_depth.value if self.crush_depth else math.inf
 
     def params(self) -> 'VehicleParams':
         """Kernel parameters, SI and radians."""
@@ -232,6 +250,7 @@ class Vehicle(_Steered):
             mu_max=math.radians(mass.rotation.value),
             mu_rate=math.radians(mass.rotation_rate.value),
             ballast=0.0,
+            drop_weight=self.drop_weight.value if self.drop_weight else 0.0,
             surface=surface.params() if surface else NoSurface(),
             delta_max=math.radians(surface.range.value) if surface else 0.0,
             delta_rate=math.radians(surface.rate.value) if surface else 0.0,
@@ -294,6 +313,7 @@ class VehicleParams(NamedTuple):
     mu_max: float
     mu_rate: float
     ballast: float  #: net heaviness beside that of the buoyancy engine (kg, + sinks)
+    drop_weight: float  #: weight in water of what can be let go (kg); 0: nothing
     surface: NamedTuple  #: of its steering surface, by its kind
     delta_max: float  #: range (rad) and rate (rad/s) of the steering surface; 0 without
     delta_rate: float

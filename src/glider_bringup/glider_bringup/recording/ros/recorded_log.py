@@ -32,6 +32,15 @@ def is_before_navigation(recorded: Iterable[str]) -> bool:
     return 'odom' in recorded and recorded.isdisjoint({'ground_truth/odom', *SENSORS})
 
 
+#: Topics that came with the guard: before, control published command itself.
+GUARDED = ('demand', 'drop_weight')
+
+
+def is_before_guard(recorded: Iterable[str]) -> bool:
+    """Whether topics were recorded when control still had the last word on the command."""
+    return 'command' in recorded and set(GUARDED).isdisjoint(recorded)
+
+
 def _known_name(topic: str) -> str:
     """Our name of a recorded topic, whatever its namespace; its own if it is none of ours."""
     for name in TOPICS:
@@ -46,8 +55,8 @@ def _stage_number(name: str) -> float:
 
 
 def _mask(text: str) -> float:
-    """Saturation mask; 0 for what is none."""
-    return float(int(text)) if text.isdecimal() and len(text) < 7 else 0.0
+    """Sum of bits; 0 for what is none."""
+    return float(int(text)) if text.isdecimal() and len(text) < 10 else 0.0
 
 
 #: Columns of a row that events on /diagnostics tell, by their keys, and how they are read.
@@ -55,6 +64,7 @@ _FLAGS = {
     'infeasible': lambda text: float(text == 'true'),
     'stage': _stage_number,
     'saturation': _mask,
+    'guard': _mask,
 }
 
 
@@ -200,7 +210,7 @@ class RecordedLog:
         missing = np.flatnonzero(self._has[:BLOCK_TICKS] != whole)
         rows = int(missing[0]) if len(missing) else BLOCK_TICKS
         block = self._log[:rows].copy()
-        block[:, [COLUMNS['infeasible'], COLUMNS['saturation']]] = 0.0
+        block[:, [COLUMNS['infeasible'], COLUMNS['saturation'], COLUMNS['guard']]] = 0.0
         for tick, column, value in self._flags:
             block[max(0, tick - self._start) :, COLUMNS[column]] = value
         if len(missing):
@@ -244,6 +254,8 @@ class RecordedLog:
         """
         names = [topic.name for topic in _PER_TICK]
         left_out = {*SENSORS, *BELIEFS} - self._recorded
+        if is_before_guard(self._recorded):
+            left_out |= {*GUARDED}
         if not self.counts['ground_truth/odom']:
             left_out |= {'ground_truth/odom'}
         per_tick = [self.counts[name] for name in names if name not in left_out]

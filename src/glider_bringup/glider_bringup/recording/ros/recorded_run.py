@@ -10,8 +10,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
 from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.ros.recorded_log import decode, is_before_navigation
+from glider_bringup.recording.ros.recorded_log import decode, is_before_guard, is_before_navigation
 from glider_model.base.settings import ConfigurationError
+from glider_model.base.wiring import at_rest
 from glider_model.ros.wire.codec import Codec
 from glider_model.ros.wire.topics import TOPICS, topic_of
 
@@ -40,6 +41,16 @@ class Series:
         self.unusable: dict[int, str] = {}
         self._blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._count = 0
+
+    @classmethod
+    def at_rest(cls, topic: str, stamps_ns: np.ndarray) -> 'Series':
+        """Messages of a topic that says nothing, at stamps int64[n]."""
+        series = cls(TOPICS[topic].codec)
+        values = np.tile(at_rest(topic), (len(stamps_ns), 1))
+        series._blocks.append((stamps_ns, values, np.ones(len(stamps_ns), bool)))
+        series._count = len(stamps_ns)
+        series.close()
+        return series
 
     def add(self, batch, chosen: np.ndarray) -> None:
         """Take messages of a batch."""
@@ -142,6 +153,11 @@ class Recording:
         self.series = {name: series for name, series in self.series.items() if len(series)}
         for series in {id(one): one for one in self.series.values()}.values():
             series.close()
+        #: control's demand went straight to the plant, as command, and no weight could be dropped
+        self.before_guard = is_before_guard(self.recorded)
+        if self.before_guard and 'command' in self.series:
+            demand = self.series['demand'] = self.series['command']
+            self.series['drop_weight'] = Series.at_rest('drop_weight', demand.stamps_ns)
 
     def node(self, name: str) -> str:
         """Full name of a node, as it stands on /diagnostics, or of a topic."""

@@ -8,6 +8,8 @@ from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.inputs import Input
 from glider_model.ros.lockstep.node import TickNode
 
+#: Samples of attitude and pressure are old after so many periods: two in a row may be missed.
+OLD_AFTER = 3.0
 _COUNTED = ('lost', 'late')
 _TELL_EVERY_S = 10.0
 
@@ -29,9 +31,17 @@ class StepNode(TickNode):
         if not self.ticks.lockstep:
             self.create_timer(TICK_S, self._on_cycle, clock=self.cycle_clock)
 
+    @property
+    def sample_period_s(self) -> float:
+        """Time (s) between two samples of what is not measured in every tick."""
+        return TICK_S
+
     def max_age_s(self, topic: str) -> float:
         """Age (s) from which on an input is old in free-running mode."""
-        return self.ticks.input_max_age_s
+        at_least_s = self.ticks.input_max_age_s
+        if topic not in SAMPLED:
+            return at_least_s
+        return max(at_least_s, OLD_AFTER * self.sample_period_s)
 
     def _on_cycle(self) -> None:
         self._count()

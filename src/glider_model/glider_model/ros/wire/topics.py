@@ -86,7 +86,7 @@ def recorded_topics(optional: Iterable[str]) -> tuple['Topic', ...]:
 
 
 #: Names of the nodes.
-PLANT, CURRENT, NAVIGATION, GUIDANCE, CONTROL = (wired.node for wired in WIRING)
+PLANT, CURRENT, NAVIGATION, GUIDANCE, CONTROL, GUARD = (wired.node for wired in WIRING)
 RECORDER = 'recorder_node'
 #: Stands for all of them to a recorder.
 REPLAY = 'replay_node'

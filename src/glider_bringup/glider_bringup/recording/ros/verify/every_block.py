@@ -43,6 +43,8 @@ def _reason_to_skip(wired: Wired, settings, recording: Recording, lockstep: bool
         return 'the settings say nothing about it'
     if wired == wiring.NAVIGATION and recording.before_navigation:
         return 'recorded before there was this block'
+    if wired == wiring.GUARD and recording.before_guard:
+        return 'recorded before there was this block'
     topics = optional_topics(settings)
     missing = [name for name in present(wired.inputs, topics) if name not in recording.series]
     if missing:

@@ -50,7 +50,7 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
     if marker is None:
         return skipped(wired.name, f'none of {", ".join(wired.outputs)} is recorded')
     stamps_ns = series[marker].stamps_ns
-    if wired == wiring.CONTROL:
+    if wired == wiring.GUARD:
         safe = np.array(block.params.safe_command)
         if marker == 'command':
             stamps_ns = stamps_ns[~np.all(series[marker].values == safe, axis=1)]

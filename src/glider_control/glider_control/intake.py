@@ -1,0 +1,106 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What control takes in: odometry, actuators and reference that cannot be are refused.
+
+The last good ones serve for a while. What else may fail is for the guard to see, which acts after
+control (`glider_guard`).
+"""
+
+import math
+from typing import NamedTuple
+
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import Joints, Reference
+from glider_model.onboard.gate import (
+    INITIAL_GATE,
+    GateParams,
+    GateState,
+    are_believed,
+    gate_step,
+    is_lost,
+)
+
+#: Told: something was refused.
+REFUSED = 64
+#: A change of what is told is told at most once in this time (ns).
+TELL_EVERY_NS = 1_000_000_000
+#: A refusal is told for so long (s): an event is told once a second at most.
+REFUSAL_TOLD_S = 2.0
+
+
+class IntakeParams(NamedTuple):
+    """What is believed."""
+
+    gate: GateParams
+    range: Joints  #: of the actuators
+
+
+class IntakeState(NamedTuple):
+    """The last that was believed."""
+
+    gate: GateState  #: the odometry that serves
+    joints: Joints
+    joints_s: float  #: time since (s)
+    reference: Reference
+    reference_s: float
+    refused_s: float  #: time since something was refused
+
+
+INITIAL_INTAKE = IntakeState(
+    INITIAL_GATE,
+    Joints(0.0, 0.0, 0.0, 0.0),
+    0.0,
+    Reference(*(12 * (0.0,))),
+    0.0,
+    REFUSAL_TOLD_S,
+)
+
+
+def make_intake(vehicle, gate: GateParams) -> IntakeParams:
+    """Limits of a vehicle (VehicleParams)."""
+    ranges = Joints(vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max, vehicle.delta_max)
+    return IntakeParams(gate, ranges)
+
+
+@kernel
+def _is_finite(reference):
+    """Whether every number that control uses of a reference is finite."""
+    a = reference
+    return math.isfinite(
+        a.p_d + a.phi + a.theta + a.psi + a.v_d + a.phi_dot + a.theta_dot + a.psi_dot
+    )
+
+
+@kernel
+def take_in(state, odometry, joints, reference, params, dt):
+    """Take in what a tick brings; what cannot be is refused, and the last good ones serve.
+
+    Returns
+    -------
+    IntakeState
+        With odometry (``gate.odometry``), ``joints`` and ``reference`` that can be worked with.
+    """
+    gate = gate_step(state.gate, odometry, params.gate, dt)
+    joints_s, reference_s, refused_s = 0.0, 0.0, state.refused_s + dt
+    if not are_believed(joints, params.range):
+        joints, joints_s = state.joints, state.joints_s + dt
+    if not _is_finite(reference):
+        reference, reference_s = state.reference, state.reference_s + dt
+    if gate.age_s > 0.0 or joints_s > 0.0 or reference_s > 0.0:
+        refused_s = 0.0
+    return IntakeState(gate, joints, joints_s, reference, reference_s, refused_s)
+
+
+@kernel
+def is_refusing(state):
+    """Whether something was refused a moment ago."""
+    return state.refused_s < REFUSAL_TOLD_S
+
+
+@kernel
+def is_blind(state, params):
+    """Whether there is nothing left to control by."""
+    hold_s = params.gate.hold_s
+    return (
+        is_lost(state.gate, params.gate) or state.joints_s > hold_s or state.reference_s > hold_s
+    )

@@ -1,0 +1,99 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Actuators that do not follow their commands."""
+
+from typing import NamedTuple
+
+from glider_guard.rows import STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, STUCK_SURFACE
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import Joints
+
+#: Of the way that its rate allows an actuator, the share that it goes at least if it follows.
+STALL_RATE_SHARE = 0.1
+
+
+class ActuatorLimits(NamedTuple):
+    """What actuators of a vehicle can do, and when they do not follow."""
+
+    range: Joints
+    tolerance: Joints  #: off its command by less an actuator is there
+    progress: Joints  #: least way in ``stall_s`` of an actuator that follows
+    stall_s: float
+
+
+class Follower(NamedTuple):
+    """Where an actuator was when it last followed its command, and the time since (s)."""
+
+    position: float
+    waits_s: float
+
+
+class Followers(NamedTuple):
+    """All actuators."""
+
+    buoyancy: Follower
+    pitch: Follower
+    roll: Follower
+    surface: Follower  #: the steering surface
+
+
+_STILL = Follower(0.0, 0.0)
+INITIAL_FOLLOWERS = Followers(_STILL, _STILL, _STILL, _STILL)
+
+
+def make_limits(vehicle, follow_share: float, stall_s: float) -> ActuatorLimits:
+    """Limits of a vehicle (VehicleParams)."""
+    ranges = Joints(vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max, vehicle.delta_max)
+    rates = Joints(vehicle.m_b_rate, vehicle.x_p_rate, vehicle.mu_rate, vehicle.delta_rate)
+    tolerance = Joints(*(follow_share * most for most in ranges))
+    progress = (
+        min(off, STALL_RATE_SHARE * rate * stall_s)
+        for off, rate in zip(tolerance, rates, strict=True)
+    )
+    return ActuatorLimits(ranges, tolerance, Joints(*progress), stall_s)
+
+
+@kernel
+def _follow(state, position, command, tolerance, progress, dt):
+    """Whether an actuator follows: `Follower` of the next tick."""
+    if abs(command - position) <= tolerance or abs(position - state.position) > progress:
+        return Follower(position, 0.0)
+    return Follower(state.position, state.waits_s + dt)
+
+
+@kernel
+def follow(state, joints, command, limits, dt):
+    """All actuators a tick later, and the rows of those that do not follow.
+
+    Parameters
+    ----------
+    state : Followers
+    joints : Joints
+        Where they are.
+    command : Joints
+        What they were last told.
+    limits : ActuatorLimits
+    dt : float
+
+    Returns
+    -------
+    Followers
+    int
+    """
+    off, least = limits.tolerance, limits.progress
+    state = Followers(
+        _follow(state.buoyancy, joints.m_b, command.m_b, off.m_b, least.m_b, dt),
+        _follow(state.pitch, joints.x_p, command.x_p, off.x_p, least.x_p, dt),
+        _follow(state.roll, joints.mu, command.mu, off.mu, least.mu, dt),
+        _follow(state.surface, joints.delta, command.delta, off.delta, least.delta, dt),
+    )
+    told = 0
+    if state.buoyancy.waits_s > limits.stall_s:
+        told |= STUCK_BUOYANCY
+    if state.pitch.waits_s > limits.stall_s:
+        told |= STUCK_PITCH
+    if state.roll.waits_s > limits.stall_s:
+        told |= STUCK_ROLL
+    if state.surface.waits_s > limits.stall_s:
+        told |= STUCK_SURFACE
+    return state, told

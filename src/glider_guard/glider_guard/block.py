@@ -1,0 +1,64 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The guard as a block."""
+
+from glider_guard.guard import GuardParams, GuardState, Heard, guard_step
+from glider_guard.rows import HOLD, ORDERED, REACTIONS, reaction_of
+from glider_guard.rows import say as said_of
+from glider_guard.settings import GuardSettings
+from glider_model.base.block import Block, Said, block_tick
+from glider_model.base.frames import odometry_from_wire
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import Joints
+from glider_model.base.wiring import GUARD as WIRED
+from glider_model.ocean.density import depth_at
+from glider_model.vehicle.file import steers_by
+
+#: A change of what is told is told at most once in this time (ns).
+TELL_EVERY_NS = 1_000_000_000
+
+
+@block_tick.body(GuardParams)
+@kernel
+def guard_tick(state, t_s, inputs, params, dt):
+    """One tick: demand, reference, odom, joint_states, pressure in; command, drop_weight out."""
+    demand, reference, odom, joints, pressure = inputs
+    heard = Heard(
+        Joints(demand[0], demand[1], demand[2], demand[3]),
+        odometry_from_wire(odom),
+        Joints(joints[0], joints[1], joints[2], joints[3]),
+        -reference[2],
+        depth_at(pressure[0]),
+    )
+    state, out = guard_step(state, heard, params, dt)
+    command = (out.command.m_b, out.command.x_p, out.command.mu, out.command.delta)
+    return state, (command, (1.0 if out.drops else 0.0,)), (out.told,)
+
+
+@kernel
+def guard_surface(state):
+    """Bring the vehicle to the surface, now and for good."""
+    return GuardState(
+        state.tick, state.taken, state.followers, state.depths, state.command, state.told | ORDERED
+    )
+
+
+def say(told: int) -> Said:
+    """Rows that hold, and the reaction to them."""
+    reaction = reaction_of(told)
+    level = 'ok' if not told else 'warn' if reaction <= HOLD else 'error'
+    values = {'guard': told, 'reaction': REACTIONS[reaction]}
+    return Said(level, said_of(told) or 'nothing to react to', values)
+
+
+GUARD = Block(
+    WIRED,
+    GuardSettings,
+    guard_tick,
+    flags=('guard',),
+    quiet=(0,),
+    every_ns=TELL_EVERY_NS,
+    say=say,
+    surface=guard_surface,
+    steers_by=steers_by,
+)

@@ -1,0 +1,172 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What depth and time under water tell: too deep, no way up, standing still, frozen."""
+
+from typing import NamedTuple
+
+from glider_guard.rows import (
+    CRUSHING,
+    DISAGREES,
+    FROZEN,
+    NOT_CLIMBING,
+    NOT_RISING,
+    OVERDEPTH,
+    STALLED,
+    TOO_DEEP,
+    UNDER_LONG,
+)
+from glider_model.base.kernel import kernel
+
+#: Longer than this (s) a vehicle may not be too deep.
+TOO_DEEP_S = 1.0
+#: Above this the vehicle is at the surface, and nothing of this is watched (m).
+SURFACE_M = 5.0
+#: For longer than this (s) the depth lags behind the vertical rate before it is told.
+LAG_S = 10.0
+#: The past of the lag fades with this time (s).
+LAG_FADES_S = 600.0
+
+
+class DepthLimits(NamedTuple):
+    """What is too deep, too long and too still."""
+
+    rated: float  #: (m); infinite if nobody says
+    margin: float  #: deeper than rated by this is too deep whatever is commanded (m)
+    crush: float  #: (m); infinite if nobody says
+    over_share: float  #: of the deepest target
+    over_m: float
+    over_s: float
+    progress_m: float  #: upward, in a climb
+    no_climb_s: float
+    drop_after_s: float
+    stalled_m: float
+    stalled_s: float
+    under_s: float  #: infinite: never too long
+    lag_m: float
+    still_s: float
+    jump_m: float  #: a depth that has gone farther in a tick was set anew
+    disagree_m: float
+    disagree_s: float
+
+
+class Depths(NamedTuple):
+    """What is watched of the depth, between two ticks."""
+
+    target: float  #: deepest that was asked for so far (m)
+    deep_s: float  #: time for which the vehicle has been too deep
+    crush_s: float  #: deeper than its hull may bear
+    over_s: float  #: deeper than it was sent
+    mark: float  #: depth from which progress upward is counted (m)
+    climbs_s: float  #: time without progress while rising is commanded
+    rises_s: float  #: while surfacing for good
+    anchor: float  #: depth about which it may be stalled (m)
+    stalled_s: float
+    under_s: float  #: time under water
+    lag_m: float  #: of the measured depth behind the vertical rate
+    lag_s: float  #: for which that has been too much
+    still_s: float  #: for which nothing measured has changed
+    apart_s: float  #: for which two measured depths have differed
+
+
+INITIAL_DEPTHS = Depths(*(14 * (0.0,)))
+
+
+class Sounding(NamedTuple):
+    """What a tick tells of the depth."""
+
+    depth: float  #: by odom (m)
+    before: float  #: the same a tick before
+    rate: float  #: measured vertical rate (m/s, + down)
+    own: float  #: by the pressure alone (m)
+    is_same: bool  #: odom is what it was a tick before
+    target: float  #: that guidance asks for (m)
+
+
+@kernel
+def _count(holds, time_s, dt):
+    """Time (s) for which something has held."""
+    return time_s + dt if holds else 0.0
+
+
+@kernel
+def _lag(lag_m, at, jump_m, dt):
+    """Lag (m) of the depth behind the vertical rate; a depth that was set anew has none."""
+    fallen = at.depth - at.before
+    if abs(fallen) > jump_m:
+        return 0.0
+    return lag_m + dt * (at.rate - lag_m / LAG_FADES_S) - fallen
+
+
+@kernel
+def sound(state, at, ascends, surfaces, limits, dt):
+    """Take in the depth of a tick.
+
+    Parameters
+    ----------
+    state : Depths
+    at : Sounding
+    ascends : bool
+        Whether the last command makes the vehicle buoyant.
+    surfaces : bool
+        Whether it is to surface for good.
+    limits : DepthLimits
+    dt : float
+
+    Returns
+    -------
+    Depths
+    """
+    depth = max(at.depth, at.own)
+    target = max(state.target, at.target)
+    under = depth > SURFACE_M
+    margin = limits.margin if ascends else 0.0
+    over = max(limits.over_m, limits.over_share * target)
+    lag_m = _lag(state.lag_m, at, limits.jump_m, dt)
+    mark = max(state.mark, depth) if ascends and under else depth
+    progress = mark - depth >= limits.progress_m
+    if progress:
+        mark = depth
+    anchor, is_stalled = state.anchor, under and abs(depth - state.anchor) < limits.stalled_m
+    if not is_stalled:
+        anchor = depth
+    return Depths(
+        target,
+        _count(depth > limits.rated + margin, state.deep_s, dt),
+        _count(depth > limits.crush, state.crush_s, dt),
+        _count(depth > target + over, state.over_s, dt),
+        mark,
+        _count(ascends and under and not progress, state.climbs_s, dt),
+        _count(surfaces and under and not progress, state.rises_s, dt),
+        anchor,
+        _count(is_stalled, state.stalled_s, dt),
+        _count(under, state.under_s, dt),
+        lag_m,
+        _count(abs(lag_m) > limits.lag_m, state.lag_s, dt),
+        _count(under and at.is_same, state.still_s, dt),
+        _count(abs(at.own - at.depth) > limits.disagree_m, state.apart_s, dt),
+    )
+
+
+@kernel
+def depth_rows(state, limits):
+    """Rows that hold."""
+    told = 0
+    if state.deep_s > TOO_DEEP_S:
+        told |= TOO_DEEP
+    if state.crush_s > TOO_DEEP_S:
+        told |= CRUSHING
+    if state.over_s > limits.over_s:
+        told |= OVERDEPTH
+    if state.climbs_s > limits.no_climb_s:
+        told |= NOT_CLIMBING
+    if state.rises_s > limits.drop_after_s:
+        told |= NOT_RISING
+    if state.stalled_s > limits.stalled_s:
+        told |= STALLED
+    if state.under_s > limits.under_s:
+        told |= UNDER_LONG
+    if state.lag_s > LAG_S or state.still_s > limits.still_s:
+        told |= FROZEN
+    if state.apart_s > limits.disagree_s:
+        told |= DISAGREES
+    return told

@@ -1,0 +1,52 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The guard as a node: demand and all that is measured in; command and drop_weight out."""
+
+import sys
+
+from glider_guard.block import GUARD
+from glider_model.base.signals import TICK_S
+from glider_model.ros.lockstep import health
+from glider_model.ros.lockstep.block_node import BlockNode
+from glider_model.ros.lockstep.orders import SURFACE
+from glider_model.ros.lockstep.process import run
+
+
+class GuardNode(BlockNode):
+    """The last word. Free-running, it surfaces the vehicle when an input is stale."""
+
+    when_stale = 'commanding the safe state until then'
+
+    def __init__(self, **kwargs) -> None:
+        super().__init__(GUARD, **kwargs)
+        self.stale_ticks = 0
+        self.start_up()
+
+    @property
+    def sample_period_s(self) -> float:
+        """Time (s) between two samples of what is not measured in every tick."""
+        return self.settings.imu_period_s
+
+    def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
+        """Answer one tick."""
+        self.stale_ticks = 0
+        super().step(stamp_ns, *inputs)
+
+    def on_stale(self, stamp_ns: int) -> None:
+        """Command what surfaces the vehicle, after a while for good."""
+        self.stale_ticks += 1
+        if self.stale_ticks == round(self.settings.lost_after_s / TICK_S):
+            self.surface(SURFACE)
+            said = f'input lost for {self.settings.lost_after_s:g} s: surfacing for good'
+            self.event(stamp_ns, health.ERROR, said)
+        publish_command = self.senders[0]
+        publish_command(stamp_ns, self.params.safe_command)
+
+
+def main(args=None) -> int:
+    """Run the node; returns its exit code."""
+    return run(GuardNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

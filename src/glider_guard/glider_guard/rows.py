@@ -1,0 +1,203 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the guard watches for, row by row, and what it does about it.
+
+A row is a bit of what is told. Rows that latch stay until a person clears them at the surface. The
+reaction of the vehicle is the gravest among the rows that are told.
+"""
+
+from typing import NamedTuple
+
+#: Reactions by gravity. note: tell it; hold: level, finish the phase; climb: whole pump and the
+#: mass at its climb stop, still steering; surface: the same, open loop, no roll and no rudder;
+#: drop: and let the weight go.
+NONE, NOTE, HOLD, CLIMB, SURFACE, DROP = range(6)
+REACTIONS = ('none', 'note', 'hold', 'climb', 'surface', 'drop')
+
+
+class Row(NamedTuple):
+    """One thing that is watched for."""
+
+    bit: int
+    name: str
+    trigger: str  #: in words
+    parameter: str  #: settings and fields of the vehicle that say when; empty: none do
+    reaction: int
+    latches: bool
+    says: str  #: on /diagnostics
+
+
+STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, STUCK_SURFACE = 8, 16, 32, 2048
+ORDERED, TOO_DEEP, FROZEN, LOST = 128, 256, 512, 1024
+OVERDEPTH, CRUSHING, NOT_CLIMBING, NOT_RISING = 1 << 13, 1 << 14, 1 << 15, 1 << 16
+STALLED, NO_DEMAND, DISAGREES, UNDER_LONG = 1 << 17, 1 << 18, 1 << 19, 1 << 20
+
+#: Every row, in the order in which they are told.
+ROWS = (
+    Row(
+        STUCK_BUOYANCY,
+        'buoyancy_engine_stuck',
+        'the buoyancy engine is off its command and does not go there',
+        'follow_share, stall_s',
+        SURFACE,
+        True,
+        'the buoyancy engine does not follow its command',
+    ),
+    Row(
+        STUCK_PITCH,
+        'pitch_mass_stuck',
+        'the pitch mass is off its command and does not go there',
+        'follow_share, stall_s',
+        CLIMB,
+        True,
+        'the pitch mass does not follow its command',
+    ),
+    Row(
+        STUCK_ROLL,
+        'roll_mass_stuck',
+        'the roll mass is off its command and does not go there',
+        'follow_share, stall_s',
+        HOLD,
+        False,
+        'the roll mass does not follow its command',
+    ),
+    Row(
+        STUCK_SURFACE,
+        'steering_surface_stuck',
+        'the steering surface is off its command and does not go there',
+        'follow_share, stall_s',
+        HOLD,
+        False,
+        'the steering surface does not follow its command',
+    ),
+    Row(
+        ORDERED,
+        'surface_ordered',
+        'guidance asks for the surface: its service abort, or an input that was lost',
+        'lost_after_s',
+        SURFACE,
+        True,
+        'ordered to the surface',
+    ),
+    Row(
+        TOO_DEEP,
+        'too_deep',
+        'deeper than rated_depth and still sent down, or deeper by a margin',
+        'rated_depth, depth_margin_share, depth_margin_m',
+        SURFACE,
+        True,
+        'deeper than the vehicle is rated for',
+    ),
+    Row(
+        CRUSHING,
+        'crush_depth',
+        'deeper than crush_depth',
+        'crush_depth',
+        DROP,
+        True,
+        'deeper than its hull may bear',
+    ),
+    Row(
+        OVERDEPTH,
+        'overdepth',
+        'deeper than any target so far, by a margin',
+        'overdepth_share, overdepth_m, overdepth_s',
+        CLIMB,
+        True,
+        'deeper than it was sent',
+    ),
+    Row(
+        NOT_CLIMBING,
+        'not_climbing',
+        'commanded to rise, and no progress upward',
+        'climb_progress_m, no_climb_s',
+        SURFACE,
+        True,
+        'does not climb',
+    ),
+    Row(
+        NOT_RISING,
+        'not_rising',
+        'surfacing for good, and no progress upward; never below drop_never_s after it began',
+        'climb_progress_m, drop_after_s',
+        DROP,
+        True,
+        'does not rise though all is done for it',
+    ),
+    Row(
+        STALLED,
+        'stalled',
+        'under water at the same depth',
+        'stalled_m, stalled_s',
+        SURFACE,
+        True,
+        'stays at one depth',
+    ),
+    Row(
+        UNDER_LONG,
+        'under_too_long',
+        'under water without a break',
+        'under_water_s',
+        SURFACE,
+        True,
+        'has been under water for too long',
+    ),
+    Row(
+        FROZEN,
+        'measurement_frozen',
+        'the measured depth does not go where the vertical rate leads, or nothing measured moves',
+        'lag_m, still_s',
+        SURFACE,
+        True,
+        'the measured depth, or all that is measured, stands still',
+    ),
+    Row(
+        DISAGREES,
+        'depth_disagrees',
+        'pressure and odom tell different depths',
+        'disagree_m, disagree_s',
+        SURFACE,
+        True,
+        'pressure and odom tell different depths',
+    ),
+    Row(
+        LOST,
+        'measurement_lost',
+        'no usable odom, joint_states or reference',
+        'gate.hold_s',
+        SURFACE,
+        True,
+        'nothing usable is measured',
+    ),
+    Row(
+        NO_DEMAND,
+        'demand_lost',
+        'no usable demand of control',
+        'gate.hold_s',
+        SURFACE,
+        True,
+        'control demands nothing usable',
+    ),
+)
+
+
+def bits_of(reaction: int) -> int:
+    """Sum of the bits of the rows with a reaction."""
+    return sum(row.bit for row in ROWS if row.reaction == reaction)
+
+
+HOLDS, CLIMBS, SURFACES, DROPS = (bits_of(one) for one in (HOLD, CLIMB, SURFACE, DROP))
+LATCHED = sum(row.bit for row in ROWS if row.latches)
+ALL = sum(row.bit for row in ROWS)
+
+
+def reaction_of(told: int) -> int:
+    """The gravest reaction to some rows."""
+    return max((row.reaction for row in ROWS if told & row.bit), default=NONE)
+
+
+def say(told: int) -> str:
+    """What some rows say, in words; empty if they say nothing."""
+    said = '; '.join(row.says for row in ROWS if told & row.bit)
+    reaction = reaction_of(told)
+    return f'{REACTIONS[reaction]}: {said}' if reaction > NOTE else said

@@ -1,0 +1,201 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The guard alone: what it lets through, what it reacts to, and what stays."""
+
+import math
+from typing import NamedTuple
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glider_guard import rows
+from glider_guard.block import GUARD, guard_surface, say
+from glider_guard.guard import GuardOutput, GuardParams, GuardState, Heard, guard_step
+from glider_guard.settings import GuardSettings
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import SURFACE_TARGET, TICK_S, Joints, Odometry
+from glider_model.vehicle.file import changed_vehicle, load_vehicle
+
+DIVES = Joints(0.4, 0.02, 0.1, 0.0)
+RISES = Joints(-0.4, -0.02, 0.1, 0.0)
+SAFE = (-1.0, -0.06, 0.0, 0.0)
+#: Vertical rate of a vehicle that is well (m/s).
+RATE = 0.2
+
+
+class Vehicle:
+    """A vehicle that does what it is told, unless a test says else."""
+
+    def __init__(self, depth_m: float = 100.0, vehicle: str = 'zhang2021', **changes) -> None:
+        self.settings = GuardSettings(vehicle=vehicle, **changes)
+        self.params: GuardParams = self.settings.params()
+        self.state: GuardState = self.settings.initial_state()
+        self.depth, self.target, self.time_s = depth_m, 300.0, 0.0
+        self.joints = DIVES
+        self.out = GuardOutput(DIVES, False, 0)
+
+    def odometry(self, rate: float) -> Odometry:
+        """Level, moving down at a rate; no two samples are the same."""
+        return Odometry(
+            self.time_s, 0.0, self.depth, 1.0, *(3 * (0.0,)), 0.3, 0.0, rate, *(3 * (0.0,))
+        )
+
+    def go(self, seconds: float, demand=DIVES, rate: float = RATE, joints=None, **heard) -> int:
+        """Fly on; rows at the end. Without ``joints`` actuators are where they were sent."""
+        for _ in range(round(seconds / TICK_S)):
+            at = Heard(demand, self.odometry(rate), self.joints, self.target, self.depth)
+            self.state, self.out = guard_step(
+                self.state, at._replace(**heard), self.params, TICK_S
+            )
+            self.joints = joints or self.out.command
+            self.depth = max(0.0, self.depth + TICK_S * rate)
+            self.time_s += TICK_S
+        return self.out.told
+
+
+class Case(NamedTuple):
+    """How to bring a row about, and for how long nothing is told (s)."""
+
+    begin: dict
+    flown: dict
+    quiet_s: float
+
+
+NAN = Joints(math.nan, 0.0, 0.0, 0.0)
+#: One case for each row, by its name.
+CASES = {
+    'buoyancy_engine_stuck': Case({}, {'joints': Joints(0.2, 0.02, 0.1, 0.0)}, 55.0),
+    'pitch_mass_stuck': Case({}, {'joints': Joints(0.4, 0.0, 0.1, 0.0)}, 55.0),
+    'roll_mass_stuck': Case({}, {'joints': Joints(0.4, 0.02, 0.5, 0.0)}, 55.0),
+    'surface_ordered': Case({}, {'target': SURFACE_TARGET}, 0.0),
+    'too_deep': Case({'depth_m': 999.0}, {'rate': 0.2}, 4.5),
+    'crush_depth': Case({'depth_m': 1249.0}, {'rate': 0.2}, 4.5),
+    'overdepth': Case({'depth_m': 300.0}, {'rate': 0.2}, 525.0),
+    'not_climbing': Case({'depth_m': 200.0}, {'demand': RISES, 'rate': 0.02}, 1195.0),
+    'stalled': Case({}, {'rate': 0.002}, 1795.0),
+    'under_too_long': Case({'under_water_s': 500.0}, {'rate': 0.2}, 495.0),
+    'measurement_frozen': Case({}, {'rate': 0.0}, 25.0),
+    'measurement_lost': Case({}, {'odometry': Odometry(*(13 * (math.nan,)))}, 0.0),
+    'depth_disagrees': Case({'pressure': True}, {'depth': 50.0}, 25.0),
+    'demand_lost': Case({}, {'demand': NAN}, 0.8),
+}
+
+
+def brought(name: str) -> tuple[Vehicle, Case]:
+    """A vehicle just before a row holds."""
+    case, vehicle = CASES[name], Vehicle(**CASES[name].begin)
+    vehicle.go(1.0)
+    return vehicle, case
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_a_row_is_told_in_time_and_reacted_to_as_it_says(name):
+    row = next(one for one in rows.ROWS if one.name == name)
+    vehicle, case = brought(name)
+    flown = dict(case.flown)
+    if 'odometry' in flown or name == 'measurement_frozen':
+        flown.setdefault('odometry', vehicle.odometry(0.0))
+    if case.quiet_s:
+        assert not vehicle.go(case.quiet_s, **flown) & row.bit
+    told = vehicle.go(60.0, **flown)
+    assert told & row.bit
+    assert rows.reaction_of(told) >= row.reaction
+    demand = flown.get('demand', DIVES)
+    expected = {
+        rows.HOLD: (demand.m_b, demand.x_p, 0.0, 0.0),
+        rows.CLIMB: (*SAFE[:2], demand.mu, demand.delta),
+        rows.SURFACE: SAFE,
+        rows.DROP: SAFE,
+    }
+    assert vehicle.out.command == pytest.approx(expected[rows.reaction_of(told)])
+    assert vehicle.out.drops == (row.reaction == rows.DROP)
+
+
+def test_every_row_has_a_case():
+    apart = {'not_rising', 'steering_surface_stuck'}  # each in a test of its own
+    assert set(CASES) | apart == {row.name for row in rows.ROWS}
+    bits = [row.bit for row in rows.ROWS]
+    assert len(set(bits)) == len(bits) and all(bit.bit_count() == 1 for bit in bits)
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_what_latches_stays_and_the_rest_goes(name):
+    row = next(one for one in rows.ROWS if one.name == name)
+    vehicle, case = brought(name)
+    flown = dict(case.flown)
+    if name == 'measurement_frozen':
+        flown['odometry'] = vehicle.odometry(0.0)
+    vehicle.go(case.quiet_s + 60.0, **flown)
+    vehicle.depth, vehicle.target = 100.0, 300.0
+    assert bool(vehicle.go(5.0) & row.bit) == row.latches
+
+
+def test_a_fin_that_does_not_move_is_held():
+    values = {'range': 26.0, 'rate': 1.2, 'area': 0.05, 'lift_slope': 3.0, 'x': -1.2}
+    fin = {f'fin.{name}': value for name, value in {**values, 'turn_rate': 0.5}.items()}
+    vehicle = Vehicle(vehicle=changed_vehicle('zhang2021', fin))
+    turns = Joints(0.4, 0.02, 0.0, 0.3)
+    assert vehicle.go(70.0, demand=turns, joints=turns._replace(delta=0.0)) == rows.STUCK_SURFACE
+    assert vehicle.out.command == turns._replace(delta=0.0)
+
+
+def test_the_weight_goes_when_nothing_else_helps_and_not_before():
+    vehicle = Vehicle()
+    vehicle.go(1.0)
+    vehicle.target = SURFACE_TARGET
+    assert vehicle.go(600.0, rate=0.05) == rows.ORDERED  # it still sinks
+    assert not vehicle.out.drops
+    told = vehicle.go(650.0, rate=0.05)
+    assert told & rows.NOT_RISING and vehicle.out.drops
+    assert vehicle.out.command == SAFE
+
+
+def test_a_vehicle_that_rises_keeps_its_weight():
+    vehicle = Vehicle(depth_m=900.0)
+    vehicle.target = SURFACE_TARGET
+    assert vehicle.go(4000.0, rate=-0.2) == rows.ORDERED
+    assert not vehicle.out.drops
+
+
+def test_no_earlier_than_ten_minutes():
+    with pytest.raises(ValueError, match='drop_after_s'):
+        GuardSettings(drop_after_s=599.0)
+
+
+def test_a_glide_down_and_up_is_let_through_untouched():
+    vehicle = Vehicle(depth_m=1.0)
+    for demand, rate in ((DIVES, RATE), (RISES, -RATE)) * 2:
+        assert vehicle.go(1450.0, demand=demand, rate=rate) == 0
+        assert vehicle.out.command is demand or vehicle.out.command == demand
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.floats(width=64), min_size=23, max_size=23), st.integers(1, 30))
+def test_whatever_it_hears_the_command_is_within_the_ranges(numbers, ticks):
+    vehicle = Vehicle()
+    vehicle.go(1.0)
+    demand, joints, odometry = Joints(*numbers[:4]), Joints(*numbers[4:8]), numbers[8:21]
+    at = Heard(demand, Odometry(*odometry), joints, numbers[21], numbers[22])
+    state = vehicle.state
+    most = Joints(*(1.5 * limit for limit in vehicle.params.actuators.range))
+    for _ in range(ticks):
+        state, out = guard_step(state, at, vehicle.params, TICK_S)
+        assert all(abs(x) <= limit for x, limit in zip(out.command, most, strict=True))
+
+
+def test_an_order_is_followed_and_told():
+    vehicle = Vehicle()
+    vehicle.go(1.0)
+    vehicle.state = guard_surface(vehicle.state)
+    assert vehicle.go(1.0) == rows.ORDERED
+    said = say(rows.ORDERED)
+    assert said.level == 'error' and said.message == 'surface: ordered to the surface'
+    assert said.values == {'guard': rows.ORDERED, 'reaction': 'surface'}
+    assert say(0).level == 'ok' and say(rows.STUCK_ROLL).level == 'warn'
+    assert GUARD.quiet == (0,)
+
+
+def test_a_hull_that_crushes_above_its_rating_is_refused():
+    with pytest.raises(ConfigurationError, match=r'crush_depth: 900 m \(allowed: > 1000 m'):
+        load_vehicle(changed_vehicle('zhang2021', {'crush_depth': 900.0}))
