@@ -23,6 +23,8 @@ from glider_bringup.nodes.recorder_node import RecorderNode, RecorderSettings
 from glider_bringup.studies.sweep.plan import MAX_CELLS, MAX_VALUES, Sweep
 from glider_control.nodes.control_node import ControlNode
 from glider_control.settings import ControlSettings
+from glider_guard.nodes.guard_node import GuardNode
+from glider_guard.settings import GuardSettings
 from glider_guidance.nodes.guidance_node import GuidanceNode
 from glider_guidance.path.settings import PathSettings, WaypointPath
 from glider_guidance.settings import GuidanceSettings
@@ -57,6 +59,7 @@ NODES = {
     'navigation_node': (NavigationNode, NavigationSettings),
     'guidance_node': (GuidanceNode, GuidanceSettings),
     'control_node': (ControlNode, ControlSettings),
+    'guard_node': (GuardNode, GuardSettings),
     'recorder_node': (RecorderNode, RecorderSettings),
 }
 CLOCK_FIELDS = set(ClockSettings.model_fields) - set(TickSettings.model_fields)

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The guard as a block."""
 
+from glider_guard.actuators import INITIAL_FOLLOWERS
+from glider_guard.depth import INITIAL_DEPTHS
 from glider_guard.guard import GuardParams, GuardState, Heard, guard_step
 from glider_guard.rows import HOLD, ORDERED, REACTIONS, reaction_of
 from glider_guard.rows import say as said_of
@@ -43,6 +45,12 @@ def guard_surface(state):
     )
 
 
+@kernel
+def guard_clear(state):
+    """Forget what has latched, and how long anything has lasted."""
+    return GuardState(0, state.taken, INITIAL_FOLLOWERS, INITIAL_DEPTHS, state.command, 0)
+
+
 def say(told: int) -> Said:
     """Rows that hold, and the reaction to them."""
     reaction = reaction_of(told)
@@ -60,5 +68,6 @@ GUARD = Block(
     every_ns=TELL_EVERY_NS,
     say=say,
     surface=guard_surface,
+    clear=guard_clear,
     steers_by=steers_by,
 )

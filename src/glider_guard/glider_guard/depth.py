@@ -52,6 +52,7 @@ class DepthLimits(NamedTuple):
 class Depths(NamedTuple):
     """What is watched of the depth, between two ticks."""
 
+    depth: float  #: the greater of those that are measured (m)
     target: float  #: deepest that was asked for so far (m)
     deep_s: float  #: time for which the vehicle has been too deep
     crush_s: float  #: deeper than its hull may bear
@@ -68,7 +69,7 @@ class Depths(NamedTuple):
     apart_s: float  #: for which two measured depths have differed
 
 
-INITIAL_DEPTHS = Depths(*(14 * (0.0,)))
+INITIAL_DEPTHS = Depths(*(15 * (0.0,)))
 
 
 class Sounding(NamedTuple):
@@ -95,6 +96,28 @@ def _lag(lag_m, at, jump_m, dt):
     if abs(fallen) > jump_m:
         return 0.0
     return lag_m + dt * (at.rate - lag_m / LAG_FADES_S) - fallen
+
+
+@kernel
+def begin_at(depth):
+    """Nothing has lasted yet, at a depth (m)."""
+    return Depths(
+        depth,
+        depth,
+        0.0,
+        0.0,
+        0.0,
+        depth,
+        0.0,
+        0.0,
+        depth,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
 
 
 @kernel
@@ -130,6 +153,7 @@ def sound(state, at, ascends, surfaces, limits, dt):
     if not is_stalled:
         anchor = depth
     return Depths(
+        depth,
         target,
         _count(depth > limits.rated + margin, state.deep_s, dt),
         _count(depth > limits.crush, state.crush_s, dt),

@@ -9,7 +9,7 @@ block that fails is met with a reaction (`glider_guard.rows`) that needs none of
 from typing import NamedTuple
 
 from glider_guard.actuators import ActuatorLimits, Followers, follow
-from glider_guard.depth import DepthLimits, Depths, Sounding, depth_rows, sound
+from glider_guard.depth import DepthLimits, Depths, Sounding, begin_at, depth_rows, sound
 from glider_guard.rows import (
     CLIMBS,
     DROPS,
@@ -181,9 +181,7 @@ def guard_step(state, heard, params, dt):
     at = _sounding(taken, before)
     depths = state.depths
     if first:
-        depths = Depths(
-            at.depth, 0.0, 0.0, 0.0, at.depth, 0.0, 0.0, at.depth, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        )
+        depths = begin_at(at.depth)
     ascends = last.m_b < 0.0
     surfaces = (state.told & (SURFACES | DROPS)) != 0
     depths = sound(depths, at, ascends, surfaces, params.depth, dt)

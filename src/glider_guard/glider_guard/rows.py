@@ -118,7 +118,7 @@ ROWS = (
     Row(
         NOT_RISING,
         'not_rising',
-        'surfacing for good, and no progress upward; never below drop_never_s after it began',
+        'surfacing for good, and no progress upward',
         'climb_progress_m, drop_after_s',
         DROP,
         True,

@@ -64,6 +64,10 @@ class RecordedBlock:
         """Do what it does when the surface is asked for."""
         self.state = self.block.surface(self.state)
 
+    def clear(self) -> None:
+        """Forget what has latched."""
+        self.state = self.block.clear(self.state)
+
     @property
     def inputs(self) -> tuple[str, ...]:
         """Topics that it needs."""

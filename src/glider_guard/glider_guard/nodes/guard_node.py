@@ -4,7 +4,10 @@
 
 import sys
 
+from std_srvs.srv import Trigger
+
 from glider_guard.block import GUARD
+from glider_guard.depth import SURFACE_M
 from glider_model.base.signals import TICK_S
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.block_node import BlockNode
@@ -13,14 +16,31 @@ from glider_model.ros.lockstep.process import run
 
 
 class GuardNode(BlockNode):
-    """The last word. Free-running, it surfaces the vehicle when an input is stale."""
+    """The last word. Free-running, it surfaces the vehicle when an input is stale.
+
+    The service clear_guard forgets what has latched, at the surface only.
+    """
 
     when_stale = 'commanding the safe state until then'
 
     def __init__(self, **kwargs) -> None:
         super().__init__(GUARD, **kwargs)
         self.stale_ticks = 0
+        self.create_service(Trigger, 'clear_guard', self.on_clear)
         self.start_up()
+
+    def on_clear(self, request, response):
+        """Serve ``clear_guard``."""
+        depth = self.state.depths.depth
+        response.success = bool(depth < SURFACE_M)
+        response.message = (
+            'cleared'
+            if response.success
+            else (f'{depth:.1f} m deep: only at the surface, above {SURFACE_M:g} m, is it cleared')
+        )
+        if response.success:
+            self.clear()
+        return response
 
     @property
     def sample_period_s(self) -> float:

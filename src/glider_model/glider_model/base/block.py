@@ -38,6 +38,7 @@ class Block(NamedTuple):
     every_ns: int = 0  #: a change of the flags is told at most once in this time
     say: Callable[..., Said] | None = None  #: what flags say
     surface: Callable | None = None  #: kernel: state of a block that asks for the surface
+    clear: Callable | None = None  #: kernel: state of a block that forgets what has latched
     steers_by: Callable[[Settings], str] = lambda settings: ''
     #: name of the steering surface among the joints on its topics, by its settings
 

@@ -8,7 +8,7 @@ from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_NS, TICK_S
 from glider_model.base.wiring import at_rest, present
 from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.orders import PARAMETERS_SET, Orders
+from glider_model.ros.lockstep.orders import CLEAR, PARAMETERS_SET, Orders
 from glider_model.ros.lockstep.step_node import StepNode
 from glider_model.ros.parameters import changed_parameters, declare_settings
 
@@ -52,13 +52,19 @@ class BlockNode(StepNode):
         said = f'compiling the mathematics of {self.block.wired.name} for its settings, once'
         with compiling_told(lambda: self.get_logger().info(said)):
             state, _, _ = self.block.tick(self.state, 0.0, inputs, self.params, TICK_S)
-            if self.block.surface:
-                self.block.surface(state)
+            for order in (self.block.surface, self.block.clear):
+                if order:
+                    order(state)
 
     def surface(self, order: str) -> None:
         """Ask for the surface, for good; ``order`` says on /diagnostics who wanted it."""
         self.state = self.block.surface(self.state)
         self.orders.add(order)
+
+    def clear(self) -> None:
+        """Forget what has latched."""
+        self.state = self.block.clear(self.state)
+        self.orders.add(CLEAR)
 
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
         """Answer one tick."""

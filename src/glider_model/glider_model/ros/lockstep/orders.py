@@ -11,7 +11,7 @@ from rclpy.node import Node
 from glider_model.ros.lockstep import health
 
 #: Messages of the events on /diagnostics.
-ABORT, PARAMETERS_SET, SURFACE = 'abort', 'parameters set', 'surface'
+ABORT, PARAMETERS_SET, SURFACE, CLEAR = 'abort', 'parameters set', 'surface', 'clear'
 
 
 class Orders:

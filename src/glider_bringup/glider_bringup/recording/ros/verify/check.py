@@ -28,10 +28,12 @@ from glider_model.base.block import Telling
 from glider_model.base.settings import ConfigurationError
 from glider_model.plant.block import PLANT
 from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.orders import ABORT, PARAMETERS_SET, SURFACE
+from glider_model.ros.lockstep.orders import ABORT, CLEAR, PARAMETERS_SET, SURFACE
 from glider_model.ros.parameters import with_parameters
 from glider_model.ros.wire.codec import to_cdr
 
+#: Orders that change what a block does.
+ORDERS = (ABORT, CLEAR, PARAMETERS_SET, SURFACE)
 #: Bytes in which an event may differ from what is expected, and still be taken for it.
 _BYTES_ALIKE = 16
 
@@ -107,6 +109,9 @@ class Check:
             order = self._orders.pop(0)
             if order.message in (ABORT, SURFACE):
                 self.block.surface()
+                continue
+            if order.message == CLEAR:
+                self.block.clear()
                 continue
             try:
                 self.block.tune(with_parameters(self.block.settings, order.values))
@@ -236,7 +241,7 @@ def _alike(one: bytes, other: bytes) -> bool:
 
 def _orders(events: list[Event], node: str) -> list[Event]:
     """Orders that a node was given in flight, in the order in which it followed them."""
-    asked = [e for e in events if e.node == node and e.message in (ABORT, PARAMETERS_SET, SURFACE)]
+    asked = [e for e in events if e.node == node and e.message in ORDERS]
     return sorted(asked, key=lambda event: event.stamp_ns)
 
 

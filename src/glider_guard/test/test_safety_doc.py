@@ -1,0 +1,60 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""docs/safety.md prints the rows of the code; run as a program, this file writes them anew."""
+
+import re
+from pathlib import Path
+
+from glider_guard.rows import REACTIONS, ROWS
+from glider_guard.settings import GuardSettings
+from glider_model.vehicle.file import Vehicle
+
+ROOT = Path(__file__).resolve().parents[3]
+DOCUMENT = ROOT / 'docs' / 'safety.md'
+HEADER = ('bit', 'row', 'when', 'by', 'then', 'latches')
+_BEGIN, _END = '<!-- table: guard -->', '<!-- end -->'
+
+
+def _with_default(name: str) -> str:
+    """Parameter with its default; a field of the vehicle by its name alone."""
+    if name in Vehicle.model_fields:
+        return f'`{name}`'
+    value = GuardSettings()
+    for part in name.split('.'):
+        value = getattr(value, part)
+    return f'`{name}` {value:g}'
+
+
+def table() -> str:
+    """The rows as Markdown."""
+    lines = [HEADER, ('---',) * len(HEADER)]
+    for row in ROWS:
+        by = ', '.join(_with_default(name) for name in row.parameter.split(', '))
+        latches = 'yes' if row.latches else 'no'
+        lines.append(
+            (str(row.bit), f'`{row.name}`', row.trigger, by, REACTIONS[row.reaction], latches)
+        )
+    return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
+
+
+def _parts() -> tuple[str, str, str]:
+    text = DOCUMENT.read_text(encoding='utf-8')
+    before, _, rest = text.partition(_BEGIN)
+    inside, _, after = rest.partition(_END)
+    return before, inside.strip(), after
+
+
+def test_the_document_prints_every_row():
+    assert _parts()[1] == table(), f'write it anew: ./glider python {Path(__file__).name}'
+
+
+def test_every_row_has_a_test():
+    """Its name, or that of its bit, stands in the tests of the guard."""
+    tests = (Path(__file__).parent / 'test_guard.py').read_text(encoding='utf-8')
+    for row in ROWS:
+        assert re.search(rf"'{row.name}'", tests), row.name
+
+
+if __name__ == '__main__':
+    before, _, after = _parts()
+    DOCUMENT.write_text(f'{before}{_BEGIN}\n{table()}\n{_END}{after}', encoding='utf-8')
