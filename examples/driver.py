@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A driver for a vehicle of your own: publishes what it measures, obeys what control commands.
 
-This is all that navigation_node, guidance_node and control_node need. See docs/your_vehicle.md.
+This is all that the nodes on board need. See docs/your_vehicle.md.
 """
 
 from typing import Protocol

@@ -17,9 +17,10 @@ from sensor_msgs.msg import FluidPressure, Imu, JointState, NavSatFix
 
 from glider_model.base.frames import OriginSettings
 from glider_model.ocean.density import pressure_at
+from glider_model.ros.lockstep.step_node import OLD_AFTER
 from glider_model.ros.places import domain_id
 from glider_model.ros.wire import qos
-from glider_navigation.nodes.navigation_node import OLD_AFTER, NavigationNode
+from glider_navigation.nodes.navigation_node import NavigationNode
 
 JOINTS = ['buoyancy_engine', 'pitch_mass', 'roll_mass']
 IMU_PERIOD_S, MAX_AGE_S = 0.5, 0.3

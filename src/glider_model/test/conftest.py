@@ -99,7 +99,7 @@ def _start(position=(0.0, 0.0, 100.0), euler=(0.0, 0.0, 0.0), velocity=(), joint
     )
     joints = Joints(*(float(number) for number in _with_surface(joints)))
     water = Water(0.0, 0.0, 0.0)
-    return PlantState(motion, joints, water, 0, False, 0, 0, -1, NO_SAMPLE, LAUNCHED)
+    return PlantState(motion, joints, water, 0, False, 0, 0, -1, NO_SAMPLE, LAUNCHED, False)
 
 
 def _with_surface(joints):

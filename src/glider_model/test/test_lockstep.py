@@ -25,6 +25,7 @@ from glider_model.ros.wire.codec import MessageError, to_cdr
 from glider_model.ros.wire.topics import (
     CONTROL,
     CURRENT,
+    GUARD,
     GUIDANCE,
     NAVIGATION,
     PLANT,
@@ -44,8 +45,8 @@ class Clock(ClockNode):
         super().__init__(PLANT, **kwargs)
         self.last_tick, self.log = last_tick, []
         self.publish = [self.add_output(name) for name in SAID]
-        self.add_input('command')
-        self.add_input('current_velocity')
+        for topic in ('command', 'current_velocity', 'drop_weight'):
+            self.add_input(topic)
         self.start_up()
 
     def publish_tick(self, stamp_ns: int) -> None:
@@ -56,7 +57,7 @@ class Clock(ClockNode):
         measured(stamp_ns, 13 * (2.0 * value,))
         joints(stamp_ns, 3 * (-value,))
 
-    def complete_tick(self, command, current) -> bool:
+    def complete_tick(self, command, current, drop_weight) -> bool:
         self.log.append((time.monotonic(), self.tick, command, current))
         return self.tick < self.last_tick
 
@@ -90,12 +91,14 @@ INPUTS = {
     NAVIGATION: ['joint_states', 'measured_odom'],
     GUIDANCE: ['odom'],
     CONTROL: ['reference', 'odom', 'joint_states'],
+    GUARD: ['demand', 'reference', 'odom', 'joint_states'],
 }
 OUTPUTS = {
     CURRENT: ['current_velocity'],
     NAVIGATION: ['odom'],
     GUIDANCE: ['tracking_error', 'current_estimate', 'reference'],
-    CONTROL: ['wrench', 'command'],
+    CONTROL: ['wrench', 'demand'],
+    GUARD: ['drop_weight', 'command'],
 }
 
 
@@ -171,9 +174,10 @@ def test_every_tick_is_acted_on_once_and_in_order(make_graph):
 def test_a_node_uses_the_inputs_of_its_tick_and_no_other(make_graph):
     graph = make_graph(last_tick=100)
     graph.spin_until_over()
-    # joint_states = -k, measured_odom = 2 k, odom = reference = k: control sends k + k - k
+    # joint_states = -k, measured_odom = 2 k, odom = reference = k: control sends k + k - k, and
+    # the guard k + k + k - k
     for _, tick, command, current in graph.plant.log:
-        assert command == (*3 * (float(tick),), 0.0)
+        assert command == (*3 * (2.0 * tick,), 0.0)
         assert current == 3 * (float(tick),)
 
 
@@ -216,7 +220,8 @@ def test_second_source_of_time_is_refused_and_named(make_graph, context, monkeyp
         (CURRENT, 'current_velocity'),
         (NAVIGATION, 'odom'),
         (GUIDANCE, 'reference'),
-        (CONTROL, 'command'),
+        (CONTROL, 'demand'),
+        (GUARD, 'command'),
     ],
 )
 def test_node_that_falls_silent_is_named(make_graph, culprit, topic):
@@ -358,7 +363,7 @@ class Intruder:
     'topic',
     [
         *('ground_truth/odom', 'measured_odom', 'odom', 'joint_states', 'current_velocity'),
-        *('reference', 'command'),
+        *('reference', 'demand', 'command', 'drop_weight'),
     ],
 )
 def test_second_publisher_in_mid_flight_is_refused_and_named(make_graph, context, topic):
@@ -377,7 +382,7 @@ def test_second_publisher_in_mid_flight_is_refused_and_named(make_graph, context
     assert graph.spin(intruder.was_named) is None
     for _, tick, command, current in graph.plant.log:
         # odom is the tick, joint_states less the tick, and each block sends on the sum
-        assert (command[0], current[0]) == (float(tick), float(tick))
+        assert (command[0], current[0]) == (2.0 * tick, float(tick))
 
 
 def test_publisher_that_takes_the_place_of_one_that_is_gone_is_believed(make_graph):

@@ -101,7 +101,7 @@ ARGUMENTS = (
     Argument(
         'autopilot',
         'false',
-        'true: navigation, guidance and control in one process, which takes the memory of one.',
+        'true: navigation, guidance, control and guard in one process, with the memory of one.',
         tuple(_TRUTH),
     ),
     Argument(
