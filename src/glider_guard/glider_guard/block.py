@@ -5,13 +5,14 @@
 from glider_guard.actuators import INITIAL_FOLLOWERS
 from glider_guard.depth import INITIAL_DEPTHS
 from glider_guard.guard import GuardParams, GuardState, Heard, guard_step
+from glider_guard.health import INITIAL_HEALTH
 from glider_guard.rows import HOLD, ORDERED, REACTIONS, reaction_of
 from glider_guard.rows import say as said_of
 from glider_guard.settings import GuardSettings
 from glider_model.base.block import Block, Said, block_tick
 from glider_model.base.frames import odometry_from_wire
 from glider_model.base.kernel import kernel
-from glider_model.base.signals import Joints
+from glider_model.base.signals import Health, Joints
 from glider_model.base.wiring import GUARD as WIRED
 from glider_model.ocean.density import depth_at
 from glider_model.vehicle.file import steers_by
@@ -23,14 +24,15 @@ TELL_EVERY_NS = 1_000_000_000
 @block_tick.body(GuardParams)
 @kernel
 def guard_tick(state, t_s, inputs, params, dt):
-    """One tick: demand, reference, odom, joint_states, pressure in; command, drop_weight out."""
-    demand, reference, odom, joints, pressure = inputs
+    """One tick: what `GUARD` reads in; command, drop_weight out; see `block_tick`."""
+    demand, reference, odom, joints, health, pressure = inputs
     heard = Heard(
         Joints(demand[0], demand[1], demand[2], demand[3]),
         odometry_from_wire(odom),
         Joints(joints[0], joints[1], joints[2], joints[3]),
         -reference[2],
         depth_at(pressure[0]),
+        Health(health[0], health[1], health[2], health[3]),
     )
     state, out = guard_step(state, heard, params, dt)
     command = (out.command.m_b, out.command.x_p, out.command.mu, out.command.delta)
@@ -41,14 +43,22 @@ def guard_tick(state, t_s, inputs, params, dt):
 def guard_surface(state):
     """Bring the vehicle to the surface, now and for good."""
     return GuardState(
-        state.tick, state.taken, state.followers, state.depths, state.command, state.told | ORDERED
+        state.tick,
+        state.taken,
+        state.followers,
+        state.depths,
+        state.health,
+        state.command,
+        state.told | ORDERED,
     )
 
 
 @kernel
 def guard_clear(state):
     """Forget what has latched, and how long anything has lasted."""
-    return GuardState(0, state.taken, INITIAL_FOLLOWERS, INITIAL_DEPTHS, state.command, 0)
+    return GuardState(
+        0, state.taken, INITIAL_FOLLOWERS, INITIAL_DEPTHS, INITIAL_HEALTH, state.command, 0
+    )
 
 
 def say(told: int) -> Said:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from glider_guard.actuators import ActuatorLimits, Followers, follow
 from glider_guard.depth import DepthLimits, Depths, Sounding, begin_at, depth_rows, sound
+from glider_guard.health import HealthLimits, HealthState, check_health
 from glider_guard.rows import (
     CLIMBS,
     DROPS,
@@ -22,7 +23,7 @@ from glider_guard.rows import (
 )
 from glider_model.base.frames import rotate_to_ned
 from glider_model.base.kernel import kernel
-from glider_model.base.signals import SURFACE_TARGET, Joints, Odometry
+from glider_model.base.signals import SURFACE_TARGET, Health, Joints, Odometry
 from glider_model.onboard.gate import GateParams, GateState, are_believed, gate_step, is_lost
 
 
@@ -32,6 +33,7 @@ class GuardParams(NamedTuple):
     gate: GateParams
     actuators: ActuatorLimits
     depth: DepthLimits
+    health: HealthLimits
     has_pressure: bool  #: there is a depth apart from that of odom
     safe_command: Joints  #: as buoyant as possible, mass at the climb stop, no roll, no turn
 
@@ -44,6 +46,7 @@ class Heard(NamedTuple):
     joints: Joints
     target: float  #: depth that guidance asks for (m); SURFACE_TARGET: the surface, for good
     depth: float  #: by the pressure (m)
+    health: Health
 
 
 class Taken(NamedTuple):
@@ -66,6 +69,7 @@ class GuardState(NamedTuple):
     taken: Taken
     followers: Followers
     depths: Depths
+    health: HealthState
     command: Joints  #: the last one
     told: int  #: rows
 
@@ -186,8 +190,9 @@ def guard_step(state, heard, params, dt):
     surfaces = (state.told & (SURFACES | DROPS)) != 0
     depths = sound(depths, at, ascends, surfaces, params.depth, dt)
     told |= depth_rows(depths, params.depth)
-    told |= _intake_rows(taken, params) | (state.told & LATCHED)
+    health, unwell = check_health(state.health, heard.health, params.health, dt)
+    told |= unwell | _intake_rows(taken, params) | (state.told & LATCHED)
     command = react(told, taken.demand, params.safe_command)
     tick = state.tick + 1 if taken.gate.seen else 0
     output = GuardOutput(command, (told & DROPS) != 0, told)
-    return GuardState(tick, taken, followers, depths, command, told), output
+    return GuardState(tick, taken, followers, depths, health, command, told), output

@@ -31,6 +31,7 @@ STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, STUCK_SURFACE = 8, 16, 32, 2048
 ORDERED, TOO_DEEP, FROZEN, LOST = 128, 256, 512, 1024
 OVERDEPTH, CRUSHING, NOT_CLIMBING, NOT_RISING = 1 << 13, 1 << 14, 1 << 15, 1 << 16
 STALLED, NO_DEMAND, DISAGREES, UNDER_LONG = 1 << 17, 1 << 18, 1 << 19, 1 << 20
+LEAK, VACUUM, BATTERY, NO_CONTACT = 1 << 21, 1 << 22, 1 << 23, 1 << 24
 
 #: Every row, in the order in which they are told.
 ROWS = (
@@ -177,6 +178,42 @@ ROWS = (
         SURFACE,
         True,
         'control demands nothing usable',
+    ),
+    Row(
+        LEAK,
+        'leak',
+        'water in the hull',
+        'health_s',
+        SURFACE,
+        True,
+        'there is water in the hull',
+    ),
+    Row(
+        VACUUM,
+        'vacuum',
+        'the hull does not hold its vacuum',
+        'vacuum_min_pa, vacuum_max_pa, health_s',
+        SURFACE,
+        True,
+        'the vacuum in the hull is not what it should be',
+    ),
+    Row(
+        BATTERY,
+        'battery',
+        'the battery gives less than it should',
+        'battery_min_v, health_s',
+        SURFACE,
+        True,
+        'the battery is low',
+    ),
+    Row(
+        NO_CONTACT,
+        'no_contact',
+        'nobody has heard of the vehicle',
+        'contact_s',
+        SURFACE,
+        True,
+        'nobody has heard of it for too long',
     ),
 )
 

@@ -9,6 +9,7 @@ from pydantic import Field
 from glider_guard.actuators import INITIAL_FOLLOWERS, make_limits
 from glider_guard.depth import INITIAL_DEPTHS, DepthLimits
 from glider_guard.guard import GuardParams, GuardState, Taken
+from glider_guard.health import INITIAL_HEALTH, HealthLimits
 from glider_model.base.settings import Settings
 from glider_model.base.signals import Joints
 from glider_model.onboard.gate import INITIAL_GATE, GateSettings
@@ -85,6 +86,27 @@ class GuardLimitSettings(Settings):
         20.0, ge=1.0, le=1000.0, description='by so much odom and pressure may differ (m)'
     )
     disagree_s: float = Field(30.0, ge=0.0, le=3600.0, description='for no longer than this (s)')
+    vacuum_min_pa: float = Field(
+        13500.0, ge=0.0, le=101325.0, description='least vacuum in the hull (Pa); 4 inHg'
+    )
+    vacuum_max_pa: float = Field(
+        40600.0, ge=0.0, le=101325.0, description='most vacuum in the hull (Pa); 12 inHg'
+    )
+    battery_min_v: float = Field(
+        10.0, ge=0.0, le=1000.0, description='least voltage of the battery (V)'
+    )
+    health_s: float = Field(
+        10.0,
+        ge=0.0,
+        le=3600.0,
+        description='leak, vacuum and battery are believed after so long (s)',
+    )
+    contact_s: float = Field(
+        259200.0,
+        ge=0.0,
+        le=1e8,
+        description='longest time without the antenna out of the water (s); 0.0: any',
+    )
 
 
 class GuardSettings(GuardLimitSettings):
@@ -134,6 +156,13 @@ class GuardSettings(GuardLimitSettings):
                 self.disagree_m,
                 self.disagree_s,
             ),
+            HealthLimits(
+                self.vacuum_min_pa,
+                self.vacuum_max_pa,
+                self.battery_min_v,
+                self.contact_s or math.inf,
+                self.health_s,
+            ),
             self.pressure,
             Joints(-limits.m_b_max, -limits.x_p_max, 0.0, 0.0),
         )
@@ -142,4 +171,4 @@ class GuardSettings(GuardLimitSettings):
         """State before the first tick."""
         rest = Joints(0.0, 0.0, 0.0, 0.0)
         taken = Taken(INITIAL_GATE, rest, 0.0, rest, 0.0, 0.0, 0.0, 0.0)
-        return GuardState(0, taken, INITIAL_FOLLOWERS, INITIAL_DEPTHS, rest, 0)
+        return GuardState(0, taken, INITIAL_FOLLOWERS, INITIAL_DEPTHS, INITIAL_HEALTH, rest, 0)

@@ -14,7 +14,7 @@ from glider_guard.block import GUARD, guard_surface, say
 from glider_guard.guard import GuardOutput, GuardParams, GuardState, Heard, guard_step
 from glider_guard.settings import GuardSettings
 from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import SURFACE_TARGET, TICK_S, Joints, Odometry
+from glider_model.base.signals import SURFACE_TARGET, TICK_S, Health, Joints, Odometry
 from glider_model.vehicle.file import changed_vehicle, load_vehicle
 
 DIVES = Joints(0.4, 0.02, 0.1, 0.0)
@@ -44,7 +44,7 @@ class Vehicle:
     def go(self, seconds: float, demand=DIVES, rate: float = RATE, joints=None, **heard) -> int:
         """Fly on; rows at the end. Without ``joints`` actuators are where they were sent."""
         for _ in range(round(seconds / TICK_S)):
-            at = Heard(demand, self.odometry(rate), self.joints, self.target, self.depth)
+            at = Heard(demand, self.odometry(rate), self.joints, self.target, self.depth, WELL)
             self.state, self.out = guard_step(
                 self.state, at._replace(**heard), self.params, TICK_S
             )
@@ -63,6 +63,7 @@ class Case(NamedTuple):
 
 
 NAN = Joints(math.nan, 0.0, 0.0, 0.0)
+WELL = Health(0.0, 23700.0, 15.0, 100.0)
 #: One case for each row, by its name.
 CASES = {
     'buoyancy_engine_stuck': Case({}, {'joints': Joints(0.2, 0.02, 0.1, 0.0)}, 55.0),
@@ -79,6 +80,10 @@ CASES = {
     'measurement_lost': Case({}, {'odometry': Odometry(*(13 * (math.nan,)))}, 0.0),
     'depth_disagrees': Case({'pressure': True}, {'depth': 50.0}, 25.0),
     'demand_lost': Case({}, {'demand': NAN}, 0.8),
+    'leak': Case({}, {'health': WELL._replace(leak=1.0)}, 9.5),
+    'vacuum': Case({}, {'health': WELL._replace(vacuum_pa=2000.0)}, 9.5),
+    'battery': Case({}, {'health': WELL._replace(battery_v=9.0)}, 9.5),
+    'no_contact': Case({}, {'health': WELL._replace(contact_age_s=3e5)}, 0.0),
 }
 
 
@@ -158,6 +163,10 @@ def test_a_vehicle_that_rises_keeps_its_weight():
     assert not vehicle.out.drops
 
 
+def test_a_vehicle_that_does_not_say_how_it_is_is_well():
+    assert Vehicle().go(100.0, health=Health(0.0, -1.0, -1.0, -1.0)) == 0
+
+
 def test_no_earlier_than_ten_minutes():
     with pytest.raises(ValueError, match='drop_after_s'):
         GuardSettings(drop_after_s=599.0)
@@ -171,12 +180,14 @@ def test_a_glide_down_and_up_is_let_through_untouched():
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.lists(st.floats(width=64), min_size=23, max_size=23), st.integers(1, 30))
+@given(st.lists(st.floats(width=64), min_size=27, max_size=27), st.integers(1, 30))
 def test_whatever_it_hears_the_command_is_within_the_ranges(numbers, ticks):
     vehicle = Vehicle()
     vehicle.go(1.0)
     demand, joints, odometry = Joints(*numbers[:4]), Joints(*numbers[4:8]), numbers[8:21]
-    at = Heard(demand, Odometry(*odometry), joints, numbers[21], numbers[22])
+    at = Heard(
+        demand, Odometry(*odometry), joints, numbers[21], numbers[22], Health(*numbers[23:])
+    )
     state = vehicle.state
     most = Joints(*(1.5 * limit for limit in vehicle.params.actuators.range))
     for _ in range(ticks):

@@ -32,7 +32,16 @@ from glider_model.ros.wire.topics import TOPICS
 from glider_navigation.block import navigation_tick
 
 #: Topics that a block reads. What the plant makes of a wild current it says itself: it fails.
-READ = ('odom', 'joint_states', 'reference', 'demand', 'command', 'drop_weight', *SENSORS)
+READ = (
+    'odom',
+    'joint_states',
+    'reference',
+    'demand',
+    'command',
+    'drop_weight',
+    'health',
+    *SENSORS,
+)
 #: Missions by their names, and what is changed in them.
 SCENES = {
     'adaptive': {'control.law': 'adaptive'},

@@ -99,6 +99,15 @@ class Adaptation(NamedTuple):
     lyapunov_2: float
 
 
+class Health(NamedTuple):
+    """What the sensors of the vehicle's own health say."""
+
+    leak: float  #: 1.0: there is water in the hull
+    vacuum_pa: float  #: pressure in the hull below that of the air at the surface (Pa)
+    battery_v: float  #: voltage of the battery (V)
+    contact_age_s: float  #: time since the antenna was last out of the water (s)
+
+
 #: Stands in the reason of every run whose numbers ceased to be finite.
 NOT_FINITE = 'not finite at tick'
 

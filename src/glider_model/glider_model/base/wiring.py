@@ -9,7 +9,7 @@ modules that are started, and what a recorded run is checked by.
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from glider_model.base.signals import Adaptation
+from glider_model.base.signals import Adaptation, Health
 
 #: Joint names of joint_states and command, in the order of `glider_model.base.signals.Joints`.
 JOINTS = ('buoyancy_engine', 'pitch_mass', 'roll_mass')
@@ -96,6 +96,7 @@ PORTS = {
         BASE_LINK,
         constants=(('status.service', 1), ('position_covariance_type', 2)),
     ),
+    'health': _named(Health._fields),
     'joint_states': _joints(),
     'current_velocity': Port('geometry_msgs/msg/TwistStamped', _TWIST, MAP),
     'odom': _odometry(BASE_LINK, tuple(f'pose.covariance[{i}]' for i in _XX_XY_YX_YY)),
@@ -145,7 +146,10 @@ SENSORS = ('measured_odom', 'imu', 'pressure', 'fix')
 #: Those of them of which a vehicle has samples now and then, and not in every tick.
 SAMPLED = ('imu', 'pressure', 'fix')
 #: What stands for a topic that may be silent for as long as it likes: under water there is no fix.
-WHEN_SILENT = {'fix': (-1.0, 0.0, 0.0, 0.0, 0.0)}
+#: A vehicle need not say how it is, either: less than nothing is not measured.
+WHEN_SILENT = {'fix': (-1.0, 0.0, 0.0, 0.0, 0.0), 'health': (0.0, -1.0, -1.0, -1.0)}
+#: What bags do not have that were recorded before it was told.
+LATER = ('health', 'demand', 'drop_weight')
 #: What ways to navigate may tell beside odom; the same holds for them.
 BELIEFS = ('believed_current', 'believed_surface_current')
 
@@ -157,6 +161,7 @@ PLANT = Wired(
         '/clock',
         'ground_truth/odom',
         *SENSORS,
+        'health',
         'joint_states',
     ),
 )
@@ -184,7 +189,7 @@ CONTROL = Wired(
 GUARD = Wired(
     'guard',
     'glider_guard',
-    inputs=('demand', 'reference', 'odom', 'joint_states', 'pressure'),
+    inputs=('demand', 'reference', 'odom', 'joint_states', 'health', 'pressure'),
     outputs=('command', 'drop_weight'),
 )
 

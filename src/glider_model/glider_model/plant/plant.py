@@ -53,6 +53,7 @@ class Surfacing(NamedTuple):
     count: int  #: surfacings so far, each after a dive
     is_under: bool  #: has dived since
     out_ticks: int  #: ticks with the antenna out of the water without a break
+    silent_ticks: int  #: ticks since it was last out of the water, or since the start
 
 
 class PlantState(NamedTuple):
@@ -71,7 +72,7 @@ class PlantState(NamedTuple):
     is_dropped: bool  #: the drop weight is gone
 
 
-LAUNCHED = Surfacing(0, False, 0)
+LAUNCHED = Surfacing(0, False, 0, 0)
 
 
 class PlantParams(NamedTuple):
@@ -289,7 +290,9 @@ def _surface(surfacing, depth):
     """What there is of the surface a tick later, at a depth (m)."""
     is_under = depth > DIVED_M or (surfacing.is_under and depth >= SURFACE_M)
     count = surfacing.count + 1 if surfacing.is_under and not is_under else surfacing.count
-    return Surfacing(count, is_under, surfacing.out_ticks + 1 if depth <= ANTENNA_M else 0)
+    if depth <= ANTENNA_M:
+        return Surfacing(count, is_under, surfacing.out_ticks + 1, 0)
+    return Surfacing(count, is_under, 0, surfacing.silent_ticks + 1)
 
 
 @kernel

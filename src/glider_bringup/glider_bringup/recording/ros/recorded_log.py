@@ -14,7 +14,7 @@ from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.recording.mcap_reader import Bag, Batch
 from glider_guidance.yo.stage import STAGE_NAMES
 from glider_model.base.signals import TICK_NS
-from glider_model.base.wiring import BELIEFS, SENSORS
+from glider_model.base.wiring import BELIEFS, LATER, SENSORS
 from glider_model.ros.lockstep import health
 from glider_model.ros.wire.codec import Codec
 from glider_model.ros.wire.topics import TOPICS, topic_of
@@ -32,13 +32,10 @@ def is_before_navigation(recorded: Iterable[str]) -> bool:
     return 'odom' in recorded and recorded.isdisjoint({'ground_truth/odom', *SENSORS})
 
 
-#: Topics that came with the guard: before, control published command itself.
-GUARDED = ('demand', 'drop_weight')
-
-
 def is_before_guard(recorded: Iterable[str]) -> bool:
     """Whether topics were recorded when control still had the last word on the command."""
-    return 'command' in recorded and set(GUARDED).isdisjoint(recorded)
+    recorded = set(recorded)
+    return 'command' in recorded and recorded.isdisjoint({'demand', 'drop_weight'})
 
 
 def _known_name(topic: str) -> str:
@@ -253,9 +250,7 @@ class RecordedLog:
         next one.
         """
         names = [topic.name for topic in _PER_TICK]
-        left_out = {*SENSORS, *BELIEFS} - self._recorded
-        if is_before_guard(self._recorded):
-            left_out |= {*GUARDED}
+        left_out = {*SENSORS, *BELIEFS, *LATER} - self._recorded
         if not self.counts['ground_truth/odom']:
             left_out |= {'ground_truth/odom'}
         per_tick = [self.counts[name] for name in names if name not in left_out]

@@ -1,0 +1,52 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the vehicle's own health sensors tell: leak, vacuum, battery, contact."""
+
+from typing import NamedTuple
+
+from glider_guard.rows import BATTERY, LEAK, NO_CONTACT, VACUUM
+from glider_model.base.kernel import kernel
+
+
+class HealthLimits(NamedTuple):
+    """What is well."""
+
+    vacuum_min: float  #: (Pa)
+    vacuum_max: float
+    battery_min: float  #: (V)
+    contact: float  #: (s); infinite: any
+    lasts: float  #: for so long it may be otherwise (s)
+
+
+class HealthState(NamedTuple):
+    """For how long each has not been well (s)."""
+
+    leak_s: float
+    vacuum_s: float
+    battery_s: float
+
+
+INITIAL_HEALTH = HealthState(0.0, 0.0, 0.0)
+
+
+@kernel
+def check_health(state, health, limits, dt):
+    """Health a tick later (`HealthState`), and the rows that hold; less than 0 is not measured."""
+    vacuum, battery = health.vacuum_pa, health.battery_v
+    is_off = vacuum >= 0.0 and not limits.vacuum_min <= vacuum <= limits.vacuum_max
+    is_low = 0.0 <= battery < limits.battery_min
+    state = HealthState(
+        state.leak_s + dt if health.leak > 0.5 else 0.0,
+        state.vacuum_s + dt if is_off else 0.0,
+        state.battery_s + dt if is_low else 0.0,
+    )
+    told = 0
+    if state.leak_s > limits.lasts:
+        told |= LEAK
+    if state.vacuum_s > limits.lasts:
+        told |= VACUUM
+    if state.battery_s > limits.lasts:
+        told |= BATTERY
+    if health.contact_age_s > limits.contact:
+        told |= NO_CONTACT
+    return state, told
