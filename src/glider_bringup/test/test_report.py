@@ -565,14 +565,14 @@ def test_comparison_of_equal_runs_says_so(tmp_path, call, wide):
 
 
 def test_comparison_keeps_its_lines_where_one_run_has_more_to_tell(tmp_path, call, wide):
-    """What control noticed in one of them shifts nothing."""
+    """What the guard told in one of them shifts nothing."""
     one = fly(tmp_path, name='one')
     event = {'t_s': 12.0, 'row': 'x', 'reaction': 'none', 'message': 'something odd'}
     guard = {'state': 'flying', 'reaction': 'none', 'events': [event]}
     two = altered(one, 'two', guard=guard, end_of_path_m=7.25)
     for runs, order in (((one, two), 1), ((two, one), -1)):
         rows, _ = compared(call, *runs)
-        assert rows['control noticed'][::order] == ['nothing', 'at 12.0 s: something odd']
+        assert rows['guard'][::order] == ['nothing', 'at 12.0 s: something odd']
         assert rows['came up from the end of path'][::order][0] == '-'
         assert rows['depth, max'][1] == f'{rows["depth, max"][0]} (=)'
 

@@ -59,7 +59,6 @@ class Depths(NamedTuple):
     over_s: float  #: deeper than it was sent
     mark: float  #: depth from which progress upward is counted (m)
     climbs_s: float  #: time without progress while rising is commanded
-    rises_s: float  #: while surfacing for good
     anchor: float  #: depth about which it may be stalled (m)
     stalled_s: float
     under_s: float  #: time under water
@@ -69,7 +68,7 @@ class Depths(NamedTuple):
     apart_s: float  #: for which two measured depths have differed
 
 
-INITIAL_DEPTHS = Depths(*(15 * (0.0,)))
+INITIAL_DEPTHS = Depths(*(14 * (0.0,)))
 
 
 class Sounding(NamedTuple):
@@ -101,27 +100,11 @@ def _lag(lag_m, at, jump_m, dt):
 @kernel
 def begin_at(depth):
     """Nothing has lasted yet, at a depth (m)."""
-    return Depths(
-        depth,
-        depth,
-        0.0,
-        0.0,
-        0.0,
-        depth,
-        0.0,
-        0.0,
-        depth,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )
+    return Depths(depth, depth, 0.0, 0.0, 0.0, depth, 0.0, depth, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
-def sound(state, at, ascends, surfaces, limits, dt):
+def sound(state, at, ascends, limits, dt):
     """Take in the depth of a tick.
 
     Parameters
@@ -130,8 +113,6 @@ def sound(state, at, ascends, surfaces, limits, dt):
     at : Sounding
     ascends : bool
         Whether the last command makes the vehicle buoyant.
-    surfaces : bool
-        Whether it is to surface for good.
     limits : DepthLimits
     dt : float
 
@@ -160,7 +141,6 @@ def sound(state, at, ascends, surfaces, limits, dt):
         _count(depth > target + over, state.over_s, dt),
         mark,
         _count(ascends and under and not progress, state.climbs_s, dt),
-        _count(surfaces and under and not progress, state.rises_s, dt),
         anchor,
         _count(is_stalled, state.stalled_s, dt),
         _count(under, state.under_s, dt),
@@ -172,8 +152,8 @@ def sound(state, at, ascends, surfaces, limits, dt):
 
 
 @kernel
-def depth_rows(state, limits):
-    """Rows that hold."""
+def depth_rows(state, surfaces, limits):
+    """Rows that hold for a vehicle that is to surface for good, or not."""
     told = 0
     if state.deep_s > TOO_DEEP_S:
         told |= TOO_DEEP
@@ -183,7 +163,7 @@ def depth_rows(state, limits):
         told |= OVERDEPTH
     if state.climbs_s > limits.no_climb_s:
         told |= NOT_CLIMBING
-    if state.rises_s > limits.drop_after_s:
+    if surfaces and state.climbs_s > limits.drop_after_s:
         told |= NOT_RISING
     if state.stalled_s > limits.stalled_s:
         told |= STALLED

@@ -12,7 +12,6 @@ from glider_guard.actuators import ActuatorLimits, Followers, follow
 from glider_guard.depth import DepthLimits, Depths, Sounding, begin_at, depth_rows, sound
 from glider_guard.health import HealthLimits, HealthState, check_health
 from glider_guard.rows import (
-    CLIMBS,
     DROPS,
     HOLDS,
     LATCHED,
@@ -149,8 +148,6 @@ def react(told, demand, safe):
     """Command by the rows that are told."""
     if told & (SURFACES | DROPS):
         return safe
-    if told & CLIMBS:
-        return Joints(safe.m_b, safe.x_p, demand.mu, demand.delta)
     if told & HOLDS:
         return Joints(demand.m_b, demand.x_p, 0.0, 0.0)
     return demand
@@ -178,7 +175,7 @@ def guard_step(state, heard, params, dt):
     last = taken.joints if first else state.command
     before = taken.gate.odometry if first else state.taken.gate.odometry
     sent = last
-    if state.told & HOLDS and not state.told & (CLIMBS | SURFACES | DROPS):
+    if state.told & HOLDS and not state.told & (SURFACES | DROPS):
         # held level: whether they follow is seen by what is demanded
         sent = Joints(last.m_b, last.x_p, taken.demand.mu, taken.demand.delta)
     followers, told = follow(state.followers, taken.joints, sent, params.actuators, dt)
@@ -188,8 +185,8 @@ def guard_step(state, heard, params, dt):
         depths = begin_at(at.depth)
     ascends = last.m_b < 0.0
     surfaces = (state.told & (SURFACES | DROPS)) != 0
-    depths = sound(depths, at, ascends, surfaces, params.depth, dt)
-    told |= depth_rows(depths, params.depth)
+    depths = sound(depths, at, ascends, params.depth, dt)
+    told |= depth_rows(depths, surfaces, params.depth)
     health, unwell = check_health(state.health, heard.health, params.health, dt)
     told |= unwell | _intake_rows(taken, params) | (state.told & LATCHED)
     command = react(told, taken.demand, params.safe_command)

@@ -8,11 +8,10 @@ reaction of the vehicle is the gravest among the rows that are told.
 
 from typing import NamedTuple
 
-#: Reactions by gravity. note: tell it; hold: level, finish the phase; climb: whole pump and the
-#: mass at its climb stop, still steering; surface: the same, open loop, no roll and no rudder;
-#: drop: and let the weight go.
-NONE, NOTE, HOLD, CLIMB, SURFACE, DROP = range(6)
-REACTIONS = ('none', 'note', 'hold', 'climb', 'surface', 'drop')
+#: Reactions by gravity. note: tell it; hold: no roll and no rudder, the dive goes on; surface: the
+#: whole pump and the mass at its climb stop, open loop; drop: and let the weight go.
+NONE, NOTE, HOLD, SURFACE, DROP = range(5)
+REACTIONS = ('none', 'note', 'hold', 'surface', 'drop')
 
 
 class Row(NamedTuple):
@@ -49,7 +48,7 @@ ROWS = (
         'pitch_mass_stuck',
         'the pitch mass is off its command and does not go there',
         'follow_share, stall_s',
-        CLIMB,
+        SURFACE,
         True,
         'the pitch mass does not follow its command',
     ),
@@ -103,7 +102,7 @@ ROWS = (
         'overdepth',
         'deeper than any target so far, by a margin',
         'overdepth_share, overdepth_m, overdepth_s',
-        CLIMB,
+        SURFACE,
         True,
         'deeper than it was sent',
     ),
@@ -223,7 +222,7 @@ def bits_of(reaction: int) -> int:
     return sum(row.bit for row in ROWS if row.reaction == reaction)
 
 
-HOLDS, CLIMBS, SURFACES, DROPS = (bits_of(one) for one in (HOLD, CLIMB, SURFACE, DROP))
+HOLDS, SURFACES, DROPS = (bits_of(one) for one in (HOLD, SURFACE, DROP))
 LATCHED = sum(row.bit for row in ROWS if row.latches)
 ALL = sum(row.bit for row in ROWS)
 

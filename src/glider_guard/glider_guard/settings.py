@@ -53,7 +53,7 @@ class GuardLimitSettings(Settings):
         5.0, ge=0.5, le=100.0, description='way upward that counts as progress (m)'
     )
     no_climb_s: float = Field(
-        1200.0,
+        900.0,
         ge=60.0,
         le=86400.0,
         description='a vehicle sent up that makes no progress for so long does not climb (s)',
@@ -62,7 +62,7 @@ class GuardLimitSettings(Settings):
         1200.0,
         ge=600.0,
         le=86400.0,
-        description='surfacing for good without progress for so long, the weight is let go (s)',
+        description='the same, surfacing for good: the weight is let go (s)',
     )
     stalled_m: float = Field(
         5.0, ge=0.5, le=100.0, description='depth that changes by less stays the same (m)'

@@ -73,7 +73,7 @@ CASES = {
     'too_deep': Case({'depth_m': 999.0}, {'rate': 0.2}, 4.5),
     'crush_depth': Case({'depth_m': 1249.0}, {'rate': 0.2}, 4.5),
     'overdepth': Case({'depth_m': 300.0}, {'rate': 0.2}, 525.0),
-    'not_climbing': Case({'depth_m': 200.0}, {'demand': RISES, 'rate': 0.02}, 1195.0),
+    'not_climbing': Case({'depth_m': 200.0}, {'demand': RISES, 'rate': 0.02}, 895.0),
     'stalled': Case({}, {'rate': 0.002}, 1795.0),
     'under_too_long': Case({'under_water_s': 500.0}, {'rate': 0.2}, 495.0),
     'measurement_frozen': Case({}, {'rate': 0.0}, 25.0),
@@ -109,7 +109,6 @@ def test_a_row_is_told_in_time_and_reacted_to_as_it_says(name):
     demand = flown.get('demand', DIVES)
     expected = {
         rows.HOLD: (demand.m_b, demand.x_p, 0.0, 0.0),
-        rows.CLIMB: (*SAFE[:2], demand.mu, demand.delta),
         rows.SURFACE: SAFE,
         rows.DROP: SAFE,
     }

@@ -146,7 +146,7 @@ def _is_card(card) -> bool:
 
 
 def _is_guard(guard) -> bool:
-    """Whether a value is what control noticed in a run; runs of before tell nothing of it."""
+    """Whether a value is what the guard told in a run; runs of before tell nothing of it."""
     events = guard.get('events', []) if isinstance(guard, dict) else None
     return isinstance(events, list) and all(
         isinstance(event, dict)

@@ -249,9 +249,7 @@ def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
             told('navigation', lambda card: (reckoned(card) or {'method': 'known'})['method'])
         )
     if any(guard_texts(card) for card in cards):
-        rows.append(
-            told('control noticed', lambda card: '; '.join(guard_texts(card)) or 'nothing')
-        )
+        rows.append(told('guard', lambda card: '; '.join(guard_texts(card)) or 'nothing'))
     return rows + [
         (figure.name, _cells(figure, cards))
         for figure in FIGURES

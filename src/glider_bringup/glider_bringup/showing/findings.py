@@ -143,7 +143,7 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
     if card['status'] in ('aborted', 'failed'):
         ended = 'was aborted' if card['status'] == 'aborted' else 'failed'
         problems.append(f'The run {ended} at {at(card["sim_time_s"])}: {card["reason"]}.')
-    problems += [f'Control noticed {text}.' for text in guard_texts(card)]
+    problems += [f'The guard, {text}.' for text in guard_texts(card)]
     if card['messages_lost']:
         problems.append(f'{card["messages_lost"]:,} messages were lost on the way to the bag.')
     broken = {

@@ -64,7 +64,7 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
         ),
         ('dives', str(card['dives'])),
         ('along path', show(card['distance_along_path_m'], 'm', 0)),
-        *(('control noticed', text) for text in guard_texts(card)),
+        *(('guard', text) for text in guard_texts(card)),
         *([('end of path', f'came up {show(end_m, "m", 1)} from its last point')]
           if end_m is not None else []),
         ('cross-track, steady', f'rms {show(track["rms_steady"], "m", 3)}, max '
@@ -93,11 +93,14 @@ def _surface_travel(travel: dict) -> str:
 
 
 def guard_texts(card: dict) -> list[str]:
-    """What control noticed, in words: each kind once, with its first time and how often."""
+    """What the guard told, in words: each kind once, with its first time and how often."""
     first, count = {}, Counter()
     for event in card.get('guard', {}).get('events', []):
-        first.setdefault(event['message'], event['t_s'])
-        count[event['message']] += 1
+        reaction, text = event.get('reaction'), event['message']
+        if reaction not in (None, 'none', 'note'):
+            text = f'{reaction}: {text}'
+        first.setdefault(text, event['t_s'])
+        count[text] += 1
     return [
         f'at {t_s:,.1f} s: {text}' + (f' ({count[text]} times)' if count[text] > 1 else '')
         for text, t_s in first.items()
