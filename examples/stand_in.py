@@ -40,7 +40,7 @@ PARAMETERS = {
     'silence_s': 3.0,
     'duration_s': 0.0,  # 0.0: until Ctrl-C
     'imu_period_s': 4.0,
-    'listeners': 3,  # subscriptions that it waits for; with navigates:=false there are 5
+    'listeners': 5,  # subscriptions that it waits for; with navigates:=false there are 7
     'seed': 1,
 }
 GLIDING = {'heading_deg': 30.0, 'pitch_deg': -30.0, 'speed_mps': 0.5, 'net_heaviness_kg': 0.4}

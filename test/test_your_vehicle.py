@@ -187,7 +187,7 @@ def flown(request, tmp_path_factory) -> Flown:
                 processes.append(subprocess.Popen([*command, *free], env=environment))
             watch.until(lambda: watch.ready == nodes)
             stand_in = [sys.executable, STAND_IN, '--ros-args', '-r', '__ns:=/glider']
-            stand_in += options(**faults, duration_s=END_S, listeners=5 if navigates else 6)
+            stand_in += options(**faults, duration_s=END_S, listeners=7 if navigates else 8)
             stand_in += options(navigates=str(navigates).lower())
             processes.append(subprocess.Popen(stand_in, env=environment))
             watch.until_s(CHANGE_S)

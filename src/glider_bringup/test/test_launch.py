@@ -17,7 +17,7 @@ from glider_bringup.engines.launch_plan import (
     check_names,
     plan_launch,
 )
-from glider_bringup.engines.processes import MODULES, PLANT, RECORDER
+from glider_bringup.engines.processes import MODULES, ON_BOARD, PLANT, RECORDER
 from glider_bringup.mission.scenario import scenario_names
 from glider_control.settings import ControlLawSettings
 from glider_guidance.settings import LosSettings
@@ -93,16 +93,15 @@ def test_autopilot_takes_the_place_of_its_nodes(tmp_path):
         LaunchedNode('glider_model', 'current_node'),
         LaunchedNode('glider_model', 'plant_node'),
     )
-    assert {'/glider/navigation_node', '/glider/guidance_node', '/glider/control_node'} < set(
-        parameters(plan)
-    )
+    aboard = {f'/glider/{wired.node}' for wired in ON_BOARD}
+    assert len(aboard) == 4 and aboard < set(parameters(plan))
 
 
-def test_vehicle_of_ones_own_has_guidance_and_control_alone(tmp_path):
+def test_vehicle_of_ones_own_has_guidance_control_and_guard_alone(tmp_path):
     arguments = {'simulate': 'false', 'lockstep': 'false', 'record': str(tmp_path / 'flight')}
     plan = plan_launch(arguments, tmp_path)
     names = {node.executable for node in plan.nodes}
-    assert names == {'guidance_node', 'control_node', RECORDER}
+    assert names == {'guidance_node', 'control_node', 'guard_node', RECORDER}
     assert not any(entry['lockstep'] for entry in parameters(plan).values())
 
 
@@ -123,10 +122,13 @@ def test_navigation_of_a_vehicle_can_be_left_out(tmp_path, navigation, method, n
         **{'scenario': str(scenario), 'navigation': navigation},
     }
     plan = plan_launch(arguments, tmp_path)
-    assert [node.executable for node in plan.nodes] == [*nodes, 'guidance_node', 'control_node']
+    aboard = [*nodes, 'guidance_node', 'control_node', 'guard_node']
+    assert [node.executable for node in plan.nodes] == aboard
+    has_pressure = bool(nodes) and method == 'dead_reckoned'
+    assert parameters(plan)['/glider/guard_node']['pressure'] == has_pressure
     (autopilot,) = plan_launch({**arguments, 'autopilot': 'true'}, tmp_path).nodes
     assert autopilot.executable == 'autopilot'
-    assert autopilot.words == (() if nodes else ('guidance', 'control'))
+    assert autopilot.words == (() if nodes else ('guidance', 'control', 'guard'))
 
 
 def test_vehicle_that_does_not_know_its_place_has_navigation_too(tmp_path):
@@ -135,7 +137,7 @@ def test_vehicle_that_does_not_know_its_place_has_navigation_too(tmp_path):
     arguments = {'simulate': 'false', 'lockstep': 'false', 'record': str(tmp_path / 'flight')}
     plan = plan_launch({**arguments, 'scenario': str(scenario)}, tmp_path)
     names = {node.executable for node in plan.nodes}
-    assert names == {'navigation_node', 'guidance_node', 'control_node', RECORDER}
+    assert names == {'navigation_node', 'guidance_node', 'control_node', 'guard_node', RECORDER}
     recorded = yaml.safe_load(parameters(plan)[f'/glider/{RECORDER}']['topics'])
     assert recorded == [
         *('imu', 'pressure', 'fix'),

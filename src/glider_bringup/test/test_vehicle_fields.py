@@ -83,7 +83,7 @@ def test_folder_has_the_vehicle_as_flown(flown):
 def test_recording_of_a_changed_vehicle_verifies(flown):
     report = result('verify', flown[1], '--json')
     assert report['identical']
-    assert [block['result'] for block in report['blocks']] == ['identical'] * 5
+    assert [block['result'] for block in report['blocks']] == ['identical'] * 6
 
 
 def test_report_tells_what_is_not_as_in_the_file_of_the_vehicle(flown, tmp_path):
@@ -164,7 +164,7 @@ def test_depth_is_held_against_the_rating_that_was_set(tmp_path):
     with pytest.raises(ConfigurationError, match='allowed: <= 500 m'):
         load_scenario('current_8deg', {'vehicle.rated_depth': 500.0})
     values = yaml.safe_load(vehicle_path('zhang2021').read_text(encoding='utf-8'))
-    del values['rated_depth']
+    del values['rated_depth'], values['crush_depth']
     (tmp_path / 'old.yaml').write_text(yaml.safe_dump(values), encoding='utf-8')
     changes = {'vehicle': str(tmp_path / 'old.yaml'), 'vehicle.rated_depth': 1500.0}
     vehicle = load_vehicle(load_scenario('current_8deg', changes).vehicle)

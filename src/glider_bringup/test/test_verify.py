@@ -257,7 +257,7 @@ def test_damage_to_an_input_leads_to_its_source(altered, recorded, tmp_path):
     [
         ('ground_truth/odom', 'plant', {'current'}),
         ('measured_odom', 'plant', {'navigation'}),
-        ('odom', 'navigation', {'guidance', 'control'}),
+        ('odom', 'navigation', {'guidance', 'control', 'guard'}),
     ],
 )
 def test_input_that_is_not_finite_ends_what_can_be_computed(
@@ -363,6 +363,7 @@ def test_blocks_without_their_inputs_are_skipped_and_say_why(altered, recorded, 
         'navigation': IDENTICAL,
         'guidance': IDENTICAL,
         'control': IDENTICAL,
+        'guard': IDENTICAL,
     }
     assert 'current_velocity' in blocks['plant']['reason']
     assert 'wrench is not recorded' in blocks['control']['notes']
@@ -386,8 +387,8 @@ def test_lost_input_is_a_difference(altered, recorded, tmp_path, tick):
 def test_message_that_is_there_twice_is_a_difference(altered, recorded, tmp_path):
     place = [i for i, m in enumerate(recorded) if m.topic == '/glider/command'][600]
     blocks = results(altered([*recorded[: place + 1], *recorded[place:]]), tmp_path)
-    assert blocks['control']['first']['topic'] == 'command'
-    assert 'twice' in blocks['control']['first']['computed']
+    assert blocks['guard']['first']['topic'] == 'command'
+    assert 'twice' in blocks['guard']['first']['computed']
 
 
 def test_recording_that_begins_late_cannot_be_compared(altered, recorded, tmp_path):
@@ -406,7 +407,7 @@ def test_half_a_topic_is_a_difference(altered, recorded, tmp_path):
     for name, concerned in (
         ('ground_truth/odom', {'plant', 'current'}),
         ('measured_odom', {'plant', 'navigation'}),
-        ('odom', {'navigation', 'guidance', 'control'}),
+        ('odom', {'navigation', 'guidance', 'control', 'guard'}),
     ):
         cut = [m for m in recorded if m.topic != f'/glider/{name}' or m.log_ns < 60_000_000_000]
         assert different(results(altered(cut), tmp_path)) == concerned

@@ -21,7 +21,7 @@ def said(state, params) -> Health:
 
 def after(state, params, ticks: int, command: Joints):
     for _ in range(ticks):
-        state = plant_move(state, (tuple(command), STILL), params, TICK_S)
+        state = plant_move(state, (tuple(command), STILL, (0.0,)), params, TICK_S)
     return state
 
 

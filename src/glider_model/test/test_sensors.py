@@ -292,7 +292,9 @@ def shown(count, **sensors):
         for name, numbers in said(state, params).items():
             rows[name].append(numbers)
         pump = 0.4 * math.sin(0.05 * tick)
-        state = plant_move(state, ((pump, 0.01, 0.1, 0.0), (0.1, 0.0, 0.0)), params, TICK_S)
+        state = plant_move(
+            state, ((pump, 0.01, 0.1, 0.0), (0.1, 0.0, 0.0), (0.0,)), params, TICK_S
+        )
     return {name: np.array(numbers) for name, numbers in rows.items()}
 
 
@@ -392,7 +394,7 @@ def test_each_time_at_the_surface_is_one_surfacing(pattern, missed):
         motion = state.motion._replace(p_d=depth, u=0.0, w=0.0)
         state = state._replace(motion=motion)
         found.append(said(state, params)['fix'][0] == HAS_FIX)
-        state = plant_move(state, (4 * (0.0,), 3 * (0.0,)), params, TICK_S)
+        state = plant_move(state, (4 * (0.0,), 3 * (0.0,), (0.0,)), params, TICK_S)
     expected = [*range(20, 30), *range(63, len(stay))]
     for number, has in enumerate(np.split(np.array(found), 4)):
         assert np.flatnonzero(has).tolist() == ([] if number in missed else expected), number

@@ -37,7 +37,7 @@ from glider_guidance.settings import METHODS
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_S
 from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace
-from glider_model.ros.wire.topics import CURRENT, NAVIGATION
+from glider_model.ros.wire.topics import CURRENT, GUARD, NAVIGATION
 
 #: The node that `ros2 launch` starts and `./glider run`, which nobody can watch, does not.
 TF, TF_MODULE = 'tf_node', 'glider_model.nodes.tf_node'
@@ -207,9 +207,12 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
         parameters[RECORDER]['progress'] = False
     # a vehicle whose place is measured knows it, and publishes odom itself
     knows_place = not simulate and 'measured_odom' in scenario.navigation.topics
+    with_navigation = _TRUTH.get(text['navigation'], not knows_place)
+    if not with_navigation:  # nor is there any sensor of its own
+        parameters[GUARD]['pressure'] = False
     nodes = _nodes(
         simulate,
-        _TRUTH.get(text['navigation'], not knows_place),
+        with_navigation,
         _TRUTH[text['autopilot']],
         record_to is not None,
         with_tf,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from glider_bringup.showing.scorecard import reckoned
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, Steps
 from glider_guard.rows import REACTIONS, ROWS
-from glider_guard.rows import SURFACE as SURFACES
+from glider_guard.rows import SURFACE as AT_LEAST
 from glider_model.ocean.current_settings import KNOT_MPS
 
 
@@ -294,7 +294,7 @@ def _guard_panels(run: FlownRun) -> list[Panel]:
         for event, role in zip(first.values(), _ROLES, strict=False)
     )
     levels = ', '.join(
-        f'{level} {name}' for level, name in enumerate(REACTIONS) if level >= SURFACES
+        f'{level} {name}' for level, name in enumerate(REACTIONS) if level >= AT_LEAST
     )
     return [
         Panel(
