@@ -145,7 +145,7 @@ def test_dead_reckoning_verifies(glider, reckoned, engine):
     done = glider('verify', reckoned[engine], '--json')
     assert done.returncode == 0, done.stderr
     blocks = {one['block']: one['result'] for one in json.loads(done.stdout)['blocks']}
-    names = ('plant', 'current', 'navigation', 'guidance', 'control')
+    names = ('plant', 'current', 'navigation', 'guidance', 'control', 'guard')
     assert blocks == dict.fromkeys(names, 'identical')
 
 

@@ -161,7 +161,7 @@ class Vehicle:
 
     def __init__(self, scenario, folder) -> None:
         state, self.params = mission_of(scenario)
-        self.plant, _, _, self.guidance, self.control = state
+        self.plant, _, _, self.guidance, self.control, _ = state
         self.bag = BagWriter(folder, 'flight')
         self.order = 0
         self.told, self.saturation = None, (0, 0)
@@ -234,11 +234,8 @@ class Vehicle:
                     )
                 ),
             )
-        self.publish('command', stamp_ns, out.command)
+        self.publish('demand', stamp_ns, out.command)
         self.command = out.command
-
-    def be_safe(self) -> None:
-        self.publish('command', self.odom[0], self.params.control.safe_command)
 
 
 @pytest.fixture
@@ -262,8 +259,6 @@ def free_flight(tmp_path):
             if not guides_first:
                 for _ in range(chance.choice([1, 1, 1, 1, 0, 2])):
                     vehicle.guide()
-            if tick in (250, 251, 252):
-                vehicle.be_safe()
             if tick == 400:
                 vehicle.measure(stamp_ns + 50_000_000)
                 vehicle.abort()
@@ -285,9 +280,10 @@ def test_flight_on_a_clock_of_its_own_is_identical(glider, free_flight):
         'navigation': 'skipped',
         'guidance': 'identical',
         'control': 'identical',
+        'guard': 'skipped',
     }
     assert blocks['guidance']['compared']['/diagnostics'] >= 3
-    assert blocks['control']['compared']['command'] == blocks['control']['ticks'] > 400
+    assert blocks['control']['compared']['demand'] == blocks['control']['ticks'] > 400
 
 
 @pytest.mark.parametrize('block', ['guidance', 'control'])

@@ -289,7 +289,7 @@ def test_lost_and_late_inputs_are_counted_and_told(flight):
 def test_safe_state_is_commanded_in_the_silence_and_named(flight):
     silence = flight.commands_between(SILENCE_S - 0.5, SILENCE_S + SILENT_S)
     assert SAFE in silence
-    told = flight.told_by('/glider/control_node', 'odom, joint_states; commanding the safe state')
+    told = flight.told_by('/glider/guard_node', 'commanding the safe state')
     in_silence = [t for t in told if abs(t.t_s - SILENCE_S) < 1.0]
     assert in_silence
     assert {t.level for t in in_silence} == {DiagnosticStatus.ERROR}
@@ -298,7 +298,7 @@ def test_safe_state_is_commanded_in_the_silence_and_named(flight):
 def test_flight_goes_on_when_inputs_are_back(flight):
     fresh = [
         told
-        for told in flight.told_by('/glider/control_node', 'inputs are fresh again')
+        for told in flight.told_by('/glider/guard_node', 'inputs are fresh again')
         if told.t_s > SILENCE_S
     ]
     assert fresh

@@ -41,12 +41,6 @@ _BYTES_ALIKE = 16
 Tracks = dict[str, Track]
 #: The track of a topic, and the messages that have no place in it.
 Place = Callable[[Series], tuple[Track, list[int]]]
-#: Whether a message without a place is right nonetheless, by name of its topic and its numbers.
-IsRight = Callable[[str, np.ndarray], bool]
-
-
-def _is_never_right(name: str, values: np.ndarray) -> bool:
-    return False
 
 
 class Check:
@@ -67,7 +61,7 @@ class Check:
         self.differing[difference.topic] += 1
         self.found.append(difference)
 
-    def tracks(self, place: Place, why: str, is_right: IsRight = _is_never_right) -> Tracks:
+    def tracks(self, place: Place, why: str) -> Tracks:
         """Tracks of the outputs that are recorded.
 
         Parameters
@@ -76,8 +70,6 @@ class Check:
             Gives the track of a topic, and the messages that have no place in it.
         why : str
             What is wrong with those, in words.
-        is_right : callable
-            Whether nothing is, by name of the topic and numbers of the message.
         """
         tracks = {}
         for name in self.block.outputs:
@@ -89,10 +81,9 @@ class Check:
                 continue
             tracks[name], left = place(series)
             for i in left:
-                if not is_right(name, series.values[i]):
-                    text = f'message {i} of the topic, {why}'
-                    stamp_ns = int(series.stamps_ns[i])
-                    self.add(Difference(stamp_ns, name, WHOLE, text, 'not computed'))
+                text = f'message {i} of the topic, {why}'
+                stamp_ns = int(series.stamps_ns[i])
+                self.add(Difference(stamp_ns, name, WHOLE, text, 'not computed'))
         return tracks
 
     # .................................................................. steps

@@ -20,7 +20,7 @@ from glider_bringup.recording.ros.verify.verdict import Verdict, skipped
 from glider_model.base import wiring
 from glider_model.base.block import optional_topics
 from glider_model.base.signals import TICK_NS
-from glider_model.base.wiring import Wired, present
+from glider_model.base.wiring import WHEN_SILENT, Wired, present
 
 
 def is_lockstep(recording: Recording, told: Told) -> bool:
@@ -52,7 +52,8 @@ def _reason_to_skip(wired: Wired, settings, recording: Recording, lockstep: bool
     outputs = present(wired.outputs, topics)
     if not any(name in recording.series for name in outputs):
         return f'none of {", ".join(outputs)} is recorded'
-    if not lockstep and wired in (wiring.PLANT, wiring.CURRENT):
+    silent = [name for name in present(wired.inputs, topics) if name in WHEN_SILENT]
+    if not lockstep and (silent or wired in (wiring.PLANT, wiring.CURRENT)):
         return 'free-running: which inputs it had at a tick is not on record'
     return ''
 

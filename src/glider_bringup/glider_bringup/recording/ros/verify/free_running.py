@@ -17,7 +17,6 @@ from glider_bringup.recording.ros.verify.verdict import (
     Verdict,
     skipped,
 )
-from glider_model.base import wiring
 
 #: An input goes on by one message from step to step, or by one of these.
 _ADVANCES = (1, 0, 2, 3, 4, 5, 6, 7, 8)
@@ -50,18 +49,13 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
     if marker is None:
         return skipped(wired.name, f'none of {", ".join(wired.outputs)} is recorded')
     stamps_ns = series[marker].stamps_ns
-    if wired == wiring.GUARD:
-        safe = np.array(block.params.safe_command)
-        if marker == 'command':
-            stamps_ns = stamps_ns[~np.all(series[marker].values == safe, axis=1)]
     check = Check(block, recording, stamps_ns)
     outputs = check.tracks(
         lambda one: _by_stamp(one, stamps_ns),
         'which belongs to no step',
-        lambda name, values: name == 'command' and np.array_equal(values, safe),
     )
     start, cuts = 0, check.cuts(len(stamps_ns))
-    first = {name: _newest(series[name], stamps_ns[0]) for name in wired.inputs}
+    first = {name: _newest(series[name], stamps_ns[0]) for name in block.inputs}
     options = _options({name: [n, n - 1, n - 2, n - 3] for name, n in first.items()})
     while start < len(stamps_ns):
         check.follow_orders(start)
