@@ -14,6 +14,7 @@ import math
 from typing import NamedTuple
 
 from glider_model.base.kernel import kernel
+from glider_model.onboard.moving_mass import MovingMass, first_moments, make_moving_mass
 from glider_model.vehicle.file import VehicleParams
 from glider_model.vehicle.rigid_body import GRAVITY
 
@@ -24,11 +25,7 @@ SMALLEST_G_Z = 0.2
 class AllocationParams(NamedTuple):
     """Masses and ranges of the actuators."""
 
-    s_x: float  #: first moment of the hull (kg m)
-    s_z: float
-    m_p: float  #: moving mass (kg)
-    x_p0: float  #: its neutral position (m)
-    R_p: float  #: its radius (m)
+    mass: MovingMass
     m_b_max: float  #: ranges (kg, m, rad, rad)
     x_p_max: float
     mu_max: float
@@ -38,11 +35,7 @@ class AllocationParams(NamedTuple):
 def make_allocation(vehicle: VehicleParams) -> AllocationParams:
     """What allocation needs to know of a vehicle: what a scale and a ruler tell."""
     return AllocationParams(
-        vehicle.s_x,
-        vehicle.s_z,
-        vehicle.m_p,
-        vehicle.x_p0,
-        vehicle.R_p,
+        make_moving_mass(vehicle),
         vehicle.m_b_max,
         vehicle.x_p_max,
         vehicle.mu_max,
@@ -68,9 +61,10 @@ def allocate_roll(tau_p, phi, theta, params):
     Held within the range; out of reach, the end of the range on the demanded side.
     """
     _, g_y, g_z = gravity_direction(phi, theta)
-    lever = params.m_p * params.R_p * GRAVITY
+    mass = params.mass
+    lever = mass.m_p * mass.R_p * GRAVITY
     a, b = lever * g_z, lever * g_y
-    demand = (tau_p + GRAVITY * params.s_z * g_y) / max(math.sqrt(a * a + b * b), 1e-9)
+    demand = (tau_p + GRAVITY * mass.s_z * g_y) / max(math.sqrt(a * a + b * b), 1e-9)
     mu = math.asin(min(1.0, max(-1.0, demand))) + math.atan2(b, a)
     return min(params.mu_max, max(-params.mu_max, mu))
 
@@ -82,9 +76,10 @@ def allocate_pitch(tau_q, mu, phi, theta, params):
     x_p = (S_z g_x - tau_q / g) / (g_z m_p) - s_x / m_p - x_0, held within the range.
     """
     g_x, _, g_z = gravity_direction(phi, theta)
-    s_z = params.s_z + params.m_p * params.R_p * math.cos(mu)
+    mass = params.mass
+    _, _, s_z = first_moments(0.0, mu, mass)
     s_x = (s_z * g_x - tau_q / GRAVITY) / max(g_z, SMALLEST_G_Z)
-    x_p = (s_x - params.s_x) / params.m_p - params.x_p0
+    x_p = (s_x - mass.s_x) / mass.m_p - mass.x_p0
     return min(params.x_p_max, max(-params.x_p_max, x_p))
 
 
@@ -98,7 +93,5 @@ def limit_surface(delta, params):
 def moments(x_p, mu, phi, theta, params):
     """Roll and pitch moment (N m) that given positions of the moving mass make."""
     g_x, g_y, g_z = gravity_direction(phi, theta)
-    s_x = params.s_x + params.m_p * (params.x_p0 + x_p)
-    s_y = params.m_p * params.R_p * math.sin(mu)
-    s_z = params.s_z + params.m_p * params.R_p * math.cos(mu)
+    s_x, s_y, s_z = first_moments(x_p, mu, params.mass)
     return GRAVITY * (s_y * g_z - s_z * g_y), GRAVITY * (s_z * g_x - s_x * g_z)

@@ -11,9 +11,16 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from glider_model.base.frames import (
+    NO_RATES,
     OriginSettings,
+    body_rates,
+    covariance_to_wire,
     euler_from_quaternion,
+    euler_rates,
     from_geodetic,
+    horizontal_to_wire,
+    imu_from_wire,
+    imu_to_wire,
     odometry_from_wire,
     odometry_to_wire,
     poses_from_wire,
@@ -30,7 +37,7 @@ from glider_model.base.frames import (
     wrench_from_wire,
     wrench_to_wire,
 )
-from glider_model.base.signals import Odometry, Reference, Water, Wrench
+from glider_model.base.signals import Covariance, Imu, Odometry, Reference, Vector, Water, Wrench
 
 quick = settings(max_examples=60, deadline=None)
 angles = st.floats(-math.pi, math.pi)
@@ -258,6 +265,35 @@ def test_wrench_comes_back_exactly(wrench):
 def test_wrench_in_flu():
     """Heave up and pitch nose-down positive, roll unchanged."""
     assert wrench_to_wire(Wrench(1.0, 2.0, 3.0)) == (-1.0, 2.0, -3.0)
+
+
+@quick
+@given(odometries, st.booleans())
+def test_imu_on_the_wire_is_that_of_odometry_and_comes_back(odometry, has_rates):
+    imu = Imu(*odometry[3:7], *odometry[10:], has_rates)
+    wire = imu_to_wire(imu)
+    assert wire[:7] == odometry_to_wire(odometry)[3:7] + odometry_to_wire(odometry)[10:]
+    assert (wire[7] == NO_RATES) == (not has_rates)
+    back = imu_from_wire(wire)
+    assert back[4:] == imu[4:]
+    assert matrix(back[:4]) == pytest.approx(matrix(imu[:4]), abs=1e-14)
+
+
+def test_covariance_on_the_wire_is_that_of_the_turned_vector():
+    covariance, vector = Covariance(1.0, 0.2, 3.0), Vector(4.0, 5.0)
+    swap = T[:2, :2]
+    turned_matrix = swap @ np.array([[1.0, 0.2], [0.2, 3.0]]) @ swap.T
+    assert covariance_to_wire(covariance) == tuple(turned_matrix.ravel())
+    assert horizontal_to_wire(vector, covariance)[:2] == tuple(swap @ vector)
+    assert horizontal_to_wire(vector, covariance)[2:] == covariance_to_wire(covariance)
+
+
+@quick
+@given(angles, pitches, st.tuples(*3 * [st.floats(-5.0, 5.0)]))
+def test_rates_of_angles_and_body_belong_together(phi, theta, rates):
+    assert body_rates(phi, theta, *euler_rates(phi, theta, *rates)) == pytest.approx(
+        rates, abs=1e-12
+    )
 
 
 def test_poses_of_many_messages_are_those_of_each():

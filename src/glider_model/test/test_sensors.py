@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from glider_model.base.frames import (
+    NO_RATES,
     OriginSettings,
     euler_from_quaternion,
     from_geodetic,
@@ -28,7 +29,6 @@ from glider_model.plant.plant import PlantSettings, plant_odometry
 from glider_model.plant.sensors import (
     HAS_FIX,
     NO_FIX,
-    NO_RATES,
     NO_SAMPLE,
     SensorSettings,
     add_noise,

@@ -5,23 +5,24 @@
 Between two samples roll and pitch go where the moving mass takes them, whose position is known all
 the time: to the angles at which gravity has no moment,
 
-    tan phi = S_y / S_z,    tan theta = -S_x / S_z,
-    S_x = s_x + m_p (x_0 + x_p),    S_y = m_p R sin mu,    S_z = s_z + m_p R cos mu,
+    tan phi = S_y / S_z,    tan theta = -S_x / S_z
 
-with a lag. Only the change of these angles since the sample is used: what else turns the vehicle
-is in the sample. The heading goes where that roll turns it, psi' = k sin(phi) + d, with a k for
-dive and climb each. From one sample to the next the heading has changed by k times the integral of
-sin(phi): that tells k, by a Kalman filter that begins with the vehicle's file. A rate made of two
-samples would be as old as half the time between them, and by it whoever learns how the vehicle
-steers learns it wrong. Only where samples are dense, that rate is used.
+(`glider_model.onboard.moving_mass`), with a lag. Only the change of these angles since the sample
+is used: what else turns the vehicle is in the sample. The heading goes where that roll turns it,
+psi' = k sin(phi) + d, with a k for dive and climb each. From one sample to the next the heading
+has changed by k times the integral of sin(phi): that tells k, by a Kalman filter that begins with
+the vehicle's file. A rate made of two samples would be as old as half the time between them, and
+by it whoever learns how the vehicle steers learns it wrong. Only where samples are dense, that
+rate is used.
 """
 
 import math
 from typing import NamedTuple
 
-from glider_model.base.frames import euler_from_quaternion, wrap_angle
+from glider_model.base.frames import body_rates, euler_from_quaternion, euler_rates, wrap_angle
 from glider_model.base.kernel import kernel
-from glider_model.vehicle.file import Vehicle, VehicleParams
+from glider_model.onboard.moving_mass import first_moments
+from glider_model.vehicle.file import Vehicle
 
 #: Samples that come faster than this (s) are dense: rates are differences.
 DENSE_S = 1.0
@@ -42,21 +43,6 @@ class Angles(NamedTuple):
     phi: float
     theta: float
     psi: float
-
-
-class MovingMass(NamedTuple):
-    """What a scale and a ruler tell of the moving mass."""
-
-    m_p: float  #: (kg)
-    lever: float  #: m_p R (kg m)
-    s_x: float  #: first moment of all else, with the mass in neutral (kg m)
-    s_z: float
-
-
-def make_moving_mass(vehicle: VehicleParams) -> MovingMass:
-    """Moving mass of a vehicle."""
-    s_x = vehicle.s_x + vehicle.m_p * vehicle.x_p0
-    return MovingMass(vehicle.m_p, vehicle.m_p * vehicle.R_p, s_x, vehicle.s_z)
 
 
 class Turning(NamedTuple):
@@ -114,32 +100,10 @@ class Attitude(NamedTuple):
 
 
 @kernel
-def euler_rates(angles, p, q, r):
-    """Rates of the Euler angles (rad/s) from those about the body axes."""
-    s_phi, c_phi = math.sin(angles.phi), math.cos(angles.phi)
-    c_theta = max(0.1, math.cos(angles.theta))
-    psi_dot = (s_phi * q + c_phi * r) / c_theta
-    return Angles(p + math.sin(angles.theta) * psi_dot, c_phi * q - s_phi * r, psi_dot)
-
-
-@kernel
-def body_rates(angles, rates):
-    """Rates about the body axes (rad/s) from those of the Euler angles."""
-    s_phi, c_phi = math.sin(angles.phi), math.cos(angles.phi)
-    s_theta, c_theta = math.sin(angles.theta), math.cos(angles.theta)
-    return (
-        rates.phi - s_theta * rates.psi,
-        c_phi * rates.theta + s_phi * c_theta * rates.psi,
-        -s_phi * rates.theta + c_phi * c_theta * rates.psi,
-    )
-
-
-@kernel
 def _follow_mass(balance, joints, mass, dt):
     """Angles that the moving mass makes a tick later, and their rates."""
-    s_z = mass.s_z + mass.lever * math.cos(joints.mu)
-    phi = math.atan2(mass.lever * math.sin(joints.mu), s_z)
-    theta = -math.atan2(mass.s_x + mass.m_p * joints.x_p, s_z)
+    s_x, s_y, s_z = first_moments(joints.x_p, joints.mu, mass)
+    phi, theta = math.atan2(s_y, s_z), -math.atan2(s_x, s_z)
     rates = Angles((phi - balance.phi) / ROLL_S, (theta - balance.theta) / PITCH_S, 0.0)
     return Angles(balance.phi + dt * rates.phi, balance.theta + dt * rates.theta, 0.0), rates
 
@@ -203,7 +167,10 @@ def attitude_step(state, imu, joints, mass, dt):
         else:
             turn = Turn(turn.dive, turn.climb, turn.d, 0.0, 0.0)
         if imu.has_rates:
-            rates = euler_rates(sample, imu.p, imu.q, imu.r)
+            phi_dot, theta_dot, psi_dot = euler_rates(
+                sample.phi, sample.theta, imu.p, imu.q, imu.r
+            )
+            rates = Angles(phi_dot, theta_dot, psi_dot)
         elif dense:
             share = 1.0 - math.exp(-age_s / RATE_S)
             psi = state.rates.psi + share * (change / age_s - state.rates.psi)
@@ -215,5 +182,6 @@ def attitude_step(state, imu, joints, mass, dt):
         before.theta + balance.theta - then.theta,
         wrap_angle(before.psi + turn.turned),
     )
-    p, q, r = body_rates(angles, state.rates)
+    rates = state.rates
+    p, q, r = body_rates(angles.phi, angles.theta, rates.phi, rates.theta, rates.psi)
     return state, Attitude(angles, p, q, r), is_new

@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 from glider_model.base.kernel import kernel
-from glider_navigation.method import Vector
+from glider_model.base.signals import Vector
 
 #: Principal lunar tide M2 (rad/s).
 TIDE = 2.0 * math.pi / (12.4206012 * 3600.0)

@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple
 
 from glider_model.base.frames import Origin
 from glider_model.base.settings import Settings
-from glider_model.base.signals import Joints
+from glider_model.base.signals import Covariance, Imu, Joints, Vector
 from glider_model.base.slot import slot
 from glider_model.vehicle.file import Vehicle
 
@@ -48,19 +48,6 @@ class NavigationMethodSettings(Settings):
         raise NotImplementedError
 
 
-class Imu(NamedTuple):
-    """Attitude q_NB, and rates in body axes (rad/s)."""
-
-    q_w: float
-    q_x: float
-    q_y: float
-    q_z: float
-    p: float
-    q: float
-    r: float
-    has_rates: bool
-
-
 class Fix(NamedTuple):
     """A place by satellite, relative to the origin (m)."""
 
@@ -81,21 +68,6 @@ class Heard(NamedTuple):
     imu: Imu
     depth: float  #: (m)
     fix: Fix
-
-
-class Covariance(NamedTuple):
-    """Of a horizontal vector."""
-
-    nn: float
-    ne: float
-    ee: float
-
-
-class Vector(NamedTuple):
-    """A horizontal vector."""
-
-    n: float
-    e: float
 
 
 class Believed(NamedTuple):

@@ -9,7 +9,7 @@ the same for both axes. Fixes count once in `FIX_EVERY_S`: the error of one is t
 from typing import NamedTuple
 
 from glider_model.base.kernel import kernel
-from glider_navigation.method import Vector
+from glider_model.base.signals import Vector
 
 #: Time from a fix that counts to the next (s).
 FIX_EVERY_S = 60.0

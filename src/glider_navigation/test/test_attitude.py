@@ -10,10 +10,10 @@ import pytest
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from glider_model.base.signals import TICK_S, Joints
+from glider_model.base.signals import TICK_S, Imu, Joints
+from glider_model.onboard.moving_mass import make_moving_mass
 from glider_model.vehicle.file import SteeringSettings, load_vehicle
-from glider_navigation.attitude import attitude_step, initial_attitude, make_moving_mass
-from glider_navigation.method import Imu
+from glider_navigation.attitude import attitude_step, initial_attitude
 
 VEHICLE = load_vehicle('zhang2021')
 MASS = make_moving_mass(VEHICLE.params())

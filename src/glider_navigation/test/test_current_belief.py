@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from glider_model.base.signals import Vector
 from glider_navigation.current_belief import (
     Regressors,
     current_at,
@@ -15,7 +16,6 @@ from glider_navigation.current_belief import (
     take_in,
     wandered,
 )
-from glider_navigation.method import Vector
 
 #: Principal lunar tide (rad/s), what is known before the first way, and what never is (m/s).
 M2 = 2.0 * math.pi / (12.4206012 * 3600.0)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from glider_model.base.frames import odometry_from_wire
-from glider_model.base.signals import TICK_S, Joints
+from glider_model.base.signals import TICK_S, Imu, Joints, Vector
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation.current_belief import Uncertainty, initial_belief
-from glider_navigation.method import Fix, Heard, Imu, Vector, method_step
+from glider_navigation.method import Fix, Heard, method_step
 from glider_navigation.methods.dead_reckoned import Way, place_covariance
 from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
 from glider_navigation.settings import NavigationSettings

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from glider_model.base.frames import odometry_to_wire
-from glider_model.base.signals import TICK_S, Joints, Odometry
-from glider_navigation.method import Fix, Heard, Imu, method_step
+from glider_model.base.signals import TICK_S, Imu, Joints, Odometry
+from glider_navigation.method import Fix, Heard, method_step
 from glider_navigation.phase import KNOWN
 from glider_navigation.settings import NavigationSettings
 

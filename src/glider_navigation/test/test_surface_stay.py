@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_navigation.method import Fix, Vector
+from glider_model.base.signals import Vector
+from glider_navigation.method import Fix
 from glider_navigation.surface_stay import begin, counts, now, take_fix, variance_now, wait
 
 quick = settings(max_examples=50, deadline=None)

@@ -11,7 +11,7 @@ import numpy as np
 from glider_bringup.blocks import COLUMNS
 from glider_model.base.frames import Origin, from_geodetic
 from glider_model.base.signals import TICK_S
-from glider_navigation.methods.dead_reckoned import DIVES_M, SURFACES_M
+from glider_navigation.phase import DIVES_M, SURFACES_M
 
 _ODOM, _FIX = (COLUMNS[name].start for name in ('odom', 'fix'))
 _CURRENT, _BELIEVED = (COLUMNS[name].start for name in ('current_velocity', 'believed_current'))

@@ -18,11 +18,13 @@ from pydantic import Field
 
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
-from glider_model.base.signals import Odometry, Reference, Water, Wrench
+from glider_model.base.signals import Imu, Odometry, Reference, Water, Wrench
 
 _HALF_SQRT2 = math.sqrt(0.5)
 #: WGS 84: semi-major axis (m), and the first eccentricity squared (-).
 _AXIS, _ECCENTRICITY2 = 6378137.0, 6.69437999014e-3
+#: What a sensor_msgs/Imu says where there are no rates.
+NO_RATES = -1.0
 
 
 @kernel
@@ -72,6 +74,27 @@ def euler_from_quaternion(q_w, q_x, q_y, q_z):
     theta = math.asin(min(1.0, max(-1.0, sine)))
     psi = math.atan2(2.0 * (q_w * q_z + q_x * q_y), 1.0 - 2.0 * (q_y * q_y + q_z * q_z))
     return phi, theta, psi
+
+
+@kernel
+def euler_rates(phi, theta, p, q, r):
+    """Rates of roll, pitch, heading (rad/s) from those about the body axes."""
+    s_phi, c_phi = math.sin(phi), math.cos(phi)
+    c_theta = max(0.1, math.cos(theta))
+    psi_dot = (s_phi * q + c_phi * r) / c_theta
+    return p + math.sin(theta) * psi_dot, c_phi * q - s_phi * r, psi_dot
+
+
+@kernel
+def body_rates(phi, theta, phi_dot, theta_dot, psi_dot):
+    """Rates about the body axes (rad/s) from those of roll, pitch, heading."""
+    s_phi, c_phi = math.sin(phi), math.cos(phi)
+    s_theta, c_theta = math.sin(theta), math.cos(theta)
+    return (
+        phi_dot - s_theta * psi_dot,
+        c_phi * theta_dot + s_phi * c_theta * psi_dot,
+        -s_phi * theta_dot + c_phi * c_theta * psi_dot,
+    )
 
 
 @kernel
@@ -131,6 +154,21 @@ def odometry_from_wire(wire):
         -wire[11],
         -wire[12],
     )
+
+
+@kernel
+def imu_to_wire(imu):
+    """Attitude and rates as ENU / FLU numbers: quaternion w x y z, rates, `NO_RATES` or 0 (8)."""
+    q_w, q_x, q_y, q_z = swap_world(imu.q_w, imu.q_x, imu.q_y, imu.q_z)
+    rates = 0.0 if imu.has_rates else NO_RATES
+    return q_w, q_x, q_y, q_z, imu.p, -imu.q, -imu.r, rates
+
+
+@kernel
+def imu_from_wire(wire):
+    """Attitude and rates from the 8 numbers of ``imu_to_wire``."""
+    q_w, q_x, q_y, q_z = swap_world(wire[0], wire[1], wire[2], wire[3])
+    return Imu(q_w, q_x, q_y, q_z, wire[4], -wire[5], -wire[6], wire[7] >= 0.0)
 
 
 @kernel
@@ -207,6 +245,18 @@ def water_to_wire(water):
 def water_from_wire(wire):
     """Water velocity from ENU numbers."""
     return Water(wire[1], wire[0], -wire[2])
+
+
+@kernel
+def covariance_to_wire(covariance):
+    """Covariance of a horizontal vector as that of east and north, row by row (4)."""
+    return covariance.ee, covariance.ne, covariance.ne, covariance.nn
+
+
+@kernel
+def horizontal_to_wire(vector, covariance):
+    """A horizontal vector as its east and north parts, with their covariance (6)."""
+    return (vector.e, vector.n) + covariance_to_wire(covariance)
 
 
 @kernel

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What travels between the four blocks: plain numbers in NED / FRD, SI units and radians."""
+"""What travels between the blocks: plain numbers in NED / FRD, SI units and radians."""
 
 from typing import NamedTuple
 
@@ -46,6 +46,34 @@ class Water(NamedTuple):
     v_n: float
     v_e: float
     v_d: float
+
+
+class Imu(NamedTuple):
+    """Attitude q_NB, and rates in body axes FRD (rad/s)."""
+
+    q_w: float
+    q_x: float
+    q_y: float
+    q_z: float
+    p: float
+    q: float
+    r: float
+    has_rates: bool
+
+
+class Vector(NamedTuple):
+    """A horizontal vector."""
+
+    n: float
+    e: float
+
+
+class Covariance(NamedTuple):
+    """Of a horizontal vector."""
+
+    nn: float
+    ne: float
+    ee: float
 
 
 class Reference(NamedTuple):

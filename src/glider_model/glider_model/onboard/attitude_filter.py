@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measured attitude and vertical rate, filtered: noise must not move motors."""
 
-import math
 from typing import NamedTuple
 
-from glider_model.base.frames import euler_from_quaternion, rotate_to_ned, wrap_angle
+from glider_model.base.frames import euler_from_quaternion, euler_rates, rotate_to_ned, wrap_angle
 from glider_model.base.kernel import kernel
 
 
@@ -39,12 +38,7 @@ def measure(state, odometry, first, time_constant, dt):
     q_w, q_x, q_y, q_z = odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
     phi, theta, psi = euler_from_quaternion(q_w, q_x, q_y, q_z)
     _, _, down = rotate_to_ned(q_w, q_x, q_y, q_z, odometry.u, odometry.v, odometry.w)
-    p, q, r = odometry.p, odometry.q, odometry.r
-    s_phi, c_phi = math.sin(phi), math.cos(phi)
-    c_theta = max(0.1, math.cos(theta))
-    psi_dot = (s_phi * q + c_phi * r) / c_theta
-    theta_dot = c_phi * q - s_phi * r
-    phi_dot = p + math.sin(theta) * psi_dot
+    phi_dot, theta_dot, psi_dot = euler_rates(phi, theta, odometry.p, odometry.q, odometry.r)
     if first:
         return Measured(phi, theta, psi, phi_dot, theta_dot, psi_dot, down)
     share = dt / (time_constant + dt)

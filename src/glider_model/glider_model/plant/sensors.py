@@ -30,15 +30,15 @@ from glider_model.base.frames import (
     Origin,
     OriginSettings,
     euler_from_quaternion,
+    imu_to_wire,
     odometry_to_wire,
     quaternion_from_euler,
-    swap_world,
     to_geodetic,
 )
 from glider_model.base.kernel import kernel
 from glider_model.base.noise import normal_pair, random_stream, uniform
 from glider_model.base.settings import Settings
-from glider_model.base.signals import TICK_S, Odometry
+from glider_model.base.signals import TICK_S, Imu, Odometry
 from glider_model.base.wiring import SENSORS
 from glider_model.ocean.density import pressure_at
 
@@ -50,8 +50,8 @@ _PAIRS = 5
 ANTENNA_M = 0.5
 #: The error of a fix stays the same for so many ticks: that of satellites changes slowly.
 FIX_ERROR_TICKS = 600
-#: What a sensor_msgs/Imu and a NavSatFix say where there is no rate, and no fix.
-NO_RATES, NO_FIX, HAS_FIX = -1.0, -1.0, 0.0
+#: Status of a NavSatFix without a fix, and with one.
+NO_FIX, HAS_FIX = -1.0, 0.0
 
 
 class SensorSettings(Settings):
@@ -435,9 +435,8 @@ def sense(odometry, joints, sample, out_ticks, surfacings, tick, params):
             )
         )
     if params.has_parts:
-        q = swap_world(sample.q_w, sample.q_x, sample.q_y, sample.q_z)
-        rates = 0.0 if params.gyro else NO_RATES
-        imu = (q[0], q[1], q[2], q[3], sample.p, -sample.q, -sample.r, rates)
+        x = sample
+        imu = imu_to_wire(Imu(x.q_w, x.q_x, x.q_y, x.q_z, x.p, x.q, x.r, params.gyro))
         pressure = pressure_at(sample.p_d)
         fix = _take_fix(odometry, out_ticks, surfacings, tick, params)
     return (

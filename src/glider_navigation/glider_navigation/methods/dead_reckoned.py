@@ -15,15 +15,10 @@ from pydantic import Field
 
 from glider_model.base.frames import odometry_to_wire, quaternion_from_euler, rotate_to_body
 from glider_model.base.kernel import kernel
-from glider_model.base.signals import Odometry
+from glider_model.base.signals import Covariance, Odometry, Vector
 from glider_model.onboard.glide_polar import Polar, make_polar
-from glider_navigation.attitude import (
-    AttitudeState,
-    MovingMass,
-    attitude_step,
-    initial_attitude,
-    make_moving_mass,
-)
+from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
+from glider_navigation.attitude import AttitudeState, attitude_step, initial_attitude
 from glider_navigation.current_belief import (
     TIDE,
     CurrentBelief,
@@ -37,13 +32,11 @@ from glider_navigation.current_belief import (
 from glider_navigation.flight_model import INITIAL_FLIGHT, Flight, follow_depth, reckon_speed
 from glider_navigation.method import (
     Believed,
-    Covariance,
     NavigationMethodSettings,
     Start,
-    Vector,
     method_step,
 )
-from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
+from glider_navigation.phase import AT_SURFACE, DIVES_M, FIXED, SURFACES_M, UNDER_WATER
 from glider_navigation.surface_stay import (
     DRIFT_STD,
     Stay,
@@ -55,8 +48,6 @@ from glider_navigation.surface_stay import (
     wait,
 )
 
-#: A vehicle that has been below the first depth dives, above the second it has come up (m).
-DIVES_M, SURFACES_M = 3.0, 1.5
 #: Shorter than this (s) a way under water tells no current.
 SHORTEST_WAY_S = 300.0
 
@@ -135,7 +126,7 @@ class DeadReckonedState(NamedTuple):
     tick: int
     attitude: AttitudeState
     flight: Flight
-    is_under: bool
+    under: bool  #: it is under water
     place: Vector  #: where the vehicle believes it is (m)
     way: Way
     stay: Stay
@@ -228,83 +219,89 @@ def _go_on(way, through, current, t_s, dt):
     )
 
 
+@kernel
+def _end_of(way):
+    """Where a way has led to (m)."""
+    return Vector(
+        way.begun.n + way.through.n + way.believed.n,
+        way.begun.e + way.through.e + way.believed.e,
+    )
+
+
+@kernel
+def _change_over(state, under, t_s, params):
+    """Way, stay and what is believed of the current, after a dive or a surfacing if there is one.
+
+    Parameters
+    ----------
+    state : DeadReckonedState
+        At the tick before.
+    under : bool
+        Whether the vehicle is under water now.
+    t_s : float
+        Time since the start (s).
+    params : DeadReckonedParams
+    """
+    way, stay, current = state.way, state.stay, state.current
+    if under and not state.under:
+        if stay.fixes > 0:
+            current = _learn(current, way, stay, params)
+        way = _dive(way, stay)
+    elif state.under and not under:
+        covariance = place_covariance(way, current, params)
+        drift = stay.drift if stay.fixes > 1 else current_at(current, t_s)
+        stay = begin(state.place, 0.5 * (covariance.nn + covariance.ee), drift)
+    return way, stay, current
+
+
+@kernel
+def _odometry(place, attitude, flight, velocity):
+    """Odometry on the wire of a place (m) and a velocity over ground (m/s)."""
+    angles = attitude.angles
+    q_w, q_x, q_y, q_z = quaternion_from_euler(angles.phi, angles.theta, angles.psi)
+    u, v, w = rotate_to_body(q_w, q_x, q_y, q_z, velocity.n, velocity.e, flight.rate)
+    p, q, r = attitude.p, attitude.q, attitude.r
+    odometry = Odometry(place.n, place.e, flight.depth, q_w, q_x, q_y, q_z, u, v, w, p, q, r)
+    return odometry_to_wire(odometry)
+
+
 @method_step.body(DeadReckonedParams)
 @kernel
 def dead_reckoned_step(state, heard, params, dt):
     """Reckon on, or take fixes; see `method_step`."""
     t_s = state.tick * dt
-    attitude, is_, is_new = attitude_step(state.attitude, heard.imu, heard.joints, params.mass, dt)
-    psi = is_.angles.psi
-    flight = follow_depth(state.flight, heard.depth, is_new or heard.depth != state.depth, dt)
-    flight = reckon_speed(flight, is_.angles.theta, params.polar, dt)
-    way, stay, current = state.way, state.stay, state.current
-    is_under = flight.depth > (SURFACES_M if state.is_under else DIVES_M)
-    if is_under and not state.is_under:
-        if stay.fixes > 0:
-            current = _learn(current, way, stay, params)
-        way = _dive(way, stay)
-    elif state.is_under and not is_under:
-        covariance = place_covariance(way, current, params)
-        drift = stay.drift if stay.fixes > 1 else current_at(current, t_s)
-        stay = begin(state.place, 0.5 * (covariance.nn + covariance.ee), drift)
-
-    through, water = Vector(0.0, 0.0), stay.drift
-    if is_under:
+    followed, attitude, sampled = attitude_step(
+        state.attitude, heard.imu, heard.joints, params.mass, dt
+    )
+    flight = follow_depth(state.flight, heard.depth, sampled or heard.depth != state.depth, dt)
+    flight = reckon_speed(flight, attitude.angles.theta, params.polar, dt)
+    under = flight.depth > (SURFACES_M if state.under else DIVES_M)
+    way, stay, current = _change_over(state, under, t_s, params)
+    if under:
+        psi = attitude.angles.psi
         through = Vector(flight.speed * math.cos(psi), flight.speed * math.sin(psi))
         water = current_at(current, t_s)
         way = _go_on(way, through, water, t_s, dt)
-        place = Vector(
-            way.begun.n + way.through.n + way.believed.n,
-            way.begun.e + way.through.e + way.believed.e,
-        )
+        place, velocity = _end_of(way), Vector(through.n + water.n, through.e + water.e)
         covariance, phase = place_covariance(way, current, params), UNDER_WATER
     else:
         stay = wait(stay, dt)
         if counts(stay, heard.fix):
             stay = take_fix(stay, heard.fix)
-        place, variance = now(stay), variance_now(stay)
+        place, velocity, variance = now(stay), stay.drift, variance_now(stay)
         covariance = Covariance(variance, 0.0, variance)
         phase = FIXED if stay.fixes > 0 else AT_SURFACE
-        water = stay.drift
-
-    q = quaternion_from_euler(is_.angles.phi, is_.angles.theta, psi)
-    u, v, w = rotate_to_body(
-        q[0], q[1], q[2], q[3], through.n + water.n, through.e + water.e, flight.rate
-    )
-    odometry = Odometry(
-        place.n,
-        place.e,
-        flight.depth,
-        q[0],
-        q[1],
-        q[2],
-        q[3],
-        u,
-        v,
-        w,
-        is_.p,
-        is_.q,
-        is_.r,
-    )
-    mean = current_at(current, t_s)
-    variance = current.p.mm + wandered(current, current.way_s)
+    wandering = current.p.mm + wandered(current, current.way_s)
     believed = Believed(
-        odometry_to_wire(odometry),
+        _odometry(place, attitude, flight, velocity),
         covariance,
-        mean,
-        Covariance(variance, 0.0, variance),
+        current_at(current, t_s),
+        Covariance(wandering, 0.0, wandering),
         stay.drift,
         Covariance(stay.vv, 0.0, stay.vv),
         phase,
     )
-    return DeadReckonedState(
-        state.tick + 1,
-        attitude,
-        flight,
-        is_under,
-        place,
-        way,
-        stay,
-        current,
-        heard.depth,
-    ), believed
+    state = DeadReckonedState(
+        state.tick + 1, followed, flight, under, place, way, stay, current, heard.depth
+    )
+    return state, believed

@@ -14,21 +14,14 @@ from glider_model.base.frames import (
     quaternion_from_euler,
 )
 from glider_model.base.kernel import kernel
-from glider_model.base.signals import TICK_S, Odometry
-from glider_navigation.attitude import (
-    AttitudeState,
-    MovingMass,
-    attitude_step,
-    initial_attitude,
-    make_moving_mass,
-)
+from glider_model.base.signals import TICK_S, Imu, Odometry, Vector
+from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
+from glider_navigation.attitude import AttitudeState, attitude_step, initial_attitude
 from glider_navigation.method import (
     NONE,
     Believed,
-    Imu,
     NavigationMethodSettings,
     Start,
-    Vector,
     method_step,
 )
 from glider_navigation.phase import KNOWN
