@@ -30,7 +30,14 @@ PER_TICK = [
 RECKONED = {
     'navigation.method': 'dead_reckoned',
     'sensors.compass_bias_deg': 1.0,
+    'sensors.declination_deg': -8.0,
+    'sensors.chart_declination_deg': -7.0,
     'sensors.gps_first_fix_s': 30.0,
+    'sensors.also_fitted': '[altitude]',
+    'sensors.altimeter_std_m': 0.2,
+    'water.bottom_m': 150.0,
+    'water.wind_mps': 8.0,
+    'water.wind_from_deg': 45.0,
     'profile.depth_m': 100.0,
     'profile.surface_every_dives': 1,
     'profile.wait_s': 200.0,
@@ -119,7 +126,7 @@ def test_dead_reckoning_is_the_same_over_nodes(reckoned):
     nodes, engine = (digests(folder) for folder in reckoned.values())
     assert nodes == engine
     expected = set(PER_TICK) - {'/glider/measured_odom'}
-    expected |= {f'/glider/{name}' for name in ('imu', 'pressure', 'fix', *BELIEFS)}
+    expected |= {f'/glider/{name}' for name in ('imu', 'pressure', 'fix', 'altitude', *BELIEFS)}
     assert set(nodes) == expected
     assert {count for count, _ in nodes.values()} == {round(RECKONED_S / TICK_S)}
     cards = [json.loads((folder / 'score.json').read_text()) for folder in reckoned.values()]
@@ -138,6 +145,18 @@ def test_dead_reckoning_had_fixes_and_lost_its_way_between_them(reckoned):
     assert surfacings >= 3
     assert np.max(apart_m[~fixed]) > 50.0
     assert np.max(apart_m[fixed][-300:]) < 20.0
+
+
+def test_altimeter_of_the_flight_heard_the_bottom_from_below_half_its_depth(reckoned):
+    blocks = RecordedLog(Bag(reckoned['nodes']), ['altitude', 'ground_truth/odom']).blocks()
+    log = np.concatenate([block.copy() for block in blocks])
+    height = log[:, COLUMNS['altitude'].start]
+    depth = -log[:, COLUMNS['ground_truth/odom'].start + 2]
+    assert np.count_nonzero(height) > 1000
+    heard = height > 0.0
+    assert np.max(np.abs(height + depth - 150.0)[heard]) < 1.5
+    assert depth[heard].min() > 48.0
+    assert depth[~heard].max() < 52.0
 
 
 @pytest.mark.parametrize('engine', ['nodes', 'direct'])

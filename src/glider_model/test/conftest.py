@@ -15,7 +15,7 @@ from rclpy.context import Context
 
 from glider_model.base.frames import quaternion_from_euler
 from glider_model.base.signals import TICK_S, Joints, Water
-from glider_model.ocean.density import DensitySettings
+from glider_model.ocean.water import WaterSettings
 from glider_model.plant.motion import Motion
 from glider_model.plant.plant import LAUNCHED, PlantParams, PlantState, dive_depths, plant_step
 from glider_model.plant.sensors import NO_SAMPLE, SensorSettings
@@ -82,7 +82,8 @@ def _plant_params(vehicle='zhang2021', **density):
     params = load_vehicle(vehicle).params() if isinstance(vehicle, str) else vehicle
     return PlantParams(
         params,
-        DensitySettings(**density).params(),
+        WaterSettings(**density).params(),
+        WaterSettings(**density).wind_drift(),
         10**9,
         0,
         0,

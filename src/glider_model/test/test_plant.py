@@ -447,6 +447,29 @@ def test_acceleration_of_a_heavy_body_at_rest(plant_params, start):
     assert np.abs(np.delete(rate, 2)).max() < 1e-15
 
 
+# ---------------------------------------------------------------------------------- wind
+
+WIND = {'wind_mps': 10.0, 'wind_from_deg': 300.0, 'leeway_share': 0.03}
+
+
+def test_wind_carries_a_vehicle_that_floats_to_leeward(fly, plant_params, start):
+    """As fast as the share of the wind says, out of where it comes from."""
+    commands = np.broadcast_to([-0.5, 0.0, 0.0], (12000, 3))
+    state = start((0.0, 0.0, 0.0), velocity=(0.0,) * 6, joints=(-0.5, 0.0, 0.0))
+    calm, blown = (
+        fly(plant_params(**wind), state, 1200.0, commands).position for wind in ({}, WIND)
+    )
+    drift = (blown[-1] - blown[6000] - calm[-1] + calm[6000])[:2] / 600.0
+    assert drift == pytest.approx(0.3 * np.array([-0.5, math.sqrt(0.75)]), abs=0.003)
+
+
+def test_wind_is_felt_by_nobody_under_water(fly, plant_params, start):
+    commands = np.broadcast_to([0.5, 0.02, 0.0], (3000, 3))
+    state = start((0.0, 0.0, 2.0))
+    calm, blown = (fly(plant_params(**wind), state, 300.0, commands).rows for wind in ({}, WIND))
+    assert np.array_equal(calm, blown)
+
+
 # ---------------------------------------------------------------------------------- extremes
 
 

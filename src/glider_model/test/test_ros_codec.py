@@ -25,7 +25,10 @@ PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 STAMPS = st.integers(0, (2**31 - 1) * 10**9)
 FINITE = st.floats(-1e300, 1e300, allow_nan=False)
 #: What a field can hold that is no float64.
-INTEGERS = {'status.status': st.integers(-128, 127).map(float)}
+NARROW = {
+    'status.status': st.integers(-128, 127).map(float),
+    'range': st.floats(-(2.0**100), 2.0**100, width=32),
+}
 
 
 def bits(values) -> list[bytes]:
@@ -35,7 +38,7 @@ def bits(values) -> list[bytes]:
 def numbers_for(topic, data):
     """Numbers of a message; 0.0 for those that it does not carry."""
     fields, width = topic.codec.fields, topic.codec.width
-    drawn = [data.draw(INTEGERS.get(field, FINITE)) for field in fields]
+    drawn = [data.draw(NARROW.get(field, FINITE)) for field in fields]
     return (*drawn, *(width - len(fields)) * (0.0,))
 
 

@@ -223,7 +223,7 @@ def measured_angles(phi_deg, theta_deg, psi_deg, **errors):
     """Roll, pitch and heading (deg) as the compass shows them."""
     params = SensorSettings(**errors).params(0)
     sample = take_sample(
-        odometry(*np.radians([phi_deg, theta_deg, psi_deg])), NO_SAMPLE, 0, params
+        odometry(*np.radians([phi_deg, theta_deg, psi_deg])), 500.0, NO_SAMPLE, 0, params
     )
     return np.degrees(euler_from_quaternion(*sample[:4]))
 
@@ -265,10 +265,57 @@ def test_errors_of_the_compass_stay(phi_deg, theta_deg, psi_deg):
 @given(st.floats(-1.0, 1200.0), st.sampled_from([0.0, 0.1, 0.5, 2.0]), st.floats(-5.0, 5.0))
 def test_depth_has_its_offset_and_comes_in_steps(depth_m, step_m, offset_m):
     params = SensorSettings(depth_offset_m=offset_m, depth_resolution_m=step_m).params(0)
-    shown = take_sample(odometry(position=(0.0, 0.0, depth_m)), NO_SAMPLE, 0, params).p_d
+    measured = odometry(position=(0.0, 0.0, depth_m))
+    shown = take_sample(measured, depth_m, NO_SAMPLE, 0, params).p_d
     assert abs(shown - depth_m - offset_m) <= 0.5 * step_m + 1e-9
     if step_m:
         assert shown / step_m == pytest.approx(round(shown / step_m), abs=1e-9)
+
+
+@quick
+@given(st.floats(-180.0, 180.0), st.floats(-30.0, 30.0), st.floats(-5.0, 5.0))
+def test_a_wrong_chart_turns_the_heading_and_magnetic_north_the_deviation(psi, true, wrong):
+    """The compass goes by magnetic north, and what the chart has of it is added."""
+    deviates = {'compass_deviation_deg': 4.0, 'declination_deg': true}
+    magnetic = psi - true
+    reading = magnetic + 4.0 * math.sin(math.radians(magnetic))
+    for charted, expected in ((None, reading + true), (true + wrong, reading + true + wrong)):
+        _, _, shown = measured_angles(0.0, 0.0, psi, chart_declination_deg=charted, **deviates)
+        assert turned_deg(shown, expected) == pytest.approx(0.0, abs=1e-9)
+    _, _, shown = measured_angles(0.0, 0.0, psi, declination_deg=true)
+    assert turned_deg(shown, psi) == pytest.approx(0.0, abs=1e-9)
+
+
+def heights(depths, bottom_m=200.0, **sensors):
+    """What the altimeter shows at depths (m), a tick each."""
+    given = PlantSettings(fitted=['altitude'], sensors=sensors, water={'bottom_m': bottom_m})
+    state, params, found = given.initial_state(), given.params(), []
+    for depth in depths:
+        state = state._replace(motion=state.motion._replace(p_d=depth))
+        found.append(said(state, params)['altitude'][0])
+        state = plant_move(state, (4 * (0.0,), 3 * (0.0,)), params, TICK_S)
+    return np.array(found)
+
+
+def test_altimeter_hears_the_bottom_within_its_reach():
+    depths = [0.0, 99.9, 100.5, 150.25, 199.4, 199.6, 200.0, 210.0]
+    shown = heights(depths, altimeter_period_s=0.1)
+    assert shown == pytest.approx([0.0, 0.0, 99.5, 49.75, 0.6, 0.0, 0.0, 0.0], abs=1e-5)
+    assert np.array_equal(shown, shown.astype(np.float32))
+    assert not heights(depths, bottom_m=0.0, altimeter_period_s=0.1).any()
+
+
+def test_altimeter_shows_its_echo_until_the_next():
+    shown = heights(150.0 + 0.1 * np.arange(40), altimeter_period_s=1.0)
+    assert shown == pytest.approx(np.repeat(50.0 - np.arange(4.0), 10), abs=1e-5)
+
+
+def test_noise_of_the_altimeter_is_that_of_its_seed():
+    shown = heights(np.full(4000, 150.0), altimeter_period_s=0.1, altimeter_std_m=0.5)
+    assert np.std(shown) == pytest.approx(0.5, rel=0.05)
+    assert np.mean(shown) == pytest.approx(50.0, abs=0.05)
+    again = heights(np.full(50, 150.0), altimeter_period_s=0.1, altimeter_std_m=0.5)
+    assert np.array_equal(shown[:50], again)
 
 
 def test_without_a_gyro_there_are_no_rates():

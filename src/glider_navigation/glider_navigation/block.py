@@ -44,6 +44,7 @@ def _hear(inputs, origin):
         imu_from_wire(imu),
         depth_at(pressure[0]),
         Fix(fix[0] >= 0.0, p_n, p_e, 0.5 * (fix[3] + fix[4])),
+        inputs[5][0],
     )
 
 

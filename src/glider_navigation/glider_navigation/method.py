@@ -68,6 +68,7 @@ class Heard(NamedTuple):
     imu: Imu
     depth: float  #: (m)
     fix: Fix
+    altitude: float  #: height over the bottom (m); 0.0: no echo
 
 
 class Believed(NamedTuple):

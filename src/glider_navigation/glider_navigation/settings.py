@@ -10,12 +10,14 @@ from pydantic import Field
 from glider_model.base import plugins
 from glider_model.base.frames import Origin, OriginSettings
 from glider_model.base.settings import Settings
+from glider_model.base.wiring import SENSORS
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation import methods
 from glider_navigation.method import NavigationMethodSettings, Start
 
 #: Other parameters of navigation: no method can have such a name.
-TAKEN = {'method', 'current', 'vehicle', 'origin', 'north_m', 'east_m', 'imu_period_s', 'gyro'}
+TAKEN = {'method', 'current', 'vehicle', 'origin', 'north_m', 'east_m'}
+TAKEN |= {'imu_period_s', 'gyro', 'also_fitted'}
 #: Settings of every way to navigate by its name.
 METHODS = plugins.classes(plugins.NAVIGATION_METHODS, NavigationMethodSettings, methods, TAKEN)
 
@@ -83,6 +85,14 @@ class NavigationSettings(NavigationLawSettings):
         0.1, ge=0.1, le=30.0, description='time between two samples of attitude (s)'
     )
     gyro: bool = Field(True, description='angular rates are measured')
+    also_fitted: list[Literal[SENSORS]] = Field(
+        [], description='topics of sensors beside those that the method reads'
+    )
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Topics of sensors and beliefs that there are in a run."""
+        return tuple(dict.fromkeys((*super().topics, *self.also_fitted)))
 
     @property
     def _start(self) -> Start:

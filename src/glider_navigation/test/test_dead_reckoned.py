@@ -37,6 +37,7 @@ def _navigate(state, q, depths, has_fix, places, variance, params, dt):
             Imu(q[i, 0], q[i, 1], q[i, 2], q[i, 3], 0.0, 0.0, 0.0, False),
             depths[i],
             Fix(has_fix[i], places[i, 0], places[i, 1], variance),
+            0.0,
         )
         state, is_ = method_step(state, heard, params, dt)
         x = odometry_from_wire(is_.odom)

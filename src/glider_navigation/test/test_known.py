@@ -28,7 +28,7 @@ class Navigation:
         self.params, self.state = settings.params().method, settings.initial_state()
 
     def tick(self, wire, mu=0.0):
-        heard = Heard(Joints(0.0, 0.0, mu, 0.0), wire, NO_IMU, 0.0, NO_FIX)
+        heard = Heard(Joints(0.0, 0.0, mu, 0.0), wire, NO_IMU, 0.0, NO_FIX, 0.0)
         self.state, believed = method_step(self.state, heard, self.params, TICK_S)
         return believed
 

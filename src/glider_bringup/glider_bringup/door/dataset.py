@@ -39,6 +39,7 @@ from glider_model.base.frames import (
 )
 from glider_model.base.kernel import kernel, source_digest
 from glider_model.base.signals import TICK_NS, Adaptation
+from glider_model.base.wiring import NO_ECHO
 from glider_model.vehicle.file import steers_by, vehicle_file
 
 NED, FRD, PATH = 'NED', 'FRD', 'path'
@@ -198,6 +199,7 @@ _BESIDE = {
         _Variable('fix', 'east', 'm', 'fix, east', NED),
         _Variable('fix', 'variance', 'm2', 'fix, variance to the north and to the east each', NED),
     ),
+    'altitude': (_Variable('altitude', 'height', 'm', 'measured height over the bottom'),),
     'believed_current': _water('believed_current', 'believed current under water'),
     'believed_surface_current': _water(
         'believed_surface_current', 'believed drift at the surface'
@@ -288,6 +290,7 @@ _AS_NUMBERS = {
     'imu': _imu,
     'pressure': lambda wire, scenario: wire,
     'fix': _fix,
+    'altitude': lambda wire, scenario: np.where(wire > NO_ECHO, wire, np.nan),
     'believed_current': _water_numbers,
     'believed_surface_current': _water_numbers,
 }

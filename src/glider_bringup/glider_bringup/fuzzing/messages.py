@@ -52,7 +52,8 @@ SCENES = {
 TICKS = 3000
 #: Good messages after it.
 AFTER = 10
-#: Fields that cannot hold such numbers.
+#: Fields of 32 bits, and fields that cannot hold such numbers.
+_NARROW = {'range'}
 _INTEGERS = {'status.status'}
 _WILD = (np.nan, np.inf, -np.inf, 0.0, 1e308, -1e308, 1e6, -1e6, 5e-324, 10.0, -10.0, 1e4, 2.0)
 
@@ -79,7 +80,11 @@ def _with_wild_numbers(draw: np.random.Generator, codec, values) -> bytes:
     numbers = list(values)
     places = [i for i, field in enumerate(codec.fields) if field not in _INTEGERS]
     for place in draw.choice(places, draw.integers(1, len(places) + 1), replace=False):
-        numbers[place] = float(draw.choice(_WILD))
+        wild = float(draw.choice(_WILD))
+        if codec.fields[place] in _NARROW:
+            with np.errstate(over='ignore'):
+                wild = float(np.float32(wild))
+        numbers[place] = wild
     return codec.encode(TICKS * TICK_NS, numbers)
 
 

@@ -30,7 +30,7 @@ from glider_model.base.settings import (
 )
 from glider_model.base.wiring import SENSORS
 from glider_model.ocean.current_settings import CurrentSettings
-from glider_model.ocean.density import DensitySettings
+from glider_model.ocean.water import WaterSettings
 from glider_model.onboard.gate import GateSettings
 from glider_model.plant.plant import SURFACE_S, InitialSettings, PlantSettings
 from glider_model.plant.sensors import SensorSettings
@@ -89,7 +89,9 @@ class Scenario(Settings):
     initial: InitialSettings = Field(
         InitialSettings(depth_m=0.1), description='state at the start'
     )
-    water: DensitySettings = Field(DensitySettings(), description='density of the water')
+    water: WaterSettings = Field(
+        WaterSettings(), description='density of the water, its bottom, and wind'
+    )
     current: CurrentSettings = Field(CurrentSettings(), description='current')
     sensors: SensorSettings = Field(SensorSettings(), description='errors of the sensors')
     origin: OriginSettings = Field(
@@ -173,6 +175,7 @@ class Scenario(Settings):
             east_m=self.initial.east_m,
             imu_period_s=self.sensors.imu_period_s,
             gyro=self.sensors.gyro,
+            also_fitted=self.sensors.also_fitted,
             **dict(self.navigation),
         )
 

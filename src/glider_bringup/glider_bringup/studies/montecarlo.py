@@ -18,7 +18,6 @@ from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.navigation import FOURTH
 from glider_bringup.studies.workers import Pool, Progress
-from glider_model.ocean.density import DensitySettings
 from glider_model.plant.sensors import SensorSettings
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import VehicleParams, load_vehicle
@@ -196,7 +195,7 @@ def make_scenarios(
     Parameters
     ----------
     name : str
-        Scenario by name or path. Its own seed, perturb, water and sensors give way to the plant's.
+        Scenario by name or path. Its seed, perturb, density and sensors give way to the plant's.
     changes : dict
         Further fields, by dotted name.
 
@@ -213,7 +212,7 @@ def make_scenarios(
         sections = {
             'seed': sampled['seed'],
             'perturb': PerturbSettings(**sampled['perturb']),
-            'water': DensitySettings(**sampled['water']),
+            'water': base.water.model_copy(update=sampled['water']),
             'sensors': SensorSettings(**sampled['sensors']),
         }
         for controller in controllers:

@@ -40,7 +40,7 @@ class Port(NamedTuple):
     frame: str = ''  #: in its header
     child_frame: str = ''  #: of an odometry
     names: tuple[str, ...] = ()  #: of a JointState
-    constants: tuple[tuple[str, int], ...] = ()  #: other fields, the same in every message
+    constants: tuple[tuple[str, float], ...] = ()  #: other fields, the same in every message
 
 
 def _odometry(child_frame: str, more: tuple[str, ...] = ()) -> Port:
@@ -66,6 +66,10 @@ def _joints() -> Port:
     """Positions of the actuators."""
     return Port('sensor_msgs/msg/JointState', (*_named(JOINTS).fields, SURFACE), names=JOINTS)
 
+
+#: An altimeter hears a bottom that is so far away (m), and says so where it hears none: by
+#: sensor_msgs/Range a number outside of the two is to be thrown away.
+ALTIMETER_REACH_M, NO_ECHO = (0.5, 100.0), 0.0
 
 #: Every per-tick topic. The twist of the reference is expressed in `map`: desired velocity over
 #: ground and Euler angle rates.
@@ -95,6 +99,12 @@ PORTS = {
         ),
         BASE_LINK,
         constants=(('status.service', 1), ('position_covariance_type', 2)),
+    ),
+    'altitude': Port(
+        'sensor_msgs/msg/Range',
+        ('range',),
+        BASE_LINK,
+        constants=(('min_range', ALTIMETER_REACH_M[0]), ('max_range', ALTIMETER_REACH_M[1])),
     ),
     'health': _named(Health._fields),
     'joint_states': _joints(),
@@ -142,12 +152,17 @@ class Wired(NamedTuple):
 
 #: What a vehicle may be able to measure. Each way to navigate reads some of it, and of this alone
 #: there are messages in a run; where a table has a column for each topic, the others are zero.
-SENSORS = ('measured_odom', 'imu', 'pressure', 'fix')
+SENSORS = ('measured_odom', 'imu', 'pressure', 'fix', 'altitude')
 #: Those of them of which a vehicle has samples now and then, and not in every tick.
-SAMPLED = ('imu', 'pressure', 'fix')
-#: What stands for a topic that may be silent for as long as it likes: under water there is no fix.
-#: A vehicle need not say how it is, either: less than nothing is not measured.
-WHEN_SILENT = {'fix': (-1.0, 0.0, 0.0, 0.0, 0.0), 'health': (0.0, -1.0, -1.0, -1.0)}
+SAMPLED = ('imu', 'pressure', 'fix', 'altitude')
+#: What stands for a topic that may be silent for as long as it likes: under water there is no fix,
+#: far above the bottom no echo. A vehicle need not say how it is, either: less than nothing is not
+#: measured.
+WHEN_SILENT = {
+    'fix': (-1.0, 0.0, 0.0, 0.0, 0.0),
+    'altitude': (NO_ECHO,),
+    'health': (0.0, -1.0, -1.0, -1.0),
+}
 #: What bags do not have that were recorded before it was told.
 LATER = ('health', 'demand', 'drop_weight')
 #: What ways to navigate may tell beside odom; the same holds for them.

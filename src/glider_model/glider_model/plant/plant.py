@@ -10,12 +10,10 @@ from pydantic import Field
 from glider_model.base.frames import OriginSettings, quaternion_from_euler, rotate_to_body
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
-from glider_model.base.signals import TICK_S, Joints, Odometry, Water, not_finite
+from glider_model.base.signals import TICK_S, Joints, Odometry, Vector, Water, not_finite
 from glider_model.base.wiring import SENSORS
-from glider_model.ocean.density import (
-    DensityParams,
-    DensitySettings,
-)
+from glider_model.ocean.density import DensityParams
+from glider_model.ocean.water import WaterSettings, with_wind
 from glider_model.plant.motion import Motion, integrate
 from glider_model.plant.sensors import (
     ANTENNA_M,
@@ -61,7 +59,7 @@ class PlantState(NamedTuple):
 
     motion: Motion
     joints: Joints
-    water: Water  #: water velocity during the tick that led here
+    water: Water  #: water velocity during the tick that led here, with the drift of wind
     tick: int
     deep: bool  #: has been below where a dive counts since it was last above
     dives: int  #: completed dives
@@ -80,6 +78,7 @@ class PlantParams(NamedTuple):
 
     vehicle: VehicleParams
     density: DensityParams
+    wind_drift: Vector  #: at the surface (m/s)
     max_ticks: int
     stop_after_dives: int  #: 0: only max_ticks ends the run
     stop_surface_ticks: int
@@ -115,7 +114,9 @@ class PlantSettings(Settings):
     """Everything the plant node is told."""
 
     vehicle: str = Field('zhang2021', description='vehicle by name, or path of its YAML file')
-    water: DensitySettings = Field(DensitySettings(), description='density of the water')
+    water: WaterSettings = Field(
+        WaterSettings(), description='density of the water, its bottom, and wind'
+    )
     initial: InitialSettings = Field(InitialSettings(), description='state at the start')
     duration_s: float = Field(
         108000.0, ge=0.1, le=1e8, description='the run ends after this simulated time (s)'
@@ -158,12 +159,13 @@ class PlantSettings(Settings):
         return PlantParams(
             perturbed(load_vehicle(self.vehicle).params(), self.perturb),
             self.water.params(),
+            self.water.wind_drift(),
             max(1, round(self.duration_s / TICK_S)),
             self.dives,
             round(self.surface_s / TICK_S),
             round(self.afloat_s / TICK_S),
             *dive_depths(self.dive_depth_m),
-            self.sensors.params(self.seed, self.origin, tuple(self.fitted)),
+            self.sensors.params(self.seed, self.origin, tuple(self.fitted), self.water.bottom_m),
         )
 
     def initial_state(self) -> PlantState:
@@ -236,6 +238,7 @@ def plant_step(state, command, water, params, dt, drops=False):
     PlantState
     """
     joints = actuators_step(state.joints, command, params.vehicle, dt)
+    water = with_wind(water, state.motion.p_d, params.wind_drift)
     water_rate = Water(0.0, 0.0, 0.0)
     if state.tick > 0:
         water_rate = Water(
@@ -261,7 +264,7 @@ def plant_step(state, command, water, params, dt, drops=False):
     sample = state.sample
     if params.sensors.is_held:
         measured = add_noise(plant_odometry(state), state.tick, params.sensors)
-        sample = take_sample(measured, sample, state.tick, params.sensors)
+        sample = take_sample(measured, state.motion.p_d, sample, state.tick, params.sensors)
     return PlantState(
         motion,
         joints,

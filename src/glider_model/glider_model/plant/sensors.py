@@ -13,10 +13,11 @@ Heading noise turns about the vertical, roll and pitch noise about the body axes
 singular. The velocity over ground keeps its numbers in body axes. Errors that stay are those of
 compass and pitch sensor:
 
-    psi_m   = psi + bias + deviation sin(psi + phase)
+    psi_m   = psi + bias + (D_chart - D) + deviation sin(psi - D + phase)
     theta_m = scale theta + offset
     phi_m   = phi + bias
 
+with D the declination: a compass turns in the magnetic field, and the chart gives it its north.
 A sensor that is sampled less often than each tick shows its last sample until the next.
 """
 
@@ -39,8 +40,9 @@ from glider_model.base.kernel import kernel
 from glider_model.base.noise import normal_pair, random_stream, uniform
 from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_S, Imu, Odometry
-from glider_model.base.wiring import SENSORS
+from glider_model.base.wiring import NO_ECHO, SENSORS
 from glider_model.ocean.density import pressure_at
+from glider_model.plant.altimeter import AltimeterParams, echo
 
 #: Sets the streams of the sensors apart from those of the current, whose offsets are smaller.
 _STREAM_OFFSET = 2**32
@@ -74,13 +76,28 @@ class SensorSettings(Settings):
         0.0,
         ge=-180.0,
         le=180.0,
-        description='error of the heading that stays, a wrong declination included (deg)',
+        description='error of the heading that stays (deg)',
     )
     compass_deviation_deg: float = Field(
-        0.0, ge=-45.0, le=45.0, description='error that goes as the sine of the heading (deg)'
+        0.0,
+        ge=-45.0,
+        le=45.0,
+        description='error that goes as the sine of the magnetic heading (deg)',
     )
     compass_deviation_phase_deg: float = Field(
         0.0, ge=-180.0, le=180.0, description='phase of that sine (deg)'
+    )
+    declination_deg: float = Field(
+        0.0,
+        ge=-180.0,
+        le=180.0,
+        description='declination where it flies: magnetic north lies so far east of north (deg)',
+    )
+    chart_declination_deg: float | None = Field(
+        None,
+        ge=-180.0,
+        le=180.0,
+        description='declination that the vehicle goes by (deg); by default the true one',
     )
     pitch_scale: float = Field(1.0, ge=0.5, le=1.5, description='measured pitch over true (-)')
     pitch_offset_deg: float = Field(
@@ -116,30 +133,52 @@ class SensorSettings(Settings):
         pattern='^[01]{1,60}$',
         description='which surfacings have no fix, over and over from the launch on: 1 has none',
     )
-
+    altimeter_period_s: float = Field(
+        1.0, ge=0.1, le=600.0, description='time from one echo of the altimeter to the next (s)'
+    )
+    altimeter_std_m: float = Field(
+        0.0, ge=0.0, le=10.0, description='noise of the height over the bottom (m)'
+    )
     also_fitted: list[Literal[SENSORS]] = Field(
         [], description='topics of sensors beside those that navigation reads'
     )
 
+    def _imu_errors(self) -> 'ImuErrors':
+        charted = self.chart_declination_deg
+        wrong = 0.0 if charted is None else charted - self.declination_deg
+        return ImuErrors(
+            math.radians(self.compass_bias_deg + wrong),
+            math.radians(self.compass_deviation_deg),
+            math.radians(self.compass_deviation_phase_deg - self.declination_deg),
+            self.pitch_scale,
+            math.radians(self.pitch_offset_deg),
+            math.radians(self.roll_bias_deg),
+        )
+
     def params(
-        self, seed: int, origin: OriginSettings | None = None, fitted: tuple[str, ...] = SENSORS
+        self,
+        seed: int,
+        origin: OriginSettings | None = None,
+        fitted: tuple[str, ...] = SENSORS,
+        bottom_m: float = 0.0,
     ) -> 'SensorParams':
         """Kernel parameters for the errors under one seed, for the sensors that are fitted."""
         pattern = self.fix_missed_pattern
+        altimeter = AltimeterParams(
+            'altitude' in fitted,
+            bottom_m,
+            self.altimeter_std_m,
+            round(self.altimeter_period_s / TICK_S),
+            np.uint64(random_stream(seed, _STREAM_OFFSET, 2)),
+        )
+        waits = altimeter.is_fitted and altimeter.period_ticks > 1
         return SensorParams(
             np.uint64(random_stream(seed, _STREAM_OFFSET, 0)),
             math.radians(self.attitude_std_deg),
             math.radians(self.heading_std_deg),
             math.radians(self.rate_std_dps),
             self.position_std_m,
-            ImuErrors(
-                math.radians(self.compass_bias_deg),
-                math.radians(self.compass_deviation_deg),
-                math.radians(self.compass_deviation_phase_deg),
-                self.pitch_scale,
-                math.radians(self.pitch_offset_deg),
-                math.radians(self.roll_bias_deg),
-            ),
+            self._imu_errors(),
             round(self.imu_period_s / TICK_S),
             self.imu_missed_share,
             self.gyro,
@@ -154,9 +193,10 @@ class SensorSettings(Settings):
                 len(pattern),
                 (origin or OriginSettings()).params(),
             ),
+            altimeter,
             'measured_odom' in fitted,
             bool({'imu', 'pressure', 'fix'} & set(fitted)),
-            self.imu_period_s > TICK_S or self.imu_missed_share > 0.0,
+            self.imu_period_s > TICK_S or self.imu_missed_share > 0.0 or waits,
         )
 
 
@@ -198,13 +238,14 @@ class SensorParams(NamedTuple):
     depth_offset: float  #: (m)
     depth_resolution: float
     gps: GpsParams
+    altimeter: AltimeterParams
     has_position: bool  #: measured_odom is fitted
     has_parts: bool  #: imu, pressure and fix are
     is_held: bool  #: samples are shown for longer than a tick
 
 
 class Sample(NamedTuple):
-    """The last sample of attitude, rates and depth (m)."""
+    """The last sample of attitude, rates, depth and height over the bottom (m)."""
 
     q_w: float
     q_x: float
@@ -214,11 +255,12 @@ class Sample(NamedTuple):
     q: float
     r: float
     p_d: float
+    altitude: float
 
 
 #: What stands in the place of sensors that are not fitted.
 NO_POSITION, NO_IMU = 13 * (0.0,), 8 * (0.0,)
-NO_SAMPLE = Sample(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_SAMPLE = Sample(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, NO_ECHO)
 
 
 class Noise(NamedTuple):
@@ -345,30 +387,36 @@ def _is_sampled(tick, params):
 
 
 @kernel
-def take_sample(measured, sample, tick, params):
-    """Sample of attitude, rates and depth that is shown at a tick: a new one, or ``sample``.
+def take_sample(measured, depth, sample, tick, params):
+    """What of a `Sample` is shown at a tick: each part is new, or that of ``sample``.
 
     Parameters
     ----------
     measured : Odometry
         With noise.
+    depth : float
+        The true one (m).
     sample : Sample
         That of the tick before.
     tick : int
     params : SensorParams
     """
+    altitude = sample.altitude
+    if params.altimeter.is_fitted and tick % params.altimeter.period_ticks == 0:
+        altitude = echo(depth, tick, params.altimeter)
+    x = sample
     if not _is_sampled(tick, params):
-        return sample
+        return Sample(x.q_w, x.q_x, x.q_y, x.q_z, x.p, x.q, x.r, x.p_d, altitude)
     x = measured
     q_w, q_x, q_y, q_z = _with_errors(x.q_w, x.q_x, x.q_y, x.q_z, params.errors)
-    depth = x.p_d
+    shown = x.p_d
     if params.depth_offset != 0.0:
-        depth += params.depth_offset
+        shown += params.depth_offset
     if params.depth_resolution > 0.0:
-        depth = params.depth_resolution * math.floor(depth / params.depth_resolution + 0.5)
+        shown = params.depth_resolution * math.floor(shown / params.depth_resolution + 0.5)
     if not params.gyro:
-        return Sample(q_w, q_x, q_y, q_z, 0.0, 0.0, 0.0, depth)
-    return Sample(q_w, q_x, q_y, q_z, x.p, x.q, x.r, depth)
+        return Sample(q_w, q_x, q_y, q_z, 0.0, 0.0, 0.0, shown, altitude)
+    return Sample(q_w, q_x, q_y, q_z, x.p, x.q, x.r, shown, altitude)
 
 
 @kernel
@@ -413,7 +461,7 @@ def sense(odometry, joints, sample, out_ticks, surfacings, tick, params):
     """
     truth = odometry_to_wire(odometry)
     measured = add_noise(odometry, tick, params)
-    sample = take_sample(measured, sample, tick, params)
+    sample = take_sample(measured, odometry.p_d, sample, tick, params)
     position, imu, pressure = NO_POSITION, NO_IMU, 0.0
     fix = (NO_FIX, 0.0, 0.0, 0.0, 0.0)
     if params.has_position:
@@ -445,6 +493,7 @@ def sense(odometry, joints, sample, out_ticks, surfacings, tick, params):
         imu,
         (pressure,),
         fix,
+        (sample.altitude,),
         (joints.m_b, joints.x_p, joints.mu, joints.delta),
     )
 

@@ -1,0 +1,59 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The water of a mission beside its current: density, bottom, and what the wind does to a vehicle.
+
+At the surface wind and waves carry a vehicle along by a share of the wind, some hundredths: leeway
+and Stokes drift together. It is as if the water there went faster by that much.
+"""
+
+import math
+
+from pydantic import Field
+
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import Vector, Water
+from glider_model.ocean.density import DensitySettings
+
+#: The drift of wind is whole above the first depth, and there is none below the second (m).
+WIND_WHOLE_M, WIND_NONE_M = 0.5, 1.5
+
+
+class WaterSettings(DensitySettings):
+    """Density of the water, depth of its bottom, and wind."""
+
+    bottom_m: float = Field(
+        0.0,
+        ge=0.0,
+        le=12000.0,
+        description='depth of the bottom that an altimeter hears (m); 0: none. It stops nobody',
+    )
+    wind_mps: float = Field(0.0, ge=0.0, le=40.0, description='speed of the wind (m/s)')
+    wind_from_deg: float = Field(
+        0.0,
+        ge=-360.0,
+        le=360.0,
+        description='where the wind comes from (deg, clockwise from north)',
+    )
+    leeway_share: float = Field(
+        0.02,
+        ge=0.0,
+        le=0.05,
+        description='drift by wind and waves of a vehicle at the surface, over the wind (-)',
+    )
+
+    def wind_drift(self) -> Vector:
+        """Drift by wind and waves at the surface (m/s)."""
+        speed, to = self.leeway_share * self.wind_mps, math.radians(self.wind_from_deg + 180.0)
+        return Vector(speed * math.cos(to), speed * math.sin(to)) if speed else NO_DRIFT
+
+
+NO_DRIFT = Vector(0.0, 0.0)
+
+
+@kernel
+def with_wind(water, depth, drift):
+    """Velocity of the water as it carries a vehicle at a depth (m) along; below, the very same."""
+    if depth >= WIND_NONE_M or (drift.n == 0.0 and drift.e == 0.0):
+        return water
+    share = min(1.0, (WIND_NONE_M - depth) / (WIND_NONE_M - WIND_WHOLE_M))
+    return Water(water.v_n + share * drift.n, water.v_e + share * drift.e, water.v_d)
