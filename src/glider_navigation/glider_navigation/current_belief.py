@@ -7,7 +7,8 @@ Kalman filter takes in the mean over each way under water between fixes (the dep
 current, DAC). The mean wanders: over a way of T s after one of T' s its variance grows by
 q (T + T') / 3. How much it wanders, q, is learnt from how far the means were off so far, so that
 what is told of the errors holds (innovation-based adaptive estimation, Mehra 1970). With the tide
-left out this is persistence: the last mean holds for the next way.
+left out this is persistence: the last mean holds for the next way. Where there is a forecast, all
+of this is about the difference between the sea and the forecast.
 """
 
 import math
@@ -61,10 +62,10 @@ class CurrentBelief(NamedTuple):
     way_s: float  #: its time; 0.0: none yet
 
 
-def initial_belief(tide: bool) -> CurrentBelief:
-    """Nothing is known yet."""
+def initial_belief(tide: bool, mean_std: float = MEAN_STD) -> CurrentBelief:
+    """Nothing is known yet, but how far the mean may be off (m/s)."""
     still, tide2 = Vector(0.0, 0.0), TIDE_STD * TIDE_STD if tide else 0.0
-    p = Uncertainty(MEAN_STD * MEAN_STD, 0.0, 0.0, tide2, 0.0, tide2)
+    p = Uncertainty(mean_std * mean_std, 0.0, 0.0, tide2, 0.0, tide2)
     return CurrentBelief(still, still, still, p, FIRST_Q, FIRST_WEIGHT, still, 0.0)
 
 

@@ -12,6 +12,7 @@ from glider_model.base.settings import Settings
 from glider_model.base.signals import Covariance, Imu, Joints, Vector
 from glider_model.base.slot import slot
 from glider_model.vehicle.file import Vehicle
+from glider_navigation.forecast import ForecastSettings
 
 
 class Start(NamedTuple):
@@ -24,6 +25,7 @@ class Start(NamedTuple):
     imu_period_s: float
     gyro: bool
     current: str  #: how the current is to be believed
+    forecast: ForecastSettings  #: of it
 
 
 class NavigationMethodSettings(Settings):

@@ -13,10 +13,11 @@ from glider_model.base.settings import Settings
 from glider_model.base.wiring import SENSORS
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation import methods
+from glider_navigation.forecast import ForecastSettings
 from glider_navigation.method import NavigationMethodSettings, Start
 
 #: Other parameters of navigation: no method can have such a name.
-TAKEN = {'method', 'current', 'vehicle', 'origin', 'north_m', 'east_m'}
+TAKEN = {'method', 'current', 'forecast', 'vehicle', 'origin', 'north_m', 'east_m'}
 TAKEN |= {'imu_period_s', 'gyro', 'also_fitted'}
 #: Settings of every way to navigate by its name.
 METHODS = plugins.classes(plugins.NAVIGATION_METHODS, NavigationMethodSettings, methods, TAKEN)
@@ -43,11 +44,24 @@ _MethodChoice = pydantic.create_model(
 class NavigationLawSettings(_MethodChoice):
     """How to navigate, whatever the vehicle: the navigation section of a scenario."""
 
-    current: Literal['none', 'persistence', 'tidal'] = Field(
+    current: Literal['none', 'persistence', 'tidal', 'forecast'] = Field(
         'persistence',
         description='current under water. none: still water; persistence: that of the last way '
-        'between fixes; tidal: a mean and the tide M2, learnt from all of them',
+        'between fixes; tidal: a mean and the tide M2, learnt from all of them; forecast: what is '
+        'forecast, and by how much that was off on the last way',
     )
+    forecast: ForecastSettings = Field(
+        ForecastSettings(), description='current that is forecast, where it is believed'
+    )
+
+    @pydantic.model_validator(mode='after')
+    def _check_forecast(self):
+        if self.current == 'forecast' and not self.forecast.is_given:
+            raise ValueError(
+                "current = 'forecast': there is none (give forecast a speed and a direction, "
+                'components or a field)'
+            )
+        return self
 
     @property
     def chosen(self) -> NavigationMethodSettings:
@@ -104,6 +118,7 @@ class NavigationSettings(NavigationLawSettings):
             self.imu_period_s,
             self.gyro,
             self.current,
+            self.forecast,
         )
 
     def params(self) -> 'NavigationParams':

@@ -139,6 +139,53 @@ def test_the_first_way_tells_the_current_and_the_second_is_reckoned_with_it(dive
         assert error < 0.05 * lost
 
 
+OFF = np.array([0.03, -0.05])
+FORECAST = {'components': [{'kind': 'table', 'rows': [[0.0, *(CURRENT + OFF).tolist()]]}]}
+
+
+def test_a_forecast_leads_the_first_way_and_fixes_tell_by_how_much_it_is_off(dives):
+    truth = dives([30.0, 40.0, 200.0])
+    track = navigate(truth, current='forecast', forecast={**FORECAST, 'error_std_mps': 0.05})
+    first = truth.places[truth.end(0)] - track.place(truth.end(0))
+    assert first == pytest.approx(-OFF * WAY_S, abs=15.0)
+    assert track.current(truth.end(0)) == pytest.approx(CURRENT + OFF, abs=1e-9)
+    assert track.current(truth.begun(1)) == pytest.approx(CURRENT, abs=0.003)
+    for way in (1, 2):
+        error = np.linalg.norm(truth.places[truth.end(way)] - track.place(truth.end(way)))
+        assert error < 0.1 * np.linalg.norm(first)
+    told = np.sqrt([track.nn[truth.end(0)], track.ee[truth.end(0)]])
+    assert np.all(told > 0.05 * 0.9 * WAY_S)
+    assert np.all(told < 0.05 * 1.2 * WAY_S)
+
+
+def test_a_forecast_changes_with_time_and_depth_as_it_says(dives):
+    """A step in the second way, and a current below 200 m, both forecast by their amounts."""
+    truth = dives([30.0, 40.0])
+    changes_s = STAY_S + WAY_S + STAY_S + 0.25 * WAY_S
+    shear = {'kind': 'table', 'rows': [[199.0, 0.0, 0.0], [201.0, 0.1, 0.0]]}
+    step = {'kind': 'steps', 'steps': [{'at_s': changes_s, 'north_mps': 0.0, 'east_mps': 0.2}]}
+    plain, told = (
+        navigate(truth, current='forecast', forecast={'components': more})
+        for more in (FORECAST['components'], [*FORECAST['components'], shear, step])
+    )
+    deep_s = np.sum(truth.depths[: truth.cycle] > 200.0) * TICK_S
+    led = told.place(truth.end(0)) - plain.place(truth.end(0))
+    assert led == pytest.approx([0.1 * deep_s, 0.0], abs=2.0)
+    led = (told.place(truth.end(1)) - told.place(truth.begun(1))) - (
+        plain.place(truth.end(1)) - plain.place(truth.begun(1))
+    )
+    assert led[1] == pytest.approx(0.2 * 0.75 * WAY_S, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    'forecast',
+    [{}, {'components': [{'kind': 'gauss_markov', 'std_mps': 0.1, 'time_constant_s': 9.0}]}],
+)
+def test_a_forecast_that_is_none_is_refused(forecast):
+    with pytest.raises(ValueError, match='forecast'):
+        NavigationSettings(method='dead_reckoned', current='forecast', forecast=forecast)
+
+
 def test_no_current_is_believed_where_none_is_asked_for(dives):
     truth = dives([30.0, 40.0])
     track = navigate(truth, current='none')

@@ -28,7 +28,7 @@ def message(values) -> str:
         ('dead_reckoned.speed_error_share', 1.1, '>= 0.0 and <= 1.0'),
         ('dead_reckoned.heading_error_deg', 91.0, '>= 0.0 and <= 90.0'),
         ('origin.latitude_deg', 90.0, '>= -85.0 and <= 85.0'),
-        ('current', 'still', "'none', 'persistence' or 'tidal'"),
+        ('current', 'still', "'none', 'persistence', 'tidal' or 'forecast'"),
     ],
 )
 def test_a_wrong_value_is_refused_with_field_value_and_range(field, value, allowed):

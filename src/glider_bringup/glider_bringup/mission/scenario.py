@@ -176,7 +176,10 @@ class Scenario(Settings):
             imu_period_s=self.sensors.imu_period_s,
             gyro=self.sensors.gyro,
             also_fitted=self.sensors.also_fitted,
-            **dict(self.navigation),
+            **{
+                **dict(self.navigation),
+                'forecast': self.navigation.forecast.resolved(self.path.course_rad()),
+            },
         )
 
     def guidance_settings(self) -> GuidanceSettings:

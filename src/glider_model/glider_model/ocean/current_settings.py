@@ -381,8 +381,8 @@ FIELDS = plugins.classes(plugins.CURRENTS, FieldSettings, fields, set(), _check_
 CurrentField = Annotated[Union[tuple(FIELDS.values())], Field(discriminator='kind')]  # noqa: UP007
 
 
-class CurrentSettings(_Flow):
-    """The water of a mission: one constant current, and any number of components beside it.
+class SumOfCurrents(_Flow):
+    """One constant current, and any number of components beside it.
 
     Without a speed there is no constant current.
     """
@@ -398,9 +398,6 @@ class CurrentSettings(_Flow):
         f'{plugins.listed(FIELDS)}.',
         json_schema_extra={'others': plugins.others(plugins.CURRENTS)},
     )
-    seed: int = Field(
-        default=0, ge=0, le=2**63 - 1, description='Seed of the random components (1).'
-    )
 
     @pydantic.model_validator(mode='after')
     def _check_constant(self):
@@ -408,7 +405,7 @@ class CurrentSettings(_Flow):
             self._require_flow()
         return self
 
-    def resolved(self, course_rad: float) -> 'CurrentSettings':
+    def resolved(self, course_rad: float) -> 'SumOfCurrents':
         """Copy that needs no path: every angle absolute, every speed in m/s.
 
         Parameters
@@ -418,26 +415,25 @@ class CurrentSettings(_Flow):
 
         Returns
         -------
-        CurrentSettings
+        SumOfCurrents
             With ``direction_deg`` and ``speed_mps`` in place of ``angle_deg`` and ``speed_kn``.
         """
         components = [component.resolved(course_rad) for component in self.components]
         return super().resolved(course_rad).model_copy(update={'components': components})
 
-    def params(self, seed: int | None = None) -> CurrentParams:
+    def params(self, seed: int = 0) -> CurrentParams:
         """Arrays that `current_step` reads.
 
         Parameters
         ----------
         seed : int, optional
-            Seed of the random components, instead of ``self.seed``.
+            Seed of the random components.
 
         Raises
         ------
         ValueError
             If an angle is still relative to the path.
         """
-        seed = self.seed if seed is None else seed
         packed = [_Packed(CONSTANT, self._north_east())] if self._has_flow() else []
         packed += [component._pack() for component in self.components]
         count = len(packed)
@@ -465,6 +461,18 @@ class CurrentSettings(_Flow):
             np.array(table, dtype=float).reshape(-1, 4),
             self.field.params() if self.field else NoField(),
         )
+
+
+class CurrentSettings(SumOfCurrents):
+    """The water of a mission."""
+
+    seed: int = Field(
+        default=0, ge=0, le=2**63 - 1, description='Seed of the random components (1).'
+    )
+
+    def params(self, seed: int | None = None) -> CurrentParams:
+        """Arrays that `current_step` reads; ``seed`` instead of that of the settings."""
+        return super().params(self.seed if seed is None else seed)
 
     def initial_state(self, seed: int | None = None) -> CurrentState:
         """State before the first step; ``seed`` as in `params`."""

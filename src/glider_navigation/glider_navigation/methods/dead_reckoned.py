@@ -30,6 +30,7 @@ from glider_navigation.current_belief import (
     wandered,
 )
 from glider_navigation.flight_model import INITIAL_FLIGHT, Flight, follow_depth, reckon_speed
+from glider_navigation.forecast import Forecast, forecast_at, make_forecast
 from glider_navigation.method import (
     Believed,
     NavigationMethodSettings,
@@ -74,6 +75,7 @@ class DeadReckonedSettings(NavigationMethodSettings):
         return DeadReckonedParams(
             make_polar(vehicle),
             make_moving_mass(vehicle),
+            make_forecast(start.forecast, start.current == 'forecast'),
             start.current != 'none',
             self.speed_error_share**2,
             math.radians(self.heading_error_deg) ** 2,
@@ -85,6 +87,8 @@ class DeadReckonedSettings(NavigationMethodSettings):
         way = Way(place, self.start_std_m**2, still, still, 0.0, 0.0, 0.0)
         stay = Stay(0.0, place, still, self.start_std_m**2, 0.0, DRIFT_STD * DRIFT_STD, 1, 0.0)
         current = initial_belief(start.current == 'tidal')
+        if start.current == 'forecast':
+            current = initial_belief(False, start.forecast.error_std_mps)
         return DeadReckonedState(
             0,
             initial_attitude(start.vehicle),
@@ -94,6 +98,7 @@ class DeadReckonedSettings(NavigationMethodSettings):
             way,
             stay,
             current,
+            still,
             0.0,
         )
 
@@ -103,6 +108,7 @@ class DeadReckonedParams(NamedTuple):
 
     polar: Polar
     mass: MovingMass
+    forecast: Forecast
     believes_current: bool
     speed_variance: float  #: of the share by which speed is off
     heading_variance: float  #: (rad^2)
@@ -131,6 +137,7 @@ class DeadReckonedState(NamedTuple):
     way: Way
     stay: Stay
     current: CurrentBelief
+    column: Vector  #: mean of the forecast over the last way that told something (m/s)
     depth: float  #: that was shown last (m)
 
 
@@ -220,6 +227,21 @@ def _go_on(way, through, current, t_s, dt):
 
 
 @kernel
+def _forecast_mean(way, current):
+    """Mean (m/s) of the forecast over a way, of what was believed in it."""
+    return Vector(
+        way.believed.n / way.t_s - current.mean.n, way.believed.e / way.t_s - current.mean.e
+    )
+
+
+@kernel
+def _water_at(place, depth, t_s, current, params):
+    """Current (m/s) that is believed for a place (m), depth (m) and time since the start (s)."""
+    learnt, told = current_at(current, t_s), forecast_at(params.forecast, place, depth, t_s)
+    return Vector(learnt.n + told.n, learnt.e + told.e)
+
+
+@kernel
 def _end_of(way):
     """Where a way has led to (m)."""
     return Vector(
@@ -241,17 +263,29 @@ def _change_over(state, under, t_s, params):
     t_s : float
         Time since the start (s).
     params : DeadReckonedParams
+
+    Returns
+    -------
+    Way, Stay, CurrentBelief
+    Vector
+        Mean of the forecast over the last way that told something (m/s).
     """
-    way, stay, current = state.way, state.stay, state.current
+    way, stay, current, column = state.way, state.stay, state.current, state.column
+    if state.tick == 0:
+        column = forecast_at(params.forecast, state.place, 0.0, t_s)
     if under and not state.under:
         if stay.fixes > 0:
+            if params.forecast.is_believed and way.t_s >= SHORTEST_WAY_S:
+                column = _forecast_mean(way, current)
             current = _learn(current, way, stay, params)
         way = _dive(way, stay)
     elif state.under and not under:
         covariance = place_covariance(way, current, params)
-        drift = stay.drift if stay.fixes > 1 else current_at(current, t_s)
+        drift = stay.drift
+        if stay.fixes <= 1:
+            drift = _water_at(state.place, 0.0, t_s, current, params)
         stay = begin(state.place, 0.5 * (covariance.nn + covariance.ee), drift)
-    return way, stay, current
+    return way, stay, current, column
 
 
 @kernel
@@ -276,11 +310,11 @@ def dead_reckoned_step(state, heard, params, dt):
     flight = follow_depth(state.flight, heard.depth, sampled or heard.depth != state.depth, dt)
     flight = reckon_speed(flight, attitude.angles.theta, params.polar, dt)
     under = flight.depth > (SURFACES_M if state.under else DIVES_M)
-    way, stay, current = _change_over(state, under, t_s, params)
+    way, stay, current, column = _change_over(state, under, t_s, params)
     if under:
         psi = attitude.angles.psi
         through = Vector(flight.speed * math.cos(psi), flight.speed * math.sin(psi))
-        water = current_at(current, t_s)
+        water = _water_at(state.place, flight.depth, t_s, current, params)
         way = _go_on(way, through, water, t_s, dt)
         place, velocity = _end_of(way), Vector(through.n + water.n, through.e + water.e)
         covariance, phase = place_covariance(way, current, params), UNDER_WATER
@@ -291,17 +325,18 @@ def dead_reckoned_step(state, heard, params, dt):
         place, velocity, variance = now(stay), stay.drift, variance_now(stay)
         covariance = Covariance(variance, 0.0, variance)
         phase = FIXED if stay.fixes > 0 else AT_SURFACE
+    learnt = current_at(current, t_s)
     wandering = current.p.mm + wandered(current, current.way_s)
     believed = Believed(
         _odometry(place, attitude, flight, velocity),
         covariance,
-        current_at(current, t_s),
+        Vector(learnt.n + column.n, learnt.e + column.e),
         Covariance(wandering, 0.0, wandering),
         stay.drift,
         Covariance(stay.vv, 0.0, stay.vv),
         phase,
     )
     state = DeadReckonedState(
-        state.tick + 1, followed, flight, under, place, way, stay, current, heard.depth
+        state.tick + 1, followed, flight, under, place, way, stay, current, column, heard.depth
     )
     return state, believed

@@ -275,10 +275,6 @@ def _envelope_experiments() -> list[Experiment]:
     ]
 
 
-#: Ways to believe the current, in the same sea.
-_CURRENTS = ('none', 'persistence', 'tidal')
-
-
 def _reckoned(scenario: str, changes: dict) -> list[Case]:
     """Position known and reckoned, without and with errors of the sensors."""
     surfaces = {'profile.surface_every_dives': 1, **changes}
@@ -288,12 +284,58 @@ def _reckoned(scenario: str, changes: dict) -> list[Case]:
         *_both_laws(scenario, 'position known', known),
         *_both_laws(scenario, 'reckoned, no errors', reckons),
         *_both_laws(scenario, 'reckoned', {**reckons, **SENSOR_ERRORS}),
-        *(
-            Case(f'reckoned, {current}', 'adaptive', 'observer', scenario, changes)
-            for current in _CURRENTS
-            if current != 'persistence'
-            for changes in ({**reckons, **SENSOR_ERRORS, 'navigation.current': current},)
-        ),
+    ]
+
+
+def _flow(speed_mps: float, direction_deg: float, share: float = 1.0, off_deg: float = 0.0):
+    """Speed and direction of a current; of its forecast, with its errors."""
+    return {'speed_mps': share * speed_mps, 'direction_deg': direction_deg + off_deg}
+
+
+def _seas(**errors: float) -> dict[str, dict[str, Any]]:
+    """Three seas, or what is forecast of them: what varies at random is not."""
+    tide = {'kind': 'tidal', **_flow(0.20, 60.0, **errors)}
+    rough = [
+        {'kind': 'shear', **_flow(0.15, -20.0, **errors), 'law': 'exponential', 'depth_m': 200.0},
+        {'kind': 'tidal', **_flow(0.08, 75.0, **errors), 'ellipticity': 0.4},
+    ]
+    return {
+        'constant': _flow(KNOT_MPS, 12.0, **errors),
+        'tidal': {**_flow(0.10, 30.0, **errors), 'components': [tide]},
+        'rough_water': {**_flow(0.3 * KNOT_MPS, 60.0, **errors), 'components': rough},
+    }
+
+
+#: How far a forecast is off.
+FORECAST_ERRORS = {'share': 0.8, 'off_deg': 10.0}
+#: Scenario and changed fields of the three seas.
+_IN_SEA = {
+    'constant': ('current_12deg', {}),
+    'tidal': ('current_12deg', {'current': _seas()['tidal']}),
+    'rough_water': ('rough_water', {}),
+}
+
+
+def _beliefs() -> list[Case]:
+    """Ways to believe the current, in three seas."""
+    forecasts = _seas(**FORECAST_ERRORS)
+    return [
+        Case(
+            f'{sea}, {belief}',
+            'adaptive',
+            'observer',
+            scenario,
+            {
+                'profile.surface_every_dives': 1,
+                'navigation.method': 'dead_reckoned',
+                **SENSOR_ERRORS,
+                **changes,
+                'navigation.current': belief,
+                **({'navigation.forecast': forecasts[sea]} if belief == 'forecast' else {}),
+            },
+        )
+        for sea, (scenario, changes) in _IN_SEA.items()
+        for belief in ('none', 'persistence', 'tidal', 'forecast')
     ]
 
 
@@ -351,6 +393,16 @@ def _navigation_experiments() -> list[Experiment]:
             'rough_water, the same errors: shear and tide that no navigation knows beforehand',
             assumed,
             _reckoned('rough_water', {}),
+            judge_limits({}),
+        ),
+        Experiment(
+            'navigation',
+            'reckoned_beliefs',
+            '',
+            'what is believed of the current, in three seas, the same errors; what is forecast is a '
+            'fifth too weak, 10 deg off, and nothing of what is random',
+            assumed,
+            _beliefs(),
             judge_limits({}),
         ),
         Experiment(

@@ -176,6 +176,7 @@ _TABLES: dict[str, Callable[[list[dict]], Table]] = {
     'envelope': _envelope,
     'reckoned_12deg': _RECKONED,
     'reckoned_rough': _RECKONED,
+    'reckoned_beliefs': _RECKONED,
     'missed_fixes': _RECKONED,
 }
 _RECKONED_REMARK = (
@@ -186,6 +187,7 @@ _RECKONED_REMARK = (
 _REMARKS = {
     'reckoned_12deg': _RECKONED_REMARK,
     'reckoned_rough': _RECKONED_REMARK,
+    'reckoned_beliefs': _RECKONED_REMARK,
     'missed_fixes': _RECKONED_REMARK,
     'robustness': (
         'The PID is told the steering of the vehicle file, also where the plant differs from it; '
