@@ -399,7 +399,7 @@ def _navigation_experiments() -> list[Experiment]:
             'navigation',
             'reckoned_beliefs',
             '',
-            'what is believed of the current, in three seas, the same errors; what is forecast is a '
+            'what is believed of the current, in three seas; what is forecast is a '
             'fifth too weak, 10 deg off, and nothing of what is random',
             assumed,
             _beliefs(),
