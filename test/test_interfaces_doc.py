@@ -5,6 +5,7 @@
 ``python test/test_interfaces_doc.py`` writes the tables anew.
 """
 
+import inspect
 import re
 import signal
 from pathlib import Path
@@ -39,6 +40,7 @@ from glider_model.nodes.plant_node import PlantNode
 from glider_model.nodes.tf_node import TfSettings
 from glider_model.ocean.current_profile import MAX_ROWS
 from glider_model.ocean.current_settings import CurrentComponent, CurrentField, CurrentSettings
+from glider_model.plant.faults.settings import Fault, FaultSettings
 from glider_model.plant.plant import PlantSettings
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.clock import ClockSettings
@@ -63,6 +65,9 @@ NODES = {
     'recorder_node': (RecorderNode, RecorderSettings),
 }
 CLOCK_FIELDS = set(ClockSettings.model_fields) - set(TickSettings.model_fields)
+
+#: Fields that every fault has.
+COMMON = set(FaultSettings.model_fields)
 
 PROFILES = ('PER_TICK', 'NEWEST', 'LATCHED', 'EVENTS', 'EVERYTHING')
 _SIGNS = (('gt', '>'), ('ge', '>='), ('lt', '<'), ('le', '<='))
@@ -161,6 +166,19 @@ def member_rows(union):
                 yield kind, f'`{name}`', default, allowed(field), field.description or ''
 
 
+def when_rows():
+    """Fields that every fault has."""
+    return (row for row in member_rows(Fault) if row[0] == 'leak' and row[1].strip('`') in COMMON)
+
+
+def kind_rows(union):
+    """Members of a union: what each is called, what it stands for, and fields of its own."""
+    for model in get_args(get_args(union)[0]):
+        (kind,) = get_args(model.model_fields['kind'].annotation)
+        own = [name for name in model.model_fields if name not in {*COMMON, 'kind'}]
+        yield f'`{kind}`', inspect.getdoc(model), ', '.join(f'`{name}`' for name in own) or '-'
+
+
 def messages_of(topic) -> str:
     if not topic.per_tick:
         return 'on change'
@@ -202,6 +220,7 @@ def limit_rows():
             ('dimensions of a sweep', Sweep.model_fields['dimensions']),
             ('waypoints of a path', WaypointPath.model_fields['waypoints']),
             ('components of a current', CurrentSettings.model_fields['components']),
+            ('faults', Scenario.model_fields['faults']),
         )
     }
     letters = ' characters: letters, digits, `_`, `.`, `-`'
@@ -238,6 +257,11 @@ def tables() -> dict[str, str]:
         'paths': table(fields, member_rows(PathSettings)),
         'currents': table(fields, member_rows(CurrentComponent)),
         'current fields': table(fields, member_rows(CurrentField)),
+        'faults': table(('kind', 'what happens', 'its own fields'), kind_rows(Fault)),
+        'every fault': table(fields[1:], (row[1:] for row in when_rows())),
+        'fields of faults': table(
+            fields, (row for row in member_rows(Fault) if row[1].strip('`') not in COMMON)
+        ),
         'tf_node': table(parameters, parameter_rows(TfSettings)),
         'limits': table(('what', 'allowed'), limit_rows()),
         'launch': table(

@@ -32,6 +32,7 @@ from glider_model.base.wiring import SENSORS
 from glider_model.ocean.current_settings import CurrentSettings
 from glider_model.ocean.water import WaterSettings
 from glider_model.onboard.gate import GateSettings
+from glider_model.plant.faults.settings import FAULTS, Fault, check_actuators
 from glider_model.plant.plant import SURFACE_S, InitialSettings, PlantSettings
 from glider_model.plant.sensors import SensorSettings
 from glider_model.vehicle.file import changed_vehicle, load_vehicle, vehicle_names, vehicle_path
@@ -103,6 +104,7 @@ class Scenario(Settings):
     perturb: PerturbSettings = Field(
         PerturbSettings(), description='what the plant differs in from its vehicle file'
     )
+    faults: list[Fault] = FAULTS
     path: PathSettings = Field(
         StraightPath(kind='straight', length_m=25000.0), description='path to follow'
     )
@@ -135,6 +137,7 @@ class Scenario(Settings):
             fitted=[name for name in SENSORS if name in self.topics],
             origin=self.origin,
             perturb=self.perturb,
+            faults=self.faults,
         )
 
     @property
@@ -397,6 +400,7 @@ def _find_vehicle(
     try:
         perturbed(vehicle.params(), scenario.perturb)
         scenario.control.steering(vehicle.steers_by)
+        check_actuators(scenario.faults, vehicle.steers_by)
     except ConfigurationError as error:
         raise ConfigurationError(f'{source}: {error}') from None
     return scenario.model_copy(update={'vehicle': name})

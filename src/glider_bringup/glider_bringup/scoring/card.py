@@ -141,6 +141,7 @@ def _is_card(card) -> bool:
             if card['ticks'] or group != 'final_state'  # a run without a tick has none
         )
         and _is_guard(card.get('guard', {}))
+        and _are_faults(card.get('faults', []))
         and _is_navigation(card.get('navigation'))
     )
 
@@ -160,6 +161,16 @@ class _Checked(BaseModel):
     """Part of a score file, which may hold anything."""
 
     model_config = ConfigDict(strict=True)
+
+
+class _Fault(_Checked):
+    """What broke in a run, and when; older runs tell nothing of it."""
+
+    t_s: float | None
+    end_s: float | None
+    kind: str
+    message: str
+    when: str
 
 
 class _Report(_Checked):
@@ -219,6 +230,14 @@ def _is_navigation(told) -> bool:
     """Whether a value is how well the vehicle knew its place; older runs tell nothing of it."""
     try:
         return told is None or bool(_Navigation.model_validate(told))
+    except ValidationError:
+        return False
+
+
+def _are_faults(told) -> bool:
+    """Whether a value is what broke in a run."""
+    try:
+        return isinstance(told, list) and all(map(_Fault.model_validate, told))
     except ValidationError:
         return False
 

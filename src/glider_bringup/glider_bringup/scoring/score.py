@@ -13,12 +13,14 @@ What is scored is the true motion, whatever the vehicle believes.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from glider_bringup.blocks import COLUMNS
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
+from glider_bringup.scoring.faults import FaultTimes
 from glider_bringup.scoring.navigation import NavigationScorer
 from glider_bringup.scoring.true_motion import TrueMotion, wire_of
 from glider_control.intake import REFUSED
@@ -35,6 +37,7 @@ from glider_model.base.frames import (
 )
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import TICK_NS, TICK_S
+from glider_model.plant.faults.settings import FaultSettings
 from glider_model.plant.plant import dive_depths
 from glider_model.plant.sensors import SensorParams
 from glider_model.vehicle.file import steers_by
@@ -101,6 +104,8 @@ class Scorer:
         What there is of navigation in the run; empty of a vehicle that knows its place.
     steers_by : str
         Name of the vehicle's steering surface, whose travel is scored; empty without.
+    faults : sequence of FaultSettings
+        What breaks in the run.
     """
 
     def __init__(
@@ -109,12 +114,14 @@ class Scorer:
         origin: Origin | None = None,
         topics: tuple[str, ...] = (),
         steers_by: str = '',
+        faults: Sequence[FaultSettings] = (),
     ) -> None:
         self.topics = topics  #: that it needs, beside those that are always read
         self._steers_by = steers_by
         self._truth = TrueMotion(sensors)
         origin = origin or OriginSettings().params()
         self._navigation = NavigationScorer(origin, reckons=bool(topics))
+        self._faults = FaultTimes(faults)
         self._blocks: list[np.ndarray] = []
         self._last: np.ndarray | None = None
         self._end: np.ndarray | None = None
@@ -125,6 +132,7 @@ class Scorer:
             return
         told, log = log, self._truth.of(log)
         self._navigation.add(told, log)
+        self._faults.add(log)
         series = np.empty((_SERIES, len(log)))
         _extract(log, series)
         series[_TOLD_E2] = told[:, _E2_COLUMN]
@@ -151,7 +159,7 @@ class Scorer:
         dict
             The run's part of ``score.json``: ticks, settle_s, dives, distance_along_path_m,
             end_of_path_m, cross_track_m, pitch_error_deg, heading_fluctuation_deg, depth_m,
-            actuator_travel, guard, navigation, final_state, and ``infeasible``.
+            actuator_travel, guard, faults, navigation, final_state, and ``infeasible``.
             A figure without data is None.
         """
         series, ticks = self._series, self.ticks
@@ -183,6 +191,7 @@ class Scorer:
             },
             'actuator_travel': self._actuator_travel(),
             'guard': _guard(series(_MASK)),
+            'faults': self._faults.result(),
             'navigation': self._navigation.result(
                 rules.navigation, _cross_track(series(_TOLD_E2), steady, scored)
             ),
@@ -229,7 +238,7 @@ def make_scorer(scenario: Scenario) -> Scorer:
     if scenario.navigation.jumps:
         topics = ('fix', 'believed_current', 'current_velocity')
     sensors, origin = scenario.sensors.params(scenario.seed), scenario.origin.params()
-    return Scorer(sensors, origin, topics, steers_by(scenario))
+    return Scorer(sensors, origin, topics, steers_by(scenario), scenario.faults)
 
 
 def scores_of(scenario: Scenario, scorer: Scorer) -> dict:

@@ -10,7 +10,7 @@ import numpy as np
 from glider_bringup.mission.rules import STEADY_DEPTH_M
 from glider_bringup.scoring.traces import Traces
 from glider_bringup.showing.panels import actuators_of
-from glider_bringup.showing.scorecard import guard_texts, reckoned
+from glider_bringup.showing.scorecard import fault_texts, guard_texts, reckoned
 from glider_bringup.showing.web_page import FlownRun
 from glider_bringup.showing.words import count, small, span, way
 from glider_model.base.signals import TICK_S
@@ -143,6 +143,7 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
     if card['status'] in ('aborted', 'failed'):
         ended = 'was aborted' if card['status'] == 'aborted' else 'failed'
         problems.append(f'The run {ended} at {at(card["sim_time_s"])}: {card["reason"]}.')
+    notes += [f'Broken on purpose: {text}.' for text in fault_texts(card)]
     problems += [f'The guard, {text}.' for text in guard_texts(card)]
     if card['messages_lost']:
         problems.append(f'{card["messages_lost"]:,} messages were lost on the way to the bag.')

@@ -64,6 +64,7 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
         ),
         ('dives', str(card['dives'])),
         ('along path', show(card['distance_along_path_m'], 'm', 0)),
+        *(('fault', text) for text in fault_texts(card)),
         *(('guard', text) for text in guard_texts(card)),
         *([('end of path', f'came up {show(end_m, "m", 1)} from its last point')]
           if end_m is not None else []),
@@ -90,6 +91,17 @@ def _surface_travel(travel: dict) -> str:
     return ''.join(
         f', {name.removesuffix("_deg")} {show(travel[name], "deg", 0)}' for name in others
     )
+
+
+def fault_texts(card: dict) -> list[str]:
+    """What broke, in words: what it was, and when."""
+    return [
+        f'{one["message"]}, {one["when"]}: did not begin'
+        if one['t_s'] is None
+        else f'at {one["t_s"]:,.1f} s: {one["message"]}'
+        + (f', until {one["end_s"]:,.1f} s' if one['end_s'] is not None else '')
+        for one in card.get('faults', [])
+    ]
 
 
 def guard_texts(card: dict) -> list[str]:

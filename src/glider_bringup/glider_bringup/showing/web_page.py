@@ -115,6 +115,7 @@ class FlownRun(NamedTuple):
             'inflections': [round(float(time), 3) for time in traces.inflections_s()],
             'path': np.round(points, 2).tolist(),
             'own_path': own_path,
+            'faults': [one for one in self.card.get('faults', []) if one['t_s'] is not None],
             'surfacings': (reckoned(self.card) or {}).get('reports', []),
         }
 

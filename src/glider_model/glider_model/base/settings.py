@@ -99,6 +99,8 @@ def find_field(model: type[Settings], name: str) -> pydantic.fields.FieldInfo | 
     """Field by its dotted name; None if there is none."""
     inside, field = [model], None
     for part in name.split('.'):
+        if field is not None and get_origin(field.annotation) is list and part.isdecimal():
+            continue
         field = next((m.model_fields[part] for m in inside if part in m.model_fields), None)
         if field is None:
             return None
@@ -109,18 +111,34 @@ def find_field(model: type[Settings], name: str) -> pydantic.fields.FieldInfo | 
 def holder_of(values: dict[str, Any], name: str) -> dict[str, Any]:
     """Mapping in nested values that holds a field, given by its dotted name; made if need be.
 
+    A member of a list goes by its number, from 0 on: ``faults.0.at_s``.
+
     Raises
     ------
     ConfigurationError
-        If something on the way is not a mapping.
+        If something on the way is not a mapping, or a list has no such member.
     """
+    inside: Any = values
     for parent in name.split('.')[:-1]:
-        values = values.setdefault(parent, {})
-        if not isinstance(values, dict):
+        if isinstance(inside, list):
+            if not parent.isdecimal() or not len(parent) < 9 or int(parent) >= len(inside):
+                there = f'0 to {len(inside) - 1}' if inside else 'none, the list is empty'
+                raise ConfigurationError(
+                    f'--set {clipped(name)}: {clipped(parent)} is not in the list '
+                    f'(allowed: {there})'
+                )
+            inside = inside[int(parent)]
+        else:
+            inside = inside.setdefault(parent, {})
+        if not isinstance(inside, dict | list):
             raise ConfigurationError(
                 f'--set {clipped(name)}: {clipped(parent)} is not a group of fields'
             )
-    return values
+    if not isinstance(inside, dict):
+        raise ConfigurationError(
+            f'--set {clipped(name)}: a member of a list is set field by field, or with the list'
+        )
+    return inside
 
 
 def unit_of(field: pydantic.fields.FieldInfo) -> str:

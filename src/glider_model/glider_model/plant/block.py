@@ -7,26 +7,14 @@ from glider_model.base.frames import water_from_wire
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import Joints
 from glider_model.base.wiring import PLANT as WIRED
-from glider_model.plant.health import health_of
-from glider_model.plant.plant import PlantSettings, plant_finished, plant_odometry, plant_step
-from glider_model.plant.sensors import sense
+from glider_model.plant.plant import PlantSettings, plant_finished, plant_step, tell
 from glider_model.vehicle.file import steers_by
 
 
 @kernel
 def plant_outputs(state, params):
     """What the plant says of a tick: the numbers of its topics, and whether it is the last one."""
-    told = sense(
-        plant_odometry(state),
-        state.joints,
-        state.sample,
-        state.surfacing.out_ticks,
-        state.surfacing.count,
-        state.tick,
-        params.sensors,
-    )
-    outputs = (*told[:-1], tuple(health_of(state)), told[-1])
-    return outputs, plant_finished(state, params)
+    return tell(state, params), plant_finished(state, params)
 
 
 @kernel

@@ -11,9 +11,15 @@ from glider_model.base.frames import OriginSettings, quaternion_from_euler, rota
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_S, Joints, Odometry, Vector, Water, not_finite
+from glider_model.base.slot import default, slot
 from glider_model.base.wiring import SENSORS
 from glider_model.ocean.density import DensityParams
 from glider_model.ocean.water import WaterSettings, with_wind
+from glider_model.plant.faults.body import acting, blown, felt, moved
+from glider_model.plant.faults.kinds import FaultParams, begun, summed
+from glider_model.plant.faults.sensing import remembered, told
+from glider_model.plant.faults.settings import FAULTS, Fault, fault_params, fault_state
+from glider_model.plant.health import health_of
 from glider_model.plant.motion import Motion, integrate
 from glider_model.plant.sensors import (
     ANTENNA_M,
@@ -22,9 +28,9 @@ from glider_model.plant.sensors import (
     SensorParams,
     SensorSettings,
     add_noise,
+    sense,
     take_sample,
 )
-from glider_model.vehicle.actuators import actuators_step
 from glider_model.vehicle.file import VehicleParams, load_vehicle
 from glider_model.vehicle.perturb import PerturbSettings, perturbed
 
@@ -67,6 +73,7 @@ class PlantState(NamedTuple):
     afloat_ticks: int  #: those in which the pump was not filled; -1: has not dived yet
     sample: Sample  #: what the sensors showed at the tick before
     surfacing: Surfacing
+    faults: NamedTuple  #: NoFaultState, or FaultState
     is_dropped: bool  #: the drop weight is gone
 
 
@@ -86,6 +93,7 @@ class PlantParams(NamedTuple):
     dive_below: float  #: a dive counts once the vehicle, having been below this (m)
     dive_above: float  #: is above this (m)
     sensors: SensorParams
+    faults: NamedTuple  #: NoFaults, or FaultParams
 
 
 def dive_depths(depth_m: float) -> tuple[float, float]:
@@ -148,6 +156,7 @@ class PlantSettings(Settings):
     perturb: PerturbSettings = Field(
         PerturbSettings(), description='what this vehicle differs in from its file'
     )
+    faults: list[Fault] = FAULTS
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -166,6 +175,7 @@ class PlantSettings(Settings):
             round(self.afloat_s / TICK_S),
             *dive_depths(self.dive_depth_m),
             self.sensors.params(self.seed, self.origin, tuple(self.fitted), self.water.bottom_m),
+            fault_params(self.faults, self.seed),
         )
 
     def initial_state(self) -> PlantState:
@@ -190,6 +200,7 @@ class PlantSettings(Settings):
             -1,
             NO_SAMPLE,
             LAUNCHED,
+            fault_state(self.faults),
             False,
         )
 
@@ -217,6 +228,35 @@ def plant_odometry(state):
 
 
 @kernel
+def tell(state, params):
+    """What the vehicle tells at a tick: numbers of the topics of the plant, as on the wire."""
+    numbers = sense(
+        plant_odometry(state),
+        state.joints,
+        state.sample,
+        state.surfacing.out_ticks,
+        state.surfacing.count,
+        state.tick,
+        params.sensors,
+    )
+    numbers = (*numbers[:-1], tuple(health_of(state)), numbers[-1])
+    return told(numbers, state, params.sensors, params.faults)
+
+
+@slot
+@default
+def _after_telling(state, faults, whole, params):
+    """State of the faults for the next tick; ``whole`` is `PlantParams`."""
+    return faults
+
+
+@_after_telling.body(FaultParams)
+@kernel
+def _remember_what_was_told(state, faults, whole, params):
+    return remembered(faults, tell(state, whole), whole.sensors)
+
+
+@kernel
 def plant_step(state, command, water, params, dt, drops=False):
     """Advance the plant by one tick.
 
@@ -237,8 +277,13 @@ def plant_step(state, command, water, params, dt, drops=False):
     -------
     PlantState
     """
-    joints = actuators_step(state.joints, command, params.vehicle, dt)
-    water = with_wind(water, state.motion.p_d, params.wind_drift)
+    faults = begun(state, params.faults)
+    total = summed(faults, state.tick, params.faults)
+    water = blown(with_wind(water, state.motion.p_d, params.wind_drift), total, params.faults)
+    joints = moved(state.joints, command, params.vehicle, dt, total, params.faults)
+    start = acting(state.joints, params.vehicle, total, params.faults)
+    end = acting(joints, params.vehicle, total, params.faults)
+    body = felt(params, total, params.faults)
     water_rate = Water(0.0, 0.0, 0.0)
     if state.tick > 0:
         water_rate = Water(
@@ -247,15 +292,11 @@ def plant_step(state, command, water, params, dt, drops=False):
             (water.v_d - state.water.v_d) / dt,
         )
     is_dropped = state.is_dropped or drops
-    before, after = (
-        _relieved(state.joints, state.is_dropped, params.vehicle),
-        _relieved(joints, is_dropped, params.vehicle),
-    )
+    start = _relieved(start, state.is_dropped, params.vehicle)
+    end = _relieved(end, is_dropped, params.vehicle)
     steps, motion, error = 1, state.motion, math.inf
     while error > LARGEST_ERROR_J and steps <= MOST_STEPS:
-        motion, error = integrate(
-            state.motion, before, after, water, water_rate, params, dt, steps
-        )
+        motion, error = integrate(state.motion, start, end, water, water_rate, body, dt, steps)
         steps *= 2
     deep = motion.p_d > params.dive_below or (state.deep and motion.p_d >= params.dive_above)
     dives = state.dives + 1 if state.deep and not deep else state.dives
@@ -275,7 +316,8 @@ def plant_step(state, command, water, params, dt, drops=False):
         surface_ticks,
         afloat_ticks,
         sample,
-        _surface(state.surfacing, motion.p_d),
+        surface_after(state.surfacing, motion.p_d),
+        _after_telling(state, faults, params, params.faults),
         is_dropped,
     )
 
@@ -289,7 +331,7 @@ def _relieved(joints, is_dropped, vehicle):
 
 
 @kernel
-def _surface(surfacing, depth):
+def surface_after(surfacing, depth):
     """What there is of the surface a tick later, at a depth (m)."""
     is_under = depth > DIVED_M or (surfacing.is_under and depth >= SURFACE_M)
     count = surfacing.count + 1 if surfacing.is_under and not is_under else surfacing.count

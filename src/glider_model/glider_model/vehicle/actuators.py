@@ -7,7 +7,7 @@ from glider_model.base.signals import Joints
 
 
 @kernel
-def _toward(position, target, limit, reach):
+def toward(position, target, limit, reach):
     """Move by at most ``reach`` toward ``target``, which is held within +-limit."""
     goal = min(limit, max(-limit, target))
     return position + min(reach, max(-reach, goal - position))
@@ -17,8 +17,8 @@ def _toward(position, target, limit, reach):
 def actuators_step(joints, command, vehicle, dt):
     """Where the actuators are one step of ``dt`` s later; they move evenly in between."""
     return Joints(
-        _toward(joints.m_b, command.m_b, vehicle.m_b_max, vehicle.m_b_rate * dt),
-        _toward(joints.x_p, command.x_p, vehicle.x_p_max, vehicle.x_p_rate * dt),
-        _toward(joints.mu, command.mu, vehicle.mu_max, vehicle.mu_rate * dt),
-        _toward(joints.delta, command.delta, vehicle.delta_max, vehicle.delta_rate * dt),
+        toward(joints.m_b, command.m_b, vehicle.m_b_max, vehicle.m_b_rate * dt),
+        toward(joints.x_p, command.x_p, vehicle.x_p_max, vehicle.x_p_rate * dt),
+        toward(joints.mu, command.mu, vehicle.mu_max, vehicle.mu_rate * dt),
+        toward(joints.delta, command.delta, vehicle.delta_max, vehicle.delta_rate * dt),
     )

@@ -47,6 +47,24 @@ function markTrace(times, name) {
   };
 }
 
+/** A line and words for each fault of a run, where it began; nothing where runs are compared. */
+function faultMarks() {
+  const { faults } = page.runs[0];
+  if (page.runs.length > 1 || !faults) return { shapes: [], annotations: [] };
+  const at = (one) => one.t_s / page.unit.seconds;
+  return {
+    shapes: faults.map((one) => ({
+      type: 'line', xref: 'x', x0: at(one), x1: at(one), yref: 'paper', y0: 0, y1: 1,
+      line: { color: values('--alert'), width: 1.2, dash: 'dash' },
+    })),
+    annotations: faults.map((one) => ({
+      xref: 'x', x: at(one), xanchor: 'left', yref: 'paper', y: 0, yanchor: 'bottom',
+      text: one.message, textangle: -90, showarrow: false,
+      font: { size: 10, color: values('--alert') },
+    })),
+  };
+}
+
 /** Level lines, with gaps between them. */
 function stepTrace(steps) {
   const x = [];
@@ -93,13 +111,15 @@ function drawTime(panel, element, from, to) {
     const times = page.runs[panel.surfacings].surfacings.map((one) => one.t_s);
     traces.push(markTrace(times, 'surfacing'));
   }
+  const broken = faultMarks();
   return Plotly.react(element, traces, {
     ...look(element),
     margin: { l: isNarrow(element) ? 64 : 76, r: 14, t: 24, b: 38 },
     showlegend: true,
     hovermode: 'x unified',
     dragmode: 'zoom',
-    shapes: limits,
+    shapes: [...limits, ...broken.shapes],
+    annotations: broken.annotations,
     xaxis: axis(`time (${page.unit.name})`, {
       range: [from / page.unit.seconds, to / page.unit.seconds], hoverformat: '.4~f',
     }),

@@ -1,0 +1,117 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What faults do to the vehicle in the water: actuators, weight, drag and lift, gusts.
+
+Each function is a slot, whose body without faults hands on what it is given.
+"""
+
+from typing import NamedTuple
+
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import Joints, Water
+from glider_model.base.slot import default, slot
+from glider_model.ocean.density import DensityParams
+from glider_model.plant.faults import kinds
+from glider_model.plant.faults.kinds import FaultParams
+from glider_model.vehicle.actuators import actuators_step, toward
+from glider_model.vehicle.file import VehicleParams
+
+_DRAG = VehicleParams._fields.index('K_D0')
+_AFTER_LIFT = VehicleParams._fields.index('K_L') + 1
+_BALLAST = VehicleParams._fields.index('ballast')
+_AFTER_BALLAST = _BALLAST + 1
+
+
+class Felt(NamedTuple):
+    """What the motion of a broken vehicle goes by, in the place of `PlantParams`."""
+
+    vehicle: VehicleParams
+    density: DensityParams
+
+
+@slot
+@default
+def moved(joints, command, vehicle, dt, total, params):
+    """Where the actuators say they are a step of ``dt`` s later; ``total`` is of `summed`."""
+    return actuators_step(joints, command, vehicle, dt)
+
+
+@moved.body(FaultParams)
+@kernel
+def _moved(joints, command, vehicle, dt, total, params):
+    v = vehicle
+    return Joints(
+        _one(joints.m_b, command.m_b, v.m_b_max, v.m_b_rate * dt, 0, total),
+        _one(joints.x_p, command.x_p, v.x_p_max, v.x_p_rate * dt, 1, total),
+        _one(joints.mu, command.mu, v.mu_max, v.mu_rate * dt, 2, total),
+        _one(joints.delta, command.delta, v.delta_max, v.delta_rate * dt, 3, total),
+    )
+
+
+@kernel
+def _one(position, target, limit, reach, which, total):
+    low, high = limit * total[kinds.LOW + which], limit * total[kinds.HIGH + which]
+    goal = min(high, max(low, target))
+    return toward(position, goal, limit, reach * total[kinds.RATE + which])
+
+
+@slot
+@default
+def acting(joints, vehicle, total, params):
+    """Where actuators are that say they are at ``joints``."""
+    return joints
+
+
+@acting.body(FaultParams)
+@kernel
+def _acting(joints, vehicle, total, params):
+    v = vehicle
+    mu = _away(joints.mu, v.mu_max, 2, total)
+    return Joints(
+        _away(joints.m_b, v.m_b_max, 0, total),
+        _away(joints.x_p, v.x_p_max, 1, total),
+        0.0 if total[kinds.NO_ROLL] > 0.0 else mu,
+        _away(joints.delta, v.delta_max, 3, total),
+    )
+
+
+@kernel
+def _away(position, limit, which, total):
+    """Position with its offset, within the range."""
+    offset = limit * total[kinds.AWAY + which]
+    return position if offset == 0.0 else min(limit, max(-limit, position + offset))
+
+
+@slot
+@default
+def blown(water, total, params):
+    """Velocity of the water around the vehicle, gusts included (NED, m/s)."""
+    return water
+
+
+@blown.body(FaultParams)
+@kernel
+def _blown(water, total, params):
+    return Water(
+        water.v_n + total[kinds.BLOWS],
+        water.v_e + total[kinds.BLOWS + 1],
+        water.v_d + total[kinds.BLOWS + 2],
+    )
+
+
+@slot
+@default
+def felt(whole, total, params):
+    """What a motion goes by: something with vehicle and density; ``whole`` is `PlantParams`."""
+    return whole
+
+
+@felt.body(FaultParams)
+@kernel
+def _felt(whole, total, params):
+    v = whole.vehicle
+    drag, lift = total[kinds.DRAG], total[kinds.LIFT]
+    changed = (v.K_D0 * drag, v.K_D * drag, v.K_L0 * lift, v.K_L * lift)
+    heavier = (v.ballast + total[kinds.HEAVY],)
+    fields = v[:_DRAG] + changed + v[_AFTER_LIFT:_BALLAST] + heavier + v[_AFTER_BALLAST:]
+    return Felt(VehicleParams(*fields), whole.density)

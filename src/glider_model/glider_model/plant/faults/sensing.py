@@ -1,0 +1,199 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What faults do to what the vehicle tells: its sensors, and those of its own health.
+
+`told` is a slot, whose body without faults hands on what it is given.
+"""
+
+import math
+
+import numpy as np
+
+from glider_model.base.frames import (
+    euler_from_quaternion,
+    quaternion_from_euler,
+    swap_world,
+)
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import Health
+from glider_model.base.slot import default, slot
+from glider_model.ocean.density import depth_at, pressure_at
+from glider_model.plant.faults import kinds
+from glider_model.plant.faults.kinds import (
+    ATTITUDE,
+    DEPTH,
+    FIX,
+    PLACE,
+    RATES,
+    VELOCITY,
+    FaultParams,
+    FaultState,
+    begun,
+    summed,
+)
+from glider_model.plant.sensors import HAS_FIX, NO_FIX
+
+#: Of water in the hull the detector notices this much (kg).
+NOTICED_KG = 0.01
+#: Metres in a degree of latitude.
+_METRES_PER_DEG = 111195.0
+
+
+@slot
+@default
+def told(numbers, state, sensors, params):
+    """Numbers of the topics of a tick, in the order of the plant's outputs, as faults make them.
+
+    Parameters
+    ----------
+    numbers : tuple of tuple of float
+        As they are without.
+    state : PlantState
+    sensors : SensorParams
+    params : FaultParams or NoFaults
+    """
+    return numbers
+
+
+@told.body(FaultParams)
+@kernel
+def _told(numbers, state, sensors, params):
+    faults = begun(state, params)
+    total = summed(faults, state.tick, params)
+    truth, position, imu, pressure, fix, health, joints = numbers
+    if total[kinds.NO_FIXES] > 0.0:
+        fix = (NO_FIX, 0.0, 0.0, 0.0, 0.0)
+    right = _seen((truth, position, imu, pressure, fix, health, joints), sensors)
+    seen = _wrong(right, faults.shown, total)
+    if sensors.has_position:
+        position = _position(position, seen, right)
+    if sensors.has_parts:
+        imu = _imu(imu, seen, right)
+        if seen[DEPTH] != right[DEPTH]:
+            pressure = (pressure_at(seen[DEPTH]),)
+        if seen[FIX] != right[FIX] or seen[FIX + 1] != right[FIX + 1]:
+            variance = sensors.gps.std * sensors.gps.std
+            fix = (seen[FIX + 2], seen[FIX], seen[FIX + 1], variance, variance)
+    return truth, position, imu, pressure, fix, _health(health, total), joints
+
+
+@kernel
+def remembered(faults, numbers, sensors):
+    """State of the faults for the tick after one of which these are the numbers told."""
+    return FaultState(faults.began, _seen(numbers, sensors))
+
+
+@kernel
+def _seen(numbers, sensors):
+    """What the sensors show, by the places of `kinds`."""
+    _, position, imu, pressure, fix, _, _ = numbers
+    seen = np.zeros(kinds.SHOWN)
+    q_w, q_x, q_y, q_z = imu[0], imu[1], imu[2], imu[3]
+    rates, depth = (imu[4], imu[5], imu[6]), 0.0
+    if sensors.has_position:
+        q_w, q_x, q_y, q_z = position[3], position[4], position[5], position[6]
+        rates, depth = (position[10], position[11], position[12]), -position[2]
+        seen[PLACE], seen[PLACE + 1] = position[1], position[0]
+        seen[VELOCITY] = position[7]
+        seen[VELOCITY + 1], seen[VELOCITY + 2] = -position[8], -position[9]
+    elif sensors.has_parts:
+        depth = depth_at(pressure[0])
+    q = swap_world(q_w, q_x, q_y, q_z)
+    seen[0], seen[1], seen[2] = euler_from_quaternion(q[0], q[1], q[2], q[3])
+    seen[RATES], seen[RATES + 1], seen[RATES + 2] = rates[0], -rates[1], -rates[2]
+    seen[DEPTH] = depth
+    seen[FIX], seen[FIX + 1], seen[FIX + 2] = fix[1], fix[2], fix[0]
+    return seen
+
+
+@kernel
+def _wrong(right, shown, total):
+    """What they show with their faults, where ``shown`` is what they showed the tick before."""
+    seen = right.copy()
+    seen[2] += total[kinds.DEVIATES] * math.sin(right[2])
+    seen[2] += total[kinds.DEVIATES + 1] * math.cos(right[2])
+    for k in range(kinds.SHOWN):
+        error = total[kinds.ERROR + k]
+        if k >= FIX:
+            error = _of_fix(k, error, right)
+        seen[k] += error
+        if total[kinds.IS_OLD + k] > 0.0:
+            seen[k] = shown[k]
+    return seen
+
+
+@kernel
+def _of_fix(k, error, right):
+    """Error (m) of a number of a fix in its own unit; 0 where there is none."""
+    if right[FIX + 2] != HAS_FIX or k == FIX + 2:
+        return 0.0
+    east = math.cos(math.radians(right[FIX])) if k == FIX + 1 else 1.0
+    return error / (_METRES_PER_DEG * east)
+
+
+@kernel
+def _attitude(seen):
+    """Quaternion (ENU / FLU) of the attitude that is shown."""
+    q = quaternion_from_euler(seen[0], seen[1], seen[2])
+    return swap_world(q[0], q[1], q[2], q[3])
+
+
+@kernel
+def _has_turned(seen, right):
+    for k in range(ATTITUDE, ATTITUDE + 3):
+        if seen[k] != right[k]:
+            return True
+    return False
+
+
+@kernel
+def _position(position, seen, right):
+    """Numbers of measured_odom; those without a fault are the very same."""
+    q = (position[3], position[4], position[5], position[6])
+    if _has_turned(seen, right):
+        q = _attitude(seen)
+    return (
+        seen[PLACE + 1],
+        seen[PLACE],
+        -seen[DEPTH],
+        q[0],
+        q[1],
+        q[2],
+        q[3],
+        seen[VELOCITY],
+        -seen[VELOCITY + 1],
+        -seen[VELOCITY + 2],
+        seen[RATES],
+        -seen[RATES + 1],
+        -seen[RATES + 2],
+    )
+
+
+@kernel
+def _imu(imu, seen, right):
+    """Numbers of imu; those without a fault are the very same."""
+    q = (imu[0], imu[1], imu[2], imu[3])
+    if _has_turned(seen, right):
+        q = _attitude(seen)
+    return (
+        q[0],
+        q[1],
+        q[2],
+        q[3],
+        seen[RATES],
+        -seen[RATES + 1],
+        -seen[RATES + 2],
+        imu[7],
+    )
+
+
+@kernel
+def _health(health, total):
+    """What the health sensors say of it."""
+    well = Health(health[0], health[1], health[2], health[3])
+    return (
+        1.0 if total[kinds.WATER] >= NOTICED_KG else well.leak,
+        max(0.0, well.vacuum_pa - total[kinds.PASCALS]),
+        max(0.0, well.battery_v - total[kinds.VOLTS]),
+        max(well.contact_age_s, total[kinds.ALONE_S]),
+    )

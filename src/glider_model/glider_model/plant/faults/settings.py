@@ -1,0 +1,425 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Faults as a person writes them: one model for each kind, with what it does."""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+import pydantic
+from pydantic import Field
+
+from glider_model.base.noise import random_stream
+from glider_model.base.settings import ConfigurationError, Settings
+from glider_model.base.signals import TICK_S
+from glider_model.plant.faults import kinds
+from glider_model.plant.faults.kinds import FaultParams, FaultState, NoFaults, NoFaultState
+
+#: Faults of one scenario at most.
+MAX_FAULTS = 50
+#: A fault without an end lasts so many ticks: longer than any run.
+FOR_EVER = 2**62
+#: Sets the streams of faults apart from those of the currents and sensors.
+_STREAM_OFFSET = 2**33
+
+#: Actuators in the order of `glider_model.base.signals.Joints`.
+ACTUATORS = ('buoyancy_engine', 'pitch_mass', 'roll_mass', 'steering_surface')
+#: Phases of a dive, in the order of their numbers in `kinds`.
+PHASES = ('any', 'dive', 'turn', 'climb', 'surface')
+#: What a sensor shows: the first of its numbers in `kinds`, how many, and one of its unit in SI.
+SENSED = {
+    'attitude': (0, 2, math.pi / 180.0),
+    'roll': (0, 1, math.pi / 180.0),
+    'pitch': (1, 1, math.pi / 180.0),
+    'heading': (2, 1, math.pi / 180.0),
+    'rates': (3, 3, math.pi / 180.0),
+    'depth': (6, 1, 1.0),
+    'position': (7, 2, 1.0),
+    'velocity': (9, 3, 1.0),
+    'fix': (12, 3, 1.0),
+}
+Sensed = Literal[tuple(SENSED)]
+_SENSOR = Field(
+    description='what is measured: attitude (roll and pitch) or one of the two, heading, rates, '
+    'depth (pressure too), position (north and east of measured_odom), velocity, fix'
+)
+_ACTUATOR = Field(description='which actuator; steering_surface where the vehicle has one')
+
+
+class Packed(NamedTuple):
+    """A fault in numbers, beside when it is."""
+
+    kind: int
+    target: int = 0  #: actuator, or the first of the numbers of a sensor
+    count: int = 1  #: of them
+    numbers: tuple[float, ...] = ()  #: four at most, by kind
+
+
+class FaultSettings(Settings):
+    """When a fault begins: at the first tick at which all of its conditions hold."""
+
+    at_s: float = Field(0.0, ge=0.0, le=1e8, description='not before this time (s)')
+    at_depth_m: float | None = Field(
+        None,
+        ge=0.0,
+        le=12000.0,
+        description='not before it is as deep as this, or in a climb as shallow (m)',
+    )
+    phase: Literal[PHASES] = Field(
+        'any',
+        description='only while it sinks (dive), rises (climb), does neither at depth (turn), or '
+        'is at the surface after a dive',
+    )
+    for_s: float = Field(0.0, ge=0.0, le=1e8, description='how long it lasts (s); 0: to the end')
+
+    def _pack(self) -> Packed:
+        """The fault in numbers."""
+        raise NotImplementedError
+
+    @property
+    def words(self) -> str:
+        """What it is, in a few words."""
+        own = [name for name in type(self).model_fields if name not in FaultSettings.model_fields]
+        shown = {name: getattr(self, name) for name in own if name != 'kind'}
+        told = ', '.join(
+            str(value) if name in ('actuator', 'sensor') else f'{name} {value}'
+            for name, value in shown.items()
+        )
+        return f'{self.kind}: {told}' if told else self.kind
+
+    @property
+    def when(self) -> str:
+        """What it waits for, in words."""
+        parts = [f'from {self.at_s:g} s'] if self.at_s or self.at_depth_m is None else []
+        parts += [f'at {self.at_depth_m:g} m'] if self.at_depth_m is not None else []
+        parts += [f'in {self.phase}'] if self.phase != 'any' else []
+        parts += [f'for {self.for_s:g} s'] if self.for_s else []
+        return ', '.join(parts)
+
+
+class Leak(FaultSettings):
+    """Water runs into the hull and makes the vehicle heavier; what is in it stays."""
+
+    kind: Literal['leak']
+    rate_kgps: float = Field(gt=0.0, le=10.0, description='water taken in (kg/s)')
+    limit_kg: float = Field(100.0, gt=0.0, le=100.0, description='and no more than this (kg)')
+    detected: bool = Field(True, description='the leak detector tells it, from 0.01 kg on')
+
+    def _pack(self) -> Packed:
+        return Packed(kinds.LEAK, 0, 1, (self.rate_kgps, self.limit_kg, float(self.detected)))
+
+
+class Mass(FaultSettings):
+    """The vehicle is heavier, or lighter: something was picked up, or lost."""
+
+    kind: Literal['mass']
+    mass_kg: float = Field(ge=-50.0, le=50.0, description='added net heaviness (kg, + sinks)')
+
+    def _pack(self) -> Packed:
+        return Packed(kinds.MASS, 0, 1, (self.mass_kg,))
+
+
+class Fouling(FaultSettings):
+    """Growth on hull and wings, or a lost wing: drag and lift change."""
+
+    kind: Literal['fouling']
+    drag: float = Field(1.5, ge=0.1, le=20.0, description='factor on the drag (-)')
+    lift: float = Field(1.0, ge=0.0, le=5.0, description='factor on the lift that turns (-)')
+    over_s: float = Field(0.0, ge=0.0, le=1e8, description='time in which that comes about (s)')
+
+    def _pack(self) -> Packed:
+        return Packed(kinds.FOULING, 0, 1, (self.drag, self.lift, self.over_s))
+
+
+class LooseRollMass(FaultSettings):
+    """The roll mass has come off its drive and hangs straight down: no roll moment."""
+
+    kind: Literal['loose_roll_mass']
+
+    def _pack(self) -> Packed:
+        return Packed(kinds.LOOSE)
+
+
+class Gust(FaultSettings):
+    """Water that moves beside the current of the scenario, where the vehicle is."""
+
+    kind: Literal['gust']
+    north_mps: float = Field(0.0, ge=-3.0, le=3.0, description='velocity to the north (m/s)')
+    east_mps: float = Field(0.0, ge=-3.0, le=3.0, description='velocity to the east (m/s)')
+    down_mps: float = Field(0.0, ge=-1.0, le=1.0, description='velocity downward (m/s)')
+    over_s: float = Field(
+        60.0, ge=1.0, le=1e6, description='time in which it rises, and falls (s)'
+    )
+
+    def _pack(self) -> Packed:
+        return Packed(
+            kinds.GUST, 0, 1, (self.north_mps, self.east_mps, self.down_mps, self.over_s)
+        )
+
+
+class _ActuatorFault(FaultSettings):
+    """Something about one actuator."""
+
+    actuator: Literal[ACTUATORS] = _ACTUATOR
+
+    def _packed(self, kind: int, *numbers: float) -> Packed:
+        return Packed(kind, ACTUATORS.index(self.actuator), 1, numbers)
+
+
+class Stuck(_ActuatorFault):
+    """The actuator does not move."""
+
+    kind: Literal['stuck']
+
+    def _pack(self) -> Packed:
+        return self._packed(kinds.SLOW, 0.0)
+
+
+class Slow(_ActuatorFault):
+    """The actuator moves slower than it should."""
+
+    kind: Literal['slow']
+    rate: float = Field(0.2, ge=0.001, le=1.0, description='factor on its rate (-)')
+
+    def _pack(self) -> Packed:
+        return self._packed(kinds.SLOW, self.rate)
+
+
+class Offset(_ActuatorFault):
+    """The actuator is somewhere else than where it says."""
+
+    kind: Literal['offset']
+    offset: float = Field(ge=-1.0, le=1.0, description='how far, as a share of its range (-)')
+
+    def _pack(self) -> Packed:
+        return self._packed(kinds.OFFSET, self.offset)
+
+
+class Partial(_ActuatorFault):
+    """The actuator reaches a part of its range."""
+
+    kind: Literal['partial']
+    low: float = Field(-1.0, ge=-1.0, le=1.0, description='from this share of its range (-)')
+    high: float = Field(1.0, ge=-1.0, le=1.0, description='to this share (-)')
+
+    @pydantic.model_validator(mode='after')
+    def _check_order(self):
+        if self.low > self.high:
+            raise ValueError(
+                f'low = {self.low:g} is above high = {self.high:g} (allowed: <= high)'
+            )
+        return self
+
+    def _pack(self) -> Packed:
+        return self._packed(kinds.PARTIAL, self.low, self.high)
+
+
+class Jam(_ActuatorFault):
+    """The actuator jams and comes free, over and over."""
+
+    kind: Literal['jam']
+    period_s: float = Field(60.0, ge=0.2, le=1e6, description='from jam to jam (s)')
+    share: float = Field(0.5, ge=0.0, le=1.0, description='share of it that it is jammed for (-)')
+
+    def _pack(self) -> Packed:
+        return self._packed(kinds.JAM, self.period_s, self.share)
+
+
+class _SensorFault(FaultSettings):
+    """Something about what is measured."""
+
+    sensor: Sensed = _SENSOR
+
+    def _packed(self, kind: int, *numbers: float) -> Packed:
+        first, count, _ = SENSED[self.sensor]
+        return Packed(kind, first, count, numbers)
+
+    def _si(self, value: float) -> float:
+        return value * SENSED[self.sensor][2]
+
+
+def _error(description: str):
+    return Field(
+        ge=-1e6, le=1e6, description=f'{description} (deg, deg/s, m or m/s, by what is measured)'
+    )
+
+
+class Frozen(_SensorFault):
+    """It shows what it showed last; stamps go on."""
+
+    kind: Literal['frozen']
+
+    def _pack(self) -> Packed:
+        return self._packed(kinds.DROPOUT, 1.0)
+
+
+class Biased(_SensorFault):
+    """It shows too much, or too little."""
+
+    kind: Literal['biased']
+    error: float = _error('added to each number')
+
+    def _pack(self) -> Packed:
+        return self._packed(kinds.BIASED, self._si(self.error))
+
+
+class Spike(_SensorFault):
+    """It shows wild numbers now and then, of either sign, at random."""
+
+    kind: Literal['spike']
+    error: float = _error('added or taken away')
+    share: float = Field(0.01, ge=0.0, le=1.0, description='share of the ticks at which it is (-)')
+
+    def _pack(self) -> Packed:
+        return self._packed(kinds.SPIKE, self._si(self.error), self.share)
+
+
+class Dropout(_SensorFault):
+    """It has no new sample now and then, at random, and shows the last one."""
+
+    kind: Literal['dropout']
+    share: float = Field(
+        0.5, ge=0.0, le=1.0, description='share of the ticks at which it has none'
+    )
+
+    def _pack(self) -> Packed:
+        return self._packed(kinds.DROPOUT, self.share)
+
+
+class Noisier(_SensorFault):
+    """White noise is added to each number."""
+
+    kind: Literal['noisier']
+    std: float = Field(
+        ge=0.0,
+        le=1e6,
+        description='standard deviation (deg, deg/s, m or m/s, by what is measured)',
+    )
+
+    def _pack(self) -> Packed:
+        return self._packed(kinds.NOISIER, self._si(self.std))
+
+
+class Compass(FaultSettings):
+    """The deviation of the compass jumps: an error that goes as the sine of the heading."""
+
+    kind: Literal['compass']
+    deviation_deg: float = Field(ge=-90.0, le=90.0, description='its largest error (deg)')
+    phase_deg: float = Field(0.0, ge=-180.0, le=180.0, description='phase of the sine (deg)')
+
+    def _pack(self) -> Packed:
+        size, phase = math.radians(self.deviation_deg), math.radians(self.phase_deg)
+        return Packed(kinds.COMPASS, 0, 1, (size * math.cos(phase), size * math.sin(phase)))
+
+
+class GpsSilent(FaultSettings):
+    """There is no fix."""
+
+    kind: Literal['gps_silent']
+
+    def _pack(self) -> Packed:
+        return Packed(kinds.GPS_SILENT)
+
+
+class Battery(FaultSettings):
+    """The voltage of the battery sags."""
+
+    kind: Literal['battery']
+    drop_v: float = Field(ge=0.0, le=15.0, description='by so much (V)')
+    over_s: float = Field(0.0, ge=0.0, le=1e8, description='in this time (s)')
+
+    def _pack(self) -> Packed:
+        return Packed(kinds.BATTERY, 0, 1, (self.drop_v, self.over_s))
+
+
+class Vacuum(FaultSettings):
+    """The vacuum of the hull is lost."""
+
+    kind: Literal['vacuum']
+    rate_paps: float = Field(100.0, gt=0.0, le=1e6, description='in a second (Pa/s)')
+
+    def _pack(self) -> Packed:
+        return Packed(kinds.VACUUM, 0, 1, (self.rate_paps,))
+
+
+class NoContact(FaultSettings):
+    """Nobody answers at the surface: the age of the last contact grows on."""
+
+    kind: Literal['no_contact']
+
+    def _pack(self) -> Packed:
+        return Packed(kinds.NO_CONTACT)
+
+
+Fault = Annotated[
+    Leak
+    | Mass
+    | Fouling
+    | LooseRollMass
+    | Gust
+    | Stuck
+    | Slow
+    | Offset
+    | Partial
+    | Jam
+    | Frozen
+    | Biased
+    | Spike
+    | Dropout
+    | Noisier
+    | Compass
+    | GpsSilent
+    | Battery
+    | Vacuum
+    | NoContact,
+    Field(discriminator='kind'),
+]
+#: A scenario's faults, as a field of settings.
+FAULTS = Field([], max_length=MAX_FAULTS, description='what breaks, and when')
+
+
+def check_actuators(faults: Sequence[FaultSettings], steers_by: str) -> None:
+    """Refuse a fault of a steering surface that the vehicle, which steers by that, does not have.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    for i, fault in enumerate(faults):
+        if getattr(fault, 'actuator', '') == ACTUATORS[-1] and not steers_by:
+            raise ConfigurationError(
+                f'faults.{i}.actuator = {ACTUATORS[-1]!r}: the vehicle has none '
+                f'(allowed: {", ".join(ACTUATORS[:-1])})'
+            )
+
+
+def fault_params(faults: Sequence[FaultSettings], seed: int) -> NamedTuple:
+    """Kernel parameters of faults: `NoFaults`, or `FaultParams`."""
+    if not faults:
+        return NoFaults()
+    packed = [fault._pack() for fault in faults]
+    numbers = np.zeros((len(faults), 4))
+    for row, one in zip(numbers, packed, strict=True):
+        row[: len(one.numbers)] = one.numbers
+    depths = [np.nan if fault.at_depth_m is None else fault.at_depth_m for fault in faults]
+    lasts = [round(f.for_s / TICK_S) if f.for_s else FOR_EVER for f in faults]
+    streams = [random_stream(seed, _STREAM_OFFSET, i) for i in range(len(faults))]
+    return FaultParams(
+        np.array([one.kind for one in packed], np.int64),
+        np.array([one.target for one in packed], np.int64),
+        np.array([one.count for one in packed], np.int64),
+        numbers,
+        np.array([round(fault.at_s / TICK_S) for fault in faults], np.int64),
+        np.array(depths, np.float64),
+        np.array([PHASES.index(fault.phase) for fault in faults], np.int64),
+        np.array(lasts, np.int64),
+        np.array(streams, np.uint64),
+    )
+
+
+def fault_state(faults: Sequence[FaultSettings]) -> NamedTuple:
+    """State of faults of which none has begun."""
+    if not faults:
+        return NoFaultState()
+    return FaultState(np.full(len(faults), -1, np.int64), np.zeros(kinds.SHOWN))
