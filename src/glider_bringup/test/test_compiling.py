@@ -33,7 +33,7 @@ def test_loop_depends_on_law_and_methods_alone():
             'navigation.method': navigation,
         }
         scenarios = [load_scenario(name, changes) for name in scenario_names()]
-        assert {combination_of(one) for one in scenarios} == {(law, method, navigation)}
+        assert {combination_of(one) for one in scenarios} == {(law, method, navigation, False)}
         (types,) = {types_of(one) for one in scenarios}
         found.add(types)
     assert len(found) == len(chosen)

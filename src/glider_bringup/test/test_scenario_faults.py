@@ -13,6 +13,8 @@ from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros.recorded_run import Recording
 from glider_bringup.recording.ros.told import read_told
 from glider_bringup.recording.ros.verify.every_block import verify
+from glider_bringup.studies.montecarlo import make_scenarios
+from glider_bringup.studies.random_faults import DRAWN, outcome, sample_faults, validated
 from glider_model.base.settings import ConfigurationError
 from glider_model.vehicle.file import load_vehicle
 
@@ -99,3 +101,35 @@ def test_a_run_tells_of_its_faults_and_verify_computes_them_again(written, tmp_p
     }
     assert not verdicts['plant'].differing
     assert verdicts['plant'].ticks == 4000
+
+
+def test_drawn_faults_are_those_of_their_seed_and_every_kind_is_drawn():
+    drawn = [sample_faults(seed, 2, 3600.0) for seed in range(300)]
+    assert drawn[7] == sample_faults(7, 2, 3600.0) != drawn[8]
+    kinds = {fault.kind for faults in drawn for fault in validated(faults)}
+    assert kinds == set(DRAWN)
+    assert len(kinds) == 20
+    assert all(0.0 < fault['at_s'] < 3600.0 for faults in drawn for fault in faults)
+
+
+def test_many_plants_break_each_in_its_own_way():
+    changes = {'duration_s': 1000.0}
+    broken = make_scenarios('current_8deg', changes, ['pid', 'adaptive'], 3, seed=5, faults=2)
+    whole = make_scenarios('current_8deg', changes, ['pid', 'adaptive'], 3, seed=5)
+    assert broken[1, 'pid'].faults == broken[1, 'adaptive'].faults != broken[2, 'pid'].faults
+    for key, scenario in broken.items():
+        assert len(scenario.faults) == 2
+        assert scenario.model_copy(update={'faults': []}) == whole[key]
+
+
+@pytest.mark.parametrize(
+    ('guard', 'failed', 'diverged', 'expected'),
+    [
+        ('none', False, False, 'flew on'),
+        ('none', False, True, 'off its path'),
+        ('surface', False, True, 'guard: surface'),
+        ('surface', True, True, 'failed'),
+    ],
+)
+def test_outcome_is_the_worst_that_is_true(guard, failed, diverged, expected):
+    assert outcome({'guard': {'reaction': guard}}, failed, diverged) == expected

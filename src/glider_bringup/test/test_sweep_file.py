@@ -148,9 +148,11 @@ def test_laws_and_methods_of_all_cells_are_known(tmp_path):
         tmp_path, dimensions={'law': laws, 'los': {'kind': 'variants', 'variants': variants}}
     )
     assert set(plan.combinations) == {
-        (law, method, 'known') for law in ('pid', 'adaptive') for method in ('observer', 'paper')
+        (law, method, 'known', False)
+        for law in ('pid', 'adaptive')
+        for method in ('observer', 'paper')
     }
-    assert plan_of(tmp_path).combinations == [('adaptive', 'observer', 'known')]
+    assert plan_of(tmp_path).combinations == [('adaptive', 'observer', 'known', False)]
 
 
 def test_digest_is_that_of_the_inputs(tmp_path):

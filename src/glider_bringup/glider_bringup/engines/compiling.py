@@ -23,10 +23,10 @@ Tell = Callable[[str], None]
 
 def told(combination: Combination, tell: Tell) -> AbstractContextManager[None]:
     """Tell what is compiled in the block, if anything is."""
-    law, method, navigation = combination
+    law, method, navigation, breaks = combination
     line = (
         f'compiling the mathematics for law {law} with method {method}, position '
-        f'{navigation.replace("_", " ")}, once; up to half a minute'
+        f'{navigation.replace("_", " ")}{", faults" if breaks else ""}, once; up to half a minute'
     )
     return compiling_told(partial(tell, line))
 
@@ -46,6 +46,7 @@ def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
                 'control.law': one.law,
                 'guidance.los.method': one.method,
                 'navigation.method': one.navigation,
+                'faults': [{'kind': 'gps_silent'}] if one.breaks else [],
             }
             state, params = mission_of(load_scenario(changes=changes))
             with told(one, tell):

@@ -16,12 +16,16 @@ class Combination(NamedTuple):
     law: str
     method: str
     navigation: str = 'known'
+    breaks: bool = False  #: faults are part of it
 
 
 def combination_of(scenario: Scenario) -> Combination:
     """What the loop that flies a scenario is compiled for."""
     return Combination(
-        scenario.control.law, scenario.guidance.los.method, scenario.navigation.method
+        scenario.control.law,
+        scenario.guidance.los.method,
+        scenario.navigation.method,
+        bool(scenario.faults),
     )
 
 

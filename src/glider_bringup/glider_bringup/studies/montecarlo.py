@@ -10,6 +10,7 @@ number of plants and of worker processes.
 import json
 import math
 import shlex
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ import numpy as np
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.navigation import FOURTH
+from glider_bringup.studies.random_faults import outcome, sample_faults, validated
 from glider_bringup.studies.workers import Pool, Progress
 from glider_model.plant.sensors import SensorSettings
 from glider_model.plant.trim import solve_trim
@@ -188,7 +190,12 @@ def _turn_rate_over_roll(vehicle: VehicleParams, sign: float) -> float | None:
 
 
 def make_scenarios(
-    name: str, changes: dict[str, Any], controllers: list[str], plants: int, seed: int
+    name: str,
+    changes: dict[str, Any],
+    controllers: list[str],
+    plants: int,
+    seed: int,
+    faults: int = 0,
 ) -> dict[tuple[int, str], Scenario]:
     """Scenario of every flight, by plant and controller.
 
@@ -198,6 +205,8 @@ def make_scenarios(
         Scenario by name or path. Its seed, perturb, density and sensors give way to the plant's.
     changes : dict
         Further fields, by dotted name.
+    faults : int
+        Faults drawn for each plant, instead of those of the scenario; 0: none are drawn.
 
     Raises
     ------
@@ -215,6 +224,9 @@ def make_scenarios(
             'water': base.water.model_copy(update=sampled['water']),
             'sensors': SensorSettings(**sampled['sensors']),
         }
+        if faults:
+            drawn = sample_faults(seed + plant, faults, base.duration_s)
+            sections['faults'] = validated(drawn)
         for controller in controllers:
             law = base.control.model_copy(update={'law': controller})
             scenarios[plant, controller] = base.model_copy(update={**sections, 'control': law})
@@ -238,8 +250,10 @@ def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
     }
     failed = status == 'failed' or not finite
     told = scores['navigation']
+    diverged = failed or far or scores['infeasible']
     return {
-        'diverged': failed or far or scores['infeasible'],
+        'diverged': diverged,
+        'outcome': outcome(scores, failed, diverged),
         **figures,
         'navigation': {name: told[name] for name in NAVIGATION},
     }
@@ -321,6 +335,7 @@ def summarise(
                 'statically_unstable': sum(one['unstable'] for one in airframes.values()),
                 'weak_steering': sum(one['weak_steering'] for one in airframes.values()),
                 'navigation': _navigation([flight['navigation'] for flight in of.values()]),
+                'outcomes': dict(Counter(flight['outcome'] for flight in of.values())),
                 'worst_plant': max(of, key=lambda plant: _badness(of[plant])),
             }
         )
@@ -367,6 +382,7 @@ def report(
     summary: dict[str, Any],
     flights: dict[tuple[int, str], dict],
     airframes: dict[int, dict],
+    faults: int = 0,
 ) -> dict[str, Any]:
     """Result of a study with every plant in it: what it is, how it flew, how to fly it again."""
     base = load_scenario(name, changes)
@@ -374,6 +390,9 @@ def report(
     plants = []
     for plant, frame in airframes.items():
         sampled = sample_plant(summary['seed'] + plant, vehicle, reckons)
+        if faults:
+            drawn = sample_faults(summary['seed'] + plant, faults, base.duration_s)
+            sampled = {**sampled, 'faults': drawn}
         runs = {controller: flight for (i, controller), flight in flights.items() if i == plant}
         plants.append(
             {

@@ -44,6 +44,9 @@ def montecarlo(
         list[repeatable(Controller)] | None,
         typer.Option(help='Attitude law; can be repeated. Default: all of them.'),
     ] = None,
+    faults: Annotated[
+        int, typer.Option(min=0, max=20, help='Faults drawn for each plant from its seed.')
+    ] = 0,
     duration: Annotated[
         str,
         typer.Option(metavar='S|full', help="Simulated seconds, or the scenario's full duration."),
@@ -61,6 +64,7 @@ def montecarlo(
     Each hydrodynamic coefficient differs by up to 30 %, added mass by 15 %, trim by 10 mm, roll at
     rest by 10 deg, ballast by 50 g; water is stratified. Control knows the file only. Where the
     vehicle reckons (navigation.method), its compass, pitch, depth and fixes are off too.
+    With --faults each plant breaks too, and what became of the flights is counted.
     """
     from glider_bringup.mission.choices import combination_of
     from glider_bringup.mission.run_folder import make_result_folder
@@ -70,7 +74,7 @@ def montecarlo(
     if duration != 'full':
         fields['duration_s'] = number('--duration', duration, 'full', TICK_S, 1e8)
     laws = picked(controller, Controller)
-    scenarios = study.make_scenarios(scenario, fields, laws, plants, seed)
+    scenarios = study.make_scenarios(scenario, fields, laws, plants, seed, faults)
     if out:
         make_result_folder(out, study.RESULT_FILE)
     messages.print(f'{scenario}: {plants} plants, each by {" and by ".join(laws)}')
@@ -82,14 +86,14 @@ def montecarlo(
         flights, airframes = study.fly_plants(scenarios, pool, update)
     name = next(iter(scenarios.values())).name
     summary = study.summarise(name, seed, flights, airframes)
-    whole = study.report(scenario, fields, summary, flights, airframes)
+    whole = study.report(scenario, fields, summary, flights, airframes, faults)
     if out:
         text = json.dumps(whole, indent=2) + '\n'
         write_whole(out / study.RESULT_FILE, text)
     if as_json:
         print(json.dumps(summary))
     else:
-        _print_study(whole)
+        _print_study(whole, faults > 0)
 
 
 #: Lines about vehicles that do not measure where they are.
@@ -102,7 +106,7 @@ _RECKONED = (
 )
 
 
-def _print_study(study: dict) -> None:
+def _print_study(study: dict, breaks: bool) -> None:
     """Print the result of a Monte Carlo study for a person."""
 
     def show(figure: dict) -> str:
@@ -136,6 +140,8 @@ def _print_study(study: dict) -> None:
     for name, text in lines:
         if reckoned or name not in _RECKONED:
             table.add_row(name, *map(text, rows))
+    for name in sorted({name for row in rows for name in row['outcomes']}) if breaks else ():
+        table.add_row(name, *(str(row['outcomes'].get(name, 0)) for row in rows))
     output.print(table)
     for row in study['rows']:
         worst = study['flown'][row['worst_plant']]['commands'][row['controller']]

@@ -87,6 +87,7 @@ def combinations(experiments: list[Experiment]) -> set[Combination]:
             case.controller,
             case.guidance,
             case.changes.get('navigation.method', case.facts.get('navigated', 'known')),
+            bool(case.changes.get('faults')),
         )
         for one in experiments
         for case in one.cases

@@ -275,10 +275,11 @@ class Plan:
         checked = self._check_values()
         #: laws and methods that cells may have
         self.combinations = [
-            Combination(law, method, navigation)
+            Combination(law, method, navigation, breaks)
             for law in dict.fromkeys(one.control.law for one in checked)
             for method in dict.fromkeys(one.guidance.los.method for one in checked)
             for navigation in dict.fromkeys(one.navigation.method for one in checked)
+            for breaks in dict.fromkeys(bool(one.faults) for one in checked)
         ]
         vehicles: dict[Path, str] = {}  # one of every vehicle file
         for one in checked:

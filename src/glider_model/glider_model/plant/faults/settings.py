@@ -80,11 +80,14 @@ class FaultSettings(Settings):
     @property
     def words(self) -> str:
         """What it is, in a few words."""
-        own = [name for name in type(self).model_fields if name not in FaultSettings.model_fields]
-        shown = {name: getattr(self, name) for name in own if name != 'kind'}
+        own = {
+            name: getattr(self, name)
+            for name, field in type(self).model_fields.items()
+            if name not in {*FaultSettings.model_fields, 'kind'}
+            and getattr(self, name) != field.default
+        }
         told = ', '.join(
-            str(value) if name in ('actuator', 'sensor') else f'{name} {value}'
-            for name, value in shown.items()
+            value if isinstance(value, str) else f'{name} {value:g}' for name, value in own.items()
         )
         return f'{self.kind}: {told}' if told else self.kind
 
