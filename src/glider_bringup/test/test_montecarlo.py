@@ -183,6 +183,7 @@ def scores(**changes):
 def test_a_good_run_has_not_diverged():
     assert judge(scores()) == {
         'diverged': False,
+        'outcome': 'flew on',
         'max_steady_m': 0.5,
         'max_all_m': 5.0,
         'max_run_m': 9.0,
