@@ -61,6 +61,27 @@ def test_classes_are_those_of_the_stated_thresholds(tmp_path):
     assert found == expected
 
 
+def test_a_map_by_surfacing_has_its_own_measure_and_limits(tmp_path, monkeypatch, capsys):
+    path = tmp_path / 'mine.yaml'
+    path.write_text(yaml.safe_dump({'dimensions': DIMENSIONS}, sort_keys=False))
+    plan, name = load_sweep(str(path)), 'navigation.from_fourth.surfacing_cross_track_m'
+    beside = [49.0, 51.0, 199.0, 201.0]
+    records = [
+        {
+            **{'cell': cell, 'status': 'completed', 'reason': ''},
+            'figures': {'cross_track_m.max_steady': 1.0, name: beside[cell % 4]},
+        }
+        for cell in range(plan.cells)
+    ]
+    file = tmp_path / 'sweep.nc'
+    write_dataset(make_dataset(plan, records, STATUSES), file)
+    found = [CLASSES[i] for i in load_map(file, 'surfacing').classes[0].T.ravel()[:4]]
+    assert found == ['stable', 'critical', 'critical', 'lost']
+    assert (load_map(file).classes == CLASSES.index('stable')).all()
+    known = write(tmp_path, [1.0])
+    assert 'surfacing' in refused([known, '--by', 'surfacing'], monkeypatch, capsys)
+
+
 def test_dimensions_are_sorted_out_whatever_their_order(tmp_path):
     stability = load_map(write(tmp_path, [1.0, 20.0, 60.0, 60.0]))
     assert stability.panels == ['one', 'other']

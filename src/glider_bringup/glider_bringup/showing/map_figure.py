@@ -12,12 +12,10 @@ from glider_bringup.mission.disk import save_figure
 from glider_bringup.showing.stability_map import (
     CLASSES,
     CRITICAL,
-    CRITICAL_M,
     FAILED,
     INFEASIBLE,
     LOST,
     STABLE,
-    STABLE_M,
     StabilityMap,
     shares,
 )
@@ -44,8 +42,8 @@ _COLOURS = {
     FAILED: '#ffffff',
 }
 _MEANING = {
-    STABLE: f'stable: steady error <= {STABLE_M:g} m',
-    CRITICAL: f'critical: <= {CRITICAL_M:g} m',
+    STABLE: 'stable: {0.text} <= {0.stable_m:g} m',
+    CRITICAL: 'critical: <= {0.critical_m:g} m',
     LOST: 'lost: more, or none measured',
     INFEASIBLE: 'reported infeasible by the run',
     FAILED: 'failed: not flown to the end',
@@ -238,7 +236,12 @@ def _legend(stability: StabilityMap) -> list:
 
     failed = np.any(stability.classes == CLASSES.index(FAILED))
     handles = [
-        Patch(facecolor=_COLOURS[name], edgecolor='black', linewidth=0.5, label=_MEANING[name])
+        Patch(
+            facecolor=_COLOURS[name],
+            edgecolor='black',
+            linewidth=0.5,
+            label=_MEANING[name].format(stability.measure),
+        )
         for name in (CLASSES if failed else CLASSES[:-1])
     ]
     speed = f'{stability.horizontal_kn:.2f} kn'

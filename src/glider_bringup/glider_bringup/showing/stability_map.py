@@ -31,8 +31,26 @@ CLASSES = STABLE, CRITICAL, LOST, INFEASIBLE, FAILED = (
     'infeasible',
     'failed',
 )
-_ERROR = 'cross_track_m_max_steady'
 SPEED, ANGLE = 'current.speed_kn', 'current.angle_deg'
+
+
+class Measure(NamedTuple):
+    """What a cell is judged by."""
+
+    variable: str  #: of the result of a sweep (m)
+    stable_m: float  #: largest value of a stable flight, and of a critical one
+    critical_m: float
+    text: str
+
+
+#: A vehicle that comes up drifts off its path: it is judged by where it comes up, from the fourth
+#: time on.
+MEASURES = {
+    'steady': Measure('cross_track_m_max_steady', STABLE_M, CRITICAL_M, 'steady error'),
+    'surfacing': Measure(
+        'navigation_from_fourth_surfacing_cross_track_m', 50.0, 200.0, 'off where it comes up'
+    ),
+}
 #: More panels than this cannot be read on one page.
 MAX_PANELS = 9
 
@@ -48,10 +66,11 @@ class StabilityMap(NamedTuple):
     classes: np.ndarray  #: int[panels, n, m], index of `CLASSES`
     feasible: np.ndarray  #: bool[n, m], what physics allows
     horizontal_kn: float  #: U_h, horizontal speed through the water
+    measure: Measure
 
 
-def load_map(file: Path) -> StabilityMap:
-    """Map of the result of a sweep.
+def load_map(file: Path, by: str = 'steady') -> StabilityMap:
+    """Map of the result of a sweep, by one of `MEASURES`.
 
     Raises
     ------
@@ -67,11 +86,14 @@ def load_map(file: Path) -> StabilityMap:
     needed = {'scenario_yaml', 'vehicle_yaml', 'sweep'}
     if not needed <= set(data.attrs) or 'status' not in data:
         raise ConfigurationError(f'{file}: not a result of ./glider sweep')
-    if _ERROR not in data:
-        raise ConfigurationError(f'{file}: every cell failed, there is nothing to draw')
+    measure = MEASURES[by]
+    if measure.variable not in data:
+        raise ConfigurationError(
+            f'{file}: every cell failed, or has no {measure.variable}: nothing to draw by {by}'
+        )
     speed, angle, others = _dimensions(file, data)
     data = data.transpose(*others, speed, angle, ...).sortby([speed, angle])
-    classes = _classify(data)
+    classes = _classify(data, measure)
     panels = [str(value) for value in data[others[0]].values] if others else ['']
     if len(panels) > MAX_PANELS:
         raise ConfigurationError(
@@ -88,6 +110,7 @@ def load_map(file: Path) -> StabilityMap:
         classes.reshape(len(panels), len(speeds), len(angles)),
         _feasible(horizontal_mps, speeds, angles),
         horizontal_mps / KNOT_MPS,
+        measure,
     )
 
 
@@ -117,14 +140,14 @@ def _horizontal_speed(file: Path, data: xarray.Dataset) -> tuple[float, str]:
     return steady_horizontal_speed(-math.radians(pitch), heaviness, polar), vehicle.name
 
 
-def _classify(data: xarray.Dataset) -> np.ndarray:
+def _classify(data: xarray.Dataset, measure: Measure) -> np.ndarray:
     """Class of every cell, an index of `CLASSES`."""
-    error = data[_ERROR].values
+    error = data[measure.variable].values
     statuses = data['status'].attrs['flag_meanings'].split()
     status = data['status'].values
     classes = np.full(error.shape, CLASSES.index(LOST))
-    classes[error <= CRITICAL_M] = CLASSES.index(CRITICAL)
-    classes[error <= STABLE_M] = CLASSES.index(STABLE)
+    classes[error <= measure.critical_m] = CLASSES.index(CRITICAL)
+    classes[error <= measure.stable_m] = CLASSES.index(STABLE)
     for name in (INFEASIBLE, FAILED):
         classes[status == statuses.index(name)] = CLASSES.index(name)
     return classes

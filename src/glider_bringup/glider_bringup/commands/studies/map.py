@@ -4,7 +4,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.table import Table
@@ -22,17 +22,24 @@ def draw(
     out: Annotated[
         Path | None, typer.Option(help='Image file: png, svg or pdf. Default: FILE with .png.')
     ] = None,
+    by: Annotated[
+        Literal['steady', 'surfacing'],
+        typer.Option(
+            help='What a cell is judged by: the steady cross-track error, or how far beside the '
+            'path it comes up from the fourth time on.'
+        ),
+    ] = 'steady',
     as_json: Json = False,
 ) -> None:
     """Draw in which currents a path is held, and the limit of physics; print the shares.
 
     FILE is the result of ./glider sweep over current.speed_kn, current.angle_deg and at most one
-    more dimension, such as stability_map.
+    more dimension, such as stability_map, or reckoned_map by surfacing.
     """
     from glider_bringup.showing import stability_map as study
     from glider_bringup.showing.map_figure import draw_map
 
-    stability = study.load_map(file)
+    stability = study.load_map(file, by)
     image = out or file.with_suffix('.png')
     with messages.status('drawing'):
         draw_map(stability, image)
