@@ -8,14 +8,14 @@ import sys
 
 import pytest
 
-from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros.recorded_run import Recording
 from glider_bringup.recording.ros.told import read_told
 from glider_bringup.recording.ros.verify.every_block import verify
 from glider_bringup.studies.montecarlo import make_scenarios
 from glider_bringup.studies.random_faults import DRAWN, outcome, sample_faults, validated
-from glider_model.base.settings import ConfigurationError
+from glider_model.base.settings import ConfigurationError, find_field, unit_of
 from glider_model.vehicle.file import load_vehicle
 
 SCENARIO = """
@@ -50,6 +50,11 @@ def test_a_field_of_a_fault_is_set_by_its_number(written):
     scenario = load_scenario(str(written), {'faults.1.error': 5.0, 'faults.0.limit_kg': 1.0})
     assert (scenario.faults[1].error, scenario.faults[0].limit_kg) == (5.0, 1.0)
     assert scenario.faults[2] == load_scenario(str(written)).faults[2]
+
+
+def test_a_field_of_a_fault_has_a_unit_in_the_result_of_a_sweep():
+    assert unit_of(find_field(Scenario, 'faults.0.rate_kgps')) == 'kg/s'
+    assert find_field(Scenario, 'faults.0.colour') is None
 
 
 def test_faults_survive_being_written(written, tmp_path):

@@ -60,7 +60,7 @@ class FaultTimes:
         """What ``score.json`` tells of each: when it began and ended (None: it did not), what."""
         told = []
         for fault, began in zip(self._faults, self._began.tolist(), strict=True):
-            end = began + round(fault.for_s / TICK_S) if fault.for_s else self._tick
+            end = began + fault.lasts
             told.append(
                 {
                     't_s': round(began * TICK_S, 6) if began >= 0 else None,

@@ -59,7 +59,7 @@ function faultMarks() {
     })),
     annotations: faults.map((one) => ({
       xref: 'x', x: at(one), xanchor: 'left', yref: 'paper', y: 0, yanchor: 'bottom',
-      text: one.message, textangle: -90, showarrow: false,
+      text: one.message.split(',')[0], textangle: -90, showarrow: false,
       font: { size: 10, color: values('--alert') },
     })),
   };

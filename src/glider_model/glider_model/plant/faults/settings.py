@@ -78,6 +78,11 @@ class FaultSettings(Settings):
         raise NotImplementedError
 
     @property
+    def lasts(self) -> int:
+        """How many ticks it lasts."""
+        return max(1, round(self.for_s / TICK_S)) if self.for_s else FOR_EVER
+
+    @property
     def words(self) -> str:
         """What it is, in a few words."""
         own = {
@@ -406,7 +411,6 @@ def fault_params(faults: Sequence[FaultSettings], seed: int) -> NamedTuple:
     for row, one in zip(numbers, packed, strict=True):
         row[: len(one.numbers)] = one.numbers
     depths = [np.nan if fault.at_depth_m is None else fault.at_depth_m for fault in faults]
-    lasts = [round(f.for_s / TICK_S) if f.for_s else FOR_EVER for f in faults]
     streams = [random_stream(seed, _STREAM_OFFSET, i) for i in range(len(faults))]
     return FaultParams(
         np.array([one.kind for one in packed], np.int64),
@@ -416,7 +420,7 @@ def fault_params(faults: Sequence[FaultSettings], seed: int) -> NamedTuple:
         np.array([round(fault.at_s / TICK_S) for fault in faults], np.int64),
         np.array(depths, np.float64),
         np.array([PHASES.index(fault.phase) for fault in faults], np.int64),
-        np.array(lasts, np.int64),
+        np.array([fault.lasts for fault in faults], np.int64),
         np.array(streams, np.uint64),
     )
 
