@@ -10,6 +10,7 @@ and, for three seconds, is silent.
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,6 +24,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -62,6 +64,13 @@ OFF_M = (15.0, 1.0)
 GLIDING = {'heading_deg': 30.0, 'pitch_deg': -30.0, 'speed_mps': 0.5, 'net_heaviness_kg': 0.4}
 SAFE = {'buoyancy_engine': -1.0, 'pitch_mass': -0.06, 'roll_mass': 0.0}
 DEADLINE_S = 200.0
+#: Flights by their names: whether the vehicle navigates itself, and whether by the autopilot.
+FLIGHTS = {
+    'odom': (True, False),
+    'odom_autopilot': (True, True),
+    'sensors': (False, False),
+    'sensors_autopilot': (False, True),
+}
 
 
 def stamp_s(message) -> float:
@@ -163,15 +172,24 @@ def commands_on_board(file: Path, navigates: bool, autopilot: bool) -> list[list
     return [[python, '-m', module, *(wired.name for wired in parts), *ros]]
 
 
-@pytest.fixture(
-    scope='module',
-    params=[(True, False), (True, True), (False, False), (False, True)],
-    ids=['odom', 'odom_autopilot', 'sensors', 'sensors_autopilot'],
-)
-def flown(request, tmp_path_factory) -> Flown:
-    """The flight: a silence, a gain changed on the way, an abort."""
-    navigates, autopilot = request.param
-    file = tmp_path_factory.mktemp('free') / 'parameters.yaml'
+@pytest.fixture(scope='module')
+def flights(tmp_path_factory):
+    """All flights by their names, under way at the same time: each waits more than it computes."""
+    folder = tmp_path_factory.mktemp('free')
+    with ThreadPoolExecutor(len(FLIGHTS)) as pool:
+        yield {
+            name: pool.submit(fly, *how, folder / f'{name}.yaml') for name, how in FLIGHTS.items()
+        }
+
+
+@pytest.fixture(scope='module', params=FLIGHTS)
+def flown(request, flights) -> Flown:
+    """One of them."""
+    return flights[request.param].result()
+
+
+def fly(navigates: bool, autopilot: bool, file: Path) -> Flown:
+    """A flight: a silence, a gain changed on the way, an abort."""
     scenario = load_scenario('current_8deg', {**FLIGHT, **({} if navigates else RECKONED)})
     write_parameters(node_parameters(scenario, lockstep=False), file)
     nodes = {wired.node for wired in ON_BOARD if not (navigates and wired == NAVIGATION)}
@@ -179,7 +197,9 @@ def flown(request, tmp_path_factory) -> Flown:
     faults = {'speed': SPEED, 'loss': LOSS, 'silence_at_s': SILENCE_S, 'silence_s': SILENT_S}
     with domain_id() as domain:
         environment = node_environment(domain)
-        rclpy.init(context=context, domain_id=domain)
+        rclpy.init(
+            context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO
+        )
         watch = Watch(context)
         try:
             for command in commands_on_board(file, navigates, autopilot):
