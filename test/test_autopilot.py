@@ -130,7 +130,10 @@ def test_it_leaves_when_the_plant_gives_up(start):
         (['--ros-args', '-p', 'law:=pid'], 'navigation_node: parameter law: unknown'),
         (['--ros-args', '--params-file', 'nix.yaml'], 'bad command line'),
         (['--ros-args', '-p', 'nonsense'], 'bad command line'),
-        (['plant'], 'autopilot: plant: no such part (allowed: navigation, guidance, control, guard)'),
+        (
+            ['plant'],
+            'autopilot: plant: no such part (allowed: navigation, guidance, control, guard)',
+        ),
     ],
 )
 def test_what_it_cannot_use_is_named(words, said):

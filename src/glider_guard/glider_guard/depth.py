@@ -39,6 +39,7 @@ class DepthLimits(NamedTuple):
     progress_m: float  #: upward, in a climb
     no_climb_s: float
     drop_after_s: float
+    drop_blind_s: float  #: the same where no depth is to be believed
     stalled_m: float
     stalled_s: float
     under_s: float  #: infinite: never too long
@@ -152,8 +153,8 @@ def sound(state, at, ascends, limits, dt):
 
 
 @kernel
-def depth_rows(state, surfaces, limits):
-    """Rows that hold for a vehicle that is to surface for good, or not."""
+def depth_rows(state, surfaces, sees, limits):
+    """Rows that hold for a vehicle that is to surface for good, or not, and sees its depth."""
     told = 0
     if state.deep_s > TOO_DEEP_S:
         told |= TOO_DEEP
@@ -163,7 +164,8 @@ def depth_rows(state, surfaces, limits):
         told |= OVERDEPTH
     if state.climbs_s > limits.no_climb_s:
         told |= NOT_CLIMBING
-    if surfaces and state.climbs_s > limits.drop_after_s:
+    drop_s = limits.drop_after_s if sees else limits.drop_blind_s
+    if surfaces and state.climbs_s > drop_s:
         told |= NOT_RISING
     if state.stalled_s > limits.stalled_s:
         told |= STALLED

@@ -12,7 +12,9 @@ from glider_guard.actuators import ActuatorLimits, Followers, follow
 from glider_guard.depth import DepthLimits, Depths, Sounding, begin_at, depth_rows, sound
 from glider_guard.health import HealthLimits, HealthState, check_health
 from glider_guard.rows import (
+    DISAGREES,
     DROPS,
+    FROZEN,
     HOLDS,
     LATCHED,
     LOST,
@@ -186,7 +188,8 @@ def guard_step(state, heard, params, dt):
     ascends = last.m_b < 0.0
     surfaces = (state.told & (SURFACES | DROPS)) != 0
     depths = sound(depths, at, ascends, params.depth, dt)
-    told |= depth_rows(depths, surfaces, params.depth)
+    sees = not state.told & (FROZEN | LOST | DISAGREES)
+    told |= depth_rows(depths, surfaces, sees, params.depth)
     health, unwell = check_health(state.health, heard.health, params.health, dt)
     told |= unwell | _intake_rows(taken, params) | (state.told & LATCHED)
     command = react(told, taken.demand, params.safe_command)

@@ -119,7 +119,7 @@ ROWS = (
         NOT_RISING,
         'not_rising',
         'surfacing for good, and no progress upward',
-        'climb_progress_m, drop_after_s',
+        'climb_progress_m, drop_after_s, drop_blind_s',
         DROP,
         True,
         'does not rise though all is done for it',

@@ -64,6 +64,12 @@ class GuardLimitSettings(Settings):
         le=86400.0,
         description='the same, surfacing for good: the weight is let go (s)',
     )
+    drop_blind_s: float = Field(
+        14400.0,
+        ge=600.0,
+        le=86400.0,
+        description='the same where the depth is not to be believed (s)',
+    )
     stalled_m: float = Field(
         5.0, ge=0.5, le=100.0, description='depth that changes by less stays the same (m)'
     )
@@ -74,7 +80,7 @@ class GuardLimitSettings(Settings):
         0.0, ge=0.0, le=1e8, description='longest time under water (s); 0.0: any'
     )
     lag_m: float = Field(
-        20.0,
+        40.0,
         ge=1.0,
         le=1000.0,
         description='by so much the depth may lag behind the measured vertical rate (m)',
@@ -147,6 +153,7 @@ class GuardSettings(GuardLimitSettings):
                 self.climb_progress_m,
                 self.no_climb_s,
                 self.drop_after_s,
+                max(self.drop_after_s, self.drop_blind_s),
                 self.stalled_m,
                 self.stalled_s or math.inf,
                 self.under_water_s or math.inf,

@@ -155,6 +155,16 @@ def test_the_weight_goes_when_nothing_else_helps_and_not_before():
     assert vehicle.out.command == SAFE
 
 
+def test_a_depth_that_is_frozen_is_no_reason_to_drop_the_weight():
+    vehicle = Vehicle()
+    vehicle.go(1.0)
+    frozen = vehicle.odometry(0.0)
+    assert vehicle.go(5000.0, odometry=frozen) & rows.FROZEN
+    assert not vehicle.out.drops
+    assert vehicle.go(11000.0, odometry=frozen) & rows.NOT_RISING
+    assert vehicle.out.drops
+
+
 def test_a_vehicle_that_rises_keeps_its_weight():
     vehicle = Vehicle(depth_m=900.0)
     vehicle.target = SURFACE_TARGET

@@ -23,7 +23,9 @@ from glider_bringup.mission.disk import write_whole
 from glider_model.base.exits import EXIT_FAILED
 
 app = typer.Typer()
-Group = Literal['current', 'yaw', 'profile', 'robustness', 'paths', 'envelope', 'navigation']
+Group = Literal[
+    'current', 'yaw', 'profile', 'robustness', 'paths', 'envelope', 'navigation', 'faults'
+]
 
 
 @app.command(epilog='Example: ./glider experiments --only robustness --only paths')

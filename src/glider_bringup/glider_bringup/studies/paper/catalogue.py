@@ -12,6 +12,7 @@ from typing import Any
 
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.studies.montecarlo import airframe
+from glider_bringup.studies.paper import broken
 from glider_bringup.studies.paper.cases import Case, Experiment
 from glider_bringup.studies.paper.limits import (
     ALL_LIMITS_M,
@@ -426,6 +427,20 @@ def _navigation_experiments() -> list[Experiment]:
     ]
 
 
+def _fault_experiments() -> list[Experiment]:
+    return [
+        Experiment(
+            'faults',
+            'fault_matrix',
+            '',
+            'current_12deg, dives to 300 m: each fault in each phase, and how it ends',
+            'nothing fails',
+            broken.cases(_LAWS),
+            broken.judge,
+        )
+    ]
+
+
 GROUPS = {
     'current': _current_experiments,
     'yaw': _yaw_experiments,
@@ -434,6 +449,7 @@ GROUPS = {
     'paths': _paths_experiments,
     'envelope': _envelope_experiments,
     'navigation': _navigation_experiments,
+    'faults': _fault_experiments,
 }
 
 

@@ -60,10 +60,10 @@ def told(numbers, state, sensors, params):
 def _told(numbers, state, sensors, params):
     faults = begun(state, params)
     total = summed(faults, state.tick, params)
-    truth, position, imu, pressure, fix, health, joints = numbers
+    truth, position, imu, pressure, fix, altitude, health, joints = numbers
     if total[kinds.NO_FIXES] > 0.0:
         fix = (NO_FIX, 0.0, 0.0, 0.0, 0.0)
-    right = _seen((truth, position, imu, pressure, fix, health, joints), sensors)
+    right = _seen((truth, position, imu, pressure, fix, altitude, health, joints), sensors)
     seen = _wrong(right, faults.shown, total)
     if sensors.has_position:
         position = _position(position, seen, right)
@@ -74,7 +74,7 @@ def _told(numbers, state, sensors, params):
         if seen[FIX] != right[FIX] or seen[FIX + 1] != right[FIX + 1]:
             variance = sensors.gps.std * sensors.gps.std
             fix = (seen[FIX + 2], seen[FIX], seen[FIX + 1], variance, variance)
-    return truth, position, imu, pressure, fix, _health(health, total), joints
+    return truth, position, imu, pressure, fix, altitude, _health(health, total), joints
 
 
 @kernel
@@ -86,7 +86,7 @@ def remembered(faults, numbers, sensors):
 @kernel
 def _seen(numbers, sensors):
     """What the sensors show, by the places of `kinds`."""
-    _, position, imu, pressure, fix, _, _ = numbers
+    _, position, imu, pressure, fix, _, _, _ = numbers
     seen = np.zeros(kinds.SHOWN)
     q_w, q_x, q_y, q_z = imu[0], imu[1], imu[2], imu[3]
     rates, depth = (imu[4], imu[5], imu[6]), 0.0
