@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,8 +27,11 @@ from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_model.ros.places import domain_id
 
+pytestmark = pytest.mark.waits
+
 CHANGES = {'dives': 0, 'duration_s': 200.0, 'navigation.method': 'dead_reckoned'}
 DEADLINE_S = 120.0
+SIGNALS = [signal.SIGINT, signal.SIGTERM]
 
 
 def digest(folder: Path) -> str:
@@ -83,40 +87,49 @@ class Started(NamedTuple):
         return True
 
 
-@pytest.fixture
-def start(tmp_path):
-    """Start a process of a flight by its name, with more words."""
-    file = tmp_path / 'parameters.yaml'
+@pytest.fixture(scope='module')
+def waiting(tmp_path_factory):
+    """What waits, by name: an autopilot for each signal, and one beside a plant that gives up.
+
+    Each in a ROS domain of its own, all at the same time: it takes 10 s until they say so.
+    """
+    folder = tmp_path_factory.mktemp('waiting')
+    file = folder / 'parameters.yaml'
     write_parameters(node_parameters(load_scenario('current_8deg'), speed=1.0), file)
-    commands, started = node_commands(file, autopilot=True), []
+    commands, started = node_commands(file, autopilot=True), {}
 
-    def run(name: str, *words: str) -> Started:
-        log = tmp_path / name
+    def start(name: str, node: str, domain: int, *words: str) -> None:
+        log = folder / name
         with log.open('w') as out:
-            command = [*commands[name], *words]
-            started.append(subprocess.Popen(command, env=environment, stdout=out, stderr=out))
-        return Started(started[-1], log)
+            process = subprocess.Popen(
+                [*commands[node], *words], env=node_environment(domain), stdout=out, stderr=out
+            )
+        started[name] = Started(process, log)
 
-    with domain_id() as domain:
-        environment = node_environment(domain)
-        yield run
-        for process in started:
-            process.kill()
-            process.wait()
+    with ExitStack() as stack:
+        stack.enter_context(pytest.MonkeyPatch.context()).delenv('ROS_DOMAIN_ID', raising=False)
+        domain = stack.enter_context(domain_id())
+        start('beside_plant', AUTOPILOT, domain)
+        start('plant', 'plant_node', domain, '-p', 'startup_timeout_s:=10.0')
+        for number in SIGNALS:
+            start(number.name, AUTOPILOT, stack.enter_context(domain_id()))
+        yield started
+        for one in started.values():
+            one.process.kill()
+            one.process.wait()
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_signal_ends_it_cleanly(start, number):
-    autopilot = start(AUTOPILOT)
+@pytest.mark.parametrize('number', SIGNALS)
+def test_signal_ends_it_cleanly(waiting, number):
+    autopilot = waiting[number.name]
     assert autopilot.has_said('navigation_node', 'control_node')  # that they wait for the plant
     autopilot.process.send_signal(number)
     assert autopilot.process.wait(DEADLINE_S) == 0
     assert 'Traceback' not in autopilot.log.read_text()
 
 
-def test_it_leaves_when_the_plant_gives_up(start):
-    autopilot = start(AUTOPILOT)
-    plant = start('plant_node', '-p', 'startup_timeout_s:=10.0')
+def test_it_leaves_when_the_plant_gives_up(waiting):
+    autopilot, plant = waiting['beside_plant'], waiting['plant']
     assert plant.process.wait(DEADLINE_S) == 3
     assert 'current_node has not appeared' in plant.log.read_text()
     assert 'navigation_node has not' not in plant.log.read_text()

@@ -25,11 +25,14 @@ from glider_model.ros.places import domain_id
 from glider_model.ros.wire.topics import (
     CONTROL,
     CURRENT,
+    GUARD,
     GUIDANCE,
     NAVIGATION,
     TOPICS,
     recorded_topics,
 )
+
+pytestmark = pytest.mark.waits
 
 TICKS = 400
 DEADLINE_S = 200.0  #: at worst with every kernel to compile
@@ -38,7 +41,7 @@ RECORDED = recorded_topics(['measured_odom'])
 LISTENERS = {
     'ground_truth/odom': {CURRENT},
     'measured_odom': {NAVIGATION},
-    'odom': {GUIDANCE, CONTROL},
+    'odom': {GUIDANCE, CONTROL, GUARD},
 }
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import root
 
 from glider_model.base.frames import quaternion_from_euler, rotate_to_ned
 from glider_model.base.settings import ConfigurationError
@@ -123,6 +122,8 @@ def _follow_branch(z: np.ndarray, target: float, glide: _Glide) -> tuple[np.ndar
 
     From the straight glide in small steps of roll mass, so that the branch is followed.
     """
+    from scipy.optimize import root  # 0.3 s, which commands that trim nothing do not wait for
+
     solved = True
     for mu in np.linspace(0.0, target, 2 + int(abs(target) / 0.05)):
         z = root(_residual, z, args=(mu, glide), method='hybr', tol=1e-13).x
