@@ -27,8 +27,6 @@ from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_model.ros.places import domain_id
 
-pytestmark = pytest.mark.waits
-
 CHANGES = {'dives': 0, 'duration_s': 200.0, 'navigation.method': 'dead_reckoned'}
 DEADLINE_S = 120.0
 SIGNALS = [signal.SIGINT, signal.SIGTERM]

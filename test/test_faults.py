@@ -24,8 +24,6 @@ from glider_model.base.signals import TICK_NS
 from glider_model.ros.wire.topics import recorded_topics
 from glider_model.vehicle.file import vehicle_path
 
-pytestmark = pytest.mark.waits
-
 PER_TICK = [
     topic.full_name('/glider') for topic in recorded_topics(['measured_odom']) if topic.per_tick
 ]

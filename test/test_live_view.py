@@ -22,8 +22,6 @@ from websockets.sync.client import connect
 
 from glider_model.ros.wire.topics import TOPICS, recorded_topics
 
-pytestmark = pytest.mark.waits
-
 DEADLINE_S = 200.0
 RECORDED = {topic.full_name('/glider'): topic for topic in recorded_topics(['measured_odom'])}
 #: Also those that this run does not have: who looks does not know how it navigates.

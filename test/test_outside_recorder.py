@@ -32,8 +32,6 @@ from glider_model.ros.wire.topics import (
     recorded_topics,
 )
 
-pytestmark = pytest.mark.waits
-
 TICKS = 400
 DEADLINE_S = 200.0  #: at worst with every kernel to compile
 RECORDED = recorded_topics(['measured_odom'])

@@ -46,8 +46,6 @@ from glider_model.ros.wire import qos
 from glider_model.ros.wire.codec import to_cdr
 from glider_model.ros.wire.topics import TOPICS
 
-pytestmark = pytest.mark.waits
-
 STAND_IN = Path(__file__).resolve().parents[1] / 'examples' / 'stand_in.py'
 SPEED, LOSS = 4.0, 0.05
 #: Seconds of the vehicle's time after its start.

@@ -22,8 +22,6 @@ from glider_model.ros.places import domain_id
 from glider_model.ros.wire import qos
 from glider_navigation.nodes.navigation_node import NavigationNode
 
-pytestmark = pytest.mark.waits
-
 JOINTS = ['buoyancy_engine', 'pitch_mass', 'roll_mass']
 IMU_PERIOD_S, MAX_AGE_S = 0.5, 0.3
 PARAMETERS = {

@@ -32,8 +32,6 @@ from glider_model.base.signals import TICK_NS
 from glider_model.ros.places import domain_id
 from glider_model.ros.wire.topics import TOPICS, recorded_topics
 
-pytestmark = pytest.mark.waits
-
 DEADLINE_S = 120.0
 RECORDED = {topic.full_name('/glider'): topic for topic in recorded_topics(['measured_odom'])}
 

@@ -16,8 +16,6 @@ from glider_bringup.engines import processes
 from glider_bringup.engines.processes import PLANT, RECORDER, node_commands, run_nodes
 from glider_model.ros.places import domain_id
 
-pytestmark = pytest.mark.waits
-
 #: A node that says it is there, and then waits for a signal.
 WAIT = """
 import os, signal, sys, time

@@ -33,8 +33,6 @@ from glider_model.ros.wire.topics import (
     TOPICS,
 )
 
-pytestmark = pytest.mark.waits
-
 TIMEOUT_S = 30.0
 #: What the plant says of a tick.
 SAID = ('/clock', 'ground_truth/odom', 'measured_odom', 'joint_states', 'health')

@@ -122,7 +122,7 @@ def _follow_branch(z: np.ndarray, target: float, glide: _Glide) -> tuple[np.ndar
 
     From the straight glide in small steps of roll mass, so that the branch is followed.
     """
-    from scipy.optimize import root  # 0.3 s, which commands that trim nothing do not wait for
+    from scipy.optimize import root  # slow to load, and most commands trim nothing
 
     solved = True
     for mu in np.linspace(0.0, target, 2 + int(abs(target) / 0.05)):

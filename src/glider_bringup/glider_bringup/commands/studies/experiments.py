@@ -44,7 +44,7 @@ def experiments(
     """Fly the experiments of the paper and what goes beyond them; exit code 1 if one fails.
 
     By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
-    engine: 158 flights, most of them of 30 hours.
+    engine; the flights of the paper last 30 hours.
     """
     from glider_bringup.mission.run_folder import make_result_folder
     from glider_bringup.showing import paper_figures
