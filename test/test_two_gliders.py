@@ -127,7 +127,7 @@ def test_a_second_glider_in_the_namespace_of_the_first_is_refused(rivals):
     code, message, _, card = rivals
     assert code == 1
     # the node that notices first says it, wherever the line is broken
-    assert 'is published by /glider/' in message
+    assert 'is published by /glider/' in ' '.join(message.split())
     assert 'a clock of its own' in ' '.join(message.split())
     assert card['reason'] == 'stopped by SIGTERM'
 

@@ -22,25 +22,25 @@
 static inline double min(double a, double b) { return b < a ? b : a; }
 static inline double max(double a, double b) { return b > a ? b : a; }
 
-typedef struct { double x, y, z; } Vector;
+typedef struct { double x, y, z; } Triple;
 typedef struct { double f_x, f_y, f_z, t_x, t_y, t_z; } Force;
 
 /* --------------------------------------------------------------------------------- frames */
 
-static inline Vector rotate_to_ned(
+static inline Triple rotate_to_ned(
     double q_w, double q_x, double q_y, double q_z, double x, double y, double z)
 {
     double t_x = 2.0 * (q_y * z - q_z * y);
     double t_y = 2.0 * (q_z * x - q_x * z);
     double t_z = 2.0 * (q_x * y - q_y * x);
-    return (Vector){
+    return (Triple){
         x + q_w * t_x + q_y * t_z - q_z * t_y,
         y + q_w * t_y + q_z * t_x - q_x * t_z,
         z + q_w * t_z + q_x * t_y - q_y * t_x,
     };
 }
 
-static inline Vector rotate_to_body(
+static inline Triple rotate_to_body(
     double q_w, double q_x, double q_y, double q_z, double x, double y, double z)
 {
     return rotate_to_ned(q_w, -q_x, -q_y, -q_z, x, y, z);
@@ -340,7 +340,7 @@ static inline Force acceleration(
     if (motion->p_d < vehicle->hull_radius)
         weight += (vehicle->m * GRAVITY * emerged_fraction(motion->p_d, vehicle->hull_radius))
             - surface_damping(motion, vehicle);
-    Vector a = {0.0, 0.0, 0.0};
+    Triple a = {0.0, 0.0, 0.0};
     if (water_rate->v_n != 0.0 || water_rate->v_e != 0.0 || water_rate->v_d != 0.0)
         a = rotate_to_body(
             q_w, q_x, q_y, q_z, water_rate->v_n, water_rate->v_e, water_rate->v_d);
@@ -362,7 +362,7 @@ static inline Motion derivative(
 {
     double q_w = motion->q_w, q_x = motion->q_x, q_y = motion->q_y, q_z = motion->q_z;
     double p = motion->p, q = motion->q, r = motion->r;
-    Vector d = rotate_to_ned(q_w, q_x, q_y, q_z, motion->u, motion->v, motion->w);
+    Triple d = rotate_to_ned(q_w, q_x, q_y, q_z, motion->u, motion->v, motion->w);
     Force a = acceleration(motion, m_b, inertia, water_rate, vehicle, density);
     return (Motion){
         d.x + current->v_n,

@@ -22,7 +22,7 @@ SCENARIO = """
 name: broken
 profile: {depth_m: 40.0}
 faults:
-- {kind: leak, at_s: 100.0, rate_kgps: 0.001, limit_kg: 0.05}
+- {kind: leak, at_s: 100.0, rate_kgps: 0.001, limit_kg: 0.05, detected: false}
 - {kind: spike, sensor: heading, error: 20.0, share: 0.1, at_depth_m: 10.0, phase: dive, for_s: 60.0}
 - {kind: frozen, sensor: depth, at_s: 1000000.0}
 """  # noqa: E501

@@ -45,7 +45,7 @@ class Flown:
         for _ in range(round(seconds / TICK_S)):
             self.states.append(state)
             self.told.append(plant_outputs(state, self.params)[0])
-            state = plant_move(state, (tuple(command), STILL), self.params, TICK_S)
+            state = plant_move(state, (tuple(command), STILL, (0.0,)), self.params, TICK_S)
 
     def topic(self, name):
         """Numbers of a topic, float64[ticks, n]."""

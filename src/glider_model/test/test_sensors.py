@@ -293,7 +293,7 @@ def heights(depths, bottom_m=200.0, **sensors):
     for depth in depths:
         state = state._replace(motion=state.motion._replace(p_d=depth))
         found.append(said(state, params)['altitude'][0])
-        state = plant_move(state, (4 * (0.0,), 3 * (0.0,)), params, TICK_S)
+        state = plant_move(state, (4 * (0.0,), 3 * (0.0,), (0.0,)), params, TICK_S)
     return np.array(found)
 
 

@@ -53,6 +53,7 @@ NOT_RESULTS = {
     'messages_lost',
     'seed',
     'guard',  # what happened, in words
+    'faults',  # the same
 }
 
 
