@@ -44,7 +44,7 @@ _PER_COUNT = {
     'idle_bytes_per_s': 'what {} nodes send when they know each other and are silent (B/s)',
 }
 MEANING = {
-    'wire_start_mb': 'a glider of six nodes, sent until its first tick (MB)',
+    'wire_start_mb': 'a glider of seven nodes, sent until its first tick (MB)',
     'wire_bytes_per_s': 'sent by it at 10 Hz in real time: all topics, recorder too (B/s)',
     **{
         f'discovery_{count}_{name}': text.format(count)

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Flights over topics: ticks per second beside what the middleware gives to bare nodes.
 
-In a tick one message after the other passes plant, navigation, guidance, control and plant again:
-four hops. The floor is four bare rclpy nodes that hand on one message in that ring, in the same
-environment and, because machines are not the same every minute, in turn with the flights.
+In a tick one message after the other passes plant, navigation, guidance, control, guard and plant
+again: five hops. The floor is five bare rclpy nodes that hand on one message in that ring, in the
+same environment and, because machines are not the same every minute, in turn with the flights.
 """
 
 import subprocess
@@ -32,12 +32,12 @@ from glider_model.ros.wire.topics import recorded_topics
 
 SCENARIO, DURATION_S = 'current_8deg', 2000.0
 REPEATS = 3
-HOPS, FLOOR_TICKS = 4, 8000
+HOPS, FLOOR_TICKS = 5, 8000
 _PER_TICK = [topic for topic in recorded_topics(['measured_odom']) if topic.per_tick]
 
 MEANING = {
-    'floor_ticks_per_s': 'four hops of bare rclpy, the floor (1/s)',
-    'nodes_ticks_per_s': 'flight of six processes, every topic recorded (1/s)',
+    'floor_ticks_per_s': 'five hops of bare rclpy, the floor (1/s)',
+    'nodes_ticks_per_s': 'flight of seven processes, every topic recorded (1/s)',
     'nodes_over_floor': 'each flight over the floors before and after it, the median ratio',
     'nodes_real_time_factor': 'simulated time over wall time of that flight, with its end',
     'nodes_messages_lost': 'messages that its bag lacks',
@@ -51,14 +51,14 @@ MEANING = {
 
 def measure(progress: Callable[[str], None]) -> dict:
     """Figures of flights over topics, and of the recorder on its own."""
-    progress('four hops of bare rclpy')
+    progress('five hops of bare rclpy')
     floors, rates, flights = [floor_ticks_per_s()], [], []
     for i in range(REPEATS):
         progress(f'{DURATION_S:,.0f} s over topics, {i + 1} of {REPEATS}')
         rate, flight = fly_over_topics(DURATION_S)
         rates.append(rate)
         flights.append(flight)
-        progress(f'four hops of bare rclpy, after flight {i + 1} of {REPEATS}')
+        progress(f'five hops of bare rclpy, after flight {i + 1} of {REPEATS}')
         floors.append(floor_ticks_per_s())
     ratios = [
         rate / mean(around)
