@@ -3,12 +3,14 @@
 """The guard as a block."""
 
 from glider_guard.actuators import INITIAL_FOLLOWERS
+from glider_guard.ascent import INITIAL_ASCENT
 from glider_guard.depth import INITIAL_DEPTHS
 from glider_guard.guard import GuardParams, GuardState, Heard, guard_step
 from glider_guard.health import INITIAL_HEALTH
 from glider_guard.rows import HOLD, ORDERED, REACTIONS, reaction_of
 from glider_guard.rows import say as said_of
 from glider_guard.settings import GuardSettings
+from glider_guard.weight import INITIAL_WEIGHT
 from glider_model.base.block import Block, Said, block_tick
 from glider_model.base.frames import odometry_from_wire
 from glider_model.base.kernel import kernel
@@ -48,6 +50,8 @@ def guard_surface(state):
         state.followers,
         state.depths,
         state.health,
+        state.weight,
+        state.ascent,
         state.command,
         state.told | ORDERED,
     )
@@ -57,7 +61,15 @@ def guard_surface(state):
 def guard_clear(state):
     """Forget what has latched, and how long anything has lasted."""
     return GuardState(
-        0, state.taken, INITIAL_FOLLOWERS, INITIAL_DEPTHS, INITIAL_HEALTH, state.command, 0
+        0,
+        state.taken,
+        INITIAL_FOLLOWERS,
+        INITIAL_DEPTHS,
+        INITIAL_HEALTH,
+        INITIAL_WEIGHT,
+        INITIAL_ASCENT,
+        state.command,
+        0,
     )
 
 

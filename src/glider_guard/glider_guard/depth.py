@@ -24,14 +24,14 @@ SURFACE_M = 5.0
 #: For longer than this (s) the depth lags behind the vertical rate before it is told.
 LAG_S = 10.0
 #: The past of the lag fades with this time (s).
-LAG_FADES_S = 600.0
+LAG_FADES_S = 150.0
 
 
 class DepthLimits(NamedTuple):
     """What is too deep, too long and too still."""
 
     rated: float  #: (m); infinite if nobody says
-    margin: float  #: deeper than rated by this is too deep whatever is commanded (m)
+    margin: float  #: sinking on to deeper than rated by this is too deep whatever is commanded (m)
     crush: float  #: (m); infinite if nobody says
     over_share: float  #: of the deepest target
     over_m: float
@@ -44,6 +44,7 @@ class DepthLimits(NamedTuple):
     stalled_s: float
     under_s: float  #: infinite: never too long
     lag_m: float
+    lag_share: float  #: of the way that the vertical rate says
     still_s: float
     jump_m: float  #: a depth that has gone farther in a tick was set anew
     disagree_m: float
@@ -64,12 +65,13 @@ class Depths(NamedTuple):
     stalled_s: float
     under_s: float  #: time under water
     lag_m: float  #: of the measured depth behind the vertical rate
+    gone_m: float  #: by the vertical rate, up or down, of late
     lag_s: float  #: for which that has been too much
     still_s: float  #: for which nothing measured has changed
     apart_s: float  #: for which two measured depths have differed
 
 
-INITIAL_DEPTHS = Depths(*(14 * (0.0,)))
+INITIAL_DEPTHS = Depths(*(15 * (0.0,)))
 
 
 class Sounding(NamedTuple):
@@ -81,6 +83,7 @@ class Sounding(NamedTuple):
     own: float  #: by the pressure alone (m)
     is_same: bool  #: odom is what it was a tick before
     target: float  #: that guidance asks for (m)
+    stop: float  #: way that it sinks on if it is stopped now (m)
 
 
 @kernel
@@ -101,7 +104,9 @@ def _lag(lag_m, at, jump_m, dt):
 @kernel
 def begin_at(depth):
     """Nothing has lasted yet, at a depth (m)."""
-    return Depths(depth, depth, 0.0, 0.0, 0.0, depth, 0.0, depth, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Depths(
+        depth, depth, 0.0, 0.0, 0.0, depth, 0.0, depth, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
 
 
 @kernel
@@ -124,9 +129,12 @@ def sound(state, at, ascends, limits, dt):
     depth = max(at.depth, at.own)
     target = max(state.target, at.target)
     under = depth > SURFACE_M
-    margin = limits.margin if ascends else 0.0
+    sinks_to = depth + at.stop - limits.margin
+    deepest = sinks_to if ascends else max(depth, sinks_to)
     over = max(limits.over_m, limits.over_share * target)
     lag_m = _lag(state.lag_m, at, limits.jump_m, dt)
+    gone_m = state.gone_m + dt * (abs(at.rate) - state.gone_m / LAG_FADES_S)
+    lags = abs(lag_m) > max(limits.lag_m, limits.lag_share * gone_m)
     mark = max(state.mark, depth) if ascends and under else depth
     progress = mark - depth >= limits.progress_m
     if progress:
@@ -137,7 +145,7 @@ def sound(state, at, ascends, limits, dt):
     return Depths(
         depth,
         target,
-        _count(depth > limits.rated + margin, state.deep_s, dt),
+        _count(deepest > limits.rated, state.deep_s, dt),
         _count(depth > limits.crush, state.crush_s, dt),
         _count(depth > target + over, state.over_s, dt),
         mark,
@@ -146,7 +154,8 @@ def sound(state, at, ascends, limits, dt):
         _count(is_stalled, state.stalled_s, dt),
         _count(under, state.under_s, dt),
         lag_m,
-        _count(abs(lag_m) > limits.lag_m, state.lag_s, dt),
+        gone_m,
+        _count(lags, state.lag_s, dt),
         _count(under and at.is_same, state.still_s, dt),
         _count(abs(at.own - at.depth) > limits.disagree_m, state.apart_s, dt),
     )

@@ -9,6 +9,7 @@ block that fails is met with a reaction (`glider_guard.rows`) that needs none of
 from typing import NamedTuple
 
 from glider_guard.actuators import ActuatorLimits, Followers, follow
+from glider_guard.ascent import INITIAL_ASCENT, Ascent, AscentLimits, come_up
 from glider_guard.depth import DepthLimits, Depths, Sounding, begin_at, depth_rows, sound
 from glider_guard.health import HealthLimits, HealthState, check_health
 from glider_guard.rows import (
@@ -22,7 +23,8 @@ from glider_guard.rows import (
     ORDERED,
     SURFACES,
 )
-from glider_model.base.frames import rotate_to_ned
+from glider_guard.weight import Weight, WeightLimits, stopping_m, weigh
+from glider_model.base.frames import euler_from_quaternion, rotate_to_ned
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import SURFACE_TARGET, Health, Joints, Odometry
 from glider_model.onboard.gate import GateParams, GateState, are_believed, gate_step, is_lost
@@ -35,8 +37,9 @@ class GuardParams(NamedTuple):
     actuators: ActuatorLimits
     depth: DepthLimits
     health: HealthLimits
+    weight: WeightLimits
     has_pressure: bool  #: there is a depth apart from that of odom
-    safe_command: Joints  #: as buoyant as possible, mass at the climb stop, no roll, no turn
+    ascent: AscentLimits
 
 
 class Heard(NamedTuple):
@@ -71,6 +74,8 @@ class GuardState(NamedTuple):
     followers: Followers
     depths: Depths
     health: HealthState
+    weight: Weight
+    ascent: Ascent
     command: Joints  #: the last one
     told: int  #: rows
 
@@ -124,12 +129,13 @@ def _is_same(a, b):
 
 
 @kernel
-def _sounding(taken, before):
-    """What two ticks tell of the depth."""
+def _sounding(taken, before, theta, params):
+    """What two ticks tell of the depth, at a pitch (rad)."""
     x = taken.gate.odometry
     _, _, rate = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
     target = max(0.0, taken.target)
-    return Sounding(x.p_d, before.p_d, rate, taken.depth, _is_same(x, before), target)
+    stop = stopping_m(theta, rate, params.weight)
+    return Sounding(x.p_d, before.p_d, rate, taken.depth, _is_same(x, before), target, stop)
 
 
 @kernel
@@ -143,16 +149,6 @@ def _intake_rows(taken, params):
     if taken.demand_s > hold_s:
         told |= NO_DEMAND
     return told
-
-
-@kernel
-def react(told, demand, safe):
-    """Command by the rows that are told."""
-    if told & (SURFACES | DROPS):
-        return safe
-    if told & HOLDS:
-        return Joints(demand.m_b, demand.x_p, 0.0, 0.0)
-    return demand
 
 
 @kernel
@@ -181,7 +177,9 @@ def guard_step(state, heard, params, dt):
         # held level: whether they follow is seen by what is demanded
         sent = Joints(last.m_b, last.x_p, taken.demand.mu, taken.demand.delta)
     followers, told = follow(state.followers, taken.joints, sent, params.actuators, dt)
-    at = _sounding(taken, before)
+    x = taken.gate.odometry
+    _, theta, _ = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
+    at = _sounding(taken, before, theta, params)
     depths = state.depths
     if first:
         depths = begin_at(at.depth)
@@ -191,8 +189,17 @@ def guard_step(state, heard, params, dt):
     sees = not state.told & (FROZEN | LOST | DISAGREES)
     told |= depth_rows(depths, surfaces, sees, params.depth)
     health, unwell = check_health(state.health, heard.health, params.health, dt)
-    told |= unwell | _intake_rows(taken, params) | (state.told & LATCHED)
-    command = react(told, taken.demand, params.safe_command)
+    weight, heavy = weigh(
+        state.weight, theta, at.rate, taken.joints.m_b, last.m_b, params.weight, dt
+    )
+    told |= unwell | heavy | _intake_rows(taken, params) | (state.told & LATCHED)
+    command, ascent = taken.demand, INITIAL_ASCENT
+    if told & (SURFACES | DROPS):
+        sees = not told & (FROZEN | LOST | DISAGREES)
+        ascent, command = come_up(state.ascent, at.rate, sees, taken.joints.m_b, params.ascent, dt)
+    elif told & HOLDS:
+        command = Joints(command.m_b, command.x_p, 0.0, 0.0)
     tick = state.tick + 1 if taken.gate.seen else 0
     output = GuardOutput(command, (told & DROPS) != 0, told)
-    return GuardState(tick, taken, followers, depths, health, command, told), output
+    state = GuardState(tick, taken, followers, depths, health, weight, ascent, command, told)
+    return state, output

@@ -31,6 +31,7 @@ ORDERED, TOO_DEEP, FROZEN, LOST = 128, 256, 512, 1024
 OVERDEPTH, CRUSHING, NOT_CLIMBING, NOT_RISING = 1 << 13, 1 << 14, 1 << 15, 1 << 16
 STALLED, NO_DEMAND, DISAGREES, UNDER_LONG = 1 << 17, 1 << 18, 1 << 19, 1 << 20
 LEAK, VACUUM, BATTERY, NO_CONTACT = 1 << 21, 1 << 22, 1 << 23, 1 << 24
+TOO_HEAVY = 1 << 25
 
 #: Every row, in the order in which they are told.
 ROWS = (
@@ -82,8 +83,8 @@ ROWS = (
     Row(
         TOO_DEEP,
         'too_deep',
-        'deeper than rated_depth and still sent down, or deeper by a margin',
-        'rated_depth, depth_margin_share, depth_margin_m',
+        'deeper than rated_depth and still sent down, or sinking on to deeper by a margin',
+        'rated_depth, depth_margin_m',
         SURFACE,
         True,
         'deeper than the vehicle is rated for',
@@ -125,6 +126,15 @@ ROWS = (
         'does not rise though all is done for it',
     ),
     Row(
+        TOO_HEAVY,
+        'too_heavy',
+        'sinks faster, or rises more slowly, than pump and ballast would have it',
+        'weight_share, weight_s',
+        SURFACE,
+        True,
+        'heavier than its pump says: water in the hull, growth, or a wing that is lost',
+    ),
+    Row(
         STALLED,
         'stalled',
         'under water at the same depth',
@@ -146,7 +156,7 @@ ROWS = (
         FROZEN,
         'measurement_frozen',
         'the measured depth does not go where the vertical rate leads, or nothing measured moves',
-        'lag_m, still_s',
+        'lag_share, lag_m, still_s',
         SURFACE,
         True,
         'the measured depth, or all that is measured, stands still',

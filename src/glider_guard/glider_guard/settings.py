@@ -7,12 +7,15 @@ import math
 from pydantic import Field
 
 from glider_guard.actuators import INITIAL_FOLLOWERS, make_limits
+from glider_guard.ascent import INITIAL_ASCENT, AscentLimits
 from glider_guard.depth import INITIAL_DEPTHS, DepthLimits
 from glider_guard.guard import GuardParams, GuardState, Taken
 from glider_guard.health import INITIAL_HEALTH, HealthLimits
+from glider_guard.weight import INITIAL_WEIGHT, PUMP_ARRIVED, WeightLimits
 from glider_model.base.settings import Settings
 from glider_model.base.signals import Joints
 from glider_model.onboard.gate import INITIAL_GATE, GateSettings
+from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 
 
@@ -33,14 +36,8 @@ class GuardLimitSettings(Settings):
         description='time in which an actuator has to go as much, or a tenth of what its rate '
         'allows (s)',
     )
-    depth_margin_share: float = Field(
-        0.05,
-        ge=0.0,
-        le=1.0,
-        description='share of rated_depth by which a turn may overshoot it (-)',
-    )
     depth_margin_m: float = Field(
-        10.0, ge=0.0, le=1000.0, description='the same, at least this (m)'
+        15.0, ge=0.0, le=1000.0, description='way by which a turn may overshoot rated_depth (m)'
     )
     overdepth_share: float = Field(
         0.25, ge=0.0, le=10.0, description='share of the deepest target that is overdepth (-)'
@@ -79,11 +76,23 @@ class GuardLimitSettings(Settings):
     under_water_s: float = Field(
         0.0, ge=0.0, le=1e8, description='longest time under water (s); 0.0: any'
     )
-    lag_m: float = Field(
-        40.0,
-        ge=1.0,
-        le=1000.0,
-        description='by so much the depth may lag behind the measured vertical rate (m)',
+    lag_share: float = Field(
+        0.5,
+        ge=0.05,
+        le=1.0,
+        description='share of the way by the measured vertical rate that the depth may lag behind '
+        '(-)',
+    )
+    lag_m: float = Field(10.0, ge=1.0, le=1000.0, description='the same, at least this (m)')
+    weight_share: float = Field(
+        0.8,
+        ge=0.05,
+        le=10.0,
+        description='share of the range of the pump by which the vehicle may be heavier than pump '
+        'and ballast make it (-)',
+    )
+    weight_s: float = Field(
+        300.0, ge=10.0, le=1e5, description='time over which its weight is averaged (s)'
     )
     still_s: float = Field(
         30.0, ge=1.0, le=1e5, description='under water nothing measured moves for so long (s)'
@@ -145,7 +154,7 @@ class GuardSettings(GuardLimitSettings):
             make_limits(limits, self.follow_share, self.stall_s),
             DepthLimits(
                 rated_m,
-                max(self.depth_margin_m, self.depth_margin_share * rated_m),
+                self.depth_margin_m,
                 vehicle.crush_depth_m,
                 self.overdepth_share,
                 self.overdepth_m,
@@ -158,6 +167,7 @@ class GuardSettings(GuardLimitSettings):
                 self.stalled_s or math.inf,
                 self.under_water_s or math.inf,
                 self.lag_m,
+                self.lag_share,
                 self.still_s,
                 gate.depth_jump,
                 self.disagree_m,
@@ -170,12 +180,34 @@ class GuardSettings(GuardLimitSettings):
                 self.contact_s or math.inf,
                 self.health_s,
             ),
+            WeightLimits(
+                make_polar(limits),
+                limits.ballast,
+                self.weight_share * limits.m_b_max,
+                self.weight_s,
+                PUMP_ARRIVED * limits.m_b_max,
+                limits.m_b_rate,
+            ),
             self.pressure,
-            Joints(-limits.m_b_max, -limits.x_p_max, 0.0, 0.0),
+            AscentLimits(
+                Joints(-limits.m_b_max, -limits.x_p_max, 0.0, 0.0),
+                (PUMP_ARRIVED - 1.0) * limits.m_b_max,
+                2.0 * limits.m_b_max / limits.m_b_rate,
+            ),
         )
 
     def initial_state(self) -> GuardState:
         """State before the first tick."""
         rest = Joints(0.0, 0.0, 0.0, 0.0)
         taken = Taken(INITIAL_GATE, rest, 0.0, rest, 0.0, 0.0, 0.0, 0.0)
-        return GuardState(0, taken, INITIAL_FOLLOWERS, INITIAL_DEPTHS, INITIAL_HEALTH, rest, 0)
+        return GuardState(
+            0,
+            taken,
+            INITIAL_FOLLOWERS,
+            INITIAL_DEPTHS,
+            INITIAL_HEALTH,
+            INITIAL_WEIGHT,
+            INITIAL_ASCENT,
+            rest,
+            0,
+        )

@@ -13,13 +13,15 @@ from glider_guard import rows
 from glider_guard.block import GUARD, guard_surface, say
 from glider_guard.guard import GuardOutput, GuardParams, GuardState, Heard, guard_step
 from glider_guard.settings import GuardSettings
+from glider_model.base.frames import quaternion_from_euler, rotate_to_body
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import SURFACE_TARGET, TICK_S, Health, Joints, Odometry
+from glider_model.onboard.glide_polar import glide_vertical_rate
 from glider_model.vehicle.file import changed_vehicle, load_vehicle
 
 DIVES = Joints(0.4, 0.02, 0.1, 0.0)
 RISES = Joints(-0.4, -0.02, 0.1, 0.0)
-SAFE = (-1.0, -0.06, 0.0, 0.0)
+SAFE, LEVEL = (-1.0, -0.06, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0)
 #: Vertical rate of a vehicle that is well (m/s).
 RATE = 0.2
 
@@ -31,15 +33,15 @@ class Vehicle:
         self.settings = GuardSettings(vehicle=vehicle, **changes)
         self.params: GuardParams = self.settings.params()
         self.state: GuardState = self.settings.initial_state()
-        self.depth, self.target, self.time_s = depth_m, 300.0, 0.0
+        self.depth, self.target, self.time_s, self.pitch_deg = depth_m, 300.0, 0.0, 0.0
         self.joints = DIVES
         self.out = GuardOutput(DIVES, False, 0)
 
     def odometry(self, rate: float) -> Odometry:
-        """Level, moving down at a rate; no two samples are the same."""
-        return Odometry(
-            self.time_s, 0.0, self.depth, 1.0, *(3 * (0.0,)), 0.3, 0.0, rate, *(3 * (0.0,))
-        )
+        """Pitched, moving down at a rate; no two samples are the same."""
+        q = quaternion_from_euler(0.0, math.radians(self.pitch_deg), 0.0)
+        velocity = rotate_to_body(*q, 0.3, 0.0, rate)
+        return Odometry(self.time_s, 0.0, self.depth, *q, *velocity, *(3 * (0.0,)))
 
     def go(self, seconds: float, demand=DIVES, rate: float = RATE, joints=None, **heard) -> int:
         """Fly on; rows at the end. Without ``joints`` actuators are where they were sent."""
@@ -70,7 +72,7 @@ CASES = {
     'pitch_mass_stuck': Case({}, {'joints': Joints(0.4, 0.0, 0.1, 0.0)}, 55.0),
     'roll_mass_stuck': Case({}, {'joints': Joints(0.4, 0.02, 0.5, 0.0)}, 55.0),
     'surface_ordered': Case({}, {'target': SURFACE_TARGET}, 0.0),
-    'too_deep': Case({'depth_m': 999.0}, {'rate': 0.2}, 4.5),
+    'too_deep': Case({'depth_m': 999.5}, {'rate': 0.1}, 3.5),
     'crush_depth': Case({'depth_m': 1249.0}, {'rate': 0.2}, 4.5),
     'overdepth': Case({'depth_m': 300.0}, {'rate': 0.2}, 525.0),
     'not_climbing': Case({'depth_m': 200.0}, {'demand': RISES, 'rate': 0.02}, 895.0),
@@ -107,17 +109,15 @@ def test_a_row_is_told_in_time_and_reacted_to_as_it_says(name):
     assert told & row.bit
     assert rows.reaction_of(told) >= row.reaction
     demand = flown.get('demand', DIVES)
-    expected = {
-        rows.HOLD: (demand.m_b, demand.x_p, 0.0, 0.0),
-        rows.SURFACE: SAFE,
-        rows.DROP: SAFE,
-    }
-    assert vehicle.out.command == pytest.approx(expected[rows.reaction_of(told)])
+    if rows.reaction_of(told) == rows.HOLD:
+        assert vehicle.out.command == (demand.m_b, demand.x_p, 0.0, 0.0)
+    else:  # the mass waits for the pump
+        assert vehicle.out.command in (SAFE, LEVEL)
     assert vehicle.out.drops == (row.reaction == rows.DROP)
 
 
 def test_every_row_has_a_case():
-    apart = {'not_rising', 'steering_surface_stuck'}  # each in a test of its own
+    apart = {'not_rising', 'steering_surface_stuck', 'too_heavy'}  # each in a test of its own
     assert set(CASES) | apart == {row.name for row in rows.ROWS}
     bits = [row.bit for row in rows.ROWS]
     assert len(set(bits)) == len(bits) and all(bit.bit_count() == 1 for bit in bits)
@@ -163,6 +163,45 @@ def test_a_depth_that_is_frozen_is_no_reason_to_drop_the_weight():
     assert not vehicle.out.drops
     assert vehicle.go(11000.0, odometry=frozen) & rows.NOT_RISING
     assert vehicle.out.drops
+
+
+@pytest.mark.parametrize(('pitch_deg', 'demand'), [(-25.0, DIVES), (25.0, RISES)])
+def test_a_vehicle_that_is_heavier_than_its_pump_says_comes_up(pitch_deg, demand):
+    """By 0.7 kg of 1.0 it flies on, by 1.0 kg it does not; the weights are those of the polar."""
+    for unknown_kg, told in ((0.7, 0), (1.0, rows.TOO_HEAVY)):
+        vehicle = Vehicle(depth_m=10.0)
+        vehicle.target, vehicle.pitch_deg = 900.0, pitch_deg
+        rate = glide_vertical_rate(
+            math.radians(-25.0), demand.m_b + unknown_kg, vehicle.params.weight.polar
+        )
+        assert vehicle.go(850.0, demand=demand, rate=rate) == told
+
+
+def test_a_vehicle_that_sinks_fast_is_stopped_in_time():
+    """Sent down, at 0.4 m/s: more than 30 m before the depth that it is rated for."""
+    vehicle = Vehicle(depth_m=700.0)
+    vehicle.target, vehicle.pitch_deg = 990.0, -25.0
+    while not vehicle.go(1.0, demand=DIVES._replace(m_b=1.0), rate=0.4):
+        pass
+    assert vehicle.out.told == rows.TOO_DEEP
+    assert 900.0 < vehicle.depth < 970.0
+
+
+@pytest.mark.parametrize(
+    ('pump_kg', 'rate', 'after_s'), [(0.2, 0.2, 500.0), (-0.96, 0.2, 0.0), (0.2, -0.1, 0.0)]
+)
+def test_the_mass_waits_for_the_pump(pump_kg, rate, after_s):
+    """Nose up at once where it rises or the pump is out, else when the pump had time to be."""
+    vehicle = Vehicle(depth_m=200.0, stall_s=3600.0)
+    vehicle.go(1.0)
+    vehicle.target = SURFACE_TARGET
+    pump = Joints(pump_kg, 0.0, 0.0, 0.0)
+    if after_s:
+        vehicle.go(after_s - 1.0, rate=rate, joints=pump)
+        assert vehicle.out.command == LEVEL
+    vehicle.joints = pump
+    vehicle.go(2.0, rate=rate, joints=pump)
+    assert vehicle.out.command == SAFE
 
 
 def test_a_vehicle_that_rises_keeps_its_weight():

@@ -8,15 +8,20 @@ from glider_model.base.frames import (
     from_geodetic,
     horizontal_to_wire,
     imu_from_wire,
+    odometry_from_wire,
 )
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import Joints
 from glider_model.base.wiring import NAVIGATION as WIRED
 from glider_model.ocean.density import depth_at
 from glider_model.vehicle.file import steers_by
+from glider_navigation.intake import is_blind, is_refusing, take_in
 from glider_navigation.method import Fix, Heard, method_step
 from glider_navigation.phase import KNOWN, PHASE_NAMES
-from glider_navigation.settings import NavigationParams, NavigationSettings
+from glider_navigation.settings import NavigationParams, NavigationSettings, NavigationState
+
+#: In the place of a quaternion: there is no attitude.
+NO_ATTITUDE = (0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -41,6 +46,7 @@ def _hear(inputs, origin):
             odom[11],
             odom[12],
         ),
+        odometry_from_wire(odom),
         imu_from_wire(imu),
         depth_at(pressure[0]),
         Fix(fix[0] >= 0.0, p_n, p_e, 0.5 * (fix[3] + fix[4])),
@@ -52,26 +58,34 @@ def _hear(inputs, origin):
 @kernel
 def navigation_tick(state, t_s, inputs, params, dt):
     """One tick: sensors in; odom and what is believed of the current out; see `block_tick`."""
-    state, believed = method_step(state, _hear(inputs, params.origin), params.method, dt)
+    intake, heard = take_in(state.intake, _hear(inputs, params.origin), params.intake, dt)
+    method, believed = method_step(state.method, heard, params.method, dt)
+    odom = believed.odom
+    if is_blind(intake, params.intake):
+        odom = odom[:3] + NO_ATTITUDE + odom[7:]
     outputs = (
-        believed.odom + covariance_to_wire(believed.place),
+        odom + covariance_to_wire(believed.place),
         horizontal_to_wire(believed.current, believed.current_covariance),
         horizontal_to_wire(believed.surface, believed.surface_covariance),
     )
-    return state, outputs, (believed.phase,)
+    return NavigationState(intake, method), outputs, (believed.phase, int(is_refusing(intake)))
 
 
-def say(phase: int) -> Said:
-    """Where the vehicle is between two fixes."""
-    return Said('ok', PHASE_NAMES[phase], {'phase': PHASE_NAMES[phase]})
+def say(phase: int, refused: int) -> Said:
+    """Where the vehicle is between two fixes, and whether a sensor is not believed."""
+    values = {'phase': PHASE_NAMES[phase], 'refused': str(bool(refused)).lower()}
+    if refused:
+        message = f'{PHASE_NAMES[phase]}; refused a measurement, the last good one serves'
+        return Said('warn', message, values)
+    return Said('ok', PHASE_NAMES[phase], values)
 
 
 NAVIGATION = Block(
     WIRED,
     NavigationSettings,
     navigation_tick,
-    flags=('phase',),
-    quiet=(KNOWN,),
+    flags=('phase', 'refused'),
+    quiet=(KNOWN, 0),
     say=say,
     steers_by=steers_by,
 )

@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple
 
 from glider_model.base.frames import Origin
 from glider_model.base.settings import Settings
-from glider_model.base.signals import Covariance, Imu, Joints, Vector
+from glider_model.base.signals import Covariance, Imu, Joints, Odometry, Vector
 from glider_model.base.slot import slot
 from glider_model.vehicle.file import Vehicle
 from glider_navigation.forecast import ForecastSettings
@@ -66,7 +66,8 @@ class Heard(NamedTuple):
     """
 
     joints: Joints
-    odom: tuple[float, ...]  #: measured_odom as on the wire
+    odom: tuple[float, ...]  #: measured_odom as on the wire, whatever is in it
+    odometry: Odometry  #: the same, as far as it can be believed
     imu: Imu
     depth: float  #: (m)
     fix: Fix

@@ -10,14 +10,17 @@ from pydantic import Field
 from glider_model.base import plugins
 from glider_model.base.frames import Origin, OriginSettings
 from glider_model.base.settings import Settings
+from glider_model.base.signals import Joints
 from glider_model.base.wiring import SENSORS
+from glider_model.onboard.gate import GateSettings
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation import methods
 from glider_navigation.forecast import ForecastSettings
+from glider_navigation.intake import INITIAL_INTAKE, IntakeParams, IntakeState
 from glider_navigation.method import NavigationMethodSettings, Start
 
 #: Other parameters of navigation: no method can have such a name.
-TAKEN = {'method', 'current', 'forecast', 'vehicle', 'origin', 'north_m', 'east_m'}
+TAKEN = {'method', 'current', 'forecast', 'gate', 'vehicle', 'origin', 'north_m', 'east_m'}
 TAKEN |= {'imu_period_s', 'gyro', 'also_fitted'}
 #: Settings of every way to navigate by its name.
 METHODS = plugins.classes(plugins.NAVIGATION_METHODS, NavigationMethodSettings, methods, TAKEN)
@@ -53,6 +56,8 @@ class NavigationLawSettings(_MethodChoice):
     forecast: ForecastSettings = Field(
         ForecastSettings(), description='current that is forecast, where it is believed'
     )
+
+    gate: GateSettings = Field(GateSettings(), description='samples of sensors that are refused')
 
     @pydantic.model_validator(mode='after')
     def _check_forecast(self):
@@ -123,15 +128,31 @@ class NavigationSettings(NavigationLawSettings):
 
     def params(self) -> 'NavigationParams':
         """Kernel parameters."""
-        return NavigationParams(self.origin.params(), self.chosen.params(self._start))
+        vehicle, gate = load_vehicle(self.vehicle).params(), self.gate.params()
+        intake = IntakeParams(
+            gate,
+            Joints(vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max, vehicle.delta_max),
+            gate.hold_s + self.imu_period_s,
+            'imu' in self.chosen.reads,
+            'measured_odom' in self.chosen.reads,
+        )
+        return NavigationParams(self.origin.params(), intake, self.chosen.params(self._start))
 
-    def initial_state(self) -> NamedTuple:
+    def initial_state(self) -> 'NavigationState':
         """State before the first tick."""
-        return self.chosen.initial_state(self._start)
+        return NavigationState(INITIAL_INTAKE, self.chosen.initial_state(self._start))
 
 
 class NavigationParams(NamedTuple):
     """Navigation as the kernels see it."""
 
     origin: Origin
+    intake: IntakeParams
+    method: NamedTuple  #: of the method that was chosen
+
+
+class NavigationState(NamedTuple):
+    """Navigation between two ticks."""
+
+    intake: IntakeState
     method: NamedTuple  #: of the method that was chosen

@@ -4,6 +4,8 @@
 
 Least squares for the straight line p + v t with what was believed before as the first knowledge,
 the same for both axes. Fixes count once in `FIX_EVERY_S`: the error of one is that of the next.
+A fix where the vehicle can hardly be is set aside; another one beside it, later, says that the
+vehicle is there after all, and what was believed of the place is forgotten.
 """
 
 from typing import NamedTuple
@@ -17,6 +19,11 @@ FIX_EVERY_S = 60.0
 LEAST_VARIANCE = 0.25
 #: Before the first fixes: standard deviation of the drift about what is believed (m/s).
 DRIFT_STD = 0.15
+#: Farther from where the vehicle is believed to be than so many standard deviations, and than so
+#: far (m), a fix is set aside.
+FARTHEST_STD, FARTHEST_M = 6.0, 100.0
+#: Another one this much later (s), and no farther from it than this (m), confirms it.
+CONFIRMED_S, CONFIRMED_M = 10.0, 100.0
 
 
 class Stay(NamedTuple):
@@ -30,12 +37,24 @@ class Stay(NamedTuple):
     vv: float
     fixes: int
     fixed_s: float  #: time of the last fix that counted
+    aside: Vector  #: a fix that was set aside (m)
+    aside_s: float  #: when that was; `NO_FIX_ASIDE`: there is none
+
+
+#: There is no fix that was set aside.
+NO_FIX_ASIDE = -1.0
 
 
 @kernel
 def begin(place, variance, drift):
     """Come up at a place (m) that is known with a variance (m^2)."""
-    return Stay(0.0, place, drift, variance, 0.0, DRIFT_STD * DRIFT_STD, 0, 0.0)
+    vv = DRIFT_STD * DRIFT_STD
+    return Stay(0.0, place, drift, variance, 0.0, vv, 0, 0.0, Vector(0.0, 0.0), NO_FIX_ASIDE)
+
+
+def launched(place: Vector, variance: float) -> Stay:
+    """Put into the water at a place (m) that is known with a variance (m^2), as by a fix."""
+    return begin(place, variance, Vector(0.0, 0.0))._replace(fixes=1)
 
 
 @kernel
@@ -72,6 +91,8 @@ def wait(stay, dt):
         stay.vv,
         stay.fixes,
         stay.fixed_s,
+        stay.aside,
+        stay.aside_s,
     )
 
 
@@ -92,4 +113,56 @@ def take_fix(stay, fix):
         stay.vv - k_v * g_v,
         stay.fixes + 1,
         t,
+        stay.aside,
+        NO_FIX_ASIDE,
     )
+
+
+@kernel
+def _distance2(fix, n, e):
+    """Squared distance (m^2) of a fix from a place."""
+    return (fix.p_n - n) * (fix.p_n - n) + (fix.p_e - e) * (fix.p_e - e)
+
+
+@kernel
+def _set_aside(stay, aside, aside_s):
+    """The same stay with a fix that is set aside."""
+    return Stay(
+        stay.t_s,
+        stay.place,
+        stay.drift,
+        stay.pp,
+        stay.pv,
+        stay.vv,
+        stay.fixes,
+        stay.fixed_s,
+        aside,
+        aside_s,
+    )
+
+
+@kernel
+def _begin_at(stay, fix):
+    """The same stay, of whose place nothing is known but this fix."""
+    t, vv = stay.t_s, DRIFT_STD * DRIFT_STD
+    place = Vector(fix.p_n - t * stay.drift.n, fix.p_e - t * stay.drift.e)
+    variance = max(LEAST_VARIANCE, fix.variance) + t * t * vv
+    return Stay(
+        t, place, stay.drift, variance, -t * vv, vv, stay.fixes + 1, t, stay.aside, NO_FIX_ASIDE
+    )
+
+
+@kernel
+def hear_fix(stay, fix):
+    """Take in a fix that counts, if the vehicle can be there, or if another one has said so."""
+    here = now(stay)
+    variance = variance_now(stay) + max(LEAST_VARIANCE, fix.variance)
+    farthest2 = max(FARTHEST_M * FARTHEST_M, FARTHEST_STD * FARTHEST_STD * variance)
+    if _distance2(fix, here.n, here.e) <= farthest2:
+        return take_fix(stay, fix)
+    beside = _distance2(fix, stay.aside.n, stay.aside.e) <= CONFIRMED_M * CONFIRMED_M
+    if stay.aside_s == NO_FIX_ASIDE or not beside:
+        return _set_aside(stay, Vector(fix.p_n, fix.p_e), stay.t_s)
+    if stay.t_s - stay.aside_s >= CONFIRMED_S:
+        return _begin_at(stay, fix)
+    return stay

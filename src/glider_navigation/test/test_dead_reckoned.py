@@ -34,6 +34,7 @@ def _navigate(state, q, depths, has_fix, places, variance, params, dt):
         heard = Heard(
             Joints(0.0, 0.0, 0.0, 0.0),
             odom,
+            odometry_from_wire(odom),
             Imu(q[i, 0], q[i, 1], q[i, 2], q[i, 3], 0.0, 0.0, 0.0, False),
             depths[i],
             Fix(has_fix[i], places[i, 0], places[i, 1], variance),
@@ -116,7 +117,7 @@ def dives(quaternions, steady_speed):
 
 def navigate(dives, **settings):
     settings = NavigationSettings(method='dead_reckoned', imu_period_s=4.0, gyro=False, **settings)
-    state, params = settings.initial_state(), settings.params().method
+    state, params = settings.initial_state().method, settings.params().method
     q = np.ascontiguousarray(dives.q)
     return Track(
         *_navigate(

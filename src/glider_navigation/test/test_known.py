@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from glider_model.base.frames import odometry_to_wire
+from glider_model.base.frames import odometry_from_wire, odometry_to_wire
 from glider_model.base.signals import TICK_S, Imu, Joints, Odometry
 from glider_navigation.method import Fix, Heard, method_step
 from glider_navigation.phase import KNOWN
@@ -25,10 +25,12 @@ class Navigation:
 
     def __init__(self, **settings):
         settings = NavigationSettings(**settings)
-        self.params, self.state = settings.params().method, settings.initial_state()
+        self.params, self.state = settings.params().method, settings.initial_state().method
 
     def tick(self, wire, mu=0.0):
-        heard = Heard(Joints(0.0, 0.0, mu, 0.0), wire, NO_IMU, 0.0, NO_FIX, 0.0)
+        heard = Heard(
+            Joints(0.0, 0.0, mu, 0.0), wire, odometry_from_wire(wire), NO_IMU, 0.0, NO_FIX, 0.0
+        )
         self.state, believed = method_step(self.state, heard, self.params, TICK_S)
         return believed
 

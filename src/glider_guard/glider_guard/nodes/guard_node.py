@@ -6,9 +6,10 @@ import sys
 
 from std_srvs.srv import Trigger
 
+from glider_guard.ascent import INITIAL_ASCENT, come_up
 from glider_guard.block import GUARD
 from glider_guard.depth import SURFACE_M
-from glider_model.base.signals import TICK_S
+from glider_model.base.signals import TICK_S, Joints
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.block_node import BlockNode
 from glider_model.ros.lockstep.orders import SURFACE
@@ -24,8 +25,9 @@ class GuardNode(BlockNode):
     when_stale = 'commanding the safe state until then'
 
     def __init__(self, **kwargs) -> None:
-        super().__init__(GUARD, **kwargs)
         self.stale_ticks = 0
+        self.ascent = INITIAL_ASCENT
+        super().__init__(GUARD, **kwargs)
         self.create_service(Trigger, 'clear_guard', self.on_clear)
         self.start_up()
 
@@ -47,9 +49,20 @@ class GuardNode(BlockNode):
         """Time (s) between two samples of what is not measured in every tick."""
         return self.settings.imu_period_s
 
+    def compile_kernels(self) -> None:
+        """Call every kernel once, so that no tick waits for the compiler."""
+        super().compile_kernels()
+        self._come_up()
+
+    def _come_up(self) -> Joints:
+        """Command of a tick in which nothing is seen."""
+        m_b = self.state.taken.joints.m_b
+        self.ascent, command = come_up(self.ascent, 0.0, False, m_b, self.params.ascent, TICK_S)
+        return command
+
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
         """Answer one tick."""
-        self.stale_ticks = 0
+        self.stale_ticks, self.ascent = 0, INITIAL_ASCENT
         super().step(stamp_ns, *inputs)
 
     def on_stale(self, stamp_ns: int) -> None:
@@ -60,7 +73,7 @@ class GuardNode(BlockNode):
             said = f'input lost for {self.settings.lost_after_s:g} s: surfacing for good'
             self.event(stamp_ns, health.ERROR, said)
         publish_command = self.senders[0]
-        publish_command(stamp_ns, self.params.safe_command)
+        publish_command(stamp_ns, self._come_up())
 
 
 def main(args=None) -> int:

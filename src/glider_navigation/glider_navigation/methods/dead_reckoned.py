@@ -39,12 +39,12 @@ from glider_navigation.method import (
 )
 from glider_navigation.phase import AT_SURFACE, DIVES_M, FIXED, SURFACES_M, UNDER_WATER
 from glider_navigation.surface_stay import (
-    DRIFT_STD,
     Stay,
     begin,
     counts,
+    hear_fix,
+    launched,
     now,
-    take_fix,
     variance_now,
     wait,
 )
@@ -85,7 +85,7 @@ class DeadReckonedSettings(NavigationMethodSettings):
         """At the surface, where the vehicle was put into the water."""
         place, still = Vector(start.p_n, start.p_e), Vector(0.0, 0.0)
         way = Way(place, self.start_std_m**2, still, still, 0.0, 0.0, 0.0)
-        stay = Stay(0.0, place, still, self.start_std_m**2, 0.0, DRIFT_STD * DRIFT_STD, 1, 0.0)
+        stay = launched(place, self.start_std_m**2)
         current = initial_belief(start.current == 'tidal')
         if start.current == 'forecast':
             current = initial_belief(False, start.forecast.error_std_mps)
@@ -321,7 +321,7 @@ def dead_reckoned_step(state, heard, params, dt):
     else:
         stay = wait(stay, dt)
         if counts(stay, heard.fix):
-            stay = take_fix(stay, heard.fix)
+            stay = hear_fix(stay, heard.fix)
         place, velocity, variance = now(stay), stay.drift, variance_now(stay)
         covariance = Covariance(variance, 0.0, variance)
         phase = FIXED if stay.fixes > 0 else AT_SURFACE

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Position is measured, as by acoustics and a Doppler log: what is measured is believed.
 
+Who acts on odometry has a gate of his own, so that it is handed on as it is.
+
 Where attitude is sampled less often than each tick, or rates are not measured, both are made of
 the samples; see `glider_navigation.attitude`.
 """
@@ -9,7 +11,6 @@ the samples; see `glider_navigation.attitude`.
 from typing import ClassVar, NamedTuple
 
 from glider_model.base.frames import (
-    odometry_from_wire,
     odometry_to_wire,
     quaternion_from_euler,
 )
@@ -62,7 +63,7 @@ def known_step(state, heard, params, dt):
     """Believe what is measured; see `method_step`."""
     odom, attitude = heard.odom, state.attitude
     if not params.as_measured:
-        x = odometry_from_wire(heard.odom)
+        x = heard.odometry
         imu = Imu(x.q_w, x.q_x, x.q_y, x.q_z, x.p, x.q, x.r, params.gyro)
         attitude, now, _ = attitude_step(state.attitude, imu, heard.joints, params.mass, dt)
         q = quaternion_from_euler(now.angles.phi, now.angles.theta, now.angles.psi)

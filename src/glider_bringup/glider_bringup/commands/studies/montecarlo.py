@@ -93,7 +93,7 @@ def montecarlo(
     if as_json:
         print(json.dumps(summary))
     else:
-        _print_study(whole, faults > 0)
+        _print_study(whole)
 
 
 #: Lines about vehicles that do not measure where they are.
@@ -106,7 +106,7 @@ _RECKONED = (
 )
 
 
-def _print_study(study: dict, breaks: bool) -> None:
+def _print_study(study: dict) -> None:
     """Print the result of a Monte Carlo study for a person."""
 
     def show(figure: dict) -> str:
@@ -140,7 +140,7 @@ def _print_study(study: dict, breaks: bool) -> None:
     for name, text in lines:
         if reckoned or name not in _RECKONED:
             table.add_row(name, *map(text, rows))
-    for name in sorted({name for row in rows for name in row['outcomes']}) if breaks else ():
+    for name in sorted({name for row in rows for name in row['outcomes']}):
         table.add_row(name, *(str(row['outcomes'].get(name, 0)) for row in rows))
     output.print(table)
     for row in study['rows']:

@@ -1,6 +1,9 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The matrix of faults: every kind in every phase of a dive, and how each has to end."""
+"""The matrix of faults: every kind in every phase of a dive, and how each has to end.
+
+And missions in which nothing breaks, of which the guard has nothing to say.
+"""
 
 from typing import Any, NamedTuple
 
@@ -107,6 +110,54 @@ def cases(laws: tuple[str, ...]) -> list[Case]:
         for phase in PHASES
         for law in laws
     ]
+
+
+#: Missions in which nothing breaks: scenario, how it navigates, simulated hours of a flight.
+CLEAN = (
+    ('rough_water', 'known', 30.0),
+    ('rough_water', 'dead_reckoned', 30.0),
+    ('noisy_sensors', 'known', 30.0),
+)
+CLEAN_SEEDS = range(6)
+LEAST_CLEAN_H = 1000.0
+
+
+def clean_cases(laws: tuple[str, ...]) -> list[Case]:
+    """Missions in which nothing breaks, by seeds."""
+    return [
+        Case(
+            f'{scenario}, position {method.replace("_", " ")}, seed {seed}',
+            law,
+            'observer',
+            scenario,
+            {
+                'seed': seed,
+                'duration_s': 3600.0 * hours,
+                'path.length_m': 200000.0,
+                'navigation.method': method,
+                'profile.surface_every_dives': 1,
+            },
+            measures=(),
+            facts={'hours': hours},
+        )
+        for scenario, method, hours in CLEAN
+        for seed in CLEAN_SEEDS
+        for law in laws
+    ]
+
+
+def judge_clean(rows: list[dict]) -> list[Check]:
+    """Whether the guard had nothing to say, in hours enough."""
+    hours = sum(row['hours'] for row in rows if row['status'] == 'completed')
+    told = [
+        Check(f'{row["case"]}, {row["controller"]}', event['row'], 'nothing told', False)
+        for row in rows
+        for event in row['guard']['events']
+    ]
+    enough = Check(
+        'hours flown', f'{hours:,.0f} h', f'{LEAST_CLEAN_H:,.0f} h', hours >= LEAST_CLEAN_H
+    )
+    return [enough, Check('told by the guard', str(len(told)), '0', not told), *told]
 
 
 def _faults_of(row: dict, deepest_m: float) -> str:

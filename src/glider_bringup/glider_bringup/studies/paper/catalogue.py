@@ -437,7 +437,16 @@ def _fault_experiments() -> list[Experiment]:
             'nothing fails',
             broken.cases(_LAWS),
             broken.judge,
-        )
+        ),
+        Experiment(
+            'faults',
+            'false_reactions',
+            '',
+            'missions in which nothing breaks: what the guard says of them',
+            'nothing fails',
+            broken.clean_cases(_LAWS),
+            broken.judge_clean,
+        ),
     ]
 
 

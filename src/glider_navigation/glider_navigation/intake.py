@@ -1,0 +1,174 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What navigation takes in: what a sensor cannot have measured is refused, its last sample serves.
+
+A sensor that shows nothing that can be believed for longer than ``hold_s`` and a sampling period
+is lost. Without attitude or depth there is no odometry: what is published then has no attitude (a
+quaternion of zeros), which nobody after navigation takes for one, and the guard brings the
+vehicle up. Whether a fix lies where the vehicle can be is for the method to say.
+"""
+
+import math
+from typing import NamedTuple
+
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import Imu, Joints
+from glider_model.onboard.gate import (
+    INITIAL_GATE,
+    NORM_REFUSED,
+    NORM_SCALED,
+    GateParams,
+    GateState,
+    are_believed,
+    gate_step,
+)
+from glider_navigation.method import Fix, Heard
+
+#: A refusal is told for so long (s), lest every sample of a sensor that fails is an event.
+REFUSAL_TOLD_S = 2.0
+#: Deeper or higher than this no sensor shows (m).
+DEPTH_MAX_M = 12000.0
+
+
+class IntakeParams(NamedTuple):
+    """What is believed."""
+
+    gate: GateParams
+    range: Joints  #: of the actuators
+    hold_s: float  #: a sample of attitude or depth serves for so long
+    reads_attitude: bool  #: imu and pressure are there to be lost
+    reads_odometry: bool  #: measured_odom is
+
+
+class IntakeState(NamedTuple):
+    """The last that was believed, and the time since (s)."""
+
+    odometry: GateState
+    joints: Joints
+    imu: Imu
+    imu_s: float
+    depth: float
+    depth_s: float
+    seen: bool  #: there has been an attitude
+    sounded: bool  #: there has been a depth
+    refused_s: float  #: since something was refused
+
+
+INITIAL_INTAKE = IntakeState(
+    INITIAL_GATE,
+    Joints(0.0, 0.0, 0.0, 0.0),
+    Imu(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False),
+    0.0,
+    0.0,
+    0.0,
+    False,
+    False,
+    REFUSAL_TOLD_S,
+)
+
+
+@kernel
+def _norm2(imu):
+    return imu.q_w * imu.q_w + imu.q_x * imu.q_x + imu.q_y * imu.q_y + imu.q_z * imu.q_z
+
+
+@kernel
+def _is_plausible(imu, params):
+    """Whether a sample is an attitude, with rates that a glider can have; false for NaN."""
+    if not abs(_norm2(imu) - 1.0) < NORM_REFUSED:
+        return False
+    most = params.rate_max
+    return not imu.has_rates or (abs(imu.p) <= most and abs(imu.q) <= most and abs(imu.r) <= most)
+
+
+@kernel
+def _has_turned(imu, last, params):
+    """Whether a sample is farther from the last good one than a glider turns."""
+    turn = imu.q_w * last.q_w + imu.q_x * last.q_x + imu.q_y * last.q_y + imu.q_z * last.q_z
+    return (
+        abs(turn) < params.attitude_cosine
+        or abs(imu.p - last.p) > params.rate_jump
+        or abs(imu.q - last.q) > params.rate_jump
+        or abs(imu.r - last.r) > params.rate_jump
+    )
+
+
+@kernel
+def _scaled(imu):
+    """The same sample with a unit quaternion; the very same if it has one."""
+    norm2 = _norm2(imu)
+    if abs(norm2 - 1.0) <= NORM_SCALED:
+        return imu
+    s = 1.0 / math.sqrt(norm2)
+    return Imu(
+        s * imu.q_w, s * imu.q_x, s * imu.q_y, s * imu.q_z, imu.p, imu.q, imu.r, imu.has_rates
+    )
+
+
+@kernel
+def _is_fix(fix):
+    """Whether a fix is one; false for NaN."""
+    return fix.is_fix and abs(fix.p_n) < 1e8 and abs(fix.p_e) < 1e8 and fix.variance >= 0.0
+
+
+@kernel
+def take_in(state, heard, params, dt):
+    """Take in what the sensors say at a tick.
+
+    Parameters
+    ----------
+    state : IntakeState
+    heard : Heard
+        Anything may be in it.
+    params : IntakeParams
+    dt : float
+        Length of the tick (s).
+
+    Returns
+    -------
+    IntakeState
+    Heard
+        With numbers that can be worked with; its ``odom`` is as it was heard.
+    """
+    odometry = gate_step(state.odometry, heard.odometry, params.gate, dt)
+    refused = params.reads_odometry and odometry.age_s > 0.0
+    joints = heard.joints
+    if not are_believed(joints, params.range):
+        joints, refused = state.joints, True
+    imu, imu_s, seen = heard.imu, state.imu_s + dt, state.seen
+    good = _is_plausible(imu, params.gate)
+    if good and seen and imu_s <= params.hold_s:
+        good = not _has_turned(imu, state.imu, params.gate)
+    if good:
+        imu, imu_s, seen = _scaled(imu), 0.0, True
+    else:
+        imu, refused = state.imu, refused or params.reads_attitude
+    depth, depth_s, sounded = heard.depth, state.depth_s + dt, state.sounded
+    good = abs(depth) <= DEPTH_MAX_M
+    if good and sounded and depth_s <= params.hold_s:
+        good = abs(depth - state.depth) <= params.gate.depth_jump
+    if good:
+        depth_s, sounded = 0.0, True
+    else:
+        depth, refused = state.depth, refused or params.reads_attitude
+    fix = heard.fix
+    if fix.is_fix and not _is_fix(fix):
+        fix, refused = Fix(False, 0.0, 0.0, 0.0), True
+    altitude = heard.altitude if math.isfinite(heard.altitude) else 0.0
+    refused_s = 0.0 if refused else state.refused_s + dt
+    taken = Heard(joints, heard.odom, odometry.odometry, imu, depth, fix, altitude)
+    state = IntakeState(odometry, joints, imu, imu_s, depth, depth_s, seen, sounded, refused_s)
+    return state, taken
+
+
+@kernel
+def is_refusing(state):
+    """Whether something was refused a moment ago."""
+    return state.refused_s < REFUSAL_TOLD_S
+
+
+@kernel
+def is_blind(state, params):
+    """Whether attitude or depth is lost to who makes odometry of them."""
+    lost = state.imu_s > params.hold_s or state.depth_s > params.hold_s
+    return params.reads_attitude and lost
