@@ -22,7 +22,7 @@ MEANING = {
     'mission_30h_peak_rss_mb': 'most resident memory of a direct run of 30 h with its score (MB)',
     'mission_30h_rss_over_imported': 'ratio of the two',
     'autopilot_peak_rss_mb': 'most resident memory of the autopilot, in flight over topics (MB)',
-    'three_nodes_peak_rss_mb': 'sum of the same of its three nodes, each in its own process (MB)',
+    'separate_nodes_peak_rss_mb': 'the same of its nodes, each in its own process, summed (MB)',
 }
 
 _IMPORT = 'from glider_bringup.scoring.card import fly_scored\n'
@@ -48,14 +48,14 @@ def measure(progress: Callable[[str], None]) -> dict:
     flown = _peak_mb(_FLY)
     progress('autopilot over topics')
     autopilot = _on_board_mb(True)
-    progress('its three nodes over topics')
-    three_nodes = _on_board_mb(False)
+    progress('its nodes over topics')
+    separate = _on_board_mb(False)
     return {
         'imported_rss_mb': imported,
         'mission_30h_peak_rss_mb': flown,
         'mission_30h_rss_over_imported': flown / imported,
         'autopilot_peak_rss_mb': autopilot,
-        'three_nodes_peak_rss_mb': three_nodes,
+        'separate_nodes_peak_rss_mb': separate,
     }
 
 

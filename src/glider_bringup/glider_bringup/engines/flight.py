@@ -11,6 +11,7 @@ import numpy as np
 from glider_bringup.engines.direct import MissionParams, MissionState, NotFiniteError, fly_blocks
 from glider_bringup.engines.interrupts import interrupts_noted
 from glider_bringup.mission.scenario import Scenario
+from glider_model.base.settings import ConfigurationError
 
 #: Called now and then with the ticks flown and the depth (m).
 Progress = Callable[[int, float], None]
@@ -40,6 +41,14 @@ def mission_of(scenario: Scenario) -> tuple[MissionState, MissionParams]:
     return state, MissionParams(*(block.params() for block in blocks))
 
 
+def _refuse_message_faults(scenario: Scenario) -> None:
+    for fault in scenario.message_faults:
+        raise ConfigurationError(
+            f"faults.{scenario.faults.index(fault)}.kind = '{fault.kind}': the direct engine has "
+            'no messages that could go wrong (fly with --engine nodes)'
+        )
+
+
 def fly(
     scenario: Scenario,
     takers: Iterable[Taker] = (),
@@ -58,7 +67,13 @@ def fly(
     progress : callable, optional
     mission : tuple, optional
         State and parameters to fly with, if they are not `mission_of` the scenario.
+
+    Raises
+    ------
+    ConfigurationError
+        If messages are to go wrong, for there are none.
     """
+    _refuse_message_faults(scenario)
     takers = tuple(takers)
     status, reason, ticks = 'completed', '', 0
     with interrupts_noted() as interrupts:

@@ -9,6 +9,8 @@ from pathlib import Path
 from glider_bringup.blocks import BLOCKS
 from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.scenario import Scenario
+from glider_model.base.wiring import publisher
+from glider_model.ros.message_fault import MessageFault
 from glider_model.ros.parameters import parameters_yaml, to_parameters
 from glider_model.ros.wire import topics
 
@@ -43,6 +45,8 @@ def node_parameters(
         for block, settings in zip(BLOCKS, scenario.block_settings(), strict=True)
     }
     nodes[topics.PLANT]['speed'] = speed
+    for name, faults in _message_faults(scenario).items():
+        nodes[name] |= {'message_faults': json.dumps(faults), 'message_seed': scenario.seed}
     if record_to is not None:
         nodes[topics.RECORDER] = {
             'folder': str(record_to.resolve()),
@@ -53,6 +57,16 @@ def node_parameters(
             'sync': sync,
         }
     return {name: {**parameters, **common} for name, parameters in nodes.items()}
+
+
+def _message_faults(scenario: Scenario) -> dict[str, list[dict]]:
+    """What goes wrong with messages, as in a scenario, by the node that publishes them."""
+    found = {}
+    for fault in scenario.message_faults:
+        found.setdefault(publisher(fault.topic).node, []).append(
+            fault.model_dump(include=set(MessageFault.model_fields))
+        )
+    return found
 
 
 def write_parameters(nodes: dict[str, dict], file: Path, namespace: str = '/glider') -> None:

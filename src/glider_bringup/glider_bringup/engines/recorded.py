@@ -80,7 +80,7 @@ def fly_nodes(
     sync : str
         When the bag is synced to disk.
     autopilot : bool
-        Navigation, guidance and control are three nodes in one process.
+        Navigation, guidance, control and guard are nodes of one process.
     """
     attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)
     as_flown = scenario.model_copy(update={'vehicle': str((folder / VEHICLE_FILE).resolve())})

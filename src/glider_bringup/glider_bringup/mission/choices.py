@@ -25,7 +25,7 @@ def combination_of(scenario: Scenario) -> Combination:
         scenario.control.law,
         scenario.guidance.los.method,
         scenario.navigation.method,
-        bool(scenario.faults),
+        bool(scenario.vehicle_faults),
     )
 
 

@@ -32,7 +32,13 @@ from glider_model.base.wiring import SENSORS
 from glider_model.ocean.current_settings import CurrentSettings
 from glider_model.ocean.water import WaterSettings
 from glider_model.onboard.gate import GateSettings
-from glider_model.plant.faults.settings import FAULTS, Fault, check_actuators
+from glider_model.plant.faults.settings import (
+    FAULTS,
+    Fault,
+    FaultSettings,
+    Message,
+    check_actuators,
+)
 from glider_model.plant.plant import SURFACE_S, InitialSettings, PlantSettings
 from glider_model.plant.sensors import SensorSettings
 from glider_model.vehicle.file import changed_vehicle, load_vehicle, vehicle_names, vehicle_path
@@ -122,6 +128,16 @@ class Scenario(Settings):
             raise ValueError('seed belongs to the scenario, not to its current')
         return current
 
+    @property
+    def vehicle_faults(self) -> list[FaultSettings]:
+        """Faults of the vehicle itself."""
+        return [fault for fault in self.faults if not isinstance(fault, Message)]
+
+    @property
+    def message_faults(self) -> list[Message]:
+        """What goes wrong with messages between nodes."""
+        return [fault for fault in self.faults if isinstance(fault, Message)]
+
     def plant_settings(self) -> PlantSettings:
         """What the plant node is told."""
         return PlantSettings(
@@ -137,7 +153,7 @@ class Scenario(Settings):
             fitted=[name for name in SENSORS if name in self.topics],
             origin=self.origin,
             perturb=self.perturb,
-            faults=self.faults,
+            faults=self.vehicle_faults,
         )
 
     @property

@@ -279,7 +279,7 @@ class Plan:
             for law in dict.fromkeys(one.control.law for one in checked)
             for method in dict.fromkeys(one.guidance.los.method for one in checked)
             for navigation in dict.fromkeys(one.navigation.method for one in checked)
-            for breaks in dict.fromkeys(bool(one.faults) for one in checked)
+            for breaks in dict.fromkeys(bool(one.vehicle_faults) for one in checked)
         ]
         vehicles: dict[Path, str] = {}  # one of every vehicle file
         for one in checked:

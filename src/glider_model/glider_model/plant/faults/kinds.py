@@ -21,6 +21,8 @@ LEAK, MASS, FOULING, LOOSE, GUST = range(5)
 SLOW, OFFSET, PARTIAL, JAM = range(5, 9)
 DROPOUT, BIASED, SPIKE, NOISIER = range(9, 13)
 COMPASS, GPS_SILENT, BATTERY, VACUUM, NO_CONTACT = range(13, 18)
+#: Of messages between nodes; the vehicle knows nothing of it.
+MESSAGE = 18
 #: Phases.
 ANY, DIVE, TURN, CLIMB, SURFACE = range(5)
 #: A vehicle that sinks or rises slower than this does neither (m/s),

@@ -15,6 +15,7 @@ from glider_model.base.settings import ConfigurationError, Settings
 from glider_model.base.signals import TICK_S
 from glider_model.plant.faults import kinds
 from glider_model.plant.faults.kinds import FaultParams, FaultState, NoFaults, NoFaultState
+from glider_model.ros.message_fault import MessageFault
 
 #: Faults of one scenario at most.
 MAX_FAULTS = 50
@@ -360,6 +361,24 @@ class NoContact(FaultSettings):
         return Packed(kinds.NO_CONTACT)
 
 
+class Message(MessageFault, FaultSettings):
+    """Messages of a topic go wrong as they leave their node; over nodes alone."""
+
+    kind: Literal['message']
+
+    @pydantic.model_validator(mode='after')
+    def _check_when(self):
+        if self.at_depth_m is not None or self.phase != 'any':
+            raise ValueError(
+                'at_depth_m, phase: a message goes wrong by time alone (at_s, for_s), for who '
+                'publishes it need not know where the vehicle is'
+            )
+        return self
+
+    def _pack(self) -> Packed:
+        return Packed(kinds.MESSAGE)
+
+
 Fault = Annotated[
     Leak
     | Mass
@@ -380,7 +399,8 @@ Fault = Annotated[
     | GpsSilent
     | Battery
     | Vacuum
-    | NoContact,
+    | NoContact
+    | Message,
     Field(discriminator='kind'),
 ]
 #: A scenario's faults, as a field of settings.

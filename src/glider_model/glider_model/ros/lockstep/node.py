@@ -21,12 +21,14 @@ from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_NS, not_finite
 from glider_model.base.wiring import WHEN_SILENT
 from glider_model.ros.lockstep import health, peers
+from glider_model.ros.lockstep.bad_line import BadLine
 from glider_model.ros.lockstep.executor import Gate, take_with_info
 from glider_model.ros.lockstep.health import Report, seconds
 from glider_model.ros.lockstep.inputs import Input
 from glider_model.ros.lockstep.peers import ALONE
 from glider_model.ros.lockstep.process import Stop
 from glider_model.ros.lockstep.watch import FAREWELL_S, REPORT_AFTER, Watch, wait_of
+from glider_model.ros.message_fault import MessageFault
 from glider_model.ros.parameters import declare_settings
 from glider_model.ros.wire import qos, topics
 from glider_model.ros.wire.codec import MessageError, NotFiniteFieldError, to_cdr
@@ -55,6 +57,10 @@ class TickSettings(Settings):
     input_max_age_s: float = Field(
         1.0, ge=0.05, le=3600.0, description='free-running: older input counts as stale (s)'
     )
+    message_faults: list[MessageFault] = Field(
+        [], description='what goes wrong with messages of this node'
+    )
+    message_seed: int = Field(0, ge=0, le=2**63 - 1, description='seed of which are struck')
 
 
 class TickNode(Node):
@@ -119,6 +125,10 @@ class TickNode(Node):
         if not topic.per_tick:
             return lambda message: publisher.publish(to_cdr(message))
         encode, publish = topic.codec.encode, publisher.publish
+        faults = [fault for fault in self.ticks.message_faults if fault.topic == name]
+        if faults:
+            line = BadLine(self, topic, faults, self.ticks.message_seed, publish)
+            return lambda stamp_ns, values=(): line.send(stamp_ns, encode(stamp_ns, values))
         return lambda stamp_ns, values=(): publish(encode(stamp_ns, values))
 
     def add_input(self, name: str) -> Input:

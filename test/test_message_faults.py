@@ -1,0 +1,141 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Messages that are lost, cut, late, twice or out of order between nodes, on purpose.
+
+In lockstep a flight is the same to the last bit, or ends and names what never came. Free-running
+it goes on with the newest that it has.
+"""
+
+import hashlib
+import json
+from collections import Counter, defaultdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from glider_bringup.blocks import COLUMNS
+from glider_bringup.engines.direct import fly_blocks
+from glider_bringup.engines.flight import mission_of
+from glider_bringup.engines.node_parameters import node_parameters, write_parameters
+from glider_bringup.engines.processes import node_commands, run_nodes
+from glider_bringup.mission.scenario import load_scenario
+from glider_model.base.wiring import publisher
+from glider_model.ros.wire.topics import TOPICS
+
+#: One topic of each node.
+STRUCK = ('measured_odom', 'current_velocity', 'odom', 'reference', 'demand', 'command')
+DURATION_S = 100
+#: Free-running: so many times real time, simulated time of the flight, and how it begins.
+SPEED, FREE_S = 8.0, 120.0
+GLIDING = {
+    **{'dives': 0, 'duration_s': FREE_S, 'initial.depth_m': 50.0, 'profile.prepare_s': 0.0},
+    **{'initial.pitch_deg': -30.0, 'initial.speed_mps': 0.5, 'initial.net_heaviness_kg': 0.4},
+}
+
+
+def faults(how: str, share: float, topics=STRUCK, **more) -> str:
+    """Faults of messages, as a person sets them."""
+    kind = {'kind': 'message', 'how': how, 'share': share, **more}
+    return json.dumps([{**kind, 'topic': topic} for topic in topics])
+
+
+def digests(folder: Path) -> dict[str, tuple[int, str]]:
+    """Number of messages of each per-tick topic, and a digest of their stamps and payloads."""
+    counts, hashes = Counter(), defaultdict(hashlib.sha256)
+    names = {topic.full_name('/glider') for topic in TOPICS.values() if topic.per_tick}
+    (file,) = folder.glob('*.mcap')
+    with file.open('rb') as stream:
+        for _, channel, message in make_reader(stream).iter_messages(topics=names):
+            counts[channel.topic] += 1
+            hashes[channel.topic].update(message.log_time.to_bytes(8, 'big') + message.data)
+    return {name: (counts[name], hashes[name].hexdigest()) for name in counts}
+
+
+def fly(glider, folder: Path, *options):
+    line = ('run', 'current_12deg', '--duration', DURATION_S, '--out', folder, '--json')
+    return glider(*line, '--no-report', *options)
+
+
+@pytest.fixture(scope='module')
+def clean(glider, tmp_path_factory) -> dict[str, tuple[int, str]]:
+    """The flight that nothing happens to."""
+    folder = tmp_path_factory.mktemp('clean') / 'run'
+    assert fly(glider, folder, '--engine', 'direct', '--bag').returncode == 0
+    return digests(folder)
+
+
+def test_twice_late_or_out_of_order_the_flight_is_the_same(glider, clean, tmp_path):
+    struck = [
+        *json.loads(faults('duplicate', 0.2)),
+        *json.loads(faults('delay', 0.05, delay_s=0.002)),
+        *json.loads(faults('reorder', 0.01)),
+    ]
+    done = fly(glider, tmp_path / 'run', '--set', f'faults={json.dumps(struck)}')
+    assert done.returncode == 0, done.stderr
+    assert digests(tmp_path / 'run') == clean
+    assert json.loads(done.stdout)['messages_lost'] == 0
+
+
+@pytest.mark.parametrize(('how', 'topic'), [('drop', 'odom'), ('corrupt', 'demand')])
+def test_a_message_that_never_comes_ends_the_flight_and_is_named(glider, tmp_path, how, topic):
+    struck = faults(how, 0.05, [topic], at_s=20.0)
+    done = fly(glider, tmp_path / 'run', '--set', f'faults={struck}')
+    assert done.returncode == 1
+    assert 'Traceback' not in done.stderr
+    card = json.loads(done.stdout)
+    assert card['status'] == 'aborted'
+    assert publisher(topic).node in card['reason'] and topic in card['reason']
+    assert 200 <= card['ticks'] < 10 * DURATION_S
+
+
+def test_the_direct_engine_says_that_it_has_no_messages(glider, tmp_path):
+    done = fly(
+        *(glider, tmp_path / 'run', '--engine', 'direct'),
+        *('--set', f'faults={faults("drop", 0.05)}'),
+    )
+    assert done.returncode == 2
+    assert "faults.0.kind = 'message': the direct engine has no messages" in done.stderr
+
+
+def test_where_the_vehicle_is_does_not_matter_to_a_message(glider, tmp_path):
+    struck = faults('drop', 0.05, ['odom'], phase='dive')
+    done = fly(glider, tmp_path / 'run', '--set', f'faults={struck}')
+    assert done.returncode == 2
+    assert 'a message goes wrong by time alone' in done.stderr
+
+
+def off_track(places: np.ndarray) -> float:
+    """Farthest (m) from a path that leads north through the origin; places east, north, up."""
+    return float(np.max(np.abs(places[:, 0])))
+
+
+def test_free_running_it_flies_on(tmp_path):
+    """One message in twenty of each of six topics lacks: no more than twice as far off."""
+    changes = {**GLIDING, 'faults': json.loads(faults('drop', 0.05))}
+    clean, struck = (load_scenario('current_12deg', one) for one in (GLIDING, changes))
+    rows = np.concatenate([rows.copy() for rows in fly_blocks(*mission_of(clean))])
+    file, folder = tmp_path / 'nodes.yaml', tmp_path / 'run'
+    folder.mkdir()
+    write_parameters(node_parameters(struck, speed=SPEED, lockstep=False, record_to=folder), file)
+    commands = {
+        name: [*command, '-p', 'use_sim_time:=true']
+        for name, command in node_commands(file).items()
+    }
+    result = run_nodes(commands, tmp_path / 'nodes.log', on_log=lambda line: None)
+    assert result.status == 'completed', result.reason
+    (bag,) = folder.glob('*.mcap')
+    with bag.open('rb') as stream:
+        reader = make_reader(stream)
+        counts = {
+            channel.topic: reader.get_summary().statistics.channel_message_counts.get(id_, 0)
+            for id_, channel in reader.get_summary().channels.items()
+        }
+        truth = reader.iter_messages(topics=['/glider/ground_truth/odom'])
+        flown = np.array([TOPICS['odom'].codec.decode(one.data)[1][:3] for _, _, one in truth])
+    assert len(flown) > 0.8 * len(rows)
+    assert counts['/glider/measured_odom'] == pytest.approx(0.95 * len(flown), rel=0.03)
+    assert np.max(-flown[:, 2]) > 60.0
+    start = COLUMNS['ground_truth/odom'].start
+    assert off_track(flown) < 2.0 * off_track(rows[:, start : start + 3])
