@@ -19,6 +19,7 @@ setup(
         (f'share/{package_name}', ['package.xml']),
         (f'share/{package_name}/launch', glob('launch/*.launch.py')),
         (f'share/{package_name}/layouts', glob('layouts/*')),
+        (f'share/{package_name}/security', glob('security/*')),
     ],
     install_requires=['setuptools'],
     extras_require={'test': ['pytest', 'hypothesis']},

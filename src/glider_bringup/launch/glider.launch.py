@@ -61,6 +61,7 @@ def node_action(node: LaunchedNode, plan: LaunchPlan) -> Node:
         namespace=plan.namespace,
         remappings=plan.remappings,
         parameters=[plan.parameters_file],
+        additional_env=plan.environment,
         output='screen',
         on_exit=on_exit(node.executable, plan),
     )

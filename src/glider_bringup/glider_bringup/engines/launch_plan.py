@@ -6,6 +6,7 @@ The launch file itself only turns this into launch actions, so that everything h
 tested where the launch system is not installed.
 """
 
+import os
 from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,9 +15,11 @@ from typing import NamedTuple
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import (
     AUTOPILOT,
+    LOCAL,
     ON_BOARD,
     OWN_CLOCK,
     PLANT,
+    RANGE,
     RECORDER,
     process_modules,
 )
@@ -136,6 +139,11 @@ class LaunchPlan(NamedTuple):
     remappings: tuple[tuple[str, str], ...]
     lockstep: bool
     nodes: tuple[LaunchedNode, ...]
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """What nodes are given beside the environment: on this machine if nobody says else."""
+        return {RANGE: os.environ.get(RANGE, LOCAL)}
 
 
 def check_names(words: Iterable[str]) -> None:

@@ -32,6 +32,9 @@ MODULES |= {RECORDER: 'glider_bringup.nodes.recorder_node', PLANT: wiring.PLANT.
 AUTOPILOT, AUTOPILOT_MODULE = 'autopilot', 'glider_bringup.nodes.autopilot'
 ON_BOARD = (wiring.NAVIGATION, wiring.GUIDANCE, wiring.CONTROL, wiring.GUARD)
 
+#: Who sees the nodes if nobody says else: those on this machine.
+RANGE, LOCAL = 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST'
+
 #: Remapping that brings the clock into the namespace: docs/adr/0013.
 OWN_CLOCK = ('/clock', 'clock')
 _PR_SET_PDEATHSIG = 1
@@ -88,7 +91,7 @@ def node_commands(
 def node_environment(domain: int) -> dict[str, str]:
     """Environment of every node of a run in a ROS domain, on this machine if nobody says else."""
     return {
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        RANGE: LOCAL,
         **os.environ,
         'ROS_DOMAIN_ID': str(domain),
         'RCUTILS_COLORIZED_OUTPUT': '0',
