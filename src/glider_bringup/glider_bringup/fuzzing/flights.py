@@ -3,7 +3,8 @@
 """Flights of scenarios whose numbers are extreme and allowed: finite, or refused before flight.
 
 A few numeric fields of the scenario at a time are put at their limits or somewhere inside, with
-every vehicle and either attitude law; half of the flights turn over at a shallow depth.
+every vehicle and either attitude law; half of the flights turn over at a shallow depth. A third of
+the vehicles do not know their place, and break on the way.
 """
 
 import math
@@ -19,16 +20,28 @@ from glider_bringup.fuzzing.counts import Counter, Counts, Tell
 from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.scoring.card import finite, fly_scored, scorecard
+from glider_bringup.studies.random_faults import sample_faults
 from glider_model.base.settings import ConfigurationError
 from glider_model.ocean.current_profile import MAX_SPEED_MPS
 from glider_model.vehicle.file import vehicle_names
 
 #: Sections of a scenario whose numbers are drawn.
-SECTIONS = ('perturb', 'initial', 'water', 'sensors', 'profile', 'guidance', 'control')
+SECTIONS = (
+    *('perturb', 'initial', 'water', 'sensors', 'navigation', 'profile', 'guidance', 'control'),
+    'guard',
+)
 #: What is chosen in every flight, beside a current.
 LAWS, GUIDANCES = ('adaptive', 'pid'), ('observer', 'paper')
+#: What is set for those that do not know their place.
+RECKONS = {
+    'navigation.method': 'dead_reckoned',
+    'guidance.los.method': 'observer',
+    'profile.surface_every_dives': 1,
+}
 #: Sections that the plant alone is told: half of the flights draw from these only.
 PLANT_SECTIONS = ('perturb', 'initial', 'water')
+#: Share of the flights by dead reckoning and with faults, and how many of them.
+BREAKS, FAULTS = 0.33, 2
 #: Most fields changed in one flight.
 FIELDS = 8
 DURATION_S, SHALLOW_M = (100.0, 600.0), (10.0, 60.0)
@@ -92,6 +105,9 @@ def draw_changes(seed: int, case: int) -> dict[str, Any]:
     }
     if draw.random() < 0.5:
         changes['profile.depth_m'] = draw.uniform(*SHALLOW_M)
+    if draw.random() < BREAKS:
+        faults = sample_faults(int(draw.integers(2**31)), FAULTS, changes['duration_s'])
+        changes |= {**RECKONS, 'faults': faults}
     for name in draw.choice(sorted(fields), draw.integers(1, FIELDS + 1), replace=False):
         changes[str(name)] = _number(draw, fields[name])
     return changes
@@ -121,15 +137,10 @@ def _fly(changes: dict[str, Any]) -> tuple[str, str]:
 def fuzz(seed: int, count: int, tell: Tell) -> Counts:
     """Fly ``count`` cases; refused before the flight, or finite to its end, is well."""
     counter = Counter(tell)
-    for law, method in product(LAWS, GUIDANCES):  # has kernels compiled, which is no case's fault
-        _fly(
-            {
-                'dives': 0,
-                'duration_s': 1.0,
-                'control.law': law,
-                'guidance.los.method': method,
-            }
-        )
+    loops = [{'guidance.los.method': method} for method in GUIDANCES]
+    loops.append({**RECKONS, 'faults': sample_faults(0, FAULTS, 1.0)})
+    for law, loop in product(LAWS, loops):  # has kernels compiled, which is no case's fault
+        _fly({'dives': 0, 'duration_s': 1.0, 'control.law': law, **loop})
     for case in range(count):
         changes = draw_changes(seed, case)
         told = ' '.join(f'--set {name}={value}' for name, value in changes.items())
