@@ -41,6 +41,7 @@ from glider_model.base.signals import TICK_S
 from glider_model.ocean.current import current_step
 from glider_model.ocean.density import depth_at
 from glider_model.plant.block import plant_outputs
+from glider_model.plant.energy import battery_of
 from glider_model.plant.health import health_of
 from glider_model.plant.plant import plant_odometry, plant_step
 from glider_navigation.block import navigation_tick
@@ -133,7 +134,8 @@ def tick(
     control, controlled = control_step(
         control, seen, plant.joints, reference, params.control, TICK_S
     )
-    heard = Heard(controlled.command, seen, plant.joints, reference.p_d, depth, health_of(plant))
+    told = (health_of(plant), battery_of(plant.ledger, params.plant.energy))
+    heard = Heard(controlled.command, seen, plant.joints, reference.p_d, depth, *told)
     guard, guarded = guard_step(guard, heard, params.guard, TICK_S)
     water = water_from_wire(water_to_wire(water))
     plant = plant_step(plant, guarded.command, water, params.plant, TICK_S, guarded.drops)

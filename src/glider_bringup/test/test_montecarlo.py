@@ -55,7 +55,10 @@ OPTIONS = [f'--set={field}={value}' for field, value in SHORT.items()]
 LAWS = ['adaptive', 'pid']
 #: Topics whose numbers are compared.
 RECORDED = [name for name in COLUMNS if name in TOPICS]
-SPREADS = ('max_steady_m', 'max_all_m', 'max_run_m', 'heading_fluctuation_deg', 'pitch_error_deg')
+SPREADS = (
+    *('max_steady_m', 'max_all_m', 'max_run_m'),
+    *('heading_fluctuation_deg', 'pitch_error_deg', 'energy_wh'),
+)
 
 
 def glider(*arguments, timeout=300):
@@ -176,6 +179,7 @@ def scores(**changes):
         'final_state': {'position_ned_m': [1.0, 2.0, 3.0], 'attitude_rpy_rad': [0.0, 0.0, 0.0]},
         'infeasible': False,
         'navigation': dict.fromkeys(NAVIGATION),
+        'energy': {'wh': 7.0},
     }
     return {**good, **changes}
 
@@ -189,6 +193,7 @@ def test_a_good_run_has_not_diverged():
         'max_run_m': 9.0,
         'heading_fluctuation_deg': 0.1,
         'pitch_error_deg': 0.1,
+        'energy_wh': 7.0,
         'navigation': dict.fromkeys(NAVIGATION),
     }
 

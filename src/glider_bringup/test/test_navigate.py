@@ -4,7 +4,6 @@
 
 import json
 import math
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -85,50 +84,6 @@ def to_nmea(values: np.ndarray) -> np.ndarray:
     return whole * 100.0 + (values - whole) * 60.0
 
 
-def write_dbd(file: Path, table: dict[str, tuple[np.ndarray, np.ndarray]], cached: bool) -> None:
-    """Write a dbd file, and its cache in ``cache`` beside it, in capitals as some tools do."""
-    names = ['m_present_time', *table]
-    listed = ''.join(f's: T {n:4d} {n:4d} 8 {name} nodim\n' for n, name in enumerate(names))
-    state_bytes = (len(names) + 3) // 4
-    header = {
-        'dbd_label': 'DBD(dinkum_binary_data)file',
-        'encoding_ver': 5,
-        'num_ascii_tags': 14,
-        'all_sensors': 'F',
-        'the8x3_filename': '00010000',
-        'full_filename': 'unit-2026-001-0-0',
-        'filename_extension': 'dbd',
-        'mission_name': 'test.mi',
-        'fileopen_time': 'Sun_Sep_13_12:26:40_2020',
-        'total_num_sensors': len(names),
-        'sensors_per_cycle': len(names),
-        'state_bytes_per_cycle': state_bytes,
-        'sensor_list_crc': 'AB12CD34',
-        'sensor_list_factored': int(cached),
-    }
-    text = ''.join(f'{name}:    {value}\n' for name, value in header.items())
-    if cached:
-        cache = file.parent / 'cache'
-        cache.mkdir(exist_ok=True)
-        (cache / 'AB12CD34.CAC').write_text(listed)
-    data = [(text if cached else text + listed).encode(), b'sa']
-    data += [struct.pack('<Hfd', 0x1234, 123.456, 123456789.12345678), b'd']
-    cycles: dict[float, dict[str, float]] = {START_S - 1.0: {}}
-    for name, (times, values) in table.items():
-        for time_s, value in zip(times, values, strict=True):
-            cycles.setdefault(float(time_s), {})[name] = float(value)
-    for time_s in sorted(cycles):
-        row = {'m_present_time': time_s, **cycles[time_s]}
-        bits = 0
-        for name in names:
-            bits = bits << 2 | (2 if name in row else 0)
-        bits <<= 2 * (4 * state_bytes - len(names))
-        data.append(bits.to_bytes(state_bytes, 'big'))
-        data += [struct.pack('<d', row[name]) for name in names if name in row]
-        data.append(b'd')
-    file.write_bytes(b''.join(data)[:-1] + b'X')
-
-
 def sensors(dives: int, **kwargs) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Sensors of a made-up Slocum, whose own current is off by 2 cm/s to magnetic north."""
     samples, fixes = made_up(dives, **kwargs)
@@ -196,7 +151,7 @@ def told(*words: str) -> str:
 
 
 @pytest.mark.parametrize('cached', [True, False])
-def test_a_slocum_finds_the_current_it_drifted_with(tmp_path, cached):
+def test_a_slocum_finds_the_current_it_drifted_with(tmp_path, cached, write_dbd):
     pytest.importorskip('dbdreader')
     write_dbd(tmp_path / '00010000.DBD', sensors(4), cached)
     flight = read_flight(tmp_path, None, quiet)
@@ -211,7 +166,7 @@ def test_a_slocum_finds_the_current_it_drifted_with(tmp_path, cached):
     assert report['dac_difference_mps']['segments'] == 4
 
 
-def test_declination_follows_from_the_way_a_slocum_reckons(tmp_path):
+def test_declination_follows_from_the_way_a_slocum_reckons(tmp_path, write_dbd):
     """Files that are sent have no m_gps_mag_var; the vehicle knew it."""
     pytest.importorskip('dbdreader')
     table = sensors(3)
@@ -229,7 +184,7 @@ def test_declination_follows_from_the_way_a_slocum_reckons(tmp_path):
         assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
 
 
-def test_a_fix_far_off_and_one_under_water_are_left_out(tmp_path):
+def test_a_fix_far_off_and_one_under_water_are_left_out(tmp_path, write_dbd):
     pytest.importorskip('dbdreader')
     table = sensors(2)
     time_s, latitude = table['m_gps_lat']
@@ -244,7 +199,7 @@ def test_a_fix_far_off_and_one_under_water_are_left_out(tmp_path):
         assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.003)
 
 
-def test_a_current_of_another_time_is_not_compared(tmp_path):
+def test_a_current_of_another_time_is_not_compared(tmp_path, write_dbd):
     """A fix in between starts a vehicle's reckoning anew, but not the clock of its current."""
     pytest.importorskip('dbdreader')
     table = sensors(2)
@@ -261,7 +216,7 @@ def test_the_fullest_kind_of_file_is_read(tmp_path):
     assert [path.name for path in slocum_files(tmp_path)] == ['a.dbd', 'b.dcd']
 
 
-def test_what_a_slocum_lacks_is_told(tmp_path):
+def test_what_a_slocum_lacks_is_told(tmp_path, write_dbd):
     pytest.importorskip('dbdreader')
     file = tmp_path / '00010000.dbd'
     table = sensors(1)
@@ -276,7 +231,7 @@ def test_what_a_slocum_lacks_is_told(tmp_path):
     assert 'no file could be read' in told(str(tmp_path))
 
 
-def test_a_damaged_file_is_left_out_and_named(tmp_path):
+def test_a_damaged_file_is_left_out_and_named(tmp_path, write_dbd):
     pytest.importorskip('dbdreader')
     write_dbd(tmp_path / '00010000.dbd', sensors(2), True)
     (tmp_path / '00020000.dbd').write_bytes(b'\0' * 1000)

@@ -14,7 +14,7 @@ from glider_guard.weight import INITIAL_WEIGHT
 from glider_model.base.block import Block, Said, block_tick
 from glider_model.base.frames import odometry_from_wire
 from glider_model.base.kernel import kernel
-from glider_model.base.signals import Health, Joints
+from glider_model.base.signals import Battery, Health, Joints
 from glider_model.base.wiring import GUARD as WIRED
 from glider_model.ocean.density import depth_at
 from glider_model.vehicle.file import steers_by
@@ -27,14 +27,15 @@ TELL_EVERY_NS = 1_000_000_000
 @kernel
 def guard_tick(state, t_s, inputs, params, dt):
     """One tick: what `GUARD` reads in; command, drop_weight out; see `block_tick`."""
-    demand, reference, odom, joints, health, pressure = inputs
+    demand, reference, odom, joints, health, battery, pressure = inputs
     heard = Heard(
         Joints(demand[0], demand[1], demand[2], demand[3]),
         odometry_from_wire(odom),
         Joints(joints[0], joints[1], joints[2], joints[3]),
         -reference[2],
         depth_at(pressure[0]),
-        Health(health[0], health[1], health[2], health[3]),
+        Health(health[0], health[1], health[2]),
+        Battery(battery[0], battery[1], battery[2], battery[3], battery[4]),
     )
     state, out = guard_step(state, heard, params, dt)
     command = (out.command.m_b, out.command.x_p, out.command.mu, out.command.delta)

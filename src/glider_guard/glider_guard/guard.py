@@ -26,7 +26,7 @@ from glider_guard.rows import (
 from glider_guard.weight import Weight, WeightLimits, stopping_m, weigh
 from glider_model.base.frames import euler_from_quaternion, rotate_to_ned
 from glider_model.base.kernel import kernel
-from glider_model.base.signals import SURFACE_TARGET, Health, Joints, Odometry
+from glider_model.base.signals import SURFACE_TARGET, Battery, Health, Joints, Odometry
 from glider_model.onboard.gate import GateParams, GateState, are_believed, gate_step, is_lost
 
 
@@ -51,6 +51,7 @@ class Heard(NamedTuple):
     target: float  #: depth that guidance asks for (m); SURFACE_TARGET: the surface, for good
     depth: float  #: by the pressure (m)
     health: Health
+    battery: Battery
 
 
 class Taken(NamedTuple):
@@ -188,7 +189,8 @@ def guard_step(state, heard, params, dt):
     depths = sound(depths, at, ascends, params.depth, dt)
     sees = not state.told & (FROZEN | LOST | DISAGREES)
     told |= depth_rows(depths, surfaces, sees, params.depth)
-    health, unwell = check_health(state.health, heard.health, params.health, dt)
+    well = params.health
+    health, unwell = check_health(state.health, heard.health, heard.battery, well, dt)
     weight, heavy = weigh(
         state.weight, theta, at.rate, taken.joints.m_b, last.m_b, params.weight, dt
     )

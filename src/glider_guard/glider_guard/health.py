@@ -14,6 +14,7 @@ class HealthLimits(NamedTuple):
     vacuum_min: float  #: (Pa)
     vacuum_max: float
     battery_min: float  #: (V)
+    reserve: float  #: share of the battery that is kept for coming home (-)
     contact: float  #: (s); infinite: any
     lasts: float  #: for so long it may be otherwise (s)
 
@@ -30,11 +31,12 @@ INITIAL_HEALTH = HealthState(0.0, 0.0, 0.0)
 
 
 @kernel
-def check_health(state, health, limits, dt):
+def check_health(state, health, battery, limits, dt):
     """Health a tick later (`HealthState`), and the rows that hold; less than 0 is not measured."""
-    vacuum, battery = health.vacuum_pa, health.battery_v
+    vacuum = health.vacuum_pa
     is_off = vacuum >= 0.0 and not limits.vacuum_min <= vacuum <= limits.vacuum_max
-    is_low = 0.0 <= battery < limits.battery_min
+    is_low = 0.0 <= battery.voltage < limits.battery_min
+    is_low = is_low or 0.0 <= battery.percentage < limits.reserve
     state = HealthState(
         state.leak_s + dt if health.leak > 0.5 else 0.0,
         state.vacuum_s + dt if is_off else 0.0,

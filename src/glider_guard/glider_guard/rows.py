@@ -209,8 +209,8 @@ ROWS = (
     Row(
         BATTERY,
         'battery',
-        'the battery gives less than it should',
-        'battery_min_v, health_s',
+        'the battery gives less than it should, or what is left is less than is not usable',
+        'battery_min_v, energy, health_s',
         SURFACE,
         True,
         'the battery is low',

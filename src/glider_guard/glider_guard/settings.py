@@ -177,6 +177,7 @@ class GuardSettings(GuardLimitSettings):
                 self.vacuum_min_pa,
                 self.vacuum_max_pa,
                 self.battery_min_v,
+                1.0 - vehicle.energy.usable.value if vehicle.energy else 0.0,
                 self.contact_s or math.inf,
                 self.health_s,
             ),

@@ -15,7 +15,7 @@ from glider_guard.guard import GuardOutput, GuardParams, GuardState, Heard, guar
 from glider_guard.settings import GuardSettings
 from glider_model.base.frames import quaternion_from_euler, rotate_to_body
 from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import SURFACE_TARGET, TICK_S, Health, Joints, Odometry
+from glider_model.base.signals import SURFACE_TARGET, TICK_S, Battery, Health, Joints, Odometry
 from glider_model.onboard.glide_polar import glide_vertical_rate
 from glider_model.vehicle.file import changed_vehicle, load_vehicle
 
@@ -46,7 +46,8 @@ class Vehicle:
     def go(self, seconds: float, demand=DIVES, rate: float = RATE, joints=None, **heard) -> int:
         """Fly on; rows at the end. Without ``joints`` actuators are where they were sent."""
         for _ in range(round(seconds / TICK_S)):
-            at = Heard(demand, self.odometry(rate), self.joints, self.target, self.depth, WELL)
+            seen = (self.target, self.depth, WELL, POWER)
+            at = Heard(demand, self.odometry(rate), self.joints, *seen)
             self.state, self.out = guard_step(
                 self.state, at._replace(**heard), self.params, TICK_S
             )
@@ -65,7 +66,8 @@ class Case(NamedTuple):
 
 
 NAN = Joints(math.nan, 0.0, 0.0, 0.0)
-WELL = Health(0.0, 23700.0, 15.0, 100.0)
+WELL = Health(0.0, 23700.0, 100.0)
+POWER = Battery(15.0, -0.1, 200.0, 225.0, 0.9)
 #: One case for each row, by its name.
 CASES = {
     'buoyancy_engine_stuck': Case({}, {'joints': Joints(0.2, 0.02, 0.1, 0.0)}, 55.0),
@@ -84,7 +86,7 @@ CASES = {
     'demand_lost': Case({}, {'demand': NAN}, 0.8),
     'leak': Case({}, {'health': WELL._replace(leak=1.0)}, 9.5),
     'vacuum': Case({}, {'health': WELL._replace(vacuum_pa=2000.0)}, 9.5),
-    'battery': Case({}, {'health': WELL._replace(battery_v=9.0)}, 9.5),
+    'battery': Case({}, {'battery': POWER._replace(voltage=9.0)}, 9.5),
     'no_contact': Case({}, {'health': WELL._replace(contact_age_s=3e5)}, 0.0),
 }
 
@@ -212,7 +214,14 @@ def test_a_vehicle_that_rises_keeps_its_weight():
 
 
 def test_a_vehicle_that_does_not_say_how_it_is_is_well():
-    assert Vehicle().go(100.0, health=Health(0.0, -1.0, -1.0, -1.0)) == 0
+    unknown = Battery(-1.0, 0.0, -1.0, -1.0, -1.0)
+    assert Vehicle().go(100.0, health=Health(0.0, -1.0, -1.0), battery=unknown) == 0
+
+
+@pytest.mark.parametrize(('left', 'row'), [(0.11, 0), (0.09, rows.BATTERY)])
+def test_what_is_not_usable_of_the_battery_brings_the_vehicle_up(left, row):
+    """The file of zhang2021 says that nine tenths of its battery are usable."""
+    assert Vehicle().go(15.0, battery=POWER._replace(percentage=left)) == row
 
 
 def test_no_earlier_than_ten_minutes():
@@ -228,14 +237,13 @@ def test_a_glide_down_and_up_is_let_through_untouched():
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.lists(st.floats(width=64), min_size=27, max_size=27), st.integers(1, 30))
+@given(st.lists(st.floats(width=64), min_size=31, max_size=31), st.integers(1, 30))
 def test_whatever_it_hears_the_command_is_within_the_ranges(numbers, ticks):
     vehicle = Vehicle()
     vehicle.go(1.0)
     demand, joints, odometry = Joints(*numbers[:4]), Joints(*numbers[4:8]), numbers[8:21]
-    at = Heard(
-        demand, Odometry(*odometry), joints, numbers[21], numbers[22], Health(*numbers[23:])
-    )
+    told = (Health(*numbers[23:26]), Battery(*numbers[26:]))
+    at = Heard(demand, Odometry(*odometry), joints, numbers[21], numbers[22], *told)
     state = vehicle.state
     most = Joints(*(1.5 * limit for limit in vehicle.params.actuators.range))
     for _ in range(ticks):

@@ -7,7 +7,7 @@ import pytest
 from glider_model.base.signals import TICK_S, Health, Joints
 from glider_model.base.wiring import PLANT
 from glider_model.plant.block import plant_move, plant_outputs
-from glider_model.plant.health import BATTERY_V, VACUUM_PA
+from glider_model.plant.health import VACUUM_PA
 from glider_model.plant.plant import PlantSettings
 
 STILL = (0.0, 0.0, 0.0)
@@ -28,7 +28,7 @@ def after(state, params, ticks: int, command: Joints):
 def test_a_vehicle_is_well_when_it_is_launched():
     settings = PlantSettings()
     told = said(settings.initial_state(), settings.params())
-    assert told == Health(0.0, VACUUM_PA, BATTERY_V, 0.0)
+    assert told == Health(0.0, VACUUM_PA, 0.0)
 
 
 @pytest.mark.parametrize(('depth_m', 'heaviness_kg', 'age_s'), [(0.1, -1.0, 0.0), (50, 1.0, 5.0)])

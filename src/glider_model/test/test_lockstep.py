@@ -35,7 +35,7 @@ from glider_model.ros.wire.topics import (
 
 TIMEOUT_S = 30.0
 #: What the plant says of a tick.
-SAID = ('/clock', 'ground_truth/odom', 'measured_odom', 'joint_states', 'health')
+SAID = ('/clock', 'ground_truth/odom', 'measured_odom', 'joint_states', 'health', 'battery')
 
 
 class Clock(ClockNode):
@@ -50,13 +50,14 @@ class Clock(ClockNode):
         self.start_up()
 
     def publish_tick(self, stamp_ns: int) -> None:
-        publish_clock, truth, measured, joints, health = self.publish
+        publish_clock, truth, measured, joints, health, battery = self.publish
         value = float(self.tick)
         publish_clock(stamp_ns)
         truth(stamp_ns, 13 * (value,))
         measured(stamp_ns, 13 * (2.0 * value,))
         joints(stamp_ns, 3 * (-value,))
-        health(stamp_ns, 4 * (0.0,))
+        health(stamp_ns, 3 * (0.0,))
+        battery(stamp_ns, 5 * (0.0,))
 
     def complete_tick(self, command, current, drop_weight) -> bool:
         self.log.append((time.monotonic(), self.tick, command, current))
@@ -92,7 +93,7 @@ INPUTS = {
     NAVIGATION: ['joint_states', 'measured_odom'],
     GUIDANCE: ['odom'],
     CONTROL: ['reference', 'odom', 'joint_states'],
-    GUARD: ['demand', 'reference', 'odom', 'joint_states', 'health'],
+    GUARD: ['demand', 'reference', 'odom', 'joint_states', 'health', 'battery'],
 }
 OUTPUTS = {
     CURRENT: ['current_velocity'],

@@ -9,7 +9,7 @@ import pydantic
 import pytest
 
 from glider_model.base.frames import euler_from_quaternion, odometry_from_wire
-from glider_model.base.signals import TICK_S, Health, Joints
+from glider_model.base.signals import TICK_S, Battery, Health, Joints
 from glider_model.base.wiring import PLANT
 from glider_model.ocean.density import depth_at
 from glider_model.plant.block import plant_move, plant_outputs
@@ -296,8 +296,8 @@ def test_health_sensors_tell_of_battery_vacuum_and_contact():
     surfaced = Flown(given, 20.0, Joints(-1.0, 0.0, 0.0, 0.0), depth_m=0.1, net_heaviness_kg=-1.0)
     well = Health(*Flown([], 0.2, depth_m=0.1).topic('health')[0])
     told = [Health(*row) for row in surfaced.topic('health')]
-    assert told[50].battery_v == pytest.approx(well.battery_v - 2.0, abs=1e-9)
-    assert told[150].battery_v == pytest.approx(well.battery_v - 4.0, abs=1e-9)
+    volts = surfaced.topic('battery')[:, Battery._fields.index('voltage')]
+    assert volts[[50, 150]] == pytest.approx(volts[0] - [2.0, 4.0], abs=1e-6)
     assert told[150].vacuum_pa == pytest.approx(well.vacuum_pa - 10000.0, abs=1e-6)
     assert told[150].contact_age_s == pytest.approx(13.0, abs=1e-9)
 

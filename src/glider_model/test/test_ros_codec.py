@@ -15,6 +15,7 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState, NavSatFix
 
+from glider_model.base.signals import Battery
 from glider_model.base.wiring import JOINTS
 from glider_model.ros.wire.codec import MessageError, cdr_places, set_field, to_cdr
 from glider_model.ros.wire.topics import TOPICS, topic_of
@@ -25,9 +26,10 @@ PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 STAMPS = st.integers(0, (2**31 - 1) * 10**9)
 FINITE = st.floats(-1e300, 1e300, allow_nan=False)
 #: What a field can hold that is no float64.
+SINGLE = st.floats(-(2.0**100), 2.0**100, width=32)
 NARROW = {
     'status.status': st.integers(-128, 127).map(float),
-    'range': st.floats(-(2.0**100), 2.0**100, width=32),
+    **dict.fromkeys(('range', *Battery._fields), SINGLE),
 }
 
 

@@ -51,6 +51,14 @@ _ANGLE_TEXTS = (
     'heading, clockwise from north',
 )
 _UNITS = {'_nm': 'N m', '_radps': 'rad/s'}
+#: What the battery says; less than nothing is not known.
+_BATTERY = (
+    ('voltage', 'V', 'voltage of the battery'),
+    ('current', 'A', 'current of the battery, negative discharges'),
+    ('charge', 'A h', 'charge that is left'),
+    ('capacity', 'A h', 'charge of the full battery'),
+    ('percentage', '1', 'share of the charge that is left'),
+)
 #: Stage of which nothing is known: a recording that began late.
 _UNKNOWN_STAGE = -1
 
@@ -157,6 +165,7 @@ def _same(steers_by: str) -> list[_Variable]:
         *_joints('joint_states', 'position:', steers_by),
         *_joints('demand', 'demanded by control:', steers_by),
         *_joints('command', 'commanded:', steers_by),
+        *(_Variable('battery', name, unit, text) for name, unit, text in _BATTERY),
         _Variable('drop_weight', 'release', '1', '1 where the guard lets the weight go'),
         _Variable('tracking_error', 'along', 'm', 'ahead of the virtual target', PATH),
         _Variable('tracking_error', 'across', 'm', 'starboard of the virtual target', PATH),

@@ -30,7 +30,9 @@ from glider_navigation.block import navigation_tick
 from glider_navigation.settings import NavigationParams
 
 #: Places among what the plant measures, which does not include /clock.
-PRESSURE, HEALTH = (PLANT.outputs.index(topic) - 1 for topic in ('pressure', 'health'))
+PRESSURE, HEALTH, BATTERY = (
+    PLANT.outputs.index(topic) - 1 for topic in ('pressure', 'health', 'battery')
+)
 
 
 class NotFiniteError(Exception):
@@ -86,7 +88,7 @@ def fly(state, params, log, dt):
     for row in range(log.shape[0]):
         t_s = plant.tick * dt
         measured, finished = plant_outputs(plant, params.plant)
-        joints, sensors = measured[-1], measured[1:-2]
+        joints, sensors = measured[-1], measured[1:-3]
         place = odometry_from_wire(measured[0])
         position = (place.p_n, place.p_e, place.p_d)
         current, velocity = current_step_in_place(current, position, t_s, params.current, dt)
@@ -98,7 +100,8 @@ def fly(state, params, log, dt):
         guidance, guided, stage = guidance_tick(guidance, t_s, (odom,), params.guidance, dt)
         seen = (guided[0], odom, joints)
         control, controlled, limits = control_tick(control, t_s, seen, params.control, dt)
-        seen = (controlled[0], guided[0], odom, joints, measured[HEALTH], measured[PRESSURE])
+        well, power = measured[HEALTH], measured[BATTERY]
+        seen = (controlled[0], guided[0], odom, joints, well, power, measured[PRESSURE])
         guard, guarded, told = guard_tick(guard, t_s, seen, params.guard, dt)
         plant = plant_move(plant, (guarded[0], water, guarded[1]), params.plant, dt)
         said = (phase, stage, limits, told)

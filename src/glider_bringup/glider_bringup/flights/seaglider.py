@@ -149,7 +149,13 @@ def _segments(dives: list[Dive], origin: np.ndarray) -> tuple[list[Segment], lis
 
 
 def _read_dive(path: Path, notes: list[str]) -> Dive:
-    found = _read_variables(path)
+    found = read_variables(path, NEEDED | WANTED)
+    for key in ('time', 'pitch', 'heading', 'depth'):
+        if key in found and len(found[key]) != len(found.get('time', ())):
+            raise ConfigurationError(
+                f'{path}: {" or ".join(NEEDED[key])} has {len(found[key])} values '
+                f'(allowed: as many as time, {len(found.get("time", ()))})'
+            )
     missing = [names for key, names in NEEDED.items() if not len(found.get(key, ()))]
     if missing:
         raise ConfigurationError(
@@ -219,15 +225,22 @@ def _number(found: dict[str, np.ndarray], name: str) -> float:
     return float(np.median(values)) if len(values) else math.nan
 
 
-def _read_variables(path: Path) -> dict[str, np.ndarray]:
-    """Variables as flat arrays, by our names; times in s since 1970, depth in m."""
+def read_variables(path: Path, wanted: dict[str, tuple[str, ...]]) -> dict[str, np.ndarray]:
+    """Variables as flat arrays, by our names; times in s since 1970, depth in m.
+
+    Parameters
+    ----------
+    path : Path
+    wanted : dict
+        Names that a variable may have in the file, by our own.
+    """
     import xarray
 
     found = {}
     try:
         for dataset in _open(path):
             with dataset:
-                for key, names in (NEEDED | WANTED).items():
+                for key, names in wanted.items():
                     name = next((name for name in names if name in dataset.variables), None)
                     if name is None or key in found:
                         continue
@@ -240,12 +253,6 @@ def _read_variables(path: Path) -> dict[str, np.ndarray]:
                     found[key] = values if values.dtype.kind in 'SUO' else values.astype(float)
     except (OSError, ValueError, TypeError, KeyError, RuntimeError) as error:
         raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
-    for key in ('time', 'pitch', 'heading', 'depth'):
-        if key in found and len(found[key]) != len(found.get('time', ())):
-            raise ConfigurationError(
-                f'{path}: {" or ".join(NEEDED[key])} has {len(found[key])} values '
-                f'(allowed: as many as time, {len(found.get("time", ()))})'
-            )
     return found
 
 

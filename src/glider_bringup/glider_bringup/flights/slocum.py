@@ -87,7 +87,7 @@ def read_slocum(place: Path, cache: Path | None, progress: Callable[[int, int], 
     ConfigurationError
     """
     files = slocum_files(place)
-    sensors, names, notes = _read_files(files, cache, progress)
+    sensors, names, notes = read_sensors(files, cache, progress, NEEDED + WANTED)
     missing = [name for name in NEEDED if not len(sensors[name][0])]
     if missing:
         raise ConfigurationError(
@@ -116,10 +116,16 @@ def read_slocum(place: Path, cache: Path | None, progress: Callable[[int, int], 
     return Flight('slocum', [path.name for path in files], segments, notes + left_out)
 
 
-def _read_files(
-    files: list[Path], cache: Path | None, progress: Callable[[int, int], None]
+def read_sensors(
+    files: list[Path],
+    cache: Path | None,
+    progress: Callable[[int, int], None],
+    names: tuple[str, ...],
 ) -> tuple[Sensors, list[tuple[float, str]], list[str]]:
-    """Sensors by name, when each file begins, and what is to be said of files left out."""
+    """Sensors by name, when each file begins, and what is to be said of files left out.
+
+    A sensor that was never recorded has no times. ``m_depth`` has to be among the names.
+    """
     try:
         from dbdreader import DBD, DbdError
     except ImportError:
@@ -128,8 +134,8 @@ def _read_files(
             'it with: ./glider python -m pip install --no-deps -r requirements-flights.txt'
         ) from None
 
-    parts: dict[str, list] = {name: [] for name in NEEDED + WANTED}
-    names, unread = [], []
+    parts: dict[str, list] = {name: [] for name in names}
+    begun, unread = [], []
     with tempfile.TemporaryDirectory() as scratch:
         _gather_caches(files[0].parent, cache, Path(scratch))
         for number, path in enumerate(files):
@@ -156,11 +162,11 @@ def _read_files(
             for name, pair in read.items():
                 parts[name].append(pair)
             if 'm_depth' in read and len(read['m_depth'][0]):
-                names.append((float(read['m_depth'][0][0]), path.name))
+                begun.append((float(read['m_depth'][0][0]), path.name))
     if len(unread) == len(files):
         raise ConfigurationError(f'{files[0].parent}: no file could be read; {unread[0]}')
     sensors = {name: _joined(pairs) for name, pairs in parts.items()}
-    return sensors, sorted(names), unread
+    return sensors, sorted(begun), unread
 
 
 def _gather_caches(folder: Path, cache: Path | None, into: Path) -> None:

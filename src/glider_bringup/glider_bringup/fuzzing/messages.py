@@ -22,7 +22,7 @@ from glider_control.control import control_step
 from glider_guard.block import guard_tick
 from glider_guidance.guidance import guidance_step
 from glider_model.base.frames import odometry_from_wire, reference_from_wire
-from glider_model.base.signals import TICK_NS, TICK_S, Joints, Water
+from glider_model.base.signals import TICK_NS, TICK_S, Battery, Joints, Water
 from glider_model.base.wiring import GUARD, NAVIGATION, SENSORS
 from glider_model.ocean.current import current_step
 from glider_model.plant.plant import plant_step
@@ -40,6 +40,7 @@ READ = (
     'command',
     'drop_weight',
     'health',
+    'battery',
     *SENSORS,
 )
 #: Missions by their names, and what is changed in them.
@@ -53,7 +54,7 @@ TICKS = 3000
 #: Good messages after it.
 AFTER = 10
 #: Fields of 32 bits, and fields that cannot hold such numbers.
-_NARROW = {'range'}
+_NARROW = {'range', *Battery._fields}
 _INTEGERS = {'status.status'}
 _WILD = (np.nan, np.inf, -np.inf, 0.0, 1e308, -1e308, 1e6, -1e6, 5e-324, 10.0, -10.0, 1e4, 2.0)
 

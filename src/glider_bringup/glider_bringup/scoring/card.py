@@ -142,7 +142,8 @@ def _is_card(card) -> bool:
         )
         and _is_guard(card.get('guard', {}))
         and _are_faults(card.get('faults', []))
-        and _is_navigation(card.get('navigation'))
+        and _is(_Navigation, card.get('navigation'))
+        and _is(_Energy, card.get('energy'))
     )
 
 
@@ -171,6 +172,25 @@ class _Fault(_Checked):
     kind: str
     message: str
     when: str
+
+
+class _EnergyBy(_Checked):
+    """What took it (Wh)."""
+
+    pump: float | None
+    hotel: float | None
+    masses: float | None
+    calls: float | None
+
+
+class _Energy(_Checked):
+    """What was taken out of the battery; older runs tell nothing of it."""
+
+    wh: float | None
+    wh_per_dive: float | None
+    by: _EnergyBy
+    endurance_days: float | None
+    range_km: float | None
 
 
 class _Report(_Checked):
@@ -226,10 +246,10 @@ class _Navigation(_Checked):
     reports: list[_Report] = []
 
 
-def _is_navigation(told) -> bool:
-    """Whether a value is how well the vehicle knew its place; older runs tell nothing of it."""
+def _is(kind: type[_Checked], told) -> bool:
+    """Whether a value is a part of a scorecard, or nothing, as in older runs."""
     try:
-        return told is None or bool(_Navigation.model_validate(told))
+        return told is None or bool(kind.model_validate(told))
     except ValidationError:
         return False
 

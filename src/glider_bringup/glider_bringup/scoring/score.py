@@ -20,6 +20,7 @@ import numpy as np
 from glider_bringup.blocks import COLUMNS
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
+from glider_bringup.scoring.energy import EnergyScorer
 from glider_bringup.scoring.faults import FaultTimes
 from glider_bringup.scoring.navigation import NavigationScorer
 from glider_bringup.scoring.true_motion import TrueMotion, wire_of
@@ -40,7 +41,8 @@ from glider_model.base.signals import TICK_NS, TICK_S
 from glider_model.plant.faults.settings import FaultSettings
 from glider_model.plant.plant import dive_depths
 from glider_model.plant.sensors import SensorParams
-from glider_model.vehicle.file import steers_by
+from glider_model.vehicle.energy import EnergySettings
+from glider_model.vehicle.file import load_vehicle, steers_by
 
 #: Heading fluctuation is about the mean over this time (s).
 HEADING_MEAN_S = 300.0
@@ -106,6 +108,8 @@ class Scorer:
         Name of the vehicle's steering surface, whose travel is scored; empty without.
     faults : sequence of FaultSettings
         What breaks in the run.
+    energy : EnergySettings, optional
+        Battery of the vehicle and what is taken out of it.
     """
 
     def __init__(
@@ -115,6 +119,7 @@ class Scorer:
         topics: tuple[str, ...] = (),
         steers_by: str = '',
         faults: Sequence[FaultSettings] = (),
+        energy: EnergySettings | None = None,
     ) -> None:
         self.topics = topics  #: that it needs, beside those that are always read
         self._steers_by = steers_by
@@ -122,6 +127,7 @@ class Scorer:
         origin = origin or OriginSettings().params()
         self._navigation = NavigationScorer(origin, reckons=bool(topics))
         self._faults = FaultTimes(faults)
+        self._energy = EnergyScorer(energy)
         self._blocks: list[np.ndarray] = []
         self._last: np.ndarray | None = None
         self._end: np.ndarray | None = None
@@ -133,6 +139,7 @@ class Scorer:
         told, log = log, self._truth.of(log)
         self._navigation.add(told, log)
         self._faults.add(log)
+        self._energy.add(log)
         series = np.empty((_SERIES, len(log)))
         _extract(log, series)
         series[_TOLD_E2] = told[:, _E2_COLUMN]
@@ -159,7 +166,7 @@ class Scorer:
         dict
             The run's part of ``score.json``: ticks, settle_s, dives, distance_along_path_m,
             end_of_path_m, cross_track_m, pitch_error_deg, heading_fluctuation_deg, depth_m,
-            actuator_travel, guard, faults, navigation, final_state, and ``infeasible``.
+            actuator_travel, energy, guard, faults, navigation, final_state, and ``infeasible``.
             A figure without data is None.
         """
         series, ticks = self._series, self.ticks
@@ -169,12 +176,14 @@ class Scorer:
         heading = _heading_fluctuation_deg(series(_HEADING))
         whole = steady & _has_whole_mean(ticks)
         deepest = float(np.max(depth)) if ticks else None
+        dives = _count_dives(depth, *dive_depths(rules.depth_m))
+        way_m, time_s = _length(series(_TARGET_N), series(_TARGET_E)), _round(ticks * TICK_S)
         return {
             'ticks': ticks,
-            'sim_time_s': _round(ticks * TICK_S),
+            'sim_time_s': time_s,
             'settle_s': rules.settle_s,
-            'dives': _count_dives(depth, *dive_depths(rules.depth_m)),
-            'distance_along_path_m': _length(series(_TARGET_N), series(_TARGET_E)),
+            'dives': dives,
+            'distance_along_path_m': way_m,
             'end_of_path_m': self._end_of_path_m(rules.path_end),
             'cross_track_m': _cross_track(e2, steady, scored),
             'pitch_error_deg': {
@@ -190,6 +199,7 @@ class Scorer:
                 'overshoot': None if deepest is None else max(0.0, deepest - rules.depth_m),
             },
             'actuator_travel': self._actuator_travel(),
+            'energy': self._energy.result(time_s, dives, way_m),
             'guard': _guard(series(_MASK)),
             'faults': self._faults.result(),
             'navigation': self._navigation.result(
@@ -238,7 +248,8 @@ def make_scorer(scenario: Scenario) -> Scorer:
     if scenario.navigation.jumps:
         topics = ('fix', 'believed_current', 'current_velocity')
     sensors, origin = scenario.sensors.params(scenario.seed), scenario.origin.params()
-    return Scorer(sensors, origin, topics, steers_by(scenario), scenario.faults)
+    energy = load_vehicle(scenario.vehicle).energy
+    return Scorer(sensors, origin, topics, steers_by(scenario), scenario.faults, energy)
 
 
 def scores_of(scenario: Scenario, scorer: Scorer) -> dict:

@@ -166,6 +166,10 @@ FIGURES = (
     Figure('pump travel', ('actuator_travel', 'buoyancy_engine_kg'), 'kg', 1, True),
     Figure('pitch mass travel', ('actuator_travel', 'pitch_mass_m'), 'm', 2, True),
     Figure('roll mass travel', ('actuator_travel', 'roll_mass_deg'), 'deg', 0, True),
+    Figure('energy', ('energy', 'wh'), 'Wh', 1, True),
+    Figure('energy, a dive', ('energy', 'wh_per_dive'), 'Wh', 1, True),
+    Figure('endurance', ('energy', 'endurance_days'), 'days', 1),
+    Figure('range', ('energy', 'range_km'), 'km', 0),
 )
 #: What a scorecard says of how a run was computed and recorded, not of the flight.
 _NOT_FLOWN = (

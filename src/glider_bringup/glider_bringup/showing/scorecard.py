@@ -52,6 +52,7 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
     travel, settle_s = card['actuator_travel'], card.get('settle_s')
     settling = 'after settling' + ('' if settle_s is None else f', the first {settle_s:,.0f} s')
     end_m, navigation = card.get('end_of_path_m'), reckoned(card)
+    energy = card.get('energy') or {'wh': None}
     return [
         ('status', card['status'] + (f' ({card["reason"]})' if card['reason'] else '')),
         ('flown', f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}'),
@@ -82,6 +83,18 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
         ('actuator travel', f'pump {show(travel["buoyancy_engine_kg"], "kg", 1)}, pitch mass '
          f'{show(travel["pitch_mass_m"], "m")}, roll mass '
          f'{show(travel["roll_mass_deg"], "deg", 0)}' + _surface_travel(travel)),
+        *(_energy_rows(energy) if energy['wh'] else []),
+    ]  # fmt: skip
+
+
+def _energy_rows(told: dict) -> list[tuple[str, str]]:
+    """Lines of what was taken out of the battery."""
+    by = ', '.join(f'{name} {show(told["by"][name], "", 1)}' for name in told['by'])
+    return [
+        ('energy', f'{show(told["wh"], "Wh", 1)}: {by}; {show(told["wh_per_dive"], "Wh", 1)} a '
+         'dive'),
+        ('battery lasts', f'{show(told["endurance_days"], "days", 1)}, '
+         f'{show(told["range_km"], "km", 0)} at this pace'),
     ]  # fmt: skip
 
 

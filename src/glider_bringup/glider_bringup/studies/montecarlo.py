@@ -74,6 +74,7 @@ FIGURES = {
     'max_run_m': ('cross_track_m', 'max_run'),
     'heading_fluctuation_deg': ('heading_fluctuation_deg', 'rms_steady'),
     'pitch_error_deg': ('pitch_error_deg', 'rms_steady'),
+    'energy_wh': ('energy', 'wh'),
 }
 #: What is told of the navigation of each flight.
 NAVIGATION = (

@@ -132,8 +132,17 @@ class Health(NamedTuple):
 
     leak: float  #: 1.0: there is water in the hull
     vacuum_pa: float  #: pressure in the hull below that of the air at the surface (Pa)
-    battery_v: float  #: voltage of the battery (V)
     contact_age_s: float  #: time since the antenna was last out of the water (s)
+
+
+class Battery(NamedTuple):
+    """What the battery says of itself; less than nothing is not measured, but for the current."""
+
+    voltage: float  #: (V)
+    current: float  #: (A), - discharges
+    charge: float  #: what is left (Ah)
+    capacity: float  #: of the full battery (Ah)
+    percentage: float  #: what is left, as a share (-)
 
 
 #: Stands in the reason of every run whose numbers ceased to be finite.

@@ -9,7 +9,7 @@ modules that are started, and what a recorded run is checked by.
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from glider_model.base.signals import Adaptation, Health
+from glider_model.base.signals import Adaptation, Battery, Health
 
 #: Joint names of joint_states and command, in the order of `glider_model.base.signals.Joints`.
 JOINTS = ('buoyancy_engine', 'pitch_mass', 'roll_mass')
@@ -71,6 +71,9 @@ def _joints() -> Port:
 #: sensor_msgs/Range a number outside of the two is to be thrown away.
 ALTIMETER_REACH_M, NO_ECHO = (0.5, 100.0), 0.0
 
+#: Status of a sensor_msgs/BatteryState: POWER_SUPPLY_STATUS_DISCHARGING.
+DISCHARGES = 2
+
 #: Every per-tick topic. The twist of the reference is expressed in `map`: desired velocity over
 #: ground and Euler angle rates.
 PORTS = {
@@ -107,6 +110,12 @@ PORTS = {
         constants=(('min_range', ALTIMETER_REACH_M[0]), ('max_range', ALTIMETER_REACH_M[1])),
     ),
     'health': _named(Health._fields),
+    'battery': Port(
+        'sensor_msgs/msg/BatteryState',
+        Battery._fields,
+        BASE_LINK,
+        constants=(('power_supply_status', DISCHARGES), ('present', True)),
+    ),
     'joint_states': _joints(),
     'current_velocity': Port('geometry_msgs/msg/TwistStamped', _TWIST, MAP),
     'odom': _odometry(BASE_LINK, tuple(f'pose.covariance[{i}]' for i in _XX_XY_YX_YY)),
@@ -154,17 +163,20 @@ class Wired(NamedTuple):
 #: there are messages in a run; where a table has a column for each topic, the others are zero.
 SENSORS = ('measured_odom', 'imu', 'pressure', 'fix', 'altitude')
 #: Those of them of which a vehicle has samples now and then, and not in every tick.
-SAMPLED = ('imu', 'pressure', 'fix', 'altitude')
+SAMPLED = ('imu', 'pressure', 'fix', 'altitude', 'battery')
+#: Age (s) from which on a topic is silent that need not be told often.
+SLOW_S = {'battery': 600.0}
 #: What stands for a topic that may be silent for as long as it likes: under water there is no fix,
 #: far above the bottom no echo. A vehicle need not say how it is, either: less than nothing is not
 #: measured.
 WHEN_SILENT = {
     'fix': (-1.0, 0.0, 0.0, 0.0, 0.0),
     'altitude': (NO_ECHO,),
-    'health': (0.0, -1.0, -1.0, -1.0),
+    'health': (0.0, -1.0, -1.0),
+    'battery': (-1.0, 0.0, -1.0, -1.0, -1.0),
 }
 #: What bags do not have that were recorded before it was told.
-LATER = ('health', 'demand', 'drop_weight')
+LATER = ('health', 'battery', 'demand', 'drop_weight')
 #: What ways to navigate may tell beside odom; the same holds for them.
 BELIEFS = ('believed_current', 'believed_surface_current')
 
@@ -177,6 +189,7 @@ PLANT = Wired(
         'ground_truth/odom',
         *SENSORS,
         'health',
+        'battery',
         'joint_states',
     ),
 )
@@ -204,7 +217,7 @@ CONTROL = Wired(
 GUARD = Wired(
     'guard',
     'glider_guard',
-    inputs=('demand', 'reference', 'odom', 'joint_states', 'health', 'pressure'),
+    inputs=('demand', 'reference', 'odom', 'joint_states', 'health', 'battery', 'pressure'),
     outputs=('command', 'drop_weight'),
 )
 

@@ -1,8 +1,8 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the sensors of the vehicle's own health say: leak, vacuum, battery, contact.
+"""What the sensors of the vehicle's own health say: leak, vacuum, contact.
 
-Hull and battery have no model of their own: without faults they are as they were at the start.
+The hull has no model of its own: without faults it is as it was at the start.
 """
 
 from glider_model.base.kernel import kernel
@@ -11,11 +11,9 @@ from glider_model.base.signals import TICK_S, Health
 #: Pressure in a closed hull below that of the air (Pa): 7 inches of mercury, in the middle of what
 #: a Slocum accepts (4 to 12).
 VACUUM_PA = 23700.0
-#: Voltage of a battery of lithium cells in service (V); a Slocum gives up at 10 V.
-BATTERY_V = 15.0
 
 
 @kernel
 def health_of(state):
     """What the health sensors of a vehicle say at a tick (`Health`), all well but for contact."""
-    return Health(0.0, VACUUM_PA, BATTERY_V, state.surfacing.silent_ticks * TICK_S)
+    return Health(0.0, VACUUM_PA, state.surfacing.silent_ticks * TICK_S)

@@ -15,6 +15,7 @@ from glider_model.base.slot import default, slot
 from glider_model.base.wiring import SENSORS
 from glider_model.ocean.density import DensityParams
 from glider_model.ocean.water import WaterSettings, with_wind
+from glider_model.plant.energy import FULL, Ledger, battery_of, spend
 from glider_model.plant.faults.body import acting, blown, felt, moved
 from glider_model.plant.faults.kinds import FaultParams, begun, summed
 from glider_model.plant.faults.sensing import remembered, told
@@ -31,6 +32,7 @@ from glider_model.plant.sensors import (
     sense,
     take_sample,
 )
+from glider_model.vehicle.energy import NO_ENERGY, EnergyParams
 from glider_model.vehicle.file import VehicleParams, load_vehicle
 from glider_model.vehicle.perturb import PerturbSettings, perturbed
 
@@ -75,6 +77,7 @@ class PlantState(NamedTuple):
     surfacing: Surfacing
     faults: NamedTuple  #: NoFaultState, or FaultState
     is_dropped: bool  #: the drop weight is gone
+    ledger: Ledger  #: energy taken out of the battery
 
 
 LAUNCHED = Surfacing(0, False, 0, 0)
@@ -94,6 +97,7 @@ class PlantParams(NamedTuple):
     dive_above: float  #: is above this (m)
     sensors: SensorParams
     faults: NamedTuple  #: NoFaults, or FaultParams
+    energy: EnergyParams
 
 
 def dive_depths(depth_m: float) -> tuple[float, float]:
@@ -165,8 +169,9 @@ class PlantSettings(Settings):
 
     def params(self) -> PlantParams:
         """Kernel parameters."""
+        vehicle = load_vehicle(self.vehicle)
         return PlantParams(
-            perturbed(load_vehicle(self.vehicle).params(), self.perturb),
+            perturbed(vehicle.params(), self.perturb),
             self.water.params(),
             self.water.wind_drift(),
             max(1, round(self.duration_s / TICK_S)),
@@ -176,6 +181,7 @@ class PlantSettings(Settings):
             *dive_depths(self.dive_depth_m),
             self.sensors.params(self.seed, self.origin, tuple(self.fitted), self.water.bottom_m),
             fault_params(self.faults, self.seed),
+            vehicle.energy.params() if vehicle.energy else NO_ENERGY,
         )
 
     def initial_state(self) -> PlantState:
@@ -202,6 +208,7 @@ class PlantSettings(Settings):
             LAUNCHED,
             fault_state(self.faults),
             False,
+            FULL,
         )
 
 
@@ -239,7 +246,8 @@ def tell(state, params):
         state.tick,
         params.sensors,
     )
-    numbers = (*numbers[:-1], tuple(health_of(state)), numbers[-1])
+    health, battery = health_of(state), battery_of(state.ledger, params.energy)
+    numbers = (*numbers[:-1], tuple(health), tuple(battery), numbers[-1])
     return told(numbers, state, params.sensors, params.faults)
 
 
@@ -306,6 +314,8 @@ def plant_step(state, command, water, params, dt, drops=False):
     if params.sensors.is_held:
         measured = add_noise(plant_odometry(state), state.tick, params.sensors)
         sample = take_sample(measured, state.motion.p_d, sample, state.tick, params.sensors)
+    surfacing = surface_after(state.surfacing, motion.p_d)
+    depths, surfacings = (state.motion.p_d, motion.p_d), (state.surfacing, surfacing)
     return PlantState(
         motion,
         joints,
@@ -316,9 +326,10 @@ def plant_step(state, command, water, params, dt, drops=False):
         surface_ticks,
         afloat_ticks,
         sample,
-        surface_after(state.surfacing, motion.p_d),
+        surfacing,
         _after_telling(state, faults, params, params.faults),
         is_dropped,
+        spend(state.ledger, state.joints, joints, depths, surfacings, params.energy, dt),
     )
 
 

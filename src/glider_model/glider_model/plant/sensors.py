@@ -457,7 +457,7 @@ def sense(odometry, joints, sample, out_ticks, surfacings, tick, params):
     -------
     tuple of tuple of float
         Numbers on the wire, in the order of the plant's outputs in `glider_model.base.wiring`, but
-        for health; zeros for what is not fitted.
+        for health and battery; zeros for what is not fitted.
     """
     truth = odometry_to_wire(odometry)
     measured = add_noise(odometry, tick, params)

@@ -25,6 +25,7 @@ from glider_model.base.settings import (
 )
 from glider_model.base.wiring import JOINTS
 from glider_model.vehicle import surfaces
+from glider_model.vehicle.energy import EnergySettings
 from glider_model.vehicle.quantity import NotNegative, Positive, Signed, quantity, vector
 from glider_model.vehicle.rigid_body import mass_matrix
 from glider_model.vehicle.surface import NoSurface, SurfaceSettings
@@ -127,6 +128,8 @@ class _Body(Settings):
     added_mass: AddedMassSettings
     hydrodynamics: HydrodynamicsSettings
     steering: SteeringSettings
+    #: Battery and what is taken out of it; without it there is no ledger.
+    energy: EnergySettings | None = None
 
 
 #: Settings of every kind of steering surface, by its name and that of its section.

@@ -127,6 +127,7 @@ def _print_study(study: dict) -> None:
         ('max whole run (m)', lambda row: show(row['max_run_m'])),
         ('heading rms (deg)', lambda row: show(row['heading_fluctuation_deg'])),
         ('pitch rms (deg)', lambda row: show(row['pitch_error_deg'])),
+        ('energy (Wh)', lambda row: show(row['energy_wh'])),
         ('surfacings', lambda row: f'{row["navigation"]["surfacings"]:,}'),
         ('error of place, from the 4th (m)', lambda row: show(row['navigation']['error_m'])),
         ('came up beside, from the 4th (m)', lambda row: show(row['navigation']['cross_track_m'])),

@@ -54,6 +54,7 @@ NOT_RESULTS = {
     'seed',
     'guard',  # what happened, in words
     'faults',  # the same
+    *('wh_per_dive', 'by', 'endurance_days', 'range_km'),  # of energy, wh is enough
 }
 
 

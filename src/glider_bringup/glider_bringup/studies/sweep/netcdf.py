@@ -29,6 +29,8 @@ _UNITS = {
     '_s': 's',
     '_rad': 'rad',
 }
+#: Units of a whole part of a scorecard.
+_PARTS = {'energy': 'W h'}
 #: Units of settings that UDUNITS spells otherwise.
 _SPELLING = {'deg': 'degree', 'deg/s': 'degree/s', 'knots': 'knot', '-': '1', '': '1'}
 #: Dimension and coordinates of vectors in a scorecard.
@@ -51,7 +53,7 @@ def _unit_and_name(figure: str) -> tuple[str, str]:
     unit, words = '1', []
     for part in figure.split('.'):
         ending = next((ending for ending in _UNITS if part.endswith(ending)), '')
-        unit = _UNITS.get(ending, unit)
+        unit = _UNITS.get(ending, _PARTS.get(part, unit))
         words.append(part.removesuffix(ending).replace('_', ' '))
     return unit, ', '.join(words)
 

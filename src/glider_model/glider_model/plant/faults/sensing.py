@@ -15,7 +15,7 @@ from glider_model.base.frames import (
     swap_world,
 )
 from glider_model.base.kernel import kernel
-from glider_model.base.signals import Health
+from glider_model.base.signals import Battery, Health
 from glider_model.base.slot import default, slot
 from glider_model.ocean.density import depth_at, pressure_at
 from glider_model.plant.faults import kinds
@@ -60,10 +60,10 @@ def told(numbers, state, sensors, params):
 def _told(numbers, state, sensors, params):
     faults = begun(state, params)
     total = summed(faults, state.tick, params)
-    truth, position, imu, pressure, fix, altitude, health, joints = numbers
+    truth, position, imu, pressure, fix, altitude, health, battery, joints = numbers
     if total[kinds.NO_FIXES] > 0.0:
         fix = (NO_FIX, 0.0, 0.0, 0.0, 0.0)
-    right = _seen((truth, position, imu, pressure, fix, altitude, health, joints), sensors)
+    right = _seen((truth, position, imu, pressure, fix), sensors)
     seen = _wrong(right, faults.shown, total)
     if sensors.has_position:
         position = _position(position, seen, right)
@@ -74,19 +74,20 @@ def _told(numbers, state, sensors, params):
         if seen[FIX] != right[FIX] or seen[FIX + 1] != right[FIX + 1]:
             variance = sensors.gps.std * sensors.gps.std
             fix = (seen[FIX + 2], seen[FIX], seen[FIX + 1], variance, variance)
-    return truth, position, imu, pressure, fix, altitude, _health(health, total), joints
+    health, battery = _health(health, total), _battery(battery, total)
+    return truth, position, imu, pressure, fix, altitude, health, battery, joints
 
 
 @kernel
 def remembered(faults, numbers, sensors):
     """State of the faults for the tick after one of which these are the numbers told."""
-    return FaultState(faults.began, _seen(numbers, sensors))
+    return FaultState(faults.began, _seen(numbers[:5], sensors))
 
 
 @kernel
 def _seen(numbers, sensors):
     """What the sensors show, by the places of `kinds`."""
-    _, position, imu, pressure, fix, _, _, _ = numbers
+    _, position, imu, pressure, fix = numbers
     seen = np.zeros(kinds.SHOWN)
     q_w, q_x, q_y, q_z = imu[0], imu[1], imu[2], imu[3]
     rates, depth = (imu[4], imu[5], imu[6]), 0.0
@@ -190,10 +191,19 @@ def _imu(imu, seen, right):
 @kernel
 def _health(health, total):
     """What the health sensors say of it."""
-    well = Health(health[0], health[1], health[2], health[3])
+    well = Health(health[0], health[1], health[2])
     return (
         1.0 if total[kinds.WATER] >= NOTICED_KG else well.leak,
         max(0.0, well.vacuum_pa - total[kinds.PASCALS]),
-        max(0.0, well.battery_v - total[kinds.VOLTS]),
         max(well.contact_age_s, total[kinds.ALONE_S]),
     )
+
+
+@kernel
+def _battery(battery, total):
+    """What the battery says of itself; without a fault the very same."""
+    x = Battery(battery[0], battery[1], battery[2], battery[3], battery[4])
+    voltage = x.voltage
+    if total[kinds.VOLTS] > 0.0:
+        voltage = np.float64(np.float32(max(0.0, voltage - total[kinds.VOLTS])))
+    return voltage, x.current, x.charge, x.capacity, x.percentage

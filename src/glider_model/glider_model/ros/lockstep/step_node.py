@@ -3,7 +3,7 @@
 """A node with a step per tick, in lockstep or at 10 Hz on the newest inputs."""
 
 from glider_model.base.signals import TICK_S
-from glider_model.base.wiring import SAMPLED, WHEN_SILENT
+from glider_model.base.wiring import SAMPLED, SLOW_S, WHEN_SILENT
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.inputs import Input
 from glider_model.ros.lockstep.node import TickNode
@@ -38,7 +38,7 @@ class StepNode(TickNode):
 
     def max_age_s(self, topic: str) -> float:
         """Age (s) from which on an input is old in free-running mode."""
-        at_least_s = self.ticks.input_max_age_s
+        at_least_s = max(self.ticks.input_max_age_s, SLOW_S.get(topic, 0.0))
         if topic not in SAMPLED:
             return at_least_s
         return max(at_least_s, OLD_AFTER * self.sample_period_s)

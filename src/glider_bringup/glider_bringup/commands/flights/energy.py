@@ -1,0 +1,82 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider energy``: the ledger of a vehicle file, fitted to flights of real gliders."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from glider_bringup.console import Json, counter, output
+
+app = typer.Typer()
+#: What the parts of a flight are.
+PARTS = {'slocum': 'half hours', 'seaglider': 'pumpings'}
+
+
+@app.command(epilog='Example: ./glider energy flights/sg561 --fit-on flights/sg171')
+def energy(
+    flight: Annotated[
+        Path,
+        typer.Argument(
+            metavar='FLIGHT',
+            help='Folder of dbd files of a Slocum (or mbd, sbd, dcd, mcd, scd), folder of p*.nc '
+            'of a Seaglider, or one p*.nc.',
+        ),
+    ],
+    fit_on: Annotated[
+        Path | None,
+        typer.Option(
+            metavar='FLIGHT',
+            help='Another flight, whose first half is fitted. Default: that of FLIGHT itself.',
+        ),
+    ] = None,
+    cache: Annotated[
+        Path | None,
+        typer.Option(
+            metavar='FOLDER',
+            help="Caches (.cac) of a Slocum's files. Default: beside them, or in a folder cache "
+            'or cac there or above.',
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fit pump and hotel load to half of a recorded flight; predict the energy of the rest.
+
+    Of a Seaglider the energy of its pump, of a Slocum all that its counter of charge counted.
+    """
+    from glider_bringup.flights.energy.reading import read_uses
+    from glider_bringup.flights.energy.uses import UNITS, predict
+
+    fitted = None
+    with counter('reading', None) as update:
+        uses = read_uses(flight, cache, update)
+        if fit_on is not None:
+            fitted = read_uses(fit_on, cache, update)
+    report = predict(flight, uses, fitted)
+    if as_json:
+        on = str(fit_on or flight)
+        print(json.dumps({'flight': str(flight), 'fitted_on': on, **report}))
+        return
+    parts = PARTS[report['vehicle']]
+    table = Table(
+        title=f'{report["vehicle"].capitalize()}, {report["files"]} files',
+        title_justify='left',
+        show_header=False,
+    )
+    for name, value in report['fitted'].items():
+        table.add_row(f'{name}, fitted', f'{value:.4g} {UNITS[name]}')
+    for name, value in report['measured'].items():
+        table.add_row(f'{name}, measured', f'{value:.4g} {UNITS[name]}')
+    table.add_row(
+        'fitted on', f'{report["fitted_parts"]} {parts}, the first half of {fit_on or flight}'
+    )
+    table.add_row(
+        'recorded', f'{report["recorded_wh"]:,.2f} Wh in {report["predicted_parts"]} {parts}'
+    )
+    table.add_row(
+        'predicted', f'{report["predicted_wh"]:,.2f} Wh, {report["error_percent"]:+.1f} %'
+    )
+    output.print(table)

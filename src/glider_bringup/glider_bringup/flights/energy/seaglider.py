@@ -1,0 +1,89 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What actuators of a Seaglider took out of its battery, by its table of their moves."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from glider_bringup.flights.energy.uses import PUMP, Uses
+from glider_bringup.flights.seaglider import read_variables, seaglider_files
+from glider_model.base.errors import ConfigurationError
+
+#: Less than this is no pumping of a Seaglider: oil let in, or the valve (cc, A).
+PUMPED_CC, PUMPING_A = 2.0, 0.05
+_METRES_PER_CM = 0.01
+#: Variables of a Seaglider, by which they are called here: its table of actuator moves.
+MOVES = {
+    'depth': ('gc_depth',),
+    'cc_per_count': ('log_VBD_CNV',),
+    'before_1': ('gc_vbd_pot1_ad_start', 'gc_vbd_ad_start'),
+    'before_2': ('gc_vbd_pot2_ad_start', 'gc_vbd_ad_start'),
+    'after_1': ('gc_vbd_pot1_ad', 'gc_vbd_ad'),
+    'after_2': ('gc_vbd_pot2_ad', 'gc_vbd_ad'),
+    'amps': ('gc_vbd_i',),
+    'volts': ('gc_vbd_volts',),
+    'seconds': ('gc_vbd_secs',),
+}
+#: The same of its moving masses: field of the vehicle file, and what a count is (cm, deg).
+MASSES = {'pitch': ('pitch_mass', 'log_PITCH_CNV'), 'roll': ('roll_mass', 'log_ROLL_CNV')}
+
+
+def seaglider_uses(place: Path, progress: Callable[[int, int], None]) -> Uses:
+    """Pumpings of all dives, by current, voltage and time of the motor."""
+    files = seaglider_files(place)
+    doings, joules, dives = [], [], []
+    moved = {field: np.zeros(2) for field, _ in MASSES.values()}
+    for number, path in enumerate(files):
+        progress(number, len(files))
+        found = read_variables(path, MOVES | _of_masses())
+        missing = [names for key, names in MOVES.items() if not len(found.get(key, ()))]
+        if missing:
+            raise ConfigurationError(
+                f'{path}: no variable {", ".join(" or ".join(names) for names in missing)} '
+                '(needed for the energy of a Seaglider)'
+            )
+        rows = {key: len(found[key]) for key in MOVES if key != 'cc_per_count'}
+        if len(set(rows.values())) > 1:
+            told = ', '.join(f'{MOVES[key][0]} {count}' for key, count in rows.items())
+            raise ConfigurationError(f'{path}: {told} values (allowed: as many of each)')
+        counts = found['after_1'] + found['after_2'] - found['before_1'] - found['before_2']
+        pumped = 0.5 * counts * found['cc_per_count'][0]
+        energy = found['amps'] * found['volts'] * np.abs(found['seconds'])
+        ran = (pumped > PUMPED_CC) & (found['amps'] > PUMPING_A)
+        ran &= np.isfinite(energy * found['depth'])
+        doings.append(np.stack([pumped, pumped * found['depth']], axis=-1)[ran])
+        joules.append(energy[ran])
+        dives.append(np.full(int(ran.sum()), number))
+        for name, (field, _) in MASSES.items():
+            moved[field] += _moved(found, name)
+    if not sum(map(len, joules)):
+        raise ConfigurationError(f'{place}: no pumping in its {len(files)} files')
+    first_half = np.concatenate(dives) < len(files) // 2
+    masses = {field: float(took / way) for field, (took, way) in moved.items() if way > 0.0}
+    together = np.concatenate(doings), np.concatenate(joules)
+    return Uses('seaglider', len(files), tuple(PUMP), *together, first_half, masses)
+
+
+def _of_masses() -> dict[str, tuple[str, ...]]:
+    """Variables of the moving masses, all of which a file may lack."""
+    parts = {'before': 'ad_start', 'after': 'ad', 'amps': 'i', 'volts': 'volts', 'secs': 'secs'}
+    return {
+        **{
+            f'{name}_{key}': (f'gc_{name}_{end}',) for name in MASSES for key, end in parts.items()
+        },
+        **{f'{name}_per_count': (count,) for name, (_, count) in MASSES.items()},
+    }
+
+
+def _moved(found: dict[str, np.ndarray], name: str) -> np.ndarray:
+    """Energy (J) and way (m, deg) of one moving mass in a dive, shape (2,); zeros if not told."""
+    keys = [f'{name}_{key}' for key in ('before', 'after', 'amps', 'volts', 'secs', 'per_count')]
+    if any(not len(found.get(key, ())) for key in keys):
+        return np.zeros(2)
+    before, after, amps, volts, seconds, per_count = (found[key] for key in keys)
+    scale = abs(per_count[0]) * (_METRES_PER_CM if name == 'pitch' else 1.0)
+    energy = amps * volts * np.abs(seconds)
+    ran = (seconds != 0.0) & (before > 0.0) & np.isfinite(energy * after)
+    return np.array([energy[ran].sum(), scale * np.abs(after - before)[ran].sum()])

@@ -1,0 +1,97 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a flight took out of the battery, and how far the battery would bring it at this pace.
+
+By the kernel of the plant's ledger, from where the actuators were and from the true depth: so a
+recording made before the vehicle had a ledger is scored too.
+"""
+
+import numpy as np
+
+from glider_bringup.blocks import COLUMNS
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import TICK_S, Joints
+from glider_model.plant.energy import FULL, spend, spent
+from glider_model.plant.plant import LAUNCHED, surface_after
+from glider_model.vehicle.energy import NO_ENERGY, EnergySettings
+
+_DOWN, _JOINTS = COLUMNS['odom'].start + 2, COLUMNS['joint_states'].start
+_J_PER_WH, _DAY_S = 3600.0, 86400.0
+
+
+@kernel
+def _joints_of(row):
+    """Actuators of a log row."""
+    return Joints(row[_JOINTS], row[_JOINTS + 1], row[_JOINTS + 2], row[_JOINTS + 3])
+
+
+@kernel
+def _spend_rows(ledger, surfacing, last, log, params):
+    """Ledger and surfacing after the rows of a log, whose ``last`` row before them is given."""
+    for k in range(len(log)):
+        depths = (-last[_DOWN], -log[k, _DOWN])
+        before, surfacing = surfacing, surface_after(surfacing, depths[1])
+        was, now, surfacings = _joints_of(last), _joints_of(log[k]), (before, surfacing)
+        ledger = spend(ledger, was, now, depths, surfacings, params, TICK_S)
+        last = log[k]
+    return ledger, surfacing
+
+
+class EnergyScorer:
+    """Takes in log rows, and tells what was taken out of the battery.
+
+    Parameters
+    ----------
+    energy : EnergySettings, optional
+        Of the vehicle; without it nothing is known.
+    """
+
+    def __init__(self, energy: EnergySettings | None) -> None:
+        self._params = energy.params() if energy else NO_ENERGY
+        self._usable_wh = energy.usable.value * energy.capacity.value if energy else None
+        self._ledger, self._surfacing = FULL, LAUNCHED
+        self._last: np.ndarray | None = None
+
+    def add(self, log: np.ndarray) -> None:
+        """Take in log rows with the true odometry, float64[n, ROW]."""
+        if self._usable_wh is None or not len(log):
+            return
+        last = self._last
+        if last is None:
+            last, log = log[0], log[1:]
+        self._last = log[-1].copy() if len(log) else last.copy()
+        self._ledger, self._surfacing = _spend_rows(
+            self._ledger, self._surfacing, last, log, self._params
+        )
+
+    def result(self, sim_time_s: float, dives: int, way_m: float) -> dict:
+        """The part ``energy`` of ``score.json``; None where nothing is known.
+
+        Endurance and range are those of the usable part of a full battery at the mean power and
+        the pace of this flight.
+
+        Parameters
+        ----------
+        sim_time_s : float
+        dives : int
+        way_m : float
+            Along the path.
+        """
+        names = ('pump', 'hotel', 'masses', 'calls')
+        wh = spent(self._ledger) / _J_PER_WH
+        if self._usable_wh is None or wh <= 0.0:
+            return {
+                'wh': None,
+                'wh_per_dive': None,
+                'by': dict.fromkeys(names),
+                'endurance_days': None,
+                'range_km': None,
+            }
+        flights = self._usable_wh / wh
+        return {
+            'wh': wh,
+            'wh_per_dive': wh / dives if dives else None,
+            'by': {name: getattr(self._ledger, name) / _J_PER_WH for name in names},
+            'endurance_days': flights * sim_time_s / _DAY_S,
+            'range_km': 1e-3 * flights * way_m,
+        }
