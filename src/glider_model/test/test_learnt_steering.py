@@ -186,6 +186,14 @@ def test_kick_that_is_enough_is_not_given_up(sine):
     assert kept == (abs(sine) < AT_LIMIT * LIMIT)
 
 
+@given(st.floats(0.012, 0.1), st.sampled_from([1.0, -1.0]), some_kicks, st.floats(-1.0, 1.0))
+def test_kick_is_given_up_where_the_vehicle_turns_out_to_turn_well(b, sign, k, sine):
+    """A gust made it look weak; held by its kick, it would fly the other way for good."""
+    state = known(sign * b, 0.0, k, 1e-3, is_kicked=True, kept_s=KEPT_S + 1.0)
+    assert not choose_steering(state, sine, LIMIT).is_kicked
+    assert choose_steering(state._replace(kept_s=KEPT_S - 1.0), sine, LIMIT).is_kicked
+
+
 @given(effectiveness, some_kicks)
 def test_vehicle_follows_up_to_where_its_turn_outruns_its_kick(b, k):
     """Where the kick goes against the turn; elsewhere it follows at least as fast."""

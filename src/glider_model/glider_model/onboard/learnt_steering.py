@@ -247,11 +247,21 @@ def is_to_be_kicked(state, bank):
 
 
 @kernel
+def turns_well(state, bank):
+    """Whether it is known that the vehicle turns fast at the limit ``bank`` (sine)."""
+    square = bank * bank
+    turn = state.b + square * state.c
+    variance = state.p[0] + 2.0 * square * state.p[1] + square * square * state.p[4]
+    return abs(turn) > STRONG_STEERING + 3.0 * math.sqrt(max(0.0, variance))
+
+
+@kernel
 def choose_steering(state, sine, bank):
     """Change the way of steering, if that is called for.
 
     A vehicle that holds its heading by its kick is left alone: given up at a large roll, the kick
-    leaves a large heading error. The kick is given up where it is not enough, at the limit.
+    leaves a large heading error. The kick is given up where it is not enough, at the limit, and
+    where the vehicle turns out to turn well: what made it look weak, as a gust does, is over.
 
     Parameters
     ----------
@@ -260,7 +270,7 @@ def choose_steering(state, sine, bank):
         Sine of the roll, smoothed, and of its limit.
     """
     is_kicked = is_to_be_kicked(state, bank)
-    is_enough = state.is_kicked and abs(sine) < AT_LIMIT * bank
+    is_enough = state.is_kicked and abs(sine) < AT_LIMIT * bank and not turns_well(state, bank)
     if is_kicked == state.is_kicked or is_enough or state.kept_s < KEPT_S:
         return state
     return SteeringState(state.b, state.c, state.k, state.d, state.p, is_kicked, 0.0)

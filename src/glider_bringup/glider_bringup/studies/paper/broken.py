@@ -29,6 +29,7 @@ class Fault(NamedTuple):
     fields: dict[str, Any]
     reactions: tuple[str, ...]
     changes: dict[str, Any] = {}
+    beside_m: float | None = None  #: at the end, off a path that leads north
 
 
 _FLIES_ON, _SURFACES = ('none',), ('surface',)
@@ -86,7 +87,12 @@ FAULTS = (
     Fault('drag doubles', {'kind': 'fouling', 'drag': 2.0, 'over_s': 600.0}, _FLIES_ON),
     Fault('0.3 kg heavier', {'kind': 'mass', 'mass_kg': 0.3}, _FLIES_ON),
     Fault('0.3 kg lighter', {'kind': 'mass', 'mass_kg': -0.3}, _FLIES_ON),
-    Fault('gust', {'kind': 'gust', 'east_mps': 0.8, 'for_s': 1800.0}, _FLIES_ON),
+    Fault(
+        'gust',
+        {'kind': 'gust', 'east_mps': 0.8, 'for_s': 1800.0},
+        _FLIES_ON,
+        beside_m=100.0,
+    ),
 )
 
 
@@ -104,7 +110,11 @@ def cases(laws: tuple[str, ...]) -> list[Case]:
                 'faults': [{**fault.fields, 'at_s': AT_S, 'phase': phase}],
             },
             measures=(),
-            facts={'fault': fault.name, 'reactions': list(fault.reactions)},
+            facts={
+                'fault': fault.name,
+                'reactions': list(fault.reactions),
+                'beside_m': fault.beside_m,
+            },
         )
         for fault in FAULTS
         for phase in PHASES
@@ -169,11 +179,13 @@ def _faults_of(row: dict, deepest_m: float) -> str:
         return f'reaction {reaction}'
     if row['faults'][0]['t_s'] is None:
         return 'it did not begin'
-    depth_m = row['final_state']['position_ned_m'][2]
+    _, east_m, depth_m = row['final_state']['position_ned_m']
     if reaction in ('surface', 'drop') and depth_m > SURFACED_M:
         return f'{depth_m:.0f} m deep at the end'
     if row['depth_m']['max'] > deepest_m:
         return f'{row["depth_m"]["max"]:.0f} m deep'
+    if row['beside_m'] is not None and abs(east_m) > row['beside_m']:
+        return f'{abs(east_m):.0f} m beside the path at the end'
     return ''
 
 
