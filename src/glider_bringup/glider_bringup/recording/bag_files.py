@@ -4,6 +4,7 @@
 
 from pathlib import Path
 
+from glider_bringup.recording.metadata import METADATA_FILE
 from glider_model.base.files import read_yaml
 from glider_model.base.settings import ConfigurationError
 
@@ -20,13 +21,13 @@ def bag_files(path: Path) -> list[Path]:
         return [path]
     if not path.is_dir():
         raise ConfigurationError(f'{path}: no such run, bag folder or .mcap file')
-    listed = _listed_files(path / 'metadata.yaml')
+    listed = _listed_files(path / METADATA_FILE)
     files = listed or sorted(path.glob('*.mcap'))
     if not files:
         raise ConfigurationError(f'{path}: no .mcap file in it')
     for file in files:
         if not file.is_file():
-            raise ConfigurationError(f'{file}: missing; {path / "metadata.yaml"} lists it')
+            raise ConfigurationError(f'{file}: missing; {path / METADATA_FILE} lists it')
     return files
 
 

@@ -28,7 +28,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema
 
 from glider_bringup.recording.bag_files import bag_files
-from glider_bringup.recording.mcap_scan import gather, scan
+from glider_bringup.recording.mcap_scan import find, gather
 from glider_bringup.recording.mcap_summary import (
     CHECKED,
     END_SIZE,
@@ -45,7 +45,8 @@ from glider_model.base.signals import TICK_NS
 _CHUNK_HEAD = struct.Struct('<QQQII')
 _LOG_TIME_AT = 6  # in a message record: channel (2), sequence (4), log time (8), publish time (8)
 _MESSAGE_HEAD = 22
-_UNREADABLE = (McapError, struct.error, UnicodeDecodeError)
+#: What is raised about a record that is none.
+UNREADABLE = (McapError, struct.error, UnicodeDecodeError)
 _NOT_TOLD = -1  #: by a zstd frame: the size of its content
 
 
@@ -99,10 +100,43 @@ class _Part(NamedTuple):
     end_ns: int
 
 
-def _span(start_ns: int, end_ns: int) -> str:
+def span(start_ns: int, end_ns: int) -> str:
     """Times from which to which messages are, in words."""
     ticks = max(0, end_ns - start_ns) // TICK_NS + 1
     return f't = {start_ns / 1e9:.1f} s to {end_ns / 1e9:.1f} s, {ticks:,} ticks'
+
+
+def unpack(data: bytes) -> bytes:
+    """Records of a chunk, decompressed and checked, from the content of its own record.
+
+    Raises
+    ------
+    ValueError
+        Saying what is wrong with it.
+    """
+    try:
+        _, _, size, checksum, name_size = _CHUNK_HEAD.unpack_from(data)
+        at = _CHUNK_HEAD.size + name_size
+        compression = data[_CHUNK_HEAD.size : at].decode()
+        packed = memoryview(data)[at + 8 :]
+        if compression == 'zstd':
+            told = zstandard.frame_content_size(packed)
+            if told not in (size, _NOT_TOLD):
+                raise ValueError(f'{told:,} bytes in place of {size:,}')
+            content = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+        elif compression == 'lz4':
+            content = lz4.frame.decompress(packed)
+        elif not compression:
+            content = bytes(packed)
+        else:
+            raise ValueError(f'unknown compression {compression!r}')
+    except (*UNREADABLE, zstandard.ZstdError, RuntimeError, MemoryError) as error:
+        raise ValueError(f'it does not decompress ({error})') from None
+    if len(content) != size:
+        raise ValueError(f'{len(content):,} bytes in place of {size:,}')
+    if checksum and zlib.crc32(content) != checksum:
+        raise ValueError('its checksum (CRC) is wrong')
+    return content
 
 
 class Bag:
@@ -175,7 +209,7 @@ class Bag:
                 break
             try:
                 self._take(number, opcode, at, length, stream, found)
-            except _UNREADABLE:
+            except UNREADABLE:
                 raise self._harmed(number, f'the record at byte {at:,} cannot be read') from None
             at = stream.seek(body + length)
         ends = fits and opcode == Opcode.DATA_END and length == 4
@@ -244,7 +278,7 @@ class Bag:
             raise self._harmed(number, 'the checksum (CRC) of its summary is wrong')
         try:
             return parse_summary(data[:-CHECKED])
-        except _UNREADABLE:
+        except UNREADABLE:
             raise self._harmed(number, 'its summary cannot be read') from None
 
     def _compare(self, number: int, summary: Summary, found: _Found) -> None:
@@ -261,7 +295,7 @@ class Bag:
             times = index.message_start_time, index.message_end_time
             part = parts.get(place)
             if place not in places or (part and (part.start_ns, part.end_ns) != times):
-                what = f'chunk {order} ({_span(*times)}) is not where it should be'
+                what = f'chunk {order} ({span(*times)}) is not where it should be'
                 raise self._harmed(number, what)
         if summary.attachments - found.attachments:
             raise self._harmed(number, 'an attachment is not where it should be')
@@ -381,27 +415,26 @@ class Bag:
     def _read(self, part: _Part) -> Batch:
         """Messages of a part in the order of the file."""
         data = np.frombuffer(self._content(part), np.uint8)
-        most = len(data) // HEAD.size + 1
-        channel, log_ns, start, size, other = (np.empty(most, np.int64) for _ in range(5))
-        messages, others = scan(data, channel, log_ns, start, size, other)
-        if messages < 0:
-            raise self._damaged(part, 'a record is longer than the chunk')
-        for at in other[:others]:
+        try:
+            found = find(data)
+        except ValueError as error:
+            raise self._damaged(part, str(error)) from None
+        for at in found.others:
             opcode, length = HEAD.unpack_from(data, at)
             body = int(at) + HEAD.size
             try:
                 self._note(part.file, opcode, data[body : body + length].tobytes())
-            except _UNREADABLE as error:
+            except UNREADABLE as error:
                 raise self._damaged(part, repr(error)) from None
-        topic = np.zeros(messages, np.int64)
-        for number in np.unique(channel[:messages]):
+        topic = np.zeros(len(found.channel), np.int64)
+        for number in np.unique(found.channel):
             if (part.file, int(number)) not in self._index:
                 raise self._damaged(part, f'messages of channel {number}, which is not defined')
-            topic[channel[:messages] == number] = self._index[part.file, int(number)]
-        times = (int(log_ns[:messages].min()), int(log_ns[:messages].max())) if messages else ()
+            topic[found.channel == number] = self._index[part.file, int(number)]
+        times = (int(found.log_ns.min()), int(found.log_ns.max())) if len(topic) else ()
         if times and times != (part.start_ns, part.end_ns):
-            raise self._damaged(part, f'its messages are of {_span(*times)}')
-        return Batch(data, topic, log_ns[:messages], start[:messages], size[:messages])
+            raise self._damaged(part, f'its messages are of {span(*times)}')
+        return Batch(data, topic, found.log_ns, found.start, found.size)
 
     def _content(self, part: _Part) -> bytes:
         """Records of a part, decompressed and checked."""
@@ -411,32 +444,13 @@ class Bag:
         if not part.number:
             return data
         try:
-            _, _, size, checksum, name_size = _CHUNK_HEAD.unpack_from(data)
-            at = _CHUNK_HEAD.size + name_size
-            compression = data[_CHUNK_HEAD.size : at].decode()
-            packed = memoryview(data)[at + 8 :]
-            if compression == 'zstd':
-                told = zstandard.frame_content_size(packed)
-                if told not in (size, _NOT_TOLD):
-                    raise self._damaged(part, f'{told:,} bytes in place of {size:,}')
-                content = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
-            elif compression == 'lz4':
-                content = lz4.frame.decompress(packed)
-            elif not compression:
-                content = bytes(packed)
-            else:
-                raise self._damaged(part, f'unknown compression {compression!r}')
-        except (*_UNREADABLE, zstandard.ZstdError, RuntimeError, MemoryError) as error:
-            raise self._damaged(part, f'it does not decompress ({error})') from None
-        if len(content) != size:
-            raise self._damaged(part, f'{len(content):,} bytes in place of {size:,}')
-        if checksum and zlib.crc32(content) != checksum:
-            raise self._damaged(part, 'its checksum (CRC) is wrong')
-        return content
+            return unpack(data)
+        except ValueError as error:
+            raise self._damaged(part, str(error)) from None
 
     def _damaged(self, part: _Part, reason: str) -> ConfigurationError:
         place = f'bytes {part.start - HEAD.size:,} to {part.start + part.length:,}'
         return ConfigurationError(
             f'{self.files[part.file]}: chunk {part.number} is damaged: {reason} ({place}, '
-            f'{_span(part.start_ns, part.end_ns)})'
+            f'{span(part.start_ns, part.end_ns)})'
         )

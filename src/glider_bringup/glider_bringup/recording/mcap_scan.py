@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The messages of a chunk, found by compiled code."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from glider_model.base.kernel import kernel
@@ -53,3 +55,29 @@ def gather(data, start, rows):
     """Fill each row with what begins at its start."""
     for i in range(rows.shape[0]):
         rows[i] = data[start[i] : start[i] + rows.shape[1]]
+
+
+class Places(NamedTuple):
+    """Where the records of a chunk are; int64 arrays."""
+
+    channel: np.ndarray  #: of each message
+    log_ns: np.ndarray  #: its log time
+    start: np.ndarray  #: where its payload begins
+    size: np.ndarray  #: of its payload
+    others: np.ndarray  #: where each of the other records begins
+
+
+def find(data: np.ndarray) -> Places:
+    """Records of a chunk, uint8[n].
+
+    Raises
+    ------
+    ValueError
+        If a record is longer than what is left.
+    """
+    channel, log_ns, start, size, other = np.empty((5, len(data) // 9 + 1), np.int64)
+    messages, others = scan(data, channel, log_ns, start, size, other)
+    if messages < 0:
+        raise ValueError('a record is longer than the chunk')
+    found = (array[:messages] for array in (channel, log_ns, start, size))
+    return Places(*found, other[:others])

@@ -58,7 +58,7 @@ class McapWriter:
         self._compressor = zstandard.ZstdCompressor(level=3)
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunk_indexes: list[ChunkIndex] = []
+        self._chunks, self._chunk_indexes = 0, bytearray()  #: their number, and their records
         self._attachment_indexes: list[AttachmentIndex] = []
         self._metadata_indexes: list[MetadataIndex] = []
         self.counts: dict[int, int] = {}
@@ -69,9 +69,7 @@ class McapWriter:
 
     def _put(self, record) -> tuple[int, int]:
         """Write a record; return its place and length in the file."""
-        builder = RecordBuilder()
-        record.write(builder)
-        data = builder.end()
+        data = _encoded(record)
         offset = self._tell()
         self._pending += data
         return offset, len(data)
@@ -94,8 +92,7 @@ class McapWriter:
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Define a message type; returns its id."""
         schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
-        self._schemas.append(schema)
-        self._put(schema)
+        self.define(schema)
         return schema.id
 
     def add_channel(self, topic: str, schema_id: int, metadata: dict[str, str]) -> int:
@@ -107,10 +104,17 @@ class McapWriter:
             metadata=metadata,
             schema_id=schema_id,
         )
-        self._channels.append(channel)
-        self.counts[channel.id] = 0
-        self._put(channel)
+        self.define(channel)
         return channel.id
+
+    def define(self, record: Schema | Channel) -> None:
+        """Define a message type or a topic under the id that it has."""
+        if isinstance(record, Channel):
+            self._channels.append(record)
+            self.counts[record.id] = 0
+        else:
+            self._schemas.append(record)
+        self._put(record)
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
         """Store a file beside the messages."""
@@ -176,6 +180,28 @@ class McapWriter:
             column = end + size
         self._chunk += rows.data
 
+    def write_chunk(
+        self, content: bytes, channel_ids: np.ndarray, stamps_ns: np.ndarray, starts: np.ndarray
+    ) -> None:
+        """Add the records of a chunk as they are, and finish it.
+
+        Parameters
+        ----------
+        content : bytes
+            Not compressed.
+        channel_ids, stamps_ns, starts : int64[n]
+            Of its messages: channel, log time, and where the payload begins.
+        """
+        self._chunk += content
+        for channel_id in np.unique(channel_ids):
+            of_it = channel_ids == channel_id
+            stamps, places = stamps_ns[of_it], starts[of_it] - _MESSAGE.size
+            self._indexes[int(channel_id)] = bytearray(
+                np.stack((stamps, places), axis=1).astype('<u8').tobytes()
+            )
+            self._note(int(channel_id), len(stamps), int(stamps.min()), int(stamps.max()))
+        self.flush()
+
     def _note(self, channel_id: int, count: int, first_ns: int, last_ns: int) -> None:
         self.counts[channel_id] += count
         if self._chunk_start_ns is None or first_ns < self._chunk_start_ns:
@@ -222,19 +248,19 @@ class McapWriter:
                 '<BQHI', Opcode.MESSAGE_INDEX, 6 + len(entries), channel_id, len(entries)
             )
             self._pending += head + entries
-        self._chunk_indexes.append(
-            ChunkIndex(
-                message_start_time=start_ns,
-                message_end_time=self._chunk_end_ns,
-                chunk_start_offset=offset,
-                chunk_length=length,
-                message_index_offsets=index_offsets,
-                message_index_length=self._tell() - index_start,
-                compression='zstd',
-                compressed_size=len(data),
-                uncompressed_size=len(self._chunk),
-            )
+        index = ChunkIndex(
+            message_start_time=start_ns,
+            message_end_time=self._chunk_end_ns,
+            chunk_start_offset=offset,
+            chunk_length=length,
+            message_index_offsets=index_offsets,
+            message_index_length=self._tell() - index_start,
+            compression='zstd',
+            compressed_size=len(data),
+            uncompressed_size=len(self._chunk),
         )
+        self._chunks += 1
+        self._chunk_indexes += _encoded(index)
         self.start_ns = start_ns if self.start_ns is None else min(self.start_ns, start_ns)
         self.end_ns = max(self.end_ns, self._chunk_end_ns)
         self._begin_chunk()
@@ -246,18 +272,14 @@ class McapWriter:
         self.flush()
         self._put(DataEnd(self._checksum))
         summary_start = self._tell()
-        summary = RecordBuilder()
-        offsets = []
+        data, offsets = bytearray(), []
         for opcode, records in self._summary().items():
-            start = summary.count
-            for record in records:
-                record.write(summary)
             if records:
-                offsets.append(SummaryOffset(opcode, summary_start + start, summary.count - start))
-        offsets_start = summary_start + summary.count
-        for offset in offsets:
-            offset.write(summary)
-        data = summary.end()
+                start = summary_start + len(data)
+                offsets.append(SummaryOffset(opcode, start, len(records)))
+            data += records
+        offsets_start = summary_start + len(data)
+        data += b''.join(map(_encoded, offsets))
         head = struct.pack('<BQQQ', Opcode.FOOTER, 20, summary_start, offsets_start)
         self._pending += data
         self._put(Footer(summary_start, offsets_start, zlib.crc32(head, zlib.crc32(data))))
@@ -267,12 +289,13 @@ class McapWriter:
             self.sync()
         self._file.close()
 
-    def _summary(self) -> dict[Opcode, list]:
+    def _summary(self) -> dict[Opcode, bytes]:
+        """Records that say what is in the file, by their kind."""
         statistics = Statistics(
             attachment_count=len(self._attachment_indexes),
             channel_count=len(self._channels),
             channel_message_counts={k: n for k, n in self.counts.items() if n},
-            chunk_count=len(self._chunk_indexes),
+            chunk_count=self._chunks,
             message_count=sum(self.counts.values()),
             message_start_time=self.start_ns or 0,
             message_end_time=self.end_ns,
@@ -280,10 +303,17 @@ class McapWriter:
             schema_count=len(self._schemas),
         )
         return {
-            Opcode.SCHEMA: self._schemas,
-            Opcode.CHANNEL: self._channels,
-            Opcode.STATISTICS: [statistics],
-            Opcode.CHUNK_INDEX: self._chunk_indexes,
-            Opcode.ATTACHMENT_INDEX: self._attachment_indexes,
-            Opcode.METADATA_INDEX: self._metadata_indexes,
+            Opcode.SCHEMA: b''.join(map(_encoded, self._schemas)),
+            Opcode.CHANNEL: b''.join(map(_encoded, self._channels)),
+            Opcode.STATISTICS: _encoded(statistics),
+            Opcode.CHUNK_INDEX: bytes(self._chunk_indexes),
+            Opcode.ATTACHMENT_INDEX: b''.join(map(_encoded, self._attachment_indexes)),
+            Opcode.METADATA_INDEX: b''.join(map(_encoded, self._metadata_indexes)),
         }
+
+
+def _encoded(record) -> bytes:
+    """Bytes of a record."""
+    builder = RecordBuilder()
+    record.write(builder)
+    return builder.end()

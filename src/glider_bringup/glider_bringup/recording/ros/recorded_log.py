@@ -249,11 +249,20 @@ class RecordedLog:
         which is not a loss: a node that ended within a tick may have let the others begin the
         next one.
         """
-        names = [topic.name for topic in _PER_TICK]
+        ticks, per_tick = self._per_tick()
+        expected = ticks if complete else ticks - 2
+        return sum(max(0, expected - count) for count in per_tick.values())
+
+    def lacking(self) -> dict[str, int]:
+        """Messages that per-tick topics have less than the one that has most, by topic."""
+        ticks, per_tick = self._per_tick()
+        return {name: ticks - count for name, count in per_tick.items() if count < ticks}
+
+    def _per_tick(self) -> tuple[int, dict[str, int]]:
+        """Messages of the topic that has most, and of each that there ought to be."""
         left_out = {*SENSORS, *BELIEFS, *LATER} - self._recorded
         if not self.counts['ground_truth/odom']:
             left_out |= {'ground_truth/odom'}
-        per_tick = [self.counts[name] for name in names if name not in left_out]
-        ticks = max(per_tick)
-        expected = ticks if complete else ticks - 2
-        return sum(max(0, expected - count) for count in per_tick)
+        names = (topic.name for topic in _PER_TICK if topic.name not in left_out)
+        counts = {name: self.counts[name] for name in names}
+        return max(counts.values()), counts

@@ -13,8 +13,15 @@ import numpy as np
 from ament_index_python.packages import get_package_share_directory
 from rclpy.qos import QoSProfile
 
-from glider_bringup.mission.disk import write_whole
 from glider_bringup.recording.mcap_writer import McapWriter
+from glider_bringup.recording.metadata import (
+    METADATA_FILE,
+    ROSBAG2,
+    FileFacts,
+    TopicFacts,
+    metadata_text,
+    write_metadata,
+)
 from glider_model.base.signals import TICK_NS
 from glider_model.ros.wire.topics import TOPICS, Topic
 
@@ -129,7 +136,7 @@ class BagWriter:
         self._folder.mkdir(parents=True, exist_ok=True)
         self._file_name = f'{name}_0.mcap'
         file = self._folder / self._file_name
-        for path in (file, self._folder / 'metadata.yaml'):
+        for path in (file, self._folder / METADATA_FILE):
             if path.exists():
                 reason = 'exists; a recording is never written over another'
                 raise FileExistsError(errno.EEXIST, reason, str(path))
@@ -203,42 +210,23 @@ class BagWriter:
         """Complete the file, and write metadata.yaml in one go."""
         self._mcap.flush()
         text = self._metadata()
-        self._mcap.add_metadata('rosbag2', {'serialized_metadata': text})
+        self._mcap.add_metadata(ROSBAG2, {'serialized_metadata': text})
         self._mcap.close(sync=self._sync != 'never')
-        lines = ''.join(f'  {line}\n' for line in text.splitlines())
-        write_whole(self._folder / 'metadata.yaml', f'rosbag2_bagfile_information:\n{lines}')
+        write_metadata(self._folder, text)
 
     def _metadata(self) -> str:
-        start_ns = self._mcap.start_ns or 0
-        duration_ns = max(0, self._mcap.end_ns - start_ns)
-        total = sum(self.counts.values())
-        topics = ''.join(self._topic_metadata(topic) for topic in self._topics)
-        return (
-            'version: 9\n'
-            'storage_identifier: mcap\n'
-            f'duration:\n  nanoseconds: {duration_ns}\n'
-            f'starting_time:\n  nanoseconds_since_epoch: {start_ns}\n'
-            f'message_count: {total}\n'
-            f'topics_with_message_count:\n{topics}'
-            'compression_format: ""\n'
-            'compression_mode: ""\n'
-            f'relative_file_paths:\n  - {self._file_name}\n'
-            f'files:\n  - path: {self._file_name}\n'
-            f'    starting_time:\n      nanoseconds_since_epoch: {start_ns}\n'
-            f'    duration:\n      nanoseconds: {duration_ns}\n'
-            f'    message_count: {total}\n'
-            'custom_data: ~\n'
-            'ros_distro: jazzy\n'
+        counts = self.counts
+        file = FileFacts(
+            self._file_name, self._mcap.start_ns or 0, self._mcap.end_ns, sum(counts.values())
         )
-
-    def _topic_metadata(self, topic: Topic) -> str:
-        profiles = qos_yaml(topic.qos).replace('\n', '\n        ')
-        return (
-            '  - topic_metadata:\n'
-            f'      name: {self._names[topic.name]}\n'
-            f'      type: {topic.type_name}\n'
-            '      serialization_format: cdr\n'
-            f'      offered_qos_profiles:\n        {profiles}\n'
-            f'      type_description_hash: {type_hash(topic.type_name)}\n'
-            f'    message_count: {self.counts[topic.name]}\n'
-        )
+        topics = [
+            TopicFacts(
+                self._names[topic.name],
+                topic.type_name,
+                qos_yaml(topic.qos),
+                type_hash(topic.type_name),
+                counts[topic.name],
+            )
+            for topic in self._topics
+        ]
+        return metadata_text([file], topics)

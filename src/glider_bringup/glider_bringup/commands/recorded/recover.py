@@ -1,0 +1,108 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider recover``: a recording whose end is missing, made whole."""
+
+import json
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from glider_bringup.console import Json, Run, counter, messages, output
+from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import TICK_S
+
+app = typer.Typer()
+
+
+@app.command(epilog='Example: ./glider recover runs/20260101-120000-current_8deg')
+def recover(
+    run: Run,
+    as_json: Json = False,
+) -> None:
+    """Make a recording whole whose end is missing, and say what is.
+
+    A recorder that was killed, or a machine without power, leaves a file without an index and no
+    metadata.yaml. Both are made from what is there; a recording that is whole is left as it is.
+    Exit code 0 in both cases, 2 where there is nothing to recover.
+    """
+    from glider_bringup.recording import recover as work
+
+    with counter('reading', None) as update:
+        done = work.recover(run, update)
+    found = {
+        'run': str(run),
+        'state': 'recovered' if done.rebuilt else 'whole',
+        'rebuilt': done.rebuilt,
+        **_ticks(run),
+        'start_s': done.start_ns / 1e9,
+        'end_s': done.end_ns / 1e9,
+        'messages': sum(done.counts.values()),
+        'topics': done.counts,
+        'dropped_bytes': done.dropped_bytes,
+        'dropped': done.dropped,
+    }
+    if as_json:
+        print(json.dumps(found))
+    else:
+        _print(found)
+
+
+def _ticks(run: Path) -> dict[str, Any]:
+    """What there is tick by tick, and what lacks; None where nobody can know."""
+    from glider_bringup.mission.planned import planned_ticks
+    from glider_bringup.mission.run_folder import scenario_of
+    from glider_bringup.recording.mcap_reader import Bag
+    from glider_bringup.recording.read_back import read_back
+    from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS
+    from glider_bringup.scoring.card import read_score
+
+    found = dict.fromkeys(('ticks', 'ticks_flown', 'ticks_planned', 'acknowledged_tick'))
+    found['lacking'] = {}
+    bag = Bag(run)
+    try:
+        with scenario_of(run, bag.attachments) as flown:
+            log = read_back(bag, flown.scenario.vehicle, [])
+            found['ticks_planned'] = planned_ticks(flown.scenario)
+    except ConfigurationError as error:  # of others, or what was flown is not known
+        messages.print(f'ticks are not counted: {error}', soft_wrap=True)
+        return found
+    found['ticks'], in_chunks = log.ticks, log.ticks - log.ticks % CHUNK_TICKS
+    found['acknowledged_tick'] = in_chunks - 1 if in_chunks else None
+    found['lacking'] = log.lacking()
+    with suppress(ConfigurationError):
+        found['ticks_flown'] = read_score(run).get('ticks')
+    return found
+
+
+def _print(found: dict[str, Any]) -> None:
+    """Print what there is, and what is missing, for a person."""
+    if found['rebuilt']:
+        output.print(f'recovered: {", ".join(found["rebuilt"])}', soft_wrap=True)
+    else:
+        output.print('whole: left as it is')
+    span = f't = {found["start_s"]:,.1f} s to {found["end_s"]:,.1f} s'
+    there = f'{found["messages"]:,} messages, {span}'
+    if found['ticks'] is not None:
+        there = f'{found["ticks"]:,} ticks, {there}'
+    output.print(f'there: {there}')
+    if found['acknowledged_tick'] is not None:
+        tick = found['acknowledged_tick']
+        output.print(f'last acknowledged tick: {tick:,} (t = {tick * TICK_S:,.1f} s)')
+    for text in _missing(found):
+        output.print(f'missing: {text}', soft_wrap=True)
+
+
+def _missing(found: dict[str, Any]) -> list[str]:
+    """What is missing, in words."""
+    missing = list(found['dropped'])
+    if missing:
+        missing[-1] += f'; {found["dropped_bytes"]:,} bytes in all'
+    missing += [f'{count:,} messages of {name}' for name, count in found['lacking'].items()]
+    for name, what in (('ticks_flown', 'that were flown'), ('ticks_planned', 'of the scenario')):
+        ticks = found[name]
+        if ticks is not None and ticks > found['ticks']:
+            missing.append(f'{ticks - found["ticks"]:,} of {ticks:,} ticks {what}')
+            break
+    return missing
