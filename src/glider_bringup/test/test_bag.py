@@ -249,6 +249,17 @@ def test_order_of_arrival_does_not_show_in_the_recording(arrivals):
     assert order.lost == 0
 
 
+def test_tick_of_which_an_event_may_be_under_way_waits_for_it():
+    written = []
+    order = TickSorter(['a'], 1, lambda *message: written.append(message[:2]))
+    for tick in range(4):
+        order.add('a', tick, b'')
+    order.write_complete(lambda stamp_ns: False, until_ns=1)
+    order.add_event('event', 2, b'')
+    order.write_complete(lambda stamp_ns: False, until_ns=3)
+    assert written == [('a', 0), ('a', 1), ('a', 2), ('event', 2), ('a', 3)]
+
+
 def test_incomplete_ticks_are_written_at_the_end_and_gaps_are_counted():
     written = []
     order = TickSorter(['a', 'b'], 10, lambda *message: written.append(message))

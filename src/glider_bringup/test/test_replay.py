@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections import defaultdict
+from pathlib import Path
 
 import pytest
 import rclpy
@@ -29,8 +30,9 @@ from glider_bringup.recording.ros.recorded_log import RecordedLog
 from glider_bringup.recording.ros.republish import plan_replay, qos_of
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS
+from glider_model.ros.lockstep import health
 from glider_model.ros.places import domain_id
-from glider_model.ros.wire.topics import TOPICS, recorded_topics
+from glider_model.ros.wire.topics import REPLAY, TOPICS, recorded_topics
 
 DEADLINE_S = 120.0
 RECORDED = {topic.full_name('/glider'): topic for topic in recorded_topics(['measured_odom'])}
@@ -176,6 +178,70 @@ def test_second_recording_at_full_speed_is_byte_identical(
     for message in read_bag(file):
         again[message.topic].append(message)
     assert again == recorded
+
+
+@pytest.fixture
+def record(start, tmp_path):
+    """Start a recorder; gives its process and the file that it will write."""
+
+    def begin(name: str) -> tuple[subprocess.Popen, Path]:
+        parameters = node_parameters(load_scenario(), record_to=tmp_path / name)
+        write_parameters(parameters, tmp_path / f'{name}.yaml')
+        process = start(*node_commands(tmp_path / f'{name}.yaml')[RECORDER])
+        return process, tmp_path / name / f'{load_scenario().name}_0.mcap'
+
+    return begin
+
+
+def test_events_that_come_late_are_recorded_with_their_tick(
+    short_run, recorded, context, record, replay, listen
+):
+    """All messages of a minute, then all its events: the file is that of a replay in order."""
+    process, usual = record('usual')
+    replayed = replay(short_run, '--rate', 'max', '--wait-for', 1, '--duration', 60)
+    _, error = replayed.communicate(timeout=DEADLINE_S)
+    assert replayed.returncode == 0, error
+    process.send_signal(signal.SIGINT)
+    assert process.wait(DEADLINE_S) == 0
+
+    process, late = record('late')
+    node = Node(REPLAY, context=context, namespace='/glider')
+    publishers = {
+        name: node.create_publisher(topic.message_type, name, topic.qos)
+        for name, topic in {**RECORDED, '/glider/told': TOPICS['told']}.items()
+    }
+    listener, acknowledged = listen(), []
+    listener.node.create_subscription(
+        TOPICS['recorded'].message_type,
+        '/glider/recorded',
+        lambda header: acknowledged.append(header.stamp.sec),
+        TOPICS['recorded'].qos,
+    )
+
+    def listen_until(condition) -> None:
+        listener.listen_until(condition, process)
+
+    listen_until(lambda: all(one.get_subscription_count() for one in publishers.values()))
+    last_ns = 600 * TICK_NS
+    kept = {n: [m for m in got if m.log_ns <= last_ns] for n, got in recorded.items()}
+    events = kept.pop('/diagnostics')
+    for name, messages in kept.items():
+        for message in messages:
+            publishers[name].publish(message.data)
+    listener.executor.spin_once(timeout_sec=1.0)
+    assert not acknowledged
+    told = health.Told(f'/glider/{REPLAY}', len(events), last_ns)
+    publishers['/glider/told'].publish(health.told_array(told))
+    listener.executor.spin_once(timeout_sec=1.0)
+    assert not acknowledged
+    assert len(events) > 3
+    for message in events:
+        publishers['/diagnostics'].publish(message.data)
+    listen_until(lambda: acknowledged and acknowledged[-1] >= 51)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(DEADLINE_S) == 0
+    node.destroy_node()
+    assert late.read_bytes() == usual.read_bytes()
 
 
 @pytest.mark.parametrize('sync', ['end', 'chunk'])

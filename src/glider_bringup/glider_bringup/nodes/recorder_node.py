@@ -7,6 +7,7 @@ import signal
 import struct
 import sys
 import time
+from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 from typing import Literal
@@ -20,7 +21,7 @@ from glider_bringup.recording.tick_sorter import TickSorter
 from glider_model.base.exits import EXIT_FAILED
 from glider_model.base.settings import ConfigurationError, Settings
 from glider_model.base.signals import TICK_NS
-from glider_model.base.wiring import BELIEFS, SENSORS
+from glider_model.base.wiring import BELIEFS, SENSORS, WIRING
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.executor import take, take_with_info
 from glider_model.ros.lockstep.inputs import Input
@@ -72,18 +73,26 @@ class RecorderNode(TickNode):
             )
         except OSError as error:
             raise ConfigurationError(f'{error.filename}: {error.strerror}') from None
-        self.order = TickSorter(per_tick, TICK_NS, self.write)
+        self.order = TickSorter(per_tick, TICK_NS, self.bag.write)
         self.recorded_ns = -TICK_NS  #: newest tick that outlives this process
-        self.has_path = False
-        self.stage, self.last_odom, self.depth_m = '', b'', 0.0
+        self.has_path = self.replayed = False
+        self.stage, self.last_odom, self.newest_ns, self.depth_m = '', b'', 0, 0.0
+        self.end: tuple[int, bytes] | None = None  #: what the plant said last
+        self.heard: Counter[str] = Counter()  #: events by the node that told of them
+        self.settled_ns: dict[str, int] = {}  #: newest tick of which a node's events are all here
         self.final_ns: int | None = None
         self.stopped = False
         self.begun = False
         self.progress_s = 0.0
+        place = self.get_namespace().rstrip('/')
+        self.replay = f'{place}/{topics.REPLAY}'
+        self.tellers = [f'{place}/{wired.node}' for wired in WIRING]
         for name in per_tick:
             self.add_input(name)
         self._subscription(TOPICS['path'], self.on_path, gated=False)
         self.events = self._subscription(TOPICS['/diagnostics'], self.on_event, raw=False)
+        self.counts = self._subscription(TOPICS['told'], self.on_count, raw=False)
+        self.counted: dict[str, health.Told] = {}
         self.recorded = self._publisher(TOPICS['recorded'])
         self.outputs['recorded'] = (TOPICS['recorded'], self.recorded)
         signal.signal(signal.SIGINT, self.on_signal)
@@ -114,9 +123,15 @@ class RecorderNode(TickNode):
         return missing or ([] if self.has_path else ['guidance_node has not published path'])
 
     def is_replayed(self) -> bool:
-        """Whether what comes is a recording, published again."""
-        publishers = self.get_publishers_info_by_topic('odom')
-        return any(info.node_name == topics.REPLAY for info in publishers)
+        """Whether what comes is a recording, published again.
+
+        In lockstep that is found out once, before the first tick: a replay that has said
+        everything may be gone while its last messages are still to be taken.
+        """
+        if not (self.running and self.ticks.lockstep):
+            publishers = self.get_publishers_info_by_topic('odom')
+            self.replayed = any(info.node_name == topics.REPLAY for info in publishers)
+        return self.replayed
 
     def on_ready(self) -> None:
         """Forget what came before this run began: it is somebody else's."""
@@ -133,11 +148,21 @@ class RecorderNode(TickNode):
         self.order.add_event('path', sec * 1_000_000_000 + nanosec, raw)
         self.has_path = True
 
+    def on_count(self, array) -> None:
+        """Learn how many events a node has told of; not from the node of a second glider."""
+        told = health.told_in(array)
+        report = self.reports.get(told.node.rpartition('/')[2]) if told else None
+        if told and (told.node == self.replay or (report and report.process == told.process)):
+            self.counted[told.node] = told
+
     def on_event(self, array) -> None:
         """Keep what happens to this glider; the end of a flight is kept by `on_report`."""
+        self.heard.update([*(status.name for status in array.status[:1]), self.replay])
         if not health.concerns(array, self.get_namespace()):
             return
-        if health.end_of_run(array) and not self.is_replayed():
+        if health.end_of_run(array):
+            if self.is_replayed():
+                self.end = health.stamp_of(array), to_cdr(array)
             return
         for status in array.status:
             for pair in status.values:
@@ -152,8 +177,7 @@ class RecorderNode(TickNode):
             self.final_ns = report.stamp_ns if report.phase == health.FINISHED else -1
             name = f'{self.get_namespace().rstrip("/")}/{report.node}'
             named = report._replace(node=name, process='')
-            array = to_cdr(health.report_array(named))
-            self.order.add_event('/diagnostics', report.stamp_ns, array)
+            self.end = report.stamp_ns, to_cdr(health.report_array(named))
 
     def keep(self, item: Input, raw: bytes, info: dict) -> None:
         """Keep a message until its tick is complete.
@@ -175,14 +199,17 @@ class RecorderNode(TickNode):
         if stamp_ns > item.stamp_ns or not self.ticks.lockstep:
             item.stamp_ns = stamp_ns
             self.order.add(item.topic.name, stamp_ns, raw)
+            if item.topic.name == 'odom':
+                self.last_odom, self.newest_ns = raw, stamp_ns
 
     def drain(self) -> None:
         """Take and write whatever has come; end when the run is over and all of it is here."""
         for item in self.inputs if self.running else ():
             while (taken := take_with_info(item.subscription)) is not None:
                 self.keep(item, *taken)
-        while (array := take(self.events)) is not None:
-            self.on_event(array)
+        for subscription, hear in ((self.counts, self.on_count), (self.events, self.on_event)):
+            while (array := take(subscription)) is not None:
+                hear(array)
         try:
             self.save()
         except DiskError as error:
@@ -197,8 +224,16 @@ class RecorderNode(TickNode):
         if not self.ticks.lockstep:
             self.order.write_rest()
             self.bag.flush()
-        elif self.order.write_complete(self.end_tick):
+        elif self.order.write_complete(self.end_tick, self.whole_ns()):
             self.publish_recorded()
+
+    def whole_ns(self) -> int:
+        """Newest tick of which no event is under way any more: all who tell have counted them."""
+        for told in self.counted.values():
+            if self.heard[told.node] >= told.events:
+                self.settled_ns[told.node] = told.stamp_ns
+        tellers = [self.replay] if self.is_replayed() else self.tellers
+        return min(self.settled_ns.get(teller, -TICK_NS) for teller in tellers)
 
     def end_tick(self, stamp_ns: int) -> bool:
         """Say that a tick is complete; whether all up to it can be acknowledged."""
@@ -206,12 +241,6 @@ class RecorderNode(TickNode):
             return False
         self.recorded_ns = stamp_ns
         return True
-
-    def write(self, name: str, stamp_ns: int, raw: bytes) -> None:
-        """Write one message, in the order that the recording shall have."""
-        self.bag.write(name, stamp_ns, raw)
-        if name == 'odom':
-            self.last_odom = raw
 
     def publish_recorded(self) -> None:
         """Let the plant go on."""
@@ -228,8 +257,8 @@ class RecorderNode(TickNode):
             if self.last_odom:
                 self.depth_m = -TOPICS['odom'].codec.decode(self.last_odom)[1][2]
         line = {
-            'tick': self.order.written_ns // TICK_NS,
-            't_s': self.order.written_ns / 1e9,
+            'tick': self.newest_ns // TICK_NS,
+            't_s': self.newest_ns / 1e9,
             'depth_m': self.depth_m,
             'stage': self.stage,
             'messages': sum(self.bag.counts.values()),
@@ -246,6 +275,8 @@ class RecorderNode(TickNode):
         """Write what is left, and complete the folder."""
         try:
             self.order.write_rest()
+            if self.end:
+                self.bag.write('/diagnostics', *self.end)
             self.bag.close()
         except DiskError as error:
             raise Stop(EXIT_FAILED, str(error)) from None

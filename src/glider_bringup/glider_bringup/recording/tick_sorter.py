@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Brings messages that arrive topic by topic into the order of a recording: tick by tick."""
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterable
 
@@ -46,13 +47,15 @@ class TickSorter:
         """Take a message that belongs to a tick, but does not come with every tick."""
         self._events.append((stamp_ns, topic, payload))
 
-    def write_complete(self, end_tick: Callable[[int], bool]) -> bool:
-        """Hand on every tick that is complete.
+    def write_complete(self, end_tick: Callable[[int], bool], until_ns: float = math.inf) -> bool:
+        """Hand on every tick that is complete, with its events.
 
         Parameters
         ----------
         end_tick : callable
             Called with the stamp after each tick; says whether it is on disk.
+        until_ns : float
+            Newest tick of which no event is under way any more.
 
         Returns
         -------
@@ -60,7 +63,7 @@ class TickSorter:
             Whether anything went to disk.
         """
         on_disk = False
-        while all(self._queues.values()):
+        while all(self._queues.values()) and self._next_ns() <= until_ns:
             self._write_tick()
             on_disk = end_tick(self.written_ns) or on_disk
         return on_disk
@@ -71,8 +74,11 @@ class TickSorter:
             self._write_tick()
         self._write_events()
 
+    def _next_ns(self) -> int:
+        return min(queue[0][0] for queue in self._queues.values() if queue)
+
     def _write_tick(self) -> None:
-        stamp_ns = min(queue[0][0] for queue in self._queues.values() if queue)
+        stamp_ns = self._next_ns()
         for topic, queue in self._queues.items():
             while queue and queue[0][0] == stamp_ns:
                 self._write(topic, stamp_ns, queue.popleft()[1])

@@ -21,10 +21,13 @@ from glider_model.base.files import parse_yaml
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS
 from glider_model.base.wiring import present
+from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.clock import MAX_TICKS_AHEAD
 from glider_model.ros.lockstep.executor import take
+from glider_model.ros.lockstep.node import COUNT_TICKS
 from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_model.ros.wire import topics
+from glider_model.ros.wire.codec import to_cdr
 from glider_model.ros.wire.topics import TOPICS
 
 #: Name that rclpy gives to a node of which it knows the endpoints only.
@@ -228,11 +231,15 @@ class _Output:
 
     def wait(self) -> None:
         """Wait until every subscriber has what was published."""
-        while self._reliable and not self.publisher.wait_for_all_acked(
-            Duration(seconds=_PATIENCE_S)
-        ):
-            pass
+        if self._reliable:
+            _wait_for_acks(self.publisher)
         self._on_the_way = 0
+
+
+def _wait_for_acks(publisher) -> None:
+    """Wait until every subscriber has what was published; Ctrl-C is heard."""
+    while not publisher.wait_for_all_acked(Duration(seconds=_PATIENCE_S)):
+        pass
 
 
 class _Brake:
@@ -277,6 +284,37 @@ class _Brake:
         )
 
 
+class _Count:
+    """Tells a recorder in lockstep how many events there were, as the nodes do by themselves."""
+
+    def __init__(self, node: Node, plan: Plan) -> None:
+        topic, self._name = TOPICS['told'], _join(plan.namespace, topics.REPLAY)
+        self._events_on = {i for i, name in plan.names.items() if name == '/diagnostics'}
+        self.publisher = node.create_publisher(
+            topic.message_type, topic.full_name(plan.namespace), topic.qos
+        )
+        self._events, self._newest_ns, self._told_ns = 0, -TICK_NS, -TICK_NS
+
+    def add(self, index: int) -> None:
+        """Count a message of a topic, given by its index in the bag."""
+        self._events += index in self._events_on
+
+    def tell_before(self, log_ns: int) -> None:
+        """Tell now and then, when a tick is over."""
+        if (
+            log_ns != self._newest_ns
+            and abs(self._newest_ns - self._told_ns) >= COUNT_TICKS * TICK_NS
+        ):
+            self.tell()
+        self._newest_ns = log_ns
+
+    def tell(self) -> None:
+        """Say how many events there were up to what was published last."""
+        self._told_ns = self._newest_ns
+        told = health.Told(self._name, self._events, self._newest_ns)
+        self.publisher.publish(to_cdr(health.told_array(told)))
+
+
 class Replay:
     """Publishers for what is to be replayed. Use it as a context.
 
@@ -304,6 +342,7 @@ class Replay:
                     clock.message_type, clock.name, clock.qos
                 )
             self._clock_ns = -TICK_NS
+            self._count = _Count(self._node, plan)
             self._brake = _Brake(self._node, plan)
         except BaseException:
             rclpy.shutdown()
@@ -346,14 +385,18 @@ class Replay:
             if math.isfinite(self._rate):
                 self._sleep_until(began_s + passed_s / self._rate, passed_s, progress)
             self._brake.wait(log_ns)
+            self._count.tell_before(log_ns)
             self._tell_time(log_ns)
             self._outputs[index].publish(raw)
+            self._count.add(index)
             now_s = time.monotonic()
             if now_s - shown_s > _PATIENCE_S:
                 shown_s = now_s
                 progress(passed_s)
+        self._count.tell()
         for output in self._outputs.values():
             output.wait()
+        _wait_for_acks(self._count.publisher)
         progress(span_s)
         counts = {output.name: output.count for output in self._outputs.values()}
         return Played(counts, time.monotonic() - began_s)

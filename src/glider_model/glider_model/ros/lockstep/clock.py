@@ -151,6 +151,7 @@ class ClockNode(TickNode):
                 self.get_fully_qualified_name(), health.FINISHED, health.COMPLETE, stamp_ns
             )
             self.publish_event(health.report_array(report))
+            self.count_events(stamp_ns)
             self.report(health.FINISHED, health.COMPLETE, stamp_ns=stamp_ns)
 
     def _on_cycle(self) -> None:

@@ -65,6 +65,32 @@ def report_array(report: Report) -> DiagnosticArray:
     return array
 
 
+class Told(NamedTuple):
+    """How many events a node has told of up to a tick: without them a recording is not whole."""
+
+    node: str  #: full name
+    events: int  #: since it was started
+    stamp_ns: int
+    process: str = ''
+
+
+def told_array(told: Told) -> DiagnosticArray:
+    """Message that carries ``told``."""
+    array = status_array(told.stamp_ns, told.node, OK, '', {'events': told.events})
+    array.status[0].hardware_id = told.process
+    return array
+
+
+def told_in(array: DiagnosticArray) -> Told | None:
+    """What a message carries; None if it is of somebody else."""
+    try:
+        (status,) = array.status
+        (pair,) = status.values
+        return Told(status.name, int(pair.value), stamp_of(array), status.hardware_id)
+    except ValueError:
+        return None
+
+
 def stamp_of(array: DiagnosticArray) -> int:
     """Stamp (ns) of the tick that a message is about."""
     return array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec

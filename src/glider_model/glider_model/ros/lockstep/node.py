@@ -35,6 +35,8 @@ from glider_model.ros.wire.codec import MessageError, NotFiniteFieldError, to_cd
 from glider_model.ros.wire.topics import TOPICS, Topic, topic_of
 
 _STARTUP_PERIOD_S = 0.03
+#: A node in lockstep says after so many ticks how many events it has told of.
+COUNT_TICKS = 64
 #: Who starts a node by hand is told what it waits for, after this time and then this often (s).
 _PATIENCE_S, _REMIND_S = 10.0, 20.0
 _QUIET_PUBLISHER = PublisherEventCallbacks(use_default_callbacks=False)
@@ -88,6 +90,7 @@ class TickNode(Node):
         events, reports = TOPICS['/diagnostics'], TOPICS['lockstep']
         self._events, self._reports = self._publisher(events), self._publisher(reports)
         self.outputs[events.name] = (events, self._events)
+        self._event_counts, self.events_told = self._publisher(TOPICS['told']), 0
         self._reports_in = self._subscription(reports, self._on_reports, raw=False)
         self.gate.awaited.add(self._reports_in)
         self._awaited = None
@@ -159,7 +162,14 @@ class TickNode(Node):
 
     def publish_event(self, array) -> None:
         """Put a DiagnosticArray on /diagnostics."""
+        self.events_told += 1
         self._events.publish(to_cdr(array))
+
+    def count_events(self, stamp_ns: int) -> None:
+        """Tell the recorder how many events there were up to a tick, so that it has them all."""
+        name = self.get_fully_qualified_name()
+        told = health.Told(name, self.events_told, stamp_ns, self.process)
+        self._event_counts.publish(to_cdr(health.told_array(told)))
 
     def report(self, phase: str, message: str = '', **fields) -> None:
         """Tell the peers how this node is, and everybody if it is not well."""
@@ -184,6 +194,7 @@ class TickNode(Node):
             raise Stop(0)
         if report.node == topics.PLANT and report.phase == health.FINISHED:
             self.over_since_s = time.monotonic()
+            self.count_events(report.stamp_ns)
             self.report(health.FINISHED, stamp_ns=report.stamp_ns)
         if self.over_since_s is not None and self.may_leave():
             raise Stop(0)
@@ -302,6 +313,8 @@ class TickNode(Node):
                     self._await(item)
                     return
             self.step(self._due_ns, *[item.values for item in self.inputs])
+            if not (self._due_ns // TICK_NS + 1) % COUNT_TICKS:
+                self.count_events(self._due_ns)
             self._due_ns += TICK_NS
 
     def _await(self, item: Input) -> None:

@@ -99,6 +99,7 @@ TOPICS = {
         Topic('path', Path, GUIDANCE, qos=qos.LATCHED),
         Topic('/diagnostics', DiagnosticArray, 'all', qos=qos.EVENTS),
         Topic('lockstep', DiagnosticArray, 'all', qos=qos.EVENTS, recorded=False),
+        Topic('told', DiagnosticArray, 'all', qos=qos.EVENTS, recorded=False),
         Topic('recorded', Header, RECORDER, (PLANT,), recorded=False),
     )
 }
