@@ -12,7 +12,12 @@ setup(
     version='0.1.0',
     packages=find_packages(exclude=['test']),
     package_data={
-        package_name: ['showing/web/*', 'mission/scenarios/*', 'studies/sweep/sweeps/*']
+        package_name: [
+            'mission/scenarios/*',
+            'nodes/*.xml',
+            'showing/web/*',
+            'studies/sweep/sweeps/*',
+        ]
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),

@@ -14,7 +14,7 @@ from glider_model.base.exits import EXIT_FAILED
 
 app = typer.Typer()
 #: Doors, each a module of `glider_bringup.fuzzing`, with the cases tried by default.
-COUNTS = {'files': 1000, 'lines': 200, 'messages': 1000, 'bags': 500, 'flights': 500}
+COUNTS = {'files': 1000, 'lines': 200, 'messages': 1000, 'bags': 500, 'flights': 500, 'kills': 18}
 Door = Literal[tuple(COUNTS)]
 
 
@@ -37,7 +37,7 @@ def fuzz(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Try the doors of the stack with mutated files, command lines, messages, bags and flights.
+    """Try the doors of the stack: mutated files, command lines, messages, bags, flights, kills.
 
     Counts tracebacks, hangs (over 10 s) and wrong results given as good ones; exit code 1 if there
     is any. The same seed tries the same cases.

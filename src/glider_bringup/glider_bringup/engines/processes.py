@@ -154,6 +154,32 @@ class _Process:
         return f'{self.name} ended with exit code {code}{tail}'
 
 
+class _Janitor:
+    """The process that tidies up after the nodes, also when this one is killed with them."""
+
+    def __init__(self) -> None:
+        self._popen = subprocess.Popen(
+            [sys.executable, '-IS', str(Path(__file__).with_name('janitor.py'))],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
+        self._popen.wait()  # it has made itself a process of nobody
+
+    def watch(self, pid: int) -> None:
+        """Let it tidy up after a process."""
+        with suppress(OSError):  # it was killed, which must not end the run
+            self._popen.stdin.write(b'%d\n' % pid)
+            self._popen.stdin.flush()
+
+    def finish(self) -> None:
+        """Let it tidy up now, and wait until it has."""
+        with suppress(OSError):
+            self._popen.stdin.close()
+        self._popen.stdout.read()  # which ends when the janitor does
+        self._popen.stdout.close()
+
+
 class _Run:
     """The processes of one run, their output, and the order to stop."""
 
@@ -166,11 +192,13 @@ class _Run:
         self.first_tick_s: float | None = None
         self.progress: dict[str, Any] = {}
         self.processes: dict[str, _Process] = {}
+        self._janitor = _Janitor()
 
     def start(self, commands: Mapping[str, Sequence[str]], environment: dict[str, str]) -> None:
         """Start a process per node."""
         for name, command in commands.items():
             process = _Process(name, command, environment)
+            self._janitor.watch(process.popen.pid)
             self.processes[name] = process
             for pipe in (process.popen.stdout, process.popen.stderr):
                 os.set_blocking(pipe.fileno(), False)
@@ -282,6 +310,7 @@ class _Run:
             process.popen.stdout.close()
             process.popen.stderr.close()
         self._selector.close()
+        self._janitor.finish()
 
 
 def _print_log(line: str) -> None:

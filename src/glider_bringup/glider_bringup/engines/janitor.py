@@ -1,0 +1,95 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Removes what processes that were killed have left in shared memory.
+
+A process that gets SIGKILL cannot tidy up, and whoever started it may be killed with it. This
+program stands outside of their tree. It is told process ids, line by line on standard input, and
+notes which segments of Fast DDS each of them has mapped. When the input ends, because whoever
+started it is through with the run or is no more, it waits until the processes are gone and removes
+those of the segments that nobody has any more. It needs the standard library only.
+"""
+
+import fcntl
+import os
+import select
+import sys
+import time
+from contextlib import suppress
+
+SHARED_MEMORY, PREFIX = '/dev/shm', 'fastrtps_'
+#: How often it looks (s): as long as segments are made, and once nothing is new for this long.
+_OFTEN_S, _SELDOM_S, _SETTLED_S = 0.2, 5.0, 3.0
+#: How long it waits for processes to be gone (s): a recorder may complete its file.
+_PATIENCE_S = 30.0
+
+
+def mapped(pid: int) -> set[str]:
+    """Names of the segments that a process has mapped; none if it is gone or somebody else's."""
+    found = set()
+    with suppress(OSError), open(f'/proc/{pid}/maps', encoding='utf-8', errors='replace') as maps:
+        for line in maps:
+            folder, _, name = line.rstrip('\n').partition(f'{SHARED_MEMORY}/')
+            if folder and name.startswith(PREFIX):
+                found.add(name.removesuffix(' (deleted)'))
+    return found
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process is there and no zombie."""
+    try:
+        with open(f'/proc/{pid}/stat', encoding='utf-8', errors='replace') as stat:
+            return stat.read().rpartition(')')[2].split()[0] not in 'ZX'
+    except OSError:
+        return False
+
+
+def is_locked(name: str) -> bool:
+    """Whether somebody, maybe in another container, holds a lock of a segment."""
+    for ending in ('_el', '_sl'):
+        with suppress(FileNotFoundError), open(f'{SHARED_MEMORY}/{name}{ending}', 'rb') as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                return True
+    return False
+
+
+def remove(names: set[str]) -> None:
+    """Remove those of the segments that nobody has."""
+    pids = [int(name) for name in os.listdir('/proc') if name.isdecimal()]
+    for name in names.difference(*map(mapped, pids)):
+        if is_locked(name):
+            continue
+        for file in (name, f'{name}_el', f'{name}_sl', f'sem.{name}_mutex'):
+            with suppress(OSError):
+                os.unlink(f'{SHARED_MEMORY}/{file}')
+
+
+def main() -> None:
+    """Watch over processes until the input ends, then tidy up."""
+    if os.fork():
+        os._exit(0)
+    os.setsid()
+    pids, names, rest = set(), set(), b''
+    new_s = time.monotonic()
+    while True:
+        is_settled = time.monotonic() - new_s > _SETTLED_S
+        ready, _, _ = select.select([0], [], [], _SELDOM_S if is_settled else _OFTEN_S)
+        data = os.read(0, 4096) if ready else None
+        if data == b'':
+            break
+        *lines, rest = (rest + (data or b'')).split(b'\n')
+        before = len(pids) + len(names)
+        pids.update(map(int, lines))
+        names.update(*map(mapped, pids))
+        if len(pids) + len(names) > before:
+            new_s = time.monotonic()
+    deadline_s = time.monotonic() + _PATIENCE_S
+    while any(map(is_alive, pids)) and time.monotonic() < deadline_s:
+        names.update(*map(mapped, pids))
+        time.sleep(_OFTEN_S)
+    remove(names)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

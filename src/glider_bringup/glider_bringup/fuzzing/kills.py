@@ -1,0 +1,164 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Door ``kills``: SIGKILL to a process of a flight over nodes, to its parent, to all at once.
+
+Each case is a flight of its own, with the next victim in turn, at a tick that is drawn. A hang is
+a process that is still there 10 s later. What counts as wrong: a node that is not named, a segment
+of shared memory that is left, an acknowledged tick that cannot be read after `recover`.
+"""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from glider_bringup.engines.janitor import SHARED_MEMORY, is_alive, mapped
+from glider_bringup.engines.processes import MODULES
+from glider_bringup.fuzzing.counts import HANG_S, Counter, Counts, Tell
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.nodes.flight_listener import Heard, flight_heard
+from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.read_back import read_back
+from glider_bringup.recording.recover import recover
+from glider_model.base.signals import TICK_S
+from glider_model.ros.places import domain_id
+
+SCENARIO = 'current_8deg'
+#: Ticks of a flight; the last of them are spared, so that it is not over before the kill.
+TICKS, SPARED = 6000, 2000
+PARENT, ALL = 'parent', 'all at once'
+VICTIMS = (*MODULES, PARENT, ALL)
+#: Nodes of a flight tick within this time (s).
+_START_S = 120.0
+
+
+class _Flight(NamedTuple):
+    """A flight that is under way."""
+
+    parent: subprocess.Popen
+    folder: Path
+    pids: dict[str, int]  #: of the nodes
+
+
+def fuzz(seed: int, count: int, tell: Tell) -> Counts:
+    """Fly and kill; see `glider_bringup.commands.fuzz`."""
+    found = Counter(tell)
+    for i in range(count):
+        victim = VICTIMS[i % len(VICTIMS)]
+        tick = random.Random(f'{seed} {i}').randrange(TICKS - SPARED)
+        with tempfile.TemporaryDirectory() as scratch, domain_id() as domain:
+            try:
+                outcome = _case(victim, tick, Path(scratch) / 'run', domain)
+            except Exception as error:
+                outcome = 'tracebacks', f'{type(error).__name__}: {error}'
+        found.add(f'seed {seed}, {victim} at tick {tick}', *outcome)
+    return found.result()
+
+
+def _case(victim: str, tick: int, folder: Path, domain: int) -> tuple[str, str]:
+    """What comes of one flight."""
+    with flight_heard(domain) as heard, _flight(folder, domain) as parent:
+        if not _wait(lambda: heard.take().tick >= tick or parent.poll() is not None, _START_S):
+            return 'hangs', f'tick {heard.tick} after {_START_S:g} s'
+        flight = _Flight(parent, folder, _nodes(parent.pid))
+        segments = set().union(*map(mapped, flight.pids.values()))
+        if len(flight.pids) < len(MODULES):
+            return 'wrong', f'it was over at tick {heard.tick}, before the kill'
+        for pid in _victims(flight, victim):
+            with suppress(ProcessLookupError):  # who goes with its parent may be gone
+                os.kill(pid, signal.SIGKILL)
+        everybody = [*flight.pids.values(), parent.pid]
+        ended = _wait(lambda: not any(map(is_alive, everybody)), HANG_S)
+        if not ended:
+            left = [name for name, pid in flight.pids.items() if is_alive(pid)]
+            return 'hangs', f'{", ".join(left) or PARENT} still there after {HANG_S:g} s'
+        gone = _wait(
+            lambda: not any(os.path.exists(f'{SHARED_MEMORY}/{s}') for s in segments), 5.0
+        )
+        if not gone:
+            return 'wrong', 'shared memory is left'
+        return _judge(flight, victim, heard.take())
+
+
+def _victims(flight: _Flight, victim: str) -> list[int]:
+    if victim == ALL:
+        return [flight.parent.pid, *flight.pids.values()]
+    return [flight.parent.pid if victim == PARENT else flight.pids[victim]]
+
+
+def _judge(flight: _Flight, victim: str, heard: Heard) -> tuple[str, str]:
+    """Whether the victim is named, and every tick that was acknowledged is there."""
+    out, error = flight.parent.communicate()
+    if 'Traceback' in error:
+        return 'tracebacks', error[-500:]
+    if victim in MODULES:
+        if flight.parent.returncode != 1:
+            return 'wrong', f'exit code {flight.parent.returncode}'
+        reason = json.loads(out)['reason']
+        if f'{victim} was killed by SIGKILL' not in reason:
+            return 'wrong', f'the reason is {reason!r}'
+    recover(flight.folder)
+    bag = Bag(flight.folder)
+    log = read_back(bag, load_scenario(str(flight.folder / 'scenario.yaml')).vehicle, [])
+    if bag.cut or log.lost(complete=False):
+        return 'wrong', f'{log.lost(complete=False)} messages lost {bag.cut}'
+    if log.ticks <= heard.acknowledged:
+        return 'wrong', f'{log.ticks} ticks are there, {heard.acknowledged} was acknowledged'
+    return '', ''
+
+
+# ------------------------------------------------------------------------------------ processes
+
+
+@contextmanager
+def _flight(folder: Path, domain: int) -> Iterator[subprocess.Popen]:
+    """A flight over nodes, by the command line; whatever is left of it is killed."""
+    process = subprocess.Popen(
+        [
+            *(sys.executable, '-m', 'glider_bringup.cli', 'run', SCENARIO, '--json'),
+            *('--duration', str(TICKS * TICK_S), '--no-report', '--out', str(folder)),
+        ],
+        env={**os.environ, 'ROS_DOMAIN_ID': str(domain)},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        for pid in [*_nodes(process.pid).values(), process.pid]:
+            if process.poll() is None:
+                os.kill(pid, signal.SIGKILL)
+        process.communicate()
+
+
+def _nodes(parent: int) -> dict[str, int]:
+    """Process ids of the nodes that a process has started."""
+    found, names = {}, {module: name for name, module in MODULES.items()}
+    try:
+        children = Path(f'/proc/{parent}/task/{parent}/children').read_text(encoding='utf-8')
+        for pid in map(int, children.split()):
+            words = Path(f'/proc/{pid}/cmdline').read_bytes().decode(errors='replace').split('\0')
+            found |= {names[word]: pid for word in words if word in names and is_alive(pid)}
+    except (FileNotFoundError, ProcessLookupError):
+        pass
+    return found
+
+
+def _wait(condition, seconds: float) -> bool:
+    """Wait until a condition holds; whether it does in time."""
+    deadline_s = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > deadline_s:
+            return False
+        time.sleep(0.002)
+    return True

@@ -1,0 +1,101 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider fuzz --only kills``, in little; and that the janitor tidies up after whom it saw."""
+
+import mmap
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from glider_bringup.engines import processes
+from glider_bringup.engines.janitor import SHARED_MEMORY, mapped
+from glider_bringup.fuzzing import kills
+
+#: A process that maps a segment as Fast DDS does, says so and waits.
+MAP = """
+import mmap, os, sys, time
+file = os.open(sys.argv[1], os.O_RDWR | os.O_CREAT)
+os.truncate(file, 4096)
+segment = mmap.mmap(file, 4096)
+print('mapped', flush=True)
+time.sleep(600)
+"""
+#: A runner: it lets the janitor watch over a process, and waits.
+WATCH = """
+import sys, time
+from glider_bringup.engines.processes import _Janitor
+janitor = _Janitor()
+janitor.watch(int(sys.argv[1]))
+print('watched', flush=True)
+time.sleep(600)
+"""
+
+
+def test_killed_flights_end_named_and_every_acknowledged_tick_can_be_read(monkeypatch):
+    monkeypatch.setattr(kills, 'VICTIMS', ('guidance_node', 'recorder_node', kills.ALL))
+    found = kills.fuzz(7, 3, lambda tried: None)
+    assert (found.tried, found.examples) == (3, ())
+    assert found.clean
+
+
+@pytest.fixture
+def segment():
+    """Path of a segment that is not there yet; it does not outlive the test."""
+    path = f'{SHARED_MEMORY}/fastrtps_test_{os.getpid()}'
+    yield path
+    for ending in ('', '_el'):
+        if os.path.exists(path + ending):
+            os.unlink(path + ending)
+
+
+@pytest.fixture
+def start():
+    """Start a process that says one word when it is ready; it does not outlive the test."""
+    started = []
+
+    def run(source: str, argument: str) -> subprocess.Popen:
+        command = [sys.executable, '-c', source, argument]
+        started.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
+        assert started[-1].stdout.readline()
+        return started[-1]
+
+    yield run
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def wait_until_gone(path: str) -> None:
+    deadline_s = time.monotonic() + 10.0
+    while os.path.exists(path):
+        assert time.monotonic() < deadline_s
+        time.sleep(0.02)
+
+
+def test_segment_of_processes_that_were_killed_with_their_runner_is_removed(segment, start):
+    process = start(MAP, segment)
+    open(f'{segment}_el', 'w').close()
+    runner = start(WATCH, str(process.pid))
+    assert os.path.basename(segment) in mapped(process.pid)
+    time.sleep(1.0)  # the janitor looks five times a second
+    for one in (runner, process):
+        one.send_signal(signal.SIGKILL)
+        one.wait()
+    wait_until_gone(segment)
+    wait_until_gone(f'{segment}_el')
+
+
+def test_segment_that_somebody_else_has_stays(segment, start):
+    process = start(MAP, segment)
+    with open(segment, 'r+b') as file, mmap.mmap(file.fileno(), 0):
+        janitor = processes._Janitor()
+        janitor.watch(process.pid)
+        time.sleep(1.0)
+        process.kill()
+        process.wait()
+        janitor.finish()
+        assert os.path.exists(segment)
