@@ -10,8 +10,8 @@ import sys
 from collections.abc import Callable
 
 from nodes import fly_once
-from nodes_memory import memory_mb
 
+from glider_bringup.engines.memory import memory_mb
 from glider_bringup.engines.processes import AUTOPILOT, ON_BOARD
 
 #: Simulated time (s) of the flights of what is on board.

@@ -6,21 +6,16 @@
 """
 
 import json
-import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
-import numpy as np
 from nodes import fly_over_topics
 
-from glider_bringup.engines.processes import AUTOPILOT, AUTOPILOT_MODULE, MODULES
+from glider_bringup.engines.memory import growth_mb_per_h, memory_mb
+from glider_bringup.engines.processes import MODULES
 from glider_model.base.signals import TICK_S
 
 HOURS, MISSION_HOURS = 1.0, 30.0
-#: Part of the flight before which memory may still grow: buffers fill, caches warm up.
-_SETTLED = 0.2
-
 MEANING = {
     'nodes_memory_h': 'simulated time of the flight (h)',
     **{f'{name}_rss_mb': f'resident memory of {name} at the end (MB)' for name in MODULES},
@@ -39,7 +34,7 @@ def measure(progress: Callable[[str], None], hours: float = HOURS) -> dict:
 
     progress(f'{hours:g} h over topics')
     fly_over_topics(hours * 3600.0, sample)
-    growth = {name: _growth(np.array(taken), hours) for name, taken in samples.items()}
+    growth = {name: growth_mb_per_h(taken) for name, taken in samples.items()}
     last = {name: taken[-1][1] for name, taken in samples.items()}
     return {
         'nodes_memory_h': hours,
@@ -49,30 +44,6 @@ def measure(progress: Callable[[str], None], hours: float = HOURS) -> dict:
             last[name] + max(0.0, growth[name]) * (MISSION_HOURS - hours) for name in MODULES
         ),
     }
-
-
-def memory_mb(entry: str) -> dict[str, float]:
-    """Memory (MB) of the nodes that this process has started, by an entry of /proc/PID/status."""
-    found, modules = {}, {**MODULES, AUTOPILOT: AUTOPILOT_MODULE}
-    for folder in Path('/proc').glob('[0-9]*'):
-        try:
-            status = dict(
-                line.split(':', 1) for line in (folder / 'status').read_text().splitlines()
-            )
-            command = (folder / 'cmdline').read_text().split('\0')
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-        if int(status['PPid']) == os.getpid() and entry in status:
-            for name, module in modules.items():
-                if module in command:
-                    found[name] = int(status[entry].split()[0]) / 1024.0
-    return found
-
-
-def _growth(taken: np.ndarray, hours: float) -> float:
-    """Slope (MB per simulated hour) of samples (h, MB), once settled."""
-    settled = taken[taken[:, 0] > _SETTLED * hours]
-    return float(np.polyfit(settled[:, 0], settled[:, 1], 1)[0])
 
 
 if __name__ == '__main__':

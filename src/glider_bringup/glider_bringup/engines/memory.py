@@ -1,0 +1,41 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Memory of the nodes of a flight, and whether it grows."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from glider_bringup.engines.processes import AUTOPILOT, AUTOPILOT_MODULE, MODULES
+
+#: Part of a flight before which memory may still grow: buffers fill, caches warm up.
+_SETTLED = 0.2
+
+
+def memory_mb(entry: str) -> dict[str, float]:
+    """Memory (MB) of the nodes that this process has started, by an entry of /proc/PID/status."""
+    found, modules = {}, {**MODULES, AUTOPILOT: AUTOPILOT_MODULE}
+    for folder in Path('/proc').glob('[0-9]*'):
+        try:
+            status = dict(
+                line.split(':', 1) for line in (folder / 'status').read_text().splitlines()
+            )
+            command = (folder / 'cmdline').read_text().split('\0')
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if int(status['PPid']) == os.getpid() and entry in status:
+            for name, module in modules.items():
+                if module in command:
+                    found[name] = int(status[entry].split()[0]) / 1024.0
+    return found
+
+
+def growth_mb_per_h(samples: Sequence[tuple[float, float]]) -> float:
+    """Slope (MB per simulated hour) of samples (h, MB), once settled; 0 of fewer than two."""
+    taken = np.array(samples).reshape(-1, 2)
+    settled = taken[taken[:, 0] > _SETTLED * taken[:, 0].max(initial=0.0)]
+    if len(settled) < 2:
+        return 0.0
+    return float(np.polyfit(settled[:, 0], settled[:, 1], 1)[0])
