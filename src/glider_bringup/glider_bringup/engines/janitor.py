@@ -54,12 +54,16 @@ def is_locked(name: str) -> bool:
     return False
 
 
-def remove(names: set[str]) -> None:
-    """Remove those of the segments that nobody has."""
+def left_over(names: set[str]) -> set[str]:
+    """Those of the segments that are there, and that nobody has."""
     pids = [int(name) for name in os.listdir('/proc') if name.isdecimal()]
-    for name in names.difference(*map(mapped, pids)):
-        if is_locked(name):
-            continue
+    there = names.intersection(os.listdir(SHARED_MEMORY)).difference(*map(mapped, pids))
+    return {name for name in there if not is_locked(name)}
+
+
+def remove(names: set[str]) -> None:
+    """Remove segments, with what belongs to them."""
+    for name in names:
         for file in (name, f'{name}_el', f'{name}_sl', f'sem.{name}_mutex'):
             with suppress(OSError):
                 os.unlink(f'{SHARED_MEMORY}/{file}')
@@ -88,7 +92,7 @@ def main() -> None:
     while any(map(is_alive, pids)) and time.monotonic() < deadline_s:
         names.update(*map(mapped, pids))
         time.sleep(_OFTEN_S)
-    remove(names)
+    remove(left_over(names))
 
 
 if __name__ == '__main__':

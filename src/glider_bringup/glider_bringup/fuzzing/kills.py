@@ -20,7 +20,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from glider_bringup.engines.janitor import SHARED_MEMORY, is_alive, mapped
+from glider_bringup.engines.janitor import is_alive, left_over, mapped
 from glider_bringup.engines.processes import MODULES
 from glider_bringup.fuzzing.counts import HANG_S, Counter, Counts, Tell
 from glider_bringup.mission.scenario import load_scenario
@@ -80,11 +80,8 @@ def _case(victim: str, tick: int, folder: Path, domain: int) -> tuple[str, str]:
         if not ended:
             left = [name for name, pid in flight.pids.items() if is_alive(pid)]
             return 'hangs', f'{", ".join(left) or PARENT} still there after {HANG_S:g} s'
-        gone = _wait(
-            lambda: not any(os.path.exists(f'{SHARED_MEMORY}/{s}') for s in segments), 5.0
-        )
-        if not gone:
-            return 'wrong', 'shared memory is left'
+        if not _wait(lambda: not left_over(segments), HANG_S):
+            return 'wrong', f'shared memory is left: {", ".join(sorted(left_over(segments)))}'
         return _judge(flight, victim, heard.take())
 
 
