@@ -4,6 +4,7 @@
 
 import mmap
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -45,7 +46,7 @@ def test_killed_flights_end_named_and_every_acknowledged_tick_can_be_read(monkey
 @pytest.fixture
 def segment():
     """Path of a segment that is not there yet; it does not outlive the test."""
-    path = f'{SHARED_MEMORY}/fastrtps_test_{os.getpid()}'
+    path = f'{SHARED_MEMORY}/fastrtps_{random.getrandbits(64):016x}'
     yield path
     for ending in ('', '_el'):
         if os.path.exists(path + ending):

@@ -6,17 +6,23 @@ A process that gets SIGKILL cannot tidy up, and whoever started it may be killed
 program stands outside of their tree. It is told process ids, line by line on standard input, and
 notes which segments of Fast DDS each of them has mapped. When the input ends, because whoever
 started it is through with the run or is no more, it waits until the processes are gone and removes
-those of the segments that nobody has any more. It needs the standard library only.
+those of the segments that nobody has any more. Ports, which are numbered for the whole machine,
+stay: Fast DDS takes them up again by itself. It needs the standard library only.
 """
 
 import fcntl
 import os
+import re
 import select
 import sys
 import time
 from contextlib import suppress
 
-SHARED_MEMORY, PREFIX = '/dev/shm', 'fastrtps_'
+SHARED_MEMORY = '/dev/shm'
+#: What the segment of a process is called: by a number that was drawn, so that nobody else's is.
+_SEGMENT = re.compile(
+    rf'{SHARED_MEMORY}/(fastrtps_[0-9a-f]{{16}})(?: \(deleted\))?$', re.MULTILINE
+)
 #: How often it looks (s): as long as segments are made, and once nothing is new for this long.
 _OFTEN_S, _SELDOM_S, _SETTLED_S = 0.2, 5.0, 3.0
 #: How long it waits for processes to be gone (s): a recorder may complete its file.
@@ -25,13 +31,11 @@ _PATIENCE_S = 30.0
 
 def mapped(pid: int) -> set[str]:
     """Names of the segments that a process has mapped; none if it is gone or somebody else's."""
-    found = set()
-    with suppress(OSError), open(f'/proc/{pid}/maps', encoding='utf-8', errors='replace') as maps:
-        for line in maps:
-            folder, _, name = line.rstrip('\n').partition(f'{SHARED_MEMORY}/')
-            if folder and name.startswith(PREFIX):
-                found.add(name.removesuffix(' (deleted)'))
-    return found
+    try:
+        with open(f'/proc/{pid}/maps', encoding='utf-8', errors='replace') as maps:
+            return set(_SEGMENT.findall(maps.read()))
+    except OSError:
+        return set()
 
 
 def is_alive(pid: int) -> bool:
@@ -44,13 +48,14 @@ def is_alive(pid: int) -> bool:
 
 
 def is_locked(name: str) -> bool:
-    """Whether somebody, maybe in another container, holds a lock of a segment."""
-    for ending in ('_el', '_sl'):
-        with suppress(FileNotFoundError), open(f'{SHARED_MEMORY}/{name}{ending}', 'rb') as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                return True
+    """Whether the owner of a segment, maybe in another container, is alive and has it locked."""
+    try:
+        with open(f'{SHARED_MEMORY}/{name}_el', 'rb') as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
     return False
 
 
@@ -62,9 +67,9 @@ def left_over(names: set[str]) -> set[str]:
 
 
 def remove(names: set[str]) -> None:
-    """Remove segments, with what belongs to them."""
+    """Remove segments, with their locks."""
     for name in names:
-        for file in (name, f'{name}_el', f'{name}_sl', f'sem.{name}_mutex'):
+        for file in (name, f'{name}_el'):
             with suppress(OSError):
                 os.unlink(f'{SHARED_MEMORY}/{file}')
 
