@@ -38,7 +38,7 @@ from glider_model.base.wiring import JOINTS, present
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
 from glider_model.nodes.tf_node import TfSettings
-from glider_model.ocean.current_profile import MAX_ROWS
+from glider_model.ocean.columns import MAX_ROWS
 from glider_model.ocean.current_settings import CurrentComponent, CurrentField, CurrentSettings
 from glider_model.plant.faults.settings import Fault, FaultSettings
 from glider_model.plant.plant import PlantSettings
@@ -232,7 +232,7 @@ def limit_rows():
         what_of = letters if what.startswith('name') else ''
         yield what, f'<= {most:,}' + (' characters' if what == 'description' else what_of)
     yield 'cells of a sweep', f'<= {MAX_CELLS:,}, of a dimension {MAX_VALUES:,}'
-    yield 'rows of a table of currents', f'<= {MAX_ROWS:,}'
+    yield 'rows of a table of currents, or of water', f'<= {MAX_ROWS:,}'
     yield '`--namespace`', NAMESPACE_ALLOWED
     yield '`ROS_DOMAIN_ID`', f'0 to {MAX_DOMAIN}'
     yield (

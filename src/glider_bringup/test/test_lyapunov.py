@@ -79,7 +79,9 @@ def record(state, params, out):
             + th_q[2] * v2 / SCALE_V2
             + th_q[3] * pitch.rate.value / SCALE_PITCH_RATE
         )
-        tau_p, tau_q = moments(joints.x_p, joints.mu, phi, theta, params.control.allocation)
+        tau_p, tau_q = moments(
+            joints.m_b, joints.x_p, joints.mu, phi, theta, params.control.allocation
+        )
         out[tick, W] = log[0, LYAPUNOV_2]
         out[tick, 1:7] = (p, roll.k1, roll.k2, 1.0, tau_p, model_p)
         out[tick, 7:13] = (q, pitch.k1, pitch.k2, c_phi, tau_q, model_q)

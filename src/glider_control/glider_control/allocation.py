@@ -70,16 +70,17 @@ def allocate_roll(tau_p, phi, theta, params):
 
 
 @kernel
-def allocate_pitch(tau_q, mu, phi, theta, params):
+def allocate_pitch(tau_q, m_b, mu, phi, theta, params):
     """Position x_p (m from neutral) of the pitch mass that makes the pitch moment ``tau_q``.
 
-    x_p = (S_z g_x - tau_q / g) / (g_z m_p) - s_x / m_p - x_0, held within the range.
+    x_p = (S_z g_x - tau_q / g) / (g_z m_p) - (s_x + m_b x_b) / m_p - x_0, held within the range,
+    beside oil that makes a net heaviness m_b (kg).
     """
     g_x, _, g_z = gravity_direction(phi, theta)
     mass = params.mass
-    _, _, s_z = first_moments(0.0, mu, mass)
+    _, _, s_z = first_moments(m_b, 0.0, mu, mass)
     s_x = (s_z * g_x - tau_q / GRAVITY) / max(g_z, SMALLEST_G_Z)
-    x_p = (s_x - mass.s_x) / mass.m_p - mass.x_p0
+    x_p = (s_x - mass.s_x - m_b * mass.pump_x) / mass.m_p - mass.x_p0
     return min(params.x_p_max, max(-params.x_p_max, x_p))
 
 
@@ -90,8 +91,8 @@ def limit_surface(delta, params):
 
 
 @kernel
-def moments(x_p, mu, phi, theta, params):
-    """Roll and pitch moment (N m) that given positions of the moving mass make."""
+def moments(m_b, x_p, mu, phi, theta, params):
+    """Roll and pitch moment (N m) that oil and given positions of the moving mass make."""
     g_x, g_y, g_z = gravity_direction(phi, theta)
-    s_x, s_y, s_z = first_moments(x_p, mu, params.mass)
+    s_x, s_y, s_z = first_moments(m_b, x_p, mu, params.mass)
     return GRAVITY * (s_y * g_z - s_z * g_y), GRAVITY * (s_z * g_x - s_x * g_z)

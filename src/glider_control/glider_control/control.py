@@ -86,7 +86,7 @@ def see(measured, taken, last, params):
     """What a law sees of what was taken in, the `IntakeState` of this tick."""
     limits, joints = params.allocation, taken.joints
     speed, alpha = glide_speed(measured.theta, measured.vertical_rate, params.polar)
-    tau_p, tau_q = moments(joints.x_p, joints.mu, measured.phi, measured.theta, limits)
+    tau_p, tau_q = moments(joints.m_b, joints.x_p, joints.mu, measured.phi, measured.theta, limits)
     return Seen(
         measured,
         taken.reference,
@@ -138,7 +138,7 @@ def control_step(state, odometry, joints, reference, params, dt):
         steering, delta = steer(steering, seen, params.steering, dt)
         m_b, trim = vertical_rate_law(state.trim, measured, taken.reference, joints, params, dt)
         mu = allocate_roll(tau_p, measured.phi, measured.theta, limits)
-        x_p = allocate_pitch(tau_q, joints.mu, measured.phi, measured.theta, limits)
+        x_p = allocate_pitch(tau_q, joints.m_b, joints.mu, measured.phi, measured.theta, limits)
         command = Joints(
             _hold(m_b, last.m_b, params.dead_band.m_b, limits.m_b_max),
             _hold(x_p, last.x_p, params.dead_band.x_p, limits.x_p_max),
@@ -152,7 +152,7 @@ def control_step(state, odometry, joints, reference, params, dt):
         saturation |= SATURATED_BUOYANCY
     if abs(command.x_p) >= limits.x_p_max:
         saturation |= SATURATED_PITCH
-    if abs(command.mu) >= limits.mu_max:
+    if 0.0 < limits.mu_max <= abs(command.mu):
         saturation |= SATURATED_ROLL
     if 0.0 < limits.delta_max <= abs(command.delta):
         saturation |= SATURATED_SURFACE

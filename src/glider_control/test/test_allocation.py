@@ -53,7 +53,7 @@ def test_gravity_direction_is_down_in_body_axes(phi, theta):
 @quick
 @given(shares, shares, rolls, pitches)
 def test_moments_are_levers_times_weights(vehicle, x_share, mu_share, phi, theta):
-    """Hull and moving mass as two point masses; the hull's weight acts off the origin."""
+    """Hull, moving mass and oil as point masses; the hull's weight acts off the origin."""
     params, limits = parts(vehicle)
     x_p, mu = x_share * limits.x_p_max, mu_share * limits.mu_max
     hull = np.array([params.s_x, 0.0, params.s_z])
@@ -61,8 +61,9 @@ def test_moments_are_levers_times_weights(vehicle, x_share, mu_share, phi, theta
         [params.x_p0 + x_p, params.R_p * math.sin(mu), params.R_p * math.cos(mu)]
     )
     gravity = R_NB(phi, theta).T @ np.array([0.0, 0.0, GRAVITY])
-    expected = np.cross(hull + moving, gravity)[:2]
-    assert moments(x_p, mu, phi, theta, limits) == pytest.approx(expected, abs=1e-9)
+    oil = 0.1 * np.array([params.pump_x, 0.0, 0.0])
+    expected = np.cross(hull + moving + oil, gravity)[:2]
+    assert moments(0.1, x_p, mu, phi, theta, limits) == pytest.approx(expected, abs=1e-9)
 
 
 @every_vehicle
@@ -74,10 +75,10 @@ def test_allocation_makes_the_moments_asked_for(vehicle, x_share, mu_share, phi,
     x_p, mu = x_share * limits.x_p_max, mu_share * limits.mu_max
     # beyond a right angle from the vertical, another rotation makes the same moment
     assume(abs(mu - math.atan2(*gravity_direction(phi, theta)[1:])) < 1.5)
-    tau_p, tau_q = moments(x_p, mu, phi, theta, limits)
+    tau_p, tau_q = moments(0.1, x_p, mu, phi, theta, limits)
     found_mu = allocate_roll(tau_p, phi, theta, limits)
-    found_x = allocate_pitch(tau_q, found_mu, phi, theta, limits)
-    assert moments(found_x, found_mu, phi, theta, limits) == pytest.approx(
+    found_x = allocate_pitch(tau_q, 0.1, found_mu, phi, theta, limits)
+    assert moments(0.1, found_x, found_mu, phi, theta, limits) == pytest.approx(
         (tau_p, tau_q), abs=1e-9
     )
     assert (found_x, found_mu) == pytest.approx((x_p, mu), abs=1e-6)
@@ -89,7 +90,7 @@ def test_allocation_makes_the_moments_asked_for(vehicle, x_share, mu_share, phi,
 def test_allocation_stays_within_the_ranges(vehicle, tau_p, tau_q, phi, theta):
     _, limits = parts(vehicle)
     mu = allocate_roll(tau_p, phi, theta, limits)
-    x_p = allocate_pitch(tau_q, mu, phi, theta, limits)
+    x_p = allocate_pitch(tau_q, 0.1, mu, phi, theta, limits)
     assert abs(mu) <= limits.mu_max
     assert abs(x_p) <= limits.x_p_max
 
@@ -99,7 +100,7 @@ def test_allocation_stays_within_the_ranges(vehicle, tau_p, tau_q, phi, theta):
 def test_out_of_reach_the_end_of_the_range_on_the_demanded_side(vehicle, side):
     _, limits = parts(vehicle)
     assert allocate_roll(side * 1e3, 0.1, -0.5, limits) == side * limits.mu_max
-    assert allocate_pitch(side * 1e3, 0.0, 0.1, -0.5, limits) == -side * limits.x_p_max
+    assert allocate_pitch(side * 1e3, 0.1, 0.0, 0.1, -0.5, limits) == -side * limits.x_p_max
 
 
 @every_vehicle
@@ -115,14 +116,14 @@ def test_more_roll_moment_turns_the_mass_further_to_starboard(vehicle, phi, thet
 @given(rolls, pitches, st.floats(-50.0, 50.0), st.floats(0.1, 5.0))
 def test_more_nose_up_moment_moves_the_mass_further_aft(vehicle, phi, theta, tau, more):
     _, limits = parts(vehicle)
-    assert allocate_pitch(tau + more, 0.0, phi, theta, limits) <= allocate_pitch(
-        tau, 0.0, phi, theta, limits
+    assert allocate_pitch(tau + more, 0.1, 0.0, phi, theta, limits) <= allocate_pitch(
+        tau, 0.1, 0.0, phi, theta, limits
     )
 
 
 @every_vehicle
 def test_mass_forward_is_nose_down_and_mass_to_starboard_rolls_to_starboard(vehicle):
     _, limits = parts(vehicle)
-    tau_p, tau_q = moments(0.0, 0.0, 0.0, 0.0, limits)
-    assert moments(0.01, 0.0, 0.0, 0.0, limits)[1] < tau_q
-    assert moments(0.0, 0.1, 0.0, 0.0, limits)[0] > tau_p
+    tau_p, tau_q = moments(0.0, 0.0, 0.0, 0.0, 0.0, limits)
+    assert moments(0.0, 0.01, 0.0, 0.0, 0.0, limits)[1] < tau_q
+    assert moments(0.0, 0.0, 0.1, 0.0, 0.0, limits)[0] > tau_p

@@ -376,7 +376,7 @@ def refer(state, place, doing, asked, aborted, params, dt):
     """
     pitch_target, rate_target = doing.pitch, doing.rate
     if place.follows_path and not aborted:
-        elevation = steepen(asked.elevation)
+        elevation = steepen(asked.elevation, params.polar)
         pitch_target = elevation
         for _ in range(3):
             pitch_target = elevation + glide_alpha(pitch_target, params.polar)

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_S, Joints
+from glider_model.base.signals import SEA_WATER_DENSITY, TICK_S, Joints
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.actuators import actuators_step
 from glider_model.vehicle.file import changed_vehicle, load_vehicle
 from glider_model.vehicle.surface import surface_loads
-from glider_model.vehicle.surfaces.fin import DENSITY, FinParams
+from glider_model.vehicle.surfaces.fin import FinParams
 
 FIN = {'range': 26.0, 'rate': 1.2, 'area': 0.05, 'lift_slope': 3.0, 'x': -1.2, 'turn_rate': 0.5}
 #: A hull with less weathercock stability than zhang2021's: +20 kg/rad in total instead of +80.
@@ -45,7 +45,7 @@ def test_a_positive_angle_turns_the_nose_to_starboard():
 def test_force_is_normal_to_the_chord_and_grows_with_the_square_of_speed():
     """rho/2 S a U^2 sin(delta) on a vehicle that goes straight ahead."""
     x, y, *_ = loads(u=0.5, delta=0.3)
-    normal = 0.5 * DENSITY * 0.05 * 3.0 * 0.25 * math.sin(0.3)
+    normal = 0.5 * SEA_WATER_DENSITY * 0.05 * 3.0 * 0.25 * math.sin(0.3)
     assert (x, y) == pytest.approx((-normal * math.sin(0.3), -normal * math.cos(0.3)), rel=1e-12)
     assert loads(u=1.0, delta=0.3)[1] == pytest.approx(4.0 * y, rel=1e-12)
 

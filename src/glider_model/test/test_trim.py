@@ -219,3 +219,45 @@ def test_a_pitch_out_of_the_mass_reach_does_not_count():
 def test_what_cannot_be_trimmed_is_refused(arguments, message):
     with pytest.raises(ConfigurationError, match=message):
         solve_trim(ZHANG, **{'net_heaviness_kg': 0.4, **arguments})
+
+
+# ------------------------------------------------------------------------- with a fin
+
+
+@pytest.mark.parametrize(
+    ('pitch_deg', 'speed', 'vertical', 'alpha_deg'),
+    [(-25.0, 0.3267, 0.1507, 2.48), (-35.0, 0.3844, 0.2293, 1.62)],
+)
+def test_slocum_glides_as_merckelbach_says(pitch_deg, speed, vertical, alpha_deg):
+    """At 0.205 kg, by his steady-state model: within 0.5 %."""
+    trim = solve_trim(load_vehicle('slocum_g2').params(), 0.205, pitch_deg=pitch_deg)
+    assert trim.converged
+    assert trim.speed_mps == pytest.approx(speed, rel=0.005)
+    assert trim.vertical_mps == pytest.approx(vertical, rel=0.005)
+    assert trim.alpha_deg == pytest.approx(alpha_deg, rel=0.005)
+
+
+@pytest.mark.parametrize('fin_deg', [5.0, 10.0, 20.0, -10.0])
+@pytest.mark.parametrize(('m_b', 'pitch_deg'), [(0.205, -25.0), (0.205, -35.0), (-0.205, 25.0)])
+def test_slocum_turns_by_its_fin_as_in_2016(fin_deg, m_b, pitch_deg):
+    """r = c0 sin(delta) U^2 with c0 = 0.5 within 10 %; to starboard in dive and climb."""
+    vehicle = load_vehicle('slocum_g2')
+    trim = solve_trim(vehicle.params(), m_b, pitch_deg=pitch_deg, fin_deg=fin_deg)
+    assert trim.converged
+    c_0 = trim.turn_rate_radps / (math.sin(math.radians(fin_deg)) * trim.speed_mps**2)
+    assert c_0 == pytest.approx(0.5, rel=0.1)
+    assert vehicle.fin.turn_rate.value == 0.5
+
+
+def test_the_pump_of_slocum_pitches_it_alone():
+    """230 cc with the battery in the middle: recorded flights have 24 to 26 deg."""
+    for oil_kg in (0.23575, -0.23575):
+        trim = solve_trim(load_vehicle('slocum_g2').params(), oil_kg, pitch_mass_m=0.0)
+        assert 24.0 < -math.copysign(1.0, oil_kg) * trim.pitch_deg < 26.0
+
+
+def test_seaglider_turns_against_its_roll_in_the_dive_and_with_it_in_the_climb():
+    """Measured, turn rate over sine of roll at 0.5 m/s: -.054, -.025 and +.031, +.030 rad/s."""
+    dive, climb = load_vehicle('seaglider').steering_rates
+    assert -0.054 < dive < -0.025
+    assert 0.025 < climb < 0.035

@@ -46,7 +46,13 @@ def edited(tmp_path, values):
 
 
 def test_vehicles_of_the_package():
-    assert vehicle_names() == ['seawing', 'zhang2021', 'zhang2021_table1']
+    assert vehicle_names() == [
+        'seaglider',
+        'seawing',
+        'slocum_g2',
+        'zhang2021',
+        'zhang2021_table1',
+    ]
 
 
 @pytest.mark.parametrize('name', vehicle_names())
@@ -136,12 +142,12 @@ def test_vehicle_by_path(edited):
             'moving_mass.rotation.value',
             400.0,
             'moving_mass.rotation.value = 400.0: should be less than or equal to 180 '
-            '(allowed: > 0.0 and <= 180.0)',
+            '(allowed: >= 0.0 and <= 180.0)',
         ),
         (
             'rigid_body.hull_mass.unit',
             'g',
-            "rigid_body.hull_mass.unit = 'g': should be 'kg' (allowed: 'kg')",
+            "rigid_body.hull_mass.unit = 'g': should be 'kg' (allowed: 'kg'; 1 g = 0.001 kg, ",
         ),
         (
             'rigid_body.hull_center_of_mass.unit',
@@ -202,7 +208,8 @@ def test_unknown_name_lists_the_known_ones(name):
         vehicle_path(name)
     assert str(caught.value) == (
         f'vehicle = {name!r}: no such vehicle '
-        '(allowed: seawing, zhang2021, zhang2021_table1, or a path to a .yaml file)'
+        '(allowed: seaglider, seawing, slocum_g2, zhang2021, zhang2021_table1, '
+        'or a path to a .yaml file)'
     )
 
 

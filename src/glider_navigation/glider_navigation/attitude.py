@@ -65,8 +65,7 @@ class Turn(NamedTuple):
 def make_turn(vehicle: Vehicle) -> Turn:
     """What the vehicle's file says of its steering."""
     dive, climb = (
-        Turning(k, max(k * k, LEAST_K_STD * LEAST_K_STD))
-        for k in (vehicle.steering.dive.value, vehicle.steering.climb.value)
+        Turning(k, max(k * k, LEAST_K_STD * LEAST_K_STD)) for k in vehicle.steering_rates
     )
     return Turn(dive, climb, 0.0, 0.0, 0.0)
 
@@ -102,7 +101,7 @@ class Attitude(NamedTuple):
 @kernel
 def _follow_mass(balance, joints, mass, dt):
     """Angles that the moving mass makes a tick later, and their rates."""
-    s_x, s_y, s_z = first_moments(joints.x_p, joints.mu, mass)
+    s_x, s_y, s_z = first_moments(joints.m_b, joints.x_p, joints.mu, mass)
     phi, theta = math.atan2(s_y, s_z), -math.atan2(s_x, s_z)
     rates = Angles((phi - balance.phi) / ROLL_S, (theta - balance.theta) / PITCH_S, 0.0)
     return Angles(balance.phi + dt * rates.phi, balance.theta + dt * rates.theta, 0.0), rates

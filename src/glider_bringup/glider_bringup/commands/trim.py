@@ -3,6 +3,7 @@
 """``./glider trim``: the steady glide of a vehicle."""
 
 import json
+import math
 from dataclasses import asdict
 from typing import Annotated
 
@@ -14,6 +15,7 @@ from glider_bringup.mission.scenario import split_changes
 from glider_model.base.exits import EXIT_FAILED
 from glider_model.base.settings import ConfigurationError
 from glider_model.plant.trim import Trim, solve_trim
+from glider_model.vehicle.coefficients import LIFT_AND_DRAG
 from glider_model.vehicle.file import changed_vehicle, load_vehicle
 
 app = typer.Typer()
@@ -35,6 +37,12 @@ def trim(
     roll_mass_deg: Annotated[
         float, typer.Option('--roll-mass-deg', help='Roll mass, + to starboard (deg).')
     ] = 0.0,
+    fin_deg: Annotated[
+        float,
+        typer.Option(
+            '--fin-deg', help='Tail fin, or other steering surface, + to starboard (deg).'
+        ),
+    ] = 0.0,
     changes: Annotated[
         list[str] | None,
         typer.Option(
@@ -53,22 +61,33 @@ def trim(
             f'--set {next(iter(others))}: not a field of a vehicle (allowed: vehicle.*)'
         )
     changed = load_vehicle(changed_vehicle(vehicle, fields))
+    params = changed.params()
     solution = solve_trim(
-        changed.params(), net_heaviness_kg, pitch_deg, pitch_mass_m, roll_mass_deg
+        params, net_heaviness_kg, pitch_deg, pitch_mass_m, roll_mass_deg, fin_deg
     )
-    values = asdict(solution)
+    of_vehicle = {
+        'steering': changed.steering_rates._asdict(),
+        'coefficients': {name: getattr(params, name) for name in LIFT_AND_DRAG},
+    }
     if as_json:
-        print(json.dumps(values))
+        print(json.dumps(asdict(solution) | of_vehicle))
     else:
-        _print_trim(vehicle, solution)
+        _print_trim(vehicle, solution, of_vehicle)
     if not solution.converged:
         messages.print("no steady state found within the vehicle's ranges", style='red')
         raise typer.Exit(EXIT_FAILED)
 
 
-def _print_trim(vehicle: str, solution: Trim) -> None:
+def _print_trim(vehicle: str, solution: Trim, of_vehicle: dict[str, dict[str, float]]) -> None:
+    """Print a solution, and what follows from the vehicle's file whatever the glide."""
+    rows = asdict(solution)
+    turn, sine = solution.turn_rate_radps, math.sin(math.radians(solution.fin_deg))
+    if turn and sine and not solution.roll_mass_deg:
+        rows['fin_turn_rate'] = turn / (sine * solution.speed_mps**2)
+    for group, numbers in of_vehicle.items():
+        rows |= {f'{group} {name}': number for name, number in numbers.items()}
     table = Table(title=vehicle, show_header=False, title_justify='left')
-    for name, value in asdict(solution).items():
+    for name, value in rows.items():
         if value is None:
             value = 'straight'
         table.add_row(name, f'{value:.5g}' if isinstance(value, float) else str(value))

@@ -32,6 +32,7 @@ def trim(
     pitch_deg: float | None = None,
     pitch_mass_m: float | None = None,
     roll_mass_deg: float = 0.0,
+    fin_deg: float = 0.0,
 ) -> Trim:
     """Steady glide or spiral of a vehicle, as ``./glider trim`` solves it.
 
@@ -45,6 +46,8 @@ def trim(
         One of them: pitch (deg, nose up), or the pitch mass from its neutral position (m).
     roll_mass_deg : float
         Roll mass, positive to starboard (deg).
+    fin_deg : float
+        Tail fin, or other steering surface, positive to starboard (deg).
 
     Returns
     -------
@@ -57,7 +60,7 @@ def trim(
         If both or neither of pitch and pitch mass are given, or an actuator does not go there.
     """
     params = load_vehicle(str(vehicle)).params()
-    return solve_trim(params, net_heaviness_kg, pitch_deg, pitch_mass_m, roll_mass_deg)
+    return solve_trim(params, net_heaviness_kg, pitch_deg, pitch_mass_m, roll_mass_deg, fin_deg)
 
 
 def sweep(

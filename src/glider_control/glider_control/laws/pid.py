@@ -59,8 +59,7 @@ class PidSettings(LawSettings):
         """Kernel parameters for a vehicle whose steering is known."""
         return PidParams(
             *(getattr(self, name) for name in PidSettings.model_fields),
-            vehicle.steering.dive.value,
-            vehicle.steering.climb.value,
+            *vehicle.steering_rates,
             bank.limit,
             bank.filter,
         )

@@ -92,7 +92,8 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
 def _others(about: dict[str, Any]) -> str:
     """Where words come from that a field, or fields that a model, does not accept here."""
     extra = about.get('json_schema_extra')
-    return f'; {extra["others"]}' if isinstance(extra, dict) and 'others' in extra else ''
+    others = extra.get('others') if isinstance(extra, dict) else None
+    return f'; {others}' if others else ''
 
 
 def find_field(model: type[Settings], name: str) -> pydantic.fields.FieldInfo | None:

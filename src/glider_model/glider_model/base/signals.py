@@ -12,6 +12,9 @@ SURFACE_TARGET = -1000.0
 TICK_S = 0.1
 TICK_NS = 100_000_000
 
+#: Density of the sea water that coefficients and kilograms of net heaviness are for (kg/m^3).
+SEA_WATER_DENSITY = 1025.0
+
 
 class Odometry(NamedTuple):
     """Where the vehicle is and how it moves over ground."""

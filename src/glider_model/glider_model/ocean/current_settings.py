@@ -18,6 +18,7 @@ from glider_model.base import plugins
 from glider_model.base.noise import random_stream
 from glider_model.base.settings import Settings
 from glider_model.ocean import fields
+from glider_model.ocean.columns import MAX_DEPTH_M, MAX_ROWS
 from glider_model.ocean.current import (
     CONSTANT,
     EXPONENTIAL_SHEAR,
@@ -31,8 +32,6 @@ from glider_model.ocean.current import (
     current_initial,
 )
 from glider_model.ocean.current_profile import (
-    MAX_DEPTH_M,
-    MAX_ROWS,
     MAX_SPEED_MPS,
     check_profile,
     check_speed,

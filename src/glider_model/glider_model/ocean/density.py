@@ -1,6 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Density of the water: stratification, compression of water and hull, and the surface."""
+"""Density of the water: stratification, compression of water and hull, and the surface.
+
+What a vehicle weighs in it, `immersed`, is a slot by the kind of water: here the one that is told
+by three numbers, in `glider_model.ocean.cast` a measured one.
+"""
 
 import math
 from typing import NamedTuple
@@ -9,9 +13,11 @@ from pydantic import Field
 
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
+from glider_model.base.signals import SEA_WATER_DENSITY
+from glider_model.base.slot import slot
 
-#: Pressure of the air (Pa), and weight of sea water, 1025 kg/m^3 under 9.81 m/s^2 (N/m^3).
-SURFACE_PRESSURE, SPECIFIC_WEIGHT = 101325.0, 1025.0 * 9.81
+#: Pressure of the air (Pa), and weight of sea water under 9.81 m/s^2 (N/m^3).
+SURFACE_PRESSURE, SPECIFIC_WEIGHT = 101325.0, SEA_WATER_DENSITY * 9.81
 
 
 class DensitySettings(Settings):
@@ -36,7 +42,8 @@ class DensitySettings(Settings):
         0.0,
         ge=0.0,
         le=1e-4,
-        description='relative loss of hull volume with depth (1/m); aluminium 3e-6 to 5e-6',
+        description='relative loss of hull volume with depth (1/m); aluminium 3e-6 to 5e-6. Of no '
+        'account for a vehicle whose file has a volume',
     )
 
     def params(self) -> 'DensityParams':
@@ -45,6 +52,7 @@ class DensitySettings(Settings):
             self.pycnocline_rise,
             1.0 / self.pycnocline_depth_m,
             self.compression_per_m - self.hull_compression_per_m,
+            self.compression_per_m,
         )
 
 
@@ -54,16 +62,90 @@ class DensityParams(NamedTuple):
     rise: float  #: relative density rise across the pycnocline
     inverse_depth: float  #: (1/m)
     net_compression: float  #: water less hull (1/m)
+    compression: float  #: of the water (1/m)
+
+
+class Immersed(NamedTuple):
+    """A vehicle in the water."""
+
+    net: float  #: its net weight (kg, + sinks)
+    oil: float  #: what of that the buoyancy engine makes, where it is (kg, + sinks)
+    ratio: float  #: density of the water over `SEA_WATER_DENSITY` (-)
+
+
+@slot
+def immersed(depth, m_b, vehicle, params):
+    """What a vehicle weighs at a depth, by the type of the water's params.
+
+    Parameters
+    ----------
+    depth : float
+        (m), above the surface as at it.
+    m_b : float
+        Net heaviness by the buoyancy engine in water of `SEA_WATER_DENSITY` (kg, + sinks).
+    vehicle : VehicleParams
+    params : NamedTuple
+        Of the water.
+
+    Returns
+    -------
+    Immersed
+    """
+
+
+@kernel
+def displacing(m_b, volume, compressibility, warmer, ratio, depth, vehicle):
+    """What a vehicle of a volume weighs: Merckelbach et al. (2019).
+
+    m_net = m - rho (V (1 - eps P + a_T (T - T_0)) + V_b),  V_b = -m_b / rho_0,  P over the surface
+
+    Parameters
+    ----------
+    m_b, depth, vehicle
+        As of `immersed`.
+    volume, compressibility : float
+        V (m^3) at the surface and at T_0, eps (1/Pa).
+    warmer : float
+        T - T_0 (K).
+    ratio : float
+        rho / rho_0 (-), rho_0 = `SEA_WATER_DENSITY`.
+
+    Returns
+    -------
+    Immersed
+    """
+    pressure = SPECIFIC_WEIGHT * max(depth, 0.0)
+    stretch = 1.0 - compressibility * pressure + vehicle.thermal_expansion * warmer
+    oil = m_b * ratio
+    hull = vehicle.m - SEA_WATER_DENSITY * ratio * volume * stretch
+    return Immersed(oil + vehicle.ballast + hull, oil, ratio)
+
+
+@kernel
+def density_rise(z, density):
+    """Relative rise of the density by the pycnocline from the surface to a depth z >= 0 (m)."""
+    if density.rise > 0.0:
+        return density.rise * (1.0 - math.exp(-z * density.inverse_depth))
+    return 0.0
 
 
 @kernel
 def buoyancy_gain(depth, mass, density):
     """Extra buoyancy dm(z) (kg) of a vehicle of ``mass`` kg at ``depth`` m."""
     z = max(depth, 0.0)
-    rise = (
-        density.rise * (1.0 - math.exp(-z * density.inverse_depth)) if density.rise > 0.0 else 0.0
-    )
-    return mass * (rise + density.net_compression * z)
+    return mass * (density_rise(z, density) + density.net_compression * z)
+
+
+@immersed.body(DensityParams)
+@kernel
+def _in_told_water(depth, m_b, vehicle, params):
+    """Of a vehicle without a volume neutral at the surface, with coefficients as they are."""
+    if vehicle.volume == 0.0:
+        gain = buoyancy_gain(depth, vehicle.m, params)
+        return Immersed(m_b + vehicle.ballast - gain, m_b, 1.0)
+    z = max(depth, 0.0)
+    ratio = 1.0 + density_rise(z, params) + params.compression * z
+    return displacing(m_b, vehicle.volume, vehicle.compressibility, 0.0, ratio, depth, vehicle)
 
 
 @kernel

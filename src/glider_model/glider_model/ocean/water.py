@@ -7,20 +7,39 @@ and Stokes drift together. It is as if the water there went faster by that much.
 """
 
 import math
+from pathlib import Path
+from typing import Any
 
+import pydantic
 from pydantic import Field
 
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import Vector, Water
-from glider_model.ocean.density import DensitySettings
+from glider_model.ocean.cast import CastParams, cast_params, check_cast, read_cast
+from glider_model.ocean.columns import MAX_ROWS
+from glider_model.ocean.density import DensityParams, DensitySettings
 
 #: The drift of wind is whole above the first depth, and there is none below the second (m).
 WIND_WHOLE_M, WIND_NONE_M = 0.5, 1.5
 
 
 class WaterSettings(DensitySettings):
-    """Density of the water, depth of its bottom, and wind."""
+    """Density of the water, depth of its bottom, and wind.
 
+    A file of measured water is read when the settings are validated and lives on as its rows, so
+    that validated settings need no file. Its path is relative to the folder named ``folder`` in
+    the validation context, and to the working directory if there is none.
+    """
+
+    profile: list[list[float]] | None = Field(
+        None,
+        min_length=1,
+        max_length=MAX_ROWS,
+        description='measured water instead of the pycnocline: a CSV file with the columns '
+        'depth_m and density_kgpm3, or temperature_degC and salinity_psu, or all of them; or a '
+        'NetCDF cast (.nc); or rows of [depth (m), density (kg/m^3)] and optionally temperature '
+        '(degC), by increasing depth',
+    )
     bottom_m: float = Field(
         0.0,
         ge=0.0,
@@ -40,6 +59,32 @@ class WaterSettings(DensitySettings):
         le=0.05,
         description='drift by wind and waves of a vehicle at the surface, over the wind (-)',
     )
+
+    @pydantic.field_validator('profile', mode='before')
+    @classmethod
+    def _read_file(cls, profile: Any, info: pydantic.ValidationInfo):
+        if not isinstance(profile, str):
+            return profile
+        return read_cast(Path((info.context or {}).get('folder', '')) / profile)
+
+    @pydantic.model_validator(mode='after')
+    def _check_rows(self):
+        if self.profile is None:
+            return self
+        check_cast(self.profile, range(1, len(self.profile) + 1), 'profile')
+        for name in ('pycnocline_rise', 'compression_per_m'):
+            if getattr(self, name):
+                raise ValueError(
+                    f'{name} = {getattr(self, name)!r}: the profile says the density '
+                    '(allowed: 0.0 beside a profile)'
+                )
+        return self
+
+    def params(self) -> DensityParams | CastParams:
+        """Kernel parameters of the density; their type says how it is told."""
+        if self.profile is None:
+            return super().params()
+        return cast_params(self.profile, self.hull_compression_per_m)
 
     def wind_drift(self) -> Vector:
         """Drift by wind and waves at the surface (m/s)."""

@@ -15,16 +15,20 @@ from glider_model.vehicle.rigid_body import GRAVITY
 
 
 class Polar(NamedTuple):
-    """Drag K_D0 + K_D alpha^2 and lift K_L0 + K_L alpha, per V^2."""
+    """Drag K_D0 V^n + K_D alpha^2 and lift K_L0 + K_L alpha, per V^2."""
 
     K_D0: float
     K_D: float
     K_L0: float
     K_L: float
+    n: float  #: 0: drag per V^2 does not change with speed
+    shallowest: float  #: the polar is used at no shallower pitch than this (rad)
 
 
-#: The polar is used at no shallower pitch than this (rad): 12 deg, about the best glide.
-SHALLOWEST_PITCH = math.radians(12.0)
+#: Slower than this drag is taken as at this (m/s).
+_SLOWEST = 0.05
+#: Where the search for a speed begins (m/s), and how often it is bettered.
+_TYPICAL, _PASSES = 0.3, 5
 #: Drag and lift polynomials are not believed beyond this angle of attack (rad).
 LARGEST_ALPHA = math.radians(15.0)
 
@@ -36,12 +40,29 @@ def make_polar(vehicle: VehicleParams) -> Polar:
         max(1e-3, vehicle.K_D),
         vehicle.K_L0,
         max(1e-3, vehicle.K_L),
+        vehicle.speed_exponent,
+        vehicle.shallowest_glide,
     )
 
 
 @kernel
+def _at_speed(speed, polar):
+    """Polar whose drag does not change with speed, as at a speed (m/s)."""
+    if polar.n == 0.0:
+        return polar
+    drag = polar.K_D0 * max(speed, _SLOWEST) ** polar.n
+    return Polar(drag, polar.K_D, polar.K_L0, polar.K_L, 0.0, polar.shallowest)
+
+
+@kernel
+def _passes(polar):
+    """How often a speed has to be found: once where drag does not change with it."""
+    return 1 if polar.n == 0.0 else _PASSES
+
+
+@kernel
 def glide_alpha(theta, polar):
-    """Angle of attack (rad) of the steady glide at pitch ``theta`` (rad).
+    """Angle of attack (rad) of the steady glide at pitch ``theta`` (rad); drag as at 1 m/s.
 
     Lift and drag balance a vertical weight: K_D0 + K_D a^2 + (K_L0 + K_L a) tan(theta - a) = 0.
     Shallower than the polar allows, the angle of the best glide is given, 15 deg at most.
@@ -61,16 +82,16 @@ def glide_alpha(theta, polar):
 
 
 @kernel
-def steepen(theta):
+def steepen(theta, polar):
     """``theta`` (rad), but no shallower than the polar is used at, keeping its sign."""
     if theta < 0.0:
-        return min(theta, -SHALLOWEST_PITCH)
-    return max(theta, SHALLOWEST_PITCH)
+        return min(theta, -polar.shallowest)
+    return max(theta, polar.shallowest)
 
 
 @kernel
 def glide_force(alpha, polar):
-    """Resultant of lift and drag per V^2 (kg/m)."""
+    """Resultant of lift and drag per V^2 (kg/m); drag as at 1 m/s."""
     drag = polar.K_D0 + polar.K_D * alpha * alpha
     lift = polar.K_L0 + polar.K_L * alpha
     return math.sqrt(drag * drag + lift * lift)
@@ -79,27 +100,42 @@ def glide_force(alpha, polar):
 @kernel
 def glide_vertical_rate(theta, net_heaviness, polar):
     """Vertical rate (m/s, + down) of the steady glide at a pitch with so much weight (kg)."""
-    steep = steepen(theta)
-    alpha = glide_alpha(steep, polar)
-    speed = math.sqrt(abs(net_heaviness) * GRAVITY / glide_force(alpha, polar))
+    steep = steepen(theta, polar)
+    alpha, speed = 0.0, _TYPICAL
+    for _ in range(_passes(polar)):
+        there = _at_speed(speed, polar)
+        alpha = glide_alpha(steep, there)
+        speed = math.sqrt(abs(net_heaviness) * GRAVITY / glide_force(alpha, there))
     return -speed * math.sin(steep - alpha)
+
+
+@kernel
+def _speed_of_rate(steep, vertical_rate, polar):
+    """Speed (m/s), with a sign if pitch and rate disagree, and angle of attack (rad)."""
+    alpha, speed = 0.0, _TYPICAL
+    for _ in range(_passes(polar)):
+        alpha = glide_alpha(steep, _at_speed(abs(speed), polar))
+        speed = vertical_rate / math.sin(steep - alpha)
+    return speed, alpha
 
 
 @kernel
 def glide_net_heaviness(theta, vertical_rate, polar):
     """Net heaviness (kg, + sinks) that a steady glide at this pitch and vertical rate takes."""
-    steep = -abs(steepen(theta)) if vertical_rate >= 0.0 else abs(steepen(theta))
-    alpha = glide_alpha(steep, polar)
-    speed = vertical_rate / math.sin(steep - alpha)
-    weight = glide_force(alpha, polar) * speed * speed / GRAVITY
+    steep = abs(steepen(theta, polar))
+    if vertical_rate >= 0.0:
+        steep = -steep
+    speed, alpha = _speed_of_rate(steep, vertical_rate, polar)
+    weight = glide_force(alpha, _at_speed(abs(speed), polar)) * speed * speed / GRAVITY
     return weight if vertical_rate >= 0.0 else -weight
 
 
 @kernel
 def glide_horizontal_speed(theta, vertical_rate, polar):
     """Horizontal speed through the water (m/s) from pitch (rad) and vertical rate (m/s)."""
-    steep = steepen(theta)
-    return abs(vertical_rate / math.tan(steep - glide_alpha(steep, polar)))
+    steep = steepen(theta, polar)
+    _, alpha = _speed_of_rate(steep, vertical_rate, polar)
+    return abs(vertical_rate / math.tan(steep - alpha))
 
 
 @kernel
@@ -111,6 +147,5 @@ def steady_horizontal_speed(theta, net_heaviness, polar):
 @kernel
 def glide_speed(theta, vertical_rate, polar):
     """Speed through the water (m/s) and angle of attack (rad) from pitch and vertical rate."""
-    steep = steepen(theta)
-    alpha = glide_alpha(steep, polar)
-    return abs(vertical_rate / math.sin(steep - alpha)), alpha
+    speed, alpha = _speed_of_rate(steepen(theta, polar), vertical_rate, polar)
+    return abs(speed), alpha

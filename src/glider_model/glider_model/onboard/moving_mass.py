@@ -1,6 +1,9 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a scale and a ruler tell of the moving mass, and the first moments that it makes."""
+"""What a scale and a ruler tell of the moving mass, and the first moments that it makes.
+
+The oil of a buoyancy engine that is not at the centre of buoyancy makes one too.
+"""
 
 import math
 from typing import NamedTuple
@@ -17,21 +20,26 @@ class MovingMass(NamedTuple):
     m_p: float  #: moving mass (kg)
     x_p0: float  #: its neutral position (m)
     R_p: float  #: its radius (m)
+    pump_x: float  #: where the buoyancy engine is (m, + forward)
 
 
 def make_moving_mass(vehicle: VehicleParams) -> MovingMass:
     """Moving mass of a vehicle."""
-    return MovingMass(vehicle.s_x, vehicle.s_z, vehicle.m_p, vehicle.x_p0, vehicle.R_p)
+    return MovingMass(
+        vehicle.s_x, vehicle.s_z, vehicle.m_p, vehicle.x_p0, vehicle.R_p, vehicle.pump_x
+    )
 
 
 @kernel
-def first_moments(x_p, mu, mass):
-    """First moments (kg m, 3) of hull and mass, the latter ``x_p`` (m) from neutral, turned by mu.
+def first_moments(m_b, x_p, mu, mass):
+    """First moments (kg m, 3) of hull, mass and oil.
 
-    S_x = s_x + m_p (x_0 + x_p),  S_y = m_p R sin mu,  S_z = s_z + m_p R cos mu
+    The mass is ``x_p`` (m) from neutral and turned by mu, the oil makes a net heaviness m_b (kg).
+
+    S_x = s_x + m_p (x_0 + x_p) + m_b x_b,  S_y = m_p R sin mu,  S_z = s_z + m_p R cos mu
     """
     return (
-        mass.s_x + mass.m_p * (mass.x_p0 + x_p),
+        mass.s_x + mass.m_p * (mass.x_p0 + x_p) + m_b * mass.pump_x,
         mass.m_p * mass.R_p * math.sin(mu),
         mass.s_z + mass.m_p * mass.R_p * math.cos(mu),
     )

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from glider_model.base.frames import rotate_to_body, rotate_to_ned
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import Joints
-from glider_model.ocean.density import buoyancy_gain, emerged_fraction
+from glider_model.ocean.density import emerged_fraction, immersed
 from glider_model.plant.exponential import decay_weights
 from glider_model.vehicle.hydrodynamics import hydrodynamics, rate_damping
 from glider_model.vehicle.rigid_body import GRAVITY, coriolis, make_inertia, solve_mass
@@ -70,9 +70,10 @@ def acceleration(motion, joints, inertia, water_rate, vehicle, density):
     k_y = 2.0 * (q_y * q_z + q_w * q_x)
     k_z = 1.0 - 2.0 * (q_x * q_x + q_y * q_y)
     s_x, s_y, s_z = inertia.s_x, inertia.s_y, inertia.s_z
-    weight = (
-        joints.m_b + vehicle.ballast - buoyancy_gain(motion.p_d, vehicle.m, density)
-    ) * GRAVITY
+    water = immersed(motion.p_d, joints.m_b, vehicle, density)
+    weight, ratio = water.net * GRAVITY, water.ratio
+    # the oil pulls where the pump is: as if so much more of the first moment were there
+    w_x = s_x + water.oil * vehicle.pump_x
     if motion.p_d < vehicle.hull_radius:
         weight += (
             vehicle.m * GRAVITY * emerged_fraction(motion.p_d, vehicle.hull_radius)
@@ -84,12 +85,12 @@ def acceleration(motion, joints, inertia, water_rate, vehicle, density):
         )
     m = vehicle.m
     return solve_mass(
-        h_x - c_x + weight * k_x - m * a_x,
-        h_y - c_y + weight * k_y - m * a_y,
-        h_z - c_z + weight * k_z - m * a_z,
-        l_x - n_x + GRAVITY * (s_y * k_z - s_z * k_y) - (s_y * a_z - s_z * a_y),
-        l_y - n_y + GRAVITY * (s_z * k_x - s_x * k_z) - (s_z * a_x - s_x * a_z),
-        l_z - n_z + GRAVITY * (s_x * k_y - s_y * k_x) - (s_x * a_y - s_y * a_x),
+        ratio * h_x - c_x + weight * k_x - m * a_x,
+        ratio * h_y - c_y + weight * k_y - m * a_y,
+        ratio * h_z - c_z + weight * k_z - m * a_z,
+        ratio * l_x - n_x + GRAVITY * (s_y * k_z - s_z * k_y) - (s_y * a_z - s_z * a_y),
+        ratio * l_y - n_y + GRAVITY * (s_z * k_x - w_x * k_z) - (s_z * a_x - s_x * a_z),
+        ratio * l_z - n_z + GRAVITY * (w_x * k_y - s_y * k_x) - (s_x * a_y - s_y * a_x),
         inertia,
         vehicle,
     )

@@ -13,7 +13,6 @@ from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_S, Joints, Odometry, Vector, Water, not_finite
 from glider_model.base.slot import default, slot
 from glider_model.base.wiring import SENSORS
-from glider_model.ocean.density import DensityParams
 from glider_model.ocean.water import WaterSettings, with_wind
 from glider_model.plant.energy import FULL, Ledger, battery_of, spend
 from glider_model.plant.faults.body import acting, blown, felt, moved
@@ -87,7 +86,7 @@ class PlantParams(NamedTuple):
     """Vehicle, water, where the run ends, and the noise of what is measured."""
 
     vehicle: VehicleParams
-    density: DensityParams
+    density: NamedTuple  #: DensityParams, or CastParams
     wind_drift: Vector  #: at the surface (m/s)
     max_ticks: int
     stop_after_dives: int  #: 0: only max_ticks ends the run

@@ -1,6 +1,9 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Steady glides and spirals: the equilibrium of the plant, solved for its own equations."""
+"""Steady glides and spirals: the equilibrium of the plant, solved for its own equations.
+
+The net heaviness is that of the whole vehicle, by its buoyancy engine, in water of one density.
+"""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +20,7 @@ from glider_model.vehicle.file import VehicleParams
 from glider_model.vehicle.rigid_body import make_inertia
 
 _STILL = Water(0.0, 0.0, 0.0)
-_UNIFORM = DensityParams(0.0, 1.0, 0.0)
+_UNIFORM = DensityParams(0.0, 1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,7 @@ class Trim:
     pitch_mass_m: float
     net_heaviness_kg: float
     roll_mass_deg: float
+    fin_deg: float
     converged: bool
 
 
@@ -47,6 +51,8 @@ class _Glide(NamedTuple):
     net_heaviness: float  #: (kg)
     theta: float | None  #: pitch (rad)
     x_p: float | None  #: pitch mass from neutral (m)
+    mu: float  #: roll mass (rad)
+    delta: float  #: steering surface (rad)
 
 
 def solve_trim(
@@ -55,6 +61,7 @@ def solve_trim(
     pitch_deg: float | None = None,
     pitch_mass_m: float | None = None,
     roll_mass_deg: float = 0.0,
+    fin_deg: float = 0.0,
 ) -> Trim:
     """Solve M nu' = 0 for a steady rotation about the vertical.
 
@@ -71,6 +78,7 @@ def solve_trim(
     checks = (
         ('net heaviness', net_heaviness_kg, 'kg', vehicle.m_b_max),
         ('roll mass', roll_mass_deg, 'deg', math.degrees(vehicle.mu_max)),
+        ('fin', fin_deg, 'deg', math.degrees(vehicle.delta_max)),
         ('pitch', pitch_deg, 'deg', 80.0),
         ('pitch mass', pitch_mass_m, 'm', vehicle.x_p_max),
     )
@@ -82,16 +90,18 @@ def solve_trim(
     if net_heaviness_kg == 0.0:
         raise ConfigurationError('net heaviness = 0 kg: a neutral vehicle does not glide')
     theta = None if pitch_deg is None else math.radians(pitch_deg)
-    glide = _Glide(vehicle, net_heaviness_kg, theta, pitch_mass_m)
+    mu, delta = math.radians(roll_mass_deg), math.radians(fin_deg)
+    # its whole net weight is given: the hull that displaces it is of no account
+    glide = _Glide(vehicle._replace(volume=0.0), net_heaviness_kg, theta, pitch_mass_m, mu, delta)
     sign = math.copysign(1.0, net_heaviness_kg)
     for guess_deg in (-30.0, -20.0, -45.0, -10.0):
         guess = sign * math.radians(guess_deg if pitch_deg is None else -abs(pitch_deg))
         fourth = guess if pitch_deg is None else 0.0
         z = np.array([0.5, 0.0, sign * 0.01, fourth, 0.0, 0.0])
-        z, solved = _follow_branch(z, math.radians(roll_mass_deg), glide)
+        z, solved = _follow_branch(z, glide)
         if solved:
             break
-    return _told(z, solved, roll_mass_deg, glide)
+    return _told(z, solved, glide)
 
 
 def _unpack(z: np.ndarray, glide: _Glide):
@@ -102,8 +112,8 @@ def _unpack(z: np.ndarray, glide: _Glide):
     return u, v, w, glide.theta, phi, rate, 0.1 * fourth
 
 
-def _residual(z: np.ndarray, mu: float, glide: _Glide) -> np.ndarray:
-    """Acceleration (6), which a steady glide does not have."""
+def _residual(z: np.ndarray, share: float, glide: _Glide) -> np.ndarray:
+    """Acceleration (6), which a steady glide does not have; a share of the way to its turn."""
     u, v, w, theta, phi, rate, x_p = _unpack(z, glide)
     q = quaternion_from_euler(phi, theta, 0.0)
     p, q_rate, r = (
@@ -112,30 +122,32 @@ def _residual(z: np.ndarray, mu: float, glide: _Glide) -> np.ndarray:
         rate * math.cos(theta) * math.cos(phi),
     )
     motion = Motion(0.0, 0.0, 100.0, *q, u, v, w, p, q_rate, r)
+    mu = share * glide.mu
     inertia = make_inertia(x_p, mu, glide.vehicle)
-    joints = Joints(glide.net_heaviness, x_p, mu, 0.0)
+    joints = Joints(glide.net_heaviness, x_p, mu, share * glide.delta)
     return np.array(acceleration(motion, joints, inertia, _STILL, glide.vehicle, _UNIFORM))
 
 
-def _follow_branch(z: np.ndarray, target: float, glide: _Glide) -> tuple[np.ndarray, bool]:
-    """Unknowns at a roll mass (rad), and whether they are solved.
+def _follow_branch(z: np.ndarray, glide: _Glide) -> tuple[np.ndarray, bool]:
+    """Unknowns of a glide, and whether they are solved.
 
-    From the straight glide in small steps of roll mass, so that the branch is followed.
+    From the straight glide in small steps of roll mass and fin, so that the branch is followed.
     """
     from scipy.optimize import root  # slow to load, and most commands trim nothing
 
     solved = True
-    for mu in np.linspace(0.0, target, 2 + int(abs(target) / 0.05)):
-        z = root(_residual, z, args=(mu, glide), method='hybr', tol=1e-13).x
+    steps = 2 + int(max(abs(glide.mu), abs(glide.delta)) / 0.05)
+    for share in np.linspace(0.0, 1.0, steps):
+        z = root(_residual, z, args=(share, glide), method='hybr', tol=1e-13).x
         upright = abs(_unpack(z, glide)[3]) < 0.5 * math.pi and abs(z[4]) < 0.5 * math.pi
-        small = np.max(np.abs(_residual(z, mu, glide))) < 1e-9
+        small = np.max(np.abs(_residual(z, share, glide))) < 1e-9
         solved = upright and z[0] > 0.0 and bool(small)
         if not solved:
             break
     return z, solved
 
 
-def _told(z: np.ndarray, solved: bool, roll_mass_deg: float, glide: _Glide) -> Trim:
+def _told(z: np.ndarray, solved: bool, glide: _Glide) -> Trim:
     """The solution, in the units of a person."""
     u, v, w, theta, phi, rate, x_p = (float(number) for number in _unpack(z, glide))
     speed = math.sqrt(u * u + v * v + w * w)
@@ -155,6 +167,7 @@ def _told(z: np.ndarray, solved: bool, roll_mass_deg: float, glide: _Glide) -> T
         turn_radius_m=horizontal / abs(rate) if turning else None,
         pitch_mass_m=x_p,
         net_heaviness_kg=glide.net_heaviness,
-        roll_mass_deg=roll_mass_deg,
+        roll_mass_deg=math.degrees(glide.mu),
+        fin_deg=math.degrees(glide.delta),
         converged=solved and abs(x_p) <= glide.vehicle.x_p_max,
     )

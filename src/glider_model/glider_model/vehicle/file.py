@@ -25,12 +25,29 @@ from glider_model.base.settings import (
 )
 from glider_model.base.wiring import JOINTS
 from glider_model.vehicle import surfaces
+from glider_model.vehicle.coefficients import (
+    EriksenSettings,
+    MerckelbachSettings,
+    with_coefficients,
+)
 from glider_model.vehicle.energy import EnergySettings
-from glider_model.vehicle.quantity import NotNegative, Positive, Signed, quantity, vector
+from glider_model.vehicle.quantity import (
+    CC,
+    CC_PER_S,
+    LITRE,
+    NotNegative,
+    Positive,
+    Signed,
+    quantity,
+    vector,
+)
 from glider_model.vehicle.rigid_body import mass_matrix
+from glider_model.vehicle.steering import SteeringRates, steering_rates
 from glider_model.vehicle.surface import NoSurface, SurfaceSettings
 
 VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
+#: Shallowest pitch at which a glide polar is used, if the file says nothing (deg).
+SHALLOWEST_GLIDE_DEG = 12.0
 #: Source of a number that a person changed for a run.
 _SET = '--set'
 
@@ -55,6 +72,16 @@ class AddedMassSettings(Settings):
 class HydrodynamicsSettings(Settings):
     """Coefficients of the viscous forces and moments (Graver 2005; Zhang et al. 2013)."""
 
+    model_config = pydantic.ConfigDict(
+        json_schema_extra={
+            'others': 'Cd0, Cd1, S, aw and ah go under merckelbach, a, b, c and l under eriksen'
+        }
+    )
+
+    #: Lift and drag as Merckelbach et al. write them, instead of K_D0, K_D, K_L0 and K_L.
+    merckelbach: MerckelbachSettings | None = None
+    #: The same as Eriksen et al. write them.
+    eriksen: EriksenSettings | None = None
     K_D0: quantity('kg/m', **NotNegative)
     K_D: quantity('kg/m/rad^2', **NotNegative)
     K_L0: quantity('kg/m', **Signed)
@@ -67,10 +94,17 @@ class HydrodynamicsSettings(Settings):
     K_q: quantity('kg s/rad', **Signed)
     K_MY: quantity('kg/rad', **Signed)
     K_r: quantity('kg s/rad', **Signed)
+    #: K_D0 is that at 1 m/s, and goes with this power of the speed: -1/2 of Eriksen's Seaglider.
+    speed_exponent: quantity('-', ge=-1.0, le=1.0) | None = None
     linear_damping: vector('kg/s')
     linear_angular_damping: vector('kg m^2/s')
     quadratic_damping: vector('kg/m')
     quadratic_angular_damping: vector('kg m^2')
+
+    @pydantic.model_validator(mode='before')
+    @classmethod
+    def _as_others_write_it(cls, values):
+        return with_coefficients(values)
 
 
 class MovingMassSettings(Settings):
@@ -82,15 +116,15 @@ class MovingMassSettings(Settings):
     inertia: vector('kg m^2', not_negative=True)  # about its own centre, turning with it
     travel: quantity('m', gt=0.0, le=2.0)
     rate: quantity('m/s', gt=0.0, le=1.0)
-    rotation: quantity('deg', gt=0.0, le=180.0)
+    rotation: quantity('deg', ge=0.0, le=180.0)  # 0: it does not turn
     rotation_rate: quantity('deg/s', gt=0.0, le=180.0)
 
 
 class BuoyancyEngineSettings(Settings):
-    """Oil pump: net heaviness within +-range."""
+    """Oil pump: net heaviness within +-range; in cc, of sea water of 1025 kg/m^3."""
 
-    range: quantity('kg', gt=0.0, le=50.0)
-    rate: quantity('kg/s', gt=0.0, le=10.0)
+    range: quantity('kg', also=CC, gt=0.0, le=50.0)
+    rate: quantity('kg/s', also=CC_PER_S, gt=0.0, le=10.0)
 
 
 class HullSettings(Settings):
@@ -103,7 +137,8 @@ class HullSettings(Settings):
 class SteeringSettings(Settings):
     """Turn rate (starboard +) over sine of roll in a gentle spiral, as ``glider trim`` solves it.
 
-    Its sign belongs to vehicle and phase: lift points the other way in the climb.
+    Its sign belongs to vehicle and phase: lift points the other way in the climb. A file without
+    it has that of `glider_model.vehicle.steering`.
     """
 
     dive: quantity('rad/s', ge=-1.0, le=1.0)
@@ -125,9 +160,22 @@ class _Body(Settings):
     crush_depth: quantity('m', gt=0.0, le=15000.0) | None = None
     #: Weight in water of what is let go in need.
     drop_weight: quantity('kg', gt=0.0, le=100.0) | None = None
+    #: Volume at the surface, at the reference temperature and with the pump at 0. Without, the
+    #: vehicle is neutral at the surface, whatever the water.
+    volume: quantity('m^3', also=LITRE, gt=0.0, le=10.0) | None = None
+    #: Share of the volume that is lost by a pascal.
+    compressibility: quantity('1/Pa', ge=0.0, le=1e-8) | None = None
+    #: Share of the volume that is gained by a degree.
+    thermal_expansion: quantity('1/K', ge=0.0, le=1e-3) | None = None
+    #: Temperature at which the hull has its volume.
+    reference_temperature: quantity('degC', ge=-5.0, le=50.0) | None = None
+    #: Pitch of about its best glide, 12 deg without: shallower, speed is not reckoned by drag.
+    shallowest_glide: quantity('deg', ge=5.0, le=30.0) | None = None
+    #: Where the oil of the buoyancy engine acts: forward of the centre of buoyancy is positive.
+    pump_x: quantity('m', ge=-5.0, le=5.0) | None = None
     added_mass: AddedMassSettings
     hydrodynamics: HydrodynamicsSettings
-    steering: SteeringSettings
+    steering: SteeringSettings | None = None
     #: Battery and what is taken out of it; without it there is no ledger.
     energy: EnergySettings | None = None
 
@@ -194,6 +242,13 @@ class Vehicle(_Steered):
         return next((name for name in SURFACES if getattr(self, name) is not None), '')
 
     @property
+    def steering_rates(self) -> SteeringRates:
+        """How roll turns it: as its file says, or as follows from its coefficients."""
+        if self.steering is None:
+            return steering_rates(self.params())
+        return SteeringRates(self.steering.dive.value, self.steering.climb.value)
+
+    @property
     def rated_depth_m(self) -> float:
         """Deepest that the hull is meant to go (m); infinite if its file does not say."""
         return self.rated_depth.value if self.rated_depth else math.inf
@@ -233,6 +288,7 @@ class Vehicle(_Steered):
             a_26=added.sway_yaw.value,
             a_35=added.heave_pitch.value,
             **{name: getattr(hydro, name).value for name in coefficients},
+            speed_exponent=_value(hydro.speed_exponent),
             D_u=hydro.linear_damping.value[0],
             D_v=hydro.linear_damping.value[1],
             D_w=hydro.linear_damping.value[2],
@@ -253,11 +309,24 @@ class Vehicle(_Steered):
             mu_max=math.radians(mass.rotation.value),
             mu_rate=math.radians(mass.rotation_rate.value),
             ballast=0.0,
-            drop_weight=self.drop_weight.value if self.drop_weight else 0.0,
+            volume=_value(self.volume),
+            compressibility=_value(self.compressibility),
+            thermal_expansion=_value(self.thermal_expansion),
+            reference_temperature=_value(self.reference_temperature),
+            shallowest_glide=math.radians(
+                self.shallowest_glide.value if self.shallowest_glide else SHALLOWEST_GLIDE_DEG
+            ),
+            pump_x=_value(self.pump_x),
+            drop_weight=_value(self.drop_weight),
             surface=surface.params() if surface else NoSurface(),
             delta_max=math.radians(surface.range.value) if surface else 0.0,
             delta_rate=math.radians(surface.rate.value) if surface else 0.0,
         )
+
+
+def _value(number) -> float:
+    """Number of a field that a file may lack: 0 without."""
+    return number.value if number else 0.0
 
 
 class VehicleParams(NamedTuple):
@@ -296,6 +365,7 @@ class VehicleParams(NamedTuple):
     K_q: float
     K_MY: float
     K_r: float
+    speed_exponent: float  #: K_D0 goes with this power of the speed over 1 m/s
     D_u: float  #: linear damping (kg/s, kg m^2/s)
     D_v: float
     D_w: float
@@ -316,6 +386,12 @@ class VehicleParams(NamedTuple):
     mu_max: float
     mu_rate: float
     ballast: float  #: net heaviness beside that of the buoyancy engine (kg, + sinks)
+    volume: float  #: of the hull at the surface (m^3); 0: it is neutral there
+    compressibility: float  #: of the hull (1/Pa)
+    thermal_expansion: float  #: of the hull (1/K), from the reference temperature (degC)
+    reference_temperature: float
+    shallowest_glide: float  #: at shallower pitch its glide polar is not used (rad)
+    pump_x: float  #: where the buoyancy engine is (m, + forward)
     drop_weight: float  #: weight in water of what can be let go (kg); 0: nothing
     surface: NamedTuple  #: of its steering surface, by its kind
     delta_max: float  #: range (rad) and rate (rad/s) of the steering surface; 0 without

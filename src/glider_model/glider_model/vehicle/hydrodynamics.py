@@ -29,6 +29,17 @@ def _body_damping(linear, quadratic, rate, inertia):
 
 
 @kernel
+def parasitic_drag(speed, vehicle):
+    """K_D0 (kg/m) at a speed (m/s); that of the file is at 1 m/s.
+
+    Of a hull with a laminar boundary layer it falls with speed (Eriksen et al. 2001).
+    """
+    if vehicle.speed_exponent == 0.0:
+        return vehicle.K_D0
+    return vehicle.K_D0 * speed**vehicle.speed_exponent
+
+
+@kernel
 def hydrodynamics(u, v, w, p, q, r, vehicle):
     """Viscous force (N) and moment (N m) for velocity through the water; 6 numbers."""
     xz2 = u * u + w * w
@@ -41,7 +52,7 @@ def hydrodynamics(u, v, w, p, q, r, vehicle):
         c_a, s_a = u / xz, w / xz
         c_b, s_b = xz / speed, v / speed
         lift_angle = s_a * c_a
-        drag = (vehicle.K_D0 + vehicle.K_D * s_a * s_a) * speed2
+        drag = (parasitic_drag(speed, vehicle) + vehicle.K_D * s_a * s_a) * speed2
         side = vehicle.K_beta * s_b * speed2
         lift = (vehicle.K_L0 + vehicle.K_L * lift_angle) * speed2
         # damping along axes that turn with alpha where it is small, by 17 deg at most

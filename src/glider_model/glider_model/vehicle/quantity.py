@@ -3,24 +3,83 @@
 """Numbers of a vehicle file: each with its unit and the source it is from."""
 
 from functools import cache
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import pydantic
 from pydantic import Field
 
 from glider_model.base.settings import Settings
+from glider_model.base.signals import SEA_WATER_DENSITY
+
+
+class Other(NamedTuple):
+    """Another unit that a number may be given in."""
+
+    unit: str
+    factor: float  #: one of it in the unit that the number is kept in
+
+
+#: Oil of a buoyancy engine, as so much sea water; and volumes.
+CC = Other('cc', 1e-6 * SEA_WATER_DENSITY)
+CC_PER_S = Other('cc/s', 1e-6 * SEA_WATER_DENSITY)
+LITRE = Other('l', 1e-3)
+
+#: What is often given instead of a unit, and what it makes.
+HINTS = {
+    'kg': '1 g = 0.001 kg, 1 cc of sea water = 0.001025 kg',
+    'kg/s': '1 cc/s of sea water = 0.001025 kg/s',
+    'm': '1 mm = 0.001 m',
+    'm^3': '1 cc = 1e-6 m^3',
+    '1/Pa': '1e-6 1/dbar = 1e-10 1/Pa',
+    'deg': '1 rad = 57.296 deg',
+    'kg/m': '1/2 rho S C, rho = 1025 kg/m^3',
+    'kg/m/rad': '1/2 rho S C, rho = 1025 kg/m^3; per deg x 57.296 is per rad',
+    'kg/m/rad^2': '1/2 rho S C, rho = 1025 kg/m^3; per deg^2 x 3282.8 is per rad^2',
+}
 
 
 @cache
-def quantity(unit: str, **limits: float) -> type[Settings]:
-    """Model of one number with its unit and source; ``limits`` are those of pydantic's Field."""
+def quantity(unit: str, also: Other | None = None, **limits: float) -> type[Settings]:
+    """Model of one number with its unit and source.
+
+    Parameters
+    ----------
+    unit : str
+    also : Other, optional
+        Another unit in which the number may be given; it is kept in ``unit``.
+    limits : float
+        Those of pydantic's Field.
+    """
+
+    def convert(values):
+        if not also or not isinstance(values, dict) or values.get('unit') != also.unit:
+            return values
+        value, source = values.get('value'), values.get('source')
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return {**values, 'unit': unit}
+        told = f'{source} ({value:g} {also.unit})' if isinstance(source, str) else source
+        return {**values, 'value': value * also.factor, 'unit': unit, 'source': told}
+
+    name = f'{unit} or {also.unit}' if also else unit
     return pydantic.create_model(
-        f'Quantity[{unit}]',
+        f'Quantity[{name}]',
         __base__=Settings,
+        __validators__={'convert': pydantic.model_validator(mode='before')(convert)},
         value=(float, Field(strict=True, description=f'number in {unit}', **limits)),
-        unit=(Literal[unit], Field(description='unit of the value')),
+        unit=(
+            Literal[unit],
+            Field(
+                description='unit of the value',
+                json_schema_extra={'others': ', '.join(_told(unit, also))},
+            ),
+        ),
         source=(str, Field(min_length=3, description='where the number comes from')),
     )
+
+
+def _told(unit: str, also: Other | None) -> list[str]:
+    """What is said of a unit that is not the one of a number."""
+    return ([f"or '{also.unit}'"] if also else []) + ([HINTS[unit]] if unit in HINTS else [])
 
 
 Positive = {'gt': 0.0, 'le': 1e5}

@@ -23,9 +23,9 @@ def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
     scenario = case.load()
     state, params = mission_of(scenario)
     if case.told:
-        steering = load_vehicle(case.told).steering
+        steering = load_vehicle(case.told).steering_rates
         pid = params.control.law._replace(
-            steering_dive=steering.dive.value, steering_climb=steering.climb.value
+            steering_dive=steering.dive, steering_climb=steering.climb
         )
         params = params._replace(control=params.control._replace(law=pid))
     scorer, recorder = make_scorer(scenario), Recorder()

@@ -10,7 +10,6 @@ from typing import NamedTuple
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import Joints, Water
 from glider_model.base.slot import default, slot
-from glider_model.ocean.density import DensityParams
 from glider_model.plant.faults import kinds
 from glider_model.plant.faults.kinds import FaultParams
 from glider_model.vehicle.actuators import actuators_step, toward
@@ -26,7 +25,7 @@ class Felt(NamedTuple):
     """What the motion of a broken vehicle goes by, in the place of `PlantParams`."""
 
     vehicle: VehicleParams
-    density: DensityParams
+    density: NamedTuple
 
 
 @slot

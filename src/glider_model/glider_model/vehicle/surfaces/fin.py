@@ -17,11 +17,9 @@ import math
 from typing import NamedTuple
 
 from glider_model.base.kernel import kernel
+from glider_model.base.signals import SEA_WATER_DENSITY
 from glider_model.vehicle.quantity import quantity
 from glider_model.vehicle.surface import SurfaceSettings, surface_loads
-
-#: Density of sea water (kg/m^3). It does not change with depth, as the hull's coefficients do not.
-DENSITY = 1025.0
 
 
 class FinSettings(SurfaceSettings):
@@ -36,7 +34,7 @@ class FinSettings(SurfaceSettings):
 
     def params(self) -> 'FinParams':
         """Kernel parameters."""
-        slope = 0.5 * DENSITY * self.area.value * self.lift_slope.value
+        slope = 0.5 * SEA_WATER_DENSITY * self.area.value * self.lift_slope.value
         return FinParams(slope, self.x.value, self.z.value if self.z else 0.0)
 
 

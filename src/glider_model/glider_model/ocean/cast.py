@@ -1,0 +1,189 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Measured water: density and temperature by depth, from a CSV file or a NetCDF cast.
+
+What is read becomes a table with a row for each metre, between which the kernels interpolate. In
+such water the viscous forces go with the density too.
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from glider_model.base.kernel import kernel
+from glider_model.base.signals import SEA_WATER_DENSITY
+from glider_model.ocean.columns import MAX_ROWS, check_depths, read_columns
+from glider_model.ocean.density import SPECIFIC_WEIGHT, displacing, immersed
+
+#: Columns of a file: density, or what it follows from by TEOS-10.
+COLUMNS = ('depth_m', 'density_kgpm3', 'temperature_degC', 'salinity_psu')
+#: Their names in the CF conventions.
+_STANDARD_NAMES = {
+    'depth': 'depth_m',
+    'sea_water_pressure': 'pressure_dbar',
+    'sea_water_density': 'density_kgpm3',
+    'sea_water_temperature': 'temperature_degC',
+    'sea_water_practical_salinity': 'salinity_psu',
+    'sea_water_salinity': 'salinity_psu',
+}
+#: What no water is beyond.
+DENSITY_RANGE, TEMPERATURE_RANGE = (950.0, 1100.0), (-5.0, 50.0)
+#: Latitude (deg) of the gravity by which pressure follows from depth.
+_LATITUDE = 45.0
+
+
+class CastParams(NamedTuple):
+    """Measured water as the kernels see it."""
+
+    rows: np.ndarray  #: float64[n, 2], at each metre: density over `SEA_WATER_DENSITY`, degC
+    has_temperature: bool
+    hull_compression: float  #: of a vehicle whose file has no volume (1/Pa)
+
+
+@kernel
+def look_up(depth, rows):
+    """Density over `SEA_WATER_DENSITY` and temperature (degC) at a depth (m), held at the ends."""
+    last = len(rows) - 1
+    if not depth > 0.0:
+        return rows[0, 0], rows[0, 1]
+    if depth >= last:
+        return rows[last, 0], rows[last, 1]
+    above = int(depth)
+    part = depth - above
+    return (
+        rows[above, 0] + part * (rows[above + 1, 0] - rows[above, 0]),
+        rows[above, 1] + part * (rows[above + 1, 1] - rows[above, 1]),
+    )
+
+
+@immersed.body(CastParams)
+@kernel
+def _in_measured_water(depth, m_b, vehicle, params):
+    """Of a vehicle without a volume neutral at the surface of this water."""
+    ratio, temperature = look_up(depth, params.rows)
+    volume, compressibility = vehicle.volume, vehicle.compressibility
+    if volume == 0.0:
+        volume = vehicle.m / (SEA_WATER_DENSITY * params.rows[0, 0])
+        compressibility = params.hull_compression
+    warmer = temperature - vehicle.reference_temperature if params.has_temperature else 0.0
+    return displacing(m_b, volume, compressibility, warmer, ratio, depth, vehicle)
+
+
+def cast_params(rows: list[list[float]], hull_compression_per_m: float) -> CastParams:
+    """Kernel parameters of checked rows of depth (m), density (kg/m^3) and, if known, degC."""
+    table = np.array(rows, dtype=float)
+    depths = np.arange(int(np.ceil(table[-1, 0])) + 1, dtype=float)
+    metres = np.zeros((len(depths), 2))
+    metres[:, 0] = np.interp(depths, table[:, 0], table[:, 1]) / SEA_WATER_DENSITY
+    has_temperature = table.shape[1] > 2
+    if has_temperature:
+        metres[:, 1] = np.interp(depths, table[:, 0], table[:, 2])
+    return CastParams(metres, has_temperature, hull_compression_per_m / SPECIFIC_WEIGHT)
+
+
+def check_cast(rows: list[list[float]], names, source: str) -> None:
+    """Refuse rows that cannot be interpolated, or are no water; ``names`` are their numbers.
+
+    Raises
+    ------
+    ValueError
+        Naming the source, the row and the column at fault.
+    """
+    if not rows:
+        raise ValueError(f'{source}: no rows (allowed: at least 1)')
+    names, columns = list(names), ('depth_m', 'density_kgpm3', 'temperature_degC')
+    limits = (None, DENSITY_RANGE, TEMPERATURE_RANGE)
+    for name, row in zip(names, rows, strict=True):
+        if len(row) not in (2, 3) or len(row) != len(rows[0]):
+            raise ValueError(
+                f'{source}: row {name}: {len(row)} columns (allowed: {", ".join(columns[:2])}, '
+                f'and optionally {columns[2]}; in all rows the same)'
+            )
+        for column, number, limit in zip(columns, row, limits, strict=False):
+            if limit and not limit[0] <= number <= limit[1]:
+                raise ValueError(
+                    f'{source}: row {name}, column {column} = {number!r} '
+                    f'(allowed: >= {limit[0]} and <= {limit[1]})'
+                )
+    check_depths([row[0] for row in rows], names, source)
+
+
+def read_cast(path: Path) -> list[list[float]]:
+    """Read and check a cast: rows of depth (m), density (kg/m^3) and, if it says so, degC.
+
+    Raises
+    ------
+    ValueError
+        Naming the file and what of it is at fault.
+    """
+    source = f'file {path}'
+    if path.suffix == '.nc':
+        found = _read_netcdf(path, source)
+    else:
+        found = read_columns(path, COLUMNS, ('depth_m',))
+    if not found:
+        raise ValueError(f'{source}: no rows (allowed: at least 1)')
+    columns = set(found[0][1])
+    if 'density_kgpm3' not in columns and not columns >= {'temperature_degC', 'salinity_psu'}:
+        raise ValueError(
+            f'{source}: column density_kgpm3 is missing (allowed: density_kgpm3, or '
+            'temperature_degC and salinity_psu)'
+        )
+    names = [name for name, _ in found]
+    table = {name: np.array([row[name] for _, row in found]) for name in columns}
+    if 'density_kgpm3' not in table:
+        table['density_kgpm3'] = _density(table, source)
+    order = [name for name in ('depth_m', *COLUMNS[1:3]) if name in table]
+    rows = [[float(number) for number in row] for row in zip(*map(table.get, order), strict=True)]
+    check_cast(rows, names, source)
+    return rows
+
+
+def _density(table: dict[str, np.ndarray], source: str) -> np.ndarray:
+    """Density (kg/m^3) in place, by TEOS-10 with the salinity of reference sea water."""
+    try:
+        import gsw
+    except ImportError:
+        raise ValueError(
+            f'{source}: density from temperature and salinity takes the library gsw; install it '
+            'with: ./glider python -m pip install --no-deps -r requirements-flights.txt'
+        ) from None
+    pressure = gsw.p_from_z(-table['depth_m'], _LATITUDE)
+    salinity = gsw.SR_from_SP(table['salinity_psu'])
+    temperature = gsw.CT_from_t(salinity, table['temperature_degC'], pressure)
+    return gsw.rho(salinity, temperature, pressure)
+
+
+def _read_netcdf(path: Path, source: str) -> list[tuple[int, dict[str, float]]]:
+    """Samples of a cast by depth, those that lack a number left out, those of a depth averaged."""
+    import xarray
+
+    try:
+        with xarray.open_dataset(path, decode_times=False) as dataset:
+            found = {}
+            for name, variable in {**dataset.coords, **dataset.data_vars}.items():
+                known = _STANDARD_NAMES.get(variable.attrs.get('standard_name'), name)
+                if known in (*COLUMNS, 'pressure_dbar') and variable.ndim == 1:
+                    found.setdefault(known, np.asarray(variable.values, dtype=float))
+    except (OSError, ValueError, TypeError, ImportError) as error:
+        raise ValueError(f'{source}: not a NetCDF file that xarray reads: {error}') from None
+    if 'depth_m' not in found and 'pressure_dbar' in found:
+        found['depth_m'] = 1e4 * found['pressure_dbar'] / SPECIFIC_WEIGHT
+    found.pop('pressure_dbar', None)
+    if len({len(values) for values in found.values()}) != 1 or 'depth_m' not in found:
+        raise ValueError(
+            f'{source}: no profile along one dimension (allowed: variables {", ".join(COLUMNS)}, '
+            f'or of standard_name {", ".join(_STANDARD_NAMES)})'
+        )
+    table = np.stack(list(found.values()), axis=1)
+    table = table[np.isfinite(table).all(axis=1)]
+    column = list(found).index('depth_m')
+    depths, which = np.unique(np.maximum(table[:, column], 0.0), return_inverse=True)
+    if not 0 < len(depths) <= MAX_ROWS:
+        raise ValueError(f'{source}: {len(depths)} depths (allowed: 1 to {MAX_ROWS})')
+    means = np.zeros((len(depths), table.shape[1]))
+    np.add.at(means, which, table)
+    means /= np.bincount(which)[:, None]
+    means[:, column] = depths
+    return [(i + 1, dict(zip(found, map(float, row), strict=True))) for i, row in enumerate(means)]

@@ -1,0 +1,97 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of numbers in CSV files, as people write them, read and checked."""
+
+import csv
+import io
+import math
+from pathlib import Path
+
+from glider_model.base.errors import ConfigurationError, shown
+from glider_model.base.files import read_text
+
+#: Rows of a table: some are looked at in every tick.
+MAX_ROWS = 10_000
+#: Deepest point of a table (m).
+MAX_DEPTH_M = 12_000.0
+
+
+def read_columns(
+    path: Path, known: tuple[str, ...], needed: tuple[str, ...]
+) -> list[tuple[int, dict[str, float]]]:
+    """Rows of a CSV file with a header: line of the file, and numbers by column.
+
+    Parameters
+    ----------
+    path : Path
+    known, needed : tuple of str
+        Columns that there may be, and those of them that there must be.
+
+    Raises
+    ------
+    ValueError
+        Naming the file, and the column and row (line of the file) at fault.
+    """
+    source = f'file {path}'
+    try:
+        reader = csv.reader(io.StringIO(read_text(path), newline=''), skipinitialspace=True)
+        lines = [(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
+    except ConfigurationError as error:
+        raise ValueError(f'file {error}') from None
+    except csv.Error as error:
+        raise ValueError(f'{source}: not a CSV text file: {error}') from None
+    header = [name.strip() for name in lines[0][1]] if lines else []
+    missing = [name for name in needed if name not in header]
+    if missing:
+        raise ValueError(
+            f'{source}: row {lines[0][0] if lines else 1}: column {missing[0]} is missing '
+            f'(allowed: {", ".join(known)})'
+        )
+    for name in header:
+        if name not in known or header.count(name) > 1:
+            wrong = 'repeated' if name in known else 'unknown'
+            raise ValueError(
+                f'{source}: row {lines[0][0]}: column {shown(name)} is {wrong} '
+                f'(allowed: {", ".join(known)})'
+            )
+    if len(lines) > MAX_ROWS + 1:
+        raise ValueError(f'{source}: {len(lines) - 1} rows (allowed: <= {MAX_ROWS})')
+    rows = []
+    for number, cells in lines[1:]:
+        if len(cells) != len(header):
+            raise ValueError(
+                f'{source}: row {number}: {len(cells)} cells for {len(header)} columns'
+            )
+        cell = dict(zip(header, cells, strict=True))
+        where = f'{source}: row {number}, column'
+        rows.append((number, {n: _number(cell[n], f'{where} {n}') for n in known if n in cell}))
+    return rows
+
+
+def check_depths(depths: list[float], names, source: str) -> None:
+    """Refuse depths (m) that do not increase; ``names`` are the numbers of their rows.
+
+    Raises
+    ------
+    ValueError
+        Naming the source, the row and the column.
+    """
+    for i, depth in enumerate(depths):
+        where = f'{source}: row {names[i]}, column depth_m = {depth!r}'
+        if not 0.0 <= depth <= MAX_DEPTH_M:
+            raise ValueError(f'{where} (allowed: >= 0.0 and <= {MAX_DEPTH_M})')
+        if i > 0 and depth <= depths[i - 1]:
+            raise ValueError(
+                f'{where}: depths must increase '
+                f'(allowed: > {depths[i - 1]!r}, the depth of row {names[i - 1]})'
+            )
+
+
+def _number(text: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f'{where} = {shown(text)}: not a finite number')
+    return value
