@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from floor import Floor, compare, compiler, compiler_version
-from plant_step import SCENARIO, SHALLOW, cost_s, flight_of, plant_steps
+from plant_step import SCENARIO, SEA, SHALLOW, cost_s, flight_of, plant_steps
 
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
@@ -33,6 +33,8 @@ MEANING = {
     'plant_step_ns': 'one tick of the plant alone (ns)',
     'plant_step_floor_ns': 'the same in C (ns)',
     'plant_step_over_c': 'their ratio',
+    'plant_step_sea_ns': 'one tick of a plant with a fin in measured water (ns)',
+    'plant_step_sea_over_plain': 'its ratio to that of the plant alone, by turns',
     'floor_ticks_compared': 'ticks in which every number of plant and C has the same bits',
     'score_30h_s': 'scoring the mission of 30 h (s)',
     'mission_real_time_factor': 'simulated time over that of mission and score',
@@ -52,6 +54,8 @@ def measure(progress: Callable[[str], None]) -> dict:
         compilation = {'compile_s': _warm_up_s(empty), 'load_s': _warm_up_s(empty)}
     progress('plant')
     plant_s, plant_floor_s, compared = _plant_s()
+    progress('plant with a fin in measured water')
+    sea_s, plain_s = _sea_s()
     missions = []
     for i in range(REPEATS):
         progress(f'mission of 30 h, {i + 1} of {REPEATS}')
@@ -64,6 +68,8 @@ def measure(progress: Callable[[str], None]) -> dict:
         'plant_step_ns': 1e9 * plant_s,
         'plant_step_floor_ns': plant_floor_s and 1e9 * plant_floor_s,
         'plant_step_over_c': None if plant_floor_s is None else plant_s / plant_floor_s,
+        'plant_step_sea_ns': 1e9 * sea_s,
+        'plant_step_sea_over_plain': sea_s / plain_s,
         'floor_ticks_compared': compared,
         'score_30h_s': score_s,
         'mission_real_time_factor': DURATION_S / (mission_s + score_s),
@@ -108,6 +114,19 @@ def _plant_s() -> tuple[float, float | None, int | None]:
         for name, way in ways.items():
             times[name].append(cost_s(way, *flight, motions) / len(motions))
     return min(times['plant']), min(times.get('floor', [None])), compared
+
+
+def _sea_s() -> tuple[float, float]:
+    """Processor time (s) of a tick of the plant with a fin in measured water, and without."""
+    flights = [flight_of(load_mission(**SHALLOW, **changes)) for changes in (SEA, {})]
+    motions = np.empty((len(flights[0][2]), len(flights[0][0].motion)))
+    for flight in flights:
+        plant_steps(*flight, motions)
+    times = [[], []]
+    for _ in range(2 * REPEATS):
+        for flight, taken in zip(flights, times, strict=True):
+            taken.append(cost_s(plant_steps, *flight, motions) / len(motions))
+    return min(times[0]), min(times[1])
 
 
 def _warm_up_s(cache: str) -> float:

@@ -24,6 +24,16 @@ SHALLOW = {
     'profile.depth_m': 150.0,
     'profile.surface_every_dives': 2,
 }
+#: A fin, a volume, and water of which temperature and density are measured.
+_FIN = {'range': 26.0, 'rate': 1.2, 'area': 0.02, 'lift_slope': 2.5, 'x': -1.0, 'turn_rate': 0.5}
+SEA = {
+    **{f'vehicle.fin.{name}': value for name, value in _FIN.items()},
+    'vehicle.volume': 69.0 / 1025.0,
+    'vehicle.compressibility': 5e-10,
+    'vehicle.thermal_expansion': 7e-5,
+    'vehicle.reference_temperature': 15.0,
+    'water.profile': [[0.0, 1025.0, 18.0], [60.0, 1026.5, 12.0], [1000.0, 1032.0, 5.0]],
+}
 
 
 @kernel

@@ -126,7 +126,7 @@ UNKNOWN = [
     ({'seed': -1}, None, ['seed = -1', '>= 0']),
     ({'settle_s': -5.0}, None, ['settle_s = -5.0', '>= 0']),
     ({'profile': {'net_heaviness_kg': -0.4}}, None, ['profile.net_heaviness_kg = -0.4', '> 0']),
-    ({'profile': {'pitch_deg': 89}}, None, ['profile.pitch_deg = 89', '>= 13', '<= 60']),
+    ({'profile': {'pitch_deg': 89}}, None, ['profile.pitch_deg = 89', '>= 8', '<= 60']),
     ({'profile': 5}, None, ['profile = 5', 'depth_m']),
     ({'control': {'law': 'magic'}}, None, ["control.law = 'magic'", "'pid'"]),
     ({'path': {'kind': 'loop'}}, None, ["path.kind = 'loop'", "'helix'"]),

@@ -13,7 +13,6 @@ from glider_control.laws.pid import (
     HEADING_INTEGRAL_MAX,
     PITCH_INTEGRAL_MAX,
     ROLL_INTEGRAL_MAX,
-    STEERING_VERTICAL_RATE,
     PidState,
     heading_to_roll,
     pid_step,
@@ -22,6 +21,7 @@ from glider_control.settings import ControlSettings
 from glider_model.base.signals import TICK_S, Reference
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import Filtered
+from glider_model.vehicle.file import SLOWEST_GLIDE_MPS
 
 quick = settings(max_examples=60, deadline=None)
 
@@ -138,7 +138,7 @@ def test_heading_is_approached_the_short_way_round():
 @given(st.floats(-0.99, 0.99), angles, small)
 def test_vehicle_that_turns_over_is_not_steered(share, error, integral):
     state = AT_REST._replace(heading_integral=integral)
-    seen = measured(w=share * STEERING_VERTICAL_RATE)
+    seen = measured(w=share * SLOWEST_GLIDE_MPS)
     assert steer(seen, asked(psi=error), state=state) == (0.0, integral)
 
 

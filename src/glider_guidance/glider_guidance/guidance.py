@@ -27,6 +27,7 @@ from glider_guidance.yo.machine import (
     ProfileParams,
     ProfileState,
     coming_turn,
+    heaviness_of,
     look_ahead_s,
     profile_step,
     profile_targets,
@@ -57,13 +58,10 @@ from glider_model.onboard.glide_polar import (
 )
 from glider_model.onboard.learnt_steering import Steering, SteeringParams, learn
 
-#: The flight model is believed this long after a glide began (s).
-SETTLED_S = 120.0
 #: An infeasible course is reported once it has lasted this long (s).
 INFEASIBLE_S = 60.0
-#: The flight model is believed above this vertical rate (m/s) and pitch (rad).
+#: The flight model is believed above this vertical rate (m/s), and where the polar is used.
 MODEL_VERTICAL_RATE = 0.05
-MODEL_PITCH = math.radians(12.0)
 #: Time constant of the estimated speed through the water (s).
 SPEED_FILTER_S = 30.0
 #: Time constant of the attitude from which steering is learnt (s).
@@ -341,8 +339,8 @@ def observe(state, place, leg, params, dt):
     theta, rate = place.theta, place.ground_d
     valid = (
         leg.is_gliding
-        and leg.glided_s > SETTLED_S
-        and abs(theta) > MODEL_PITCH
+        and leg.glided_s > params.profile.settled_s
+        and abs(theta) > params.polar.shallowest
         and abs(rate) > MODEL_VERTICAL_RATE
         and theta * rate < 0.0
     )
@@ -380,7 +378,9 @@ def refer(state, place, doing, asked, aborted, params, dt):
         pitch_target = elevation
         for _ in range(3):
             pitch_target = elevation + glide_alpha(pitch_target, params.polar)
-        rate_target = glide_vertical_rate(pitch_target, params.profile.net_heaviness, params.polar)
+        rate_target = glide_vertical_rate(
+            pitch_target, heaviness_of(pitch_target, params.profile), params.polar
+        )
     made_good = (
         place.ground_n * place.d_n + place.ground_e * place.d_e + place.ground_d * place.d_d
     ) / place.slope

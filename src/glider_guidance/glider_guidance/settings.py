@@ -178,6 +178,23 @@ class GuidanceSettings(GuidanceLawSettings):
                 f'{vehicle.rated_depth_m:g} m, its rated_depth)'
             )
 
+    def check_pitch(self) -> None:
+        """Refuse a glide that the vehicle does not have.
+
+        Raises
+        ------
+        ConfigurationError
+            If a pitch of the profile is shallower than its file says it glides at.
+        """
+        shallowest = math.degrees(load_vehicle(self.vehicle).params().shallowest_glide)
+        for name in ('pitch_deg', 'climb_pitch_deg'):
+            pitch = getattr(self.profile, name)
+            if pitch is not None and pitch < shallowest - 1e-9:
+                raise ConfigurationError(
+                    f'profile.{name} = {pitch:g}: shallower than the vehicle glides (allowed: >= '
+                    f'{shallowest:g} deg, its shallowest_glide)'
+                )
+
     def params(self) -> GuidanceParams:
         """Kernel parameters."""
         vehicle = load_vehicle(self.vehicle)
@@ -197,7 +214,7 @@ class GuidanceSettings(GuidanceLawSettings):
             ObserverParams(self.observer.k3_per_s, self.observer.k4_per_s2),
             FilterParams(filters.heading_frequency_radps, filters.heading_rate_radps),
             FilterParams(filters.pitch_frequency_radps, filters.pitch_rate_radps),
-            self.steering.params(banks=not vehicle.steers_by),
+            self.steering.params(not vehicle.steers_by, kernel_vehicle.slowest_glide),
             self.gate.params(),
         )
 

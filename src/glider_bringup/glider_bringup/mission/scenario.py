@@ -366,7 +366,7 @@ def make_scenario(
     scenario = _find_vehicle(scenario, path.parent, in_vehicle, f'{path}{changed}')
     if not recorded:
         try:
-            _check_depth(scenario)
+            _check_glide(scenario)
         except ConfigurationError as error:
             raise ConfigurationError(f'{path}{changed}: {error}') from None
     return scenario
@@ -381,9 +381,10 @@ def split_changes(changes: dict[str, Any]) -> tuple[dict[str, Any], dict[str, An
     )
 
 
-def _check_depth(scenario: Scenario) -> None:
-    """Refuse a mission that begins, or goes, deeper than its vehicle is rated for."""
+def _check_glide(scenario: Scenario) -> None:
+    """Refuse a mission that begins, or goes, deeper than its vehicle can, or more shallowly."""
     scenario.guidance_settings().check_depth()
+    scenario.guidance_settings().check_pitch()
     start_m, rated_m = scenario.initial.depth_m, load_vehicle(scenario.vehicle).rated_depth_m
     if start_m > rated_m:
         raise ConfigurationError(

@@ -147,7 +147,8 @@ class AdaptiveSettings(LawSettings):
 
     def params(self, vehicle: Vehicle, bank: Bank) -> 'AdaptiveParams':
         """Kernel parameters for a vehicle whose masses, but nothing else, are known."""
-        kernel_vehicle, steering = vehicle.params(), self.steering.params(bank.limit > 0.0)
+        kernel_vehicle = vehicle.params()
+        steering = self.steering.params(bank.limit > 0.0, kernel_vehicle.slowest_glide)
         _, _, _, i_xx, i_yy, *_ = rigid_body(0.0, 0.0, kernel_vehicle)
         return AdaptiveParams(
             self.roll.params(i_xx + kernel_vehicle.a_44),

@@ -60,6 +60,7 @@ class PidSettings(LawSettings):
         return PidParams(
             *(getattr(self, name) for name in PidSettings.model_fields),
             *vehicle.steering_rates,
+            vehicle.params().slowest_glide,
             bank.limit,
             bank.filter,
         )
@@ -83,6 +84,7 @@ class PidParams(NamedTuple):
     heading_kd: float
     steering_dive: float  #: turn rate over sin(roll) at STEERING_SPEED (rad/s), signed
     steering_climb: float
+    slowest_glide: float  #: vertical rate below which it turns over and cannot be steered (m/s)
     roll_limit: float  #: (rad)
     roll_filter: FilterParams
 
@@ -96,8 +98,6 @@ class PidState(NamedTuple):
     roll: Filtered
 
 
-#: Below this vertical rate the vehicle is turning over and cannot be steered (m/s).
-STEERING_VERTICAL_RATE = 0.12
 #: Integrators are held within these bounds (N m, N m, rad/s).
 PITCH_INTEGRAL_MAX, ROLL_INTEGRAL_MAX, HEADING_INTEGRAL_MAX = 3.0, 2.0, 0.005
 
@@ -113,7 +113,7 @@ def heading_to_roll(state, measured, reference, speed, params, dt):
 
     phi_s = asin sat((psi_s' + k_psi e + k_d (psi_s' - psi') + d) / (b V / V_0))
     """
-    if abs(measured.vertical_rate) < STEERING_VERTICAL_RATE:
+    if abs(measured.vertical_rate) < params.slowest_glide:
         return 0.0, state.heading_integral
     steering = params.steering_dive if measured.vertical_rate > 0.0 else params.steering_climb
     gain = steering * speed_ratio(speed)

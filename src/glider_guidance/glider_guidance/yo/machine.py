@@ -30,6 +30,8 @@ from glider_model.onboard.glide_polar import Polar, glide_vertical_rate
 PITCH_OVER = 0.5
 #: Largest lead that is believed, in leads by the vehicle's file.
 LEAD_RANGE = 6.0
+#: The flight model is believed this long after a glide began (s), or after this share of it.
+SETTLED_S, SETTLED_SHARE = 120.0, 0.3
 #: The path is looked at for so many full dives before its end.
 DIVES_AHEAD = 4.0
 
@@ -46,13 +48,19 @@ class ProfileSettings(Settings):
         10.0, ge=2.0, le=1000.0, description='depth of the upper turn between dives (m)'
     )
     pitch_deg: float = Field(
-        30.0, ge=13.0, le=60.0, description='glide pitch, nose down diving and up climbing (deg)'
+        30.0, ge=8.0, le=60.0, description='glide pitch, nose down diving and up climbing (deg)'
     )
     net_heaviness_kg: float = Field(
         0.4,
         gt=0.0,
         le=20.0,
         description='net heaviness that sets the speed, - when climbing (kg)',
+    )
+    climb_pitch_deg: float | None = Field(
+        None, ge=8.0, le=60.0, description='glide pitch of the climb, if another one (deg)'
+    )
+    climb_net_heaviness_kg: float | None = Field(
+        None, gt=0.0, le=20.0, description='magnitude for the climb, if another one (kg)'
     )
     prepare_s: float = Field(
         60.0, ge=0.0, le=86400.0, description='surface preparation before a dive (s)'
@@ -66,20 +74,40 @@ class ProfileSettings(Settings):
 
     def params(self, dives: int, pump_rate_kgps: float, polar: Polar) -> 'ProfileParams':
         """Kernel parameters for so many dives (0: no end) with this pump: turns are led."""
-        pitch = math.radians(self.pitch_deg)
+        pitch, heavy = math.radians(self.pitch_deg), self.net_heaviness_kg
+        climb_pitch = pitch if self.climb_pitch_deg is None else math.radians(self.climb_pitch_deg)
+        light = heavy if self.climb_net_heaviness_kg is None else self.climb_net_heaviness_kg
+        dive_rate = glide_vertical_rate(-pitch, heavy, polar)
+        climb_rate = -glide_vertical_rate(climb_pitch, -light, polar)
+        if (climb_pitch, light) == (pitch, heavy):
+            climb_rate = dive_rate
+        rate = _mean_rate(dive_rate, climb_rate)
+        top_depth = min(self.top_depth_m, 0.5 * self.depth_m)
         return ProfileParams(
             self.mode == 'path',
             self.depth_m,
-            min(self.top_depth_m, 0.5 * self.depth_m),
+            top_depth,
             pitch,
-            self.net_heaviness_kg,
-            glide_vertical_rate(-pitch, self.net_heaviness_kg, polar),
+            climb_pitch,
+            heavy,
+            light,
+            dive_rate,
+            climb_rate,
+            rate,
             dives,
             self.surface_every_dives,
             round(self.prepare_s / TICK_S),
             round(self.wait_s / TICK_S),
-            2.0 / 3.0 * self.net_heaviness_kg / pump_rate_kgps,
+            min(SETTLED_S, SETTLED_SHARE * (self.depth_m - top_depth) / rate),
+            2.0 / 3.0 * (heavy if light == heavy else 0.5 * (heavy + light)) / pump_rate_kgps,
         )
+
+
+def _mean_rate(dive_rate: float, climb_rate: float) -> float:
+    """Rate (m/s) that takes as long down and up as two rates do; that of both if they are one."""
+    if dive_rate == climb_rate:
+        return dive_rate
+    return 2.0 * dive_rate * climb_rate / (dive_rate + climb_rate)
 
 
 class ProfileParams(NamedTuple):
@@ -88,13 +116,18 @@ class ProfileParams(NamedTuple):
     follows_path: bool
     depth: float  #: lower turn (m)
     top_depth: float  #: upper turn (m)
-    pitch: float  #: magnitude (rad)
-    net_heaviness: float  #: magnitude (kg)
-    glide_rate: float  #: vertical rate of the steady glide, by the polar, magnitude (m/s)
+    pitch: float  #: of the dive, magnitude (rad)
+    climb_pitch: float
+    net_heaviness: float  #: of the dive, magnitude (kg)
+    climb_net_heaviness: float
+    dive_rate: float  #: vertical rates of the steady glides, by the polar, magnitudes (m/s)
+    climb_rate: float
+    glide_rate: float  #: down and up again over the time that both take (m/s)
     dives: int  #: 0: no end
     surface_every: int  #: dives between waits on the surface; 0: after the last
     prepare_ticks: int
     wait_ticks: int
+    settled_s: float  #: the flight model is believed this long after a glide began (s)
     lead_s: float  #: way left once the pump starts, over the speed, by the file's pump (s)
 
 
@@ -197,9 +230,9 @@ def profile_step(state, depth, vertical_rate, left, params):
         # pump's time to neutral, two thirds of which are lost
         took_s = 2.0 / 3.0 * state.ticks * TICK_S / (1.0 - PITCH_OVER * PITCH_OVER)
         took_s = min(LEAD_RANGE * params.lead_s, took_s)
-        if stage == INFLECTING_UP and vertical_rate > PITCH_OVER * params.glide_rate:
+        if stage == INFLECTING_UP and vertical_rate > PITCH_OVER * params.dive_rate:
             up_s = took_s
-        elif stage == INFLECTING_DOWN and vertical_rate < -PITCH_OVER * params.glide_rate:
+        elif stage == INFLECTING_DOWN and vertical_rate < -PITCH_OVER * params.climb_rate:
             down_s = took_s
         return ProfileState(
             stage, state.ticks + 1, state.dives, state.aborted, up_s, down_s, planned
@@ -207,6 +240,12 @@ def profile_step(state, depth, vertical_rate, left, params):
     climbed = state.stage == GLIDING_UP and not state.aborted
     dives = state.dives + (1 if climbed else 0)
     return ProfileState(stage, 0, dives, state.aborted, up_s, down_s, planned)
+
+
+@kernel
+def heaviness_of(pitch, params):
+    """Magnitude of the net heaviness (kg) of a dive, at a pitch (rad) below 0, or of a climb."""
+    return params.net_heaviness if pitch < 0.0 else params.climb_net_heaviness
 
 
 @kernel
@@ -218,14 +257,14 @@ def profile_targets(stage, vertical_rate, params):
     to ``PITCH_OVER`` of the glide's. In preparation the nose is already turned down while the
     buoyancy keeps the vehicle up.
     """
-    rate = params.glide_rate
     down = is_descending(stage)
     nose_down = down or stage == SURFACE_PREPARATION
     if stage == INFLECTING_UP:
-        nose_down = vertical_rate > PITCH_OVER * rate
+        nose_down = vertical_rate > PITCH_OVER * params.dive_rate
     elif stage == INFLECTING_DOWN:
-        nose_down = vertical_rate > -PITCH_OVER * rate
-    return -params.pitch if nose_down else params.pitch, rate if down else -rate
+        nose_down = vertical_rate > -PITCH_OVER * params.climb_rate
+    pitch = -params.pitch if nose_down else params.climb_pitch
+    return pitch, params.dive_rate if down else -params.climb_rate
 
 
 def mission_time_s(params: ProfileParams, dives: int) -> float:

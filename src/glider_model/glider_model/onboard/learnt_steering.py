@@ -26,11 +26,12 @@ from pydantic import Field
 
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
+from glider_model.vehicle.file import SLOWEST_GLIDE_MPS
 
 #: Speed through the water at which steering effectiveness is given (m/s).
 STEERING_SPEED = 0.5
-#: Nothing is learnt below this speed and this vertical rate (m/s).
-LEARN_SPEED, LEARN_VERTICAL_RATE = 0.15, 0.12
+#: Nothing is learnt below this speed (m/s).
+LEARN_SPEED = 0.15
 #: A vehicle that turns faster than this times sin(roll) is steered by its turn (rad/s).
 STRONG_STEERING = 6e-3
 #: An estimate with a smaller standard deviation is believed, this share of which is no difference.
@@ -97,8 +98,13 @@ class SteeringLearningSettings(Settings):
         description='roll at which a vehicle has to turn, or else is steered by its kick (deg)',
     )
 
-    def params(self, banks: bool = True) -> 'SteeringParams':
-        """Kernel parameters; for a vehicle that does not bank to turn, which learns nothing."""
+    def params(
+        self, banks: bool = True, slowest_glide: float = SLOWEST_GLIDE_MPS
+    ) -> 'SteeringParams':
+        """Kernel parameters for a vehicle, of its file's slowest glide (m/s).
+
+        One that does not bank to turn learns nothing.
+        """
         return SteeringParams(
             self.drift_radps**2 / 1000.0,
             self.bend_drift_radps**2 / 1000.0,
@@ -108,6 +114,7 @@ class SteeringLearningSettings(Settings):
             self.after_s if banks else math.inf,
             self.smoothing_s,
             math.sin(math.radians(self.bank_deg)),
+            slowest_glide,
         )
 
     def initial_state(self) -> 'Steering':
@@ -142,6 +149,7 @@ class SteeringParams(NamedTuple):
     after_s: float  #: time after a turn-over in which nothing is learnt (s)
     smoothing_s: float
     bank: float  #: sine of the roll at which a vehicle has to turn (-)
+    slowest_glide: float  #: vertical rate below which it turns over (m/s)
 
 
 class SteeringState(NamedTuple):
@@ -305,7 +313,7 @@ def learn(steering, measured, speed, params, dt):
         Length of the tick (s).
     """
     ratio = speed_ratio(speed)
-    is_gliding = abs(measured.vertical_rate) > LEARN_VERTICAL_RATE and speed > LEARN_SPEED
+    is_gliding = abs(measured.vertical_rate) > params.slowest_glide and speed > LEARN_SPEED
     steady_s = steering.steady_s + dt if is_gliding else 0.0
     share = dt / (params.smoothing_s + dt) if steady_s > dt else 1.0
     sine = math.sin(measured.phi)

@@ -6,7 +6,7 @@ import math
 
 from glider_model.base.settings import Settings
 from glider_model.base.signals import SEA_WATER_DENSITY
-from glider_model.vehicle.quantity import quantity
+from glider_model.vehicle.quantity import meaning, quantity
 
 #: Coefficients of lift and drag, with their units: what a set stands for.
 LIFT_AND_DRAG = {
@@ -26,11 +26,11 @@ class MerckelbachSettings(Settings):
     Merckelbach et al. (2010, 2019).
     """
 
-    Cd0: quantity('-', gt=0.0, le=10.0)
-    Cd1: quantity('1/rad^2', ge=0.0, le=1000.0)
-    S: quantity('m^2', gt=0.0, le=10.0)
-    aw: quantity('1/rad', ge=0.0, le=100.0)
-    ah: quantity('1/rad', ge=0.0, le=100.0)
+    Cd0: meaning(quantity('-', gt=0.0, le=10.0), 'drag at no angle of attack')
+    Cd1: meaning(quantity('1/rad^2', ge=0.0, le=1000.0), 'drag over alpha^2, all of it')
+    S: meaning(quantity('m^2', gt=0.0, le=10.0), 'reference area')
+    aw: meaning(quantity('1/rad', ge=0.0, le=100.0), 'lift over alpha, of the wings')
+    ah: meaning(quantity('1/rad', ge=0.0, le=100.0), 'lift over alpha, of the hull')
 
     def coefficients(self) -> dict[str, float]:
         """Coefficients K (kg/m, rad) by their names."""
@@ -50,10 +50,10 @@ class EriksenSettings(Settings):
     Eriksen et al. (2001): alpha in degrees, as in ``hd_a``, ``hd_b`` and ``hd_c`` of its files.
     """
 
-    a: quantity('1/deg', gt=0.0, le=1.0)
-    b: quantity('Pa^(1/4)', gt=0.0, le=1.0)
-    c: quantity('1/deg^2', ge=0.0, le=0.1)
-    l: quantity('m', gt=0.0, le=20.0)  # noqa: E741
+    a: meaning(quantity('1/deg', gt=0.0, le=1.0), 'lift over alpha, hd_a')
+    b: meaning(quantity('Pa^(1/4)', gt=0.0, le=1.0), 'drag at no angle of attack, hd_b')
+    c: meaning(quantity('1/deg^2', ge=0.0, le=0.1), 'drag over alpha^2, hd_c')
+    l: meaning(quantity('m', gt=0.0, le=20.0), 'length of the glider')  # noqa: E741
 
     def coefficients(self) -> dict[str, float]:
         """Coefficients K (kg/m, rad) by their names."""

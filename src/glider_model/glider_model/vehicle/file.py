@@ -25,154 +25,76 @@ from glider_model.base.settings import (
 )
 from glider_model.base.wiring import JOINTS
 from glider_model.vehicle import surfaces
-from glider_model.vehicle.coefficients import (
-    EriksenSettings,
-    MerckelbachSettings,
-    with_coefficients,
-)
 from glider_model.vehicle.energy import EnergySettings
-from glider_model.vehicle.quantity import (
-    CC,
-    CC_PER_S,
-    LITRE,
-    NotNegative,
-    Positive,
-    Signed,
-    quantity,
-    vector,
-)
+from glider_model.vehicle.quantity import LITRE, meaning, quantity
 from glider_model.vehicle.rigid_body import mass_matrix
+from glider_model.vehicle.sections import (
+    AddedMassSettings,
+    BuoyancyEngineSettings,
+    HullSettings,
+    HydrodynamicsSettings,
+    MovingMassSettings,
+    RigidBodySettings,
+    SteeringSettings,
+)
 from glider_model.vehicle.steering import SteeringRates, steering_rates
 from glider_model.vehicle.surface import NoSurface, SurfaceSettings
 
 VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
 #: Shallowest pitch at which a glide polar is used, if the file says nothing (deg).
 SHALLOWEST_GLIDE_DEG = 12.0
+#: Vertical rate of the slowest glide, if the file says nothing (m/s).
+SLOWEST_GLIDE_MPS = 0.12
 #: Source of a number that a person changed for a run.
 _SET = '--set'
-
-
-class RigidBodySettings(Settings):
-    """Hull without the moving mass. Origin at the centre of buoyancy, axes FRD."""
-
-    hull_mass: quantity('kg', **Positive)
-    hull_center_of_mass: vector('m')
-    hull_inertia: vector('kg m^2', not_negative=True)  # about the origin
-
-
-class AddedMassSettings(Settings):
-    """Positive added mass M_A (Fossen's -X_udot, ...), symmetric, with its two cross terms."""
-
-    linear: vector('kg', not_negative=True)
-    angular: vector('kg m^2', not_negative=True)
-    sway_yaw: quantity('kg m', **Signed)
-    heave_pitch: quantity('kg m', **Signed)
-
-
-class HydrodynamicsSettings(Settings):
-    """Coefficients of the viscous forces and moments (Graver 2005; Zhang et al. 2013)."""
-
-    model_config = pydantic.ConfigDict(
-        json_schema_extra={
-            'others': 'Cd0, Cd1, S, aw and ah go under merckelbach, a, b, c and l under eriksen'
-        }
-    )
-
-    #: Lift and drag as Merckelbach et al. write them, instead of K_D0, K_D, K_L0 and K_L.
-    merckelbach: MerckelbachSettings | None = None
-    #: The same as Eriksen et al. write them.
-    eriksen: EriksenSettings | None = None
-    K_D0: quantity('kg/m', **NotNegative)
-    K_D: quantity('kg/m/rad^2', **NotNegative)
-    K_L0: quantity('kg/m', **Signed)
-    K_L: quantity('kg/m/rad', **Signed)
-    K_beta: quantity('kg/m/rad', **Signed)
-    K_MR: quantity('kg/rad', **Signed)
-    K_p: quantity('kg s/rad', **Signed)
-    K_M0: quantity('kg', **Signed)
-    K_M: quantity('kg/rad', **Signed)
-    K_q: quantity('kg s/rad', **Signed)
-    K_MY: quantity('kg/rad', **Signed)
-    K_r: quantity('kg s/rad', **Signed)
-    #: K_D0 is that at 1 m/s, and goes with this power of the speed: -1/2 of Eriksen's Seaglider.
-    speed_exponent: quantity('-', ge=-1.0, le=1.0) | None = None
-    linear_damping: vector('kg/s')
-    linear_angular_damping: vector('kg m^2/s')
-    quadratic_damping: vector('kg/m')
-    quadratic_angular_damping: vector('kg m^2')
-
-    @pydantic.model_validator(mode='before')
-    @classmethod
-    def _as_others_write_it(cls, values):
-        return with_coefficients(values)
-
-
-class MovingMassSettings(Settings):
-    """Mass that slides along x for pitch and turns about x for roll."""
-
-    mass: quantity('kg', **Positive)
-    neutral_x: quantity('m', ge=-10.0, le=10.0)
-    radius: quantity('m', gt=0.0, le=1.0)
-    inertia: vector('kg m^2', not_negative=True)  # about its own centre, turning with it
-    travel: quantity('m', gt=0.0, le=2.0)
-    rate: quantity('m/s', gt=0.0, le=1.0)
-    rotation: quantity('deg', ge=0.0, le=180.0)  # 0: it does not turn
-    rotation_rate: quantity('deg/s', gt=0.0, le=180.0)
-
-
-class BuoyancyEngineSettings(Settings):
-    """Oil pump: net heaviness within +-range; in cc, of sea water of 1025 kg/m^3."""
-
-    range: quantity('kg', also=CC, gt=0.0, le=50.0)
-    rate: quantity('kg/s', also=CC_PER_S, gt=0.0, le=10.0)
-
-
-class HullSettings(Settings):
-    """Outer shape, used where the hull breaks the surface."""
-
-    length: quantity('m', gt=0.1, le=20.0)
-    diameter: quantity('m', gt=0.01, le=5.0)
-
-
-class SteeringSettings(Settings):
-    """Turn rate (starboard +) over sine of roll in a gentle spiral, as ``glider trim`` solves it.
-
-    Its sign belongs to vehicle and phase: lift points the other way in the climb. A file without
-    it has that of `glider_model.vehicle.steering`.
-    """
-
-    dive: quantity('rad/s', ge=-1.0, le=1.0)
-    climb: quantity('rad/s', ge=-1.0, le=1.0)
 
 
 class _Body(Settings):
     """What every vehicle file says."""
 
-    name: Annotated[str, Field(pattern=r'^[a-z0-9_]+$')]
-    description: str
+    name: Annotated[str, Field(pattern=r'^[a-z0-9_]+$', description='its name')]
+    description: Annotated[str, Field(description='what it is, in a line')]
     rigid_body: RigidBodySettings
     moving_mass: MovingMassSettings
     buoyancy_engine: BuoyancyEngineSettings
     hull: HullSettings
-    #: Deepest that the hull is meant to go. Recordings made before there was this field lack it.
-    rated_depth: quantity('m', gt=0.0, le=12000.0) | None = None
-    #: Deeper than this the hull may give way.
-    crush_depth: quantity('m', gt=0.0, le=15000.0) | None = None
-    #: Weight in water of what is let go in need.
-    drop_weight: quantity('kg', gt=0.0, le=100.0) | None = None
-    #: Volume at the surface, at the reference temperature and with the pump at 0. Without, the
-    #: vehicle is neutral at the surface, whatever the water.
-    volume: quantity('m^3', also=LITRE, gt=0.0, le=10.0) | None = None
-    #: Share of the volume that is lost by a pascal.
-    compressibility: quantity('1/Pa', ge=0.0, le=1e-8) | None = None
-    #: Share of the volume that is gained by a degree.
-    thermal_expansion: quantity('1/K', ge=0.0, le=1e-3) | None = None
-    #: Temperature at which the hull has its volume.
-    reference_temperature: quantity('degC', ge=-5.0, le=50.0) | None = None
-    #: Pitch of about its best glide, 12 deg without: shallower, speed is not reckoned by drag.
-    shallowest_glide: quantity('deg', ge=5.0, le=30.0) | None = None
-    #: Where the oil of the buoyancy engine acts: forward of the centre of buoyancy is positive.
-    pump_x: quantity('m', ge=-5.0, le=5.0) | None = None
+    # Recordings made before there was this field lack it.
+    rated_depth: meaning(
+        quantity('m', gt=0.0, le=12000.0) | None,
+        'deepest that the hull is meant to go; without it the vehicle does not fly',
+    ) = None
+    crush_depth: meaning(
+        quantity('m', gt=0.0, le=15000.0) | None, 'deeper than this the hull may give way'
+    ) = None
+    drop_weight: meaning(
+        quantity('kg', gt=0.0, le=100.0) | None, 'weight in water of what is let go in need'
+    ) = None
+    volume: meaning(
+        quantity('m^3', also=LITRE, gt=0.0, le=10.0) | None,
+        'at the surface, at the reference temperature, with the pump at 0; without it the vehicle '
+        'is neutral at the surface of any water',
+    ) = None
+    compressibility: meaning(
+        quantity('1/Pa', ge=0.0, le=1e-8) | None, 'share of the volume lost by a pascal'
+    ) = None
+    thermal_expansion: meaning(
+        quantity('1/K', ge=0.0, le=1e-3) | None, 'share of the volume gained by a degree'
+    ) = None
+    reference_temperature: meaning(
+        quantity('degC', ge=-5.0, le=50.0) | None, 'temperature at which it has its volume'
+    ) = None
+    shallowest_glide: meaning(
+        quantity('deg', ge=5.0, le=30.0) | None,
+        'shallowest pitch that it glides at, about that of its best glide; 12 without',
+    ) = None
+    slowest_glide: meaning(
+        quantity('m/s', gt=0.0, le=0.12) | None,
+        'vertical rate below which it turns over and is not steered by roll; 0.12 without',
+    ) = None
+    pump_x: meaning(
+        quantity('m', ge=-5.0, le=5.0) | None,
+        'where the oil acts, + forward of the centre of buoyancy; 0 without',
+    ) = None
     added_mass: AddedMassSettings
     hydrodynamics: HydrodynamicsSettings
     steering: SteeringSettings | None = None
@@ -316,6 +238,7 @@ class Vehicle(_Steered):
             shallowest_glide=math.radians(
                 self.shallowest_glide.value if self.shallowest_glide else SHALLOWEST_GLIDE_DEG
             ),
+            slowest_glide=self.slowest_glide.value if self.slowest_glide else SLOWEST_GLIDE_MPS,
             pump_x=_value(self.pump_x),
             drop_weight=_value(self.drop_weight),
             surface=surface.params() if surface else NoSurface(),
@@ -391,6 +314,7 @@ class VehicleParams(NamedTuple):
     thermal_expansion: float  #: of the hull (1/K), from the reference temperature (degC)
     reference_temperature: float
     shallowest_glide: float  #: at shallower pitch its glide polar is not used (rad)
+    slowest_glide: float  #: at a smaller vertical rate it turns over (m/s)
     pump_x: float  #: where the buoyancy engine is (m, + forward)
     drop_weight: float  #: weight in water of what can be let go (kg); 0: nothing
     surface: NamedTuple  #: of its steering surface, by its kind

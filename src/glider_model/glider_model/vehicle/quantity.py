@@ -102,8 +102,13 @@ class Vector(Settings):
         return value
 
 
-def vector(unit: str, not_negative: bool = False):
-    """Vector whose unit, and if asked sign, is checked."""
+def meaning(kind, words: str):
+    """Type of a field that says what it means."""
+    return Annotated[kind, Field(description=words)]
+
+
+def vector(unit: str, words: str, not_negative: bool = False):
+    """Vector that says what it means, and whose unit, and if asked sign, is checked."""
 
     def check(vector: Vector) -> Vector:
         if vector.unit != unit:
@@ -112,4 +117,7 @@ def vector(unit: str, not_negative: bool = False):
             raise ValueError(f'value = {vector.value} has a negative component (allowed: >= 0)')
         return vector
 
-    return Annotated[Vector, pydantic.AfterValidator(check)]
+    about = {'unit': unit, 'allowed': '>= 0.0' if not_negative else ''}
+    return Annotated[
+        Vector, pydantic.AfterValidator(check), Field(description=words, json_schema_extra=about)
+    ]

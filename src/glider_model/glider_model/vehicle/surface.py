@@ -13,14 +13,14 @@ from typing import NamedTuple
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
 from glider_model.base.slot import slot
-from glider_model.vehicle.quantity import quantity
+from glider_model.vehicle.quantity import meaning, quantity
 
 
 class SurfaceSettings(Settings):
     """A steering surface: as far as it goes to each side, and how fast."""
 
-    range: quantity('deg', gt=0.0, le=90.0)
-    rate: quantity('deg/s', gt=0.0, le=180.0)
+    range: meaning(quantity('deg', gt=0.0, le=90.0), 'as far as it turns to each side')
+    rate: meaning(quantity('deg/s', gt=0.0, le=180.0), 'how fast it turns')
 
     def params(self) -> NamedTuple:
         """Kernel parameters, of a type of its own, for `surface_loads`."""

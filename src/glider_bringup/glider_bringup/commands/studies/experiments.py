@@ -24,7 +24,15 @@ from glider_model.base.exits import EXIT_FAILED
 
 app = typer.Typer()
 Group = Literal[
-    'current', 'yaw', 'profile', 'robustness', 'paths', 'envelope', 'navigation', 'faults'
+    'current',
+    'yaw',
+    'profile',
+    'robustness',
+    'vehicles',
+    'paths',
+    'envelope',
+    'navigation',
+    'faults',
 ]
 
 

@@ -25,6 +25,7 @@ from glider_bringup.studies.paper.limits import (
     STRAIGHT_LIMITS,
     TURN_MARGIN_M,
     TURN_S,
+    VEHICLE_LIMIT_M,
     judge_envelope,
     judge_limits,
     judge_reckoned,
@@ -155,6 +156,36 @@ def _robustness_experiments() -> list[Experiment]:
             'not flown',
             cases,
             judge_limits(ROBUST_LIMITS),
+        )
+    ]
+
+
+#: Current that every vehicle is flown in.
+_HALF_KNOT = {'current.speed_kn': 0.5, 'current.angle_deg': 20.0}
+#: Scenario and changed fields of each vehicle.
+_VEHICLES = {
+    'zhang2021': ('current_8deg', _HALF_KNOT),
+    'seawing': ('current_8deg', {**_HALF_KNOT, 'vehicle': 'seawing'}),
+    'slocum_g2': ('slocum_shelf', _HALF_KNOT),
+    'seaglider': ('seaglider_1000m', _HALF_KNOT),
+}
+
+
+def _vehicles_experiments() -> list[Experiment]:
+    cases = [
+        case
+        for vehicle, (scenario, changes) in _VEHICLES.items()
+        for case in _both_laws(scenario, vehicle, changes)
+    ]
+    return [
+        Experiment(
+            'vehicles',
+            'vehicles',
+            '',
+            'one law, no retuning, four vehicles on a straight path in 0.5 kn at 20 deg',
+            'not flown',
+            cases,
+            judge_limits({'cross_track_m.max_steady': VEHICLE_LIMIT_M}),
         )
     ]
 
@@ -455,6 +486,7 @@ GROUPS = {
     'yaw': _yaw_experiments,
     'profile': _profile_experiments,
     'robustness': _robustness_experiments,
+    'vehicles': _vehicles_experiments,
     'paths': _paths_experiments,
     'envelope': _envelope_experiments,
     'navigation': _navigation_experiments,

@@ -38,6 +38,8 @@ RECKONED_LIMITS = {
 FAULTLESS_LIMITS = {'navigation.from_fourth.surfacing_cross_track_m': 20.0}
 #: Attitude that is sampled now and then (m).
 SPARSE_LIMIT_M = 3.0
+#: The same law on every vehicle, in 0.5 kn at 20 deg.
+VEHICLE_LIMIT_M = 3.0
 #: In a leg, after its corner: spread of the heading, and how far it may be from the course (deg).
 HEADING_SPREAD_LIMIT_DEG, OFF_COURSE_LIMIT_DEG = 45.0, 90.0
 #: Envelope: cross current over U_h up to which a course must be held; error allowed with turns.

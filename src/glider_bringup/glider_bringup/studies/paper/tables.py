@@ -170,6 +170,7 @@ _TABLES: dict[str, Callable[[list[dict]], Table]] = {
     'yaw_10deg_adaptive': _YAW,
     'profile': _PROFILE,
     'robustness': _side_by_side,
+    'vehicles': _side_by_side,
     'helix': _side_by_side,
     'spline': _side_by_side,
     'survey': _survey,
@@ -194,6 +195,10 @@ _REMARKS = {
         'PID of zhang2021: that of another vehicle. '
         'A roll mass that is stuck altogether leaves a glider without steering: it keeps a third '
         'of its travel.'
+    ),
+    'vehicles': (
+        'zhang2021, seawing and seaglider dive to 1000 m and are steered by roll, slocum_g2 to '
+        '200 m by its fin; the PID is told how each steers.'
     ),
     'envelope': (
         'Largest cross-track error with turns (m). x: no heading can hold the course; the run was '

@@ -18,19 +18,26 @@ from typing import NamedTuple
 
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import SEA_WATER_DENSITY
-from glider_model.vehicle.quantity import quantity
+from glider_model.vehicle.quantity import meaning, quantity
 from glider_model.vehicle.surface import SurfaceSettings, surface_loads
 
 
 class FinSettings(SurfaceSettings):
     """Tail fin."""
 
-    area: quantity('m^2', gt=0.0, le=1.0)
-    lift_slope: quantity('1/rad', gt=0.0, le=2.0 * math.pi)
-    x: quantity('m', ge=-10.0, lt=0.0)  # of its centre of pressure from the centre of buoyancy
-    z: quantity('m', ge=-2.0, le=2.0) | None = None  # + below; without: on the x axis
-    #: Turn rate over sin(angle) and squared speed in a steady turn, by which it is steered.
-    turn_rate: quantity('rad s/m^2', gt=0.0, le=100.0)
+    area: meaning(quantity('m^2', gt=0.0, le=1.0), 'of one side')
+    lift_slope: meaning(
+        quantity('1/rad', gt=0.0, le=round(2.0 * math.pi, 4)),
+        '6.13 A / (A + 2.25) by aspect ratio A',
+    )
+    x: meaning(quantity('m', ge=-10.0, lt=0.0), 'where it is, ahead of the centre of buoyancy')
+    z: meaning(quantity('m', ge=-2.0, le=2.0) | None, 'the same below; on the x axis without') = (
+        None
+    )
+    turn_rate: meaning(
+        quantity('rad s/m^2', gt=0.0, le=100.0),
+        'turn rate over sin(angle) and squared speed in a steady turn, by which it is steered',
+    )
 
     def params(self) -> 'FinParams':
         """Kernel parameters."""
