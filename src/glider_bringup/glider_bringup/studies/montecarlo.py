@@ -64,7 +64,7 @@ ERRORS = {
 DIVERGED_M = 1000.0
 #: A plant whose turn rate over sin(roll) falls to this share of its file's steers weakly.
 WEAK_STEERING = 0.25
-#: Glide that stability and steering are judged in.
+#: Glide that stability and steering are judged in, with half of the pump's range at most.
 _GLIDE_KG, _GLIDE_PITCH_DEG, _ROLL_MASS_DEG = 0.4, 30.0, 10.0
 
 #: What is told of the flights of a controller, and where a scorecard has it.
@@ -152,7 +152,7 @@ def airframe(vehicle: VehicleParams, plant: VehicleParams) -> dict[str, Any]:
     dict
         ``pitch_moment_kg`` and ``yaw_moment_kg``, static moment per angle and V^2 with the Munk
         moment (stable: < 0 and > 0); ``steering_dive`` and ``steering_climb``, turn rate over
-        sin(roll) relative to that of the file (None: no steady glide); and what follows:
+        sin(roll) relative to that of the file (None: no steady glide, or no roll); what follows:
         ``unstable``, ``weak_steering``.
     """
     pitch = plant.K_M + plant.a_33 - plant.a_11
@@ -166,15 +166,14 @@ def airframe(vehicle: VehicleParams, plant: VehicleParams) -> dict[str, Any]:
         'yaw_moment_kg': yaw,
         **steering,
         'unstable': pitch >= 0.0 or yaw <= 0.0,
-        'weak_steering': any(
-            share is None or share < WEAK_STEERING for share in steering.values()
-        ),
+        'weak_steering': vehicle.mu_max > 0.0
+        and any(share is None or share < WEAK_STEERING for share in steering.values()),
     }
 
 
 def _turn_rate_over_roll(vehicle: VehicleParams, sign: float) -> float | None:
     """Turn rate per sine of roll (rad/s) in a dive (sign 1) or climb (-1)."""
-    heaviness = sign * _GLIDE_KG - vehicle.ballast
+    heaviness = sign * min(_GLIDE_KG, 0.5 * vehicle.m_b_max) - vehicle.ballast
     pitch = -sign * _GLIDE_PITCH_DEG
     mass = min(_ROLL_MASS_DEG, math.degrees(vehicle.mu_max))
     trims = [

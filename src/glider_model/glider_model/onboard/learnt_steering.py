@@ -30,6 +30,8 @@ from glider_model.vehicle.file import SLOWEST_GLIDE_MPS
 
 #: Speed through the water at which steering effectiveness is given (m/s).
 STEERING_SPEED = 0.5
+#: A vehicle that does not bank to turn begins to learn after this time (s).
+NEVER_S = 1e12
 #: Nothing is learnt below this speed (m/s).
 LEARN_SPEED = 0.15
 #: A vehicle that turns faster than this times sin(roll) is steered by its turn (rad/s).
@@ -111,7 +113,7 @@ class SteeringLearningSettings(Settings):
             self.kick_drift**2 / 1000.0,
             self.disturbance_drift_radps**2 / 1000.0,
             self.noise_radps**2 * self.correlation_s,
-            self.after_s if banks else math.inf,
+            self.after_s if banks else NEVER_S,
             self.smoothing_s,
             math.sin(math.radians(self.bank_deg)),
             slowest_glide,
