@@ -6,10 +6,11 @@ import math
 from typing import NamedTuple
 
 from glider_model.base.settings import Settings
-from glider_model.vehicle.quantity import quantity
+from glider_model.base.signals import SEA_WATER_DENSITY
+from glider_model.vehicle.quantity import meaning, quantity
 
-#: Sea water by which net heaviness (kg) is oil (cc): 1025 kg/m^3.
-CC_PER_KG = 1e6 / 1025.0
+#: Oil (cc) that makes as much net heaviness (kg).
+CC_PER_KG = 1e6 / SEA_WATER_DENSITY
 #: Voltage of a battery of which the vehicle file says nothing: lithium cells in service (V).
 VOLTAGE_V = 15.0
 
@@ -24,22 +25,26 @@ class EnergySettings(Settings):
     never less than nothing. A mass takes as much as it moves, to and fro.
     """
 
-    capacity: quantity('Wh', gt=0.0, le=1e6)
-    usable: quantity('-', gt=0.0, le=1.0)  # share of it; the guard surfaces on the rest
-    voltage: quantity('V', gt=0.0, le=1000.0)
-    pump_out: quantity('J/cc', **_Line)
-    pump_out_per_m: quantity('J/cc/m', **_Line)
-    pump_in: quantity('J/cc', **_Line)
-    pump_in_per_m: quantity('J/cc/m', **_Line)
-    hotel_dive: quantity('W', **_Power)
-    hotel_climb: quantity('W', **_Power)
-    hotel_surface: quantity('W', **_Power)
-    pitch_mass: quantity('J/m', ge=0.0, le=1e6)
-    roll_mass: quantity('J/deg', ge=0.0, le=1e4)
-    steering_surface: quantity('J/deg', ge=0.0, le=1e4) | None = None
-    call_start: quantity('J', ge=0.0, le=1e6)  # once at each surfacing
-    call_power: quantity('W', **_Power)  # above hotel_surface
-    call_duration: quantity('s', ge=0.0, le=86400.0)
+    capacity: meaning(quantity('Wh', gt=0.0, le=1e6), 'of a fresh battery')
+    usable: meaning(quantity('-', gt=0.0, le=1.0), 'share of it; the guard surfaces on the rest')
+    voltage: meaning(quantity('V', gt=0.0, le=1000.0), 'of a battery in service')
+    pump_out: meaning(quantity('J/cc', **_Line), 'taken by a volume pumped out at the surface')
+    pump_out_per_m: meaning(quantity('J/cc/m', **_Line), 'and more for every metre of depth')
+    pump_in: meaning(
+        quantity('J/cc', **_Line), 'the same of a volume let in; never less than nothing in all'
+    )
+    pump_in_per_m: meaning(quantity('J/cc/m', **_Line), 'and more for every metre of depth')
+    hotel_dive: meaning(quantity('W', **_Power), 'electronics and sensors in the dive')
+    hotel_climb: meaning(quantity('W', **_Power), 'the same in the climb')
+    hotel_surface: meaning(quantity('W', **_Power), 'the same at the surface')
+    pitch_mass: meaning(quantity('J/m', ge=0.0, le=1e6), 'by as much as it moves, to and fro')
+    roll_mass: meaning(quantity('J/deg', ge=0.0, le=1e4), 'the same')
+    steering_surface: meaning(quantity('J/deg', ge=0.0, le=1e4) | None, 'the same; 0 without') = (
+        None
+    )
+    call_start: meaning(quantity('J', ge=0.0, le=1e6), 'once at each surfacing')
+    call_power: meaning(quantity('W', **_Power), 'of a call, above hotel_surface')
+    call_duration: meaning(quantity('s', ge=0.0, le=86400.0), 'of a call')
 
     def params(self) -> 'EnergyParams':
         """Kernel parameters."""

@@ -98,7 +98,6 @@ class _Body(Settings):
     added_mass: AddedMassSettings
     hydrodynamics: HydrodynamicsSettings
     steering: SteeringSettings | None = None
-    #: Battery and what is taken out of it; without it there is no ledger.
     energy: EnergySettings | None = None
 
 
