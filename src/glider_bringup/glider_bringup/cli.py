@@ -48,8 +48,8 @@ app = typer.Typer(
 #: Commands in the order in which --help lists them; those that are not named here follow.
 ORDER = (
     *('run', 'montecarlo', 'experiments', 'sweep', 'map', 'score', 'figure', 'report', 'compare'),
-    *('export', 'replay', 'verify', 'recover', 'navigate', 'energy', 'fuzz', 'soak'),
-    *('trim', 'list'),
+    *('export', 'replay', 'verify', 'recover', 'navigate', 'validate', 'energy', 'fuzz'),
+    *('soak', 'trim', 'list'),
 )
 #: What the ./glider script does by itself, and --help has to tell of: text and example.
 OF_THE_SCRIPT = {

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from glider_bringup.cli import app
 from glider_bringup.flights.comparison import navigate, summary
-from glider_bringup.flights.reading import read_flight
+from glider_bringup.flights.reading import read_flight, read_whole
 from glider_bringup.flights.slocum import slocum_files
 from glider_model.base.errors import ConfigurationError
 
@@ -238,6 +238,39 @@ def test_a_damaged_file_is_left_out_and_named(tmp_path, write_dbd):
     flight = read_flight(tmp_path, None, quiet)
     assert len(flight.segments) == 2
     assert flight.notes[0].startswith('00020000.dbd: cannot be read')
+
+
+def test_instruments_of_a_slocum_come_from_both_computers(tmp_path):
+    """Those of the water by the times of the CTD, half a second off those of the file."""
+    pytest.importorskip('dbdreader')
+    gsw = pytest.importorskip('gsw')
+    table = sensors(2)
+    time_s, depth = table['m_depth']
+    whole = np.ones(len(time_s))
+    table |= {'m_roll': (time_s, 0.1 * whole), 'm_battpos': (time_s, 0.5 * whole)}
+    table |= {'m_ballast_pumped': (time_s, -230.0 * whole), 'm_fin': (time_s, -0.2 * whole)}
+    write_dbd(tmp_path / '00010000.dbd', table, True)
+    science = {
+        'sci_water_pressure': (time_s, gsw.p_from_z(-depth, ORIGIN[0]) / 10.0),
+        'sci_water_temp': (time_s, 10.0 * whole),
+        'sci_water_cond': (time_s, gsw.C_from_SP(35.0, 10.0, depth) / 10.0),
+        'sci_ctd41cp_timestamp': (time_s, time_s - 0.5),
+    }
+    write_dbd(tmp_path / '00010000.ebd', science, False)
+    flight = read_whole(tmp_path, None, quiet)
+    found = flight.instruments
+    assert found.time_s == pytest.approx(time_s - 0.5, abs=1e-6)
+    inside = slice(1, -1)
+    assert found.depth_m[inside] == pytest.approx(depth[inside], abs=0.01)
+    assert found.salinity[inside] == pytest.approx(35.0, abs=0.01)
+    assert found.pumped_m3[inside] == pytest.approx(-230e-6)
+    assert found.mass_x_m[inside] == pytest.approx(0.0127)
+    assert found.surface_rad[inside] == pytest.approx(-0.2)
+    assert found.roll_rad[inside] == pytest.approx(0.1)
+    # Navigation has no need of the other computer.
+    (tmp_path / '00010000.ebd').write_bytes(b'nothing')
+    assert read_flight(tmp_path, None, quiet).instruments is None
+    assert any('00010000.ebd' in note for note in read_whole(tmp_path, None, quiet).notes)
 
 
 # ---------------------------------------------------------------------- Seaglider

@@ -27,6 +27,13 @@ class Row(NamedTuple):
     missed_m: dict[str, float]
 
 
+def comparable_current(flight: Flight, segment: Segment, reckoned: Reckoned) -> np.ndarray:
+    """Our current (m/s) over what the vehicle's own is a mean, shape (2,): north, east."""
+    if ON_BOARD_OVER[flight.kind] == 'between fixes':
+        return mean_current(segment, reckoned)
+    return reckoned.dac_mps
+
+
 def navigate(flight: Flight, progress: Callable[[int, int], None]) -> list[Row]:
     """Navigate all segments, in the order of time, each by what was known before it."""
     rows: list[Row] = []
@@ -34,9 +41,7 @@ def navigate(flight: Flight, progress: Callable[[int, int], None]) -> list[Row]:
     for number, segment in enumerate(flight.segments):
         progress(number, len(flight.segments))
         reckoned = reckon(segment)
-        comparable = reckoned.dac_mps
-        if ON_BOARD_OVER[flight.kind] == 'between fixes':
-            comparable = mean_current(segment, reckoned)
+        comparable = comparable_current(flight, segment, reckoned)
         missed = dict.fromkeys(FORECASTS, math.nan)
         at_s = 0.5 * (reckoned.dived_s + reckoned.surfaced_s)
         for name, forecast in forecaster.forecast(at_s).items():

@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from glider_bringup.flights.og1 import og1_files, read_og1
 from glider_bringup.flights.record import Flight
 from glider_bringup.flights.seaglider import read_seaglider, seaglider_files
 from glider_bringup.flights.slocum import read_slocum, slocum_files
@@ -27,19 +28,7 @@ def read_flight(place: Path, cache: Path | None, progress: Callable[[int, int], 
     ------
     ConfigurationError
     """
-    if not place.exists():
-        raise ConfigurationError(f'{place}: there is no such folder or file')
-    if cache is not None and not cache.is_dir():
-        raise ConfigurationError(f'--cache {cache}: there is no such folder')
-    if slocum_files(place):
-        flight = read_slocum(place, cache, progress)
-    elif seaglider_files(place):
-        flight = read_seaglider(place, progress)
-    else:
-        raise ConfigurationError(
-            f'{place}: no files of a flight in it (allowed: .dbd, .mbd, .sbd, .dcd, .mcd, .scd of '
-            'a Slocum, p*.nc of a Seaglider)'
-        )
+    flight = _read(place, cache, progress, whole=False)
     if not flight.segments:
         why = '; '.join(flight.notes)
         raise ConfigurationError(
@@ -47,3 +36,28 @@ def read_flight(place: Path, cache: Path | None, progress: Callable[[int, int], 
             + (f': {why}' if why else '')
         )
     return flight
+
+
+def read_whole(place: Path, cache: Path | None, progress: Callable[[int, int], None]) -> Flight:
+    """Read a flight with its instruments, whether or not it has segments; see `read_flight`."""
+    return _read(place, cache, progress, whole=True)
+
+
+def _read(
+    place: Path, cache: Path | None, progress: Callable[[int, int], None], whole: bool
+) -> Flight:
+    if not place.exists():
+        raise ConfigurationError(f'{place}: there is no such folder or file')
+    if cache is not None and not cache.is_dir():
+        raise ConfigurationError(f'--cache {cache}: there is no such folder')
+    if slocum_files(place):
+        return read_slocum(place, cache, progress, whole)
+    if whole and og1_files(place):
+        return read_og1(place, progress)
+    if seaglider_files(place):
+        return read_seaglider(place, progress)
+    raise ConfigurationError(
+        f'{place}: no files of a flight in it (allowed: .dbd, .mbd, .sbd, .dcd, .mcd, .scd of '
+        'a Slocum, p*.nc of a Seaglider'
+        + (', NetCDF with TIME and PITCH as OG1 has them)' if whole else ')')
+    )

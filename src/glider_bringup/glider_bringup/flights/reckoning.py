@@ -64,10 +64,10 @@ def mean_current(segment: Segment, reckoned: Reckoned) -> np.ndarray:
     return (moved_m - reckoned.way_m) / (end_s - begin_s)
 
 
-def vertical_rate(time_s: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
-    """Vertical rate (m/s, + down), shape (n,): the slope of depth over about `RATE_S`."""
-    begin = np.maximum(time_s - 0.5 * RATE_S, time_s[0])
-    end = np.minimum(time_s + 0.5 * RATE_S, time_s[-1])
+def vertical_rate(time_s: np.ndarray, depth_m: np.ndarray, over_s: float = RATE_S) -> np.ndarray:
+    """Vertical rate (m/s, + down), shape (n,): the slope of depth over about ``over_s``."""
+    begin = np.maximum(time_s - 0.5 * over_s, time_s[0])
+    end = np.minimum(time_s + 0.5 * over_s, time_s[-1])
     index = np.arange(len(time_s))
     # With samples that are further apart, the neighbours.
     begin = np.minimum(begin, time_s[np.maximum(index - 1, 0)])

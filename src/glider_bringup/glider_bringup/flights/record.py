@@ -86,6 +86,38 @@ class Segment(NamedTuple):
     polar: Polar
 
 
+class Instruments(NamedTuple):
+    """What was recorded over a whole flight, all of shape (n,), in the order of time.
+
+    NaN where it is not known.
+    """
+
+    #: Time (s since 1970).
+    time_s: np.ndarray
+    #: Depth (m, + down), of the finest pressure that was recorded.
+    depth_m: np.ndarray
+    #: Pitch (rad, + nose up).
+    pitch_rad: np.ndarray
+    #: Roll (rad, + to starboard).
+    roll_rad: np.ndarray
+    #: Heading (rad from true north, + to east).
+    heading_rad: np.ndarray
+    #: Volume of the buoyancy engine (m^3, + rises).
+    pumped_m3: np.ndarray
+    #: Position of the pitch mass (m, + forward: nose down).
+    mass_x_m: np.ndarray
+    #: Angle of the roll mass (rad, + to starboard).
+    mass_roll_rad: np.ndarray
+    #: Angle of the steering surface (rad, + nose to starboard).
+    surface_rad: np.ndarray
+    #: Temperature in situ (deg C, ITS-90).
+    temperature_degc: np.ndarray
+    #: Practical salinity (-).
+    salinity: np.ndarray
+    #: Vertical rate (m/s, + down) of the flight model of the vehicle's makers.
+    own_rate_mps: np.ndarray
+
+
 class Flight(NamedTuple):
     """A recorded flight."""
 
@@ -96,9 +128,26 @@ class Flight(NamedTuple):
     segments: list[Segment]
     #: What a person should know of the files: a sentence each.
     notes: list[str]
+    #: Latitude and longitude of its first fix (degrees), shape (2,).
+    origin_deg: np.ndarray
+    #: What else was recorded; None if it was not asked for.
+    instruments: Instruments | None = None
+    #: Constants of the body that the files name, by the names of `BODY`.
+    body: dict[str, float] | None = None
 
 
+#: Constants of a body that files may name: mass (kg), volume with the engine at zero (m^3). Those
+#: of a base station for compressibility belong to its own way of computing, and are not taken.
+BODY = ('mass_kg', 'volume_m3')
 NOT_KNOWN = np.full(2, math.nan)
+
+
+def instruments(time_s: np.ndarray, **known: np.ndarray) -> Instruments:
+    """Instruments of which some are known, all at the same times."""
+    nothing = np.full(len(time_s), math.nan)
+    return Instruments(
+        time_s, **{name: known.get(name, nothing) for name in Instruments._fields[1:]}
+    )
 
 
 def local_metres(origin_deg: np.ndarray, latitude_deg, longitude_deg) -> np.ndarray:

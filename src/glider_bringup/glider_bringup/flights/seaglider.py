@@ -15,16 +15,19 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_bringup.flights.folders import files_in
+from glider_bringup.flights.netcdf import SUFFIXES, datasets, seconds
 from glider_bringup.flights.record import (
     NOT_KNOWN,
     Fixes,
     Flight,
+    Instruments,
     OnBoard,
     Polar,
     Samples,
     Segment,
     angles_at_times,
     at_times,
+    instruments,
     local_metres,
 )
 from glider_bringup.flights.segments import cut
@@ -32,7 +35,6 @@ from glider_model.base.errors import ConfigurationError
 
 #: Files of dives: the number of the vehicle, three digits, and of the dive, four.
 DIVE_FILE = re.compile(r'p(\d{3})(\d{4}).*\.nc.*', re.IGNORECASE)
-SUFFIXES = ('.nc', '.ncdf', '.nc4')
 #: What a file must have, by any of the names: first the base station's, then the vehicle's own.
 NEEDED = {
     'time': ('time',),
@@ -59,6 +61,26 @@ WANTED = {
     's': ('sg_cal_hd_s',),
     'length': ('sg_cal_glider_length',),
 }
+#: What more there is for a flight model: what was measured (its unit in ours),
+MEASURED = {
+    'roll_rad': (('eng_rollAng', 'roll'), math.radians(1.0)),
+    'pumped_m3': (('eng_vbdCC', 'vbdCC'), 1e-6),
+    'mass_x_m': (('eng_pitchCtl', 'pitchCtl'), 1e-2),
+    'mass_roll_rad': (('eng_rollCtl', 'rollCtl'), math.radians(1.0)),
+    'temperature_degc': (('temperature', 'temperature_raw'), 1.0),
+    'salinity': (('salinity', 'salinity_raw'), 1.0),
+    'own_rate_mps': (('vert_speed',), -1e-2),  # cm/s, + up
+}
+#: and the constants of the body; ``volmax`` is the volume with the engine at its fullest.
+CONSTANTS = {
+    'mass': ('sg_cal_mass',),
+    'volmax': ('sg_cal_volmax',),
+    'bias': ('sg_cal_vbdbias',),
+    'zero_count': ('log_C_VBD',),
+    'fullest_count': ('sg_cal_vbd_min_cnts', 'log_VBD_MIN'),
+    'counts_per_cc': ('sg_cal_vbd_cnts_per_cc',),
+    'cc_per_count': ('log_VBD_CNV',),
+}
 #: Eriksen et al. (2001), doi:10.1109/48.972073: a (1/deg), b (Pa^1/4), c (1/deg^2), s, length (m).
 ERIKSEN = {'a': 0.003836, 'b': 0.010078, 'c': 2.1e-6, 's': -0.25, 'length': 1.8}
 #: At shallower pitch the base station takes a Seaglider for stalled (rad).
@@ -81,6 +103,9 @@ class Dive(NamedTuple):
     dac_mps: np.ndarray
     way_m: np.ndarray
     polar: Polar
+    instruments: Instruments
+    #: Constants of the body that the file names, see `glider_bringup.flights.record.BODY`.
+    body: dict[str, float]
 
 
 def seaglider_files(place: Path) -> list[Path]:
@@ -120,7 +145,27 @@ def read_seaglider(place: Path, progress: Callable[[int, int], None]) -> Flight:
         found, said = _segments(run, origin)
         segments += found
         left_out += [one for one in said if one not in left_out]
-    return Flight('seaglider', [path.name for path in files], segments, notes + left_out)
+    names = {name for dive in dives for name in dive.body}
+    body = {
+        name: float(np.median([dive.body[name] for dive in dives if name in dive.body]))
+        for name in names
+    }
+    recorded = np.concatenate([_of_one_zero(dive, body) for dive in dives], axis=1)
+    recorded = Instruments(*recorded[:, np.argsort(recorded[0], kind='stable')])
+    read = [path.name for path in files]
+    return Flight('seaglider', read, segments, notes + left_out, origin, recorded, body)
+
+
+def _of_one_zero(dive: Dive, body: dict[str, float]) -> np.ndarray:
+    """Instruments of a dive, shape (12, n); the zero of its engine is that of the whole flight.
+
+    Each dive may have another one: people move it between dives.
+    """
+    shift = dive.body.get('volume_m3', 0.0) - body.get('volume_m3', 0.0)
+    if 'volume_m3' not in dive.body:
+        shift = 0.0
+    own = dive.instruments
+    return np.stack(own._replace(pumped_m3=own.pumped_m3 + shift))
 
 
 def _runs(dives: list[Dive]) -> list[list[Dive]]:
@@ -149,7 +194,8 @@ def _segments(dives: list[Dive], origin: np.ndarray) -> tuple[list[Segment], lis
 
 
 def _read_dive(path: Path, notes: list[str]) -> Dive:
-    found = read_variables(path, NEEDED | WANTED)
+    more = CONSTANTS | {key: names for key, (names, _) in MEASURED.items()}
+    found = read_variables(path, NEEDED | WANTED | more)
     for key in ('time', 'pitch', 'heading', 'depth'):
         if key in found and len(found[key]) != len(found.get('time', ())):
             raise ConfigurationError(
@@ -182,6 +228,8 @@ def _read_dive(path: Path, notes: list[str]) -> Dive:
         np.array([_number(found, 'speed_north'), _number(found, 'speed_east')])
         * _number(found, 'flight_time'),
         _polar(found),
+        _instruments(found, math.radians(declination)),
+        _body(found),
     )
 
 
@@ -200,6 +248,39 @@ def _samples(found: dict[str, np.ndarray], declination: float) -> Samples:
     pitch, heading = (np.radians(found[name]) for name in ('pitch', 'heading'))
     heading = angles_at_times(time_s, time_s, heading) + declination
     return Samples(time_s, found['depth'], at_times(time_s, time_s, pitch), heading, buoyancy)
+
+
+def _instruments(found: dict[str, np.ndarray], declination: float) -> Instruments:
+    samples, time_s = _samples(found, declination), found['time']
+    measured = {}
+    for name, (_, unit) in MEASURED.items():
+        # What the CTD measured, and what was made of it, has times of its own.
+        for times in ('time', 'buoyancy_time'):
+            if name in found and len(found.get(times, ())) == len(found[name]):
+                measured[name] = unit * at_times(time_s, found[times], found[name])
+                break
+    return instruments(
+        time_s,
+        depth_m=samples.depth_m,
+        pitch_rad=samples.pitch_rad,
+        heading_rad=samples.heading_rad,
+        **measured,
+    )
+
+
+def _body(found: dict[str, np.ndarray]) -> dict[str, float]:
+    """What the file says of the body, the volume at the zero of the engine's cc."""
+    own = {name: _number(found, name) for name in CONSTANTS}
+    cc_per_count = own['cc_per_count']
+    if math.isnan(cc_per_count):
+        cc_per_count = 1.0 / own['counts_per_cc']
+    fullest_cc = (own['fullest_count'] - own['zero_count']) * cc_per_count
+    bias_cc = 0.0 if math.isnan(own['bias']) else own['bias']
+    body = {
+        'mass_kg': own['mass'],
+        'volume_m3': 1e-6 * (own['volmax'] - abs(fullest_cc) - bias_cc),
+    }
+    return {name: value for name, value in body.items() if math.isfinite(value)}
 
 
 def _polar(found: dict[str, np.ndarray]) -> Polar:
@@ -238,7 +319,7 @@ def read_variables(path: Path, wanted: dict[str, tuple[str, ...]]) -> dict[str, 
 
     found = {}
     try:
-        for dataset in _open(path):
+        for dataset in datasets(path):
             with dataset:
                 for key, names in wanted.items():
                     name = next((name for name in names if name in dataset.variables), None)
@@ -247,40 +328,10 @@ def read_variables(path: Path, wanted: dict[str, tuple[str, ...]]) -> dict[str, 
                     variable = dataset[name]
                     values = np.atleast_1d(variable.values).ravel()
                     if key.endswith('time') and key != 'flight_time':
-                        values = _seconds(xarray, variable)
+                        values = seconds(xarray, variable)
                     elif name == 'eng_depth':
                         values = values / 100.0
                     found[key] = values if values.dtype.kind in 'SUO' else values.astype(float)
     except (OSError, ValueError, TypeError, KeyError, RuntimeError) as error:
         raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
     return found
-
-
-def _open(path: Path) -> list:
-    """The datasets of all groups of a file, of NetCDF 3 or 4."""
-    import xarray
-
-    with path.open('rb') as file:
-        start = file.read(4)
-    if start[:3] == b'CDF':
-        return [xarray.open_dataset(path, engine='scipy', decode_times=False)]
-    if start != b'\x89HDF':
-        raise ValueError('it is neither NetCDF 3 nor NetCDF 4')
-    try:
-        import h5netcdf  # noqa: F401 - xarray reads NetCDF 4 through it
-    except ImportError:
-        raise ConfigurationError(
-            f'{path}: h5netcdf, which reads NetCDF 4, is not installed; install it with: '
-            './glider python -m pip install --no-deps -r requirements-flights.txt'
-        ) from None
-    return list(xarray.open_groups(path, engine='h5netcdf', decode_times=False).values())
-
-
-def _seconds(xarray, variable) -> np.ndarray:
-    """Times as s since 1970, whatever their unit."""
-    units = str(variable.attrs.get('units', 'seconds since 1970-1-1'))
-    values = np.atleast_1d(variable.values).ravel().astype(float)
-    if re.match(r'seconds\s+since\s+1970-0?1-0?1\b', units):
-        return values
-    decoded = xarray.coding.times.decode_cf_datetime(values, units)
-    return np.asarray(decoded, 'datetime64[ns]').astype(np.int64) * 1e-9

@@ -18,19 +18,31 @@ from glider_bringup.flights.record import (
     NOT_KNOWN,
     Fixes,
     Flight,
+    Instruments,
     OnBoard,
     Polar,
     Samples,
     Segment,
     angles_at_times,
     at_times,
+    instruments,
     local_metres,
 )
+from glider_bringup.flights.seawater import depth_of, pressure_of, salinity_of
 from glider_bringup.flights.segments import DIVE_DEPTH_M, Cut, cut
 from glider_model.base.errors import ConfigurationError
 
 #: Kinds of files of the flight computer, fullest first: all that is measured, then what is sent.
 KINDS = (('.dbd', '.dcd'), ('.mbd', '.mcd'), ('.sbd', '.scd'))
+#: Kinds of files of the science computer, by those of the flight computer.
+SCIENCE = {
+    '.dbd': ('.ebd', '.ecd'),
+    '.dcd': ('.ecd', '.ebd'),
+    '.mbd': ('.nbd', '.ncd'),
+    '.mcd': ('.ncd', '.nbd'),
+    '.sbd': ('.tbd', '.tcd'),
+    '.scd': ('.tcd', '.tbd'),
+}
 #: Folders in which the caches of a flight are, beside its files or above them.
 CACHE_FOLDERS = ('cache', 'cac', '.dinkumcache', 'dinkumcache')
 CACHES = '.cac'
@@ -44,6 +56,18 @@ WANTED = (
     *('m_gps_mag_var', 'm_speed', 'm_lat', 'm_lon', 'm_dr_time'),
     *('m_final_water_vx', 'm_final_water_vy', 'm_water_vx', 'm_water_vy'),
 )
+#: What more there is for a flight model: of the flight computer, and of that of science.
+ENGINEERING = (
+    *('m_roll', 'm_fin', 'm_battpos', 'm_battroll', 'm_ballast_pumped', 'm_de_oil_vol'),
+    'm_pressure',
+)
+WATER = ('sci_water_pressure', 'sci_water_cond', 'sci_water_temp')
+#: When the CTD measured, of which the times of the file are up to a second off.
+CTD_TIMES = ('sci_ctd41cp_timestamp', 'sci_rbrctd_timestamp')
+#: No further off than this, or they are of something else (s).
+CTD_LATE_S = 10.0
+#: Unit of ``m_battpos`` (m), of pressures (dbar) and of conductivity (mS/cm) there.
+INCH, BAR, SIEMENS_PER_METRE = 0.0254, 10.0, 10.0
 #: Merckelbach, Smeed and Griffiths (2010), doi:10.1175/2009JTECHO710.1: lift slopes 3.8 of the
 #: hull and 3.73 of the wings, drag 0.15 + 10.5 alpha^2, area 0.1 m^2.
 POLAR = Polar(
@@ -79,15 +103,20 @@ def slocum_files(place: Path) -> list[Path]:
     return []
 
 
-def read_slocum(place: Path, cache: Path | None, progress: Callable[[int, int], None]) -> Flight:
+def read_slocum(
+    place: Path, cache: Path | None, progress: Callable[[int, int], None], whole: bool = False
+) -> Flight:
     """Read a flight; without a folder of caches they are looked for.
+
+    With ``whole`` its instruments too, those of the science computer from the files beside.
 
     Raises
     ------
     ConfigurationError
     """
     files = slocum_files(place)
-    sensors, names, notes = read_sensors(files, cache, progress, NEEDED + WANTED)
+    listed = NEEDED + WANTED + (ENGINEERING if whole else ())
+    sensors, names, notes = read_sensors(files, cache, progress, listed)
     missing = [name for name in NEEDED if not len(sensors[name][0])]
     if missing:
         raise ConfigurationError(
@@ -113,7 +142,80 @@ def read_slocum(place: Path, cache: Path | None, progress: Callable[[int, int], 
         )
         for one, end in zip(cuts, ends, strict=True)
     ]
-    return Flight('slocum', [path.name for path in files], segments, notes + left_out)
+    recorded = None
+    if whole:
+        beside = [path for path in map(_science_file, files) if path is not None]
+        water = dict.fromkeys(WATER + CTD_TIMES, (np.empty(0), np.empty(0)))
+        if beside:
+            try:
+                water, _, unread = read_sensors(beside, cache, progress, WATER + CTD_TIMES)
+            except ConfigurationError as error:
+                unread = [f'no water: {error}']
+            notes += unread
+        recorded = _instruments(sensors | _by_ctd(water), declined, origin)
+    read = [path.name for path in files]
+    return Flight('slocum', read, segments, notes + left_out, origin, recorded)
+
+
+def _science_file(path: Path) -> Path | None:
+    """File of the science computer that belongs to one of the flight computer."""
+    of_stem = {one.suffix.lower(): one for one in path.parent.glob(f'{path.stem}.*')}
+    kinds = SCIENCE[path.suffix.lower()]
+    return next((of_stem[suffix] for suffix in kinds if suffix in of_stem), None)
+
+
+def _by_ctd(water: Sensors) -> Sensors:
+    """What the CTD measured, by its own times where these are recorded."""
+    for name in CTD_TIMES:
+        file_s, own_s = water[name]
+        good = np.abs(own_s - file_s) < CTD_LATE_S
+        if good.sum() > 1:
+            file_s, own_s = file_s[good], own_s[good]
+            timed = {}
+            for one in WATER:
+                _, mine, theirs = np.intersect1d(water[one][0], file_s, return_indices=True)
+                timed[one] = (own_s[theirs], water[one][1][mine])
+            return timed
+    return water
+
+
+def _instruments(sensors: Sensors, declined: float, origin: np.ndarray) -> Instruments:
+    """What was measured, at the times of the finest pressure."""
+    pressures = {
+        name: (sensors[name][0], BAR * sensors[name][1])
+        for name in ('sci_water_pressure', 'm_pressure')
+    }
+    own_s, dbar = max(pressures.values(), key=lambda pair: len(pair[0]))
+    time_s, depth_m = own_s, depth_of(dbar, origin[0])
+    if not len(time_s):
+        time_s, depth_m = sensors['m_depth']
+
+    def measured(name: str, unit: float = 1.0) -> np.ndarray:
+        own_s, values = sensors[name]
+        return unit * at_times(time_s, own_s, values)
+
+    pumped = measured('m_ballast_pumped', 1e-6)
+    if np.isnan(pumped).all():
+        pumped = measured('m_de_oil_vol', 1e-6)
+    temperature = measured('sci_water_temp')
+    heading = angles_at_times(time_s, *sensors['m_heading']) - declined
+    return instruments(
+        time_s,
+        depth_m=depth_m,
+        pitch_rad=measured('m_pitch'),
+        roll_rad=measured('m_roll'),
+        heading_rad=heading,
+        pumped_m3=pumped,
+        mass_x_m=measured('m_battpos', INCH),
+        mass_roll_rad=measured('m_battroll'),
+        surface_rad=measured('m_fin'),
+        temperature_degc=temperature,
+        salinity=salinity_of(
+            measured('sci_water_cond', SIEMENS_PER_METRE),
+            temperature,
+            pressure_of(depth_m, origin[0]),
+        ),
+    )
 
 
 def read_sensors(
@@ -124,7 +226,8 @@ def read_sensors(
 ) -> tuple[Sensors, list[tuple[float, str]], list[str]]:
     """Sensors by name, when each file begins, and what is to be said of files left out.
 
-    A sensor that was never recorded has no times. ``m_depth`` has to be among the names.
+    A sensor that was never recorded has no times. Of the flight computer ``m_depth`` has to be
+    among the names: it says when a file begins.
     """
     try:
         from dbdreader import DBD, DbdError

@@ -1,0 +1,116 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flights in NetCDF as OceanGliders has it (OG1), or another trajectory by CF.
+
+All along one time; capitals or not. Files of a Seaglider that were converted to it keep what
+its actuators did (``VBD_CC``, ``PITCH_CTL``, ``ROLL_CTL``).
+"""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from glider_bringup.flights.folders import files_in
+from glider_bringup.flights.netcdf import SUFFIXES, datasets, seconds
+from glider_bringup.flights.record import Flight, Instruments, instruments
+from glider_bringup.flights.seawater import depth_of
+from glider_model.base.errors import ConfigurationError
+
+#: Names of variables in capitals, by ours, and what their values are multiplied by.
+NAMES = {
+    'time': (('TIME',), 1.0),
+    'latitude': (('LATITUDE', 'LAT'), 1.0),
+    'longitude': (('LONGITUDE', 'LON'), 1.0),
+    'pressure': (('PRES', 'PRESSURE'), 1.0),
+    'depth_m': (('DEPTH',), 1.0),
+    'pitch_rad': (('PITCH',), math.radians(1.0)),
+    'roll_rad': (('ROLL',), math.radians(1.0)),
+    'heading_rad': (('HEADING', 'HDG'), math.radians(1.0)),
+    'pumped_m3': (('VBD_CC', 'BALLAST_PUMPED', 'OIL_VOLUME'), 1e-6),
+    'mass_x_m': (('PITCH_CTL',), 1e-2),
+    'mass_roll_rad': (('ROLL_CTL',), math.radians(1.0)),
+    'surface_rad': (('FIN', 'RUDDER'), math.radians(1.0)),
+    'temperature_degc': (('TEMP', 'TEMPERATURE'), 1.0),
+    'salinity': (('PSAL', 'SALINITY'), 1.0),
+    'own_rate_mps': (('GLIDER_VERT_VELO_MODEL',), -1e-2),
+}
+NEEDED = ('time', 'pitch_rad', 'pumped_m3')
+
+
+def og1_files(place: Path) -> list[Path]:
+    """NetCDF files with one time for all: those of a Seaglider's base station have several."""
+    files = files_in(place, lambda path: path.suffix.lower() in SUFFIXES)
+    return [path for path in files if _is_one(path)]
+
+
+def _is_one(path: Path) -> bool:
+    try:
+        names = {name.upper() for part in datasets(path) for name in part.variables}
+    except (OSError, ValueError):
+        return False
+    return {'TIME', 'PITCH'} <= names and 'LOG_GPS_LAT' not in names
+
+
+def read_og1(place: Path, progress: Callable[[int, int], None]) -> Flight:
+    """Read a flight; without segments, as what is a fix is not told.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    files, parts, origins = og1_files(place), [], []
+    for number, path in enumerate(files):
+        progress(number, len(files))
+        found = _read(path)
+        origin = np.array([_middle(found.get('latitude')), _middle(found.get('longitude'))])
+        origins.append(np.nan_to_num(origin))
+        parts.append(_instruments(found, origins[-1][0]))
+    table = np.concatenate([np.stack(part) for part in parts], axis=1)
+    table = table[:, np.argsort(table[0], kind='stable')]
+    return Flight('og1', [path.name for path in files], [], [], origins[0], Instruments(*table))
+
+
+def _read(path: Path) -> dict[str, np.ndarray]:
+    """Variables by our names; times in s since 1970."""
+    import xarray
+
+    found: dict[str, np.ndarray] = {}
+    for dataset in datasets(path):
+        with dataset:
+            by_name = {str(name).upper(): name for name in dataset.variables}
+            for key, (names, unit) in NAMES.items():
+                name = next((by_name[one] for one in names if one in by_name), None)
+                if name is None or key in found:
+                    continue
+                variable = dataset[name]
+                if key == 'time':
+                    found[key] = seconds(xarray, variable)
+                    continue
+                if str(variable.attrs.get('units', '')).startswith('rad'):
+                    unit = 1.0
+                found[key] = unit * np.atleast_1d(variable.values).ravel().astype(float)
+    missing = [key for key in NEEDED if key not in found]
+    if missing:
+        names = ', '.join(' or '.join(NAMES[key][0]) for key in missing)
+        raise ConfigurationError(f'{path}: no variable {names} (needed of a flight in OG1 or CF)')
+    return found
+
+
+def _instruments(found: dict[str, np.ndarray], latitude: float) -> Instruments:
+    count = len(found['time'])
+    known = {
+        name: found[name] for name in Instruments._fields[1:] if len(found.get(name, ())) == count
+    }
+    if len(found.get('pressure', ())) == count:
+        known['depth_m'] = depth_of(found['pressure'], latitude)
+    return instruments(found['time'], **known)
+
+
+def _middle(values: np.ndarray | None) -> float:
+    return (
+        math.nan
+        if values is None or not np.isfinite(values).any()
+        else float(np.nanmedian(values))
+    )

@@ -1,0 +1,163 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Constants of a vehicle that are found from the recording itself.
+
+Least squares of the vertical rate, and of pitch where actuators are imposed: what a glider weighs
+and how rough it is differs from flight to flight, and nobody measures it otherwise.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from glider_bringup.flights.validation.flying import Imposed, Model, fly
+from glider_bringup.flights.validation.score import Adcp, speed_off
+from glider_bringup.flights.validation.track import Track
+from glider_model.base.errors import ConfigurationError
+
+#: One of least squares: of the vertical rate (m/s), of pitch (rad), of speed by an ADCP (m/s).
+UNIT_MPS, UNIT_RAD, UNIT_ADCP_MPS = 0.01, math.radians(2.0), 0.03
+#: No more than about so many samples of all stretches, so many of them, are looked at.
+SAMPLES, STRETCHES = 20_000, 12
+#: The net weight is looked for within so much of that of the file (kg).
+SEARCH_KG = 3.0
+
+
+class Constant(NamedTuple):
+    """Something that can be fitted."""
+
+    unit: str
+    #: A step of it that is felt, in its unit.
+    step: float
+    #: Its value in a model, and the model with another one.
+    read: Callable[[Model], float]
+    write: Callable[[Model, float], Model]
+
+
+def _of_vehicle(field: str, unit: str, step: float) -> Constant:
+    return Constant(
+        unit,
+        step,
+        lambda model: getattr(model.vehicle, field),
+        lambda model, value: model._replace(vehicle=model.vehicle._replace(**{field: value})),
+    )
+
+
+CONSTANTS = {
+    'mass': _of_vehicle('ballast', 'kg', 0.01),
+    'Cd0': _of_vehicle('K_D0', 'kg/m', 0.1),
+    'Cd1': _of_vehicle('K_D', 'kg/m/rad^2', 10.0),
+    'lift': _of_vehicle('K_L', 'kg/m/rad', 10.0),
+    'compressibility': _of_vehicle('compressibility', '1/Pa', 1e-11),
+    'expansion': _of_vehicle('thermal_expansion', '1/K', 1e-6),
+    'trim': _of_vehicle('s_x', 'kg m', 0.01),
+    'righting': _of_vehicle('s_z', 'kg m', 0.01),
+    'pump_x': _of_vehicle('pump_x', 'm', 0.01),
+    'pitch_scale': Constant(
+        '-',
+        0.01,
+        lambda model: model.pitch_scale,
+        lambda model, value: model._replace(pitch_scale=value),
+    ),
+    'pitch_offset': Constant(
+        'deg',
+        0.1,
+        lambda model: math.degrees(model.pitch_offset_rad),
+        lambda model, value: model._replace(pitch_offset_rad=math.radians(value)),
+    ),
+}
+#: What is fitted if nothing else is said: what the makers of a vehicle fit too.
+FITTED = {'slocum': ('mass', 'Cd0'), 'seaglider': ('mass', 'Cd0', 'lift'), 'og1': ('mass', 'Cd0')}
+#: More of it with actuators imposed: where the centre of mass is, along the vehicle and below.
+OF_ACTUATORS = ('trim', 'righting')
+#: More of it where an ADCP tells the speed: pitch sensors have been found 14 % off.
+BY_ADCP = ('pitch_scale',)
+
+
+def chosen(text: str | None, kind: str, impose: Imposed, has_adcp: bool) -> tuple[str, ...]:
+    """Names of constants of an option ``--fit``; ``none`` is none.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    if text is None:
+        names = FITTED[kind] + (BY_ADCP if has_adcp else ())
+        return names + (OF_ACTUATORS if impose == 'actuators' else ())
+    names = tuple(dict.fromkeys(text.split(','))) if text != 'none' else ()
+    for name in names:
+        if name not in CONSTANTS:
+            raise ConfigurationError(
+                f'--fit {text}: no constant {name} (allowed: none, or some of '
+                f'{", ".join(CONSTANTS)} with commas)'
+            )
+    return names
+
+
+def fitted(
+    found: list[Track],
+    model: Model,
+    impose: Imposed,
+    names: tuple[str, ...],
+    told: list[Track],
+    adcp: Adcp | None,
+) -> Model:
+    """Model with the named constants so that it flies most like the recording.
+
+    It is told the speed by an ADCP of the stretches ``told``.
+    """
+    if not names:
+        return model
+    from scipy.optimize import least_squares  # slow to load
+
+    every = max(1, round(len(found) / STRETCHES))
+    some = [track for track in found if track.counts.any()][::every]
+    step = max(1, sum(int(track.counts.sum()) for track in some) // SAMPLES)
+    if 'mass' in names:
+        model = _balanced(some, model)
+    constants = [CONSTANTS[name] for name in names]
+    start = np.array([one.read(model) / one.step for one in constants])
+
+    def moved(values: np.ndarray) -> Model:
+        changed = model
+        for one, value in zip(constants, values, strict=True):
+            changed = one.write(changed, value * one.step)
+        return changed
+
+    def wrong(values: np.ndarray) -> np.ndarray:
+        tried = moved(values)
+        off = [_wrong(track, tried, impose, step) for track in some]
+        for track in told:
+            speed = speed_off(track, fly(track, tried, impose), adcp)
+            off.append(speed[np.isfinite(speed)] / UNIT_ADCP_MPS)
+        return np.concatenate(off)
+
+    def slope(values: np.ndarray) -> np.ndarray:
+        here = wrong(values)
+        return np.stack([wrong(values + one) - here for one in np.eye(len(values))], axis=1)
+
+    return moved(least_squares(wrong, start, slope, loss='soft_l1').x)
+
+
+def _balanced(some: list[Track], model: Model) -> Model:
+    """Model as heavy as its mean vertical rate is the recorded one, of its first stretch."""
+    track, mass = some[0], CONSTANTS['mass']
+    low, high = -SEARCH_KG, SEARCH_KG
+    while high - low > mass.step:
+        middle = 0.5 * (low + high)
+        off = np.mean(_wrong(track, mass.write(model, middle), 'pitch', 1))
+        low, high = (low, middle) if off > 0.0 else (middle, high)
+    return mass.write(model, 0.5 * (low + high))
+
+
+def _wrong(track: Track, model: Model, impose: Imposed, step: int) -> np.ndarray:
+    """What is off, in units of least squares."""
+    flown = fly(track, model, impose)
+    counts = np.flatnonzero(track.counts)[::step]
+    rate = (flown.rate_mps - track.rate_mps)[counts] / UNIT_MPS
+    if impose == 'pitch':
+        return rate
+    pitch = flown.pitch_rad - model.pitch(track.instruments.pitch_rad)
+    return np.concatenate([rate, pitch[counts] / UNIT_RAD])

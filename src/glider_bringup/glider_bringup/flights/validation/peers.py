@@ -1,0 +1,81 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flight models of others over the same samples: gliderflight, and that of a base station."""
+
+from typing import Any
+
+import numpy as np
+
+from glider_bringup.flights.reckoning import vertical_rate
+from glider_bringup.flights.record import Flight
+from glider_bringup.flights.validation.flying import Model
+from glider_bringup.flights.validation.score import rms
+from glider_bringup.flights.validation.track import RATE_S, Track
+
+#: As the documentation of gliderflight has it: lift slope of the hull (1/rad), induced drag
+#: (1/rad^2), and the parasitic drag that its fit begins with.
+LIFT, INDUCED, DRAG = 3.8, 10.5, 0.15
+CC_PER_M3, BAR_PER_DBAR = 1e6, 0.1
+
+
+def peer(flight: Flight, found: list[Track], model: Model) -> tuple[dict[str, Any] | None, str]:
+    """Figures of the other model of this kind of vehicle, or None and why."""
+    own = [track.instruments.own_rate_mps for track in found]
+    if any(np.isfinite(rate).any() for rate in own):
+        return _figures('basestation', found, own), ''
+    try:
+        import gliderflight
+    except ImportError:
+        return None, (
+            'gliderflight, the model to compare with, is not installed; install it with: '
+            './glider python -m pip install --no-deps -r requirements-flights.txt'
+        )
+    if any(np.isnan(track.density_kgpm3).all() for track in found):
+        return None, 'gliderflight needs temperature and salinity, which were not recorded'
+    return _figures('gliderflight', found, _gliderflight(gliderflight, found, model)), ''
+
+
+def _figures(name: str, found: list[Track], rates: list[np.ndarray]) -> dict[str, Any]:
+    off = np.concatenate(
+        [(rate - track.rate_mps)[track.counts] for track, rate in zip(found, rates, strict=True)]
+    )
+    return {
+        'name': name,
+        'w_rmse_cmps': rms(off, 100.0),
+        'samples': int(np.isfinite(off).sum()),
+    }
+
+
+def _gliderflight(gliderflight, found: list[Track], model: Model) -> list[np.ndarray]:
+    """Vertical rates (m/s, + down) of Merckelbach's steady model, its mass and drag fitted."""
+    rho_0 = float(np.nanmean(np.concatenate([track.density_kgpm3 for track in found])))
+    theirs = gliderflight.SteadyStateCalibrate(rho0=rho_0)
+    volume = model.vehicle.volume
+    theirs.define(ah=LIFT, Cd1=INDUCED, Cd0=DRAG, mg=rho_0 * volume, Vg=volume)
+    theirs.set_input_data(**_inputs(found, model))
+    theirs.set_mask(~np.concatenate([track.counts for track in found]))
+    theirs.calibrate('Cd0', 'mg')
+    theirs.solve()
+    rates = []
+    ends = np.cumsum([len(track.phase) for track in found])[:-1]
+    for track, rising in zip(found, np.split(theirs.wg, ends), strict=True):
+        time_s = track.instruments.time_s
+        sunk = 0.5 * (rising[1:] + rising[:-1]) * np.diff(time_s)
+        rates.append(vertical_rate(time_s, -np.concatenate([[0.0], np.cumsum(sunk)]), RATE_S))
+    return rates
+
+
+def _inputs(found: list[Track], model: Model) -> dict[str, np.ndarray]:
+    """What gliderflight goes by, in its units, and the recorded rate as we have it."""
+    parts = [
+        {
+            'time': track.instruments.time_s,
+            'pressure': BAR_PER_DBAR * track.pressure_dbar,
+            'pitch': model.pitch(track.instruments.pitch_rad),
+            'buoyancy_change': CC_PER_M3 * track.instruments.pumped_m3,
+            'density': track.density_kgpm3,
+            'dhdt': -track.rate_mps,
+        }
+        for track in found
+    ]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

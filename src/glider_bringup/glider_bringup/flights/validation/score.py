@@ -1,0 +1,159 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""How far off the plant came out, beside the flight and beside the models of others."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from glider_bringup.flights.comparison import comparable_current
+from glider_bringup.flights.reckoning import reckon
+from glider_bringup.flights.record import Flight, Segment, at_times
+from glider_bringup.flights.validation.flying import Simulated
+from glider_bringup.flights.validation.track import Track
+
+#: Heading turns over this time (s), so that noise of the compass is small beside a turn.
+TURN_S = 60.0
+#: Turn rate over sin(roll) is told for this speed through the water (m/s), with which it grows.
+TURN_MPS = 0.5
+#: A roll that does not vary by as much (-, standard deviation of its sine) tells nothing of turns.
+SMALLEST_ROLL = 0.02
+PHASES = {'dive': 1.0, 'climb': -1.0}
+
+
+class Adcp(NamedTuple):
+    """Speed through the water (m/s) that was measured, and when (s since 1970), of shape (n,)."""
+
+    time_s: np.ndarray
+    speed_mps: np.ndarray
+
+
+def score(
+    flight: Flight,
+    found: list[Track],
+    flown: list[Simulated],
+    pitch_rad: list[np.ndarray],
+    speed: np.ndarray,
+) -> dict[str, Any]:
+    """Figures of a flight.
+
+    Parameters
+    ----------
+    flight, found, flown
+        What was recorded, and what the plant did along each stretch.
+    pitch_rad : list of ndarray
+        True pitch of each stretch.
+    speed : ndarray, shape (n,)
+        Simulated speed less that by an ADCP (m/s); none without one.
+    """
+    pairs = list(zip(found, flown, strict=True))
+    rate = np.concatenate([(one.rate_mps - track.rate_mps)[track.counts] for track, one in pairs])
+    pitch = np.concatenate(
+        [
+            (one.pitch_rad - true)[track.counts]
+            for (track, one), true in zip(pairs, pitch_rad, strict=True)
+        ]
+    )
+    return {
+        'segments': len(found),
+        'samples': len(rate),
+        'w_rmse_cmps': rms(rate, 100.0),
+        'w_bias_cmps': mean(rate, 100.0),
+        'u_adcp_rmse_cmps': rms(speed, 100.0),
+        'u_adcp_bias_cmps': mean(speed, 100.0),
+        'pitch_rmse_deg': rms(pitch, math.degrees(1.0)),
+        'turn_rate_per_sin_roll': {
+            name: {
+                'recorded': _turn_rate(pairs, phase, recorded=True),
+                'simulated': _turn_rate(pairs, phase, recorded=False),
+            }
+            for name, phase in PHASES.items()
+        },
+        'dac_off_cmps': _closure(flight, pairs),
+    }
+
+
+def rms(values: np.ndarray, scale: float) -> float | None:
+    """Root mean square of what is known; None if nothing is."""
+    values = values[np.isfinite(values)]
+    return round(scale * float(np.sqrt(np.mean(values**2))), 4) if len(values) else None
+
+
+def mean(values: np.ndarray, scale: float) -> float | None:
+    """Mean of what is known; None if nothing is."""
+    values = values[np.isfinite(values)]
+    return round(scale * float(np.mean(values)), 4) if len(values) else None
+
+
+def speed_off(track: Track, flown: Simulated, adcp: Adcp) -> np.ndarray:
+    """Simulated less measured speed (m/s) of the samples in the dive, as an ADCP looks ahead."""
+    measured = at_times(track.instruments.time_s, adcp.time_s, adcp.speed_mps)
+    return (flown.speed_mps - measured)[track.counts & (track.phase > 0.0)]
+
+
+def _turn_rate(pairs, phase: float, recorded: bool) -> float | None:
+    """Turn rate over sin(roll) at `TURN_MPS` (rad/s), by least squares with an offset."""
+    rows, rates = [], []
+    for track, one in pairs:
+        time_s = track.instruments.time_s
+        heading = one.heading_rad
+        roll = one.roll_rad
+        if recorded:
+            heading, roll = track.instruments.heading_rad, track.instruments.roll_rad
+        good = np.isfinite(heading) & np.isfinite(roll)
+        if good.sum() < 3:
+            continue
+        heading = np.interp(time_s, time_s[good], np.unwrap(heading[good]))
+        sine = np.interp(time_s, time_s[good], np.sin(roll[good]))
+        begin, end = time_s - 0.5 * TURN_S, time_s + 0.5 * TURN_S
+        inside = (begin >= time_s[0]) & (end <= time_s[-1]) & track.counts
+        counts = inside & (track.phase == phase)
+        turned = np.interp(end, time_s, heading) - np.interp(begin, time_s, heading)
+        way = np.concatenate([[0.0], np.cumsum(_trapezoids(sine * one.speed_mps, time_s))])
+        banked = np.interp(end, time_s, way) - np.interp(begin, time_s, way)
+        rows.append((banked / TURN_S / TURN_MPS)[counts])
+        rates.append((turned / TURN_S)[counts])
+    banked = np.concatenate(rows or [np.empty(0)])
+    if len(banked) < 3 or np.std(banked) * TURN_MPS / 0.3 < SMALLEST_ROLL:
+        return None
+    return round(float(np.polyfit(banked, np.concatenate(rates), 1)[0]), 4)
+
+
+def _trapezoids(values: np.ndarray, time_s: np.ndarray) -> np.ndarray:
+    return 0.5 * (values[1:] + values[:-1]) * np.diff(time_s)
+
+
+def _closure(flight: Flight, pairs) -> dict[str, Any]:
+    """Our depth-averaged current, by the plant's way through the water, less that on board."""
+    off = []
+    for segment in flight.segments:
+        way = _way(segment, pairs)
+        if way is not None:
+            reckoned = reckon(segment)._replace(way_m=way)
+            own = comparable_current(flight, segment, reckoned)
+            off.append(float(np.hypot(*(own - segment.on_board.dac_mps))))
+    off = np.array([value for value in off if math.isfinite(value)])
+    return {
+        'median': round(100.0 * float(np.median(off)), 4) if len(off) else None,
+        'segments': len(off),
+    }
+
+
+def _way(segment: Segment, pairs) -> np.ndarray | None:
+    """Way through the water of a segment (m north, east); None if it was not flown whole."""
+    way, seconds = np.zeros(2), 0.0
+    for track, one in pairs:
+        time_s, heading = track.instruments.time_s, track.instruments.heading_rad
+        if not segment.before.time_s[-1] <= 0.5 * (time_s[0] + time_s[-1]):
+            continue
+        if not 0.5 * (time_s[0] + time_s[-1]) <= segment.after.time_s[0]:
+            continue
+        ahead, abeam = np.diff(one.ahead_m), np.diff(one.abeam_m)
+        middle = np.unwrap(heading)
+        middle = 0.5 * (middle[1:] + middle[:-1])
+        north = ahead * np.cos(middle) - abeam * np.sin(middle)
+        east = ahead * np.sin(middle) + abeam * np.cos(middle)
+        way += np.array([np.nansum(north), np.nansum(east)])
+        seconds += float(np.ptp(time_s))
+    return way if seconds > 0.8 * reckon(segment).seconds else None

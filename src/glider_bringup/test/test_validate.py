@@ -1,0 +1,302 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider validate`` on flights that are made up here, by steady glides solved apart."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import xarray
+from scipy.optimize import brentq
+from typer.testing import CliRunner
+
+from glider_bringup.cli import app
+from glider_bringup.flights.reading import read_whole
+from glider_model.base.errors import ConfigurationError
+from glider_model.plant.trim import solve_trim
+from glider_model.vehicle.file import load_vehicle
+
+gsw = pytest.importorskip('gsw')
+
+START_S, PERIOD_S = 1.6e9, 5.0
+LATITUDE, LONGITUDE = 40.0, -30.0
+#: Of the flights made up here: pitch (rad), what is pumped (m^3), deepest (m), water.
+PITCH, PUMPED, DEEPEST = math.radians(26.0), 230e-6, 150.0
+SALINITY = 35.0
+#: What they weigh more than the file says (kg), and their parasitic drag over that of the file.
+HEAVIER, ROUGHER = 0.12, 1.3
+#: Recorded turn rate over sin(roll) at 0.5 m/s (rad/s).
+TURNS = {1.0: -0.05, -1.0: 0.03}
+
+
+def quiet(*_):
+    pass
+
+
+def temperature(depth: np.ndarray) -> np.ndarray:
+    return 8.0 + 10.0 * np.exp(-depth / 40.0)
+
+
+def density(depth: float) -> float:
+    pressure = gsw.p_from_z(-depth, LATITUDE)
+    absolute = gsw.SA_from_SP(SALINITY, pressure, LONGITUDE, LATITUDE)
+    return float(gsw.rho_t_exact(absolute, temperature(depth), pressure))
+
+
+def glide(depth: float, sign: float) -> tuple[float, float]:
+    """Speed and vertical rate (m/s, + down) of a steady glide of slocum_g2, by Merckelbach."""
+    file, rho = load_vehicle('slocum_g2').params(), density(depth)
+    squeezed = file.compressibility * rho * 9.81 * depth
+    stretched = file.thermal_expansion * (temperature(depth) - file.reference_temperature)
+    volume = file.volume * (1.0 - squeezed + stretched)
+    net = 70.0 + HEAVIER - rho * (volume - sign * PUMPED)
+    assert net * sign > 0.0
+
+    def drag(alpha):
+        return ROUGHER * 0.15 + 10.5 * alpha**2
+
+    def balance(alpha):
+        return drag(alpha) * math.cos(PITCH + alpha) - 7.5 * alpha * math.sin(PITCH + alpha)
+
+    alpha = brentq(balance, 0.0, math.radians(8.0))
+    force = 9.81 * abs(net) * math.sin(PITCH + alpha)
+    speed = math.sqrt(2.0 * force / (rho * 0.1 * drag(alpha)))
+    return speed, sign * speed * math.sin(PITCH + alpha)
+
+
+def made_up() -> dict[str, np.ndarray]:
+    """A dive and a climb, a sample each few seconds."""
+    now, depth, heading, rows = 0.0, 2.5, 0.3, []
+    for sign in (1.0, -1.0):
+        while (depth < DEEPEST) if sign > 0.0 else (depth > 2.5):
+            speed, rate = glide(depth, sign)
+            roll = 0.12 * math.sin(now / 120.0)
+            rows.append((now, depth, -sign * PITCH, roll, heading, -sign * PUMPED, -rate, speed))
+            heading += PERIOD_S * TURNS[sign] * math.sin(roll) * speed / 0.5
+            depth += PERIOD_S * rate
+            now += PERIOD_S
+    names = ('time', 'depth', 'pitch', 'roll', 'heading', 'pumped', 'rising', 'speed')
+    return dict(zip(names, np.array(rows).T, strict=True))
+
+
+@pytest.fixture(scope='module')
+def dive() -> dict[str, np.ndarray]:
+    return made_up()
+
+
+def write_dive(file, dive, **changes) -> None:
+    """Write it as a base station of a Seaglider does; what is None is left out."""
+    point, fix = 'sg_data_point', 'gps_info'
+    end_s = START_S + dive['time'][-1]
+    data = {
+        'time': (point, START_S + dive['time'], {'units': 'seconds since 1970-1-1 00:00:00'}),
+        'depth': (point, dive['depth']),
+        'eng_pitchAng': (point, np.degrees(dive['pitch'])),
+        'eng_rollAng': (point, np.degrees(dive['roll'])),
+        'eng_head': (point, np.degrees(dive['heading'])),
+        'eng_vbdCC': (point, 1e6 * dive['pumped']),
+        'temperature': (point, temperature(dive['depth'])),
+        'salinity': (point, np.full(len(dive['time']), SALINITY)),
+        'vert_speed': (point, 100.0 * dive['rising'] + 2.0),
+        'magnetic_variation': ((), 0.0),
+        'log_gps_time': (fix, np.array([START_S - 300.0, START_S - 60.0, end_s + 60.0])),
+        'log_gps_lat': (fix, np.full(3, LATITUDE)),
+        'log_gps_lon': (fix, np.full(3, LONGITUDE)),
+    } | changes
+    data = {name: value for name, value in data.items() if value is not None}
+    xarray.Dataset(data).to_netcdf(file, engine='scipy')
+
+
+def report(*words: str) -> dict:
+    done = CliRunner().invoke(app, ['validate', *words, '--json'], catch_exceptions=False)
+    assert done.exit_code == 0
+    return json.loads(done.stdout)
+
+
+def told(*words: str) -> str:
+    """What the command says when it refuses."""
+    with pytest.raises(ConfigurationError) as error:
+        CliRunner().invoke(app, ['validate', *words], catch_exceptions=False)
+    assert '\n' not in str(error.value)
+    return str(error.value)
+
+
+@pytest.fixture(scope='module')
+def file(tmp_path_factory, dive):
+    path = tmp_path_factory.mktemp('flight') / 'p1230001.nc'
+    write_dive(path, dive)
+    return str(path)
+
+
+def test_the_plant_glides_as_a_model_solved_apart_once_weight_and_drag_are_found(file):
+    found = report(file, '--vehicle', 'slocum_g2', '--fit', 'mass,Cd0')
+    assert found['segments'] == 1
+    assert found['w_rmse_cmps'] < 0.15
+    assert abs(found['w_bias_cmps']) < 0.05
+    assert found['fitted']['mass'] == pytest.approx(HEAVIER, abs=0.005)
+    drag = load_vehicle('slocum_g2').params().K_D0
+    assert found['fitted']['Cd0'] == pytest.approx(ROUGHER * drag, rel=0.02)
+    assert found['u_adcp_rmse_cmps'] is None
+
+
+def test_without_a_fit_it_is_off_by_what_the_flight_weighs_more(file):
+    found = report(file, '--vehicle', 'slocum_g2', '--fit', 'none')
+    assert found['fitted'] == {}
+    # A plant that is lighter sinks more slowly and rises faster.
+    assert -7.0 < found['w_bias_cmps'] < -2.0
+
+
+def test_what_the_base_station_made_of_it_stands_beside(file):
+    """Its rate is 2 cm/s off here."""
+    found = report(file, '--vehicle', 'slocum_g2', '--fit', 'none')
+    assert found['peer']['name'] == 'basestation'
+    assert found['peer']['w_rmse_cmps'] == pytest.approx(2.0, abs=0.05)
+
+
+def test_turns_over_roll_are_told_by_phase(file):
+    name = 'turn_rate_per_sin_roll'
+    turns = report(file, '--vehicle', 'slocum_g2', '--fit', 'mass,Cd0')[name]
+    assert turns['dive']['recorded'] == pytest.approx(TURNS[1.0], rel=0.05)
+    assert turns['climb']['recorded'] == pytest.approx(TURNS[-1.0], rel=0.05)
+    turns = report(file, '--vehicle', 'seaglider', '--fit', 'mass,Cd0')[name]
+    assert -0.1 < turns['dive']['simulated'] < -0.01
+    assert 0.01 < turns['climb']['simulated'] < 0.1
+
+
+def test_speed_is_compared_with_an_adcp(file, dive, tmp_path):
+    measured = tmp_path / 'speed.npy'
+    np.save(measured, np.stack([START_S + dive['time'], dive['speed'] + 0.05]))
+    words = (file, '--vehicle', 'slocum_g2', '--fit', 'mass,Cd0', '--adcp', str(measured))
+    found = report(*words)
+    assert found['u_adcp_bias_cmps'] == pytest.approx(-5.0, abs=0.3)
+    assert found['u_adcp_rmse_cmps'] == pytest.approx(5.0, abs=0.3)
+    table = tmp_path / 'speed.csv'
+    np.savetxt(table, np.load(measured).T, delimiter=',')
+    assert report(*words[:-1], str(table))['u_adcp_rmse_cmps'] == found['u_adcp_rmse_cmps']
+
+
+def test_a_pitch_sensor_that_reads_too_much_is_found_by_the_adcp(dive, tmp_path):
+    """Over several stretches: each is compared with a model that was not told of it."""
+    for number in range(4):
+        later = {**dive, 'time': dive['time'] + 10_000.0 * number}
+        changes = {'eng_pitchAng': ('sg_data_point', np.degrees(dive['pitch']) / 0.86)}
+        write_dive(tmp_path / f'p123{number + 1:04d}.nc', later, **changes)
+    times = np.concatenate([START_S + dive['time'] + 10_000.0 * number for number in range(4)])
+    np.save(tmp_path / 'U_measured.npy', np.stack([times, np.tile(dive['speed'], 4)]))
+    found = report(str(tmp_path), '--vehicle', 'slocum_g2', '--fit', 'mass,Cd0,pitch_scale')
+    assert found['segments'] == 4
+    assert found['fitted']['pitch_scale'] == pytest.approx(0.86, abs=0.01)
+    assert found['u_adcp_rmse_cmps'] < 0.5
+
+
+def test_the_plant_finds_its_pitch_by_the_actuators(dive, tmp_path):
+    """Where the pitch mass has to be for it is what `./glider trim` says."""
+    vehicle = load_vehicle('slocum_g2').params()
+    at = [
+        solve_trim(vehicle, sign * 0.2, pitch_deg=-sign * math.degrees(PITCH)).pitch_mass_m
+        for sign in (1.0, -1.0)
+    ]
+    pumped = np.where(dive['pumped'] < 0.0, -0.2, 0.2) / 1025.0
+    mass = np.where(dive['pumped'] < 0.0, *at)
+    write_dive(
+        tmp_path / 'p1230001.nc',
+        dive,
+        eng_vbdCC=('sg_data_point', 1e6 * pumped),
+        eng_pitchCtl=('sg_data_point', 100.0 * mass),
+        eng_rollAng=None,
+    )
+    words = (str(tmp_path), '--vehicle', 'slocum_g2', '--impose', 'actuators', '--fit')
+    found = report(*words, 'none')
+    assert found['imposed'] == 'actuators'
+    assert found['pitch_rmse_deg'] < 1.5
+    assert report(*words, 'mass,Cd0,trim')['pitch_rmse_deg'] < found['pitch_rmse_deg']
+
+
+def test_a_flight_in_og1_gives_the_same_figures(file, dive, tmp_path):
+    count = len(dive['time'])
+    data = {
+        'TIME': START_S + dive['time'],
+        'LATITUDE': np.full(count, LATITUDE),
+        'LONGITUDE': np.full(count, LONGITUDE),
+        'DEPTH': dive['depth'],
+        'PITCH': np.degrees(dive['pitch']),
+        'ROLL': np.degrees(dive['roll']),
+        'HEADING': np.degrees(dive['heading']),
+        'VBD_CC': 1e6 * dive['pumped'],
+        'TEMP': temperature(dive['depth']),
+        'PSAL': np.full(count, SALINITY),
+        'GLIDER_VERT_VELO_MODEL': 100.0 * dive['rising'] + 2.0,
+    }
+    dataset = xarray.Dataset({name: ('N_MEASUREMENTS', values) for name, values in data.items()})
+    dataset['TIME'].attrs['units'] = 'seconds since 1970-01-01T00:00:00Z'
+    dataset.to_netcdf(tmp_path / 'sg123_delayed.nc', engine='scipy')
+    words = ('--vehicle', 'slocum_g2', '--fit', 'mass,Cd0')
+    one, other = report(file, *words), report(str(tmp_path), *words)
+    assert other['kind'] == 'og1'
+    assert other['w_rmse_cmps'] == pytest.approx(one['w_rmse_cmps'], abs=0.01)
+    assert other['peer']['w_rmse_cmps'] == pytest.approx(one['peer']['w_rmse_cmps'], abs=0.01)
+
+
+def test_the_zero_of_an_engine_may_move_from_dive_to_dive(dive, tmp_path):
+    """The cc of a Seaglider count from a number that people set before each dive."""
+    for number, zero in enumerate((2900.0, 2700.0)):
+        later = {**dive, 'time': dive['time'] + 10_000.0 * number}
+        moved = 1e6 * dive['pumped'] + (zero - 2900.0) * 0.25
+        write_dive(
+            tmp_path / f'p123{number + 1:04d}.nc',
+            later,
+            eng_vbdCC=('sg_data_point', moved),
+            log_C_VBD=((), zero),
+            log_VBD_MIN=((), 500.0),
+            log_VBD_CNV=((), -0.25),
+            sg_cal_volmax=((), 69e3),
+            sg_cal_mass=((), 70.0),
+        )
+    recorded = read_whole(tmp_path, None, quiet).instruments
+    one, other = np.split(recorded.pumped_m3, 2)
+    assert other == pytest.approx(one, abs=1e-9)
+
+
+def test_the_page_of_pictures_is_drawn(file, tmp_path):
+    picture = tmp_path / 'flight.svg'
+    words = [file, '--vehicle', 'slocum_g2', '--fit', 'none', '--out', str(picture)]
+    done = CliRunner().invoke(app, ['validate', *words], catch_exceptions=False)
+    assert done.exit_code == 0
+    assert 'vertical rate off, rms' in done.stdout
+    assert picture.read_text().count('<g id="axes_') == 6
+
+
+def test_gliderflight_that_is_not_there_is_told(dive, tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__('sys').modules, 'gliderflight', None)
+    write_dive(tmp_path / 'p1230001.nc', dive, vert_speed=None)
+    found = report(str(tmp_path), '--vehicle', 'slocum_g2', '--fit', 'none')
+    assert found['peer'] is None
+    assert 'gliderflight, the model to compare with, is not installed' in found['notes'][-1]
+
+
+def test_gliderflight_flies_beside(dive, tmp_path):
+    pytest.importorskip('gliderflight')
+    write_dive(tmp_path / 'p1230001.nc', dive, vert_speed=None)
+    found = report(str(tmp_path), '--vehicle', 'slocum_g2', '--fit', 'mass,Cd0')
+    assert found['peer']['name'] == 'gliderflight'
+    # It knows of no thermal expansion.
+    assert found['w_rmse_cmps'] < found['peer']['w_rmse_cmps'] < 2.0
+
+
+def test_what_cannot_be_flown_is_told(file, dive, tmp_path):
+    slocum = ('--vehicle', 'slocum_g2')
+    assert 'no constant mas (allowed: none' in told(file, *slocum, '--fit', 'mas')
+    assert 'its file has no volume' in told(file, '--vehicle', 'zhang2021')
+    assert 'no such folder or file' in told(str(tmp_path / 'lost'), *slocum)
+    assert 'mass_x_m was not recorded' in told(file, *slocum, '--impose', 'actuators')
+    wrong = tmp_path / 'wrong.npy'
+    np.save(wrong, np.zeros(5))
+    assert 'has shape (5,)' in told(file, *slocum, '--adcp', str(wrong))
+    write_dive(tmp_path / 'p1230001.nc', {name: part[:5] for name, part in dive.items()})
+    assert 'no stretch under water of 120 s' in told(str(tmp_path), *slocum)
+
+
+def test_gsw_that_is_not_there_is_named(file, monkeypatch):
+    monkeypatch.setitem(__import__('sys').modules, 'gsw', None)
+    assert 'requirements-flights.txt' in told(file, '--vehicle', 'slocum_g2')
