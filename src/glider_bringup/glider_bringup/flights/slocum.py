@@ -194,9 +194,9 @@ def _instruments(sensors: Sensors, declined: float, origin: np.ndarray) -> Instr
         own_s, values = sensors[name]
         return unit * at_times(time_s, own_s, values)
 
-    pumped = measured('m_ballast_pumped', 1e-6)
-    if np.isnan(pumped).all():
-        pumped = measured('m_de_oil_vol', 1e-6)
+    # One of the two is of another engine, which is not fitted.
+    engines = [measured(name, 1e-6) for name in ('m_ballast_pumped', 'm_de_oil_vol')]
+    pumped = max(engines, key=lambda values: int(np.isfinite(values).sum()))
     temperature = measured('sci_water_temp')
     heading = angles_at_times(time_s, *sensors['m_heading']) - declined
     return instruments(

@@ -21,6 +21,10 @@ from glider_model.base.errors import ConfigurationError
 UNIT_MPS, UNIT_RAD, UNIT_ADCP_MPS = 0.01, math.radians(2.0), 0.03
 #: No more than about so many samples of all stretches, so many of them, are looked at.
 SAMPLES, STRETCHES = 20_000, 12
+#: The net weight that a fit begins with is that of so many stretches.
+FEW = 3
+#: Relative change of cost and constants at which a fit has found them.
+TOLERANCE = 1e-5
 #: The net weight is looked for within so much of that of the file (kg).
 SEARCH_KG = 3.0
 
@@ -116,7 +120,7 @@ def fitted(
     some = [track for track in found if track.counts.any()][::every]
     step = max(1, sum(int(track.counts.sum()) for track in some) // SAMPLES)
     if 'mass' in names:
-        model = _balanced(some, model)
+        model = _balanced(some[:FEW], model)
     constants = [CONSTANTS[name] for name in names]
     start = np.array([one.read(model) / one.step for one in constants])
 
@@ -138,16 +142,18 @@ def fitted(
         here = wrong(values)
         return np.stack([wrong(values + one) - here for one in np.eye(len(values))], axis=1)
 
-    return moved(least_squares(wrong, start, slope, loss='soft_l1').x)
+    tolerances = dict.fromkeys(('ftol', 'xtol', 'gtol'), TOLERANCE)
+    return moved(least_squares(wrong, start, slope, loss='soft_l1', **tolerances).x)
 
 
 def _balanced(some: list[Track], model: Model) -> Model:
-    """Model as heavy as its mean vertical rate is the recorded one, of its first stretch."""
-    track, mass = some[0], CONSTANTS['mass']
+    """Model as heavy as its median vertical rate is off by nothing."""
+    mass = CONSTANTS['mass']
     low, high = -SEARCH_KG, SEARCH_KG
     while high - low > mass.step:
         middle = 0.5 * (low + high)
-        off = np.mean(_wrong(track, mass.write(model, middle), 'pitch', 1))
+        tried = mass.write(model, middle)
+        off = np.median(np.concatenate([_wrong(track, tried, 'pitch', 1) for track in some]))
         low, high = (low, middle) if off > 0.0 else (middle, high)
     return mass.write(model, 0.5 * (low + high))
 

@@ -61,10 +61,8 @@ def model_of(name: str, flight: Flight) -> Model:
         If its volume is not known.
     """
     vehicle, body = load_vehicle(name).params(), flight.body or {}
-    vehicle = vehicle._replace(
-        m=body.get('mass_kg', vehicle.m),
-        volume=body.get('volume_m3', vehicle.volume),
-    )
+    if body.keys() >= {'mass_kg', 'volume_m3'}:  # one alone would be that of another vehicle
+        vehicle = vehicle._replace(m=body['mass_kg'], volume=body['volume_m3'])
     if vehicle.volume == 0.0:
         raise ConfigurationError(
             f'--vehicle {name}: its file has no volume (needed to fly in water that was measured)'

@@ -26,6 +26,8 @@ from glider_model.base.errors import ConfigurationError
 
 #: Speeds of an ADCP that come with a flight, in its folder or the one above it.
 ADCP_FILES = 'U_*.npy'
+#: Speeds of an ADCP that are none, or larger than this (m/s), stand for nothing.
+FASTEST_MPS = 5.0
 
 
 class Validation(NamedTuple):
@@ -122,4 +124,5 @@ def find_adcp(place: Path, file: Path | None) -> Adcp | None:
         )
     time_s, speed = np.asarray(table, float)
     good = np.isfinite(time_s)
-    return Adcp(time_s[good], np.where(np.abs(speed[good]) < 5.0, speed[good], math.nan))
+    speed = np.where((speed > 0.0) & (speed < FASTEST_MPS), speed, math.nan)
+    return Adcp(time_s[good], speed[good])

@@ -78,6 +78,11 @@ def _usable(whole: Instruments) -> Instruments:
 
 
 def _track(own: Instruments, origin_deg: np.ndarray) -> Track:
+    water = {
+        name: _by_depth(own.depth_m, getattr(own, name))
+        for name in ('salinity', 'temperature_degc')
+    }
+    own = own._replace(**water)
     pressure = pressure_of(own.depth_m, origin_deg[0])
     density = density_of(own.salinity, own.temperature_degc, pressure, origin_deg)
     turns = _turns(own.depth_m)
@@ -99,6 +104,16 @@ def _track(own: Instruments, origin_deg: np.ndarray) -> Track:
         phase,
         counts,
     )
+
+
+def _by_depth(depth_m: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values with gaps filled from those of the same depths, where there are some."""
+    good = np.isfinite(values)
+    if good.all() or not good.any():
+        return values
+    order = np.argsort(depth_m[good], kind='stable')
+    filled = np.interp(depth_m, depth_m[good][order], values[good][order])
+    return np.where(good, values, filled)
 
 
 def _turns(depth_m: np.ndarray) -> list[int]:
