@@ -203,7 +203,7 @@ def test_the_plant_finds_its_pitch_by_the_actuators(dive, tmp_path):
         tmp_path / 'p1230001.nc',
         dive,
         eng_vbdCC=('sg_data_point', 1e6 * pumped),
-        eng_pitchCtl=('sg_data_point', 100.0 * mass),
+        eng_pitchCtl=('sg_data_point', -100.0 * mass),
         eng_rollAng=None,
     )
     words = (str(tmp_path), '--vehicle', 'slocum_g2', '--impose', 'actuators', '--fit')

@@ -29,7 +29,7 @@ NAMES = {
     'roll_rad': (('ROLL',), math.radians(1.0)),
     'heading_rad': (('HEADING', 'HDG'), math.radians(1.0)),
     'pumped_m3': (('VBD_CC', 'BALLAST_PUMPED', 'OIL_VOLUME'), 1e-6),
-    'mass_x_m': (('PITCH_CTL',), 1e-2),
+    'mass_x_m': (('PITCH_CTL',), -1e-2),  # of a Seaglider: cm, + aft
     'mass_roll_rad': (('ROLL_CTL',), math.radians(1.0)),
     'surface_rad': (('FIN', 'RUDDER'), math.radians(1.0)),
     'temperature_degc': (('TEMP', 'TEMPERATURE'), 1.0),

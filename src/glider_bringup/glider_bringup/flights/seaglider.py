@@ -65,7 +65,7 @@ WANTED = {
 MEASURED = {
     'roll_rad': (('eng_rollAng', 'roll'), math.radians(1.0)),
     'pumped_m3': (('eng_vbdCC', 'vbdCC'), 1e-6),
-    'mass_x_m': (('eng_pitchCtl', 'pitchCtl'), 1e-2),
+    'mass_x_m': (('eng_pitchCtl', 'pitchCtl'), -1e-2),  # cm, + aft
     'mass_roll_rad': (('eng_rollCtl', 'rollCtl'), math.radians(1.0)),
     'temperature_degc': (('temperature', 'temperature_raw'), 1.0),
     'salinity': (('salinity', 'salinity_raw'), 1.0),

@@ -23,6 +23,8 @@ UNIT_MPS, UNIT_RAD, UNIT_ADCP_MPS = 0.01, math.radians(2.0), 0.03
 SAMPLES, STRETCHES = 20_000, 12
 #: The net weight that a fit begins with is that of so many stretches.
 FEW = 3
+#: What a plant that nobody can fly is off by, in units of least squares.
+WORST = 1e3
 #: Relative change of cost and constants at which a fit has found them.
 TOLERANCE = 1e-5
 #: The net weight is looked for within so much of that of the file (kg).
@@ -38,23 +40,26 @@ class Constant(NamedTuple):
     #: Its value in a model, and the model with another one.
     read: Callable[[Model], float]
     write: Callable[[Model, float], Model]
+    #: It is no less.
+    lowest: float = -math.inf
 
 
-def _of_vehicle(field: str, unit: str, step: float) -> Constant:
+def _of_vehicle(field: str, unit: str, step: float, lowest: float = -math.inf) -> Constant:
     return Constant(
         unit,
         step,
         lambda model: getattr(model.vehicle, field),
         lambda model, value: model._replace(vehicle=model.vehicle._replace(**{field: value})),
+        lowest,
     )
 
 
 CONSTANTS = {
     'mass': _of_vehicle('ballast', 'kg', 0.01),
-    'Cd0': _of_vehicle('K_D0', 'kg/m', 0.1),
-    'Cd1': _of_vehicle('K_D', 'kg/m/rad^2', 10.0),
-    'lift': _of_vehicle('K_L', 'kg/m/rad', 10.0),
-    'compressibility': _of_vehicle('compressibility', '1/Pa', 1e-11),
+    'Cd0': _of_vehicle('K_D0', 'kg/m', 0.1, 0.0),
+    'Cd1': _of_vehicle('K_D', 'kg/m/rad^2', 10.0, 0.0),
+    'lift': _of_vehicle('K_L', 'kg/m/rad', 10.0, 0.0),
+    'compressibility': _of_vehicle('compressibility', '1/Pa', 1e-11, 0.0),
     'expansion': _of_vehicle('thermal_expansion', '1/K', 1e-6),
     'trim': _of_vehicle('s_x', 'kg m', 0.01),
     'righting': _of_vehicle('s_z', 'kg m', 0.01),
@@ -136,14 +141,17 @@ def fitted(
         for track in told:
             speed = speed_off(track, fly(track, tried, impose), adcp)
             off.append(speed[np.isfinite(speed)] / UNIT_ADCP_MPS)
-        return np.concatenate(off)
+        return np.nan_to_num(np.concatenate(off), nan=WORST, posinf=WORST, neginf=-WORST)
 
     def slope(values: np.ndarray) -> np.ndarray:
         here = wrong(values)
         return np.stack([wrong(values + one) - here for one in np.eye(len(values))], axis=1)
 
     tolerances = dict.fromkeys(('ftol', 'xtol', 'gtol'), TOLERANCE)
-    return moved(least_squares(wrong, start, slope, loss='soft_l1', **tolerances).x)
+    lowest = np.array([one.lowest / one.step for one in constants])
+    start = np.maximum(start, lowest)
+    limits = (lowest - 1e-9, np.inf)
+    return moved(least_squares(wrong, start, slope, limits, loss='soft_l1', **tolerances).x)
 
 
 def _balanced(some: list[Track], model: Model) -> Model:

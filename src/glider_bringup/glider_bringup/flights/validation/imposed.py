@@ -24,8 +24,9 @@ from glider_model.vehicle.file import VehicleParams
 from glider_model.vehicle.rigid_body import make_inertia, solve_mass
 
 #: Longest step while the attitude is imposed (s), at speeds up to this (m/s): above it damping in
-#: yaw, which is the fastest that is left and goes with the square of speed, asks for shorter ones.
-STEP_S, STEP_MPS = 0.2, 0.5
+#: yaw, which is the fastest that is left and goes with the square of speed, asks for shorter ones,
+#: but none is shorter than the last.
+STEP_S, STEP_MPS, SHORTEST_S = 0.2, 0.5, 0.01
 #: Speed ahead at which a stretch begins (m/s); what follows from it is over before it is compared.
 START_MPS = 0.2
 _STILL = Water(0.0, 0.0, 0.0)
@@ -212,6 +213,7 @@ def fly_held(table, vehicle, step, flown):
         while done < span:
             speed2 = u * u + v * v + w * w
             longest = step * min(1.0, STEP_MPS * STEP_MPS / max(speed2, 1e-9))
+            longest = max(longest, SHORTEST_S)
             h = (span - done) / math.ceil((span - done) / longest)
             start = _between(here, after, done / span)
             middle = _between(here, after, (done + 0.5 * h) / span)
