@@ -240,7 +240,7 @@ def test_a_damaged_file_is_left_out_and_named(tmp_path, write_dbd):
     assert flight.notes[0].startswith('00020000.dbd: cannot be read')
 
 
-def test_instruments_of_a_slocum_come_from_both_computers(tmp_path):
+def test_instruments_of_a_slocum_come_from_both_computers(tmp_path, write_dbd):
     """Those of the water by the times of the CTD, half a second off those of the file."""
     pytest.importorskip('dbdreader')
     gsw = pytest.importorskip('gsw')
