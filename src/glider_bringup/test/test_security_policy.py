@@ -51,7 +51,7 @@ COMMENT = (
 def rights(node: str) -> dict[str, set[str]]:
     """Topics that a node may publish and subscribe, and services that it may reply to."""
     block = next((wired for wired in WIRING if wired.node == node), None)
-    publish = {'/diagnostics', 'lockstep', *SAYS}
+    publish = {'/diagnostics', 'lockstep', 'told', *SAYS}
     subscribe = {'lockstep', '/clock', '/parameter_events'}
     if block:
         publish |= {*block.outputs}
@@ -62,6 +62,7 @@ def rights(node: str) -> dict[str, set[str]]:
         subscribe.add('recorded')
     if node == RECORDER:
         publish.add('recorded')
+        subscribe.add('told')
         subscribe |= {topic.name for topic in TOPICS.values() if topic.recorded}
     return {
         'publish': publish,
