@@ -16,10 +16,12 @@ from rclpy.context import Context
 from glider_model.base.frames import quaternion_from_euler
 from glider_model.base.signals import TICK_S, Joints, Water
 from glider_model.ocean.water import WaterSettings
+from glider_model.plant.energy import FULL
 from glider_model.plant.faults.kinds import NoFaults, NoFaultState
 from glider_model.plant.motion import Motion
 from glider_model.plant.plant import LAUNCHED, PlantParams, PlantState, dive_depths, plant_step
 from glider_model.plant.sensors import NO_SAMPLE, SensorSettings
+from glider_model.vehicle.energy import NO_ENERGY
 from glider_model.vehicle.file import load_vehicle
 
 
@@ -92,6 +94,7 @@ def _plant_params(vehicle='zhang2021', **density):
         *dive_depths(1000.0),
         SensorSettings().params(0),
         NoFaults(),
+        NO_ENERGY,
     )
 
 
@@ -103,7 +106,7 @@ def _start(position=(0.0, 0.0, 100.0), euler=(0.0, 0.0, 0.0), velocity=(), joint
     joints = Joints(*(float(number) for number in _with_surface(joints)))
     water = Water(0.0, 0.0, 0.0)
     return PlantState(
-        motion, joints, water, 0, False, 0, 0, -1, NO_SAMPLE, LAUNCHED, NoFaultState(), False
+        motion, joints, water, 0, False, 0, 0, -1, NO_SAMPLE, LAUNCHED, NoFaultState(), False, FULL
     )
 
 
