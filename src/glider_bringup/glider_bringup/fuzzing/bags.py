@@ -8,6 +8,7 @@ is not what it makes of the unharmed bag, and says neither so nor what is missin
 """
 
 import random
+import shutil
 import tempfile
 from collections.abc import Callable
 from functools import partial
@@ -23,6 +24,7 @@ from glider_bringup.fuzzing.watch import outcome_of
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.recover import recover
 from glider_bringup.recording.ros.recorded_run import Recording
 from glider_bringup.recording.ros.republish import (
     check_not_empty,
@@ -166,9 +168,19 @@ def _replay(folder: Path) -> Answer:
     return list(recorded_messages(plan, profiles)), bool(bag.cut)
 
 
+def _recover(folder: Path) -> Answer:
+    """What is in a copy that was made whole; its score is what there is to say of it."""
+    with tempfile.TemporaryDirectory() as scratch:
+        copy = Path(shutil.copytree(folder, Path(scratch) / folder.name))
+        found = recover(copy)
+        card, is_told = _score(copy)
+        return (found.counts, card), is_told or bool(found.rebuilt)
+
+
 COMMANDS: dict[str, Callable[[Path], Answer]] = {
     'score': _score,
     'report': _report,
     'verify': _verify,
     'replay': _replay,
+    'recover': _recover,
 }
