@@ -35,14 +35,14 @@ RECKONED = {
     'sensors.gps_first_fix_s': 30.0,
     'sensors.also_fitted': '[altitude]',
     'sensors.altimeter_std_m': 0.2,
-    'water.bottom_m': 150.0,
+    'water.bottom_m': 90.0,
     'water.wind_mps': 8.0,
     'water.wind_from_deg': 45.0,
-    'profile.depth_m': 100.0,
+    'profile.depth_m': 60.0,
     'profile.surface_every_dives': 1,
     'profile.wait_s': 200.0,
 }
-RECKONED_S = 3600
+RECKONED_S = 2400
 
 #: What tells how a result came about, not what it is.
 HOW = {'engine', 'wall_time_s', 'real_time_factor', 'messages_recorded'}

@@ -62,7 +62,8 @@ RECKONED = {
 OFF_M = (15.0, 1.0)
 #: How the stand-in begins.
 GLIDING = {'heading_deg': 30.0, 'pitch_deg': -30.0, 'speed_mps': 0.5, 'net_heaviness_kg': 0.4}
-SAFE = {'buoyancy_engine': -1.0, 'pitch_mass': -0.06, 'roll_mass': 0.0}
+#: All the buoyancy there is; the mass waits in the middle for the pump.
+SAFE = {'buoyancy_engine': -1.0, 'pitch_mass': 0.0, 'roll_mass': 0.0}
 DEADLINE_S = 200.0
 #: Flights by their names: whether the vehicle navigates itself, and whether by the autopilot.
 FLIGHTS = {

@@ -38,6 +38,7 @@ from glider_model.base.frames import (
     water_to_wire,
 )
 from glider_model.base.signals import TICK_S
+from glider_model.base.wiring import NO_ECHO
 from glider_model.ocean.current import current_step
 from glider_model.ocean.density import depth_at
 from glider_model.plant.block import plant_outputs
@@ -135,7 +136,7 @@ def tick(
         control, seen, plant.joints, reference, params.control, TICK_S
     )
     told = (health_of(plant), battery_of(plant.ledger, params.plant.energy))
-    heard = Heard(controlled.command, seen, plant.joints, reference.p_d, depth, *told)
+    heard = Heard(controlled.command, seen, plant.joints, reference.p_d, depth, NO_ECHO, *told)
     guard, guarded = guard_step(guard, heard, params.guard, TICK_S)
     water = water_from_wire(water_to_wire(water))
     plant = plant_step(plant, guarded.command, water, params.plant, TICK_S, guarded.drops)

@@ -27,13 +27,14 @@ TELL_EVERY_NS = 1_000_000_000
 @kernel
 def guard_tick(state, t_s, inputs, params, dt):
     """One tick: what `GUARD` reads in; command, drop_weight out; see `block_tick`."""
-    demand, reference, odom, joints, health, battery, pressure = inputs
+    demand, reference, odom, joints, health, battery, pressure, altitude = inputs
     heard = Heard(
         Joints(demand[0], demand[1], demand[2], demand[3]),
         odometry_from_wire(odom),
         Joints(joints[0], joints[1], joints[2], joints[3]),
         -reference[2],
         depth_at(pressure[0]),
+        altitude[0],
         Health(health[0], health[1], health[2]),
         Battery(battery[0], battery[1], battery[2], battery[3], battery[4]),
     )

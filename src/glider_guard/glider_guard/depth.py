@@ -8,6 +8,7 @@ from glider_guard.rows import (
     CRUSHING,
     DISAGREES,
     FROZEN,
+    NEAR_BOTTOM,
     NOT_CLIMBING,
     NOT_RISING,
     OVERDEPTH,
@@ -19,6 +20,8 @@ from glider_model.base.kernel import kernel
 
 #: Longer than this (s) a vehicle may not be too deep.
 TOO_DEEP_S = 1.0
+#: A vehicle that rises faster than this (m/s) leaves the bottom.
+RISES_MPS = 0.02
 #: Above this the vehicle is at the surface, and nothing of this is watched (m).
 SURFACE_M = 5.0
 #: For longer than this (s) the depth lags behind the vertical rate before it is told.
@@ -36,6 +39,8 @@ class DepthLimits(NamedTuple):
     over_share: float  #: of the deepest target
     over_m: float
     over_s: float
+    altitude_m: float  #: least height over the bottom
+    altitude_s: float
     progress_m: float  #: upward, in a climb
     no_climb_s: float
     drop_after_s: float
@@ -59,6 +64,7 @@ class Depths(NamedTuple):
     deep_s: float  #: time for which the vehicle has been too deep
     crush_s: float  #: deeper than its hull may bear
     over_s: float  #: deeper than it was sent
+    bottom_s: float  #: for which the bottom has been too close
     mark: float  #: depth from which progress upward is counted (m)
     climbs_s: float  #: time without progress while rising is commanded
     anchor: float  #: depth about which it may be stalled (m)
@@ -71,7 +77,7 @@ class Depths(NamedTuple):
     apart_s: float  #: for which two measured depths have differed
 
 
-INITIAL_DEPTHS = Depths(*(15 * (0.0,)))
+INITIAL_DEPTHS = Depths(*(16 * (0.0,)))
 
 
 class Sounding(NamedTuple):
@@ -84,6 +90,7 @@ class Sounding(NamedTuple):
     is_same: bool  #: odom is what it was a tick before
     target: float  #: that guidance asks for (m)
     stop: float  #: way that it sinks on if it is stopped now (m)
+    altitude: float  #: height over the bottom (m); 0.0: no echo
 
 
 @kernel
@@ -105,7 +112,7 @@ def _lag(lag_m, at, jump_m, dt):
 def begin_at(depth):
     """Nothing has lasted yet, at a depth (m)."""
     return Depths(
-        depth, depth, 0.0, 0.0, 0.0, depth, 0.0, depth, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        depth, depth, 0.0, 0.0, 0.0, 0.0, depth, 0.0, depth, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     )
 
 
@@ -148,6 +155,7 @@ def sound(state, at, ascends, limits, dt):
         _count(deepest > limits.rated, state.deep_s, dt),
         _count(depth > limits.crush, state.crush_s, dt),
         _count(depth > target + over, state.over_s, dt),
+        _count(0.0 < at.altitude < limits.altitude_m and at.rate > -RISES_MPS, state.bottom_s, dt),
         mark,
         _count(ascends and under and not progress, state.climbs_s, dt),
         anchor,
@@ -171,6 +179,8 @@ def depth_rows(state, surfaces, sees, limits):
         told |= CRUSHING
     if state.over_s > limits.over_s:
         told |= OVERDEPTH
+    if state.bottom_s > limits.altitude_s:
+        told |= NEAR_BOTTOM
     if state.climbs_s > limits.no_climb_s:
         told |= NOT_CLIMBING
     drop_s = limits.drop_after_s if sees else limits.drop_blind_s

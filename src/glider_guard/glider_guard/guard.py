@@ -50,6 +50,7 @@ class Heard(NamedTuple):
     joints: Joints
     target: float  #: depth that guidance asks for (m); SURFACE_TARGET: the surface, for good
     depth: float  #: by the pressure (m)
+    altitude: float  #: height over the bottom (m); 0.0: no echo
     health: Health
     battery: Battery
 
@@ -130,13 +131,14 @@ def _is_same(a, b):
 
 
 @kernel
-def _sounding(taken, before, theta, params):
+def _sounding(taken, before, altitude, theta, params):
     """What two ticks tell of the depth, at a pitch (rad)."""
     x = taken.gate.odometry
     _, _, rate = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
     target = max(0.0, taken.target)
     stop = stopping_m(theta, rate, params.weight)
-    return Sounding(x.p_d, before.p_d, rate, taken.depth, _is_same(x, before), target, stop)
+    same = _is_same(x, before)
+    return Sounding(x.p_d, before.p_d, rate, taken.depth, same, target, stop, altitude)
 
 
 @kernel
@@ -180,7 +182,7 @@ def guard_step(state, heard, params, dt):
     followers, told = follow(state.followers, taken.joints, sent, params.actuators, dt)
     x = taken.gate.odometry
     _, theta, _ = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
-    at = _sounding(taken, before, theta, params)
+    at = _sounding(taken, before, heard.altitude, theta, params)
     depths = state.depths
     if first:
         depths = begin_at(at.depth)

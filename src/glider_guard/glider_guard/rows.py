@@ -31,7 +31,7 @@ ORDERED, TOO_DEEP, FROZEN, LOST = 128, 256, 512, 1024
 OVERDEPTH, CRUSHING, NOT_CLIMBING, NOT_RISING = 1 << 13, 1 << 14, 1 << 15, 1 << 16
 STALLED, NO_DEMAND, DISAGREES, UNDER_LONG = 1 << 17, 1 << 18, 1 << 19, 1 << 20
 LEAK, VACUUM, BATTERY, NO_CONTACT = 1 << 21, 1 << 22, 1 << 23, 1 << 24
-TOO_HEAVY = 1 << 25
+TOO_HEAVY, NEAR_BOTTOM = 1 << 25, 1 << 26
 
 #: Every row, in the order in which they are told.
 ROWS = (
@@ -97,6 +97,15 @@ ROWS = (
         DROP,
         True,
         'deeper than its hull may bear',
+    ),
+    Row(
+        NEAR_BOTTOM,
+        'near_bottom',
+        'an altimeter hears the bottom closer than this, and the vehicle does not rise',
+        'altitude_min_m, altitude_s',
+        SURFACE,
+        True,
+        'too close to the bottom',
     ),
     Row(
         OVERDEPTH,

@@ -46,6 +46,15 @@ class GuardLimitSettings(Settings):
         100.0, ge=1.0, le=12000.0, description='the same, at least this (m)'
     )
     overdepth_s: float = Field(30.0, ge=0.0, le=3600.0, description='for longer than this (s)')
+    altitude_min_m: float = Field(
+        3.0,
+        ge=0.0,
+        le=100.0,
+        description='least height over the bottom, where there is an altimeter (m); 0.0: any',
+    )
+    altitude_s: float = Field(
+        2.0, ge=0.0, le=3600.0, description='the bottom is heard for longer than this (s)'
+    )
     climb_progress_m: float = Field(
         5.0, ge=0.5, le=100.0, description='way upward that counts as progress (m)'
     )
@@ -129,6 +138,7 @@ class GuardSettings(GuardLimitSettings):
 
     vehicle: str = Field('zhang2021', description='vehicle: ranges and rates, depths, weight')
     pressure: bool = Field(False, description='there is a depth apart from that of odom')
+    altitude: bool = Field(False, description='there is an altimeter')
     imu_period_s: float = Field(
         0.1, ge=0.1, le=30.0, description='time between two samples of the pressure (s)'
     )
@@ -143,7 +153,7 @@ class GuardSettings(GuardLimitSettings):
     @property
     def topics(self) -> tuple[str, ...]:
         """Those of the topics that not every run has that it reads."""
-        return ('pressure',) if self.pressure else ()
+        return tuple(name for name in ('pressure', 'altitude') if getattr(self, name))
 
     def params(self) -> GuardParams:
         """Kernel parameters."""
@@ -159,6 +169,8 @@ class GuardSettings(GuardLimitSettings):
                 self.overdepth_share,
                 self.overdepth_m,
                 self.overdepth_s,
+                self.altitude_min_m,
+                self.altitude_s,
                 self.climb_progress_m,
                 self.no_climb_s,
                 self.drop_after_s,

@@ -16,6 +16,7 @@ from glider_guard.settings import GuardSettings
 from glider_model.base.frames import quaternion_from_euler, rotate_to_body
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import SURFACE_TARGET, TICK_S, Battery, Health, Joints, Odometry
+from glider_model.base.wiring import NO_ECHO
 from glider_model.onboard.glide_polar import glide_vertical_rate
 from glider_model.vehicle.file import changed_vehicle, load_vehicle
 
@@ -46,7 +47,7 @@ class Vehicle:
     def go(self, seconds: float, demand=DIVES, rate: float = RATE, joints=None, **heard) -> int:
         """Fly on; rows at the end. Without ``joints`` actuators are where they were sent."""
         for _ in range(round(seconds / TICK_S)):
-            seen = (self.target, self.depth, WELL, POWER)
+            seen = (self.target, self.depth, NO_ECHO, WELL, POWER)
             at = Heard(demand, self.odometry(rate), self.joints, *seen)
             self.state, self.out = guard_step(
                 self.state, at._replace(**heard), self.params, TICK_S
@@ -76,6 +77,7 @@ CASES = {
     'surface_ordered': Case({}, {'target': SURFACE_TARGET}, 0.0),
     'too_deep': Case({'depth_m': 999.5}, {'rate': 0.1}, 3.5),
     'crush_depth': Case({'depth_m': 1249.0}, {'rate': 0.2}, 4.5),
+    'near_bottom': Case({'altitude': True}, {'altitude': 2.5}, 1.5),
     'overdepth': Case({'depth_m': 300.0}, {'rate': 0.2}, 525.0),
     'not_climbing': Case({'depth_m': 200.0}, {'demand': RISES, 'rate': 0.02}, 895.0),
     'stalled': Case({}, {'rate': 0.002}, 1795.0),
@@ -237,13 +239,13 @@ def test_a_glide_down_and_up_is_let_through_untouched():
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.lists(st.floats(width=64), min_size=31, max_size=31), st.integers(1, 30))
+@given(st.lists(st.floats(width=64), min_size=32, max_size=32), st.integers(1, 30))
 def test_whatever_it_hears_the_command_is_within_the_ranges(numbers, ticks):
     vehicle = Vehicle()
     vehicle.go(1.0)
     demand, joints, odometry = Joints(*numbers[:4]), Joints(*numbers[4:8]), numbers[8:21]
-    told = (Health(*numbers[23:26]), Battery(*numbers[26:]))
-    at = Heard(demand, Odometry(*odometry), joints, numbers[21], numbers[22], *told)
+    told = (*numbers[21:24], Health(*numbers[24:27]), Battery(*numbers[27:]))
+    at = Heard(demand, Odometry(*odometry), joints, *told)
     state = vehicle.state
     most = Joints(*(1.5 * limit for limit in vehicle.params.actuators.range))
     for _ in range(ticks):

@@ -30,8 +30,8 @@ from glider_navigation.block import navigation_tick
 from glider_navigation.settings import NavigationParams
 
 #: Places among what the plant measures, which does not include /clock.
-PRESSURE, HEALTH, BATTERY = (
-    PLANT.outputs.index(topic) - 1 for topic in ('pressure', 'health', 'battery')
+PRESSURE, ALTITUDE, HEALTH, BATTERY = (
+    PLANT.outputs.index(topic) - 1 for topic in ('pressure', 'altitude', 'health', 'battery')
 )
 
 
@@ -101,7 +101,8 @@ def fly(state, params, log, dt):
         seen = (guided[0], odom, joints)
         control, controlled, limits = control_tick(control, t_s, seen, params.control, dt)
         well, power = measured[HEALTH], measured[BATTERY]
-        seen = (controlled[0], guided[0], odom, joints, well, power, measured[PRESSURE])
+        pressure, altitude = measured[PRESSURE], measured[ALTITUDE]
+        seen = (controlled[0], guided[0], odom, joints, well, power, pressure, altitude)
         guard, guarded, told = guard_tick(guard, t_s, seen, params.guard, dt)
         plant = plant_move(plant, (guarded[0], water, guarded[1]), params.plant, dt)
         said = (phase, stage, limits, told)

@@ -217,7 +217,7 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     knows_place = not simulate and 'measured_odom' in scenario.navigation.topics
     with_navigation = _TRUTH.get(text['navigation'], not knows_place)
     if not with_navigation:  # nor is there any sensor of its own
-        parameters[GUARD]['pressure'] = False
+        parameters[GUARD] |= {'pressure': False, 'altitude': False}
     nodes = _nodes(
         simulate,
         with_navigation,

@@ -23,7 +23,7 @@ from glider_bringup.scoring.card import finite, fly_scored, scorecard
 from glider_bringup.studies.random_faults import sample_faults
 from glider_model.base.settings import ConfigurationError
 from glider_model.ocean.current_profile import MAX_SPEED_MPS
-from glider_model.vehicle.file import vehicle_names
+from glider_model.vehicle.file import load_vehicle, vehicle_names
 
 #: Sections of a scenario whose numbers are drawn.
 SECTIONS = (
@@ -38,6 +38,8 @@ RECKONS = {
     'guidance.los.method': 'observer',
     'profile.surface_every_dives': 1,
 }
+#: The same for those with a steering surface.
+STEERS = {'control.law': 'adaptive', 'guidance.los.method': 'observer'}
 #: Sections that the plant alone is told: half of the flights draw from these only.
 PLANT_SECTIONS = ('perturb', 'initial', 'water')
 #: Share of the flights by dead reckoning and with faults, and how many of them.
@@ -105,7 +107,9 @@ def draw_changes(seed: int, case: int) -> dict[str, Any]:
     }
     if draw.random() < 0.5:
         changes['profile.depth_m'] = draw.uniform(*SHALLOW_M)
-    if draw.random() < BREAKS:
+    if load_vehicle(changes['vehicle']).steers_by:
+        changes |= STEERS
+    elif draw.random() < BREAKS:
         faults = sample_faults(int(draw.integers(2**31)), FAULTS, changes['duration_s'])
         changes |= {**RECKONS, 'faults': faults}
     for name in draw.choice(sorted(fields), draw.integers(1, FIELDS + 1), replace=False):
@@ -139,8 +143,12 @@ def fuzz(seed: int, count: int, tell: Tell) -> Counts:
     counter = Counter(tell)
     loops = [{'guidance.los.method': method} for method in GUIDANCES]
     loops.append({**RECKONS, 'faults': sample_faults(0, FAULTS, 1.0)})
-    for law, loop in product(LAWS, loops):  # has kernels compiled, which is no case's fault
-        _fly({'dives': 0, 'duration_s': 1.0, 'control.law': law, **loop})
+    flights = [{'control.law': law, **loop} for law, loop in product(LAWS, loops)]
+    flights += [
+        {'vehicle': name, **STEERS} for name in vehicle_names() if load_vehicle(name).steers_by
+    ]
+    for changes in flights:  # has kernels compiled, which is no case's fault
+        _fly({'dives': 0, 'duration_s': 1.0, 'profile.depth_m': SHALLOW_M[0], **changes})
     for case in range(count):
         changes = draw_changes(seed, case)
         told = ' '.join(f'--set {name}={value}' for name, value in changes.items())

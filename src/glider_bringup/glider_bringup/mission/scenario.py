@@ -233,6 +233,7 @@ class Scenario(Settings):
         return GuardSettings(
             vehicle=self.vehicle,
             pressure='pressure' in self.topics,
+            altitude='altitude' in self.topics,
             imu_period_s=self.sensors.imu_period_s,
             **self._believing(self.guard),
         )

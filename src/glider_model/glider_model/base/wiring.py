@@ -217,7 +217,10 @@ CONTROL = Wired(
 GUARD = Wired(
     'guard',
     'glider_guard',
-    inputs=('demand', 'reference', 'odom', 'joint_states', 'health', 'battery', 'pressure'),
+    inputs=(
+        *('demand', 'reference', 'odom', 'joint_states', 'health', 'battery', 'pressure'),
+        'altitude',
+    ),
     outputs=('command', 'drop_weight'),
 )
 
