@@ -35,7 +35,7 @@ RECKONED = {
     'sensors.gps_first_fix_s': 30.0,
     'sensors.also_fitted': '[altitude]',
     'sensors.altimeter_std_m': 0.2,
-    'water.bottom_m': 90.0,
+    'water.bottom_m': 120.0,
     'water.wind_mps': 8.0,
     'water.wind_from_deg': 45.0,
     'profile.depth_m': 60.0,
@@ -147,16 +147,16 @@ def test_dead_reckoning_had_fixes_and_lost_its_way_between_them(reckoned):
     assert np.max(apart_m[fixed][-300:]) < 20.0
 
 
-def test_altimeter_of_the_flight_heard_the_bottom_from_below_half_its_depth(reckoned):
+def test_altimeter_of_the_flight_heard_the_bottom_within_its_reach(reckoned):
     blocks = RecordedLog(Bag(reckoned['nodes']), ['altitude', 'ground_truth/odom']).blocks()
     log = np.concatenate([block.copy() for block in blocks])
     height = log[:, COLUMNS['altitude'].start]
     depth = -log[:, COLUMNS['ground_truth/odom'].start + 2]
     assert np.count_nonzero(height) > 1000
     heard = height > 0.0
-    assert np.max(np.abs(height + depth - 150.0)[heard]) < 1.5
-    assert depth[heard].min() > 48.0
-    assert depth[~heard].max() < 52.0
+    assert np.max(np.abs(height + depth - 120.0)[heard]) < 1.5
+    assert depth[heard].min() > 18.0
+    assert depth[~heard].max() < 22.0
 
 
 @pytest.mark.parametrize('engine', ['nodes', 'direct'])

@@ -44,7 +44,7 @@ class WaterSettings(DensitySettings):
         0.0,
         ge=0.0,
         le=12000.0,
-        description='depth of the bottom that an altimeter hears (m); 0: none. It stops nobody by itself',
+        description='depth of the bottom that an altimeter hears (m); 0: none. It stops nobody',
     )
     wind_mps: float = Field(0.0, ge=0.0, le=40.0, description='speed of the wind (m/s)')
     wind_from_deg: float = Field(
