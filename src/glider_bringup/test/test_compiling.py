@@ -25,7 +25,7 @@ def test_loop_depends_on_law_and_methods_alone():
         ('pid', 'paper', 'known'),
         ('pid', 'paper', 'dead_reckoned'),
     ]
-    found = set()
+    found = {}
     for law, method, navigation in chosen:
         changes = {
             'control.law': law,
@@ -33,10 +33,13 @@ def test_loop_depends_on_law_and_methods_alone():
             'navigation.method': navigation,
         }
         scenarios = [load_scenario(name, changes) for name in scenario_names()]
-        assert {combination_of(one) for one in scenarios} == {(law, method, navigation, False)}
-        (types,) = {types_of(one) for one in scenarios}
-        found.add(types)
-    assert len(found) == len(chosen)
+        for one in scenarios:
+            found.setdefault(combination_of(one), set()).add(types_of(one))
+        assert {one[:4] for one in found} >= {(law, method, navigation, False)}
+    assert {one.steered for one in found} == {'', 'slocum_g2'}
+    assert len(found) == 2 * len(chosen)
+    assert [len(types) for types in found.values()] == [1] * len(found)
+    assert len(set.union(*found.values())) == len(found)
 
 
 def test_line_names_law_and_method():
@@ -45,6 +48,9 @@ def test_line_names_law_and_method():
         numba.njit(lambda x: x + 1.0)(1.0)
     (line,) = lines
     assert 'law pid with method paper' in line
+    with told(Combination('pid', 'paper', steered='slocum_g2'), lines.append):
+        numba.njit(lambda x: x + 2.0)(1.0)
+    assert 'vehicle slocum_g2' in lines[-1]
 
 
 def test_loops_are_there_before_workers_start(monkeypatch):

@@ -148,11 +148,19 @@ def test_laws_and_methods_of_all_cells_are_known(tmp_path):
         tmp_path, dimensions={'law': laws, 'los': {'kind': 'variants', 'variants': variants}}
     )
     assert set(plan.combinations) == {
-        (law, method, 'known', False)
+        (law, method, 'known', False, '')
         for law in ('pid', 'adaptive')
         for method in ('observer', 'paper')
     }
-    assert plan_of(tmp_path).combinations == [('adaptive', 'observer', 'known', False)]
+    assert plan_of(tmp_path).combinations == [('adaptive', 'observer', 'known', False, '')]
+
+
+def test_vehicles_with_a_fin_have_a_loop_of_their_own(tmp_path):
+    names = ['zhang2021', 'slocum_g2', 'seawing']
+    vehicles = {'kind': 'values', 'field': 'vehicle', 'values': names}
+    shallow = {'profile.depth_m': 150, 'initial.depth_m': 0}
+    plan = plan_of(tmp_path, set=shallow, dimensions={'vehicle': vehicles})
+    assert [one.steered for one in plan.combinations] == ['', 'slocum_g2']
 
 
 def test_digest_is_that_of_the_inputs(tmp_path):

@@ -16,6 +16,7 @@ from glider_bringup.mission.choices import Combination
 from glider_bringup.mission.scenario import load_scenario
 from glider_model.base.kernel import compiling_told
 from glider_model.base.signals import TICK_S
+from glider_model.vehicle.file import vehicle_path
 
 #: Gets one line for a person.
 Tell = Callable[[str], None]
@@ -23,11 +24,13 @@ Tell = Callable[[str], None]
 
 def told(combination: Combination, tell: Tell) -> AbstractContextManager[None]:
     """Tell what is compiled in the block, if anything is."""
-    law, method, navigation, breaks = combination
-    line = (
-        f'compiling the mathematics for law {law} with method {method}, position '
-        f'{navigation.replace("_", " ")}{", faults" if breaks else ""}, once; up to half a minute'
-    )
+    law, method, navigation, breaks, steered = combination
+    words = [f'law {law} with method {method}', f'position {navigation.replace("_", " ")}']
+    if breaks:
+        words.append('faults')
+    if steered:
+        words.append(f'vehicle {vehicle_path(steered).stem}')
+    line = f'compiling the mathematics for {", ".join(words)}, once; up to half a minute'
     return compiling_told(partial(tell, line))
 
 
@@ -48,6 +51,8 @@ def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
                 'navigation.method': one.navigation,
                 'faults': [{'kind': 'gps_silent'}] if one.breaks else [],
             }
+            if one.steered:
+                changes['vehicle'] = one.steered
             state, params = mission_of(load_scenario(changes=changes))
             with told(one, tell):
                 fly(state, params, nothing, TICK_S)

@@ -5,6 +5,7 @@
 from typing import Any, Literal, NamedTuple
 
 from glider_bringup.mission.scenario import Scenario
+from glider_model.vehicle.file import steers_by
 
 #: The engines: node processes over topics, or one compiled loop. Same results.
 ENGINES = ('nodes', 'direct')
@@ -17,6 +18,7 @@ class Combination(NamedTuple):
     method: str
     navigation: str = 'known'
     breaks: bool = False  #: faults are part of it
+    steered: str = ''  #: the vehicle, if a surface steers it
 
 
 def combination_of(scenario: Scenario) -> Combination:
@@ -26,6 +28,7 @@ def combination_of(scenario: Scenario) -> Combination:
         scenario.guidance.los.method,
         scenario.navigation.method,
         bool(scenario.vehicle_faults),
+        scenario.vehicle if steers_by(scenario) else '',
     )
 
 

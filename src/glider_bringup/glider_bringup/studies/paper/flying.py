@@ -6,7 +6,7 @@ from typing import Any
 
 from glider_bringup.engines.flight import fly as fly_mission
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.choices import Combination
+from glider_bringup.mission.choices import Combination, combination_of
 from glider_bringup.scoring.card import finite
 from glider_bringup.scoring.one_hertz import Record, Recorder
 from glider_bringup.scoring.score import make_scorer, scores_of
@@ -82,16 +82,7 @@ def fly(
 
 def combinations(experiments: list[Experiment]) -> set[Combination]:
     """What `fly` needs loops for."""
-    return {
-        Combination(
-            case.controller,
-            case.guidance,
-            case.changes.get('navigation.method', case.facts.get('navigated', 'known')),
-            bool(case.changes.get('faults')),
-        )
-        for one in experiments
-        for case in one.cases
-    }
+    return {combination_of(case.load()) for one in experiments for case in one.cases}
 
 
 def count_flights(experiments: list[Experiment]) -> int:

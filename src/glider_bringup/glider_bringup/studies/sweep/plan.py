@@ -21,7 +21,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_bringup.mission.choices import Combination
+from glider_bringup.mission.choices import Combination, combination_of
 from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
@@ -39,7 +39,7 @@ from glider_model.base.settings import (
     find_file,
     validate,
 )
-from glider_model.vehicle.file import vehicle_file, vehicle_path
+from glider_model.vehicle.file import steers_by, vehicle_file, vehicle_path
 
 SWEEP_FOLDER = Path(__file__).parent / 'sweeps'
 #: No sweep has more cells: these take days, and 0.5 GB of memory when the result is written.
@@ -275,11 +275,14 @@ class Plan:
         checked = self._check_values()
         #: laws and methods that cells may have
         self.combinations = [
-            Combination(law, method, navigation, breaks)
+            Combination(law, method, navigation, breaks, steered)
             for law in dict.fromkeys(one.control.law for one in checked)
             for method in dict.fromkeys(one.guidance.los.method for one in checked)
             for navigation in dict.fromkeys(one.navigation.method for one in checked)
             for breaks in dict.fromkeys(bool(one.vehicle_faults) for one in checked)
+            for steered in {
+                steers_by(one): combination_of(one).steered for one in checked
+            }.values()
         ]
         vehicles: dict[Path, str] = {}  # one of every vehicle file
         for one in checked:
