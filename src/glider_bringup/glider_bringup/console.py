@@ -87,6 +87,22 @@ Changes = Annotated[
 Run = Annotated[
     Path, typer.Argument(metavar='RUN', help='Folder of a run or a bag, or an .mcap file.')
 ]
+Recording = Annotated[
+    Path,
+    typer.Argument(
+        metavar='FLIGHT',
+        help='Folder of dbd files of a Slocum (or mbd, sbd, dcd, mcd, scd), folder of p*.nc '
+        'of a Seaglider, or one p*.nc.',
+    ),
+]
+Cache = Annotated[
+    Path | None,
+    typer.Option(
+        metavar='FOLDER',
+        help="Caches (.cac) of a Slocum's files. Default: beside them, or in a folder cache "
+        'or cac there or above.',
+    ),
+]
 Json = Annotated[
     bool, typer.Option('--json', help='Print one JSON object and nothing else on standard output.')
 ]

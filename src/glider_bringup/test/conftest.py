@@ -2,18 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags for tests, read and written with the mcap package, and files of a Slocum."""
 
+import signal
 import struct
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+import rclpy
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
+from rclpy.context import Context
 
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
+from glider_model.ros.places import domain_id
 
 #: A file of a Slocum begins a second before this (s since 1970).
 _DBD_START_S = 1.6e9
@@ -110,6 +114,21 @@ def _write_dbd(file: Path, table: dict[str, tuple[np.ndarray, np.ndarray]], cach
         data += [struct.pack('<d', row[name]) for name in names if name in row]
         data.append(b'd')
     file.write_bytes(b''.join(data)[:-1] + b'X')
+
+
+@pytest.fixture
+def context(monkeypatch):
+    """Context of rclpy in a ROS domain of its own; handlers of signals stay as they were."""
+    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    context = Context()
+    with domain_id() as domain:
+        rclpy.init(context=context, domain_id=domain)
+        yield context
+        rclpy.try_shutdown(context=context)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture(scope='session')

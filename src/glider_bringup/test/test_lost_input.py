@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Control and guard, free-running, whose inputs fail: what they bridge, and what surfaces."""
 
-import signal
 import time
 
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
@@ -20,7 +18,6 @@ from glider_guard.nodes.guard_node import GuardNode
 from glider_guard.rows import LOST, ORDERED
 from glider_guard.settings import GuardSettings
 from glider_model.base.signals import TICK_NS
-from glider_model.ros.places import domain_id
 from glider_model.ros.wire import qos
 from glider_model.ros.wire.codec import to_cdr
 from glider_model.ros.wire.topics import TOPICS
@@ -32,20 +29,6 @@ INPUTS = {'odom': (*LEVEL, *CERTAIN), 'joint_states': (0.4, 0.0, 0.0), 'referenc
 DEADLINE_S = 60.0
 #: The mass waits in the middle: the pump of this vehicle does not move, and nobody sees it rise.
 SAFE = (GuardSettings().params().ascent.safe.m_b, 0.0, 0.0)
-
-
-@pytest.fixture
-def context(monkeypatch):
-    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    context = Context()
-    with domain_id() as domain:
-        rclpy.init(context=context, domain_id=domain)
-        yield context
-        rclpy.try_shutdown(context=context)
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 class Vehicle:

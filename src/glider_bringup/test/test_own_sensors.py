@@ -3,14 +3,12 @@
 """Navigation, free-running, with sensors at their own pace, or with none that can be believed."""
 
 import math
-import signal
 import time
 
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure, Imu, JointState, NavSatFix
@@ -18,7 +16,6 @@ from sensor_msgs.msg import FluidPressure, Imu, JointState, NavSatFix
 from glider_model.base.frames import OriginSettings
 from glider_model.ocean.density import pressure_at
 from glider_model.ros.lockstep.step_node import OLD_AFTER
-from glider_model.ros.places import domain_id
 from glider_model.ros.wire import qos
 from glider_navigation.nodes.navigation_node import NavigationNode
 
@@ -30,20 +27,6 @@ PARAMETERS = {
 }
 HERE = OriginSettings()
 DEADLINE_S = 60.0
-
-
-@pytest.fixture
-def context(monkeypatch):
-    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    context = Context()
-    with domain_id() as domain:
-        rclpy.init(context=context, domain_id=domain)
-        yield context
-        rclpy.try_shutdown(context=context)
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 class Vehicle:

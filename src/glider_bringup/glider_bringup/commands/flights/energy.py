@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from glider_bringup.console import Json, counter, output
+from glider_bringup.console import Cache, Json, Recording, counter, output
 
 app = typer.Typer()
 #: What the parts of a flight are.
@@ -18,14 +18,7 @@ PARTS = {'slocum': 'half hours', 'seaglider': 'pumpings'}
 
 @app.command(epilog='Example: ./glider energy flights/sg561 --fit-on flights/sg171')
 def energy(
-    flight: Annotated[
-        Path,
-        typer.Argument(
-            metavar='FLIGHT',
-            help='Folder of dbd files of a Slocum (or mbd, sbd, dcd, mcd, scd), folder of p*.nc '
-            'of a Seaglider, or one p*.nc.',
-        ),
-    ],
+    flight: Recording,
     fit_on: Annotated[
         Path | None,
         typer.Option(
@@ -33,14 +26,7 @@ def energy(
             help='Another flight, whose first half is fitted. Default: that of FLIGHT itself.',
         ),
     ] = None,
-    cache: Annotated[
-        Path | None,
-        typer.Option(
-            metavar='FOLDER',
-            help="Caches (.cac) of a Slocum's files. Default: beside them, or in a folder cache "
-            'or cac there or above.',
-        ),
-    ] = None,
+    cache: Cache = None,
     as_json: Json = False,
 ) -> None:
     """Fit pump and hotel load to half of a recorded flight; predict the energy of the rest.

@@ -6,14 +6,13 @@ import json
 import math
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from glider_bringup.console import Json, counter, output
+from glider_bringup.console import Cache, Json, Recording, counter, output
 
 app = typer.Typer()
 #: Characters of the name of a file in the table: its end tells files of a flight apart.
@@ -29,22 +28,8 @@ MEANING = {
 
 @app.command(epilog='Example: ./glider navigate flights/delayed/raw --cache flights/cache')
 def navigate(
-    flight: Annotated[
-        Path,
-        typer.Argument(
-            metavar='FLIGHT',
-            help='Folder of dbd files of a Slocum (or mbd, sbd, dcd, mcd, scd), folder of p*.nc '
-            'of a Seaglider, or one p*.nc.',
-        ),
-    ],
-    cache: Annotated[
-        Path | None,
-        typer.Option(
-            metavar='FOLDER',
-            help="Caches (.cac) of a Slocum's files. Default: beside them, or in a folder cache "
-            'or cac there or above.',
-        ),
-    ] = None,
+    flight: Recording,
+    cache: Cache = None,
     as_json: Json = False,
 ) -> None:
     """Navigate a recorded flight of a real glider; compare with what it made of it itself.

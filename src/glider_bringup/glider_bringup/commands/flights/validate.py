@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from glider_bringup.console import Json, counter, output
+from glider_bringup.console import Cache, Json, counter, output
 from glider_bringup.flights.validation.flying import Imposed
 
 app = typer.Typer()
@@ -50,14 +50,7 @@ def validate(
             '1970), speed (m/s). Default: a file U_*.npy in the folder or above it.',
         ),
     ] = None,
-    cache: Annotated[
-        Path | None,
-        typer.Option(
-            metavar='FOLDER',
-            help="Caches (.cac) of a Slocum's files. Default: beside them, or in a folder cache "
-            'or cac there or above.',
-        ),
-    ] = None,
+    cache: Cache = None,
     out: Annotated[
         Path | None,
         typer.Option(help='Image file for the picture: png, svg or pdf. Default: no picture.'),
