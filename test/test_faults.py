@@ -18,6 +18,8 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 
+from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
+from glider_bringup.engines.janitor import is_alive
 from glider_bringup.engines.processes import MODULES, PLANT
 from glider_bringup.mission.scenario import SCENARIO_FOLDER
 from glider_model.base.signals import TICK_NS
@@ -34,26 +36,6 @@ FLOWN_BYTES = 300_000  #: of recording: several chunks are on disk
 
 
 # ---------------------------------------------------------------------- processes
-
-
-def command_of(pid: str) -> list[str]:
-    """Command line of a process; empty if there is none, or if it is dead."""
-    try:
-        return Path(f'/proc/{pid}/cmdline').read_text().split('\0')
-    except (FileNotFoundError, ProcessLookupError):
-        return []
-
-
-def nodes_of(folder: Path) -> dict[str, int]:
-    """Process ids of the nodes that fly into a run folder, by name."""
-    found = {}
-    for entry in Path('/proc').iterdir():
-        command = command_of(entry.name) if entry.name.isdigit() else []
-        if any(argument.startswith(str(folder)) for argument in command):
-            found.update(
-                {name: int(entry.name) for name, module in MODULES.items() if module in command}
-            )
-    return found
 
 
 def wait_until(condition, deadline_s: float, process: subprocess.Popen, what: str):
@@ -78,8 +60,8 @@ class Flying:
         wait_until(self._has_nodes, START_S, self.process, 'all processes')
 
     def _has_nodes(self) -> bool:
-        self.nodes = nodes_of(self.out)
-        return set(self.nodes) == set(MODULES)
+        self.nodes = nodes_of(self.process.pid)
+        return set(self.nodes) == {*MODULES, FORK_SERVER}
 
     def take_off(self) -> 'Flying':
         """Wait until it flies, and some of that is on disk."""
@@ -92,7 +74,7 @@ class Flying:
     def end(self, within_s: float = STOP_S) -> tuple[int, dict]:
         """Exit code and scorecard of the run, which is about to end by itself."""
         code = self.process.wait(within_s)
-        left = nodes_of(self.out)
+        left = [name for name, pid in self.nodes.items() if is_alive(pid)]
         assert not left, f'left behind: {left}'
         assert 'Traceback' not in self.messages
         return code, json.loads((self._texts / 'stdout').read_text())
@@ -182,7 +164,7 @@ def check_complete(flying: Flying, card: dict, culprit: str = '') -> None:
 # ---------------------------------------------------------------------- nodes that die
 
 
-@pytest.mark.parametrize('name', sorted(set(MODULES) - {'recorder_node'}))
+@pytest.mark.parametrize('name', sorted({*MODULES, FORK_SERVER} - {'recorder_node'}))
 def test_killed_node_ends_the_run_and_is_named(flying, name):
     os.kill(flying.nodes[name], signal.SIGKILL)
     code, card = flying.end()

@@ -37,7 +37,7 @@ time.sleep(600)
 
 
 def test_killed_flights_end_named_and_every_acknowledged_tick_can_be_read(monkeypatch):
-    monkeypatch.setattr(kills, 'VICTIMS', ('guidance_node', 'recorder_node', kills.ALL))
+    monkeypatch.setattr(kills, 'VICTIMS', ('fork_server', 'recorder_node', kills.ALL))
     found = kills.fuzz(7, 3, lambda tried: None)
     assert (found.tried, found.examples) == (3, ())
     assert found.clean

@@ -14,7 +14,7 @@ from glider_model.base.exits import EXIT_FAILED
 
 app = typer.Typer()
 #: Doors, each a module of `glider_bringup.fuzzing`, with the cases tried by default.
-COUNTS = {'files': 1000, 'lines': 200, 'messages': 1000, 'bags': 500, 'flights': 500, 'kills': 18}
+COUNTS = {'files': 1000, 'lines': 200, 'messages': 1000, 'bags': 500, 'flights': 500, 'kills': 20}
 Door = Literal[tuple(COUNTS)]
 
 

@@ -4,11 +4,12 @@
 
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.engines.processes import AUTOPILOT, AUTOPILOT_MODULE, MODULES
+from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 
 #: Part of a flight before which memory may still grow: buffers fill, caches warm up.
 _SETTLED = 0.2
@@ -16,19 +17,13 @@ _SETTLED = 0.2
 
 def memory_mb(entry: str) -> dict[str, float]:
     """Memory (MB) of the nodes that this process has started, by an entry of /proc/PID/status."""
-    found, modules = {}, {**MODULES, AUTOPILOT: AUTOPILOT_MODULE}
-    for folder in Path('/proc').glob('[0-9]*'):
-        try:
-            status = dict(
-                line.split(':', 1) for line in (folder / 'status').read_text().splitlines()
-            )
-            command = (folder / 'cmdline').read_text().split('\0')
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-        if int(status['PPid']) == os.getpid() and entry in status:
-            for name, module in modules.items():
-                if module in command:
-                    found[name] = int(status[entry].split()[0]) / 1024.0
+    found = {}
+    for name, pid in nodes_of(os.getpid()).items():
+        with suppress(FileNotFoundError, ProcessLookupError):
+            lines = Path(f'/proc/{pid}/status').read_text(encoding='utf-8').splitlines()
+            status = dict(line.split(':', 1) for line in lines)
+            if name != FORK_SERVER and entry in status:
+                found[name] = int(status[entry].split()[0]) / 1024.0
     return found
 
 

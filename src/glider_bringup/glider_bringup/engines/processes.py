@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Flies a scenario over ROS 2: one process per node, started, watched and stopped together."""
 
-import ctypes
 import json
 import os
 import selectors
@@ -13,9 +12,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+from glider_bringup.engines.fork_server import FORK_SERVER, tie_to
+from glider_bringup.engines.janitor import is_alive
 from glider_model.base import wiring
 from glider_model.base.exits import FATAL
 from glider_model.base.wiring import WIRING
@@ -37,14 +39,14 @@ RANGE, LOCAL = 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST'
 
 #: Remapping that brings the clock into the namespace: docs/adr/0013.
 OWN_CLOCK = ('/clock', 'clock')
-_PR_SET_PDEATHSIG = 1
-_LIBC = ctypes.CDLL(None)
 #: Signals of a stop, and how long (s) a process has after each.
 _ESCALATION = ((signal.SIGINT, 2.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 2.0))
 #: Nodes have this long (s) to leave by themselves after a completed run.
 _LEAVE_S = 3.0
 #: The recorder hears the last messages within this time (s) after the plant has stopped.
 _HEAR_S = 0.5
+#: The fork server is gone within this time (s) after the nodes.
+_END_S = 1.0
 #: A failure is seen within this time (s) after nodes left because of it.
 _AFTERMATH_S = 1.0
 
@@ -102,25 +104,10 @@ def node_environment(domain: int) -> dict[str, str]:
 class _Process:
     """One node and what it says."""
 
-    def __init__(self, name: str, command: Sequence[str], environment: dict[str, str]) -> None:
+    def __init__(self, name: str) -> None:
         self.name = name
-        last_signal = signal.SIGTERM if name == RECORDER else signal.SIGKILL
-        parent = os.getpid()
-
-        def tie_to_runner() -> None:
-            _LIBC.prctl(_PR_SET_PDEATHSIG, last_signal)
-            if os.getppid() != parent:
-                os._exit(1)
-
-        self.popen = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=environment,
-            start_new_session=True,
-            preexec_fn=tie_to_runner,
-        )
+        self.pid: int | None = None
+        self.code: int | None = None  #: with which it has ended; negative: the signal
         self.last_line = ''
         self.fatal = ''
 
@@ -133,25 +120,69 @@ class _Process:
         if line.strip():
             self.last_line = line.strip()
 
-    @property
-    def code(self) -> int | None:
-        return self.popen.poll()
-
     def send(self, number: int) -> None:
-        if self.popen.poll() is None:
-            self.popen.send_signal(number)
+        if self.pid is not None and self.code is None:
+            with suppress(ProcessLookupError):  # it went with the fork server
+                os.kill(self.pid, number)
 
     def epitaph(self) -> str:
         """How the process ended, in words."""
-        code = self.popen.returncode
-        if code < 0:
-            return f'{self.name} was killed by {signal.Signals(-code).name}'
+        if self.code < 0:
+            return f'{self.name} was killed by {signal.Signals(-self.code).name}'
         if self.fatal:
             return self.fatal
-        if code == 0:
+        if self.code == 0:
             return f'{self.name} ended before the run was complete'
         tail = f': {self.last_line}' if self.last_line else ''
-        return f'{self.name} ended with exit code {code}{tail}'
+        return f'{self.name} ended with exit code {self.code}{tail}'
+
+
+class _ForkServer(_Process):
+    """The process that starts the nodes and tells how they end."""
+
+    def __init__(self) -> None:
+        super().__init__(FORK_SERVER)
+        self._popen: subprocess.Popen | None = None
+
+    def start(
+        self, plan: Sequence[tuple[str, Sequence[str], int, int, int]], environment: dict[str, str]
+    ) -> tuple[int, IO[bytes]]:
+        """Start it with what `fork_server` wants to know; gives what it tells, and its output."""
+        told, says = os.pipe()
+        parent = os.getpid()
+        self._popen = subprocess.Popen(
+            [sys.executable, '-m', 'glider_bringup.engines.fork_server', str(says)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            pass_fds=[says, *(end for _, _, out, error, _ in plan for end in (out, error))],
+            env=environment,
+            start_new_session=True,
+            preexec_fn=lambda: tie_to(parent, signal.SIGKILL),
+        )
+        os.close(says)
+        self.pid = self._popen.pid
+        with suppress(BrokenPipeError):  # it is gone already, which is seen soon
+            self._popen.stdin.write(json.dumps(plan).encode() + b'\n')
+            self._popen.stdin.flush()
+        return told, self._popen.stdout
+
+    def look(self) -> bool:
+        """Whether it is gone."""
+        self.code = self._popen.poll() if self._popen else None
+        return self.code is not None
+
+    def finish(self, patience_s: float) -> None:
+        """End it. It has no nodes any more, or they go with it."""
+        if self._popen is None:
+            return
+        with suppress(BrokenPipeError):
+            self._popen.stdin.close()
+        try:
+            self._popen.wait(patience_s)
+        except subprocess.TimeoutExpired:
+            self._popen.kill()
+            self._popen.wait()
 
 
 class _Janitor:
@@ -192,38 +223,68 @@ class _Run:
         self.first_tick_s: float | None = None
         self.progress: dict[str, Any] = {}
         self.processes: dict[str, _Process] = {}
+        self._server = _ForkServer()
         self._janitor = _Janitor()
 
     def start(self, commands: Mapping[str, Sequence[str]], environment: dict[str, str]) -> None:
-        """Start a process per node."""
+        """Have a process started per node."""
+        plan, ends = [], []
         for name, command in commands.items():
-            process = _Process(name, command, environment)
-            self._janitor.watch(process.popen.pid)
-            self.processes[name] = process
-            for pipe in (process.popen.stdout, process.popen.stderr):
-                os.set_blocking(pipe.fileno(), False)
-                self._selector.register(pipe, selectors.EVENT_READ, process)
-                self._partial[pipe.fileno()] = b''
+            process = self.processes[name] = _Process(name)
+            last_signal = signal.SIGTERM if name == RECORDER else signal.SIGKILL
+            (out, out_end), (error, error_end) = os.pipe(), os.pipe()
+            self._listen(out, partial(self._say, process, from_stdout=True))
+            self._listen(error, partial(self._say, process))
+            plan.append((name, list(command), out_end, error_end, int(last_signal)))
+            ends += [out_end, error_end]
+        told, output = self._server.start(plan, environment)
+        for end in ends:
+            os.close(end)
+        self._listen(told, self._hear)
+        self._listen(os.dup(output.fileno()), partial(self._say, self._server))
+        output.close()
+
+    def _listen(self, pipe: int, take: Callable[[str], None]) -> None:
+        """Have the lines from a pipe taken."""
+        os.set_blocking(pipe, False)
+        self._selector.register(pipe, selectors.EVENT_READ, take)
+        self._partial[pipe] = b''
 
     # ------------------------------------------------------------------ output
 
     def pump(self, timeout_s: float) -> None:
         """Pass on what the nodes have said, waiting at most ``timeout_s`` for it."""
+        gone = self._server.look()  # first, so that all it had to tell is heard below
         for key, _ in self._selector.select(timeout_s):
-            self._read(key.fileobj, key.data)
+            self._read(key.fd, key.data)
+        if gone:
+            for process in self.processes.values():
+                if process.code is None and (process.pid is None or not is_alive(process.pid)):
+                    process.code = -signal.SIGKILL
 
-    def _read(self, pipe: IO[bytes], process: _Process) -> None:
-        data = os.read(pipe.fileno(), 65536)
-        *lines, rest = (self._partial[pipe.fileno()] + data).split(b'\n')
-        self._partial[pipe.fileno()] = rest
+    def _read(self, pipe: int, take: Callable[[str], None]) -> None:
+        data = os.read(pipe, 65536)
+        *lines, rest = (self._partial[pipe] + data).split(b'\n')
+        self._partial[pipe] = rest
         if not data:
             self._selector.unregister(pipe)
+            os.close(pipe)
             lines += [rest] if rest else []
         for line in lines:
-            self._line(process, line.decode(errors='replace'), pipe is process.popen.stdout)
+            take(line.decode(errors='replace'))
 
-    def _line(self, process: _Process, line: str, is_stdout: bool) -> None:
-        if is_stdout and process.name == RECORDER and line.startswith('{'):
+    def _hear(self, line: str) -> None:
+        """Take what the fork server tells of a node: first its process id, then its exit code."""
+        name, number = json.loads(line)
+        process = self.processes[name]
+        if process.pid is None:
+            process.pid = number
+            self._janitor.watch(number)
+        else:
+            process.code = number
+
+    def _say(self, process: _Process, line: str, from_stdout: bool = False) -> None:
+        if from_stdout and process.name == RECORDER and line.startswith('{'):
             self.progress = json.loads(line)
             if self.first_tick_s is None:
                 self.first_tick_s = time.monotonic()
@@ -242,9 +303,11 @@ class _Run:
             if self.signal is not None:
                 return 'aborted', None
             ended = [p for p in self.processes.values() if p.code is not None]
-            if not ended:
+            if not ended and self._server.code is None:
                 continue
             self.pump(0.0)
+            if self._server.code is not None:
+                return 'failed', self._server
             if not self._is_complete():
                 return 'failed', self._culprit()
             self._wait_for(self.processes.values(), _LEAVE_S)
@@ -285,6 +348,8 @@ class _Run:
         last, so that it has everything.
         """
         by_name = self.processes.values()
+        if any(p.pid is None for p in by_name):  # in the middle of the start
+            self._server.finish(0.0)
         groups = (
             [p for p in by_name if p.name == PLANT],
             [p for p in by_name if p.name not in (PLANT, RECORDER)],
@@ -301,14 +366,14 @@ class _Run:
                 self._wait_for(group, patience_s)
             if running and group is groups[0] and first == 0:
                 self._wait_for(groups[2], _HEAR_S)
+        self._server.finish(_END_S)
         while self._selector.get_map():
             before = len(self._selector.get_map())
             self.pump(0.2)
             if len(self._selector.get_map()) == before and not self._selector.select(0):
                 break
-        for process in self.processes.values():
-            process.popen.stdout.close()
-            process.popen.stderr.close()
+        for pipe in list(self._selector.get_map()):
+            os.close(pipe)
         self._selector.close()
         self._janitor.finish()
 
@@ -367,7 +432,7 @@ def _result(run: _Run, status: str, culprit: _Process | None) -> RunnerResult:
     if status == 'aborted':
         reason = f'stopped by {signal.Signals(run.signal).name}'
     if culprit is not None:
-        reason, name, code = culprit.epitaph(), culprit.name, culprit.popen.returncode
+        reason, name, code = culprit.epitaph(), culprit.name, culprit.code
         if code == 3:
             named = [other for other in run.processes if other in reason]
             name = min(named, key=reason.index, default=name)

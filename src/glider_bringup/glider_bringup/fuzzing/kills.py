@@ -20,6 +20,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive, left_over, mapped
 from glider_bringup.engines.processes import MODULES
 from glider_bringup.fuzzing.counts import HANG_S, Counter, Counts, Tell
@@ -35,7 +36,7 @@ SCENARIO = 'current_8deg'
 #: Ticks of a flight; the last of them are spared, so that it is not over before the kill.
 TICKS, SPARED = 6000, 2000
 PARENT, ALL = 'parent', 'all at once'
-VICTIMS = (*MODULES, PARENT, ALL)
+VICTIMS = (*MODULES, FORK_SERVER, PARENT, ALL)
 #: Nodes of a flight tick within this time (s).
 _START_S = 120.0
 
@@ -45,7 +46,7 @@ class _Flight(NamedTuple):
 
     parent: subprocess.Popen
     folder: Path
-    pids: dict[str, int]  #: of the nodes
+    pids: dict[str, int]  #: of the nodes, and of what has started them
 
 
 def fuzz(seed: int, count: int, tell: Tell) -> Counts:
@@ -68,9 +69,9 @@ def _case(victim: str, tick: int, folder: Path, domain: int) -> tuple[str, str]:
     with flight_heard(domain) as heard, _flight(folder, domain) as parent:
         if not _wait(lambda: heard.take().tick >= tick or parent.poll() is not None, _START_S):
             return 'hangs', f'tick {heard.tick} after {_START_S:g} s'
-        flight = _Flight(parent, folder, _nodes(parent.pid))
+        flight = _Flight(parent, folder, nodes_of(parent.pid))
         segments = set().union(*map(mapped, flight.pids.values()))
-        if len(flight.pids) < len(MODULES):
+        if not {*MODULES, FORK_SERVER} <= set(flight.pids):
             return 'wrong', f'it was over at tick {heard.tick}, before the kill'
         for pid in _victims(flight, victim):
             with suppress(ProcessLookupError):  # who goes with its parent may be gone
@@ -96,7 +97,7 @@ def _judge(flight: _Flight, victim: str, heard: Heard) -> tuple[str, str]:
     out, error = flight.parent.communicate()
     if 'Traceback' in error:
         return 'tracebacks', error[-500:]
-    if victim in MODULES:
+    if victim in flight.pids:
         if flight.parent.returncode != 1:
             return 'wrong', f'exit code {flight.parent.returncode}'
         reason = json.loads(out)['reason']
@@ -132,23 +133,10 @@ def _flight(folder: Path, domain: int) -> Iterator[subprocess.Popen]:
     try:
         yield process
     finally:
-        for pid in [*_nodes(process.pid).values(), process.pid]:
+        for pid in [*nodes_of(process.pid).values(), process.pid]:
             if process.poll() is None:
                 os.kill(pid, signal.SIGKILL)
         process.communicate()
-
-
-def _nodes(parent: int) -> dict[str, int]:
-    """Process ids of the nodes that a process has started."""
-    found, names = {}, {module: name for name, module in MODULES.items()}
-    try:
-        children = Path(f'/proc/{parent}/task/{parent}/children').read_text(encoding='utf-8')
-        for pid in map(int, children.split()):
-            words = Path(f'/proc/{pid}/cmdline').read_bytes().decode(errors='replace').split('\0')
-            found |= {names[word]: pid for word in words if word in names and is_alive(pid)}
-    except (FileNotFoundError, ProcessLookupError):
-        pass
-    return found
 
 
 def _wait(condition, seconds: float) -> bool:
