@@ -19,7 +19,7 @@ from glider_model.ros.wire.topics import recorded_topics
 
 GLIDER = [sys.executable, '-m', 'glider_bringup.cli']
 DEADLINE_S = 300.0
-DURATION_S = 1000
+DURATION_S = 600
 FLOWN_BYTES = 300_000  #: of recording: several chunks are on disk
 #: Scenario by namespace.
 GLIDERS = {'alpha': 'rough_water', 'beta': 'current_8deg'}
