@@ -23,7 +23,7 @@ from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import Flight, mission_of
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.mission.scenario import load_scenario, scenario_names
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import make_tracer
@@ -72,9 +72,9 @@ def read_page(file):
     return Text(page), data
 
 
-def fly(tmp_path, change=None, stop=False, name='flight', **fields):
+def fly(tmp_path, change=None, stop=False, name='flight', of='current_8deg', **fields):
     """Fly in this process; ``change`` alters each block of the log, ``stop`` is a Ctrl-C."""
-    scenario = load_scenario('current_8deg', {**SHORT, **fields})
+    scenario = load_scenario(of, {**SHORT, **fields})
     folder = make_run_folder(scenario, tmp_path / name)
     tracer, scorer = make_tracer(scenario), Scorer()
     for log in fly_blocks(*mission_of(scenario)):
@@ -134,6 +134,15 @@ def flown(tmp_path_factory):
 
 
 # ---------------------------------------------------------------------------------- one run
+
+
+@pytest.mark.parametrize('name', scenario_names())
+def test_every_scenario_has_a_report_of_what_its_vehicle_can_move(tmp_path, name):
+    page, _ = report_of(fly(tmp_path, of=name, duration_s=30.0))
+    is_slocum = name.startswith('slocum')
+    assert 'Net heaviness, + sinks' in page.text and '+ forward: nose down' in page.text
+    assert ('Angle, + turns the nose to starboard' in page.text) == is_slocum
+    assert ('Rotation, + to starboard' in page.text) != is_slocum
 
 
 def test_report_holds_the_run_and_needs_nothing_else(flown):

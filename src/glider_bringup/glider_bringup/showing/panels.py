@@ -85,14 +85,14 @@ _ROLES = ('measured', 'reference', 'third', 'fourth')
 
 
 def actuators_of(run: FlownRun) -> list[tuple[Actuator, float]]:
-    """Actuators of the vehicle, each with its limit in its unit."""
+    """Actuators that the vehicle can move, each with its limit in its unit."""
     vehicle, name = run.vehicle.params(), run.vehicle.steers_by
     limits = vehicle.m_b_max, 1e3 * vehicle.x_p_max, math.degrees(vehicle.mu_max)
     found = list(zip(ACTUATORS, limits, strict=True))
     if name:
         surface = SURFACE._replace(title=name.replace('_', ' ').capitalize())
         found.append((surface, math.degrees(vehicle.delta_max)))
-    return found
+    return [(one, limit) for one, limit in found if limit > 0.0]
 
 
 def _maps() -> list[Panel]:
