@@ -9,8 +9,8 @@ rclpy is imported by each node. A node that is not a Python module is executed.
 It gets one line of JSON on standard input: a list of ``[name, command, standard output, standard
 error, signal]``, the signal being what a node gets when this process ends. What it has to say goes
 to the file descriptor that is its argument, a line of JSON each: ``[name, pid]`` once, and
-``[name, exit code]`` when the node has ended, negative for a signal. Nodes that ended stay zombies
-until the standard input ends, so that nobody else gets their process ids before that.
+``[name, exit code]`` when the node has ended, negative for a signal. It stays until its standard
+input ends.
 """
 
 import ctypes
@@ -19,7 +19,6 @@ import importlib
 import json
 import os
 import runpy
-import selectors
 import signal
 import sys
 from contextlib import suppress
@@ -93,7 +92,7 @@ def _start(server: int, name: str, command: list[str], out: int, error: int, las
 
 def main() -> None:
     """Start nodes, and tell how they end."""
-    says, server, pids = int(sys.argv[1]), os.getpid(), {}
+    says, server, names = int(sys.argv[1]), os.getpid(), {}
 
     def say(*words) -> None:
         with suppress(BrokenPipeError):
@@ -104,22 +103,15 @@ def main() -> None:
         importlib.import_module(SHARED)
     gc.freeze()
     for name, *how in plan:
-        pids[name] = _start(server, name, *how)
-        say(name, pids[name])
+        pid = _start(server, name, *how)
+        names[pid] = name
+        say(name, pid)
         for end in how[1:3]:
             os.close(end)
-    with selectors.DefaultSelector() as selector:
-        for name, pid in pids.items():
-            selector.register(os.pidfd_open(pid), selectors.EVENT_READ, name)
-        while selector.get_map():
-            for key, _ in selector.select():
-                selector.unregister(key.fileobj)
-                ended = os.waitid(os.P_PID, pids[key.data], os.WEXITED | os.WNOWAIT)
-                killed = ended.si_code != os.CLD_EXITED
-                say(key.data, -ended.si_status if killed else ended.si_status)
+    while names:
+        pid, status = os.wait()
+        say(names.pop(pid), os.waitstatus_to_exitcode(status))
     sys.stdin.buffer.read()
-    for pid in pids.values():  # whose use of the processor counts as that of the runner then
-        os.waitpid(pid, os.WNOHANG)
 
 
 if __name__ == '__main__':
