@@ -370,6 +370,7 @@ def test_recording_without_clock_gets_one_by_its_log_times(
     [
         (['--topics', 'odom,depth'], ['--topics depth', '/glider/odom', '/clock']),
         (['--start', '121'], ['--start 121', '119.9']),
+        (['--duration', '1e400'], ['--duration inf', '1e+08']),
         (['--start', '1.01', '--duration', '0.01', '--topics', 'odom'], ['nothing to replay']),
         (['--rate', 'fast'], ['--rate', 'max']),
         (['--rate', '0'], ['--rate', '0.001']),

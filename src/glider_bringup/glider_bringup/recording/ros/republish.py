@@ -34,6 +34,8 @@ from glider_model.ros.wire.topics import TOPICS
 _NAME_UNKNOWN = '_NODE_NAME_UNKNOWN_'
 #: Sleeps and waits are cut into pieces of this length (s), so that Ctrl-C is heard.
 _PATIENCE_S = 0.1
+#: Nothing longer is replayed (s).
+MAX_DURATION_S = 1e8
 #: Depth of a publisher where the recording does not say.
 _DEPTH = 1024
 
@@ -103,6 +105,10 @@ def plan_replay(
         raise ConfigurationError(
             f'--start {start_s:g}: beyond the end (allowed: 0 to {length_s:.1f}, the length of '
             f'the recording in s)'
+        )
+    if duration_s is not None and duration_s > MAX_DURATION_S:
+        raise ConfigurationError(
+            f'--duration {duration_s:g}: not usable (allowed: 0 to {MAX_DURATION_S:g} s)'
         )
     start_ns = bag.start_ns + round(start_s * 1e9)
     end_ns = bag.end_ns if duration_s is None else start_ns + round(duration_s * 1e9)
