@@ -38,6 +38,54 @@ def test_both_laws_hold_a_straight_path_in_a_current(law, real):
     assert scores['actuator_travel']['roll_mass_deg'] < scores['actuator_travel']['fin_deg']
 
 
+def shelf(law, share, **changes):
+    """A Slocum whose fin has a share of its area, on the shelf in half a knot."""
+    fields = {'dives': 0, 'duration_s': 9000.0, 'settle_s': 1800.0, 'control.law': law}
+    fields |= {'vehicle.fin.area': 0.02 * share} | changes
+    run = fly(load_scenario('slocum_shelf', fields))
+    assert run.score['status'] == 'completed'
+    rate = run.to_xarray()['adaptation_steering_dive'].to_numpy()
+    return run.score, rate / (0.5 * 0.5**2)
+
+
+#: Turn rate of a Slocum's fin over that of its file, by its share of the area there:
+#: `./glider trim slocum_g2 --fin-deg 3 --set vehicle.fin.area=...` at 0.205 kg and -25 deg.
+REAL = {0.4: 0.486, 2.5: 1.62}
+
+
+@pytest.mark.parametrize('law', ['adaptive', 'pid'])
+def test_how_well_the_fin_turns_is_learnt_by_either_law(law):
+    """A weak fin then errs less than one that is taken for that of its file, a strong one hunts
+    less; both hold the path.
+    """
+    fixed = {'control.fin.share_std': 0.0}
+    (weak, share), (weak_fixed, _) = shelf(law, 0.4), shelf(law, 0.4, **fixed)
+    assert share[-1] == pytest.approx(REAL[0.4], rel=0.15)
+    error, error_fixed = (one['cross_track_m'] for one in (weak, weak_fixed))
+    assert error['rms_steady'] < 0.9 * error_fixed['rms_steady']
+    (strong, share), (strong_fixed, _) = shelf(law, 2.5), shelf(law, 2.5, **fixed)
+    assert share[-1] == pytest.approx(REAL[2.5], rel=0.15)
+    way, way_fixed = (one['actuator_travel']['fin_deg'] for one in (strong, strong_fixed))
+    assert way < 0.5 * way_fixed
+    for scores in (weak, strong):
+        assert scores['cross_track_m']['max_steady'] < 1.0
+        assert scores['guard']['events'] == []
+
+
+@pytest.mark.parametrize(
+    ('broken', 'rel'),
+    [
+        ({'kind': 'gust', 'east_mps': 0.8, 'for_s': 600.0}, 0.3),
+        ({'kind': 'stuck', 'actuator': 'steering_surface', 'for_s': 1500.0}, 0.4),
+    ],
+    ids=['a gust', 'a fin stuck for a while'],
+)
+def test_what_breaks_teaches_no_nonsense(broken, rel):
+    scores, share = shelf('pid', 1.0, faults=[{**broken, 'at_s': 3000.0}])
+    assert share[-1] == pytest.approx(1.0, rel=rel)
+    assert 0.5 < share.min() < share.max() < 2.0
+
+
 def test_a_run_is_read_back_as_it_was_flown(tmp_path):
     """Bag, dataset and scenario know the fin by its name; those of others do not."""
     fields = {**FIELDS, 'duration_s': 60.0, 'profile.prepare_s': 0.0, 'initial.heading_deg': 20.0}

@@ -24,7 +24,7 @@ from glider_control.intake import (
     take_in,
 )
 from glider_control.law import Seen, law_learnt, law_step
-from glider_control.surface import steer
+from glider_control.surface import steer, surface_learnt
 from glider_control.vertical_rate import Trim, vertical_rate_law
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import Adaptation, Joints, Wrench
@@ -97,6 +97,7 @@ def see(measured, taken, last, params):
         tau_q,
         abs(last.mu) >= limits.mu_max,
         abs(last.x_p) >= limits.x_p_max,
+        joints.delta,
     )
 
 
@@ -156,7 +157,7 @@ def control_step(state, odometry, joints, reference, params, dt):
         saturation |= SATURATED_ROLL
     if 0.0 < limits.delta_max <= abs(command.delta):
         saturation |= SATURATED_SURFACE
-    learnt = law_learnt(law, params.law)
+    learnt = surface_learnt(law_learnt(law, params.law), steering, params.steering)
     output = ControlOutput(command, Wrench(m_b * GRAVITY, tau_p, tau_q), learnt, saturation)
     tick = state.tick + 1 if taken.gate.seen else 0
     return ControlState(tick, measured, law, steering, trim, command, taken), output

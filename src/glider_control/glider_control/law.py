@@ -60,6 +60,7 @@ class Seen(NamedTuple):
     tau_q: float  #: pitch moment that it makes now (N m)
     roll_held: bool  #: the roll mass was sent to its limit: integrators wait
     pitch_held: bool  #: the pitch mass was
+    delta: float  #: where the steering surface is (rad); 0 without one
 
 
 class LawSettings(Settings):

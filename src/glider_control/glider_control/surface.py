@@ -13,7 +13,7 @@ from pydantic import Field
 
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
-from glider_model.base.slot import slot
+from glider_model.base.slot import default, slot
 from glider_model.vehicle.file import Vehicle
 
 
@@ -68,3 +68,24 @@ def steer(state, seen, params, dt):
 def _bank_to_turn(state, seen, params, dt):
     """The control law turns the vehicle."""
     return state, 0.0
+
+
+@slot
+@default
+def surface_learnt(learnt, state, params):
+    """What is told on the topic ``adaptation``, with what steering has learnt of its surface.
+
+    Parameters
+    ----------
+    learnt : Adaptation
+        What the control law has learnt.
+    state : NamedTuple
+        Of the steering.
+    params : NamedTuple
+        Those of `SurfaceLawSettings.params`, by whose type it is.
+
+    Returns
+    -------
+    Adaptation
+    """
+    return learnt

@@ -41,7 +41,7 @@ def reference(**changes) -> Reference:
 
 
 def step(state, now, wanted, applied=(0.0, 0.0), held=(False, False)):
-    seen = Seen(now, wanted, SPEED, ALPHA, 0.4, *applied, *held)
+    seen = Seen(now, wanted, SPEED, ALPHA, 0.4, *applied, *held, 0.0)
     return adaptive_step(state, seen, PARAMS, DT)
 
 

@@ -66,7 +66,7 @@ def steer(seen, reference, vehicle='zhang2021', state=AT_REST, speed=0.5):
 
 def control(seen, reference, state=AT_REST, pitch_held=False, roll_held=False, params=None):
     """State, roll moment and pitch moment (N m) after one tick."""
-    sight = Seen(seen, reference, 0.5, 0.03, 0.4, 0.0, 0.0, roll_held, pitch_held)
+    sight = Seen(seen, reference, 0.5, 0.03, 0.4, 0.0, 0.0, roll_held, pitch_held, 0.0)
     return pid_step(state, sight, params or PARAMS['zhang2021'], TICK_S)
 
 

@@ -61,14 +61,15 @@ _LEARNT = (
     (
         'learnt_steering',
         'Steering',
-        'Turn rate over sine of roll at 0.5 m/s, + to starboard: it differs in dive and climb.',
+        'Turn rate over sine of roll at 0.5 m/s, + to starboard: it differs in dive and climb; of '
+        'a vehicle with a fin over the sine of its angle.',
         'rad/s',
         ('steering_dive_radps', 'steering_climb_radps'),
     ),
     (
         'learnt_disturbance',
         'Turn-rate disturbance',
-        'Turn rate that is there without roll.',
+        'Turn rate that is there without roll, or with the fin straight.',
         'rad/s',
         ('disturbance_dive_radps', 'disturbance_climb_radps'),
     ),

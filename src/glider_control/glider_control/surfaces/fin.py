@@ -2,12 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Steering by a tail fin: the angle whose turn is the one that is wanted.
 
-In a steady turn r = c sin(delta) V^2, with c from the vehicle's file. Wanted is
+In a steady turn psi' = s c sin(delta) V^2, with c from the vehicle's file and s learnt. Wanted is
 
     turn = psi_s' + k_psi e + k_d (psi_s' - psi') + d,   d' = k_i e
 
 with the heading error e, as of a law that banks to turn. It turns to the same side in dive and
-climb, so that there is one d.
+climb, so that there is one d and one s.
+
+The share s is that of the file's effectiveness which the vehicle really has. A Kalman filter of
+one number compares the yaw rate with c sin(delta) V^2 for the angle at which the fin *is*, delayed
+as a turn takes to build up. Of both what lasts is taken off: a fin that is bent or stuck, a hull
+that turns by itself and a current tell nothing of s, changes of the angle do. What the model does
+not explain, as a gust, counts as a few standard deviations at most, and s never changes its sign.
 """
 
 import math
@@ -15,10 +21,11 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_control.surface import SurfaceLawSettings, steer
+from glider_control.surface import SurfaceLawSettings, steer, surface_learnt
 from glider_model.base.frames import wrap_angle
 from glider_model.base.kernel import kernel
-from glider_model.onboard.learnt_steering import LEARN_SPEED
+from glider_model.base.signals import Adaptation
+from glider_model.onboard.learnt_steering import LEARN_SPEED, STEERING_SPEED
 from glider_model.vehicle.file import Vehicle
 
 _TUNABLE = {'tunable': True}
@@ -27,6 +34,10 @@ _TUNABLE = {'tunable': True}
 GLIDING_VERTICAL_RATE = 0.05
 #: d is held within this (rad/s).
 INTEGRAL_MAX = 0.005
+#: The share s is held within these (-).
+LEAST_SHARE, MOST_SHARE = 0.2, 5.0
+#: An error counts as so many standard deviations at most.
+MOST_DEVIATIONS = 2.0
 
 
 class FinLawSettings(SurfaceLawSettings):
@@ -41,6 +52,33 @@ class FinLawSettings(SurfaceLawSettings):
     heading_kd: float = Field(
         0.5, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=_TUNABLE
     )
+    share_std: float = Field(
+        0.7,
+        ge=0.0,
+        le=5.0,
+        description='standard deviation of s before anything is known; 0: it is not learnt (-)',
+    )
+    share_drift: float = Field(
+        0.05, ge=0.0, le=5.0, description='change of s to be expected in 1000 s (-)'
+    )
+    noise_radps: float = Field(
+        0.0003, gt=0.0, le=0.1, description='yaw rate that the model does not explain (rad/s)'
+    )
+    correlation_s: float = Field(
+        60.0, gt=0.0, le=600.0, description='time over which that is one and the same error (s)'
+    )
+    build_up_s: float = Field(
+        4.0, gt=0.0, le=200.0, description='time in which a turn builds up (s)'
+    )
+    smoothing_s: float = Field(
+        10.0, gt=0.0, le=200.0, description='low pass on angle and yaw rate (s)'
+    )
+    lasting_s: float = Field(
+        300.0, gt=0.0, le=2000.0, description='what lasts longer than this tells nothing of s (s)'
+    )
+    after_s: float = Field(
+        90.0, ge=0.0, le=600.0, description='learning begins this long after a turn-over (s)'
+    )
 
     def params(self, vehicle: Vehicle) -> 'FinLawParams':
         """Kernel parameters for a vehicle whose fin is known."""
@@ -50,27 +88,89 @@ class FinLawSettings(SurfaceLawSettings):
             self.heading_kd,
             vehicle.fin.turn_rate.value,
             math.radians(vehicle.fin.range.value),
+            self.share_drift**2 / 1000.0 if self.share_std > 0.0 else 0.0,
+            self.noise_radps,
+            self.correlation_s,
+            self.build_up_s,
+            self.smoothing_s,
+            self.lasting_s,
+            self.after_s,
         )
 
     def initial_state(self) -> 'FinLawState':
-        """Integral at zero."""
-        return FinLawState(0.0)
+        """Integral at zero, a fin as in the file."""
+        return FinLawState(0.0, 1.0, self.share_std**2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class FinLawParams(NamedTuple):
-    """Gains, and how the vehicle turns."""
+    """Gains, how the vehicle turns, and how that is learnt."""
 
     heading_kp: float
     heading_ki: float
     heading_kd: float
-    turn_rate: float  #: over sin(delta) V^2 (rad s/m^2)
+    turn_rate: float  #: over sin(delta) V^2, of the file (rad s/m^2)
     limit: float  #: largest angle (rad)
+    share_drift: float  #: variance growth of s (1/s)
+    noise: float  #: (rad/s)
+    correlation_s: float
+    build_up_s: float
+    smoothing_s: float
+    lasting_s: float
+    after_s: float
 
 
 class FinLawState(NamedTuple):
-    """Integral."""
+    """Integral, and what is known of the fin."""
 
     heading_integral: float  #: d (rad/s)
+    share: float  #: s (-)
+    variance: float  #: of s (-)
+    built_up: float  #: sin(delta), delayed as a turn builds up (-)
+    sine: float  #: the same, smoothed (-)
+    turn: float  #: yaw rate, smoothed (rad/s)
+    lasting_sine: float  #: what of the two lasts (-, rad/s)
+    lasting_turn: float
+    steady_s: float  #: time since the last turn-over (s)
+
+
+@kernel
+def learn_share(state, seen, params, dt):
+    """One tick of learning how the fin turns the vehicle: see the head of this file."""
+    speed, turn = seen.speed, seen.measured.psi_dot
+    is_gliding = abs(seen.measured.vertical_rate) >= GLIDING_VERTICAL_RATE
+    steady_s = state.steady_s + dt if is_gliding and speed > LEARN_SPEED else 0.0
+    built_up, sine = math.sin(seen.delta), math.sin(seen.delta)
+    if steady_s > dt:
+        built_up = state.built_up + dt / (params.build_up_s + dt) * (sine - state.built_up)
+        part = dt / (params.smoothing_s + dt)
+        sine = state.sine + part * (built_up - state.sine)
+        turn = state.turn + part * (turn - state.turn)
+    part = dt / (params.lasting_s + dt) if steady_s > params.after_s else 1.0
+    lasting_sine = state.lasting_sine + part * (sine - state.lasting_sine)
+    lasting_turn = state.lasting_turn + part * (turn - state.lasting_turn)
+    share, variance = state.share, state.variance
+    if steady_s > params.after_s:
+        variance += params.share_drift * dt
+        change = params.turn_rate * speed * speed * (sine - lasting_sine)
+        error = turn - lasting_turn - share * change
+        square = variance * change * change
+        most = MOST_DEVIATIONS * math.sqrt(square + params.noise * params.noise)
+        error = min(most, max(-most, error))
+        spread = square + params.noise * params.noise * params.correlation_s / dt
+        share += variance * change / spread * error
+        share = min(MOST_SHARE, max(LEAST_SHARE, share))
+        variance -= variance * square / spread
+    return FinLawState(
+        state.heading_integral,
+        share,
+        variance,
+        built_up,
+        sine,
+        turn,
+        lasting_sine,
+        lasting_turn,
+        steady_s,
+    )
 
 
 @steer.body(FinLawParams)
@@ -78,9 +178,10 @@ class FinLawState(NamedTuple):
 def steer_by_fin(state, seen, params, dt):
     """Angle (rad) of the fin: see `steer`."""
     measured, reference = seen.measured, seen.reference
-    integral = state.heading_integral
+    learnt = learn_share(state, seen, params, dt)
     if abs(measured.vertical_rate) < GLIDING_VERTICAL_RATE:
-        return FinLawState(integral), 0.0
+        return learnt, 0.0
+    integral = state.heading_integral
     error = wrap_angle(reference.psi - measured.psi)
     turn = (
         reference.psi_dot
@@ -89,9 +190,29 @@ def steer_by_fin(state, seen, params, dt):
         + integral
     )
     speed = max(seen.speed, LEARN_SPEED)
-    sine = turn / (params.turn_rate * speed * speed)
+    sine = turn / (learnt.share * params.turn_rate * speed * speed)
     delta = math.asin(min(1.0, max(-1.0, sine)))
     if abs(delta) < params.limit or delta * error < 0.0:
         moved = integral + dt * params.heading_ki * error
         integral = min(INTEGRAL_MAX, max(-INTEGRAL_MAX, moved))
-    return FinLawState(integral), min(params.limit, max(-params.limit, delta))
+    state = FinLawState(
+        integral,
+        learnt.share,
+        learnt.variance,
+        learnt.built_up,
+        learnt.sine,
+        learnt.turn,
+        learnt.lasting_sine,
+        learnt.lasting_turn,
+        learnt.steady_s,
+    )
+    return state, min(params.limit, max(-params.limit, delta))
+
+
+@surface_learnt.body(FinLawParams)
+@kernel
+def fin_learnt(learnt, state, params):
+    """Turn rate over sin(delta) at 0.5 m/s, alike in dive and climb, and what is there without."""
+    rate = state.share * params.turn_rate * STEERING_SPEED * STEERING_SPEED
+    told = (rate, -state.heading_integral)
+    return Adaptation(*learnt[:7], *told, *told, *learnt[11:])

@@ -113,7 +113,7 @@ class Wrench(NamedTuple):
 
 
 class Adaptation(NamedTuple):
-    """What the adaptive law has learnt; all zero under the PID law."""
+    """What control has learnt; under the PID law zero but for the steering of a fin."""
 
     roll_bias_nm: float  #: parameters of the roll moment (N m)
     roll_side_force_nm: float
@@ -122,7 +122,7 @@ class Adaptation(NamedTuple):
     pitch_alpha_nm: float
     pitch_speed_nm: float
     pitch_damping_nm: float
-    steering_dive_radps: float  #: turn rate over sin(roll) at 0.5 m/s, and its offset
+    steering_dive_radps: float  #: turn rate over sin(roll), or of the fin, at 0.5 m/s, and offset
     disturbance_dive_radps: float
     steering_climb_radps: float
     disturbance_climb_radps: float

@@ -36,7 +36,7 @@ class FinSettings(SurfaceSettings):
     )
     turn_rate: meaning(
         quantity('rad s/m^2', gt=0.0, le=100.0),
-        'turn rate over sin(angle) and squared speed in a steady turn, by which it is steered',
+        'turn rate over sin(angle) and squared speed in a steady turn; control begins with it',
     )
 
     def params(self) -> 'FinParams':
