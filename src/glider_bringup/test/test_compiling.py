@@ -6,7 +6,7 @@ import numba
 import pytest
 
 from glider_bringup.engines import direct
-from glider_bringup.engines.compiling import told
+from glider_bringup.engines.compiling import compile_loops, told
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.choices import Combination, combination_of
 from glider_bringup.mission.scenario import load_scenario, scenario_names
@@ -67,4 +67,11 @@ def test_loops_are_there_before_workers_start(monkeypatch):
         workers.worker_pool(1, None, [combination_of(scenario)] * 2),
     ):
         pass
+    assert types_of(scenario) in {signature[:2] for signature in direct.fly.signatures}
+
+
+def test_the_loop_of_a_vehicle_for_shallow_water_is_compiled_too():
+    """It is not rated for the dives of the scenario that others are compiled with."""
+    scenario = load_scenario('slocum_shelf')
+    compile_loops([combination_of(scenario)], lambda line: None)
     assert types_of(scenario) in {signature[:2] for signature in direct.fly.signatures}

@@ -16,8 +16,10 @@ from glider_bringup.mission.choices import Combination
 from glider_bringup.mission.scenario import load_scenario
 from glider_model.base.kernel import compiling_told
 from glider_model.base.signals import TICK_S
-from glider_model.vehicle.file import vehicle_path
+from glider_model.vehicle.file import load_vehicle, vehicle_path
 
+#: Depth of a profile that is compiled and not flown, if the vehicle is rated for it (m).
+DEPTH_M = 100.0
 #: Gets one line for a person.
 Tell = Callable[[str], None]
 
@@ -53,6 +55,7 @@ def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
             }
             if one.steered:
                 changes['vehicle'] = one.steered
+                changes['profile.depth_m'] = min(DEPTH_M, load_vehicle(one.steered).rated_depth_m)
             state, params = mission_of(load_scenario(changes=changes))
             with told(one, tell):
                 fly(state, params, nothing, TICK_S)
