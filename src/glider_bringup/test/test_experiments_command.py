@@ -443,3 +443,25 @@ def test_interrupt_ends_the_command():
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
+
+
+def test_every_vehicle_flies_with_position_known_and_reckoned(planned):
+    """By both laws; the limits are those of navigation, and hold for the adaptive law."""
+    known, reckoned = planned['vehicles'], planned['vehicles_reckoned']
+    flown = [(one.case, one.controller) for one in known.cases]
+    assert flown == [(one.case, one.controller) for one in reckoned.cases]
+    assert len({case for case, _ in flown}) == 4 and len(flown) == 8
+    assert {one.load().navigation.method for one in known.cases} == {'known'}
+    for scenario in (one.load() for one in reckoned.cases):
+        assert scenario.navigation.method == 'dead_reckoned'
+        assert scenario.profile.surface_every_dives == 1
+        assert scenario.sensors.compass_bias_deg == 1.0 and scenario.sensors.pitch_scale == 0.96
+
+    def verdict(controller, beside_m):
+        from_fourth = {'surfacing_cross_track_m': beside_m, 'under_water_rms_m': 10.0}
+        row = {'case': 'seaglider', 'controller': controller, 'guidance': 'observer'}
+        row |= {'status': 'completed', 'navigation': {'from_fourth': from_fourth}}
+        return [check.passed for check in reckoned.judge([row])]
+
+    assert all(verdict('adaptive', 49.0)) and not all(verdict('adaptive', 51.0))
+    assert verdict('pid', 51.0) == []

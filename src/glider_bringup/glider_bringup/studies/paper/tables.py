@@ -175,6 +175,7 @@ _TABLES: dict[str, Callable[[list[dict]], Table]] = {
     'spline': _side_by_side,
     'survey': _survey,
     'envelope': _envelope,
+    'vehicles_reckoned': _RECKONED,
     'reckoned_12deg': _RECKONED,
     'reckoned_rough': _RECKONED,
     'reckoned_beliefs': _RECKONED,
@@ -186,6 +187,7 @@ _RECKONED_REMARK = (
     'mean current of a way, as it is believed after its fixes, is off the true one.'
 )
 _REMARKS = {
+    'vehicles_reckoned': _RECKONED_REMARK,
     'reckoned_12deg': _RECKONED_REMARK,
     'reckoned_rough': _RECKONED_REMARK,
     'reckoned_beliefs': _RECKONED_REMARK,
