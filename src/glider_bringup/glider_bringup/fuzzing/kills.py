@@ -34,7 +34,7 @@ from glider_model.ros.places import domain_id
 
 SCENARIO = 'current_8deg'
 #: Ticks of a flight; the last of them are spared, so that it is not over before the kill.
-TICKS, SPARED = 6000, 2000
+TICKS, SPARED = 3000, 1000
 PARENT, ALL = 'parent', 'all at once'
 VICTIMS = (*MODULES, FORK_SERVER, PARENT, ALL)
 #: Nodes of a flight tick within this time (s).
