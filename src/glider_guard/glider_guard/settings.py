@@ -16,6 +16,7 @@ from glider_model.base.settings import Settings
 from glider_model.base.signals import Joints
 from glider_model.onboard.gate import INITIAL_GATE, GateSettings
 from glider_model.onboard.glide_polar import make_polar
+from glider_model.vehicle.actuators import doubt
 from glider_model.vehicle.file import load_vehicle
 
 
@@ -159,6 +160,7 @@ class GuardSettings(GuardLimitSettings):
         """Kernel parameters."""
         vehicle = load_vehicle(self.vehicle)
         limits, rated_m, gate = vehicle.params(), vehicle.rated_depth_m, self.gate.params()
+        off, slowest = doubt(limits.errors), vehicle.slowest_pump_rate(rated_m)
         return GuardParams(
             gate,
             make_limits(limits, self.follow_share, self.stall_s),
@@ -198,14 +200,14 @@ class GuardSettings(GuardLimitSettings):
                 limits.ballast,
                 self.weight_share * limits.m_b_max,
                 self.weight_s,
-                PUMP_ARRIVED * limits.m_b_max,
-                limits.m_b_rate,
+                max(PUMP_ARRIVED * limits.m_b_max, off.m_b),
+                slowest,
             ),
             self.pressure,
             AscentLimits(
                 Joints(-limits.m_b_max, -limits.x_p_max, 0.0, 0.0),
-                (PUMP_ARRIVED - 1.0) * limits.m_b_max,
-                2.0 * limits.m_b_max / limits.m_b_rate,
+                max((PUMP_ARRIVED - 1.0) * limits.m_b_max, off.m_b - limits.m_b_max),
+                2.0 * limits.m_b_max / slowest,
             ),
         )
 

@@ -201,7 +201,8 @@ class GuidanceSettings(GuidanceLawSettings):
         kernel_vehicle = vehicle.params()
         polar = make_polar(kernel_vehicle)
         filters = self.filters
-        profile = self.profile.params(self.dives, kernel_vehicle.m_b_rate, polar)
+        pump_rate = vehicle.slowest_pump_rate(self.profile.depth_m)
+        profile = self.profile.params(self.dives, pump_rate, polar)
         return GuidanceParams(
             self.path.params(),
             profile,

@@ -20,6 +20,7 @@ from glider_model.plant.energy import FULL
 from glider_model.plant.faults.kinds import NoFaults, NoFaultState
 from glider_model.plant.motion import Motion
 from glider_model.plant.plant import LAUNCHED, PlantParams, PlantState, dive_depths, plant_step
+from glider_model.plant.readings import make_readings
 from glider_model.plant.sensors import NO_SAMPLE, SensorSettings
 from glider_model.vehicle.energy import NO_ENERGY
 from glider_model.vehicle.file import load_vehicle
@@ -95,6 +96,7 @@ def _plant_params(vehicle='zhang2021', **density):
         SensorSettings().params(0),
         NoFaults(),
         NO_ENERGY,
+        make_readings(params, 0),
     )
 
 

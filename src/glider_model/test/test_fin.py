@@ -89,9 +89,9 @@ def test_the_turn_of_a_slocum_can_be_met(sign, fly, plant_params, start):
 def test_it_goes_as_fast_and_as_far_as_its_file_says():
     vehicle = with_fin().params()
     at_rest, target = Joints(0.0, 0.0, 0.0, 0.0), Joints(0.0, 0.0, 0.0, 9.0)
-    moved = actuators_step(at_rest, target, vehicle, TICK_S)
+    moved = actuators_step(at_rest, target, 0.0, vehicle, TICK_S)
     assert moved.delta == pytest.approx(math.radians(1.2) * TICK_S, rel=1e-12)
-    assert actuators_step(at_rest, target, vehicle, 1e6).delta == math.radians(26.0)
+    assert actuators_step(at_rest, target, 0.0, vehicle, 1e6).delta == math.radians(26.0)
 
 
 def test_without_a_fin_the_loads_are_the_very_same_numbers():
@@ -107,7 +107,7 @@ def test_without_a_fin_the_loads_are_the_very_same_numbers():
     [
         ('x', 0.5, 'fin.x.value = 0.5: should be less than 0 (allowed: >= -10.0 and < 0.0)'),
         ('range', 100.0, 'fin.range.value = 100.0: should be less than or equal to 90 '),
-        ('span', 1.0, 'fin.span = 1.0: unknown field (allowed fields: range, rate, area, '),
+        ('span', 1.0, 'fin.span = 1.0: unknown field (allowed fields: range, rate, dead_band, '),
     ],
 )
 def test_what_is_wrong_in_its_section_is_named(field, value, expected):

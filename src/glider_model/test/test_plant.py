@@ -289,7 +289,7 @@ targets = st.builds(Joints, *4 * [st.floats(-1e3, 1e3)])
 @given(joints, targets)
 def test_actuators_keep_to_their_rates(position, target):
     vehicle = load_vehicle('zhang2021').params()
-    moved = np.array(actuators_step(position, target, vehicle, TICK_S)) - np.array(position)
+    moved = np.array(actuators_step(position, target, 0.0, vehicle, TICK_S)) - np.array(position)
     rates = np.array([0.004, 0.003, math.radians(6.0), 0.0])
     assert np.all(np.abs(moved) <= rates * TICK_S * (1.0 + 1e-9))
 
@@ -298,7 +298,7 @@ def test_actuators_keep_to_their_rates(position, target):
 @given(joints, targets)
 def test_actuators_keep_to_their_ranges(position, target):
     vehicle = load_vehicle('zhang2021').params()
-    moved = actuators_step(position, target, vehicle, 1e6)
+    moved = actuators_step(position, target, 0.0, vehicle, 1e6)
     limits = (1.0, 0.06, math.radians(60.0), 0.0)
     expected = np.clip(target, np.negative(limits), limits)
     np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-12)
@@ -306,7 +306,7 @@ def test_actuators_keep_to_their_ranges(position, target):
 
 def test_actuators_stay_where_they_are_wanted():
     vehicle, position = load_vehicle('zhang2021').params(), Joints(0.123, -0.0456, 0.789, 0.0)
-    assert actuators_step(position, position, vehicle, TICK_S) == position
+    assert actuators_step(position, position, 0.0, vehicle, TICK_S) == position
 
 
 def test_pump_takes_its_time(fly, plant_params, start):

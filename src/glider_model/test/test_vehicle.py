@@ -64,6 +64,8 @@ def test_vehicle_is_called_like_its_file(name):
 def test_parameters_are_finite(name):
     numbers = load_vehicle(name).params()._asdict()
     numbers.pop('surface')
+    errors = numbers.pop('errors')
+    numbers |= errors.dead_band._asdict() | {'rate_per_m': errors.rate_per_m}
     assert all(math.isfinite(number) for number in numbers.values())
 
 

@@ -40,6 +40,7 @@ from glider_model.base.kernel import kernel
 from glider_model.base.signals import TICK_NS, TICK_S
 from glider_model.plant.faults.settings import FaultSettings
 from glider_model.plant.plant import dive_depths
+from glider_model.plant.readings import Readings, make_readings, noise_of_readings
 from glider_model.plant.sensors import SensorParams
 from glider_model.vehicle.energy import EnergySettings
 from glider_model.vehicle.file import load_vehicle, steers_by
@@ -93,6 +94,17 @@ def _extract(log, series):
         series[_SURFACE, row] = log[row, _JOINTS_START + 3]
 
 
+@kernel
+def _take_off_noise(log, first_tick, readings):
+    """Put where the actuators are in the place of where they say that they are, in place."""
+    for row in range(log.shape[0]):
+        noise = noise_of_readings(first_tick + row, readings)
+        log[row, _JOINTS_START] -= noise.m_b
+        log[row, _JOINTS_START + 1] -= noise.x_p
+        log[row, _JOINTS_START + 2] -= noise.mu
+        log[row, _JOINTS_START + 3] -= noise.delta
+
+
 class Scorer:
     """Collects log blocks, then gives the score.
 
@@ -110,6 +122,8 @@ class Scorer:
         What breaks in the run.
     energy : EnergySettings, optional
         Battery of the vehicle and what is taken out of it.
+    readings : Readings, optional
+        Noise of where its actuators say that they are: no way that they go.
     """
 
     def __init__(
@@ -120,6 +134,7 @@ class Scorer:
         steers_by: str = '',
         faults: Sequence[FaultSettings] = (),
         energy: EnergySettings | None = None,
+        readings: Readings | None = None,
     ) -> None:
         self.topics = topics  #: that it needs, beside those that are always read
         self._steers_by = steers_by
@@ -128,6 +143,7 @@ class Scorer:
         self._navigation = NavigationScorer(origin, reckons=bool(topics))
         self._faults = FaultTimes(faults)
         self._energy = EnergyScorer(energy)
+        self._readings = readings if readings and readings.is_noisy else None
         self._blocks: list[np.ndarray] = []
         self._last: np.ndarray | None = None
         self._end: np.ndarray | None = None
@@ -137,6 +153,9 @@ class Scorer:
         if not len(log):
             return
         told, log = log, self._truth.of(log)
+        if self._readings:
+            log = log.copy()
+            _take_off_noise(log, self.ticks, self._readings)
         self._navigation.add(told, log)
         self._faults.add(log)
         self._energy.add(log)
@@ -249,7 +268,8 @@ def make_scorer(scenario: Scenario) -> Scorer:
         topics = ('fix', 'believed_current', 'current_velocity')
     sensors, origin = scenario.sensors.params(scenario.seed), scenario.origin.params()
     energy = load_vehicle(scenario.vehicle).energy
-    return Scorer(sensors, origin, topics, steers_by(scenario), scenario.faults, energy)
+    readings = make_readings(load_vehicle(scenario.vehicle).params(), scenario.seed)
+    return Scorer(sensors, origin, topics, steers_by(scenario), scenario.faults, energy, readings)
 
 
 def scores_of(scenario: Scenario, scorer: Scorer) -> dict:

@@ -21,6 +21,7 @@ from glider_model.plant.faults.sensing import remembered, told
 from glider_model.plant.faults.settings import FAULTS, Fault, fault_params, fault_state
 from glider_model.plant.health import health_of
 from glider_model.plant.motion import Motion, integrate
+from glider_model.plant.readings import Readings, make_readings, read
 from glider_model.plant.sensors import (
     ANTENNA_M,
     NO_SAMPLE,
@@ -97,6 +98,7 @@ class PlantParams(NamedTuple):
     sensors: SensorParams
     faults: NamedTuple  #: NoFaults, or FaultParams
     energy: EnergyParams
+    readings: Readings  #: noise of where the actuators say that they are
 
 
 def dive_depths(depth_m: float) -> tuple[float, float]:
@@ -169,8 +171,9 @@ class PlantSettings(Settings):
     def params(self) -> PlantParams:
         """Kernel parameters."""
         vehicle = load_vehicle(self.vehicle)
+        real = perturbed(vehicle.params(), self.perturb)
         return PlantParams(
-            perturbed(vehicle.params(), self.perturb),
+            real,
             self.water.params(),
             self.water.wind_drift(),
             max(1, round(self.duration_s / TICK_S)),
@@ -181,6 +184,7 @@ class PlantSettings(Settings):
             self.sensors.params(self.seed, self.origin, tuple(self.fitted), self.water.bottom_m),
             fault_params(self.faults, self.seed),
             vehicle.energy.params() if vehicle.energy else NO_ENERGY,
+            make_readings(real, self.seed),
         )
 
     def initial_state(self) -> PlantState:
@@ -238,7 +242,7 @@ def tell(state, params):
     """What the vehicle tells at a tick: numbers of the topics of the plant, as on the wire."""
     numbers = sense(
         plant_odometry(state),
-        state.joints,
+        read(state.joints, state.tick, params.readings),
         state.sample,
         state.surfacing.out_ticks,
         state.surfacing.count,
@@ -287,7 +291,8 @@ def plant_step(state, command, water, params, dt, drops=False):
     faults = begun(state, params.faults)
     total = summed(faults, state.tick, params.faults)
     water = blown(with_wind(water, state.motion.p_d, params.wind_drift), total, params.faults)
-    joints = moved(state.joints, command, params.vehicle, dt, total, params.faults)
+    depth, v = state.motion.p_d, params.vehicle
+    joints = moved(state.joints, command, depth, v, dt, total, params.faults)
     start = acting(state.joints, params.vehicle, total, params.faults)
     end = acting(joints, params.vehicle, total, params.faults)
     body = felt(params, total, params.faults)
@@ -308,7 +313,8 @@ def plant_step(state, command, water, params, dt, drops=False):
     deep = motion.p_d > params.dive_below or (state.deep and motion.p_d >= params.dive_above)
     dives = state.dives + 1 if state.deep and not deep else state.dives
     surface_ticks = state.surface_ticks + 1 if motion.p_d < SURFACE_M else 0
-    afloat_ticks = _afloat(state.afloat_ticks, motion.p_d, command.m_b > joints.m_b)
+    fills = command.m_b > joints.m_b + v.errors.dead_band.m_b
+    afloat_ticks = _afloat(state.afloat_ticks, motion.p_d, fills)
     sample = state.sample
     if params.sensors.is_held:
         measured = add_noise(plant_odometry(state), state.tick, params.sensors)

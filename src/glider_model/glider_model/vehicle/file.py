@@ -23,8 +23,10 @@ from glider_model.base.settings import (
     holder_of,
     validate,
 )
+from glider_model.base.signals import Joints
 from glider_model.base.wiring import JOINTS
 from glider_model.vehicle import surfaces
+from glider_model.vehicle.actuators import ActuatorErrors
 from glider_model.vehicle.energy import EnergySettings
 from glider_model.vehicle.quantity import LITRE, meaning, quantity
 from glider_model.vehicle.rigid_body import mass_matrix
@@ -45,6 +47,8 @@ VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
 SHALLOWEST_GLIDE_DEG = 12.0
 #: Vertical rate of the slowest glide, if the file says nothing (m/s).
 SLOWEST_GLIDE_MPS = 0.12
+#: Share of its rate that a pump keeps at the rated depth at least (-).
+LEAST_PUMP_SHARE = 0.05
 #: Source of a number that a person changed for a run.
 _SET = '--set'
 
@@ -139,6 +143,17 @@ class Vehicle(_Steered):
         return self
 
     @pydantic.model_validator(mode='after')
+    def _pumps_at_its_rated_depth(self):
+        fall = _value(self.buoyancy_engine.rate_per_m)
+        if self.rated_depth and fall * self.rated_depth.value > 1.0 - LEAST_PUMP_SHARE:
+            most = (1.0 - LEAST_PUMP_SHARE) / self.rated_depth_m
+            raise ValueError(
+                f'buoyancy_engine.rate_per_m: {fall:g} 1/m '
+                f'(allowed: <= {most:.3g} 1/m, which leaves 5 % of the rate at its rated_depth)'
+            )
+        return self
+
+    @pydantic.model_validator(mode='after')
     def _mass_is_positive(self):
         fault = mass_fault(self.params())
         if fault:
@@ -173,6 +188,12 @@ class Vehicle(_Steered):
     def rated_depth_m(self) -> float:
         """Deepest that the hull is meant to go (m); infinite if its file does not say."""
         return self.rated_depth.value if self.rated_depth else math.inf
+
+    def slowest_pump_rate(self, depth_m: float) -> float:
+        """Rate (kg/s) of the pump at a depth (m), which is rated for, while it pumps out."""
+        fall, rated_m = _value(self.buoyancy_engine.rate_per_m), self.rated_depth_m
+        share = 1.0 - fall * min(depth_m, rated_m) if fall > 0.0 else 1.0
+        return self.buoyancy_engine.rate.value * share
 
     @property
     def crush_depth_m(self) -> float:
@@ -243,6 +264,26 @@ class Vehicle(_Steered):
             surface=surface.params() if surface else NoSurface(),
             delta_max=math.radians(surface.range.value) if surface else 0.0,
             delta_rate=math.radians(surface.rate.value) if surface else 0.0,
+            errors=self._errors(surface),
+        )
+
+    def _errors(self, surface: SurfaceSettings | None) -> ActuatorErrors:
+        """How its actuators err."""
+        pump, mass = self.buoyancy_engine, self.moving_mass
+        return ActuatorErrors(
+            Joints(
+                _value(pump.dead_band),
+                _value(mass.dead_band),
+                math.radians(_value(mass.rotation_dead_band)),
+                math.radians(_value(surface.dead_band)) if surface else 0.0,
+            ),
+            Joints(
+                _value(pump.noise),
+                _value(mass.noise),
+                math.radians(_value(mass.rotation_noise)),
+                math.radians(_value(surface.noise)) if surface else 0.0,
+            ),
+            _value(pump.rate_per_m),
         )
 
 
@@ -319,6 +360,7 @@ class VehicleParams(NamedTuple):
     surface: NamedTuple  #: of its steering surface, by its kind
     delta_max: float  #: range (rad) and rate (rad/s) of the steering surface; 0 without
     delta_rate: float
+    errors: ActuatorErrors
 
 
 def mass_fault(vehicle: VehicleParams) -> str:

@@ -100,6 +100,19 @@ class MovingMassSettings(Settings):
         quantity('deg', ge=0.0, le=180.0), 'as far as it turns to each side; 0: it does not'
     )
     rotation_rate: meaning(quantity('deg/s', gt=0.0, le=180.0), 'how fast it turns')
+    dead_band: meaning(
+        quantity('m', ge=0.0, le=0.1) | None,
+        'nearer than this to where it is sent it stops sliding',
+    ) = None
+    noise: meaning(
+        quantity('m', ge=0.0, le=0.1) | None, 'standard deviation of where it says that it is'
+    ) = None
+    rotation_dead_band: meaning(
+        quantity('deg', ge=0.0, le=20.0) | None, 'nearer than this it stops turning'
+    ) = None
+    rotation_noise: meaning(
+        quantity('deg', ge=0.0, le=20.0) | None, 'standard deviation of the angle that it says'
+    ) = None
 
 
 class BuoyancyEngineSettings(Settings):
@@ -110,6 +123,16 @@ class BuoyancyEngineSettings(Settings):
         'most that it makes light or heavy; half a stroke',
     )
     rate: meaning(quantity('kg/s', also=CC_PER_S, gt=0.0, le=10.0), 'how fast')
+    rate_per_m: meaning(
+        quantity('1/m', ge=0.0, le=0.01) | None,
+        'share of the rate that a metre of depth takes off while it pumps out, against the water',
+    ) = None
+    dead_band: meaning(
+        quantity('kg', also=CC, ge=0.0, le=1.0) | None, 'nearer than this to its goal it stops'
+    ) = None
+    noise: meaning(
+        quantity('kg', also=CC, ge=0.0, le=1.0) | None, 'standard deviation of where it says it is'
+    ) = None
 
 
 class HullSettings(Settings):

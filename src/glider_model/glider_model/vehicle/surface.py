@@ -21,6 +21,12 @@ class SurfaceSettings(Settings):
 
     range: meaning(quantity('deg', gt=0.0, le=90.0), 'as far as it turns to each side')
     rate: meaning(quantity('deg/s', gt=0.0, le=180.0), 'how fast it turns')
+    dead_band: meaning(
+        quantity('deg', ge=0.0, le=20.0) | None, 'nearer than this to where it is sent it stops'
+    ) = None
+    noise: meaning(
+        quantity('deg', ge=0.0, le=20.0) | None, 'standard deviation of the angle that it says'
+    ) = None
 
     def params(self) -> NamedTuple:
         """Kernel parameters, of a type of its own, for `surface_loads`."""

@@ -12,7 +12,7 @@ from glider_model.base.signals import Joints, Water
 from glider_model.base.slot import default, slot
 from glider_model.plant.faults import kinds
 from glider_model.plant.faults.kinds import FaultParams
-from glider_model.vehicle.actuators import actuators_step, toward
+from glider_model.vehicle.actuators import actuators_step, pump_rate, toward
 from glider_model.vehicle.file import VehicleParams
 
 _DRAG = VehicleParams._fields.index('K_D0')
@@ -30,28 +30,29 @@ class Felt(NamedTuple):
 
 @slot
 @default
-def moved(joints, command, vehicle, dt, total, params):
-    """Where the actuators say they are a step of ``dt`` s later; ``total`` is of `summed`."""
-    return actuators_step(joints, command, vehicle, dt)
+def moved(joints, command, depth, vehicle, dt, total, params):
+    """Where the actuators are, offsets apart, ``dt`` s later; ``total`` is of `summed`."""
+    return actuators_step(joints, command, depth, vehicle, dt)
 
 
 @moved.body(FaultParams)
 @kernel
-def _moved(joints, command, vehicle, dt, total, params):
-    v = vehicle
+def _moved(joints, command, depth, vehicle, dt, total, params):
+    v, off = vehicle, vehicle.errors.dead_band
+    rate = pump_rate(joints.m_b, command.m_b, depth, v)
     return Joints(
-        _one(joints.m_b, command.m_b, v.m_b_max, v.m_b_rate * dt, 0, total),
-        _one(joints.x_p, command.x_p, v.x_p_max, v.x_p_rate * dt, 1, total),
-        _one(joints.mu, command.mu, v.mu_max, v.mu_rate * dt, 2, total),
-        _one(joints.delta, command.delta, v.delta_max, v.delta_rate * dt, 3, total),
+        _one(joints.m_b, command.m_b, v.m_b_max, rate * dt, off.m_b, 0, total),
+        _one(joints.x_p, command.x_p, v.x_p_max, v.x_p_rate * dt, off.x_p, 1, total),
+        _one(joints.mu, command.mu, v.mu_max, v.mu_rate * dt, off.mu, 2, total),
+        _one(joints.delta, command.delta, v.delta_max, v.delta_rate * dt, off.delta, 3, total),
     )
 
 
 @kernel
-def _one(position, target, limit, reach, which, total):
+def _one(position, target, limit, reach, dead_band, which, total):
     low, high = limit * total[kinds.LOW + which], limit * total[kinds.HIGH + which]
     goal = min(high, max(low, target))
-    return toward(position, goal, limit, reach * total[kinds.RATE + which])
+    return toward(position, goal, limit, reach * total[kinds.RATE + which], dead_band)
 
 
 @slot
