@@ -4,11 +4,13 @@
 
 Each case is a flight of its own, with the next victim in turn, at a tick that is drawn. A hang is
 a process that is still there 10 s later. What counts as wrong: a node that is not named, a segment
-of shared memory that is left, an acknowledged tick that cannot be read after `recover`.
+of shared memory that is left, an acknowledged tick of which any message cannot be read after
+`recover`. What a killed node had said, and the recorder had not heard, is not acknowledged.
 """
 
 import json
 import os
+import posixpath
 import random
 import signal
 import subprocess
@@ -20,6 +22,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive, left_over, mapped
 from glider_bringup.engines.processes import MODULES
@@ -29,8 +33,9 @@ from glider_bringup.nodes.flight_listener import Heard, flight_heard
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.read_back import read_back
 from glider_bringup.recording.recover import recover
-from glider_model.base.signals import TICK_S
-from glider_model.ros.places import domain_id
+from glider_bringup.recording.ros.recorded_log import RecordedLog
+from glider_model.base.signals import TICK_NS, TICK_S
+from glider_model.ros.places import NAMESPACE, domain_id
 
 SCENARIO = 'current_8deg'
 #: Ticks of a flight; the last of them are spared, so that it is not over before the kill.
@@ -106,11 +111,22 @@ def _judge(flight: _Flight, victim: str, heard: Heard) -> tuple[str, str]:
     recover(flight.folder)
     bag = Bag(flight.folder)
     log = read_back(bag, load_scenario(str(flight.folder / 'scenario.yaml')).vehicle, [])
-    if bag.cut or log.lost(complete=False):
-        return 'wrong', f'{log.lost(complete=False)} messages lost {bag.cut}'
-    if log.ticks <= heard.acknowledged:
-        return 'wrong', f'{log.ticks} ticks are there, {heard.acknowledged} was acknowledged'
+    if bag.cut:
+        return 'wrong', f'it is cut yet: {bag.cut}'
+    lacking = _lacking(bag, log, heard.acknowledged)
+    if lacking or log.ticks <= heard.acknowledged:
+        return 'wrong', f'{log.ticks} ticks, {heard.acknowledged} was acknowledged {lacking}'
     return '', ''
+
+
+def _lacking(bag: Bag, log: RecordedLog, newest: int) -> dict[str, int]:
+    """How many messages of ticks up to the newest a bag lacks, by topic."""
+    found = {posixpath.join(NAMESPACE, name): set() for name in log.recorded()}
+    for batch in bag.batches():
+        for index in np.unique(batch.topic):
+            ticks = batch.log_ns[batch.topic == index] // TICK_NS
+            found.get(bag.topics[index].name, set()).update(ticks[ticks <= newest].tolist())
+    return {name: newest + 1 - len(ticks) for name, ticks in found.items() if len(ticks) <= newest}
 
 
 # ------------------------------------------------------------------------------------ processes

@@ -258,6 +258,10 @@ class RecordedLog:
         ticks, per_tick = self._per_tick()
         return {name: ticks - count for name, count in per_tick.items() if count < ticks}
 
+    def recorded(self) -> dict[str, int]:
+        """Messages of every topic that ought to have one per tick, by topic."""
+        return self._per_tick()[1]
+
     def _per_tick(self) -> tuple[int, dict[str, int]]:
         """Messages of the topic that has most, and of each that there ought to be."""
         left_out = {*SENSORS, *BELIEFS, *LATER} - self._recorded
