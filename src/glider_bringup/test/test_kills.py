@@ -54,6 +54,30 @@ def segment():
 
 
 @pytest.fixture
+def ports():
+    """Paths of a port that is ready and of one that is half made; they do not outlive the test."""
+    found = []
+    for state in (2, 1):
+        path = f'{SHARED_MEMORY}/fastrtps_port{random.randrange(10**8, 10**9)}'
+        with open(path, 'xb') as port:
+            port.write(state.to_bytes(4, sys.byteorder) + bytes(52396))
+        found.append(path)
+    yield found
+    for path in found:
+        if os.path.exists(path):
+            os.unlink(path)
+
+
+def test_port_that_was_never_completed_is_removed_before_a_run(ports):
+    """Fast DDS would wait for it for ever, in every process of its domain."""
+    ready, half_made = ports
+    janitor = processes._Janitor()
+    assert os.path.exists(ready) and not os.path.exists(half_made)
+    janitor.finish()
+    assert os.path.exists(ready)
+
+
+@pytest.fixture
 def start():
     """Start a process that says one word when it is ready; it does not outlive the test."""
     started = []

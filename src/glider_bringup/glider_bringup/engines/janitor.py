@@ -7,7 +7,9 @@ program stands outside of their tree. It is told process ids, line by line on st
 notes which segments of Fast DDS each of them has mapped. When the input ends, because whoever
 started it is through with the run or is no more, it waits until the processes are gone and removes
 those of the segments that nobody has any more. Ports, which are numbered for the whole machine,
-stay: Fast DDS takes them up again by itself. It needs the standard library only.
+stay: Fast DDS takes them up again by itself. Not so a port that somebody was killed in the middle
+of making, on which whoever opens it waits for ever: those it removes, before the run as well. It
+needs the standard library only.
 """
 
 import fcntl
@@ -23,6 +25,10 @@ SHARED_MEMORY = '/dev/shm'
 _SEGMENT = re.compile(
     rf'{SHARED_MEMORY}/(fastrtps_[0-9a-f]{{16}})(?: \(deleted\))?$', re.MULTILINE
 )
+_PORT = re.compile('fastrtps_port[0-9]+')
+#: What a port that is ready has as its first number (boost::interprocess), and how long (s) it may
+#: take from the beginning to there: it takes microseconds.
+_READY, _MAKING_S = 2, 1.0
 #: How often it looks (s): as long as segments are made, and once nothing is new for this long.
 _OFTEN_S, _SELDOM_S, _SETTLED_S = 0.2, 5.0, 3.0
 #: How long it waits for processes to be gone (s): a recorder may complete its file.
@@ -66,6 +72,24 @@ def left_over(names: set[str]) -> set[str]:
     return {name for name in there if not is_locked(name)}
 
 
+def _in_the_making() -> set[str]:
+    found = set()
+    for name in filter(_PORT.fullmatch, os.listdir(SHARED_MEMORY)):
+        with suppress(OSError), open(f'{SHARED_MEMORY}/{name}', 'rb') as port:
+            if int.from_bytes(port.read(4), sys.byteorder) != _READY:
+                found.add(name)
+    return found
+
+
+def half_made() -> set[str]:
+    """Ports that somebody has begun to make, and will not complete."""
+    found = _in_the_making()
+    if found:
+        time.sleep(_MAKING_S)
+        found &= _in_the_making()
+    return found
+
+
 def remove(names: set[str]) -> None:
     """Remove segments, with their locks."""
     for name in names:
@@ -76,6 +100,7 @@ def remove(names: set[str]) -> None:
 
 def main() -> None:
     """Watch over processes until the input ends, then tidy up."""
+    remove(half_made())
     if os.fork():
         os._exit(0)
     os.setsid()
@@ -97,7 +122,7 @@ def main() -> None:
     while any(map(is_alive, pids)) and time.monotonic() < deadline_s:
         names.update(*map(mapped, pids))
         time.sleep(_OFTEN_S)
-    remove(left_over(names))
+    remove(left_over(names) | half_made())
 
 
 if __name__ == '__main__':
