@@ -43,7 +43,7 @@ def test_the_guard_does_not_take_a_dead_band_for_a_stuck_actuator(name, errors, 
 def test_what_is_stuck_is_still_found():
     """Through the noise of what it says."""
     fault = {'kind': 'stuck', 'actuator': 'buoyancy_engine', 'at_s': 1500.0}
-    run = flown('slocum_shelf', FIN_NOISE, duration_s=4000.0, faults=[fault])
+    run = flown('seaglider_1000m', ROLL_NOISE, duration_s=4000.0, faults=[fault])
     assert 'buoyancy_engine_stuck' in {event['row'] for event in run.score['guard']['events']}
 
 
