@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Process that starts the nodes of a run as copies of itself: what they share is imported once.
 
-To import the mathematics takes each process most of a second of a processor, and a run has eight.
+To import the mathematics is most of the start of a node, and a run over nodes has eight processes.
 It imports nothing that starts threads other than those of numpy, which a fork ends in good order;
 rclpy is imported by each node. A node that is not a Python module is executed.
 
