@@ -44,8 +44,8 @@ def main() -> None:
     for block, told, own in zip(BLOCKS[1:], params[1:], state[1:], strict=True):
         inputs = tuple(at_rest(topic) for topic in block.wired.inputs)
         moved, _, _ = block.tick(own, 0.0, inputs, told, TICK_S)
-        if block.surface:
-            block.surface(moved)
+        for order in block.orders:
+            order(moved)
     at_sea = tuple(at_rest(topic) for topic in PLANT.wired.inputs)
     plant_outputs(plant_move(state.plant, at_sea, params.plant, TICK_S), params.plant)
     verify_one_tick()

@@ -42,6 +42,11 @@ class Block(NamedTuple):
     steers_by: Callable[[Settings], str] = lambda settings: ''
     #: name of the steering surface among the joints on its topics, by its settings
 
+    @property
+    def orders(self) -> tuple[Callable, ...]:
+        """Those of its kernels that take an order in flight."""
+        return tuple(order for order in (self.surface, self.clear) if order)
+
 
 @slot
 def block_tick(state, t_s, inputs, params, dt):

@@ -52,9 +52,8 @@ class BlockNode(StepNode):
         said = f'compiling the mathematics of {self.block.wired.name} for its settings, once'
         with compiling_told(lambda: self.get_logger().info(said)):
             state, _, _ = self.block.tick(self.state, 0.0, inputs, self.params, TICK_S)
-            for order in (self.block.surface, self.block.clear):
-                if order:
-                    order(state)
+            for order in self.block.orders:
+                order(state)
 
     def surface(self, order: str) -> None:
         """Ask for the surface, for good; ``order`` says on /diagnostics who wanted it."""
