@@ -14,6 +14,7 @@ import pytest
 from glider_bringup.engines.direct import NotFiniteError, fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.fuzzing import flights
+from glider_bringup.fuzzing.counts import Counter
 from glider_bringup.mission.scenario import load_scenario, read_scenario
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import fly_scored, scorecard
@@ -138,7 +139,9 @@ def test_score_that_is_not_finite_is_a_failure():
 
 def test_extreme_flights_are_finite_or_refused():
     """A few of `./glider fuzz --only flights`."""
-    counts = flights.fuzz(seed=1, count=30, tell=lambda tried: None)
+    counter = Counter(lambda tried: None)
+    flights.fuzz(1, 30, counter)
+    counts = counter.result()
     assert counts.clean, counts.examples
     assert counts.tried == 30
 
@@ -146,7 +149,9 @@ def test_extreme_flights_are_finite_or_refused():
 def test_fuzz_sees_a_flight_that_fails(driven, monkeypatch):
     changes = {'vehicle': str(driven), 'dives': 0, 'duration_s': DURATION_S}
     monkeypatch.setattr(flights, 'draw_changes', lambda seed, case: changes)
-    counts = flights.fuzz(seed=0, count=1, tell=lambda tried: None)
+    counter = Counter(lambda tried: None)
+    flights.fuzz(0, 1, counter)
+    counts = counter.result()
     assert (counts.wrong, counts.clean) == (1, False)
     assert 'not finite at tick' in counts.examples[0]
 

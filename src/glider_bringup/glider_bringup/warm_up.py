@@ -1,8 +1,14 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles every kernel once, so that the first run does not have to: set-up calls this."""
+"""Compiles every kernel once, so that the first run does not have to: set-up calls this.
+
+By one process a processor: a kernel that another has compiled is read from the cache.
+"""
 
 import tempfile
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -29,28 +35,52 @@ from glider_model.plant.trim import solve_trim
 
 
 def main() -> None:
-    """One tick by the direct engine, one by each block as its node calls it, and a trim."""
+    """Blocks first, which the loop consists of; then what is called on its own; side by side."""
+    with ProcessPoolExecutor(mp_context=get_context('fork')) as pool:
+        list(pool.map(one_tick, range(len(BLOCKS))))
+        list(pool.map(call, (fly_one_tick, score_nothing)))
+        list(pool.map(call, (verify_one_tick, fly_for_notebooks)))
+
+
+def call(task: Callable[[], None]) -> None:
+    """Do one of the tasks below."""
+    task()
+
+
+def one_tick(number: int) -> None:
+    """One tick of a block, as its node calls it, and every order that it takes."""
+    state, params = mission_of(load_scenario())
+    block, own, told = BLOCKS[number], state[number], params[number]
+    inputs = tuple(at_rest(topic) for topic in block.wired.inputs)
+    if block.wired is PLANT.wired:
+        plant_outputs(plant_move(own, inputs, told, TICK_S), told)
+        return
+    moved, _, _ = block.tick(own, 0.0, inputs, told, TICK_S)
+    for order in block.orders:
+        order(moved)
+
+
+def fly_one_tick() -> None:
+    """One tick by the direct engine."""
+    state, params = mission_of(load_scenario())
+    fly(state, params, np.zeros((1, ROW)), TICK_S)
+
+
+def score_nothing() -> None:
+    """Score a flight that has none, make its traces; and a trim."""
     scenario = load_scenario()
-    state, params = mission_of(scenario)
     log = np.zeros((1, ROW))
-    fly(state, params, log, TICK_S)
     scorer = Scorer(SensorSettings(position_std_m=1.0).params(0))
     scorer.add(log)
     scorer.result(Rules())
-    tracer = make_tracer(scenario)
-    tracer.add(log)
+    make_tracer(scenario).add(log)
     halve(np.zeros(4, np.float32))
+    solve_trim(mission_of(scenario)[1].plant.vehicle, 0.4, pitch_deg=-30.0)
 
-    for block, told, own in zip(BLOCKS[1:], params[1:], state[1:], strict=True):
-        inputs = tuple(at_rest(topic) for topic in block.wired.inputs)
-        moved, _, _ = block.tick(own, 0.0, inputs, told, TICK_S)
-        for order in block.orders:
-            order(moved)
-    at_sea = tuple(at_rest(topic) for topic in PLANT.wired.inputs)
-    plant_outputs(plant_move(state.plant, at_sea, params.plant, TICK_S), params.plant)
-    verify_one_tick()
+
+def fly_for_notebooks() -> None:
+    """Fly as a notebook does, and make its dataset."""
     glider_bringup.fly(duration=TICK_S).to_xarray()
-    solve_trim(params.plant.vehicle, 0.4, pitch_deg=-30.0)
 
 
 def verify_one_tick() -> None:

@@ -17,6 +17,7 @@ from mcap.reader import make_reader
 
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.fuzzing import bags, watch
+from glider_bringup.fuzzing.counts import Counter
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.mcap_reader import Bag
@@ -93,8 +94,9 @@ def chunk_places(file: Path) -> list[tuple[int, int]]:
 
 def test_door_of_bags_is_clean():
     told = []
-    found = bags.fuzz(5, 25, told.append)
-    assert found == (25, 0, 0, 0, ())
+    counter = Counter(told.append)
+    bags.fuzz(5, 25, counter)
+    assert counter.result() == (25, 0, 0, 0, ())
     assert told == list(range(1, 26))
 
 

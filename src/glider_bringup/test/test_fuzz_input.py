@@ -2,25 +2,46 @@
 # SPDX-License-Identifier: Apache-2.0
 """``./glider fuzz --only files --only lines``, in little."""
 
+import json
 import random
 
 import pytest
+from typer.testing import CliRunner
 
+from glider_bringup.cli import app
 from glider_bringup.fuzzing import files, lines, watch
-from glider_bringup.fuzzing.counts import Counts
+from glider_bringup.fuzzing.counts import Counter, Counts
 from glider_model.base.errors import ConfigurationError
 
 
-def ignore(tried: int) -> None:
-    """Progress that nobody looks at."""
+@pytest.fixture
+def counter() -> Counter:
+    """Counts, at which nobody looks meanwhile."""
+    return Counter(lambda tried: None)
 
 
-def test_mutated_files_do_no_harm():
-    assert files.fuzz(7, 60, ignore) == Counts(60, 0, 0, 0)
+def test_mutated_files_do_no_harm(counter):
+    files.fuzz(7, 60, counter)
+    assert counter.result() == Counts(60, 0, 0, 0)
 
 
-def test_hostile_command_lines_do_no_harm():
-    assert lines.fuzz(7, 12, ignore) == Counts(12, 0, 0, 0)
+def test_hostile_command_lines_do_no_harm(counter):
+    lines.fuzz(7, 12, counter)
+    assert counter.result() == Counts(12, 0, 0, 0)
+
+
+def test_ctrl_c_prints_what_was_counted(monkeypatch):
+    def fuzz(seed, count, counter):
+        counter.add('one')
+        counter.add('another', 'wrong', 'it was')
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(files, 'fuzz', fuzz)
+    done = CliRunner().invoke(app, ['fuzz', '--only', 'files', '--only', 'lines', '--json'])
+    assert done.exit_code == 130
+    (found,) = json.loads(done.stdout).items()
+    wrong = {'wrong': 1, 'examples': ['wrong: another: it was']}
+    assert found == ('files', {'tried': 2, 'tracebacks': 0, 'hangs': 0, **wrong})
 
 
 def test_shipped_files_are_good():

@@ -15,6 +15,7 @@ import pytest
 from glider_bringup.engines import processes
 from glider_bringup.engines.janitor import SHARED_MEMORY, mapped
 from glider_bringup.fuzzing import kills
+from glider_bringup.fuzzing.counts import Counter
 
 #: A process that maps a segment as Fast DDS does, says so and waits.
 MAP = """
@@ -38,7 +39,9 @@ time.sleep(600)
 
 def test_killed_flights_end_named_and_every_acknowledged_tick_can_be_read(monkeypatch):
     monkeypatch.setattr(kills, 'VICTIMS', ('fork_server', 'recorder_node', kills.ALL))
-    found = kills.fuzz(7, 3, lambda tried: None)
+    counter = Counter(lambda tried: None)
+    kills.fuzz(7, 3, counter)
+    found = counter.result()
     assert (found.tried, found.examples) == (3, ())
     assert found.clean
 

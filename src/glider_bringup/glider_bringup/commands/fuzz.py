@@ -10,7 +10,8 @@ import typer
 from rich.table import Table
 
 from glider_bringup.console import Json, counter, messages, output, picked, repeatable
-from glider_model.base.exits import EXIT_FAILED
+from glider_bringup.fuzzing.counts import Counter
+from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
 
 app = typer.Typer()
 #: Doors, each a module of `glider_bringup.fuzzing`, with the cases tried by default.
@@ -40,18 +41,26 @@ def fuzz(
     """Try the doors of the stack: mutated files, command lines, messages, bags, flights, kills.
 
     Counts tracebacks, hangs (over 10 s) and wrong results given as good ones; exit code 1 if there
-    is any. The same seed tries the same cases.
+    is any. The same seed tries the same cases. Ctrl-C prints what was counted until then.
     """
-    found = {}
-    for door in picked(only, Door):
-        cases = count or COUNTS[door]
-        with counter(door, cases) as update:
-            work = import_module(f'glider_bringup.fuzzing.{door}')
-            found[door] = work.fuzz(seed, cases, update)
+    counts, interrupted = {}, False
+    try:
+        for door in picked(only, Door):
+            cases = count or COUNTS[door]
+            with counter(door, cases) as update:
+                work = import_module(f'glider_bringup.fuzzing.{door}')
+                counts[door] = Counter(update)
+                work.fuzz(seed, cases, counts[door])
+    except KeyboardInterrupt:
+        interrupted = True
+    found = {door: one.result() for door, one in counts.items()}
     if as_json:
         print(json.dumps({door: one._asdict() for door, one in found.items()}))
     else:
         _print(found)
+    if interrupted:
+        messages.print('stopped by SIGINT')
+        raise typer.Exit(EXIT_INTERRUPTED)
     if not all(one.clean for one in found.values()):
         raise typer.Exit(EXIT_FAILED)
 

@@ -19,7 +19,7 @@ from typing import Any
 from mcap.opcode import Opcode
 
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.fuzzing.counts import Counter, Counts, Tell
+from glider_bringup.fuzzing.counts import Counter
 from glider_bringup.fuzzing.watch import outcome_of
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
@@ -63,9 +63,9 @@ _DATA_END = bytes([Opcode.DATA_END]) + (4).to_bytes(8, 'little')
 Answer = tuple[Any, bool]
 
 
-def fuzz(seed: int, count: int, tell: Tell) -> Counts:
+def fuzz(seed: int, count: int, counter: Counter) -> None:
     """Try so many bags; see `glider_bringup.commands.fuzz`."""
-    found, draw = Counter(tell), random.Random(seed)
+    draw = random.Random(seed)
     with tempfile.TemporaryDirectory() as scratch:
         folders = _fly(Path(scratch))
         good = [
@@ -85,8 +85,7 @@ def fuzz(seed: int, count: int, tell: Tell) -> Counts:
                 harmed[bit // 8] ^= 1 << bit % 8
                 how = f'bit {bit % 8} of byte {bit // 8} flipped'
             _bag_of(folder).write_bytes(harmed)
-            found.add(f'{folder.name}, {how}', *_outcome(folder, expected))
-    return found.result()
+            counter.add(f'{folder.name}, {how}', *_outcome(folder, expected))
 
 
 def _outcome(folder: Path, expected: dict[str, Answer]) -> tuple[str, str]:

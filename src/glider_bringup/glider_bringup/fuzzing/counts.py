@@ -30,7 +30,7 @@ class Counts(NamedTuple):
 
 
 class Counter:
-    """Collects the outcomes of cases."""
+    """Collects the outcomes of cases; what there is of them is known at any time."""
 
     def __init__(self, tell: Tell) -> None:
         self._tell = tell

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.fuzzing.counts import Counter, Counts, Tell
+from glider_bringup.fuzzing.counts import Counter
 from glider_bringup.fuzzing.watch import badly_told, outcome_of
 from glider_bringup.mission.scenario import load_scenario, scenario_names, scenario_path
 from glider_bringup.studies.sweep.plan import SWEEP_FOLDER, load_sweep, sweep_names
@@ -214,9 +214,9 @@ def _case(source: _Source, data: bytes, folder: Path) -> tuple[str, str]:
     return ('', '') if good else ('wrong', 'accepted, with numbers that are not finite')
 
 
-def fuzz(seed: int, count: int, tell: Tell) -> Counts:
+def fuzz(seed: int, count: int, counter: Counter) -> None:
     """Give mutated files to what reads them for the command line."""
-    counter, sources = Counter(tell), _sources()
+    sources = _sources()
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         for i in range(count):
@@ -225,4 +225,3 @@ def fuzz(seed: int, count: int, tell: Tell) -> Counts:
             data = mutate(source.data, draw)
             found = outcome_of(partial(_case, source, data, folder))
             counter.add(f'seed {seed}, file {i}, a mutated {source.kind} {source.name}', *found)
-    return counter.result()

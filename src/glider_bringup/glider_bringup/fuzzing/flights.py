@@ -16,7 +16,7 @@ from typing import Any, get_args
 import numpy as np
 import pydantic
 
-from glider_bringup.fuzzing.counts import Counter, Counts, Tell
+from glider_bringup.fuzzing.counts import Counter
 from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.scoring.card import finite, fly_scored, scorecard
@@ -138,9 +138,8 @@ def _fly(changes: dict[str, Any]) -> tuple[str, str]:
     return '', ''
 
 
-def fuzz(seed: int, count: int, tell: Tell) -> Counts:
+def fuzz(seed: int, count: int, counter: Counter) -> None:
     """Fly ``count`` cases; refused before the flight, or finite to its end, is well."""
-    counter = Counter(tell)
     loops = [{'guidance.los.method': method} for method in GUIDANCES]
     loops.append({**RECKONS, 'faults': sample_faults(0, FAULTS, 1.0)})
     flights = [{'control.law': law, **loop} for law, loop in product(LAWS, loops)]
@@ -154,4 +153,3 @@ def fuzz(seed: int, count: int, tell: Tell) -> Counts:
         told = ' '.join(f'--set {name}={value}' for name, value in changes.items())
         outcome, why = outcome_of(partial(_fly, changes), time_limit_after)
         counter.add(f'./glider run --engine direct {told}', outcome, why)
-    return counter.result()

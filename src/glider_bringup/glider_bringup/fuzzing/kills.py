@@ -27,7 +27,7 @@ import numpy as np
 from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive, left_over, mapped
 from glider_bringup.engines.processes import MODULES
-from glider_bringup.fuzzing.counts import HANG_S, Counter, Counts, Tell
+from glider_bringup.fuzzing.counts import HANG_S, Counter
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.nodes.flight_listener import Heard, flight_heard
 from glider_bringup.recording.mcap_reader import Bag
@@ -54,9 +54,8 @@ class _Flight(NamedTuple):
     pids: dict[str, int]  #: of the nodes, and of what has started them
 
 
-def fuzz(seed: int, count: int, tell: Tell) -> Counts:
+def fuzz(seed: int, count: int, counter: Counter) -> None:
     """Fly and kill; see `glider_bringup.commands.fuzz`."""
-    found = Counter(tell)
     for i in range(count):
         victim = VICTIMS[i % len(VICTIMS)]
         tick = random.Random(f'{seed} {i}').randrange(TICKS - SPARED)
@@ -65,8 +64,7 @@ def fuzz(seed: int, count: int, tell: Tell) -> Counts:
                 outcome = _case(victim, tick, Path(scratch) / 'run', domain)
             except Exception as error:
                 outcome = 'tracebacks', f'{type(error).__name__}: {error}'
-        found.add(f'seed {seed}, {victim} at tick {tick}', *outcome)
-    return found.result()
+        counter.add(f'seed {seed}, {victim} at tick {tick}', *outcome)
 
 
 def _case(victim: str, tick: int, folder: Path, domain: int) -> tuple[str, str]:

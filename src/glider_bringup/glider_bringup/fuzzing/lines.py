@@ -20,7 +20,7 @@ from pathlib import Path
 
 import typer
 
-from glider_bringup.fuzzing.counts import Counter, Counts, Tell
+from glider_bringup.fuzzing.counts import Counter
 from glider_bringup.fuzzing.files import SCALARS
 from glider_bringup.fuzzing.watch import badly_told, outcome_of
 
@@ -169,9 +169,8 @@ def _prepare(folder: Path) -> None:
         raise RuntimeError(f'the flight to try commands on has failed: {why}')
 
 
-def fuzz(seed: int, count: int, tell: Tell) -> Counts:
+def fuzz(seed: int, count: int, counter: Counter) -> None:
     """Run hostile command lines."""
-    counter = Counter(tell)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         _prepare(folder)
@@ -180,4 +179,3 @@ def fuzz(seed: int, count: int, tell: Tell) -> Counts:
             shown = shlex.join(word[:100] for word in words)
             case = f'seed {seed}, line {i}: ./glider {shown}'.encode('ascii', 'backslashreplace')
             counter.add(case.decode(), *outcome_of(partial(_case, words, folder)))
-    return counter.result()

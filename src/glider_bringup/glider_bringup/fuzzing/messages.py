@@ -15,7 +15,7 @@ import numpy as np
 from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import MissionParams, MissionState, fly
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.fuzzing.counts import Counter, Counts, Tell
+from glider_bringup.fuzzing.counts import Counter
 from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission.scenario import load_scenario
 from glider_control.control import control_step
@@ -166,9 +166,8 @@ def _try(draw: np.random.Generator, scene: Scene, name: str, mutate) -> tuple[st
     return '', ''
 
 
-def fuzz(seed: int, count: int, tell: Tell) -> Counts:
+def fuzz(seed: int, count: int, counter: Counter) -> None:
     """Send ``count`` messages; refused, or answered within all limits, is well."""
-    counter = Counter(tell)
     scenes = {name: make_scene(name) for name in SCENES}
     _outputs(scenes['pid'], 'odom', scenes['pid'].wires['odom'])  # loads the kernels
     for case in range(count):
@@ -179,4 +178,3 @@ def fuzz(seed: int, count: int, tell: Tell) -> Counts:
         outcome, why = outcome_of(attempt, time_limit_after)
         case_text = f'seed {seed}, case {case}: {name}{mutate.__name__.replace("_", " ")}, {scene}'
         counter.add(case_text, outcome, why)
-    return counter.result()
