@@ -26,6 +26,8 @@ segment = mmap.mmap(file, 4096)
 print('mapped', flush=True)
 time.sleep(600)
 """
+#: The same for a process that takes its time to begin, as on a busy machine.
+MAP_LATE = "import time; print('begins', flush=True); time.sleep(6.0)" + MAP
 #: A runner: it lets the janitor watch over a process, and waits.
 WATCH = """
 import sys, time
@@ -104,13 +106,19 @@ def wait_until_gone(path: str) -> None:
         time.sleep(0.02)
 
 
-def test_segment_of_processes_that_were_killed_with_their_runner_is_removed(segment, start):
-    process = start(MAP, segment)
+@pytest.mark.parametrize('source', [MAP, MAP_LATE], ids=['early', 'late'])
+def test_segment_of_processes_that_were_killed_with_their_runner_is_removed(
+    segment, start, source
+):
+    process = start(source, segment)
     open(f'{segment}_el', 'w').close()
     runner = start(WATCH, str(process.pid))
-    assert os.path.basename(segment) in mapped(process.pid)
+    deadline_s = time.monotonic() + 10.0
+    while os.path.basename(segment) not in mapped(process.pid):
+        assert time.monotonic() < deadline_s
+        time.sleep(0.02)
     time.sleep(1.0)  # the janitor looks five times a second
-    for one in (runner, process):
+    for one in (process, runner):
         one.send_signal(signal.SIGKILL)
         one.wait()
     wait_until_gone(segment)

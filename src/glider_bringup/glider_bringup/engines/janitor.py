@@ -29,8 +29,11 @@ _PORT = re.compile('fastrtps_port[0-9]+')
 #: What a port that is ready has as its first number (boost::interprocess), and how long (s) it may
 #: take from the beginning to there: it takes microseconds.
 _READY, _MAKING_S = 2, 1.0
-#: How often it looks (s): as long as segments are made, and once nothing is new for this long.
-_OFTEN_S, _SELDOM_S, _SETTLED_S = 0.2, 5.0, 3.0
+#: How often it looks (s): as long as segments are made, and later.
+_OFTEN_S, _SELDOM_S = 0.2, 5.0
+#: Nothing is new for this long (s): when there is a segment for each process, as there has to be,
+#: and when there is not, on a busy machine or because they have none.
+_SETTLED_S, _NO_MORE_S = 3.0, 60.0
 #: How long it waits for processes to be gone (s): a recorder may complete its file.
 _PATIENCE_S = 30.0
 
@@ -107,7 +110,8 @@ def main() -> None:
     pids, names, rest = set(), set(), b''
     new_s = time.monotonic()
     while True:
-        is_settled = time.monotonic() - new_s > _SETTLED_S
+        settled_s = _SETTLED_S if len(names) >= len(pids) else _NO_MORE_S
+        is_settled = time.monotonic() - new_s > settled_s
         ready, _, _ = select.select([0], [], [], _SELDOM_S if is_settled else _OFTEN_S)
         data = os.read(0, 4096) if ready else None
         if data == b'':
