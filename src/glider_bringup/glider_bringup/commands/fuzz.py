@@ -4,13 +4,13 @@
 
 import json
 from importlib import import_module
+from types import ModuleType
 from typing import Annotated, Literal
 
 import typer
 from rich.table import Table
 
 from glider_bringup.console import Json, counter, messages, output, picked, repeatable
-from glider_bringup.fuzzing.counts import Counter
 from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
 
 app = typer.Typer()
@@ -48,9 +48,8 @@ def fuzz(
         for door in picked(only, Door):
             cases = count or COUNTS[door]
             with counter(door, cases) as update:
-                work = import_module(f'glider_bringup.fuzzing.{door}')
-                counts[door] = Counter(update)
-                work.fuzz(seed, cases, counts[door])
+                counts[door] = _fuzzing('counts').Counter(update)
+                _fuzzing(door).fuzz(seed, cases, counts[door])
     except KeyboardInterrupt:
         interrupted = True
     found = {door: one.result() for door, one in counts.items()}
@@ -63,6 +62,11 @@ def fuzz(
         raise typer.Exit(EXIT_INTERRUPTED)
     if not all(one.clean for one in found.values()):
         raise typer.Exit(EXIT_FAILED)
+
+
+def _fuzzing(name: str) -> ModuleType:
+    """Module of the room that tries commands too, which therefore stands above them."""
+    return import_module(f'glider_bringup.fuzzing.{name}')
 
 
 def _print(found: dict) -> None:
