@@ -31,8 +31,8 @@ _PORT = re.compile('fastrtps_port[0-9]+')
 _READY, _MAKING_S = 2, 1.0
 #: How often it looks (s): as long as segments are made, and later.
 _OFTEN_S, _SELDOM_S = 0.2, 5.0
-#: Nothing is new for this long (s): when there is a segment for each process, as there has to be,
-#: and when there is not, on a busy machine or because they have none.
+#: Nothing is new for this long (s): once every process has a segment, which its own is the first
+#: of, and before, on a busy machine or because they need none.
 _SETTLED_S, _NO_MORE_S = 3.0, 60.0
 #: How long it waits for processes to be gone (s): a recorder may complete its file.
 _PATIENCE_S = 30.0
@@ -107,26 +107,32 @@ def main() -> None:
     if os.fork():
         os._exit(0)
     os.setsid()
-    pids, names, rest = set(), set(), b''
-    new_s = time.monotonic()
+    found: dict[int, set[str]] = {}  # segments by process
+    new_s, rest = time.monotonic(), b''
     while True:
-        settled_s = _SETTLED_S if len(names) >= len(pids) else _NO_MORE_S
+        settled_s = _SETTLED_S if all(found.values()) else _NO_MORE_S
         is_settled = time.monotonic() - new_s > settled_s
         ready, _, _ = select.select([0], [], [], _SELDOM_S if is_settled else _OFTEN_S)
         data = os.read(0, 4096) if ready else None
         if data == b'':
             break
         *lines, rest = (rest + (data or b'')).split(b'\n')
-        before = len(pids) + len(names)
-        pids.update(map(int, lines))
-        names.update(*map(mapped, pids))
-        if len(pids) + len(names) > before:
+        found |= {int(line): set() for line in lines}
+        if _look(found) or lines:
             new_s = time.monotonic()
     deadline_s = time.monotonic() + _PATIENCE_S
-    while any(map(is_alive, pids)) and time.monotonic() < deadline_s:
-        names.update(*map(mapped, pids))
+    while any(map(is_alive, found)) and time.monotonic() < deadline_s:
+        _look(found)
         time.sleep(_OFTEN_S)
-    remove(left_over(names) | half_made())
+    remove(left_over(set().union(*found.values())) | half_made())
+
+
+def _look(found: dict[int, set[str]]) -> bool:
+    """Add what each process has mapped by now; whether anything is new."""
+    before = sum(map(len, found.values()))
+    for pid, names in found.items():
+        names |= mapped(pid)
+    return sum(map(len, found.values())) > before
 
 
 if __name__ == '__main__':
