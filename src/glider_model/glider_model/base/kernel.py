@@ -9,6 +9,7 @@ whose kernels call each other, those of other distributions that fill a slot amo
 of them and everything is compiled afresh.
 """
 
+import fcntl
 import hashlib
 import importlib.util
 import os
@@ -19,6 +20,7 @@ from pathlib import Path
 
 import numba
 from numba.core import event
+from numba.core.caching import FunctionCache
 
 from glider_model.base.plugins import registered, sources
 
@@ -58,10 +60,33 @@ def cache_folder() -> Path:
 if not os.environ.get('NUMBA_CACHE_DIR'):
     numba.config.CACHE_DIR = str(cache_folder())
 
-#: Compiles a pure function. No fastmath: IEEE arithmetic in source order is what makes a run over
-#: topics and a direct run agree to the last bit. Inlined into its callers: a NamedTuple would
-#: otherwise be copied number by number at every call.
-kernel = numba.njit(cache=True, error_model='numpy', forceinline=True)
+
+class _Cache(FunctionCache):
+    """numba's cache of a function, which one process at a time adds to.
+
+    numba looks for a free name, writes the index and then the file. Two processes that compile a
+    function for different types at the same time would give their code the same name, and one of
+    them would later run that of the other.
+    """
+
+    def save_overload(self, sig, data) -> None:
+        """Save what was compiled for a signature."""
+        os.makedirs(self.cache_path, exist_ok=True)
+        with open(os.path.join(self.cache_path, 'lock'), 'w') as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            super().save_overload(sig, data)
+
+
+def kernel(function: Callable) -> numba.core.dispatcher.Dispatcher:
+    """Compile a pure function, when it is called first.
+
+    No fastmath: IEEE arithmetic in source order is what makes a run over topics and a direct run
+    agree to the last bit. Inlined into its callers: a NamedTuple would otherwise be copied number
+    by number at every call.
+    """
+    compiled = numba.njit(error_model='numpy', forceinline=True)(function)
+    compiled._cache = _Cache(function)  # as its enable_caching() does
+    return compiled
 
 
 class _Once(event.Listener):
