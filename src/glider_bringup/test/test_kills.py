@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -28,6 +29,19 @@ time.sleep(600)
 """
 #: The same for a process that takes its time to begin, as on a busy machine.
 MAP_LATE = "import time; print('begins', flush=True); time.sleep(6.0)" + MAP
+#: A process that has a segment and its lock, and then no first thread any more, but another one.
+HEADLESS = """
+import ctypes, fcntl, mmap, os, sys, threading, time
+file = os.open(sys.argv[1], os.O_RDWR | os.O_CREAT)
+os.truncate(file, 4096)
+segment = mmap.mmap(file, 4096)
+lock = os.open(sys.argv[1] + '_el', os.O_RDWR | os.O_CREAT)
+fcntl.flock(lock, fcntl.LOCK_EX)
+threading.Thread(target=time.sleep, args=[600]).start()
+print('mapped', flush=True)
+time.sleep(3.0)
+ctypes.CDLL(None).pthread_exit(None)
+"""
 #: A runner: it lets the janitor watch over a process, and waits.
 WATCH = """
 import sys, time
@@ -123,6 +137,23 @@ def test_segment_of_processes_that_were_killed_with_their_runner_is_removed(
         one.wait()
     wait_until_gone(segment)
     wait_until_gone(f'{segment}_el')
+
+
+def test_segment_of_a_process_that_is_not_wholly_gone_is_removed_once_it_is(segment, start):
+    """One that is killed may lose its first thread before those that have its locks."""
+    process = start(HEADLESS, segment)
+    runner = start(WATCH, str(process.pid))
+    deadline_s = time.monotonic() + 10.0
+    while ') Z ' not in Path(f'/proc/{process.pid}/stat').read_text():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.02)
+    runner.kill()
+    runner.wait()
+    time.sleep(1.0)
+    assert os.path.exists(segment)
+    process.kill()
+    process.wait()
+    wait_until_gone(segment)
 
 
 def test_segment_that_somebody_else_has_stays(segment, start):

@@ -48,10 +48,15 @@ def mapped(pid: int) -> set[str]:
 
 
 def is_alive(pid: int) -> bool:
-    """Whether a process is there and no zombie."""
+    """Whether a process, or a thread of it, is there and no zombie.
+
+    The first thread of a process that is killed may be gone before the others, which have its
+    files and its locks for a moment yet.
+    """
     try:
         with open(f'/proc/{pid}/stat', encoding='utf-8', errors='replace') as stat:
-            return stat.read().rpartition(')')[2].split()[0] not in 'ZX'
+            state = stat.read().rpartition(')')[2].split()[0]
+        return state not in 'ZX' or len(os.listdir(f'/proc/{pid}/task')) > 1
     except OSError:
         return False
 
