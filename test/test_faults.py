@@ -133,13 +133,10 @@ def lacking_when_cut(culprit: str = '') -> dict[str, int]:
     Some nodes have answered the last tick, and others have not: one. Of a node that ended in the
     middle of a tick, what the others wait for may have reached them, but not the recorder, and the
     rest was never published. Then they begin the next tick, which this node does not answer: its
-    topics lack two. The plant does not answer ticks, it begins them: one. With the process that
-    has started them, they all end in the middle of a tick.
+    topics lack two. The plant does not answer ticks, it begins them: one.
     """
     return {
-        topic.full_name('/glider'): 2
-        if topic.publisher != PLANT and culprit in (topic.publisher, FORK_SERVER)
-        else 1
+        topic.full_name('/glider'): 2 if topic.publisher == culprit != PLANT else 1
         for topic in recorded_topics(['measured_odom'])
         if topic.per_tick
     }
