@@ -6,8 +6,8 @@ By one process a processor: a kernel that another has compiled is read from the 
 """
 
 import tempfile
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -37,14 +37,10 @@ from glider_model.plant.trim import solve_trim
 def main() -> None:
     """Blocks first, which the loop consists of; then what is called on its own; side by side."""
     with ProcessPoolExecutor(mp_context=get_context('fork')) as pool:
-        list(pool.map(one_tick, range(len(BLOCKS))))
-        list(pool.map(call, (fly_one_tick, score_nothing)))
-        list(pool.map(call, (verify_one_tick, fly_for_notebooks)))
-
-
-def call(task: Callable[[], None]) -> None:
-    """Do one of the tasks below."""
-    task()
+        blocks = [partial(one_tick, number) for number in range(len(BLOCKS))]
+        for tasks in (blocks, (fly_one_tick, score_nothing), (verify_one_tick, fly_for_notebooks)):
+            for future in [pool.submit(task) for task in tasks]:
+                future.result()
 
 
 def one_tick(number: int) -> None:

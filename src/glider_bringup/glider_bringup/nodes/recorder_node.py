@@ -35,6 +35,8 @@ from glider_model.ros.wire.topics import TOPICS, recorded_topics
 
 _DRAIN_S = 0.02
 _PROGRESS_S = 0.25
+#: Told to stop, it does once nothing has come for this long, or at the latest (s).
+_QUIET_S, _LATEST_S = 0.2, 1.0
 
 
 class RecorderSettings(Settings):
@@ -81,7 +83,8 @@ class RecorderNode(TickNode):
         self.heard: Counter[str] = Counter()  #: events by the node that told of them
         self.settled_ns: dict[str, int] = {}  #: newest tick of which a node's events are all here
         self.final_ns: int | None = None
-        self.stopped = False
+        self.stopped_s: float | None = None  #: when it was told to stop
+        self.came_s = 0.0  #: when the newest message came
         self.begun = False
         self.progress_s = 0.0
         place = self.get_namespace().rstrip('/')
@@ -111,8 +114,8 @@ class RecorderNode(TickNode):
         return item
 
     def on_signal(self, number, frame) -> None:
-        """Remember to stop; `drain` does it, with everything that has come."""
-        self.stopped = True
+        """Remember to stop; `drain` does it, with everything that is under way."""
+        self.stopped_s = self.stopped_s or time.monotonic()
 
     def unmatched(self) -> list[str]:
         """What is missing; the path is part of it, so that it is recorded first.
@@ -207,6 +210,7 @@ class RecorderNode(TickNode):
         for item in self.inputs if self.running else ():
             while (taken := take_with_info(item.subscription)) is not None:
                 self.keep(item, *taken)
+                self.came_s = time.monotonic()
         for subscription, hear in ((self.counts, self.on_count), (self.events, self.on_event)):
             while (array := take(subscription)) is not None:
                 hear(array)
@@ -216,8 +220,18 @@ class RecorderNode(TickNode):
             raise Stop(EXIT_FAILED, str(error)) from None
         if self.last_odom and time.monotonic() - self.progress_s > _PROGRESS_S:
             self.print_progress()
-        if self.stopped or (self.final_ns is not None and self.order.written_ns >= self.final_ns):
+        if self.is_stopped() or (
+            self.final_ns is not None and self.order.written_ns >= self.final_ns
+        ):
             raise Stop(0)
+
+    def is_stopped(self) -> bool:
+        """Whether it was told to stop, and what nodes said that are dead by now has come."""
+        if self.stopped_s is None:
+            return False
+        now_s = time.monotonic()
+        quiet_s = now_s - max(self.came_s, self.stopped_s)
+        return quiet_s > _QUIET_S or now_s - self.stopped_s > _LATEST_S
 
     def save(self) -> None:
         """Write what has come as far as it is complete, and let the plant go on."""
