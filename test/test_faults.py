@@ -175,6 +175,15 @@ def test_killed_node_ends_the_run_and_is_named(flying, name):
     check_complete(flying, card, name)
 
 
+def test_what_a_node_said_before_it_was_killed_is_recorded_by_a_recorder_that_lags(flying):
+    os.kill(flying.nodes['recorder_node'], signal.SIGSTOP)
+    time.sleep(0.3)  # in which the others fly as far as they may: hundreds of messages
+    os.kill(flying.nodes['guidance_node'], signal.SIGKILL)
+    os.kill(flying.nodes['recorder_node'], signal.SIGCONT)
+    _, card = flying.end()
+    check_complete(flying, card, 'guidance_node')
+
+
 def test_killed_recorder_ends_the_run_and_leaves_what_was_on_disk(flying):
     on_disk = flying.recording.stat().st_size
     os.kill(flying.nodes['recorder_node'], signal.SIGKILL)

@@ -59,9 +59,9 @@ def rights(node: str) -> dict[str, set[str]]:
     if node == GUIDANCE:
         publish.add('path')
     if node == PLANT:
-        subscribe.add('recorded')
+        subscribe |= {'recorded', 'heard'}
     if node == RECORDER:
-        publish.add('recorded')
+        publish |= {'recorded', 'heard'}
         subscribe.add('told')
         subscribe |= {topic.name for topic in TOPICS.values() if topic.recorded}
     return {

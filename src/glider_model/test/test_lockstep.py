@@ -251,19 +251,27 @@ def test_a_plant_of_a_second_glider_does_not_end_the_run(make_graph, context, is
 
 
 class Recorder(StepNode):
-    """Stands in for the recorder: takes nothing, and says what it has on disk when it is told."""
+    """Stands in for the recorder: takes nothing, and says what it has when it is told."""
 
     def __init__(self, **kwargs) -> None:
         super().__init__(RECORDER, **kwargs)
         for topic in TOPICS.values():
             if topic.recorded:
                 self._subscription(topic, lambda raw: None, gated=False)
-        self.recorded = self._publisher(TOPICS['recorded'])
-        self.outputs['recorded'] = (TOPICS['recorded'], self.recorded)
+        for name in MAX_TICKS_AHEAD:
+            self.outputs[name] = (TOPICS[name], self._publisher(TOPICS[name]))
         self.start_up()
 
+    def say(self, name: str, tick: int, process: str) -> None:
+        """Say how far a recorder is."""
+        header = Header(frame_id=process)
+        header.stamp.sec, header.stamp.nanosec = divmod(tick * TICK_NS, 1_000_000_000)
+        topic, publisher = self.outputs[name]
+        publisher.publish(header)
 
-def test_only_its_own_recorder_lets_the_plant_go_on(make_graph, context):
+
+@pytest.mark.parametrize('name', MAX_TICKS_AHEAD)
+def test_only_its_own_recorder_lets_the_plant_go_on(make_graph, context, name):
     parameters = {'record': True, 'tick_timeout_s': 30.0}
     graph = make_graph(last_tick=10**9, **parameters)
     recorder = Recorder(
@@ -274,16 +282,17 @@ def test_only_its_own_recorder_lets_the_plant_go_on(make_graph, context):
     )
     graph.nodes.append(recorder)
     graph.executor.add_node(recorder)
-    assert graph.spin(lambda: graph.plant.tick == MAX_TICKS_AHEAD) is None
-    on_disk = Header(frame_id='another')
-    on_disk.stamp.sec = 10
-    recorder.recorded.publish(on_disk)
+    ahead = MAX_TICKS_AHEAD[name]
+    (other,) = {*MAX_TICKS_AHEAD} - {name}
+    assert graph.spin(lambda: graph.plant.tick == min(MAX_TICKS_AHEAD.values())) is None
+    recorder.say(other, 10_000, recorder.process)
+    assert graph.spin(lambda: graph.plant.tick == ahead) is None
+    recorder.say(name, 100, 'another')
     until = time.monotonic() + 1.0
     assert graph.spin(lambda: time.monotonic() > until) is None
-    assert graph.plant.tick == MAX_TICKS_AHEAD
-    on_disk.frame_id = recorder.process
-    recorder.recorded.publish(on_disk)
-    assert graph.spin(lambda: graph.plant.tick == MAX_TICKS_AHEAD + 101) is None
+    assert graph.plant.tick == ahead
+    recorder.say(name, 100, recorder.process)
+    assert graph.spin(lambda: graph.plant.tick == ahead + 101) is None
 
 
 INTERRUPTED = """

@@ -33,7 +33,7 @@ from glider_model.ros.wire import qos, topics
 from glider_model.ros.wire.codec import MessageError, to_cdr
 from glider_model.ros.wire.topics import TOPICS, recorded_topics
 
-_DRAIN_S = 0.02
+_DRAIN_S = 0.01
 _PROGRESS_S = 0.25
 #: Told to stop, it does once nothing has come for this long, or at the latest (s).
 _QUIET_S, _LATEST_S = 0.2, 1.0
@@ -77,6 +77,7 @@ class RecorderNode(TickNode):
             raise ConfigurationError(f'{error.filename}: {error.strerror}') from None
         self.order = TickSorter(per_tick, TICK_NS, self.bag.write)
         self.recorded_ns = -TICK_NS  #: newest tick that outlives this process
+        self.heard_ns = -TICK_NS  #: newest tick of which it has said that all messages are here
         self.has_path = self.replayed = False
         self.stage, self.last_odom, self.newest_ns, self.depth_m = '', b'', 0, 0.0
         self.end: tuple[int, bytes] | None = None  #: what the plant said last
@@ -96,8 +97,8 @@ class RecorderNode(TickNode):
         self.events = self._subscription(TOPICS['/diagnostics'], self.on_event, raw=False)
         self.counts = self._subscription(TOPICS['told'], self.on_count, raw=False)
         self.counted: dict[str, health.Told] = {}
-        self.recorded = self._publisher(TOPICS['recorded'])
-        self.outputs['recorded'] = (TOPICS['recorded'], self.recorded)
+        self.words = {name: self._publisher(TOPICS[name]) for name in ('recorded', 'heard')}
+        self.outputs |= {name: (TOPICS[name], word) for name, word in self.words.items()}
         signal.signal(signal.SIGINT, self.on_signal)
         signal.signal(signal.SIGTERM, self.on_signal)
         self.wall_timer(_DRAIN_S, self.drain)
@@ -238,8 +239,12 @@ class RecorderNode(TickNode):
         if not self.ticks.lockstep:
             self.order.write_rest()
             self.bag.flush()
-        elif self.order.write_complete(self.end_tick, self.whole_ns()):
-            self.publish_recorded()
+            return
+        if self.order.heard_ns > self.heard_ns:
+            self.heard_ns = self.order.heard_ns
+            self.say('heard', self.heard_ns)
+        if self.order.write_complete(self.end_tick, self.whole_ns()):
+            self.say('recorded', self.recorded_ns)
 
     def whole_ns(self) -> int:
         """Newest tick of which no event is under way any more: all who tell have counted them."""
@@ -256,11 +261,11 @@ class RecorderNode(TickNode):
         self.recorded_ns = stamp_ns
         return True
 
-    def publish_recorded(self) -> None:
+    def say(self, name: str, stamp_ns: int) -> None:
         """Let the plant go on."""
         header = Header(frame_id=self.process)
-        header.stamp.sec, header.stamp.nanosec = divmod(self.recorded_ns, 1_000_000_000)
-        self.recorded.publish(header)
+        header.stamp.sec, header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
+        self.words[name].publish(header)
 
     def print_progress(self, **more) -> None:
         """Print one JSON line for whoever started this process."""

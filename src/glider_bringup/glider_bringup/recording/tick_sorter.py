@@ -43,6 +43,12 @@ class TickSorter:
         self._newest_ns[topic] = stamp_ns
         self._queues[topic].append((stamp_ns, payload))
 
+    @property
+    def heard_ns(self) -> int:
+        """Stamp of the newest tick of which every per-tick message has come."""
+        newest = (self._newest_ns.get(name, -self._period_ns) for name in self._queues)
+        return min(newest)
+
     def add_event(self, topic: str, stamp_ns: int, payload: bytes) -> None:
         """Take a message that belongs to a tick, but does not come with every tick."""
         self._events.append((stamp_ns, topic, payload))

@@ -269,7 +269,7 @@ class _Brake:
         """Wait until the recorder is not too far behind."""
         if self._recorded_ns is None:
             self._recorded_ns = log_ns
-        while self._whole and log_ns - self._recorded_ns > MAX_TICKS_AHEAD * TICK_NS:
+        while self._whole and log_ns - self._recorded_ns > MAX_TICKS_AHEAD['recorded'] * TICK_NS:
             message = take(self._subscription)
             if message is not None:
                 self._recorded_ns = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec

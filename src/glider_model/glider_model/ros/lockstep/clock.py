@@ -7,8 +7,10 @@ there. That is the plant; a replay could do the same.
 """
 
 import time
+from functools import partial
 
 from pydantic import Field
+from rclpy.subscription import Subscription
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
@@ -24,8 +26,11 @@ from glider_model.ros.lockstep.process import Stop
 from glider_model.ros.wire import topics
 from glider_model.ros.wire.topics import TOPICS
 
-#: The plant is never more than this many ticks ahead of what the recorder has on disk.
-MAX_TICKS_AHEAD = 256
+#: The plant is never more than this many ticks ahead of what the recorder has on disk, or of what
+#: has come to it. What is on its way to a process waits in a queue of 512 messages (Fast DDS:
+#: port_queue_capacity), 22 of which are a tick at most. More would be dropped and sent again, but
+#: not by a node that is killed: what it had said would be lost with it.
+MAX_TICKS_AHEAD = {'recorded': 256, 'heard': 20}
 
 #: Nodes of a run that is just over are out of sight within this time (s).
 _RIVALS_LEAVE_S = 5.0
@@ -37,6 +42,18 @@ class ClockSettings(TickSettings):
     speed: float = Field(
         0.0, ge=0.0, le=1e6, description='times real time; 0.0: as fast as possible'
     )
+
+
+class _Lead:
+    """How far the plant is ahead of what the recorder says on a topic."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.said_ns = name, -TICK_NS
+        self.subscription: Subscription | None = None
+
+    def is_too_long(self, tick: int) -> bool:
+        """Whether a tick has to wait for the recorder."""
+        return self.said_ns < (tick - MAX_TICKS_AHEAD[self.name]) * TICK_NS
 
 
 class _Pace:
@@ -70,16 +87,18 @@ class ClockNode(TickNode):
         super().__init__(name, **kwargs)
         self.tick = 0
         self._published = -1
-        self._recorded_ns = -TICK_NS
         self._paused = False
         self._pace = _Pace(self.ticks.speed)
         self._pace_timer = self.wall_timer(1.0, self._on_pace)
         self._pace_timer.cancel()
         self._clock_started_s = time.monotonic()
-        self._recorded = None
-        self._held = False
-        if self.ticks.record:
-            self._recorded = self._subscription(TOPICS['recorded'], self._on_recorded, raw=False)
+        self._leads: list[_Lead] = []
+        self._held_by: _Lead | None = None
+        for name in MAX_TICKS_AHEAD if self.ticks.record else ():
+            lead = _Lead(name)
+            hear = partial(self._on_recorder, lead)
+            lead.subscription = self._subscription(TOPICS[name], hear, raw=False)
+            self._leads.append(lead)
         self.create_service(SetBool, 'pause', self._on_pause)
 
     # ------------------------------------------------------------------ for subclasses
@@ -164,9 +183,9 @@ class ClockNode(TickNode):
         if self._paused or self._published == self.tick:
             return
         if self.ticks.lockstep:
-            if self._recorded is not None and self._is_ahead():
-                self._held = True
-                self.gate.awaited.add(self._recorded)
+            self._held_by = next((lead for lead in self._leads if self._is_ahead(lead)), None)
+            if self._held_by is not None:
+                self.gate.awaited.add(self._held_by.subscription)
                 return
             wait_s = self._pace.wait_s(self.tick)
             if wait_s > 0.0:
@@ -191,22 +210,21 @@ class ClockNode(TickNode):
         hidden = [f'/clock is published by {name} too'] if answered and self.ticks.lockstep else []
         return super().rivals() or hidden
 
-    def _is_ahead(self) -> bool:
-        limit_ns = (self.tick - MAX_TICKS_AHEAD) * TICK_NS
-        while self._recorded_ns < limit_ns and (message := take(self._recorded)) is not None:
-            self._keep_recorded(message)
-        return self._recorded_ns < limit_ns
+    def _is_ahead(self, lead: _Lead) -> bool:
+        while lead.is_too_long(self.tick) and (message := take(lead.subscription)) is not None:
+            self._keep_said(lead, message)
+        return lead.is_too_long(self.tick)
 
-    def _keep_recorded(self, message: Header) -> None:
+    def _keep_said(self, lead: _Lead, message: Header) -> None:
         recorder = self.reports.get(topics.RECORDER)
         if recorder is None or message.frame_id != recorder.process:
             return  # of the recorder of a second glider
-        self._recorded_ns = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
+        lead.said_ns = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
 
-    def _on_recorded(self, message: Header) -> None:
-        self._keep_recorded(message)
-        self.gate.awaited.discard(self._recorded)
-        self._held = False
+    def _on_recorder(self, lead: _Lead, message: Header) -> None:
+        self._keep_said(lead, message)
+        self.gate.awaited.discard(lead.subscription)
+        self._held_by = None
         self._release()
 
     def _on_pause(self, request, response):
@@ -233,7 +251,7 @@ class ClockNode(TickNode):
 
     def watch_tick(self) -> None:
         """End the run, and name the culprit, if a tick takes too long."""
-        waits_for_time = self._published != self.tick and not self._held
+        waits_for_time = self._published != self.tick and self._held_by is None
         if self._paused or waits_for_time:
             self._wait.begin_at_next_look()
         elif self._wait.stuck_s(self._due_ns) > self.ticks.tick_timeout_s:
@@ -241,10 +259,11 @@ class ClockNode(TickNode):
 
     def _blame(self) -> str:
         """Find the node at which the tick hangs, by following who waits for whom."""
-        if self._held:
+        if self._held_by is not None:
+            what = {'recorded': 'has nothing on disk', 'heard': 'has not heard everything'}
             return (
-                f'{topics.RECORDER} has nothing on disk after {seconds(self._recorded_ns)}; '
-                f'the run waits at {seconds(self._due_ns)}'
+                f'{topics.RECORDER} {what[self._held_by.name]} after '
+                f'{seconds(self._held_by.said_ns)}; the run waits at {seconds(self._due_ns)}'
             )
         missing = [item for item in self.inputs if not self._has(item)]
         if not missing:

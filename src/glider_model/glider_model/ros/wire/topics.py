@@ -101,6 +101,7 @@ TOPICS = {
         Topic('lockstep', DiagnosticArray, 'all', qos=qos.EVENTS, recorded=False),
         Topic('told', DiagnosticArray, 'all', qos=qos.EVENTS, recorded=False),
         Topic('recorded', Header, RECORDER, (PLANT,), recorded=False),
+        Topic('heard', Header, RECORDER, (PLANT,), recorded=False),
     )
 }
 
