@@ -14,7 +14,7 @@ import yaml
 from mcap.reader import make_reader
 
 from glider_bringup.blocks import COLUMNS
-from glider_bringup.engines.processes import MODULES, node_commands, run_nodes
+from glider_bringup.engines.processes import MODULES, RECORDER, node_commands, run_nodes
 from glider_bringup.mission.run_folder import PARAMETERS_FILE
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros.recorded_log import RecordedLog
@@ -57,6 +57,22 @@ from glider_model.ros.lockstep import executor
 sys.modules[name] = internals
 assert not executor.can_take() and not executor.can_wait()
 runpy.run_module(sys.argv.pop(1), run_name='__main__', alter_sys=True)
+"""
+
+#: A recorder that does not get the processor for a second after it has said that it is ready.
+SLOW_RECORDER = """
+import sys, time
+from glider_bringup.nodes import recorder_node
+from glider_model.ros.lockstep.health import READY
+
+class SlowRecorder(recorder_node.RecorderNode):
+    def report(self, phase, *args, **fields):
+        super().report(phase, *args, **fields)
+        if phase == READY:
+            time.sleep(1.0)
+
+recorder_node.RecorderNode = SlowRecorder
+sys.exit(recorder_node.main())
 """
 
 
@@ -174,20 +190,41 @@ def test_payloads_are_the_same_without_the_internals_of_rclpy(glider, over_nodes
         *('--duration', 100, '--out', tmp_path / 'direct'),
     )
     assert done.returncode == 0, done.stderr
-    public = tmp_path / 'public'
-    public.mkdir()
-    parameters = yaml.safe_load((over_nodes.folder / PARAMETERS_FILE).read_text())
-    parameters['/glider/plant_node']['ros__parameters']['duration_s'] = 100.0
-    parameters['/glider/guidance_node']['ros__parameters']['duration_s'] = 100.0
-    parameters['/glider/recorder_node']['ros__parameters']['folder'] = str(public)
-    (public / PARAMETERS_FILE).write_text(yaml.safe_dump(parameters))
-    commands = {
-        name: [sys.executable, '-c', WITHOUT_INTERNALS, MODULES[name], *command[3:]]
-        for name, command in node_commands(public / PARAMETERS_FILE).items()
-    }
-    result = run_nodes(commands, public / 'log.txt')
-    assert (result.status, result.reason) == ('completed', '')
-    assert result.progress['lost'] == 0
-    flown = digests(public)
+    flown = flown_by(
+        over_nodes.folder,
+        tmp_path / 'public',
+        100.0,
+        lambda name: ['-c', WITHOUT_INTERNALS, MODULES[name]],
+    )
     assert flown == digests(tmp_path / 'direct')
     assert all(count == 1000 for count, _ in flown.values())
+
+
+def test_first_ticks_are_recorded_though_the_recorder_is_slow(over_nodes, tmp_path):
+    slow = {RECORDER: ['-c', SLOW_RECORDER]}
+    flown = flown_by(
+        over_nodes.folder,
+        tmp_path / 'slow',
+        20.0,
+        lambda name: slow.get(name, ['-m', MODULES[name]]),
+    )
+    assert all(count == 200 for count, _ in flown.values())
+    assert len(flown) == len(PER_TICK)
+
+
+def flown_by(of: Path, folder: Path, duration_s: float, program) -> dict[str, tuple[int, str]]:
+    """Digests of a flight by nodes that are other programs, with the parameters of a run."""
+    folder.mkdir()
+    parameters = yaml.safe_load((of / PARAMETERS_FILE).read_text())
+    parameters['/glider/plant_node']['ros__parameters']['duration_s'] = duration_s
+    parameters['/glider/guidance_node']['ros__parameters']['duration_s'] = duration_s
+    parameters['/glider/recorder_node']['ros__parameters']['folder'] = str(folder)
+    (folder / PARAMETERS_FILE).write_text(yaml.safe_dump(parameters))
+    commands = {
+        name: [sys.executable, *program(name), *command[3:]]
+        for name, command in node_commands(folder / PARAMETERS_FILE).items()
+    }
+    result = run_nodes(commands, folder / 'log.txt')
+    assert (result.status, result.reason) == ('completed', '')
+    assert result.progress['lost'] == 0
+    return digests(folder)

@@ -274,6 +274,14 @@ def test_incomplete_ticks_are_written_at_the_end_and_gaps_are_counted():
     assert order.written_ns == 40
 
 
+def test_a_topic_that_begins_later_than_others_has_lost_messages():
+    order = TickSorter(['a', 'b'], 10, lambda *message: None)
+    order.add('a', 50, b'')
+    assert (order.lost, order.heard_ns) == (0, 40)
+    order.add('b', 70, b'')
+    assert (order.lost, order.heard_ns) == (2, 50)
+
+
 def write_with_gaps(folder, ticks, lost):
     """Bag of per-tick messages without the lost (topic, tick); all numbers are the tick."""
     bag = BagWriter(folder, 'gaps')

@@ -137,8 +137,8 @@ class RecorderNode(TickNode):
             self.replayed = any(info.node_name == topics.REPLAY for info in publishers)
         return self.replayed
 
-    def on_ready(self) -> None:
-        """Forget what came before this run began: it is somebody else's."""
+    def on_matched(self) -> None:
+        """Forget what came before this run begins: it is somebody else's."""
         if self.ticks.lockstep and not self.is_replayed():
             for item in self.inputs:
                 while take(item.subscription) is not None:

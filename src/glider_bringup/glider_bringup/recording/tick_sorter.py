@@ -38,7 +38,9 @@ class TickSorter:
 
     def add(self, topic: str, stamp_ns: int, payload: bytes) -> None:
         """Take a message of a per-tick topic."""
-        due_ns = self._newest_ns.get(topic, stamp_ns - self._period_ns) + self._period_ns
+        if not self._newest_ns:  # all topics begin with the same tick
+            self._newest_ns = dict.fromkeys(self._queues, stamp_ns - self._period_ns)
+        due_ns = self._newest_ns[topic] + self._period_ns
         self.lost += max(0, (stamp_ns - due_ns) // self._period_ns)
         self._newest_ns[topic] = stamp_ns
         self._queues[topic].append((stamp_ns, payload))
@@ -46,8 +48,7 @@ class TickSorter:
     @property
     def heard_ns(self) -> int:
         """Stamp of the newest tick of which every per-tick message has come."""
-        newest = (self._newest_ns.get(name, -self._period_ns) for name in self._queues)
-        return min(newest)
+        return min(self._newest_ns.values(), default=-self._period_ns)
 
     def add_event(self, topic: str, stamp_ns: int, payload: bytes) -> None:
         """Take a message that belongs to a tick, but does not come with every tick."""

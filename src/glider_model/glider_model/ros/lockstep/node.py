@@ -251,11 +251,15 @@ class TickNode(Node):
                 )
             return
         self.destroy_timer(self._startup_timer)
+        self.on_matched()
         self.running = True
         self._wait.begin()
         self.report(health.READY)
         self.wall_timer(min(0.5, 0.1 * self.ticks.tick_timeout_s), self.watch)
         self.on_ready()
+
+    def on_matched(self) -> None:
+        """Last act before this node says that it is ready, after which ticks may come."""
 
     def on_ready(self) -> None:
         """Peers are matched; free-running nodes start their timer here."""
