@@ -23,10 +23,10 @@ import typer
 from rich.table import Table
 
 from glider_bringup.console import Json, messages, output, picked, repeatable
-from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED
 
 #: Modules of this folder, in the order in which they are measured.
-SECTIONS = ('compute', 'memory', 'nodes', 'nodes_memory', 'sweep', 'storage', 'fleet', 'against')
+SECTIONS = ('compute', 'memory', 'nodes', 'nodes_memory', 'sweep', 'storage', 'against')
 
 Section = Literal[SECTIONS]
 

@@ -16,6 +16,7 @@ import numpy as np
 from floor import Floor, compare, compiler, compiler_version
 from plant_step import SCENARIO, SEA, SHALLOW, cost_s, flight_of, plant_steps
 
+from glider_bringup.door.flight import Flight
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import Scenario, load_scenario
@@ -23,7 +24,7 @@ from glider_bringup.scoring.score import Scorer
 
 #: The mission: straight path, constant current, no noise.
 DURATION_S = 108000.0
-REPEATS = 5
+REPEATS, STEPS = 5, 2000
 
 MEANING = {
     'compile_s': 'compiling all kernels, once after a change of the sources (s)',
@@ -38,6 +39,7 @@ MEANING = {
     'floor_ticks_compared': 'ticks in which every number of plant and C has the same bits',
     'score_30h_s': 'scoring the mission of 30 h (s)',
     'mission_real_time_factor': 'simulated time over that of mission and score',
+    'flight_step_us': 'one tick of the whole stack by `glider.Flight.step`, from Python (us)',
 }
 
 
@@ -73,6 +75,7 @@ def measure(progress: Callable[[str], None]) -> dict:
         'floor_ticks_compared': compared,
         'score_30h_s': score_s,
         'mission_real_time_factor': DURATION_S / (mission_s + score_s),
+        'flight_step_us': 1e6 * _step_s(),
     }
 
 
@@ -96,6 +99,18 @@ def _mission_s() -> tuple[float, float]:
     flying_s = whole_s - sum(scoring_s)
     scoring_s.append(cost_s(scorer.result, scenario.score_rules(DURATION_S)))
     return flying_s, sum(scoring_s)
+
+
+def _step_s() -> float:
+    """Processor time (s) of a step of a flight in one's own hands."""
+    flight = Flight(load_mission())
+
+    def fly() -> None:
+        for _ in range(STEPS):
+            flight.step()
+
+    fly()
+    return min(cost_s(fly) for _ in range(REPEATS)) / STEPS
 
 
 def _plant_s() -> tuple[float, float | None, int | None]:
@@ -135,8 +150,7 @@ def _warm_up_s(cache: str) -> float:
         'import time; from glider_bringup import warm_up; start = time.process_time(); '
         'warm_up.main(); print(time.process_time() - start)'
     )
-    environment = {name: v for name, v in os.environ.items() if name != 'NUMBA_CACHE_DIR'}
-    environment['GLIDER_CACHE'] = cache
+    environment = {**os.environ, 'GLIDER_CACHE': cache}
     done = subprocess.run(
         [sys.executable, '-c', program],
         env=environment,

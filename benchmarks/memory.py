@@ -12,7 +12,7 @@ from collections.abc import Callable
 from nodes import fly_once
 
 from glider_bringup.engines.memory import memory_mb
-from glider_bringup.engines.processes import AUTOPILOT, ON_BOARD
+from glider_bringup.engines.processes import AUTOPILOT, ON_BOARD, Layout
 
 #: Simulated time (s) of the flights of what is on board.
 FLIGHT_S = 600.0
@@ -47,9 +47,9 @@ def measure(progress: Callable[[str], None]) -> dict:
     progress('30 h by the direct engine')
     flown = _peak_mb(_FLY)
     progress('autopilot over topics')
-    autopilot = _on_board_mb(True)
+    autopilot = _on_board_mb('autopilot')
     progress('its nodes over topics')
-    separate = _on_board_mb(False)
+    separate = _on_board_mb('processes')
     return {
         'imported_rss_mb': imported,
         'mission_30h_peak_rss_mb': flown,
@@ -59,18 +59,18 @@ def measure(progress: Callable[[str], None]) -> dict:
     }
 
 
-def _on_board_mb(autopilot: bool) -> float:
-    """Most resident memory (MB) of what is on board, dead reckoning, in one process or three."""
+def _on_board_mb(layout: Layout) -> float:
+    """Most resident memory (MB) of what is on board, dead reckoning."""
     peaks = {}
     fly_once(
         FLIGHT_S,
         0.0,
         lambda tick, depth_m: peaks.update(memory_mb('VmHWM')),
         navigation='dead_reckoned',
-        autopilot=autopilot,
+        layout=layout,
     )
-    names = [AUTOPILOT] if autopilot else [wired.node for wired in ON_BOARD]
-    return sum(peaks[name] for name in names)
+    aboard = {AUTOPILOT, *(wired.node for wired in ON_BOARD)}
+    return sum(peak for name, peak in peaks.items() if name in aboard)
 
 
 def _peak_mb(program: str) -> float:

@@ -7,6 +7,7 @@ again: five hops. The floor is five bare rclpy nodes that hand on one message in
 same environment and, because machines are not the same every minute, in turn with the flights.
 """
 
+import resource
 import subprocess
 import sys
 import time
@@ -19,8 +20,9 @@ import numpy as np
 
 from glider_bringup.blocks import COLUMNS
 from glider_bringup.engines.direct import fly_blocks
-from glider_bringup.engines.flight import Flight, Progress, mission_of
-from glider_bringup.engines.processes import node_environment
+from glider_bringup.engines.flight import Outcome, Progress, mission_of
+from glider_bringup.engines.memory import memory_mb
+from glider_bringup.engines.processes import Layout, node_environment
 from glider_bringup.engines.recorded import fly_nodes
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
@@ -37,10 +39,12 @@ _PER_TICK = [topic for topic in recorded_topics(['measured_odom']) if topic.per_
 
 MEANING = {
     'floor_ticks_per_s': 'five hops of bare rclpy, the floor (1/s)',
-    'nodes_ticks_per_s': 'flight of seven processes, every topic recorded (1/s)',
+    'nodes_ticks_per_s': 'flight over nodes, every topic recorded (1/s)',
     'nodes_over_floor': 'each flight over the floors before and after it, the median ratio',
     'nodes_real_time_factor': 'simulated time over wall time of that flight, with its end',
     'nodes_messages_lost': 'messages that its bag lacks',
+    'nodes_cpu_over_processes': 'processor time of a flight, over that with a process a node',
+    'nodes_rss_over_processes': 'most resident memory of its processes, over theirs',
     'file_messages_per_s': 'the messages of a flight written to a plain file, the floor (1/s)',
     'recorder_messages_per_s': 'the same by the recorder: ordered, indexed, compressed (1/s)',
     'recorder_mb_per_s': 'the same (MB/s of messages)',
@@ -64,6 +68,8 @@ def measure(progress: Callable[[str], None]) -> dict:
         rate / mean(around)
         for rate, around in zip(rates, zip(floors[:-1], floors[1:], strict=True), strict=True)
     ]
+    progress('a flight with a process for each node, and one without')
+    processes, together = (_costs(layout) for layout in ('processes', 'together'))
     progress('recorder')
     file_s, recorder_s, messages, megabytes = _write_messages()
     ticks_per_s = median(rates)
@@ -73,6 +79,8 @@ def measure(progress: Callable[[str], None]) -> dict:
         'nodes_over_floor': median(ratios),
         'nodes_real_time_factor': DURATION_S / median(one.wall_time_s for one in flights),
         'nodes_messages_lost': sum(one.messages_lost for one in flights),
+        'nodes_cpu_over_processes': together[0] / processes[0],
+        'nodes_rss_over_processes': together[1] / processes[1],
         'file_messages_per_s': messages / file_s,
         'recorder_messages_per_s': messages / recorder_s,
         'recorder_mb_per_s': megabytes / recorder_s,
@@ -108,24 +116,32 @@ def fly_once(
     speed: float,
     on_progress: Progress,
     navigation: str = 'known',
-    autopilot: bool = False,
-) -> Flight:
+    layout: Layout = 'together',
+) -> Outcome:
     """Fly the scenario over topics, at ``speed`` times real time (0.0: as fast as possible)."""
     changes = {'dives': 0, 'duration_s': duration_s, 'navigation.method': navigation}
     scenario = load_scenario(SCENARIO, changes)
     with TemporaryDirectory() as parent:
         folder = make_run_folder(scenario, Path(parent) / 'run')
-        flight = fly_nodes(
-            scenario, folder, progress=on_progress, speed=speed, autopilot=autopilot
-        )
+        flight = fly_nodes(scenario, folder, progress=on_progress, speed=speed, layout=layout)
     if flight.status != 'completed':
         raise RuntimeError(f'the flight over topics was aborted: {flight.reason}')
     return flight
 
 
+def _costs(layout: Layout) -> tuple[float, float]:
+    """Processor time (s) and most resident memory (MB) of the processes of a flight."""
+    peaks: dict[str, float] = {}
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    fly_once(DURATION_S, 0.0, lambda *_: peaks.update(memory_mb('VmHWM')), layout=layout)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    used_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return used_s, sum(peaks.values())
+
+
 def fly_over_topics(
     duration_s: float, on_tick: Callable[[int], None] = lambda tick: None
-) -> tuple[float, Flight]:
+) -> tuple[float, Outcome]:
     """Ticks per second between the first and the last word of the recorder, and the flight.
 
     ``on_tick`` is called several times a second.

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Resident memory of each node process in a long flight over topics, and whether it stays.
+"""Resident memory of each process in a long flight over topics, and whether it stays.
 
 ``python benchmarks/nodes_memory.py 5`` measures five simulated hours instead of one.
 """
@@ -12,13 +12,14 @@ from collections.abc import Callable
 from nodes import fly_over_topics
 
 from glider_bringup.engines.memory import growth_mb_per_h, memory_mb
-from glider_bringup.engines.processes import MODULES
+from glider_bringup.engines.processes import process_modules
 from glider_model.base.signals import TICK_S
 
 HOURS, MISSION_HOURS = 1.0, 30.0
+PROCESSES = tuple(process_modules('together'))
 MEANING = {
     'nodes_memory_h': 'simulated time of the flight (h)',
-    **{f'{name}_rss_mb': f'resident memory of {name} at the end (MB)' for name in MODULES},
+    **{f'{name}_rss_mb': f'resident memory of {name} at the end (MB)' for name in PROCESSES},
     'nodes_rss_growth_mb_per_h': 'growth of the process that grows most (MB per simulated hour)',
     'nodes_30h_rss_mb': 'largest process after 30 h, if it goes on like this (MB)',
 }
@@ -26,7 +27,7 @@ MEANING = {
 
 def measure(progress: Callable[[str], None], hours: float = HOURS) -> dict:
     """Figures of one flight."""
-    samples = {name: [] for name in MODULES}
+    samples = {name: [] for name in PROCESSES}
 
     def sample(tick: int) -> None:
         for name, megabytes in memory_mb('VmRSS').items():
@@ -41,7 +42,7 @@ def measure(progress: Callable[[str], None], hours: float = HOURS) -> dict:
         **{f'{name}_rss_mb': megabytes for name, megabytes in last.items()},
         'nodes_rss_growth_mb_per_h': max(growth.values()),
         'nodes_30h_rss_mb': max(
-            last[name] + max(0.0, growth[name]) * (MISSION_HOURS - hours) for name in MODULES
+            last[name] + max(0.0, growth[name]) * (MISSION_HOURS - hours) for name in PROCESSES
         ),
     }
 

@@ -143,7 +143,7 @@ def _record(sync: Sync) -> tuple[float, float]:
             times.append(time.perf_counter() - start)
 
         bag.flush = timed
-        log, recorded_s = LogWriter(bag, scenario.path.points(2), scenario.topics), 0.0
+        log, recorded_s = LogWriter(bag, scenario.guidance_settings(), scenario.topics), 0.0
         for rows in fly_blocks(*mission_of(scenario)):
             start = time.perf_counter()
             log.add(rows)

@@ -46,7 +46,6 @@ FLOORS = {
         ('door',),
         ('commands',),
         ('cli',),
-        ('fuzzing',),
     ),
 }
 

@@ -40,10 +40,15 @@ def digest(folder: Path) -> str:
 
 @pytest.fixture(scope='module')
 def flights(tmp_path_factory) -> dict:
-    """Folder and scores of one flight: three nodes in one process, each in its own, none."""
+    """Folder and scores of one flight: some nodes in a process, all, each in its own, none."""
     scenario, parent = load_scenario('rough_water', CHANGES), tmp_path_factory.mktemp('autopilot')
     flown = {}
-    for name, options in (('together', {'autopilot': True}), ('alone', {}), ('direct', None)):
+    for name, options in (
+        ('autopilot', {'layout': 'autopilot'}),
+        ('together', {}),
+        ('alone', {'layout': 'processes'}),
+        ('direct', None),
+    ):
         folder, scorer = make_run_folder(scenario, parent / name), make_scorer(scenario)
         if options is None:
             flight = fly_recorded(scenario, folder, [scorer])
@@ -55,13 +60,14 @@ def flights(tmp_path_factory) -> dict:
     return flown
 
 
-@pytest.mark.parametrize('other', ['alone', 'direct'])
+@pytest.mark.parametrize('other', ['autopilot', 'alone', 'direct'])
 def test_scores_are_the_same(flights, other):
     assert flights['together'][1] == flights[other][1]
 
 
-def test_recording_is_the_same_to_the_last_byte(flights):
-    assert digest(flights['together'][0]) == digest(flights['alone'][0])
+@pytest.mark.parametrize('other', ['autopilot', 'alone'])
+def test_recording_is_the_same_to_the_last_byte(flights, other):
+    assert digest(flights['together'][0]) == digest(flights[other][0])
 
 
 def test_recording_verifies(glider, flights):
@@ -94,7 +100,7 @@ def waiting(tmp_path_factory):
     folder = tmp_path_factory.mktemp('waiting')
     file = folder / 'parameters.yaml'
     write_parameters(node_parameters(load_scenario('current_8deg'), speed=1.0), file)
-    commands, started = node_commands(file, autopilot=True), {}
+    commands, started = node_commands(file, layout='autopilot'), {}
 
     def start(name: str, node: str, domain: int, *words: str) -> None:
         log = folder / name

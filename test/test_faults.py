@@ -20,7 +20,7 @@ from mcap.stream_reader import StreamReader
 
 from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive
-from glider_bringup.engines.processes import MODULES, PLANT
+from glider_bringup.engines.processes import MODULES, PLANT, STACK, process_modules
 from glider_bringup.mission.scenario import SCENARIO_FOLDER
 from glider_model.base.signals import TICK_NS
 from glider_model.ros.wire.topics import recorded_topics
@@ -49,19 +49,21 @@ def wait_until(condition, deadline_s: float, process: subprocess.Popen, what: st
 
 
 class Flying:
-    """A long run over nodes."""
+    """A long run over nodes, each a process or but for the recorder in one."""
 
-    def __init__(self, start_glider, tmp_path: Path) -> None:
+    def __init__(self, start_glider, tmp_path: Path, layout='processes') -> None:
         self.out, self._texts = tmp_path / 'run', tmp_path
         self.nodes: dict[str, int] = {}
+        self._expected = {*process_modules(layout), FORK_SERVER}
+        options = ['--processes'] if layout == 'processes' else []
         self.process = start_glider(
-            'run', 'rough_water', '--duration', 100000, '--out', self.out, '--json'
+            'run', 'rough_water', '--duration', 100000, '--out', self.out, '--json', *options
         )
         wait_until(self._has_nodes, START_S, self.process, 'all processes')
 
     def _has_nodes(self) -> bool:
         self.nodes = nodes_of(self.process.pid)
-        return set(self.nodes) == {*MODULES, FORK_SERVER}
+        return set(self.nodes) == self._expected
 
     def take_off(self) -> 'Flying':
         """Wait until it flies, and some of that is on disk."""
@@ -173,6 +175,19 @@ def test_killed_node_ends_the_run_and_is_named(flying, name):
     assert card['reason'] == f'{name} was killed by SIGKILL'
     assert card['reason'] in flying.messages
     check_complete(flying, card, name)
+
+
+@pytest.mark.parametrize('name', [STACK, FORK_SERVER, 'recorder_node'])
+def test_killed_process_of_all_nodes_ends_the_run_and_is_named(start_glider, tmp_path, name):
+    flying = Flying(start_glider, tmp_path, 'together').take_off()
+    os.kill(flying.nodes[name], signal.SIGKILL)
+    code, card = flying.end()
+    assert (code, card['status']) == (1, 'aborted')
+    assert card['reason'] == f'{name} was killed by SIGKILL'
+    if name == 'recorder_node':
+        check_ticks(messages_on_disk(flying.recording), dict.fromkeys(PER_TICK, 0))
+    else:
+        check_complete(flying, card)
 
 
 def test_what_a_node_said_before_it_was_killed_is_recorded_by_a_recorder_that_lags(flying):

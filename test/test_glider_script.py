@@ -15,10 +15,10 @@ WHEELS = Path(sys.prefix)
 OWN_WHEELS = WHEELS == Path(os.environ.get('GLIDER_HOME') or ROOT) / '.venv'
 
 
-def glider(distro, *prefixes):
-    """Finished ./glider list --json in a terminal with these variables."""
+def glider(distro, *prefixes, arguments=('list', '--json')):
+    """Finished ./glider list --json, or another command, in a terminal with these variables."""
     return subprocess.run(
-        [ROOT / 'glider', 'list', '--json'],
+        [ROOT / 'glider', *arguments],
         capture_output=True,
         text=True,
         env={
@@ -55,3 +55,21 @@ def test_another_ros_that_is_sourced_is_refused(tmp_path):
     assert done.stdout == ''
     (line,) = done.stderr.splitlines()
     assert 'ROS 2 humble is sourced' in line and 'jazzy' in line
+
+
+@pytest.mark.skipif(not OWN_WHEELS, reason='would set up an environment from wheels')
+@pytest.mark.parametrize(
+    ('arguments', 'said'),
+    [
+        (
+            ['test', '--only', 'weather'],
+            'test --only weather: no such tests (allowed: fast, fuzz, soak)',
+        ),
+        (['test', '--only'], 'test --only : no such tests (allowed: fast, fuzz, soak)'),
+        (['soak'], 'soak: no command any more (allowed: ./glider test --only soak)'),
+    ],
+)
+def test_tests_that_count_are_found_by_name(arguments, said):
+    done = glider('', arguments=arguments)
+    assert (done.returncode, done.stdout) == (2, '')
+    assert done.stderr.splitlines()[-1] == f'glider: {said}'

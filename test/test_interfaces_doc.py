@@ -69,7 +69,7 @@ CLOCK_FIELDS = set(ClockSettings.model_fields) - set(TickSettings.model_fields)
 #: Fields that every fault has.
 COMMON = set(FaultSettings.model_fields)
 
-PROFILES = ('PER_TICK', 'NEWEST', 'LATCHED', 'EVENTS', 'EVERYTHING')
+PROFILES = ('PER_TICK', 'FREE', 'NEWEST', 'LATCHED', 'EVENTS', 'REPEATED', 'EVERYTHING')
 _SIGNS = (('gt', '>'), ('ge', '>='), ('lt', '<'), ('le', '<='))
 DEADLINE_S = 120.0
 

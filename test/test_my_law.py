@@ -21,6 +21,7 @@ import xarray
 import yaml
 
 from glider_bringup.recording.mcap_reader import Bag
+from glider_model.base import kernel_cache
 from glider_model.ros.wire.topics import recorded_topics
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -125,8 +126,7 @@ class Machine:
 
     def start(self, *arguments) -> subprocess.CompletedProcess:
         """Run Python to its end, with the packages on its path."""
-        ours = {'ROS_DOMAIN_ID', 'NUMBA_CACHE_DIR'}
-        env = {name: value for name, value in os.environ.items() if name not in ours}
+        env = {name: value for name, value in os.environ.items() if name != 'ROS_DOMAIN_ID'}
         path = [str(self.site), *filter(None, [env.get('PYTHONPATH')])]
         env |= {'PYTHONPATH': os.pathsep.join(path), 'GLIDER_CACHE': str(self.cache)}
         return subprocess.run(
@@ -187,6 +187,8 @@ def payloads(folder: Path) -> dict[str, list[tuple[int, bytes]]]:
 @pytest.fixture(scope='module')
 def machine(tmp_path_factory) -> Machine:
     made = Machine(tmp_path_factory.mktemp('machine'))
+    # what its packages do not reach is compiled already
+    shutil.copytree(kernel_cache.folder(), made.cache / 'kernels', dirs_exist_ok=True)
     made.install('my_law', 'my_method')
     return made
 
@@ -315,10 +317,11 @@ def test_help_names_it_and_a_wrong_gain_is_told(machine):
 
 
 def test_a_run_whose_law_is_not_installed_is_told_in_one_line_each(machine, nodes):
-    elsewhere = shutil.copytree(nodes.folder, machine.folder / 'elsewhere')
-    text = (elsewhere / 'scenario.yaml').read_text().replace('sliding', 'gliding')
-    (elsewhere / 'scenario.yaml').write_text(text.replace('vector_field', 'scalar_field'))
-    done = machine.start('-m', 'glider_bringup.cli', 'verify', elsewhere)
+    text = (nodes.folder / 'scenario.yaml').read_text().replace('sliding', 'gliding')
+    other = machine.folder / 'other.yaml'
+    other.write_text(text.replace('vector_field', 'scalar_field'))
+    command = ['-m', 'glider_bringup.cli', 'verify', nodes.folder, '--settings', other]
+    done = machine.start(*command)
     assert (done.returncode, done.stdout) == (2, '')
     one, other = filter(str.strip, done.stderr.splitlines())
     assert "guidance.los.method = 'scalar_field'" in one and 'glider.guidance_methods' in one
@@ -334,7 +337,7 @@ def test_a_changed_line_is_what_flies_next(machine, direct, nodes, sweep):
     changed, over_nodes = machine.fly_both('changed')
     assert set(machine.compiled()) > set(before)
     flown, old = payloads(changed.folder), payloads(direct.folder)
-    assert flown['/glider/wrench'][0] != old['/glider/wrench'][0]
+    assert flown['/glider/wrench'] != old['/glider/wrench']
     assert payloads(over_nodes.folder) == flown
     worked = machine.sweep('sweep_changed', gain=values('control.sliding.k', 12.0))
     assert worked['final_state_position_ned_m'].values.tolist() == [changed.place]
@@ -380,3 +383,13 @@ def test_the_document_builds_the_files_that_are_flown(file):
 
 def test_the_document_shows_no_other_files():
     assert {name for name, _ in PIECE.findall(DOCUMENT.read_text())} == set(BUILT)
+
+
+def test_the_shortest_way_flies(monkeypatch):
+    """The piece of Python at the head of the document, as it stands."""
+    (piece,) = re.findall(r'<!-- run -->\n```python\n(.*?)```', DOCUMENT.read_text(), re.DOTALL)
+    names = {'__name__': '__main__'}
+    exec(compile(piece, DOCUMENT.name, 'exec'), names)
+    run = names['run']
+    assert (run.score['controller'], run.score['status']) == ('hold', 'completed')
+    assert run.score['cross_track_m']['max_steady'] < 5.0

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run whose numbers cease to be finite: failed, told by name, exit code 1, valid JSON.
 
-No scenario of a shipped vehicle does so (test_extremes_stay_finite, `./glider fuzz`). A vehicle
+No scenario of a shipped vehicle does so (`./glider test --only fuzz --door flights`). A vehicle
 file can: here rolling is driven, not damped, by the flow, so that a roll grows without limit.
 """
 
@@ -11,10 +11,10 @@ import math
 
 import pytest
 
+from fuzzing import flights
+from fuzzing.counts import Counter
 from glider_bringup.engines.direct import NotFiniteError, fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.fuzzing import flights
-from glider_bringup.fuzzing.counts import Counter
 from glider_bringup.mission.scenario import load_scenario, read_scenario
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import fly_scored, scorecard
@@ -138,7 +138,7 @@ def test_score_that_is_not_finite_is_a_failure():
 
 
 def test_extreme_flights_are_finite_or_refused():
-    """A few of `./glider fuzz --only flights`."""
+    """A few of `./glider test --only fuzz --door flights`."""
     counter = Counter(lambda tried: None)
     flights.fuzz(1, 30, counter)
     counts = counter.result()

@@ -54,6 +54,14 @@ LEGEND_IS_APART = """(id) => {
     (part) => element.querySelector(part).getBoundingClientRect());
   return legend.bottom <= plot.top + 1 && legend.top >= element.getBoundingClientRect().top - 1;
 }"""
+#: How long a metre is drawn in each small map of a panel (px).
+METRES = """(id) => {
+  const layout = document.getElementById(id)._fullLayout;
+  const length = (axis) => axis._length / Math.abs(axis.range[1] - axis.range[0]);
+  return Object.keys(layout).filter((key) => /^xaxis/.test(key)).map((key) => ({
+    east: length(layout[key]), north: length(layout[key.replace('x', 'y')]),
+  }));
+}"""
 #: What the plan shows from south to north.
 PLAN_RANGES = "document.getElementById('plan')._fullLayout.yaxis.range"
 #: Whether every chart is as wide as its place.
@@ -209,7 +217,7 @@ def check_drawn(panels):
         assert panel['width'] == pytest.approx(panel['place'], abs=1.0), 'it fills its place'
         drawn = [trace for trace in panel['traces'] if len(finite(trace['y'])) > 1]
         assert drawn, panel['id']
-        markers = {'track': 1, 'plan': 3}.get(panel['kind'], 0)
+        markers = {'track': 1, 'plan': 3, 'places': 2 * len(drawn) // 3}.get(panel['kind'], 0)
         assert panel['lines'] >= len(drawn) - markers, panel['id']
         for trace in panel['traces']:
             assert len(trace['x']) == len(trace['y']), (panel['id'], trace['name'])
@@ -239,7 +247,8 @@ def test_report_of_the_default_run(browser, default_run):
     check_drawn(panels)
     assert {panel['id'] for panel in panels} == {
         *('track', 'space', 'depth', 'cross_track', 'pitch', 'heading', 'roll'),
-        *('buoyancy_engine', 'pitch_mass', 'roll_mass', 'current_north', 'current_east'),
+        *('buoyancy_engine', 'pitch_mass', 'roll_mass', 'battery'),
+        *('current_north', 'current_east'),
         *('learnt_pitch', 'learnt_roll', 'learnt_steering', 'learnt_disturbance'),
         'learnt_lyapunov',
     }
@@ -250,7 +259,7 @@ def test_report_of_the_default_run(browser, default_run):
     assert tiles['cross-track, steady'] == pytest.approx(track['max_steady'], abs=0.005)
     assert tiles['deepest point'] == pytest.approx(card['depth_m']['max'], abs=0.05)
     assert tiles['pitch error, steady'] == pytest.approx(pitch['rms_steady'], abs=0.005)
-    table = page.locator('.table').inner_text()
+    table = page.locator('.table').last.inner_text()
     assert f'{track["max_steady"]:.3f} m' in table
     assert f'{card["actuator_travel"]["roll_mass_deg"]:.0f} deg' in table
 
@@ -351,16 +360,16 @@ def test_report_of_a_run_that_reckons_its_place(browser, reckoned_run, width, sc
     shown = drawn['true place at surfacing']
     assert shown['y'] == pytest.approx([one['true_ned_m'][0] / 1e3 for one in reports])
     assert shown['x'] == pytest.approx([one['true_ned_m'][1] / 1e3 for one in reports])
-    ring = [[]]
-    for point in zip(*(drawn['95 % ellipse of the believed place'][i] for i in 'yx'), strict=True):
-        ring[-1].append(point) if point[0] is not None else ring.append([])
-    for one, points in zip(reports, ring, strict=False):
+    (places,) = (panel for panel in panels if panel['kind'] == 'places')
+    rings = [trace for trace in places['traces'] if trace['name'] == '95 % ellipse']
+    for one, ring in zip(reports, rings, strict=True):
         nn, ne, ee = one['covariance_m2']
-        for north, east in points:
-            n, e = 1e3 * north - one['believed_ned_m'][0], 1e3 * east - one['believed_ned_m'][1]
+        for n, e in zip(ring['y'], ring['x'], strict=True):
             off = (ee * n * n - 2.0 * ne * n * e + nn * e * e) / (nn * ee - ne * ne)
             assert off == pytest.approx(5.991, rel=1e-3)
-    assert page.locator('.many tbody tr').count() == len(reports)
+    for metre in page.evaluate(METRES, 'places'):
+        assert metre['east'] == pytest.approx(metre['north'], rel=0.01), 'circles are round'
+    assert page.locator('.many').first.locator('tbody tr').count() == len(reports)
     assert page.evaluate(LEGEND_IS_APART, 'plan')
     assert (said, len(asked)) == ([], 1)
     page.close()

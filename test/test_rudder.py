@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rudder that nobody here has heard of: two files of a package, and a section of a vehicle file.
 
-The package is installed by pip into a folder of its own, as a stranger would, with a cache of its
-own. What is flown with it is the vehicle of a YAML file, directly and over nodes.
+The package is installed by pip into a folder of its own, as a stranger would. It flies with the
+vehicle of a YAML file, directly and over nodes.
 """
 
 import json
@@ -156,10 +156,9 @@ class Machine:
 
     def start(self, *arguments) -> subprocess.CompletedProcess:
         """Run a command to its end, with the package on its path."""
-        ours = {'ROS_DOMAIN_ID', 'NUMBA_CACHE_DIR'}
-        env = {name: value for name, value in os.environ.items() if name not in ours}
+        env = {name: value for name, value in os.environ.items() if name != 'ROS_DOMAIN_ID'}
         path = [str(self.site), *filter(None, [env.get('PYTHONPATH')])]
-        env |= {'PYTHONPATH': os.pathsep.join(path), 'GLIDER_CACHE': str(self.folder / 'cache')}
+        env['PYTHONPATH'] = os.pathsep.join(path)
         return subprocess.run(
             [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
             env=env,

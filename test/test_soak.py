@@ -1,20 +1,26 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""``./glider soak``, in little."""
+"""``./glider test --only soak``, in little."""
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 from glider_bringup.engines.memory import growth_mb_per_h
-from glider_bringup.engines.processes import MODULES
+from glider_bringup.engines.processes import process_modules
 
 
-def test_soak_counts_ticks_looks_at_memory_and_verifies(glider, tmp_path):
-    done = glider('soak', 'current_8deg', '--duration', 200, '--out', tmp_path / 'run', '--json')
+def test_soak_counts_ticks_looks_at_memory_and_verifies(tmp_path):
+    command = [sys.executable, Path(__file__).with_name('soak.py'), 'current_8deg', '--json']
+    command += ['--duration', '200', '--out', tmp_path / 'run']
+    done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert (result['status'], result['ticks'], result['ticks_lost']) == ('completed', 2000, 0)
     assert (result['messages_lost'], result['verify']) == (0, 'identical')
-    assert set(result['rss_mb']) == set(result['growth_mb_per_h']) == set(MODULES)
+    processes = set(process_modules('together'))
+    assert set(result['rss_mb']) == set(result['growth_mb_per_h']) == processes
     assert min(result['rss_mb'].values()) > 30.0
 
 

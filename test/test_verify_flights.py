@@ -27,6 +27,7 @@ from glider_control.control import control_step
 from glider_guidance import block as guidance
 from glider_guidance.guidance import guidance_abort, guidance_step
 from glider_guidance.nodes.guidance_node import path_message
+from glider_model.base.errors import EXIT_SURFACED
 from glider_model.base.frames import (
     odometry_from_wire,
     odometry_to_wire,
@@ -133,7 +134,8 @@ def test_orders_in_flight_are_on_record_and_verified(glider, bystander, tmp_path
         assert call(pause, SetBool.Request(data=False)).success
         assert call(abort, Trigger.Request()).success
         _, error = process.communicate(timeout=DEADLINE_S)
-        assert process.returncode == 0, error
+        assert process.returncode == EXIT_SURFACED, error
+        assert 'ordered to the surface' in error
     finally:
         if process.poll() is None:
             process.kill()

@@ -62,7 +62,7 @@ RECKONED = {
 OFF_M = (15.0, 1.0)
 #: How the stand-in begins.
 GLIDING = {'heading_deg': 30.0, 'pitch_deg': -30.0, 'speed_mps': 0.5, 'net_heaviness_kg': 0.4}
-#: All the buoyancy there is; the mass waits in the middle for the pump.
+#: All the buoyancy there is; the mass holds it level for the pump.
 SAFE = {'buoyancy_engine': -1.0, 'pitch_mass': 0.0, 'roll_mass': 0.0}
 DEADLINE_S = 200.0
 #: Flights by their names: whether the vehicle navigates itself, and whether by the autopilot.
@@ -165,7 +165,7 @@ class Flown(NamedTuple):
 
 def commands_on_board(file: Path, navigates: bool, autopilot: bool) -> list[list[str]]:
     """What is started on board."""
-    commands = node_commands(file, autopilot=autopilot)
+    commands = node_commands(file, layout='autopilot' if autopilot else 'processes')
     parts = [wired for wired in ON_BOARD if not (navigates and wired == NAVIGATION)]
     if not autopilot:
         return [commands[wired.node] for wired in parts]

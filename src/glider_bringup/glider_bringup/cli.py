@@ -19,8 +19,14 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
     from glider_bringup import commands
     from glider_bringup.console import messages
     from glider_bringup.mission.disk import DiskError
-    from glider_model.base.errors import MAX_LINE, ConfigurationError, printable, shown
-    from glider_model.base.exits import EXIT_FAILED, EXIT_USAGE
+    from glider_model.base.errors import (
+        EXIT_FAILED,
+        EXIT_USAGE,
+        MAX_LINE,
+        ConfigurationError,
+        printable,
+        shown,
+    )
 except KeyboardInterrupt:
     sys.exit(130)  # EXIT_INTERRUPTED, which may not be there yet
 except (OSError, ImportError) as error:
@@ -48,12 +54,12 @@ app = typer.Typer(
 #: Commands in the order in which --help lists them; those that are not named here follow.
 ORDER = (
     *('run', 'montecarlo', 'experiments', 'sweep', 'map', 'score', 'figure', 'report', 'compare'),
-    *('export', 'replay', 'verify', 'recover', 'navigate', 'validate', 'energy', 'fuzz'),
-    *('soak', 'trim', 'list'),
+    *('export', 'replay', 'verify', 'recover', 'navigate', 'validate', 'energy'),
+    *('autopilot', 'trim', 'list'),
 )
 #: What the ./glider script does by itself, and --help has to tell of: text and example.
 OF_THE_SCRIPT = {
-    'test': ("Run all tests: each package's, then those of the whole system.", 'test'),
+    'test': ('Run all tests; --only fuzz or soak: those that try long and count.', 'test'),
     'python': (
         'Run Python with the stack in it: a program, -m MODULE, or an interpreter.',
         'python my_study.py',

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the commands share: consoles, options, progress bars."""
 
+import json
 from collections.abc import Callable, Iterable
 from contextlib import contextmanager
 from enum import Enum
@@ -25,8 +26,7 @@ from rich.text import Text
 
 from glider_bringup.mission.scenario import parse_assignment
 from glider_control.settings import ControlLawSettings
-from glider_model.base.errors import ConfigurationError, printable
-from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED, ConfigurationError, printable
 from glider_model.base.signals import TICK_S
 
 
@@ -136,10 +136,41 @@ def tell(line: str) -> None:
     messages.print(line, soft_wrap=True)
 
 
+def print_written(word: str, run: Path, file: Path, as_json: bool) -> None:
+    """Say on standard output which file was made of a run."""
+    if as_json:
+        print(json.dumps({'run': str(run), 'file': str(file)}))
+    else:
+        output.print(f'{word}: {file}', soft_wrap=True)
+
+
 #: Columns of progress bars, beside what is done and the bar itself; made anew for each bar.
 PERCENT = partial(TextColumn, '{task.percentage:3.0f} %')
 STATE = partial(TextColumn, '{task.fields[state]}')
 COUNT, ELAPSED, REMAINING = MofNCompleteColumn, TimeElapsedColumn, TimeRemainingColumn
+
+
+#: Progress bars that are shown now: of these there is one at a time.
+_shown: list[Progress] = []
+
+
+def compiling(line: str) -> Callable[[], None] | None:
+    """Say that something is compiled: on a terminal by a bar with a clock, else by a line.
+
+    Returns what takes the bar away again. Where a bar is shown already, this one stands below it.
+    """
+    if not messages.is_terminal:
+        tell(line)
+        return None
+    if _shown:
+        bar = _shown[-1]
+        task = bar.add_task(line, total=None, state='')
+        return partial(bar.remove_task, task)
+    columns = TextColumn('{task.description}'), BarColumn(), ELAPSED()
+    bar = Progress(*columns, console=messages, transient=True)
+    bar.add_task(line, total=None)
+    bar.start()
+    return bar.stop
 
 
 @contextmanager
@@ -147,7 +178,11 @@ def progress_bar(description: str, total: float | None, *columns: Callable[[], P
     """Progress bar, which goes when it is done; yields its update, see `rich.progress`."""
     made = [TextColumn('{task.description}'), BarColumn(), *(column() for column in columns)]
     with Progress(*made, console=messages, transient=True) as bar:
-        yield partial(bar.update, bar.add_task(description, total=total, state=''))
+        _shown.append(bar)
+        try:
+            yield partial(bar.update, bar.add_task(description, total=total, state=''))
+        finally:
+            _shown.remove(bar)
 
 
 @contextmanager
@@ -204,7 +239,7 @@ def workers_at_work(
             f'--workers {workers}: not with --scheduler, whose cluster has workers of its own'
         )
     try:
-        with worker_pool(workers, scheduler, combinations, tell) as pool:
+        with worker_pool(workers, scheduler, combinations, compiling) as pool:
             yield pool
         return
     except KeyboardInterrupt:

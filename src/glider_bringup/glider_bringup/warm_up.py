@@ -27,6 +27,7 @@ from glider_bringup.recording.ros.told import read_told
 from glider_bringup.recording.ros.verify.every_block import verify
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import halve, make_tracer
+from glider_model.base.kernel_cache import forget_old
 from glider_model.base.signals import TICK_S
 from glider_model.base.wiring import at_rest
 from glider_model.plant.block import PLANT, plant_move, plant_outputs
@@ -41,6 +42,7 @@ def main() -> None:
         for tasks in (blocks, (fly_one_tick, score_nothing), (verify_one_tick, fly_for_notebooks)):
             for future in [pool.submit(task) for task in tasks]:
                 future.result()
+    forget_old()
 
 
 def one_tick(number: int) -> None:

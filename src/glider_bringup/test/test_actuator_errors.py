@@ -16,8 +16,12 @@ FIN_NOISE = {**FIN, **NOISE, 'fin.noise': 0.5}
 ROLL_NOISE = {**ROLL, **NOISE, 'moving_mass.rotation_noise': 0.5}
 
 
+#: Its place is known throughout, and what it measures is so.
+KNOWN = {'navigation.method': 'known', 'profile.surface_every_dives': 0, 'sensors': {}}
+
+
 def flown(name, errors, **fields):
-    changes = {'dives': 0, 'settle_s': 1800.0, **fields}
+    changes = {'dives': 0, 'settle_s': 1800.0, **KNOWN, **fields}
     changes |= {f'vehicle.{field}': value for field, value in errors.items()}
     return fly(load_scenario(name, changes))
 

@@ -260,6 +260,19 @@ def test_tick_of_which_an_event_may_be_under_way_waits_for_it():
     assert written == [('a', 0), ('a', 1), ('a', 2), ('event', 2), ('a', 3)]
 
 
+def test_event_from_before_the_beginning_of_time_is_of_the_first_tick(tmp_path):
+    """As somebody may stamp it whose clock is not set; MCAP has no number for it."""
+    bag = BagWriter(tmp_path, 'run')
+    order = TickSorter(['odom'], 1, bag.write)
+    order.add_event('/diagnostics', -1, b'\0\1\0\0')
+    order.write_rest()
+    bag.close()
+    (file,) = tmp_path.glob('*.mcap')
+    with file.open('rb') as stream:
+        (message,) = (one for _, _, one in make_reader(stream).iter_messages())
+    assert (message.log_time, message.data) == (0, b'\0\1\0\0')
+
+
 def test_incomplete_ticks_are_written_at_the_end_and_gaps_are_counted():
     written = []
     order = TickSorter(['a', 'b'], 10, lambda *message: written.append(message))

@@ -15,9 +15,8 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 
-from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.fuzzing import bags, watch
-from glider_bringup.fuzzing.counts import Counter
+from fuzzing import bags, watch
+from fuzzing.counts import Counter
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.mcap_reader import Bag
@@ -26,10 +25,8 @@ from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
 from glider_bringup.recording.ros.told import read_told
 from glider_bringup.recording.ros.verify.every_block import verify
 from glider_bringup.scoring.again import score_again
-from glider_bringup.scoring.card import scorecard, write_score
-from glider_bringup.scoring.score import make_scorer, scores_of
-from glider_bringup.scoring.traces import load_traces, make_tracer
-from glider_bringup.showing.flown_run import draw, keep_traces, read_run, write_report
+from glider_bringup.scoring.traces import load_traces
+from glider_bringup.showing.flown_run import draw, read_run, write_report
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_NS, TICK_S
 from glider_model.ros.lockstep import health
@@ -57,14 +54,7 @@ def flown(tmp_path_factory) -> Path:
     """Run folder with all that a run has."""
     changes = {'dives': 0, 'duration_s': TICKS * TICK_S, 'settle_s': 0.0}
     scenario = load_scenario('current_8deg', changes)
-    folder = make_run_folder(scenario, tmp_path_factory.mktemp('harm') / 'flight')
-    tracer = make_tracer(scenario)
-    scorer = make_scorer(scenario)
-    flight = fly_recorded(scenario, folder, [scorer, tracer])
-    card = scorecard(scenario, 'direct', flight, scores_of(scenario, scorer))
-    write_score(folder, card)
-    keep_traces(scenario, folder, card, tracer)
-    return folder
+    return bags.fly_whole(scenario, tmp_path_factory.mktemp('harm') / 'flight')
 
 
 @pytest.fixture
@@ -259,6 +249,7 @@ def test_number_that_is_none_ends_the_rows_where_it_is_scored(tmp_path, topic, w
 
 
 def test_traces_that_are_damaged_are_named(run):
+    """A flipped bit is refused, or is one that the numbers do not need: of headers, of deflate."""
     file = run / 'traces.npz'
     data, draw, refused = file.read_bytes(), random.Random(3), 0
     good = load_traces(file)
@@ -272,7 +263,7 @@ def test_traces_that_are_damaged_are_named(run):
         else:
             for name, values in good.curves.items():
                 assert again.curves[name].tobytes() == values.tobytes()
-    assert refused > 50
+    assert refused > 30
 
 
 def test_score_file_that_is_damaged_is_named_or_can_be_shown(run):

@@ -171,9 +171,11 @@ def test_turned_world_gives_the_same_flight(course_deg):
 def test_still_vehicle_drifts_with_the_current():
     """Neutral, level and at rest in the water, commanded nothing: only the current moves it.
 
-    The first tick finds the water already moving, and so does the vehicle at rest in it.
+    The first tick finds the water already moving, and so does the vehicle at rest in it. A depth
+    that is the same to the last bit is no measurement to the guard, which has to wait here.
     """
-    state, params = mission('current_8deg', initial__depth_m=500.0, duration_s=600.0)
+    waits = {'guard__still_s': 3600.0}
+    state, params = mission('current_8deg', initial__depth_m=500.0, duration_s=600.0, **waits)
     control = params.control
     limits = control.allocation._replace(m_b_max=0.0, x_p_max=0.0, mu_max=0.0)
     params = params._replace(control=control._replace(allocation=limits))

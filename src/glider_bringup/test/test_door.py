@@ -7,11 +7,18 @@ import io
 import json
 import subprocess
 import sys
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 
+import matplotlib
+import numba
 import numpy as np
 import pytest
+import typer
 import xarray
+import yaml
+from matplotlib import pyplot
 from mcap_ros2.reader import read_ros2_messages
 from rich.console import Console
 from scipy.io import loadmat
@@ -19,7 +26,9 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 import glider_bringup as glider
-from glider_bringup.cli import app
+from glider_bringup import console
+from glider_bringup.cli import OF_THE_SCRIPT, app
+from glider_model.base.kernel import compiling_told
 from glider_model.base.settings import ConfigurationError
 
 #: Half of what is named north, east and down in the world of topics: x east, y north, z up.
@@ -373,7 +382,10 @@ def test_netcdf_keeps_numbers_units_and_attributes(export, data):
             assert read[name].dtype == variable.dtype
             for attribute, value in variable.attrs.items():
                 assert np.array_equal(read[name].attrs[attribute], value)
-        assert read.attrs == data.attrs
+        assert data.attrs.items() <= read.attrs.items()
+        assert yaml.safe_load(read.attrs['scenario_yaml'])['name'] == data.attrs['scenario']
+        assert json.loads(read.attrs['score_json'])['seed'] == data.attrs['seed']
+        assert 'zhang2021' in read.attrs['vehicle_yaml']
 
 
 def test_csv_has_one_row_a_tick_under_names_with_units(export, data):
@@ -410,8 +422,182 @@ def test_files_are_called_after_the_run_unless_they_are_given_a_name(flown):
 def test_run_without_a_bag_says_so(tmp_path):
     run = glider.fly(duration=1.0, out=tmp_path / 'run')
     assert len(run.to_xarray().time) == 10
-    with pytest.raises(ConfigurationError, match='it has no bag'):
+    with pytest.raises(ConfigurationError, match='a direct one with --bag'):
         glider.open_run(run.folder).to_xarray()
     done = CliRunner().invoke(app, ['export', str(run.folder), '--to', 'csv'])
     assert isinstance(done.exception, ConfigurationError)
     assert not (run.folder / 'run.csv').exists()
+
+
+# ---------------------------------------------------------------------------------- laws, plots
+
+
+#: As in a cell of a notebook.
+CELL = """
+from typing import NamedTuple
+
+from glider_control.law import LawSettings, law_step
+from glider_model.base.kernel import kernel
+
+
+class Level(NamedTuple):
+    '''Gains of a law that holds pitch.'''
+
+    k: float
+
+
+class Turns(NamedTuple):
+    '''How often it was called.'''
+
+    count: int
+
+
+class LevelLaw(LawSettings):
+    '''Holds pitch, and counts.'''
+
+    k: float = 25.0
+
+    def params(self, vehicle, bank):
+        return Level(self.k)
+
+    def initial_state(self):
+        return Turns(0)
+
+
+@law_step.body(Level)
+@kernel
+def level_step(state, seen, params, dt):
+    error = seen.reference.theta - seen.measured.theta
+    pitch = params.k * error - 40.0 * seen.measured.theta_dot
+    return Turns(state.count + 1), -20.0 * seen.measured.phi_dot, pitch
+"""
+
+
+@pytest.fixture(scope='module')
+def level_law():
+    """A law that a notebook has, from its settings to its step."""
+    names = {'__name__': '__main__'}
+    exec(compile(CELL, '<ipython-input-1>', 'exec'), names)
+    return names['LevelLaw']
+
+
+def level(seen):
+    """The same, without a state."""
+    error = seen.reference.theta - seen.measured.theta
+    return -20.0 * seen.measured.phi_dot, 25.0 * error - 40.0 * seen.measured.theta_dot
+
+
+def test_law_of_a_program_is_flown_as_a_class_and_as_a_function(level_law, tmp_path):
+    """They are one law: the same flight, each under its name."""
+    changes = {'dives': 0, 'duration_s': 400.0}
+    one = glider.fly('current_8deg', changes, law=level_law, out=tmp_path / 'one', bag=True)
+    two = glider.fly('current_8deg', changes, law=level)
+    shipped = glider.fly('current_8deg', changes)
+    assert (one.score['controller'], two.score['controller']) == ('LevelLaw', 'level')
+    xarray.testing.assert_equal(one.to_xarray(), two.to_xarray())
+    assert not one.to_xarray().odom_pitch.equals(shipped.to_xarray().odom_pitch)
+    told = yaml.safe_load((one.folder / 'scenario.yaml').read_text())
+    assert told['control'] == {**told['control'], 'law': 'LevelLaw', 'LevelLaw': {'k': 25.0}}
+    assert glider.open_run(one.folder).score == one.score
+    page = one.report()
+    assert 'LevelLaw' in page.read_text(encoding='utf-8')
+    changed = glider.fly('current_8deg', {**changes, 'control.LevelLaw.k': 60.0}, law=level_law)
+    assert not changed.to_xarray().odom_pitch.equals(one.to_xarray().odom_pitch)
+    held = glider.Flight('current_8deg', changes, law=level_law)
+    assert held.until().name == 'end'
+    assert held.now['odom_pitch'] == one.to_xarray().odom_pitch.values[-1]
+    again = glider.fly(one.scenario)
+    xarray.testing.assert_equal(again.to_xarray(), one.to_xarray())
+    # a program that has not the law is told so
+    line = subprocess.run(
+        [sys.executable, '-m', 'glider_bringup.cli', 'verify', str(one.folder)],
+        capture_output=True,
+        text=True,
+    )
+    assert line.returncode == 2
+    assert 'LevelLaw' in line.stderr and 'Traceback' not in line.stderr
+
+
+@pytest.mark.parametrize(
+    ('law', 'choices', 'words'),
+    [
+        ('adaptive', {}, ['LawSettings', 'controller']),
+        (lambda seen: (0.0, 0.0), {}, ['<lambda>', 'letters']),
+        (lambda state, seen: (0.0, 0.0), {}, ['one parameter']),
+        (level, {'engine': 'nodes'}, ['nodes', 'direct']),
+        (level, {'controller': 'pid'}, ['pid']),
+    ],
+)
+def test_law_that_cannot_be_flown_is_told(law, choices, words):
+    with pytest.raises(glider.ConfigurationError) as error:
+        glider.fly('current_8deg', law=law, **choices)
+    assert all(word in str(error.value) for word in words)
+
+
+def test_depth_is_drawn_downward_and_nothing_else(data):
+    matplotlib.use('Agg')
+    deep = data.where(data.odom_depth >= 0.0, drop=True)
+    other = xarray.DataArray([1.0, 2.0], attrs={'positive': 'down'})  # not ours
+    for draw, is_down in (
+        (data.odom_depth.plot, True),
+        (deep.ground_truth_odom_depth[5:].plot.line, True),
+        (data.reference_depth.plot.step, True),
+        (partial(data.odom_depth.plot, yincrease=True), False),
+        (data.odom_pitch.plot, False),
+        (other.plot, False),
+    ):
+        assert draw()[0].axes.yaxis_inverted() == is_down
+        pyplot.close('all')
+
+
+def test_a_printed_dataset_holds_no_files(data):
+    """As text and in a notebook: the scenario is not in it, nor is the vehicle."""
+    for text in (repr(data), data._repr_html_()):
+        assert 'rated_depth' not in text
+        assert 'pitch_error_deg' not in text
+    assert len(repr(data)) < 20_000
+
+
+def test_sweep_of_a_mapping_is_that_of_its_file(tmp_path):
+    file = tmp_path / 'two.yaml'
+    axis = {'kind': 'values', 'field': 'current.speed_kn', 'values': [0.0, 0.5]}
+    values = {'scenario': 'current_8deg', 'dimensions': {'current_speed_kn': axis}}
+    values['set'] = {'dives': 0, 'duration_s': 60.0}
+    file.write_text(yaml.safe_dump(values))
+    axes = {'current.speed_kn': np.array([0.0, 0.5])}
+    of_mapping = glider.sweep(axes, scenario='current_8deg', set=values['set'], workers=1)
+    xarray.testing.assert_equal(of_mapping, glider.sweep(file, workers=1))
+    with pytest.raises(glider.ConfigurationError, match=r'current.speed_kn'):
+        glider.sweep({'current.speed_kn': [99.0]})
+    with pytest.raises(glider.ConfigurationError, match='no field'):
+        glider.sweep({})
+
+
+@pytest.mark.parametrize('name', sorted(typer.main.get_command(app).commands))
+def test_every_command_prints_json_or_says_that_it_does_not(name):
+    command = typer.main.get_command(app).commands[name]
+    options = [option for one in command.params for option in one.opts]
+    assert '--json' in options or 'no JSON' in command.help or name in OF_THE_SCRIPT
+
+
+def test_compiling_shows_a_bar_with_a_clock_on_a_terminal(monkeypatch):
+    """Alone and below a bar that is shown already; it is gone when it is compiled."""
+    for beside in (False, True):
+        shown = io.StringIO()
+        terminal = console._PlainConsole(file=shown, force_terminal=True, width=120)
+        monkeypatch.setattr(console, 'messages', terminal)
+        with console.progress_bar('flying', 5, console.ELAPSED) if beside else nullcontext():
+            with compiling_told(partial(console.compiling, 'compiling the law')):
+                numba.njit(lambda x: x + 1.0)(1.0)
+            assert not [bar for bar in console._shown if len(bar.tasks) > 1]
+        assert 'compiling the law' in shown.getvalue()
+        assert '0:00:0' in shown.getvalue()
+
+
+def test_compiling_is_one_line_where_there_is_no_terminal(monkeypatch):
+    shown = io.StringIO()
+    monkeypatch.setattr(console, 'messages', console._PlainConsole(file=shown))
+    with compiling_told(partial(console.compiling, 'compiling the law')):
+        numba.njit(lambda x: x + 1.0)(1.0)
+        numba.njit(lambda x: x + 2.0)(1.0)
+    assert shown.getvalue() == 'compiling the law\n'

@@ -21,6 +21,7 @@ from glider_bringup.commands.studies.experiments import Group
 from glider_bringup.mission.run_folder import make_result_folder
 from glider_bringup.mission.scenario import load_scenario, parse_assignment
 from glider_bringup.scoring.one_hertz import Recorder
+from glider_bringup.studies.hunt import search
 from glider_bringup.studies.paper import catalogue, flying, measures, verdicts
 from glider_bringup.studies.paper.cases import Case, Experiment
 from glider_bringup.studies.paper.catalogue import (
@@ -62,7 +63,7 @@ def planned():
 
 
 def test_command_line_knows_every_group():
-    assert get_args(Group) == tuple(GROUPS)
+    assert get_args(Group) == (*GROUPS, search.NAME)
 
 
 def test_every_experiment_can_be_flown(planned):
@@ -417,8 +418,8 @@ def test_a_failed_verdict_is_exit_code_one(tmp_path, monkeypatch):
     for rows, code in (([made_up()], 0), ([made_up(status='infeasible')], 1)):
         monkeypatch.setattr(flying, 'fly', lambda *a, rows=rows: ([rows], [[]]))
         out = tmp_path / str(code)
-        result = CliRunner().invoke(cli.app, ['experiments', '--json', '--out', str(out)])
-        assert result.exit_code == code
+        options = ['--only', 'paths', '--json', '--out', str(out)]
+        assert CliRunner().invoke(cli.app, ['experiments', *options]).exit_code == code
         assert (out / RESULT_FILE).is_file()
 
 

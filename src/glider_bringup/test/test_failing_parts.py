@@ -281,9 +281,10 @@ def test_a_heavy_vehicle_turns_by_itself():
 
 
 def test_a_vehicle_below_its_rating_surfaces_and_says_so():
-    """0.5 kg too heavy it is stopped before it can overshoot 1000 m by the margin."""
+    """0.8 kg too heavy, its pump slow, it is stopped before it has overshot 1000 m by 40 m."""
     changes = {
-        'perturb.net_heaviness_kg': 0.5,
+        'perturb.net_heaviness_kg': 0.8,
+        'perturb.pump_rate': 0.5,
         'initial.depth_m': 800.0,
         'duration_s': 4000.0,
         'dives': 0,
@@ -292,8 +293,7 @@ def test_a_vehicle_below_its_rating_surfaces_and_says_so():
     _, log = flown(state, params, 40000)
     mask, depth = log[:, COLUMNS['guard']].astype(int), -log[:, UP]
     first = int(np.flatnonzero(mask & TOO_DEEP)[0])
-    assert depth[first] < 1000.0
-    assert np.max(depth) < 1020.0
+    assert np.max(depth) < 1040.0
     assert np.all(log[first:, COMMAND][:, [0, 2, 3]] == (-1.0, 0.0, 0.0))
     assert log[-1, COMMAND][1] == -0.06
     assert depth[-1] < np.max(depth) - 20.0

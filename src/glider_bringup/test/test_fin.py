@@ -38,10 +38,14 @@ def test_both_laws_hold_a_straight_path_in_a_current(law, real):
     assert scores['actuator_travel']['roll_mass_deg'] < scores['actuator_travel']['fin_deg']
 
 
+#: Its place is known throughout, and what it measures is so.
+KNOWN = {'navigation.method': 'known', 'profile.surface_every_dives': 0, 'sensors': {}}
+
+
 def shelf(law, share, **changes):
     """A Slocum whose fin has a share of its area, on the shelf in half a knot."""
     fields = {'dives': 0, 'duration_s': 9000.0, 'settle_s': 1800.0, 'control.law': law}
-    fields |= {'vehicle.fin.area': 0.02 * share} | changes
+    fields |= {'vehicle.fin.area': 0.02 * share, **KNOWN} | changes
     run = fly(load_scenario('slocum_shelf', fields))
     assert run.score['status'] == 'completed'
     rate = run.to_xarray()['adaptation_steering_dive'].to_numpy()

@@ -98,15 +98,17 @@ def test_device_that_is_full_is_named_and_stays_a_device(tmp_path, name):
 def test_bag_is_readable_up_to_where_the_disk_was_full(tmp_path):
     done = glider(
         *('run', '--engine', 'direct', '--bag', '--duration', 600),
-        *('--out', tmp_path / 'flight', '--no-report'),
+        *('--out', tmp_path / 'flight', '--no-report', '--json'),
     )
     assert done.returncode == 1, done.stderr
     (file,) = (tmp_path / 'flight').glob('*.mcap')
-    *_, told = done.stderr.strip().splitlines()
-    assert told == f'{file}: cannot be written: File too large'
+    card = json.loads(done.stdout)
+    assert card['status'] == 'aborted'
+    assert card['reason'] == f'{file}: cannot be written: File too large'
+    assert f'aborted: {card["reason"]}' in done.stderr.splitlines()
     assert 'Traceback' not in done.stderr
     names = {one.name for one in file.parent.iterdir()}
-    assert names == {file.name, 'scenario.yaml', 'vehicle.yaml'}
+    assert names == {file.name, 'scenario.yaml', 'vehicle.yaml', 'score.json'}
     card = score_again(file.parent)
     assert card['status'] == 'aborted'
     assert card['ticks'] >= CHUNK_TICKS

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""``./glider fuzz --only files --only lines``, in little."""
+"""``./glider test --only fuzz --door files --door lines``, in little."""
 
 import json
 import random
@@ -8,9 +8,9 @@ import random
 import pytest
 from typer.testing import CliRunner
 
-from glider_bringup.cli import app
-from glider_bringup.fuzzing import files, lines, watch
-from glider_bringup.fuzzing.counts import Counter, Counts
+from fuzzing import files, lines, watch
+from fuzzing.__main__ import app
+from fuzzing.counts import Counter, Counts
 from glider_model.base.errors import ConfigurationError
 
 
@@ -37,7 +37,7 @@ def test_ctrl_c_prints_what_was_counted(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(files, 'fuzz', fuzz)
-    done = CliRunner().invoke(app, ['fuzz', '--only', 'files', '--only', 'lines', '--json'])
+    done = CliRunner().invoke(app, ['--door', 'files', '--door', 'lines', '--json'])
     assert done.exit_code == 130
     (found,) = json.loads(done.stdout).items()
     wrong = {'wrong': 1, 'examples': ['wrong: another: it was']}

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""``./glider fuzz --only kills``, in little; and that the janitor tidies up after whom it saw."""
+"""``./glider test --only fuzz --door kills``, in little; and the janitor that tidies up after."""
 
 import mmap
 import os
@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from fuzzing import kills
+from fuzzing.counts import Counter
 from glider_bringup.engines import processes
 from glider_bringup.engines.janitor import SHARED_MEMORY, mapped
-from glider_bringup.fuzzing import kills
-from glider_bringup.fuzzing.counts import Counter
 
 #: A process that maps a segment as Fast DDS does, says so and waits.
 MAP = """

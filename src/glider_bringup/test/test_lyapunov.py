@@ -146,13 +146,14 @@ def bound(start, rate, mu):
 
 @pytest.fixture(scope='module', params=UNKNOWN.values(), ids=UNKNOWN)
 def flight(request):
-    """An unknown vehicle, from the tick on at which every filter has seen two measurements."""
+    """An unknown vehicle, from the second tick on at which it is steered: afloat the law rests."""
     law, seen = fly_unknown(request.param)
-    return law, seen[2:]
+    steered = np.flatnonzero(seen[:, W])
+    return law, seen[steered[0] + 2 :]
 
 
 def test_w_stays_below_its_bound_through_the_whole_mission(flight):
-    """Through dives, climbs, inflections and the surface; the bound is not a loose one either."""
+    """Through dives, climbs and inflections; the bound is not a loose one either."""
     law, seen = flight
     _, mu, rate = disturbance(law, seen)
     limit = bound(seen[0, W], rate, mu)

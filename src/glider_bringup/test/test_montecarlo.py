@@ -177,7 +177,7 @@ def scores(**changes):
         'pitch_error_deg': {'rms_steady': 0.1, 'max_steady': 0.2},
         'heading_fluctuation_deg': {'rms_steady': 0.1, 'max_steady': 0.2},
         'final_state': {'position_ned_m': [1.0, 2.0, 3.0], 'attitude_rpy_rad': [0.0, 0.0, 0.0]},
-        'infeasible': False,
+        'status': 'completed',
         'navigation': dict.fromkeys(NAVIGATION),
         'energy': {'wh': 7.0},
     }
@@ -187,7 +187,7 @@ def scores(**changes):
 def test_a_good_run_has_not_diverged():
     assert judge(scores()) == {
         'diverged': False,
-        'outcome': 'flew on',
+        'outcome': 'completed',
         'max_steady_m': 0.5,
         'max_all_m': 5.0,
         'max_run_m': 9.0,
@@ -201,7 +201,8 @@ def test_a_good_run_has_not_diverged():
 @pytest.mark.parametrize(
     'change',
     [
-        {'infeasible': True},
+        {'status': 'infeasible'},
+        {'status': 'lost'},
         {'cross_track_m': {'max_steady': 900.0, 'max_all': 1000.1, 'max_run': 1000.1}},
         {'pitch_error_deg': {'rms_steady': math.nan}},
         {'final_state': {'position_ned_m': [1.0, math.inf, 3.0]}},

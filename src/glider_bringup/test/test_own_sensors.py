@@ -84,6 +84,10 @@ class Vehicle:
     def said(self, text: str) -> bool:
         return any(text in told for told in self.told)
 
+    def misses(self, topic: str) -> bool:
+        """Whether a topic was said to be missing; on a slow machine others may be."""
+        return any('missing' in told and topic in told for told in self.told)
+
     def north_m(self) -> float:
         return self.odom[-1].pose.pose.position.y
 
@@ -179,7 +183,7 @@ def test_fix_counts_at_the_surface_and_is_forgotten_when_it_is_old(flight):
     assert heard[-1][-1][0] == 0.0
     vehicle.fix = None
     flight.until(lambda: heard[-1][-1] == (-1.0, 0.0, 0.0, 0.0, 0.0))
-    assert not vehicle.said('missing')
+    assert not vehicle.misses('fix')
 
 
 @pytest.mark.parametrize('number', [0.0, math.nan])
@@ -189,7 +193,7 @@ def test_receiver_without_a_fix_is_heard_in_peace(flight, number):
     vehicle.fix.latitude = vehicle.fix.longitude = number
     flight.go_on(30)
     assert not vehicle.said('refused')
-    assert not vehicle.said('missing')
+    assert not vehicle.misses('fix')
     assert abs(vehicle.north_m()) < 20.0
 
 

@@ -15,13 +15,37 @@ from glider_model.ocean.density import immersed
 SEA = [[0.0, 1022.5, 20.0], [30.0, 1024.0, 15.0], [200.0, 1025.6, 12.0], [1000.0, 1030.0, 5.0]]
 
 
-def flown(name, **changes):
+#: Its place is known throughout, and what it measures is so.
+KNOWN = {'navigation.method': 'known', 'profile.surface_every_dives': 0, 'sensors': {}}
+
+
+def flown(name, known=KNOWN, **changes):
     fields = {name.replace('__', '.'): value for name, value in changes.items()}
     recorder = Recorder()
-    flight, scores = fly_scored(load_scenario(name, {'dives': 0, **fields}), [recorder])
+    flight, scores = fly_scored(load_scenario(name, {'dives': 0, **known, **fields}), [recorder])
     assert flight.status == 'completed'
     assert scores['guard']['events'] == []
     return scores, recorder.result()
+
+
+@pytest.mark.parametrize('name', ['slocum_shelf', 'seaglider_1000m'])
+def test_operators_meet_them_as_theirs_fly(name):
+    """As the scenario is: no position under water, fixes when it comes up, and it learns of them.
+
+    The first way is flown in a current that nobody has told it of, and drifts with it.
+    """
+    scenario = load_scenario(name)
+    assert scenario.navigation.method == 'dead_reckoned'
+    scores, _ = flown(name, known={}, dives=scenario.dives)
+    told = scores['navigation']
+    assert told['surfacings'] >= 2
+    assert told['fixed'] >= 1
+    first, second = told['reports'][:2]
+    under_water_s = first['t_s'] - first['dive_t_s']
+    drift_m = np.hypot(*first['dac_true_mps']) * under_water_s
+    assert first['error_m'] == pytest.approx(drift_m, rel=0.05)
+    assert second['error_m'] < 0.1 * first['error_m']
+    assert told['ellipse_95_share'] == 1.0
 
 
 @pytest.mark.parametrize('law', ['adaptive', 'pid'])

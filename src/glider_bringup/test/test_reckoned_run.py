@@ -14,9 +14,10 @@ import glider_bringup as glider
 from glider_bringup import cli, console
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.traces import load_traces
-from glider_bringup.showing.findings import navigation_notes
+from glider_bringup.showing.findings import navigation_notes, verdict
 from glider_bringup.showing.flown_run import draw, read_run, write_report
 from glider_bringup.showing.scorecard import card_rows
+from glider_bringup.showing.words import small
 from glider_model.ocean.current_settings import KNOT_MPS
 
 RECKONED = {
@@ -198,7 +199,9 @@ def test_report_shows_true_and_believed(flown, data):
         )
         assert len(believed['spans']) == len(reports) - 1
     assert 'Each surfacing' in body
-    assert body.count('<tr>') == 1 + len(reports) + len(card_rows(flown.score))
+    surfacings = body[body.index('Each surfacing') : body.index('Where it went')]
+    assert surfacings.count('<tr>') == 1 + len(reports)
+    assert body.count('<tr>') > surfacings.count('<tr>') + len(card_rows(flown.score))
     for note in navigation_notes(flown.score['navigation'], True):
         assert note in body
 
@@ -230,6 +233,18 @@ def told_of(off, inside, rms=0.01):
         'ellipse_95_share': inside / len(off) if off else None,
         'dac_error_mps': {'rms': rms, 'worst': rms},
     }
+
+
+def test_the_largest_error_comes_first(flown):
+    """A complete run opens with how far off it was at worst: its path, and where it believed."""
+    reports = flown.score['navigation']['reports']
+    worst_m = max(math.dist(one['true_ned_m'], one['believed_ned_m']) for one in reports)
+    off_m = flown.score['cross_track_m']['max_run']
+    assert worst_m > 100.0
+    assert verdict(flown.score, 600.0).startswith(
+        f'At worst it was {small(off_m)} off its path and came up {small(worst_m)} from where it '
+        'believed to be.'
+    )
 
 
 def test_navigation_is_told_in_words():

@@ -16,6 +16,7 @@ import pytest
 import rclpy
 from mcap.writer import Writer
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -238,6 +239,8 @@ def test_events_that_come_late_are_recorded_with_their_tick(
     for message in events:
         publishers['/diagnostics'].publish(message.data)
     listen_until(lambda: acknowledged and acknowledged[-1] >= 51)
+    # those after it may be on their way
+    assert publishers['/diagnostics'].wait_for_all_acked(Duration(seconds=DEADLINE_S))
     process.send_signal(signal.SIGINT)
     assert process.wait(DEADLINE_S) == 0
     node.destroy_node()

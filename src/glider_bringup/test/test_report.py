@@ -4,6 +4,7 @@
 
 import base64
 import json
+import math
 import os
 import re
 import resource
@@ -19,12 +20,14 @@ import pytest
 
 from glider_bringup import cli, console
 from glider_bringup.blocks import COLUMNS
+from glider_bringup.door.run import Rows
 from glider_bringup.engines.direct import fly_blocks
-from glider_bringup.engines.flight import Flight, mission_of
+from glider_bringup.engines.flight import Outcome, mission_of
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario, scenario_names
 from glider_bringup.scoring.card import scorecard, write_score
+from glider_bringup.scoring.dives import dives_of
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import make_tracer
 from glider_bringup.showing.findings import LOST_M, findings, lost_since_s, verdict
@@ -81,7 +84,7 @@ def fly(tmp_path, change=None, stop=False, name='flight', of='current_8deg', **f
         log = log if change is None else change(log.copy())
         tracer.add(log)
         scorer.add(log)
-    flight = Flight('aborted' if stop else 'completed', 'stopped' if stop else '', 1.0, 0, 0)
+    flight = Outcome('aborted' if stop else 'completed', 'stopped' if stop else '', 1.0, 0, 0)
     scores = scorer.result(scenario.score_rules(scorer.ticks * 0.1))
     card = scorecard(scenario, 'direct', flight, scores)
     write_score(folder, card)
@@ -265,7 +268,7 @@ def never_flown(folder):
     """Run that was aborted before its first tick."""
     scenario = load_scenario('current_8deg')
     folder = make_run_folder(scenario, folder)
-    flight = Flight('aborted', 'plant_node was killed by SIGKILL', 0.0, 0, 0)
+    flight = Outcome('aborted', 'plant_node was killed by SIGKILL', 0.0, 0, 0)
     card = scorecard(scenario, 'nodes', flight, Scorer().result(Rules()))
     write_score(folder, card)
     keep_traces(scenario, folder, card, make_tracer(scenario))
@@ -309,6 +312,65 @@ def test_topic_that_is_not_in_the_bag_has_no_panel(tmp_path):
 def test_pid_shows_nothing_learnt(tmp_path):
     _, data = report_of(fly(tmp_path, **{'control.law': 'pid'}))
     assert not [panel['id'] for panel in data['panels'] if panel['id'].startswith('learnt')]
+
+
+def test_desired_path_is_drawn_as_far_as_it_was_followed(tmp_path):
+    """A leg of 50 m that goes on straight, followed for ten minutes."""
+    path = {'kind': 'straight', 'length_m': 50.0, 'course_deg': 30.0, 'at_end': 'continue'}
+    _, data = report_of(fly(tmp_path, duration_s=600.0, path=path))
+    (run,) = data['runs']
+    way = [math.hypot(n, e) for n, e, _ in run['path']]
+    track = np.hypot(run['arrays']['track_north_m'], run['arrays']['track_east_m'])
+    assert track.max() > 60.0
+    assert way[-1] == pytest.approx(track.max(), abs=2.0)
+    for north, east, depth in (point for point in run['path'] if point[0] > 10.0):
+        assert math.degrees(math.atan2(east, north)) == pytest.approx(30.0, abs=0.1)
+        assert depth == 0.0
+
+
+def test_battery_has_a_curve(flown):
+    """Within rounding it is what the scorecard says was taken out of 100 %."""
+    _, data = read_page(flown / 'report.html')
+    curve = data['runs'][0]['arrays']['battery_percent']
+    run = read_run(flown)
+    taken = run.card['energy']['wh'] / run.vehicle.energy.capacity.value
+    assert curve[0] == pytest.approx(100.0, abs=1e-3)
+    assert 100.0 - curve[-1] == pytest.approx(100.0 * taken, rel=0.01)
+    assert 'battery' in [panel['id'] for panel in data['panels']]
+
+
+def test_battery_that_is_not_known_has_none(tmp_path):
+    def unknown(log):
+        log[:, COLUMNS['battery']] = -1.0
+        return log
+
+    text, data = report_of(fly(tmp_path, unknown))
+    assert 'battery' not in [panel['id'] for panel in data['panels']]
+    assert 'battery_percent' not in text.text
+
+
+def test_each_dive_has_a_line(tmp_path):
+    fields = {'duration_s': 1500.0, 'profile.depth_m': 40.0, 'profile.top_depth_m': 5.0}
+    folder = fly(tmp_path, **fields)
+    rows = Rows()
+    for log in fly_blocks(*mission_of(load_scenario('current_8deg', {**SHORT, **fields}))):
+        rows.add(log)
+    log = rows.result()
+    depth = -log[:, COLUMNS['ground_truth/odom'].start + 2]
+    place = log[:, COLUMNS['ground_truth/odom']][:, :2]
+    bottoms = np.flatnonzero((depth[1:-1] >= depth[:-2]) & (depth[1:-1] > depth[2:]))
+    bottoms = bottoms[depth[bottoms] > 35.0] + 1
+    found = dives_of(read_run(folder).traces)
+    assert len(bottoms) > 1
+    for one, bottom in zip(found, bottoms, strict=False):
+        assert one.from_s < 0.1 * bottom < one.to_s
+        assert one.deepest_m == pytest.approx(depth[bottom], abs=1e-3)
+        first, last = (min(round(10.0 * t), len(log) - 1) for t in (one.from_s, one.to_s))
+        assert one.way_m == pytest.approx(np.linalg.norm(place[last] - place[first]), abs=1.0)
+    assert len(found) in (len(bottoms), len(bottoms) + 1)
+    text, _ = report_of(folder)
+    assert 'Each dive' in text.text
+    assert f'{depth[bottoms[0]]:,.1f}' in text.text
 
 
 # ---------------------------------------------------------------------------------- in words

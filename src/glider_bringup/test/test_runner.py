@@ -244,6 +244,22 @@ def test_nodes_share_a_domain_that_no_other_run_has(monkeypatch, fly):
     assert 1 <= int(domains.pop()) <= 101
 
 
+def test_ps_shows_which_node_is_which(fly):
+    read = "print('line', open('/proc/self/cmdline').read().partition(chr(0))[0], flush=True)"
+    commands = {PLANT: [sys.executable, '-m', 'timeit', '-n', '1', '-r', '1', read]}
+    _, lines = fly(commands)
+    assert f'[{PLANT}] line {PLANT} (-m timeit)' in lines
+
+
+def test_domain_that_a_run_was_given_is_not_drawn(monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(os.getpid() % 101 + 1))  # the first that it would draw
+    with domain_id() as given, domain_id() as given_too:
+        assert given == given_too
+        monkeypatch.delenv('ROS_DOMAIN_ID')
+        with domain_id() as drawn:
+            assert drawn != given
+
+
 def test_domain_of_the_user_is_kept(monkeypatch):
     monkeypatch.setenv('ROS_DOMAIN_ID', '42')
     with domain_id() as domain:

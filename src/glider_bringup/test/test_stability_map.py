@@ -215,7 +215,7 @@ def test_nothing_of_a_map_is_cut_off(tmp_path, monkeypatch, speeds, angles, circ
     drawing = (tmp_path / 'map.svg').read_text()
     assert f'<!--  {circle} -->' in drawing
     held = shares(load_map(file))[0]['stable_of_feasible']
-    assert f'<!-- {held:.0%} of the feasible -->' in drawing
+    assert f'<!-- {held:.1%} of the feasible -->' in drawing
 
 
 def test_map_of_currents_that_nobody_can_hold(tmp_path, monkeypatch, capsys):

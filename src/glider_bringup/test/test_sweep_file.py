@@ -158,7 +158,7 @@ def test_laws_and_methods_of_all_cells_are_known(tmp_path):
 def test_vehicles_with_a_fin_have_a_loop_of_their_own(tmp_path):
     names = ['zhang2021', 'slocum_g2', 'seawing']
     vehicles = {'kind': 'values', 'field': 'vehicle', 'values': names}
-    shallow = {'profile.depth_m': 150, 'initial.depth_m': 0}
+    shallow = {'profile.depth_m': 150, 'profile.net_heaviness_kg': 0.2, 'initial.depth_m': 0}
     plan = plan_of(tmp_path, set=shallow, dimensions={'vehicle': vehicles})
     assert [one.steered for one in plan.combinations] == ['', 'slocum_g2']
 

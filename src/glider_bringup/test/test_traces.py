@@ -22,7 +22,7 @@ from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_S
 from glider_model.vehicle.file import load_vehicle
 
-quick = settings(max_examples=40, deadline=None)
+quick = settings(max_examples=40)
 VEHICLE = load_vehicle('zhang2021').params()
 E2 = COLUMNS['tracking_error'].start + 1
 TRUTH = COLUMNS['ground_truth/odom']

@@ -189,9 +189,7 @@ def fields_that_differ(topic, one: bytes, other: bytes) -> list[str] | None:
 
 
 @given(data=st.data())
-@settings(
-    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_flipped_bit_is_named(altered, recorded, tmp_path, data):
     """Whatever bit of whatever per-tick message: block, topic and tick; the field as well."""
     name = data.draw(st.sampled_from(sorted(PER_TICK)))
@@ -334,14 +332,17 @@ def test_change_is_found_where_the_run_itself_would_have_changed(
     assert first['topic'] in [topic for tick, topic in pairs if tick == pairs[0][0]]
 
 
-def test_edited_scenario_of_the_folder_counts_and_is_pointed_out(altered, recorded, tmp_path):
+def test_edited_scenario_is_refused_in_the_folder_and_tried_as_settings(
+    altered, recorded, tmp_path
+):
     folder = altered(recorded)
     text = (folder / 'scenario.yaml').read_text()
     assert 'b1: 6.0' in text
-    (folder / 'scenario.yaml').write_text(text.replace('b1: 6.0', 'b1: 6.1'))
-    report = verified(folder, tmp_path)
-    assert different({one['block']: one for one in report['blocks']}) == {'control'}
-    assert 'not the scenario that is attached' in report['notes'][0]
+    edited = folder / 'scenario.yaml'
+    edited.write_text(text.replace('b1: 6.0', 'b1: 6.1'))
+    with pytest.raises(ConfigurationError, match='not the one that was flown'):
+        verified(folder, tmp_path)
+    assert different(results(folder, tmp_path, settings=edited)) == {'control'}
 
 
 # ---------------------------------------------------------------------- what is not there
@@ -500,7 +501,7 @@ def test_ctrl_c_within_compiled_code_is_answered(short_run, block):
     ('name', 'content', 'words'),
     [
         ('nothing', None, 'no such run'),
-        ('empty', {}, 'no .mcap file'),
+        ('empty', {}, 'a direct one with --bag'),
         ('text', {'a.mcap': b'not a bag at all'}, 'a.mcap: not an MCAP file'),
         (
             'sqlite',

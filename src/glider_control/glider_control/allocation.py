@@ -14,7 +14,12 @@ import math
 from typing import NamedTuple
 
 from glider_model.base.kernel import kernel
-from glider_model.onboard.moving_mass import MovingMass, first_moments, make_moving_mass
+from glider_model.onboard.moving_mass import (
+    MovingMass,
+    first_moments,
+    make_moving_mass,
+    mass_place,
+)
 from glider_model.vehicle.file import VehicleParams
 from glider_model.vehicle.rigid_body import GRAVITY
 
@@ -80,8 +85,7 @@ def allocate_pitch(tau_q, m_b, mu, phi, theta, params):
     mass = params.mass
     _, _, s_z = first_moments(m_b, 0.0, mu, mass)
     s_x = (s_z * g_x - tau_q / GRAVITY) / max(g_z, SMALLEST_G_Z)
-    x_p = (s_x - mass.s_x - m_b * mass.pump_x) / mass.m_p - mass.x_p0
-    return min(params.x_p_max, max(-params.x_p_max, x_p))
+    return mass_place(s_x, m_b, params.x_p_max, mass)
 
 
 @kernel

@@ -6,6 +6,7 @@ The channels cannot be swapped: buoyancy sets speed and vertical rate, the mass 
 pitch, the mass turned to a side sets roll and so heading, unless a steering surface does.
 """
 
+import math
 from typing import NamedTuple
 
 from glider_control.allocation import (
@@ -34,6 +35,10 @@ from glider_model.vehicle.rigid_body import GRAVITY
 
 #: Bits of ``ControlOutput.saturation``; REFUSED, and those of `glider_guard.rows`, are others.
 SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL, SATURATED_SURFACE = 1, 2, 4, 4096
+#: Shallower than this a vehicle is afloat, until it is deeper than that (m).
+AFLOAT_M, SUBMERGED_M = 1.0, 2.0
+#: Pitch of a vehicle afloat (rad).
+AFLOAT_PITCH = math.radians(-40.0)
 
 
 class ControlParams(NamedTuple):
@@ -62,6 +67,8 @@ class ControlState(NamedTuple):
     trim: Trim
     command: Joints  #: last command
     intake: IntakeState
+    depth: float  #: filtered as the attitude is (m)
+    is_afloat: bool
 
 
 class ControlOutput(NamedTuple):
@@ -88,17 +95,28 @@ def see(measured, taken, last, params):
     speed, alpha = glide_speed(measured.theta, measured.vertical_rate, params.polar)
     tau_p, tau_q = moments(joints.m_b, joints.x_p, joints.mu, measured.phi, measured.theta, limits)
     return Seen(
-        measured,
-        taken.reference,
-        speed,
-        alpha,
-        joints.m_b,
-        tau_p,
-        tau_q,
-        abs(last.mu) >= limits.mu_max,
-        abs(last.x_p) >= limits.x_p_max,
-        joints.delta,
+        measured=measured,
+        reference=taken.reference,
+        speed=speed,
+        alpha=alpha,
+        m_b=joints.m_b,
+        tau_p=tau_p,
+        tau_q=tau_q,
+        roll_held=abs(last.mu) >= limits.mu_max,
+        pitch_held=abs(last.x_p) >= limits.x_p_max,
+        delta=joints.delta,
     )
+
+
+@kernel
+def rest_afloat(m_b, params):
+    """Actuators of a vehicle afloat: no roll, no turn, and balanced nose down, antenna up.
+
+    Without way through the water there is nothing to steer by: a law would swing the vehicle. One
+    that begins to sink level stays in a stall; nose down it glides from the first metre on.
+    """
+    x_p = allocate_pitch(0.0, m_b, 0.0, 0.0, AFLOAT_PITCH, params)
+    return Joints(m_b, x_p, 0.0, 0.0)
 
 
 @kernel
@@ -127,6 +145,9 @@ def control_step(state, odometry, joints, reference, params, dt):
     last = joints if first else state.command
     limits = params.allocation
     measured = measure(state.measured, odometry, first, params.attitude_s, dt)
+    depth = odometry.p_d if first else state.depth
+    depth += dt / (params.attitude_s + dt) * (odometry.p_d - depth)
+    is_afloat = depth < (SUBMERGED_M if state.is_afloat else AFLOAT_M)
 
     law, steering, trim = state.law, state.steering, state.trim
     command, tau_p, tau_q = last, 0.0, 0.0
@@ -134,19 +155,24 @@ def control_step(state, odometry, joints, reference, params, dt):
     if is_blind(taken, params.intake):
         command, m_b = params.safe_command, params.safe_command.m_b
     elif taken.gate.seen:
-        seen = see(measured, taken, last, params)
-        law, tau_p, tau_q = law_step(law, seen, params.law, dt)
-        steering, delta = steer(steering, seen, params.steering, dt)
         m_b, trim = vertical_rate_law(state.trim, measured, taken.reference, joints, params, dt)
-        mu = allocate_roll(tau_p, measured.phi, measured.theta, limits)
-        x_p = allocate_pitch(tau_q, joints.m_b, joints.mu, measured.phi, measured.theta, limits)
+        phi, theta = measured.phi, measured.theta
+        if is_afloat:
+            wanted = rest_afloat(m_b, limits)
+            tau_p, tau_q = moments(m_b, wanted.x_p, wanted.mu, phi, theta, limits)
+        else:
+            seen = see(measured, taken, last, params)
+            law, tau_p, tau_q = law_step(law, seen, params.law, dt)
+            steering, delta = steer(steering, seen, params.steering, dt)
+            mu = allocate_roll(tau_p, phi, theta, limits)
+            x_p = allocate_pitch(tau_q, joints.m_b, joints.mu, phi, theta, limits)
+            wanted = Joints(m_b, x_p, mu, limit_surface(delta, limits))
+        band = params.dead_band
         command = Joints(
-            _hold(m_b, last.m_b, params.dead_band.m_b, limits.m_b_max),
-            _hold(x_p, last.x_p, params.dead_band.x_p, limits.x_p_max),
-            _hold(mu, last.mu, params.dead_band.mu, limits.mu_max),
-            _hold(
-                limit_surface(delta, limits), last.delta, params.dead_band.delta, limits.delta_max
-            ),
+            _hold(wanted.m_b, last.m_b, band.m_b, limits.m_b_max),
+            _hold(wanted.x_p, last.x_p, band.x_p, limits.x_p_max),
+            _hold(wanted.mu, last.mu, band.mu, limits.mu_max),
+            _hold(wanted.delta, last.delta, band.delta, limits.delta_max),
         )
     saturation = REFUSED if is_refusing(taken) else 0
     if abs(command.m_b) >= limits.m_b_max:
@@ -160,4 +186,15 @@ def control_step(state, odometry, joints, reference, params, dt):
     learnt = surface_learnt(law_learnt(law, params.law), steering, params.steering)
     output = ControlOutput(command, Wrench(m_b * GRAVITY, tau_p, tau_q), learnt, saturation)
     tick = state.tick + 1 if taken.gate.seen else 0
-    return ControlState(tick, measured, law, steering, trim, command, taken), output
+    state = ControlState(
+        tick=tick,
+        measured=measured,
+        law=law,
+        steering=steering,
+        trim=trim,
+        command=command,
+        intake=taken,
+        depth=depth,
+        is_afloat=is_afloat,
+    )
+    return state, output

@@ -47,12 +47,12 @@ class IntakeState(NamedTuple):
 
 
 INITIAL_INTAKE = IntakeState(
-    INITIAL_GATE,
-    Joints(0.0, 0.0, 0.0, 0.0),
-    0.0,
-    Reference(*(12 * (0.0,))),
-    0.0,
-    REFUSAL_TOLD_S,
+    gate=INITIAL_GATE,
+    joints=Joints(0.0, 0.0, 0.0, 0.0),
+    joints_s=0.0,
+    reference=Reference(*(12 * (0.0,))),
+    reference_s=0.0,
+    refused_s=REFUSAL_TOLD_S,
 )
 
 
@@ -88,7 +88,14 @@ def take_in(state, odometry, joints, reference, params, dt):
         reference, reference_s = state.reference, state.reference_s + dt
     if gate.age_s > 0.0 or joints_s > 0.0 or reference_s > 0.0:
         refused_s = 0.0
-    return IntakeState(gate, joints, joints_s, reference, reference_s, refused_s)
+    return IntakeState(
+        gate=gate,
+        joints=joints,
+        joints_s=joints_s,
+        reference=reference,
+        reference_s=reference_s,
+        refused_s=refused_s,
+    )
 
 
 @kernel

@@ -110,4 +110,18 @@ def law_learnt(state, params):
     -------
     Adaptation
     """
-    return Adaptation(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Adaptation(
+        roll_bias_nm=0.0,
+        roll_side_force_nm=0.0,
+        roll_damping_nm=0.0,
+        pitch_bias_nm=0.0,
+        pitch_alpha_nm=0.0,
+        pitch_speed_nm=0.0,
+        pitch_damping_nm=0.0,
+        steering_dive_radps=0.0,
+        disturbance_dive_radps=0.0,
+        steering_climb_radps=0.0,
+        disturbance_climb_radps=0.0,
+        lyapunov_1=0.0,
+        lyapunov_2=0.0,
+    )

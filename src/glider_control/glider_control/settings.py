@@ -150,33 +150,80 @@ class ControlSettings(ControlLawSettings):
         if surface:
             bank = bank._replace(limit=0.0)  # it is held level
         return ControlParams(
-            make_allocation(kernel_vehicle),
-            make_polar(kernel_vehicle),
-            self.chosen.params(vehicle, bank),
-            surface.params(vehicle) if surface else NoSteering(),
-            self.buoyancy.ki_kg_per_m,
-            self.buoyancy.drag_ki_kg_per_m,
-            self.buoyancy.trim_limit_kg,
-            filters.attitude_s,
-            Joints(
+            allocation=make_allocation(kernel_vehicle),
+            polar=make_polar(kernel_vehicle),
+            law=self.chosen.params(vehicle, bank),
+            steering=surface.params(vehicle) if surface else NoSteering(),
+            buoyancy_ki=self.buoyancy.ki_kg_per_m,
+            drag_ki=self.buoyancy.drag_ki_kg_per_m,
+            buoyancy_trim_max=self.buoyancy.trim_limit_kg,
+            attitude_s=filters.attitude_s,
+            dead_band=Joints(
                 filters.buoyancy_dead_band_kg,
                 filters.pitch_dead_band_m,
                 math.radians(filters.roll_dead_band_deg),
                 math.radians(surface.dead_band_deg) if surface else 0.0,
             ),
-            Joints(-kernel_vehicle.m_b_max, -kernel_vehicle.x_p_max, 0.0, 0.0),
-            make_intake(kernel_vehicle, self.gate.params()),
+            safe_command=Joints(-kernel_vehicle.m_b_max, -kernel_vehicle.x_p_max, 0.0, 0.0),
+            intake=make_intake(kernel_vehicle, self.gate.params()),
         )
 
     def initial_state(self) -> 'ControlState':
         """State before the first tick."""
         surface = self.steering(load_vehicle(self.vehicle).steers_by)
         return ControlState(
-            0,
-            Measured(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-            self.chosen.initial_state(),
-            surface.initial_state() if surface else NoSteering(),
-            Trim(0.0, 0.0),
-            Joints(0.0, 0.0, 0.0, 0.0),
-            INITIAL_INTAKE,
+            tick=0,
+            measured=Measured(
+                phi=0.0,
+                theta=0.0,
+                psi=0.0,
+                phi_dot=0.0,
+                theta_dot=0.0,
+                psi_dot=0.0,
+                vertical_rate=0.0,
+            ),
+            law=self.chosen.initial_state(),
+            steering=surface.initial_state() if surface else NoSteering(),
+            trim=Trim(0.0, 0.0),
+            command=Joints(0.0, 0.0, 0.0, 0.0),
+            intake=INITIAL_INTAKE,
+            depth=0.0,
+            is_afloat=True,
         )
+
+
+def check_law(name: str, law: type) -> None:
+    """Refuse a law that this program alone brings, if it cannot be called by this name.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    taken = {*TAKEN, *LAWS, *SURFACE_LAWS}
+    if not name.isidentifier() or name in taken:
+        raise ConfigurationError(
+            f'law {name}: not usable as a name (allowed: letters, digits and _, and none of '
+            f'{", ".join(sorted(taken))})'
+        )
+    try:
+        law()
+    except pydantic.ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = '.'.join(map(str, first['loc']))
+        raise ConfigurationError(
+            f'law {name}: its field {field} has no usable default: {first["msg"]}'
+        ) from None
+
+
+def with_law(
+    name: str, law: type[LawSettings]
+) -> tuple[type[ControlLawSettings], type[ControlSettings]]:
+    """Kinds of settings that know one law more than are registered."""
+    more = {
+        'law': (Literal[(*LAWS, name)], ControlLawSettings.model_fields['law']),
+        name: (law, Field(law(), description=plugins.summary(law))),
+    }
+    return tuple(
+        pydantic.create_model(base.__name__, __base__=base, **more)
+        for base in (ControlLawSettings, ControlSettings)
+    )

@@ -91,7 +91,7 @@ class PitchPlant:
 parameters = st.tuples(*(st.floats(-1.0, 1.0) for _ in range(3)), st.floats(-1.5, 0.0))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(parameters, st.floats(-0.2, 0.2))
 def test_lyapunov_function_never_grows_on_an_unknown_plant(theta_star, error):
     """But for leakage and the sampling: it never rises by more than 1e-4 of its start in a tick.
@@ -104,7 +104,7 @@ def test_lyapunov_function_never_grows_on_an_unknown_plant(theta_star, error):
     assert learning[-1] <= learning[0] + 1e-9
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(parameters)
 def test_pitch_error_ends_inside_the_ultimate_bound(theta_star):
     """0.1 deg after 30 min: the dead zone of learning over L1, doubled."""

@@ -19,7 +19,7 @@ from glider_control.allocation import (
 from glider_model.vehicle.file import load_vehicle, vehicle_names
 from glider_model.vehicle.rigid_body import GRAVITY
 
-quick = settings(max_examples=60, deadline=None)
+quick = settings(max_examples=60)
 every_vehicle = pytest.mark.parametrize('vehicle', vehicle_names())
 
 rolls = st.floats(-0.7, 0.7)

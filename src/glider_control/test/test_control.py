@@ -25,7 +25,7 @@ from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle, vehicle_names
 from glider_model.vehicle.rigid_body import GRAVITY
 
-quick = settings(max_examples=40, deadline=None)
+quick = settings(max_examples=40)
 
 COLUMNS = 'phi theta psi down m_b x_p mu c_m_b c_x_p c_mu saturation'.split()
 #: Net heaviness (kg) and pitch (deg) of the dives flown here.

@@ -27,7 +27,7 @@ FIN = {'range': 26.0, 'rate': 1.2, 'area': 0.05, 'lift_slope': 3.0, 'x': -1.2, '
 VEHICLE = changed_vehicle('zhang2021', {f'fin.{name}': value for name, value in FIN.items()})
 LIMIT = math.radians(26.0)
 LAWS = ('adaptive', 'pid')
-quick = settings(max_examples=60, deadline=None)
+quick = settings(max_examples=60)
 LAW = ControlSettings(vehicle=VEHICLE).params().steering
 NOTHING_YET = FinLawSettings().initial_state()
 

@@ -23,7 +23,7 @@ from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import Filtered
 from glider_model.vehicle.file import SLOWEST_GLIDE_MPS
 
-quick = settings(max_examples=60, deadline=None)
+quick = settings(max_examples=60)
 
 AT_REST = PidState(0.0, 0.0, 0.0, Filtered(0.0, 0.0))
 #: Heading error to starboard: the roll that turns there, by vehicle and phase.

@@ -26,7 +26,7 @@ def known(b, c=0.0, std=0.0):
     return PRIOR._replace(b=b, c=c, p=(std * std, *PRIOR.p[1:]))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(effectiveness, bends, st.floats(-0.05, 0.05), st.floats(0.3, 2.0))
 def test_the_roll_turns_as_asked_or_as_much_as_it_can(b, c, turn, ratio):
     sine, most = roll_to_turn(known(b, c), turn, ratio, LIMIT)
@@ -110,7 +110,7 @@ def test_vehicle_that_hardly_turns_is_kicked_for_the_whole_error(k, kick_std, er
         assert sine * k == pytest.approx(error, rel=1e-3)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(2e-4, 2e-3), st.floats(8.0, 26.0), st.floats(0.2, 0.45), st.floats(-3.0, 3.0))
 def test_kicked_vehicle_holds_its_heading_at_the_bank_at_which_it_does_not_turn(
     b, null_deg, k, error_deg

@@ -4,16 +4,22 @@
 
 A vehicle that still sinks when its nose goes up slides down backward, faster than it dived: from
 0.36 to 0.69 m/s in zhang2021. Held level it lies across its way, and hardly sinks. So the mass
-waits in the middle until the vehicle rises, or until the pump has done what it can.
+is where it balances the rest as long as the vehicle sinks, and at its stop once it rises.
 """
 
 from typing import NamedTuple
 
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import Joints
+from glider_model.onboard.moving_mass import MovingMass, mass_place
 
-#: A vehicle that rises faster than this (m/s) has turned over.
+#: A vehicle that rises faster than this (m/s) turns its nose up; one that sinks faster lies level.
 RISES_MPS = 0.05
+#: One that rises nose up more slowly than this (m/s), for so long (s), is held level for
+#: as long: it may lie in a stall that it rises out of.
+SLOW_MPS, SLOW_S = 0.03, 300.0
+#: Its vertical rate is averaged over this time (s): a turn throws it up for a moment.
+AVERAGE_S = 20.0
 
 
 class AscentLimits(NamedTuple):
@@ -22,20 +28,25 @@ class AscentLimits(NamedTuple):
     safe: Joints  #: as buoyant as possible, mass at the climb stop, no roll, no turn
     pumped: float  #: from here on the pump has done what it can (kg)
     pump_s: float  #: and after this time, wherever it is
+    mass: MovingMass
 
 
 class Ascent(NamedTuple):
     """A vehicle on its way up, between two ticks."""
 
-    waits_s: float  #: with the mass in the middle
+    waits_s: float  #: since it was sent up
+    rate: float  #: averaged (m/s, + down)
     turned: bool  #: nose up
+    slow_s: (
+        float  #: for which it has risen too slowly so; less than 0: is still held level for that
+    )
 
 
-INITIAL_ASCENT = Ascent(0.0, False)
+INITIAL_ASCENT = Ascent(0.0, 0.0, False, 0.0)
 
 
 @kernel
-def come_up(state, rate, sees, m_b, limits, dt):
+def come_up(state, rate, sees, under, m_b, limits, dt):
     """Command of a tick on the way up.
 
     Parameters
@@ -45,6 +56,8 @@ def come_up(state, rate, sees, m_b, limits, dt):
         Measured vertical rate (m/s, + down).
     sees : bool
         Whether that is to be believed.
+    under : bool
+        Whether it is under water.
     m_b : float
         Where the pump is (kg).
     limits : AscentLimits
@@ -54,8 +67,20 @@ def come_up(state, rate, sees, m_b, limits, dt):
     -------
     Ascent, Joints
     """
-    waits_s = state.waits_s + dt
-    rises = sees and rate < -RISES_MPS
-    turned = state.turned or rises or m_b <= limits.pumped or waits_s > limits.pump_s
+    average = rate if state.waits_s == 0.0 else state.rate + dt / AVERAGE_S * (rate - state.rate)
+    waits_s, turned = state.waits_s + dt, state.turned
+    is_done = m_b <= limits.pumped or waits_s > limits.pump_s
+    if is_done and not sees:
+        turned = True
+    elif sees and average < (0.0 if is_done else -RISES_MPS):
+        turned = True
+    elif sees and average > RISES_MPS:
+        turned = False
+    slow_s = min(0.0, state.slow_s + dt) if state.slow_s < 0.0 else 0.0
+    if slow_s < 0.0:
+        turned = False
+    elif turned and sees and under and average > -SLOW_MPS:
+        slow_s = state.slow_s + dt if state.slow_s < SLOW_S else -SLOW_S
     safe = limits.safe
-    return Ascent(waits_s, turned), Joints(safe.m_b, safe.x_p if turned else 0.0, 0.0, 0.0)
+    x_p = safe.x_p if turned else mass_place(0.0, m_b, -safe.x_p, limits.mass)
+    return Ascent(waits_s, average, turned, slow_s), Joints(safe.m_b, x_p, 0.0, 0.0)

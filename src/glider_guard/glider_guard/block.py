@@ -5,18 +5,20 @@
 from glider_guard.actuators import INITIAL_FOLLOWERS
 from glider_guard.ascent import INITIAL_ASCENT
 from glider_guard.depth import INITIAL_DEPTHS
-from glider_guard.guard import GuardParams, GuardState, Heard, guard_step
+from glider_guard.guard import GuardParams, Heard, guard_step
 from glider_guard.health import INITIAL_HEALTH
 from glider_guard.rows import HOLD, ORDERED, REACTIONS, reaction_of
 from glider_guard.rows import say as said_of
 from glider_guard.settings import GuardSettings
 from glider_guard.weight import INITIAL_WEIGHT
+from glider_guard.witness import INITIAL_WITNESS
 from glider_model.base.block import Block, Said, block_tick
-from glider_model.base.frames import odometry_from_wire
-from glider_model.base.kernel import kernel
+from glider_model.base.frames import covariance_from_wire, odometry_from_wire
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.signals import Battery, Health, Joints
 from glider_model.base.wiring import GUARD as WIRED
 from glider_model.ocean.density import depth_at
+from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH
 from glider_model.vehicle.file import steers_by
 
 #: A change of what is told is told at most once in this time (ns).
@@ -29,14 +31,15 @@ def guard_tick(state, t_s, inputs, params, dt):
     """One tick: what `GUARD` reads in; command, drop_weight out; see `block_tick`."""
     demand, reference, odom, joints, health, battery, pressure, altitude = inputs
     heard = Heard(
-        Joints(demand[0], demand[1], demand[2], demand[3]),
-        odometry_from_wire(odom),
-        Joints(joints[0], joints[1], joints[2], joints[3]),
-        -reference[2],
-        depth_at(pressure[0]),
-        altitude[0],
-        Health(health[0], health[1], health[2]),
-        Battery(battery[0], battery[1], battery[2], battery[3], battery[4]),
+        demand=Joints(demand[0], demand[1], demand[2], demand[3]),
+        odometry=odometry_from_wire(odom),
+        joints=Joints(joints[0], joints[1], joints[2], joints[3]),
+        target=-reference[2],
+        depth=depth_at(pressure[0]),
+        altitude=altitude[0],
+        health=Health(health[0], health[1], health[2]),
+        battery=Battery(battery[0], battery[1], battery[2], battery[3], battery[4]),
+        known=covariance_from_wire(odom),
     )
     state, out = guard_step(state, heard, params, dt)
     command = (out.command.m_b, out.command.x_p, out.command.mu, out.command.delta)
@@ -46,32 +49,23 @@ def guard_tick(state, t_s, inputs, params, dt):
 @kernel
 def guard_surface(state):
     """Bring the vehicle to the surface, now and for good."""
-    return GuardState(
-        state.tick,
-        state.taken,
-        state.followers,
-        state.depths,
-        state.health,
-        state.weight,
-        state.ascent,
-        state.command,
-        state.told | ORDERED,
-    )
+    return replace(state, told=state.told | ORDERED)
 
 
 @kernel
 def guard_clear(state):
     """Forget what has latched, and how long anything has lasted."""
-    return GuardState(
-        0,
-        state.taken,
-        INITIAL_FOLLOWERS,
-        INITIAL_DEPTHS,
-        INITIAL_HEALTH,
-        INITIAL_WEIGHT,
-        INITIAL_ASCENT,
-        state.command,
-        0,
+    return replace(
+        state,
+        tick=0,
+        followers=INITIAL_FOLLOWERS,
+        witness=INITIAL_WITNESS,
+        depths=INITIAL_DEPTHS,
+        health=INITIAL_HEALTH,
+        weight=INITIAL_WEIGHT,
+        ascent=INITIAL_ASCENT,
+        fixes=INITIAL_FIX_WATCH,
+        told=0,
     )
 
 

@@ -16,18 +16,26 @@ from glider_guard.rows import (
     TOO_DEEP,
     UNDER_LONG,
 )
+from glider_guard.witness import SURFACE_M
 from glider_model.base.kernel import kernel
 
 #: Longer than this (s) a vehicle may not be too deep.
 TOO_DEEP_S = 1.0
 #: A vehicle that rises faster than this (m/s) leaves the bottom.
 RISES_MPS = 0.02
-#: Above this the vehicle is at the surface, and nothing of this is watched (m).
-SURFACE_M = 5.0
+#: A vehicle with its pump out that sinks by so much (m) is too heavy for it. Where it leaks, has
+#: been found too heavy before or sinks from the surface it only grows heavier: its weight goes.
+SUNK_M = 3.0
+#: The depth by which it sinks, or stays where it is, is averaged over this time (s).
+MEAN_S = 10.0
+#: A depth that changes by no more than this rests (m).
+AT_REST_M = 1.0
 #: For longer than this (s) the depth lags behind the vertical rate before it is told.
 LAG_S = 10.0
 #: The past of the lag fades with this time (s).
 LAG_FADES_S = 150.0
+#: An attitude that is off by so much (rad) shows way over ground as way up or down.
+TILT = 0.1
 
 
 class DepthLimits(NamedTuple):
@@ -36,6 +44,7 @@ class DepthLimits(NamedTuple):
     rated: float  #: (m); infinite if nobody says
     margin: float  #: sinking on to deeper than rated by this is too deep whatever is commanded (m)
     crush: float  #: (m); infinite if nobody says
+    drop_margin: float  #: sinking on to nearer than this to it is deep enough for the weight (m)
     over_share: float  #: of the deepest target
     over_m: float
     over_s: float
@@ -45,6 +54,8 @@ class DepthLimits(NamedTuple):
     no_climb_s: float
     drop_after_s: float
     drop_blind_s: float  #: the same where no depth is to be believed
+    climb_mps: float  #: slowest way up
+    led_m: float  #: by pump and pitch, where the depth stays the same
     stalled_m: float
     stalled_s: float
     under_s: float  #: infinite: never too long
@@ -59,38 +70,56 @@ class DepthLimits(NamedTuple):
 class Depths(NamedTuple):
     """What is watched of the depth, between two ticks."""
 
-    depth: float  #: the greater of those that are measured (m)
+    depth: float  #: that is believed (m)
     target: float  #: deepest that was asked for so far (m)
     deep_s: float  #: time for which the vehicle has been too deep
-    crush_s: float  #: deeper than its hull may bear
+    crush_s: float  #: deeper than its hull may bear, or about to be
     over_s: float  #: deeper than it was sent
     bottom_s: float  #: for which the bottom has been too close
     mark: float  #: depth from which progress upward is counted (m)
     climbs_s: float  #: time without progress while rising is commanded
-    anchor: float  #: depth about which it may be stalled (m)
+    mean: float  #: depth, averaged (m)
+    top: float  #: the least that it has been while it stayed the same (m)
+    bottom: float  #: and the most
     stalled_s: float
+    rest: float  #: depth at which it may be at rest (m)
+    led_m: float  #: way by pump and pitch meanwhile (m, + down)
+    up_s: float  #: time under water since it surfaces for good
+    up_from: float  #: depth at which that began (m)
+    least: float  #: the least mean since the pump has done what it can (m)
     under_s: float  #: time under water
     lag_m: float  #: of the measured depth behind the vertical rate
-    gone_m: float  #: by the vertical rate, up or down, of late
+    gone_m: float  #: by the vertical rate, up or down, of late, and by what an attitude may be off
     lag_s: float  #: for which that has been too much
     still_s: float  #: for which nothing measured has changed
     apart_s: float  #: for which two measured depths have differed
 
 
-INITIAL_DEPTHS = Depths(*(16 * (0.0,)))
+INITIAL_DEPTHS = Depths(*(23 * (0.0,)))
 
 
 class Sounding(NamedTuple):
     """What a tick tells of the depth."""
 
-    depth: float  #: by odom (m)
+    odom: float  #: by odom (m)
     before: float  #: the same a tick before
-    rate: float  #: measured vertical rate (m/s, + down)
-    own: float  #: by the pressure alone (m)
+    odom_rate: float  #: vertical rate of odom (m/s, + down)
+    odom_speed: float  #: over ground, level (m/s)
+    depth: float  #: that is believed (m)
+    rate: float  #: vertical rate that is believed (m/s, + down)
+    apart_m: float  #: between pressure and odom (m)
     is_same: bool  #: odom is what it was a tick before
     target: float  #: that guidance asks for (m)
     stop: float  #: way that it sinks on if it is stopped now (m)
+    drop_way: float  #: the same if its weight is let go where the pump does not do (m)
+    led: float  #: vertical rate by pump and pitch, where they make a glide (m/s, + down)
     altitude: float  #: height over the bottom (m); 0.0: no echo
+    is_sent_up: bool  #: the last command makes it lighter than its file says it is, or than it is
+    ascends: bool  #: and than both, or as light as can be
+    surfaces: bool  #: for good
+    is_pumped: bool  #: the pump has done what it can
+    is_out: bool  #: the antenna, of the water
+    is_afloat: bool  #: for certain
 
 
 @kernel
@@ -101,31 +130,61 @@ def _count(holds, time_s, dt):
 
 @kernel
 def _lag(lag_m, at, jump_m, dt):
-    """Lag (m) of the depth behind the vertical rate; a depth that was set anew has none."""
-    fallen = at.depth - at.before
-    if abs(fallen) > jump_m:
+    """Lag (m) of the depth behind the vertical rate; one that is set anew has none."""
+    fallen = at.odom - at.before
+    if abs(fallen) > jump_m or at.is_out:
         return 0.0
-    return lag_m + dt * (at.rate - lag_m / LAG_FADES_S) - fallen
+    return lag_m + dt * (at.odom_rate - lag_m / LAG_FADES_S) - fallen
+
+
+@kernel
+def sinking_rate(state):
+    """Vertical rate (m/s, + down) of the mean depth.
+
+    That of odom may be noise, and where an attitude is off it shows way over ground as way down.
+    """
+    return (state.depth - state.mean) / MEAN_S
 
 
 @kernel
 def begin_at(depth):
     """Nothing has lasted yet, at a depth (m)."""
+    none = 0.0
     return Depths(
-        depth, depth, 0.0, 0.0, 0.0, 0.0, depth, 0.0, depth, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        depth=depth,
+        target=depth,
+        deep_s=none,
+        crush_s=none,
+        over_s=none,
+        bottom_s=none,
+        mark=depth,
+        climbs_s=none,
+        mean=depth,
+        top=depth,
+        bottom=depth,
+        stalled_s=none,
+        rest=depth,
+        led_m=none,
+        up_s=none,
+        up_from=depth,
+        least=depth,
+        under_s=none,
+        lag_m=none,
+        gone_m=none,
+        lag_s=none,
+        still_s=none,
+        apart_s=none,
     )
 
 
 @kernel
-def sound(state, at, ascends, limits, dt):
+def sound(state, at, limits, dt):
     """Take in the depth of a tick.
 
     Parameters
     ----------
     state : Depths
     at : Sounding
-    ascends : bool
-        Whether the last command makes the vehicle buoyant.
     limits : DepthLimits
     dt : float
 
@@ -133,45 +192,81 @@ def sound(state, at, ascends, limits, dt):
     -------
     Depths
     """
-    depth = max(at.depth, at.own)
+    depth = at.depth
     target = max(state.target, at.target)
     under = depth > SURFACE_M
     sinks_to = depth + at.stop - limits.margin
-    deepest = sinks_to if ascends else max(depth, sinks_to)
+    deepest = sinks_to if at.is_sent_up else max(depth, sinks_to)
+    crushed = depth > limits.crush
+    if at.surfaces and at.rate > RISES_MPS:
+        crushed = crushed or depth + at.drop_way > limits.crush - limits.drop_margin
     over = max(limits.over_m, limits.over_share * target)
     lag_m = _lag(state.lag_m, at, limits.jump_m, dt)
-    gone_m = state.gone_m + dt * (abs(at.rate) - state.gone_m / LAG_FADES_S)
+    going = abs(at.odom_rate) + TILT * at.odom_speed
+    gone_m = state.gone_m + dt * (going - state.gone_m / LAG_FADES_S)
     lags = abs(lag_m) > max(limits.lag_m, limits.lag_share * gone_m)
-    mark = max(state.mark, depth) if ascends and under else depth
+    climbs = at.ascends or at.surfaces
+    mark = max(state.mark, depth) if climbs and under else depth
     progress = mark - depth >= limits.progress_m
     if progress:
         mark = depth
-    anchor, is_stalled = state.anchor, under and abs(depth - state.anchor) < limits.stalled_m
+    mean, before = state.mean + dt / MEAN_S * (depth - state.mean), state.least
+    if abs(depth - state.depth) > limits.jump_m:  # it was set anew
+        mean, before = depth, depth
+    top, bottom = min(state.top, mean), max(state.bottom, mean)
+    is_stalled = under and bottom - top < limits.stalled_m
     if not is_stalled:
-        anchor = depth
+        top, bottom = mean, mean
+    is_counted = at.surfaces and at.is_pumped and not at.is_out
+    least = min(before, mean) if is_counted else mean
+    rest, led_m = state.rest, state.led_m + dt * at.led
+    if not under or abs(depth - rest) > AT_REST_M:
+        rest, led_m = depth, 0.0
+    waits_up = at.surfaces and not at.is_afloat
+    up_from = state.up_from if waits_up and state.up_s > 0.0 else depth
+    is_near = 0.0 < at.altitude < limits.altitude_m and at.rate > -RISES_MPS
+    no_way_up, is_still = climbs and under and not progress, under and at.is_same
     return Depths(
-        depth,
-        target,
-        _count(deepest > limits.rated, state.deep_s, dt),
-        _count(depth > limits.crush, state.crush_s, dt),
-        _count(depth > target + over, state.over_s, dt),
-        _count(0.0 < at.altitude < limits.altitude_m and at.rate > -RISES_MPS, state.bottom_s, dt),
-        mark,
-        _count(ascends and under and not progress, state.climbs_s, dt),
-        anchor,
-        _count(is_stalled, state.stalled_s, dt),
-        _count(under, state.under_s, dt),
-        lag_m,
-        gone_m,
-        _count(lags, state.lag_s, dt),
-        _count(under and at.is_same, state.still_s, dt),
-        _count(abs(at.own - at.depth) > limits.disagree_m, state.apart_s, dt),
+        depth=depth,
+        target=target,
+        deep_s=_count(deepest > limits.rated, state.deep_s, dt),
+        crush_s=_count(crushed, state.crush_s, dt),
+        over_s=_count(depth > target + over, state.over_s, dt),
+        bottom_s=_count(is_near, state.bottom_s, dt),
+        mark=mark,
+        climbs_s=_count(no_way_up, state.climbs_s, dt),
+        mean=mean,
+        top=top,
+        bottom=bottom,
+        stalled_s=_count(is_stalled, state.stalled_s, dt),
+        rest=rest,
+        led_m=led_m,
+        up_s=_count(waits_up, state.up_s, dt),
+        up_from=up_from,
+        least=least,
+        under_s=_count(under, state.under_s, dt),
+        lag_m=lag_m,
+        gone_m=gone_m,
+        lag_s=_count(lags, state.lag_s, dt),
+        still_s=_count(is_still, state.still_s, dt),
+        apart_s=_count(at.apart_m > limits.disagree_m, state.apart_s, dt),
     )
 
 
 @kernel
-def depth_rows(state, surfaces, sees, limits):
-    """Rows that hold for a vehicle that is to surface for good, or not, and sees its depth."""
+def _weight_goes(state, sees, floods, limits):
+    """Whether a vehicle that surfaces for good does not, and never will, without its weight."""
+    drop_s = limits.drop_after_s if sees else limits.drop_blind_s
+    is_late = state.up_s > drop_s + state.up_from / limits.climb_mps
+    sinks = sees and state.mean - state.least > SUNK_M
+    is_flooded = sinks and (floods or state.least < SURFACE_M)
+    is_flooded = is_flooded or (floods and not sees and state.up_s > 0.0)
+    return state.climbs_s > limits.drop_after_s or is_late or is_flooded
+
+
+@kernel
+def depth_rows(state, surfaces, sees, floods, limits):
+    """Rows that hold for a vehicle that is to surface for good, sees its depth, floods, or not."""
     told = 0
     if state.deep_s > TOO_DEEP_S:
         told |= TOO_DEEP
@@ -183,14 +278,15 @@ def depth_rows(state, surfaces, sees, limits):
         told |= NEAR_BOTTOM
     if state.climbs_s > limits.no_climb_s:
         told |= NOT_CLIMBING
-    drop_s = limits.drop_after_s if sees else limits.drop_blind_s
-    if surfaces and state.climbs_s > drop_s:
+    if surfaces and _weight_goes(state, sees, floods, limits):
         told |= NOT_RISING
     if state.stalled_s > limits.stalled_s:
         told |= STALLED
     if state.under_s > limits.under_s:
         told |= UNDER_LONG
     if state.lag_s > LAG_S or state.still_s > limits.still_s:
+        told |= FROZEN
+    if not surfaces and abs(state.led_m) > limits.led_m:
         told |= FROZEN
     if state.apart_s > limits.disagree_s:
         told |= DISAGREES

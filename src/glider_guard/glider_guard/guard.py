@@ -6,27 +6,57 @@ It trusts nobody before it: what it is told is checked again, and an actuator, a
 block that fails is met with a reaction (`glider_guard.rows`) that needs none of them.
 """
 
+import math
 from typing import NamedTuple
 
 from glider_guard.actuators import ActuatorLimits, Followers, follow
 from glider_guard.ascent import INITIAL_ASCENT, Ascent, AscentLimits, come_up
-from glider_guard.depth import DepthLimits, Depths, Sounding, begin_at, depth_rows, sound
+from glider_guard.depth import (
+    DepthLimits,
+    Depths,
+    Sounding,
+    begin_at,
+    depth_rows,
+    sinking_rate,
+    sound,
+)
+from glider_guard.fixes import fix_rows
 from glider_guard.health import HealthLimits, HealthState, check_health
 from glider_guard.rows import (
-    DISAGREES,
+    BLIND,
     DROPS,
-    FROZEN,
     HOLDS,
     LATCHED,
+    LEAK,
     LOST,
     NO_DEMAND,
     ORDERED,
+    STUCK_BUOYANCY,
     SURFACES,
+    TOO_HEAVY,
 )
-from glider_guard.weight import Weight, WeightLimits, stopping_m, weigh
+from glider_guard.weight import (
+    Weight,
+    WeightLimits,
+    led_rate,
+    sinking_weight,
+    sinks_on_m,
+    turning_m,
+    weigh,
+)
+from glider_guard.witness import (
+    SURFACE_M,
+    Shown,
+    Witness,
+    WitnessLimits,
+    begin_watch,
+    is_out,
+    watch,
+)
 from glider_model.base.frames import euler_from_quaternion, rotate_to_ned
 from glider_model.base.kernel import kernel
-from glider_model.base.signals import SURFACE_TARGET, Battery, Health, Joints, Odometry
+from glider_model.base.signals import SURFACE_TARGET, Battery, Covariance, Health, Joints, Odometry
+from glider_model.onboard.fix_watch import FixWatch, watch_fixes
 from glider_model.onboard.gate import GateParams, GateState, are_believed, gate_step, is_lost
 
 
@@ -40,6 +70,7 @@ class GuardParams(NamedTuple):
     weight: WeightLimits
     has_pressure: bool  #: there is a depth apart from that of odom
     ascent: AscentLimits
+    witness: WitnessLimits
 
 
 class Heard(NamedTuple):
@@ -53,6 +84,7 @@ class Heard(NamedTuple):
     altitude: float  #: height over the bottom (m); 0.0: no echo
     health: Health
     battery: Battery
+    known: Covariance = Covariance(0.0, 0.0, 0.0)  #: of the place of the odometry (m^2)
 
 
 class Taken(NamedTuple):
@@ -65,7 +97,6 @@ class Taken(NamedTuple):
     joints_s: float
     target: float
     target_s: float
-    depth: float
 
 
 class GuardState(NamedTuple):
@@ -74,10 +105,12 @@ class GuardState(NamedTuple):
     tick: int
     taken: Taken
     followers: Followers
+    witness: Witness
     depths: Depths
     health: HealthState
     weight: Weight
     ascent: Ascent
+    fixes: FixWatch
     command: Joints  #: the last one
     told: int  #: rows
 
@@ -104,10 +137,15 @@ def take_in(state, heard, params, dt):
     if not abs(target) < 1e6:
         target, target_s = state.target, state.target_s + dt
     gate = gate_step(state.gate, heard.odometry, params.gate, dt)
-    depth = gate.odometry.p_d
-    if params.has_pressure:
-        depth = heard.depth if abs(heard.depth) < 1e6 else state.depth
-    return Taken(gate, demand, demand_s, joints, joints_s, target, target_s, depth)
+    return Taken(
+        gate=gate,
+        demand=demand,
+        demand_s=demand_s,
+        joints=joints,
+        joints_s=joints_s,
+        target=target,
+        target_s=target_s,
+    )
 
 
 @kernel
@@ -131,17 +169,6 @@ def _is_same(a, b):
 
 
 @kernel
-def _sounding(taken, before, altitude, theta, params):
-    """What two ticks tell of the depth, at a pitch (rad)."""
-    x = taken.gate.odometry
-    _, _, rate = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
-    target = max(0.0, taken.target)
-    stop = stopping_m(theta, rate, params.weight)
-    same = _is_same(x, before)
-    return Sounding(x.p_d, before.p_d, rate, taken.depth, same, target, stop, altitude)
-
-
-@kernel
 def _intake_rows(taken, params):
     """Rows of what is asked for, and of what is not heard any more."""
     told, hold_s = 0, params.gate.hold_s
@@ -152,6 +179,76 @@ def _intake_rows(taken, params):
     if taken.demand_s > hold_s:
         told |= NO_DEMAND
     return told
+
+
+@kernel
+def _sent(last, demand, told):
+    """Where actuators are sent: held level, whether they follow is seen by what is demanded."""
+    if told & HOLDS and not told & (SURFACES | DROPS):
+        return Joints(last.m_b, last.x_p, demand.mu, demand.delta)
+    return last
+
+
+@kernel
+def _react(state, taken, told, rate, under, limits, dt):
+    """Ascent a tick later, and the command of this one: what is demanded, held level, or up."""
+    demand = taken.demand
+    if told & (SURFACES | DROPS):
+        return come_up(state, rate, not told & BLIND, under, taken.joints.m_b, limits, dt)
+    if told & HOLDS:
+        return INITIAL_ASCENT, Joints(demand.m_b, demand.x_p, 0.0, 0.0)
+    return INITIAL_ASCENT, demand
+
+
+@kernel
+def _sounding(taken, before, heard, witness, led, last, state, is_pumped, params):
+    """What a tick tells of the depth: `Sounding`.
+
+    Parameters
+    ----------
+    taken : Taken
+    before : Odometry
+        That was believed a tick before.
+    heard : Heard
+    witness : Witness
+    led : float
+        Vertical rate by pump and pitch, where they make a glide (m/s, + down).
+    last : Joints
+        Where the actuators were sent last.
+    state : GuardState
+    is_pumped : bool
+        The pump has done what it can.
+    params : GuardParams
+    """
+    x, m_b, rate = taken.gate.odometry, taken.joints.m_b, witness.rate
+    north, east, down = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
+    sinks = sinking_weight(state.weight, m_b, params.weight)
+    neutral = -params.weight.ballast - state.weight.off
+    ascends = last.m_b <= params.ascent.pumped or last.m_b < min(0.0, neutral)
+    is_afloat = witness.depth <= SURFACE_M
+    if heard.health.contact_age_s >= 0.0 and state.told & BLIND:
+        is_afloat = is_out(witness)
+    return Sounding(
+        odom=x.p_d,
+        before=before.p_d,
+        odom_rate=down,
+        odom_speed=math.hypot(north, east),
+        depth=witness.depth,
+        rate=rate,
+        apart_m=witness.apart_m,
+        is_same=_is_same(x, before),
+        target=max(0.0, taken.target),
+        stop=turning_m(rate, sinks, params.weight),
+        drop_way=sinks_on_m(rate, sinks, m_b, is_pumped, params.weight),
+        led=led,
+        altitude=heard.altitude,
+        is_sent_up=last.m_b < max(0.0, neutral),
+        ascends=ascends,
+        surfaces=(state.told & (SURFACES | DROPS)) != 0,
+        is_pumped=is_pumped,
+        is_out=is_out(witness),
+        is_afloat=is_afloat,
+    )
 
 
 @kernel
@@ -175,35 +272,61 @@ def guard_step(state, heard, params, dt):
     taken = take_in(state.taken, heard, params, dt)
     last = taken.joints if first else state.command
     before = taken.gate.odometry if first else state.taken.gate.odometry
-    sent = last
-    if state.told & HOLDS and not state.told & (SURFACES | DROPS):
-        # held level: whether they follow is seen by what is demanded
-        sent = Joints(last.m_b, last.x_p, taken.demand.mu, taken.demand.delta)
+    sent = _sent(last, taken.demand, state.told)
     followers, told = follow(state.followers, taken.joints, sent, params.actuators, dt)
-    x = taken.gate.odometry
+    x, m_b = taken.gate.odometry, taken.joints.m_b
     _, theta, _ = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
-    at = _sounding(taken, before, heard.altitude, theta, params)
-    depths = state.depths
+    _, _, rate = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
+    raw = heard.depth if params.has_pressure else heard.odometry.p_d
+    witness, depths = state.witness, state.depths
     if first:
-        depths = begin_at(at.depth)
-    ascends = last.m_b < 0.0
-    surfaces = (state.told & (SURFACES | DROPS)) != 0
-    depths = sound(depths, at, ascends, params.depth, dt)
-    sees = not state.told & (FROZEN | LOST | DISAGREES)
-    told |= depth_rows(depths, surfaces, sees, params.depth)
-    well = params.health
-    health, unwell = check_health(state.health, heard.health, heard.battery, well, dt)
-    weight, heavy = weigh(
-        state.weight, theta, at.rate, taken.joints.m_b, last.m_b, params.weight, dt
+        witness = begin_watch(raw, x.p_d)
+        depths = begin_at(witness.depth)
+    sees = not state.told & BLIND
+    led, is_glide = led_rate(state.weight, theta, m_b, params.weight)
+    is_same = _is_same(x, before)
+    shown = Shown(
+        raw=raw,
+        odom=x.p_d,
+        odom_before=before.p_d,
+        contact_age_s=heard.health.contact_age_s,
+        rate=rate,
+        led=led,
+        is_glide=is_glide,
+        is_same=is_same,
     )
-    told |= unwell | heavy | _intake_rows(taken, params) | (state.told & LATCHED)
-    command, ascent = taken.demand, INITIAL_ASCENT
-    if told & (SURFACES | DROPS):
-        sees = not told & (FROZEN | LOST | DISAGREES)
-        ascent, command = come_up(state.ascent, at.rate, sees, taken.joints.m_b, params.ascent, dt)
-    elif told & HOLDS:
-        command = Joints(command.m_b, command.x_p, 0.0, 0.0)
+    witness, wrong = watch(witness, shown, sees, params.witness, dt)
+    is_stuck = ((told | state.told) & STUCK_BUOYANCY) != 0
+    is_pumped = is_stuck or m_b <= params.ascent.pumped
+    at = _sounding(
+        taken, before, heard, witness, led if is_glide else 0.0, last, state, is_pumped, params
+    )
+    depths = sound(depths, at, params.depth, dt)
+    # without a depth, a leak alone is certain
+    floods = (state.told & (LEAK | TOO_HEAVY if sees else LEAK)) != 0
+    told |= wrong | depth_rows(depths, at.surfaces, sees, floods, params.depth)
+    health, unwell = check_health(state.health, heard.health, heard.battery, params.health, dt)
+    sinking = sinking_rate(depths) if sees else rate
+    under = witness.depth > SURFACE_M
+    weight, heavy = weigh(
+        state.weight, theta, rate, sinking, m_b, last.m_b, under, params.weight, dt
+    )
+    fixes = watch_fixes(state.fixes, heard.odometry, heard.known, dt)
+    told |= fix_rows(fixes) | unwell | heavy | _intake_rows(taken, params) | (state.told & LATCHED)
+    ascent, command = _react(state.ascent, taken, told, sinking, under, params.ascent, dt)
     tick = state.tick + 1 if taken.gate.seen else 0
     output = GuardOutput(command, (told & DROPS) != 0, told)
-    state = GuardState(tick, taken, followers, depths, health, weight, ascent, command, told)
+    state = GuardState(
+        tick=tick,
+        taken=taken,
+        followers=followers,
+        witness=witness,
+        depths=depths,
+        health=health,
+        weight=weight,
+        ascent=ascent,
+        fixes=fixes,
+        command=command,
+        told=told,
+    )
     return state, output

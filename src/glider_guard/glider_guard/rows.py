@@ -32,6 +32,8 @@ OVERDEPTH, CRUSHING, NOT_CLIMBING, NOT_RISING = 1 << 13, 1 << 14, 1 << 15, 1 << 
 STALLED, NO_DEMAND, DISAGREES, UNDER_LONG = 1 << 17, 1 << 18, 1 << 19, 1 << 20
 LEAK, VACUUM, BATTERY, NO_CONTACT = 1 << 21, 1 << 22, 1 << 23, 1 << 24
 TOO_HEAVY, NEAR_BOTTOM = 1 << 25, 1 << 26
+DEPTH_OFFSET, DEPTH_WRONG = 1 << 28, 1 << 29
+ASTRAY, CONTRADICTED = 1 << 27, 1 << 30
 
 #: Every row, in the order in which they are told.
 ROWS = (
@@ -84,7 +86,7 @@ ROWS = (
         TOO_DEEP,
         'too_deep',
         'deeper than rated_depth and still sent down, or sinking on to deeper by a margin',
-        'rated_depth, depth_margin_m',
+        'rated_depth, depth_margin_share, depth_margin_m',
         SURFACE,
         True,
         'deeper than the vehicle is rated for',
@@ -92,11 +94,12 @@ ROWS = (
     Row(
         CRUSHING,
         'crush_depth',
-        'deeper than crush_depth',
-        'crush_depth',
+        'deeper than crush_depth, or surfacing for good and sinking to nearer than drop_margin '
+        'to it before the pump, if it still can, or the weight stops that',
+        'crush_depth, drop_margin',
         DROP,
         True,
-        'deeper than its hull may bear',
+        'deeper than its hull may bear, or about to be',
     ),
     Row(
         NEAR_BOTTOM,
@@ -128,8 +131,10 @@ ROWS = (
     Row(
         NOT_RISING,
         'not_rising',
-        'surfacing for good, and no progress upward',
-        'climb_progress_m, drop_after_s, drop_blind_s',
+        'surfacing for good, and no progress upward; not up by the time that climb_mps takes, and '
+        'some more; or it sinks with the pump out, and leaks, is too heavy or was up before; or '
+        'it leaks, and nobody knows',
+        'climb_progress_m, drop_after_s, drop_blind_s, climb_mps',
         DROP,
         True,
         'does not rise though all is done for it',
@@ -164,11 +169,30 @@ ROWS = (
     Row(
         FROZEN,
         'measurement_frozen',
-        'the measured depth does not go where the vertical rate leads, or nothing measured moves',
-        'lag_share, lag_m, still_s',
+        'the measured depth does not go where the vertical rate, or pump and pitch, lead, shows '
+        'the same to the last bit, or nothing measured moves',
+        'lag_share, lag_m, led_m, still_s',
         SURFACE,
         True,
         'the measured depth, or all that is measured, stands still',
+    ),
+    Row(
+        DEPTH_OFFSET,
+        'depth_offset',
+        'with the antenna out of the water the depth is not 0: that is taken off',
+        'offset_max_m',
+        NOTE,
+        False,
+        'the depth is not 0 at the surface, and is corrected',
+    ),
+    Row(
+        DEPTH_WRONG,
+        'depth_wrong',
+        'at the surface the depth is not 0 by more than that, or it jumps and stays there',
+        'offset_max_m, gate.depth_jump_m, gate.hold_s',
+        SURFACE,
+        True,
+        'the measured depth is wrong at the surface, or has jumped',
     ),
     Row(
         DISAGREES,
@@ -178,6 +202,26 @@ ROWS = (
         SURFACE,
         True,
         'pressure and odom tell different depths',
+    ),
+    Row(
+        CONTRADICTED,
+        'fixes_contradict',
+        'one of the last six surfacings was farther from where navigation had it than its '
+        'covariance and the change of drift at the surface explain: guidance surfaces after '
+        'every dive',
+        '',
+        NOTE,
+        False,
+        'a fix contradicts navigation',
+    ),
+    Row(
+        ASTRAY,
+        'astray',
+        'two of the last six were',
+        '',
+        SURFACE,
+        True,
+        'fixes contradict navigation again and again: a compass or its declination is wrong',
     ),
     Row(
         LOST,
@@ -242,6 +286,8 @@ def bits_of(reaction: int) -> int:
 
 
 HOLDS, SURFACES, DROPS = (bits_of(one) for one in (HOLD, SURFACE, DROP))
+#: While one of these holds the depth is not believed.
+BLIND = FROZEN | LOST | DISAGREES | DEPTH_WRONG
 LATCHED = sum(row.bit for row in ROWS if row.latches)
 ALL = sum(row.bit for row in ROWS)
 

@@ -12,12 +12,18 @@ from glider_guard.depth import INITIAL_DEPTHS, DepthLimits
 from glider_guard.guard import GuardParams, GuardState, Taken
 from glider_guard.health import INITIAL_HEALTH, HealthLimits
 from glider_guard.weight import INITIAL_WEIGHT, PUMP_ARRIVED, WeightLimits
+from glider_guard.witness import INITIAL_WITNESS, WitnessLimits
 from glider_model.base.settings import Settings
 from glider_model.base.signals import Joints
+from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH
 from glider_model.onboard.gate import INITIAL_GATE, GateSettings
 from glider_model.onboard.glide_polar import make_polar
+from glider_model.onboard.moving_mass import make_moving_mass
 from glider_model.vehicle.actuators import doubt
 from glider_model.vehicle.file import load_vehicle
+
+#: What is as improbable as this does not happen.
+RARE = 1e-9
 
 
 class GuardLimitSettings(Settings):
@@ -37,8 +43,14 @@ class GuardLimitSettings(Settings):
         description='time in which an actuator has to go as much, or a tenth of what its rate '
         'allows (s)',
     )
+    depth_margin_share: float = Field(
+        0.04,
+        ge=0.0,
+        le=1.0,
+        description='share of rated_depth by which a turn may overshoot it (-)',
+    )
     depth_margin_m: float = Field(
-        15.0, ge=0.0, le=1000.0, description='way by which a turn may overshoot rated_depth (m)'
+        15.0, ge=0.0, le=1000.0, description='the same, at least this (m)'
     )
     overdepth_share: float = Field(
         0.25, ge=0.0, le=10.0, description='share of the deepest target that is overdepth (-)'
@@ -72,10 +84,18 @@ class GuardLimitSettings(Settings):
         description='the same, surfacing for good: the weight is let go (s)',
     )
     drop_blind_s: float = Field(
-        14400.0,
+        1200.0,
         ge=600.0,
         le=86400.0,
-        description='the same where the depth is not to be believed (s)',
+        description='the same where the depth is not to be believed, beside the time of the way '
+        'up (s)',
+    )
+    climb_mps: float = Field(
+        0.15,
+        ge=0.01,
+        le=1.0,
+        description='surfacing for good it is up in the time that its depth takes at this rate, '
+        'and one of those two (m/s)',
     )
     stalled_m: float = Field(
         5.0, ge=0.5, le=100.0, description='depth that changes by less stays the same (m)'
@@ -94,8 +114,20 @@ class GuardLimitSettings(Settings):
         '(-)',
     )
     lag_m: float = Field(10.0, ge=1.0, le=1000.0, description='the same, at least this (m)')
+    led_m: float = Field(
+        30.0,
+        ge=5.0,
+        le=1000.0,
+        description='way that pump and pitch lead while the depth rests within a metre (m)',
+    )
+    offset_max_m: float = Field(
+        20.0,
+        ge=2.0,
+        le=1000.0,
+        description='so much a depth may be off at the surface, and is corrected (m)',
+    )
     weight_share: float = Field(
-        0.8,
+        0.95,
         ge=0.05,
         le=10.0,
         description='share of the range of the pump by which the vehicle may be heavier than pump '
@@ -143,6 +175,12 @@ class GuardSettings(GuardLimitSettings):
     imu_period_s: float = Field(
         0.1, ge=0.1, le=30.0, description='time between two samples of the pressure (s)'
     )
+    imu_missed_share: float = Field(
+        0.0, ge=0.0, le=0.9, description='share of those samples that drop out (-)'
+    )
+    depth_resolution_m: float = Field(
+        0.0, ge=0.0, le=10.0, description='steps in which depth is measured (m); 0: none'
+    )
     lost_after_s: float = Field(
         10.0,
         ge=0.1,
@@ -156,73 +194,110 @@ class GuardSettings(GuardLimitSettings):
         """Those of the topics that not every run has that it reads."""
         return tuple(name for name in ('pressure', 'altitude') if getattr(self, name))
 
+    @property
+    def _gap_s(self) -> float:
+        """Time (s) within which there is a sample of the depth, as good as for certain."""
+        if self.imu_missed_share == 0.0:
+            return self.imu_period_s
+        return self.imu_period_s * math.ceil(math.log(RARE) / math.log(self.imu_missed_share))
+
+    def _margin_m(self, rated_m: float) -> float:
+        """Way (m) by which a turn may overshoot the rated depth (m)."""
+        share = self.depth_margin_share * rated_m if math.isfinite(rated_m) else 0.0
+        return max(self.depth_margin_m, share)
+
     def params(self) -> GuardParams:
         """Kernel parameters."""
         vehicle = load_vehicle(self.vehicle)
         limits, rated_m, gate = vehicle.params(), vehicle.rated_depth_m, self.gate.params()
         off, slowest = doubt(limits.errors), vehicle.slowest_pump_rate(rated_m)
         return GuardParams(
-            gate,
-            make_limits(limits, self.follow_share, self.stall_s),
-            DepthLimits(
-                rated_m,
-                self.depth_margin_m,
-                vehicle.crush_depth_m,
-                self.overdepth_share,
-                self.overdepth_m,
-                self.overdepth_s,
-                self.altitude_min_m,
-                self.altitude_s,
-                self.climb_progress_m,
-                self.no_climb_s,
-                self.drop_after_s,
-                max(self.drop_after_s, self.drop_blind_s),
-                self.stalled_m,
-                self.stalled_s or math.inf,
-                self.under_water_s or math.inf,
-                self.lag_m,
-                self.lag_share,
-                self.still_s,
-                gate.depth_jump,
-                self.disagree_m,
-                self.disagree_s,
+            gate=gate,
+            actuators=make_limits(limits, self.follow_share, self.stall_s),
+            depth=DepthLimits(
+                rated=rated_m,
+                margin=self._margin_m(rated_m),
+                crush=vehicle.crush_depth_m,
+                drop_margin=vehicle.drop_margin_m,
+                over_share=self.overdepth_share,
+                over_m=self.overdepth_m,
+                over_s=self.overdepth_s,
+                altitude_m=self.altitude_min_m,
+                altitude_s=self.altitude_s,
+                progress_m=self.climb_progress_m,
+                no_climb_s=self.no_climb_s,
+                drop_after_s=self.drop_after_s,
+                drop_blind_s=self.drop_blind_s,
+                climb_mps=self.climb_mps,
+                led_m=self.led_m + 6.0 * self.depth_resolution_m,
+                stalled_m=self.stalled_m,
+                stalled_s=self.stalled_s or math.inf,
+                under_s=self.under_water_s or math.inf,
+                lag_m=self.lag_m,
+                lag_share=self.lag_share,
+                still_s=self.still_s,
+                jump_m=gate.depth_jump,
+                disagree_m=self.disagree_m,
+                disagree_s=self.disagree_s,
             ),
-            HealthLimits(
-                self.vacuum_min_pa,
-                self.vacuum_max_pa,
-                self.battery_min_v,
-                1.0 - vehicle.energy.usable.value if vehicle.energy else 0.0,
-                self.contact_s or math.inf,
-                self.health_s,
+            health=HealthLimits(
+                vacuum_min=self.vacuum_min_pa,
+                vacuum_max=self.vacuum_max_pa,
+                battery_min=self.battery_min_v,
+                reserve=1.0 - vehicle.energy.usable.value if vehicle.energy else 0.0,
+                contact=self.contact_s or math.inf,
+                lasts=self.health_s,
             ),
-            WeightLimits(
-                make_polar(limits),
-                limits.ballast,
-                self.weight_share * limits.m_b_max,
-                self.weight_s,
-                max(PUMP_ARRIVED * limits.m_b_max, off.m_b),
-                slowest,
+            weight=WeightLimits(
+                polar=make_polar(limits),
+                ballast=limits.ballast,
+                most=self.weight_share * limits.m_b_max,
+                average_s=self.weight_s,
+                arrived=max(PUMP_ARRIVED * limits.m_b_max, off.m_b),
+                rate=slowest,
+                range=limits.m_b_max,
             ),
-            self.pressure,
-            AscentLimits(
+            has_pressure=self.pressure,
+            ascent=AscentLimits(
                 Joints(-limits.m_b_max, -limits.x_p_max, 0.0, 0.0),
                 max((PUMP_ARRIVED - 1.0) * limits.m_b_max, off.m_b - limits.m_b_max),
                 2.0 * limits.m_b_max / slowest,
+                make_moving_mass(limits),
+            ),
+            witness=WitnessLimits(
+                same_s=self.still_s + self._gap_s,
+                is_rough=self.depth_resolution_m > 0.0,
+                led_m=self.lag_m + 3.0 * self.depth_resolution_m,
+                jump_m=gate.depth_jump,
+                hold_s=gate.hold_s + self._gap_s,
+                settled_s=4.0 * self.imu_period_s,
+                offset_m=self.offset_max_m,
+                has_rate=not self.pressure,
             ),
         )
 
     def initial_state(self) -> GuardState:
         """State before the first tick."""
         rest = Joints(0.0, 0.0, 0.0, 0.0)
-        taken = Taken(INITIAL_GATE, rest, 0.0, rest, 0.0, 0.0, 0.0, 0.0)
+        taken = Taken(
+            gate=INITIAL_GATE,
+            demand=rest,
+            demand_s=0.0,
+            joints=rest,
+            joints_s=0.0,
+            target=0.0,
+            target_s=0.0,
+        )
         return GuardState(
-            0,
-            taken,
-            INITIAL_FOLLOWERS,
-            INITIAL_DEPTHS,
-            INITIAL_HEALTH,
-            INITIAL_WEIGHT,
-            INITIAL_ASCENT,
-            rest,
-            0,
+            tick=0,
+            taken=taken,
+            followers=INITIAL_FOLLOWERS,
+            witness=INITIAL_WITNESS,
+            depths=INITIAL_DEPTHS,
+            health=INITIAL_HEALTH,
+            weight=INITIAL_WEIGHT,
+            ascent=INITIAL_ASCENT,
+            fixes=INITIAL_FIX_WATCH,
+            command=rest,
+            told=0,
         )

@@ -2,11 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Guidance as a block."""
 
-from glider_guidance.guidance import GuidanceParams, guidance_abort, guidance_step
+from glider_guidance.guidance import GuidanceParams, guidance_abort, guidance_step, hear_fixes
 from glider_guidance.settings import GuidanceSettings
 from glider_guidance.yo.stage import STAGE_NAMES
 from glider_model.base.block import Block, Said, block_tick
-from glider_model.base.frames import odometry_from_wire, reference_to_wire, water_to_wire
+from glider_model.base.frames import (
+    covariance_from_wire,
+    odometry_from_wire,
+    reference_to_wire,
+    water_to_wire,
+)
 from glider_model.base.kernel import kernel
 from glider_model.base.wiring import GUIDANCE as WIRED
 
@@ -15,7 +20,9 @@ from glider_model.base.wiring import GUIDANCE as WIRED
 @kernel
 def guidance_tick(state, t_s, inputs, params, dt):
     """One tick: odom in; reference, tracking_error, current_estimate out; see `block_tick`."""
-    state, out = guidance_step(state, odometry_from_wire(inputs[0]), params, dt)
+    odometry = odometry_from_wire(inputs[0])
+    state = hear_fixes(state, odometry, covariance_from_wire(inputs[0]), dt)
+    state, out = guidance_step(state, odometry, params, dt)
     error = (out.error.e1, out.error.e2, out.error.e3)
     outputs = (reference_to_wire(out.reference), error, water_to_wire(out.current))
     return state, outputs, (out.stage, int(out.infeasible))

@@ -31,6 +31,7 @@ from glider_guidance.yo.machine import (
     look_ahead_s,
     profile_step,
     profile_targets,
+    surfacing_every_dive,
 )
 from glider_guidance.yo.stage import (
     AT_END_OF_PATH,
@@ -43,10 +44,11 @@ from glider_guidance.yo.stage import (
 )
 from glider_guidance.yo.turns import time_to_turn, turn_lead_s
 from glider_model.base.frames import euler_from_quaternion, rotate_to_ned
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.signals import SURFACE_TARGET, TICK_S, Reference, TrackingError, Water
 from glider_model.onboard.attitude_filter import Measured, measure
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_angle
+from glider_model.onboard.fix_watch import FixWatch, contradictions, watch_fixes
 from glider_model.onboard.gate import GateParams, GateState, gate_step
 from glider_model.onboard.glide_polar import (
     Polar,
@@ -74,6 +76,7 @@ class GuidanceParams(NamedTuple):
     """Guidance as the kernels see it."""
 
     path: PathParams
+    path_id: int  #: by which it is known from another one
     profile: ProfileParams
     polar: Polar
     profile_speed: float  #: horizontal speed through the water of the steady glide (m/s)
@@ -117,11 +120,13 @@ class GuidanceState(NamedTuple):
     gate: GateState  #: the odometry that serves
     profile: ProfileState
     s: float  #: path parameter of the virtual target (m)
+    path_id: int  #: of the path that is followed
     followed: Followed
     water: WaterState
     method: NamedTuple  #: of the method that was chosen
     commanded: Commanded
     infeasible_ticks: int
+    fixes: FixWatch
 
 
 class GuidanceOutput(NamedTuple):
@@ -165,27 +170,13 @@ class Doing(NamedTuple):
 @kernel
 def guidance_abort(state):
     """Ask for the surface, now and for good."""
-    profile = state.profile
-    aborted = ProfileState(
-        profile.stage,
-        profile.ticks,
-        profile.dives,
-        True,
-        profile.lead_up_s,
-        profile.lead_down_s,
-        profile.turn_depth,
-    )
-    return GuidanceState(
-        state.tick,
-        state.gate,
-        aborted,
-        state.s,
-        state.followed,
-        state.water,
-        state.method,
-        state.commanded,
-        state.infeasible_ticks,
-    )
+    return replace(state, profile=replace(state.profile, aborted=True))
+
+
+@kernel
+def hear_fixes(state, odometry, known, dt):
+    """The state after odometry, its place known by a `Covariance`, is heard for fixes."""
+    return replace(state, fixes=watch_fixes(state.fixes, odometry, known, dt))
 
 
 @kernel
@@ -196,18 +187,37 @@ def _start(state, odometry, params):
     follows_path = params.profile.follows_path
     s = path_closest(odometry.p_n, odometry.p_e, odometry.p_d, not follows_path, params.path)
     stage = GLIDING_DOWN if follows_path else SURFACE_PREPARATION
-    before = state.profile
-    return GuidanceState(
-        state.tick,
-        state.gate,
-        ProfileState(stage, 0, before.dives, before.aborted, 0.0, 0.0, params.profile.depth),
-        s,
-        state.followed,
-        WaterState(state.water.observer, params.profile_speed),
-        state.method,
-        Commanded(Filtered(psi, 0.0), Filtered(theta, 0.0), psi),
-        0,
+    profile = replace(
+        state.profile,
+        stage=stage,
+        ticks=0,
+        lead_up_s=0.0,
+        lead_down_s=0.0,
+        turn_depth=params.profile.depth,
+        depth=params.profile.depth,
     )
+    return replace(
+        state,
+        profile=profile,
+        s=s,
+        path_id=params.path_id,
+        water=WaterState(state.water.observer, params.profile_speed),
+        commanded=Commanded(Filtered(psi, 0.0), Filtered(theta, 0.0), psi),
+        infeasible_ticks=0,
+    )
+
+
+@kernel
+def _change_path(state, odometry, params):
+    """State at the first tick of another path: its closest point; who was at the end dives on."""
+    x, follows_path = odometry, params.profile.follows_path
+    s = path_closest(x.p_n, x.p_e, x.p_d, not follows_path, params.path)
+    profile = state.profile
+    if profile.stage == AT_END_OF_PATH:
+        profile = replace(profile, stage=SURFACE_PREPARATION, ticks=0)
+    if is_descending(profile.stage):
+        profile = replace(profile, turn_depth=params.profile.depth)
+    return replace(state, profile=profile, s=s, path_id=params.path_id)
 
 
 def path_time_s(params: GuidanceParams, current_n: float, current_e: float) -> float:
@@ -245,20 +255,20 @@ def locate(s, odometry, params):
     if not follows_path:
         e3 = 0.0
     return Place(
-        follows_path,
-        d_n,
-        d_e,
-        d_d,
-        slope,
-        gamma_d,
-        rho_d,
-        TrackingError(e1, e2, e3),
-        ground_n,
-        ground_e,
-        ground_d,
-        odometry.p_d,
-        theta,
-        psi,
+        follows_path=follows_path,
+        d_n=d_n,
+        d_e=d_e,
+        d_d=d_d,
+        slope=slope,
+        course=gamma_d,
+        elevation=rho_d,
+        error=TrackingError(e1, e2, e3),
+        ground_n=ground_n,
+        ground_e=ground_e,
+        ground_d=ground_d,
+        depth=odometry.p_d,
+        theta=theta,
+        psi=psi,
     )
 
 
@@ -292,9 +302,21 @@ def advance(state, place, params, dt):
     before, depth, rate = state.profile, place.depth, place.ground_d
     left = _way_left(state, place.error.e1, params)
     if place.follows_path and not before.aborted:
-        profile = ProfileState(GLIDING_DOWN, before.ticks + 1, before.dives, False, 0.0, 0.0, 0.0)
+        profile = ProfileState(
+            stage=GLIDING_DOWN,
+            ticks=before.ticks + 1,
+            dives=before.dives,
+            aborted=False,
+            lead_up_s=0.0,
+            lead_down_s=0.0,
+            turn_depth=0.0,
+            depth=params.profile.depth,
+        )
     else:
-        profile = profile_step(before, depth, rate, left, params.profile)
+        asked = params.profile
+        if contradictions(state.fixes) > 0:
+            asked = surfacing_every_dive(asked)
+        profile = profile_step(before, depth, rate, left, asked)
     stage = profile.stage
     turn_depth = coming_turn(profile, depth, left, params.profile)
     pitch_target, rate_target = profile_targets(stage, rate, params.profile)
@@ -309,17 +331,17 @@ def advance(state, place, params, dt):
     if state.tick * dt + to_turn_s > params.end_s:
         to_turn_s = math.inf
     leg = Leg(
-        stage,
-        is_descending(stage),
-        is_gliding(stage),
-        is_surfaced,
-        turns_over,
-        turns_over and is_gliding(before.stage),
-        profile.ticks * dt,
-        before.ticks * dt,
-        turn_lead_s(profile, params.profile),
-        turn_lead_s(before, params.profile),
-        to_turn_s,
+        stage=stage,
+        descends=is_descending(stage),
+        is_gliding=is_gliding(stage),
+        is_surfaced=is_surfaced,
+        turns_over=turns_over,
+        begins_to_turn_over=turns_over and is_gliding(before.stage),
+        glided_s=profile.ticks * dt,
+        glided_before_s=before.ticks * dt,
+        lead_s=turn_lead_s(profile, params.profile),
+        lead_before_s=turn_lead_s(before, params.profile),
+        to_turn_s=to_turn_s,
     )
     return profile, Doing(leg, turn_depth, pitch_target, rate_target)
 
@@ -401,18 +423,18 @@ def refer(state, place, doing, asked, aborted, params, dt):
     if aborted:
         t_d = SURFACE_TARGET
     reference = Reference(
-        t_n,
-        t_e,
-        t_d,
-        0.0,
-        pitch.value,
-        heading.value,
-        math.cos(asked.heading) * asked.speed + asked.current_n,
-        math.sin(asked.heading) * asked.speed + asked.current_e,
-        rate_target,
-        0.0,
-        pitch.rate,
-        heading.rate,
+        p_n=t_n,
+        p_e=t_e,
+        p_d=t_d,
+        phi=0.0,
+        theta=pitch.value,
+        psi=heading.value,
+        v_n=math.cos(asked.heading) * asked.speed + asked.current_n,
+        v_e=math.sin(asked.heading) * asked.speed + asked.current_e,
+        v_d=rate_target,
+        phi_dot=0.0,
+        theta_dot=pitch.rate,
+        psi_dot=heading.rate,
     )
     return Commanded(heading, pitch, asked.heading), state.s + dt * s_rate, reference
 
@@ -438,24 +460,26 @@ def guidance_step(state, odometry, params, dt):
     odometry = gate.odometry
     if state.tick == 0:
         state = _start(state, odometry, params)
+    if state.path_id != params.path_id:
+        state = _change_path(state, odometry, params)
     place = locate(state.s, odometry, params)
     profile, doing = advance(state, place, params, dt)
     followed = follow(state, odometry, params, dt)
     water = observe(state.water, place, doing.leg, params, dt)
     current = Water(water.observer.current_n, water.observer.current_e, 0.0)
     seen = Situation(
-        place.course,
-        place.elevation,
-        place.error,
-        place.follows_path,
-        place.ground_n,
-        place.ground_e,
-        water.speed,
-        params.profile_speed,
-        current,
-        followed.steering,
-        doing.leg,
-        state.commanded.heading_command,
+        course=place.course,
+        elevation=place.elevation,
+        error=place.error,
+        follows_path=place.follows_path,
+        ground_n=place.ground_n,
+        ground_e=place.ground_e,
+        speed=water.speed,
+        glide_speed=params.profile_speed,
+        current=current,
+        steering=followed.steering,
+        leg=doing.leg,
+        heading=state.commanded.heading_command,
     )
     method, asked = method_step(state.method, seen, params.method, dt)
     commanded, s, reference = refer(state, place, doing, asked, profile.aborted, params, dt)
@@ -464,13 +488,15 @@ def guidance_step(state, odometry, params, dt):
     is_infeasible = infeasible_ticks * dt > INFEASIBLE_S
     output = GuidanceOutput(reference, place.error, current, doing.leg.stage, is_infeasible)
     return GuidanceState(
-        state.tick + 1 if gate.seen else 0,
-        gate,
-        profile,
-        s,
-        followed,
-        WaterState(water.observer, asked.speed),
-        method if gate.seen else state.method,
-        commanded,
-        infeasible_ticks,
+        tick=state.tick + 1 if gate.seen else 0,
+        gate=gate,
+        profile=profile,
+        s=s,
+        path_id=state.path_id,
+        followed=followed,
+        water=WaterState(water.observer, asked.speed),
+        method=method if gate.seen else state.method,
+        commanded=commanded,
+        infeasible_ticks=infeasible_ticks,
+        fixes=state.fixes,
     ), output

@@ -3,6 +3,7 @@
 """Settings of guidance, and what the kernels are told by them."""
 
 import math
+import zlib
 from typing import Literal
 
 import pydantic
@@ -12,12 +13,14 @@ from glider_guidance import methods
 from glider_guidance.current_observer import ObserverParams, ObserverState
 from glider_guidance.guidance import Commanded, Followed, GuidanceParams, GuidanceState, WaterState
 from glider_guidance.method import LosGains, MethodSettings
+from glider_guidance.order import Order
 from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.yo.machine import INITIAL_PROFILE, ProfileSettings
 from glider_model.base import plugins
 from glider_model.base.settings import ConfigurationError, Settings
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import Filtered, FilterParams
+from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH
 from glider_model.onboard.gate import INITIAL_GATE, GateSettings
 from glider_model.onboard.glide_polar import glide_horizontal_speed, make_polar
 from glider_model.onboard.learnt_steering import SteeringLearningSettings
@@ -25,7 +28,7 @@ from glider_model.vehicle.file import load_vehicle, vehicle_path
 
 #: Other parameters of guidance: no method can have such a name.
 TAKEN = {'los', 'observer', 'filters', 'steering', 'gate', 'vehicle', 'path', 'profile'}
-TAKEN |= {'dives', 'duration_s'}
+TAKEN |= {'dives', 'duration_s', 'hold', 'orders'}
 #: Settings of every guidance method by its name.
 METHODS = plugins.classes(plugins.GUIDANCE_METHODS, MethodSettings, methods, TAKEN)
 
@@ -142,7 +145,9 @@ class GuidanceSettings(GuidanceLawSettings):
 
     vehicle: str = Field('zhang2021', description='vehicle whose glide polar and pump are used')
     path: PathSettings = Field(
-        StraightPath(kind='straight', length_m=25000.0), description='path to follow'
+        StraightPath(kind='straight', length_m=25000.0),
+        description='path to follow',
+        json_schema_extra={'tunable': True},
     )
     profile: ProfileSettings = Field(ProfileSettings(), description='sawtooth')
     dives: int = Field(
@@ -154,8 +159,25 @@ class GuidanceSettings(GuidanceLawSettings):
         le=1e8,
         description='time at which the mission ends (s), no later turn is led; 0.0: never',
     )
+    hold: bool = Field(
+        False,
+        description='come up, and wait at the surface until it is false',
+        json_schema_extra={'tunable': True},
+    )
+    orders: list[Order] = Field([], description='what the vehicle is told in flight, and when')
 
-    def check_depth(self) -> None:
+    def check(self) -> None:
+        """Refuse a depth, a glide or a yo that the vehicle does not have."""
+        if self.hold and self.profile.mode == 'path':
+            raise ConfigurationError(
+                'hold = true: not along a path in three dimensions (allowed: with profile.mode = '
+                "'profile')"
+            )
+        self._check_depth()
+        self._check_pitch()
+        self._check_profile()
+
+    def _check_depth(self) -> None:
         """Refuse to go deeper than the vehicle is rated for.
 
         Raises
@@ -178,7 +200,7 @@ class GuidanceSettings(GuidanceLawSettings):
                 f'{vehicle.rated_depth_m:g} m, its rated_depth)'
             )
 
-    def check_pitch(self) -> None:
+    def _check_pitch(self) -> None:
         """Refuse a glide that the vehicle does not have.
 
         Raises
@@ -195,6 +217,28 @@ class GuidanceSettings(GuidanceLawSettings):
                     f'{shallowest:g} deg, its shallowest_glide)'
                 )
 
+    def _check_profile(self) -> None:
+        """Refuse dives that turn no deeper than they begin, and a weight that no pump makes.
+
+        Raises
+        ------
+        ConfigurationError
+        """
+        profile = self.profile
+        if profile.mode == 'profile' and profile.top_depth_m >= profile.depth_m:
+            raise ConfigurationError(
+                f'profile.top_depth_m = {profile.top_depth_m:g}: not above the lower turn '
+                f'(allowed: < {profile.depth_m:g} m, profile.depth_m)'
+            )
+        most = load_vehicle(self.vehicle).params().m_b_max
+        for name in ('net_heaviness_kg', 'climb_net_heaviness_kg'):
+            weight = getattr(profile, name)
+            if weight is not None and weight > most:
+                raise ConfigurationError(
+                    f'profile.{name} = {weight:g}: more than the pump of the vehicle makes '
+                    f'(allowed: <= {most:g} kg, its buoyancy_engine.range)'
+                )
+
     def params(self) -> GuidanceParams:
         """Kernel parameters."""
         vehicle = load_vehicle(self.vehicle)
@@ -202,34 +246,50 @@ class GuidanceSettings(GuidanceLawSettings):
         polar = make_polar(kernel_vehicle)
         filters = self.filters
         pump_rate = vehicle.slowest_pump_rate(self.profile.depth_m)
-        profile = self.profile.params(self.dives, pump_rate, polar)
+        profile = self.profile.params(self.dives, pump_rate, polar)._replace(holds=self.hold)
         return GuidanceParams(
-            self.path.params(),
-            profile,
-            polar,
-            glide_horizontal_speed(profile.pitch, profile.glide_rate, polar),
-            self.chosen.params(self.los, vehicle),
-            self.duration_s if self.duration_s > 0.0 else math.inf,
-            self.path.at_end == 'stop',
-            self.los.delta1_per_s,
-            ObserverParams(self.observer.k3_per_s, self.observer.k4_per_s2),
-            FilterParams(filters.heading_frequency_radps, filters.heading_rate_radps),
-            FilterParams(filters.pitch_frequency_radps, filters.pitch_rate_radps),
-            self.steering.params(not vehicle.steers_by, kernel_vehicle.slowest_glide),
-            self.gate.params(),
+            path=self.path.params(),
+            path_id=zlib.crc32(self.path.model_dump_json().encode()),
+            profile=profile,
+            polar=polar,
+            profile_speed=glide_horizontal_speed(profile.pitch, profile.glide_rate, polar),
+            method=self.chosen.params(self.los, vehicle),
+            end_s=self.duration_s if self.duration_s > 0.0 else math.inf,
+            ends_with_path=self.path.at_end == 'stop',
+            target_gain=self.los.delta1_per_s,
+            observer=ObserverParams(self.observer.k3_per_s, self.observer.k4_per_s2),
+            heading_filter=FilterParams(
+                filters.heading_frequency_radps, filters.heading_rate_radps
+            ),
+            pitch_filter=FilterParams(filters.pitch_frequency_radps, filters.pitch_rate_radps),
+            steering=self.steering.params(not vehicle.steers_by, kernel_vehicle.slowest_glide),
+            gate=self.gate.params(),
         )
 
     def initial_state(self) -> GuidanceState:
         """State before the first tick."""
         level = Filtered(0.0, 0.0)
         return GuidanceState(
-            0,
-            INITIAL_GATE,
-            INITIAL_PROFILE,
-            0.0,
-            Followed(Measured(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), self.steering.initial_state()),
-            WaterState(ObserverState(0.0, 0.0, 0.0, 0.0), 0.0),
-            self.chosen.initial_state(),
-            Commanded(level, level, 0.0),
-            0,
+            tick=0,
+            gate=INITIAL_GATE,
+            profile=INITIAL_PROFILE,
+            s=0.0,
+            path_id=0,
+            followed=Followed(
+                Measured(
+                    phi=0.0,
+                    theta=0.0,
+                    psi=0.0,
+                    phi_dot=0.0,
+                    theta_dot=0.0,
+                    psi_dot=0.0,
+                    vertical_rate=0.0,
+                ),
+                self.steering.initial_state(),
+            ),
+            water=WaterState(ObserverState(0.0, 0.0, 0.0, 0.0), 0.0),
+            method=self.chosen.initial_state(),
+            commanded=Commanded(level, level, 0.0),
+            infeasible_ticks=0,
+            fixes=INITIAL_FIX_WATCH,
         )

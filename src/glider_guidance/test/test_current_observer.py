@@ -13,7 +13,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from glider_guidance.current_observer import ObserverParams, ObserverState, observer_step
 from glider_guidance.settings import ObserverSettings
 
-quick = settings(max_examples=50, deadline=None)
+quick = settings(max_examples=50)
 
 DEFAULT = ObserverParams(ObserverSettings().k3_per_s, ObserverSettings().k4_per_s2)
 AT_REST = ObserverState(0.0, 0.0, 0.0, 0.0)

@@ -13,7 +13,7 @@ from glider_guidance.path.curve import path_length
 from glider_guidance.path.settings import HelixPath, SplinePath, StraightPath, WaypointPath
 from glider_guidance.yo.end_of_path import way_left
 
-quick = settings(max_examples=50, deadline=None)
+quick = settings(max_examples=50)
 
 SPEED = 0.42
 

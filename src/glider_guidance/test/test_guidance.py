@@ -28,7 +28,7 @@ from glider_model.base.signals import TICK_S, Odometry
 from glider_model.onboard.glide_polar import glide_horizontal_speed
 from glider_model.onboard.learnt_steering import SteeringLearningSettings
 
-quick = settings(max_examples=25, deadline=None)
+quick = settings(max_examples=25)
 
 #: Slower than this a vehicle may fly worse than its polar says (m/s).
 STALL_RATE = 0.15

@@ -18,7 +18,7 @@ from glider_guidance.los import (
 from glider_guidance.path.curve import path_angles, path_errors, path_point, path_tangent
 from glider_guidance.path.settings import HelixPath, SplinePath
 
-quick = settings(max_examples=100, deadline=None)
+quick = settings(max_examples=100)
 
 courses = st.floats(-math.pi, math.pi)
 elevations = st.floats(-1.4, 1.4)

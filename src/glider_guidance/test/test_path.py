@@ -30,7 +30,7 @@ from glider_guidance.path.settings import (
     WaypointPath,
 )
 
-quick = settings(max_examples=50, deadline=None)
+quick = settings(max_examples=50)
 read_path = pydantic.TypeAdapter(PathSettings).validate_python
 
 coordinates = st.floats(-3000.0, 3000.0)

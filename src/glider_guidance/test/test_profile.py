@@ -15,7 +15,6 @@ from glider_guidance.yo.machine import (
     NO_END,
     PITCH_OVER,
     ProfileSettings,
-    ProfileState,
     mission_time_s,
     profile_step,
     profile_targets,
@@ -37,7 +36,7 @@ from glider_model.base.signals import TICK_S
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 
-quick = settings(max_examples=50, deadline=None)
+quick = settings(max_examples=50)
 
 POLAR = make_polar(load_vehicle('zhang2021').params())
 PUMP = 0.004
@@ -219,7 +218,7 @@ def test_preparation_lasts_as_long_as_asked():
 def test_abort_leads_to_surfacing_from_every_stage(stage):
     params = ProfileSettings().params(1, PUMP, POLAR)
     state = profile_step(
-        ProfileState(stage, 100, 0, True, 0.0, 0.0, 1000.0), 200.0, 0.2, NO_END, params
+        INITIAL_PROFILE._replace(stage=stage, ticks=100, aborted=True), 200.0, 0.2, NO_END, params
     )
     assert state.stage == SURFACING
 
@@ -227,7 +226,7 @@ def test_abort_leads_to_surfacing_from_every_stage(stage):
 @pytest.mark.parametrize('stage', ALL_STAGES)
 def test_abort_at_the_surface_stays_there(stage):
     params = ProfileSettings(wait_s=0.0, prepare_s=0.0).params(5, PUMP, POLAR)
-    state = ProfileState(stage, 10**6, 0, True, 0.0, 0.0, 1000.0)
+    state = INITIAL_PROFILE._replace(stage=stage, ticks=10**6, aborted=True)
     for _ in range(100):
         state = profile_step(state, 0.2, 0.0, NO_END, params)
     assert state.stage == WAITING_ON_SURFACE

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from glider_model.base.signals import TICK_S, Odometry
 from glider_model.onboard.attitude_filter import Measured, measure
 
-quick = settings(max_examples=60, deadline=None)
+quick = settings(max_examples=60)
 
 TIME_CONSTANT = 2.0
 NOTHING = Measured(*(7 * (0.0,)))

@@ -17,7 +17,7 @@ from glider_model.onboard.command_filter import (
     filter_command,
 )
 
-quick = settings(max_examples=40, deadline=None)
+quick = settings(max_examples=40)
 DT = 0.1
 params = st.builds(FilterParams, st.floats(0.05, 2.0), st.floats(0.01, 1.0))
 commands = st.floats(-3.0, 3.0)

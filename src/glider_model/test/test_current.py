@@ -16,7 +16,7 @@ from glider_model.ocean.current_profile import MAX_SPEED_MPS
 from glider_model.ocean.current_settings import KNOT_MPS, M2_PERIOD_S, CurrentSettings
 
 DT = 0.1
-quick = settings(max_examples=50, deadline=None)
+quick = settings(max_examples=50)
 speeds = st.floats(0.0, MAX_SPEED_MPS)
 directions = st.floats(-360.0, 360.0)
 depths = st.floats(-10.0, 2000.0)

@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from glider_model.ocean.current import current_initial, current_step
 from glider_model.ocean.current_settings import FIELDS, CurrentSettings
 
-quick = settings(max_examples=50, deadline=None)
+quick = settings(max_examples=50)
 #: An eddy that turns counterclockwise, weaker with depth, carried to the east.
 EDDY = {
     **{'kind': 'eddy', 'north_m': 1000.0, 'east_m': -2000.0, 'radius_m': 3000.0},

@@ -19,7 +19,7 @@ from glider_model.ocean.density import (
 )
 from glider_model.vehicle.rigid_body import GRAVITY
 
-quick = settings(max_examples=60, deadline=None)
+quick = settings(max_examples=60)
 M, RADIUS = 69.0, 0.11  # kg and m, zhang2021
 depths = st.floats(0.0, 1000.0)
 

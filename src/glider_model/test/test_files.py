@@ -153,7 +153,7 @@ JSON = st.recursive(
 
 
 @given(JSON)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_written_values_are_read_again(values):
     assert repr(parse_yaml(yaml_text(values), 'a.yaml')) == repr(values)
 

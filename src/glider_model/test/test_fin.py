@@ -22,7 +22,7 @@ FIN = {'range': 26.0, 'rate': 1.2, 'area': 0.05, 'lift_slope': 3.0, 'x': -1.2, '
 SLENDER = {'hydrodynamics.K_MY': 98.4}
 NOTHING = 6 * (0.0,)
 numbers = st.floats(-2.0, 2.0)
-quick = settings(max_examples=200, deadline=None)
+quick = settings(max_examples=200)
 
 
 def with_fin(changes=None, **fin):

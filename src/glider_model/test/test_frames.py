@@ -39,7 +39,7 @@ from glider_model.base.frames import (
 )
 from glider_model.base.signals import Covariance, Imu, Odometry, Reference, Vector, Water, Wrench
 
-quick = settings(max_examples=60, deadline=None)
+quick = settings(max_examples=60)
 angles = st.floats(-math.pi, math.pi)
 pitches = st.floats(-1.4, 1.4)
 numbers = st.floats(-1e4, 1e4)
@@ -115,7 +115,7 @@ def test_rotation_to_body_is_the_inverse(q, vector):
 # ---------------------------------------------------------------------------------- wrap_angle
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.floats(-1e6, 1e6))
 def test_wrapped_angle_stays_in_range(angle):
     assert -math.pi <= wrap_angle(angle) < math.pi

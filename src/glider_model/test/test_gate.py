@@ -12,7 +12,7 @@ from glider_model.base.frames import quaternion_from_euler
 from glider_model.base.signals import TICK_S, Odometry
 from glider_model.onboard.gate import INITIAL_GATE, GateSettings, gate_step, is_lost
 
-quick = settings(max_examples=100, deadline=None)
+quick = settings(max_examples=100)
 PARAMS = GateSettings().params()
 WILD = st.sampled_from([math.nan, math.inf, -math.inf, 1e300, -1e300, 1e30])
 

@@ -23,7 +23,7 @@ from glider_model.onboard.glide_polar import (
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle
 
-quick = settings(max_examples=60, deadline=None)
+quick = settings(max_examples=60)
 VEHICLES = {name: load_vehicle(name).params() for name in ('zhang2021', 'seawing')}
 POLARS = {name: make_polar(vehicle) for name, vehicle in VEHICLES.items()}
 SHALLOWEST = POLARS['zhang2021'].shallowest

@@ -66,7 +66,7 @@ def covariance(state):
     return matrix + np.triu(matrix, 1).T
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(effectiveness, bends, kicks, offsets, st.integers(0, 1000), st.sampled_from([-1.0, 1.0]))
 def test_estimate_comes_to_the_truth_from_either_sign(b, c, k, d, seed, first_guess):
     """b within 10 % after 20 min of turning, from any start; c and k within their deviations."""
@@ -108,7 +108,7 @@ def test_straight_flight_teaches_nothing_about_b():
     assert after.p[0] == pytest.approx(before.p[0] + PARAMS.drift * 1000.0, rel=1e-9)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 1000), effectiveness)
 def test_covariance_stays_positive_definite(seed, b):
     bank, roll_rate = turns(300.0, seed)

@@ -6,17 +6,21 @@ import os
 import subprocess
 import sys
 import time
+from collections import defaultdict
 
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
+from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from glider_model.base.signals import TICK_NS
-from glider_model.ros.lockstep import clock, health
+from glider_model.ros.lockstep import clock, health, peers
 from glider_model.ros.lockstep.clock import MAX_TICKS_AHEAD, ClockNode
 from glider_model.ros.lockstep.executor import make_executor
 from glider_model.ros.lockstep.process import Stop
@@ -84,7 +88,7 @@ class Block(StepNode):
         for name, publish in self.publish.items():
             publish(stamp_ns, len(TOPICS[name].codec.fields) * (total,))
 
-    def on_stale(self, stamp_ns: int) -> None:
+    def on_stale(self, stamp_ns: int, cycles: int) -> None:
         self.stale_steps += 1
 
 
@@ -370,30 +374,63 @@ class Intruder:
         return any(said in told for told in self.told)
 
 
-@pytest.mark.parametrize(
-    'topic',
-    [
-        *('ground_truth/odom', 'measured_odom', 'odom', 'joint_states', 'current_velocity'),
-        *('reference', 'demand', 'command', 'drop_weight'),
-    ],
-)
-def test_second_publisher_in_mid_flight_is_refused_and_named(make_graph, context, topic):
-    """It says what the first one says, with other numbers, for this tick and the ones to come."""
-    graph = make_graph(last_tick=10**9)
+#: Inputs of the blocks: a stranger may publish on any of them.
+LISTENED = sorted({'command', 'current_velocity', 'drop_weight'}.union(*INPUTS.values()))
+#: How a flight goes on, and how long (wall time, s) a stranger publishes in each way.
+MODES = {
+    'as fast as possible': ({}, 0.1),
+    'four times real time': ({'speed': 4.0}, 0.15),
+    'free-running': ({'lockstep': False}, 0.25),
+}
+WILD = 12345.0
+#: What a stranger says, from the topic and the tick that is due.
+SAYS = {
+    'what the first one says': lambda topic, tick: _wild(topic, tick),
+    'a tick ahead': lambda topic, tick: _wild(topic, tick + 1),
+    'nothing': lambda topic, tick: b'',
+    'noise': lambda topic, tick: bytes(range(256)),
+}
+#: Messages of a stranger for each turn of the executor: less often than the first one publishes,
+#: and far more often.
+BURSTS = (1, 60)
+
+
+def _wild(topic, tick: int) -> bytes:
+    return topic.codec.encode(tick * TICK_NS, len(topic.codec.fields) * (WILD,))
+
+
+@pytest.mark.parametrize('mode', MODES)
+@pytest.mark.parametrize('topic', LISTENED)
+def test_stranger_is_refused_and_named_however_much_it_says(make_graph, context, topic, mode):
+    """It joins in mid-flight, and its numbers rise from 1 to far beyond those of the first one."""
+    parameters, each_s = MODES[mode]
+    graph = make_graph(last_tick=10**9, **parameters)
     assert graph.spin(lambda: graph.plant.tick > 10) is None
     intruder = Intruder(graph, context, topic)
     assert graph.spin(intruder.is_heard) is None
-    wild = len(intruder.topic.codec.fields) * (12345.0,)
-    for _ in range(10):
-        for ahead in range(5):
-            stamp_ns = (graph.plant.tick + ahead) * TICK_NS
-            intruder.publish(intruder.topic.codec.encode(stamp_ns, wild))
-        until = graph.plant.tick + 5
-        assert graph.spin(lambda: graph.plant.tick > until) is None  # noqa: B023
+    sent, before = 0, graph.plant.tick
+    for says in SAYS.values():
+        for burst in BURSTS:
+            until = time.monotonic() + each_s
+            while time.monotonic() < until:
+                for _ in range(burst):
+                    intruder.publish(says(intruder.topic, graph.plant.tick))
+                sent += burst
+                graph.executor.spin_once(timeout_sec=0.02)
     assert graph.spin(intruder.was_named) is None
-    for _, tick, command, current in graph.plant.log:
+    assert sent > graph.plant.tick + 100
+    flown = [(tick, command, current) for _, tick, command, current in graph.plant.log]
+    if parameters.get('lockstep', True):
         # odom is the tick, joint_states less the tick, and each block sends on the sum
-        assert (command[0], current[0]) == (2.0 * tick, float(tick))
+        assert [(command[0], current[0]) for _, command, current in flown] == [
+            (2.0 * tick, float(tick)) for tick, *_ in flown
+        ]
+        assert graph.plant.tick > before + 10
+    else:
+        said = [(*command, *current) for tick, command, current in flown if tick > 10]
+        assert max(abs(value) for values in said for value in values) < WILD
+        # every tick brings something new: the first one is still obeyed
+        assert len(set(said)) > 0.6 * len(said) > 10
 
 
 def test_publisher_that_takes_the_place_of_one_that_is_gone_is_believed(make_graph):
@@ -409,6 +446,97 @@ def test_publisher_that_takes_the_place_of_one_that_is_gone_is_believed(make_gra
     before = len(control.steps)
     assert graph.spin(lambda: len(control.steps) > before + 5) is None
     assert all(item.refused == 0 for item in control.inputs)
+
+
+class Speaker:
+    """A node that says things on a topic of the glider, when it is told to."""
+
+    def __init__(self, graph, context, name: str, namespace: str, topic: str) -> None:
+        self.node = rclpy.create_node(name, namespace=namespace, context=context)
+        graph.nodes.append(self.node)
+        self.topic, full_name = TOPICS[topic], TOPICS[topic].full_name('/glider')
+        self.publisher = self.node.create_publisher(
+            self.topic.message_type, full_name, self.topic.qos
+        )
+        self.number = 0
+
+    def say(self, value: float) -> None:
+        """Say something about a tick that is new."""
+        self.number += 1
+        stamp_ns = time.time_ns() // TICK_NS * TICK_NS + self.number
+        self.publisher.publish(
+            self.topic.codec.encode(stamp_ns, len(self.topic.codec.fields) * (value,))
+        )
+
+
+@pytest.fixture
+def listening(make_graph, context):
+    """Control without guidance, and what else publishes reference: control, the rest by name."""
+    graph = make_graph(lockstep=False, input_max_age_s=0.5, without=[GUIDANCE])
+    control = graph.blocks[CONTROL]
+    (item,) = (item for item in control.inputs if item.topic.name == 'reference')
+
+    def add(name: str, namespace: str = '/glider') -> Speaker:
+        speaker = Speaker(graph, context, name, namespace, 'reference')
+        count = speaker.publisher.get_subscription_count
+        assert graph.spin(lambda: count() >= 2) is None  # control and the guard
+        return speaker
+
+    def is_believed(speaker: Speaker, value: float, for_s: float = 3.0) -> bool:
+        """Let it speak for a while; whether control believes it by then."""
+        until = time.monotonic() + for_s
+
+        def say() -> bool:
+            speaker.say(value)
+            return item.values[:1] == (value,) or time.monotonic() > until
+
+        assert graph.spin(say) is None
+        return item.values[:1] == (value,)
+
+    return add, is_believed, item
+
+
+def test_one_that_was_started_again_is_believed_once_the_first_is_silent(listening):
+    """The first is not gone from sight: the middleware lists it for as long as it likes."""
+    add, is_believed, item = listening
+    first = add(GUIDANCE)
+    assert is_believed(first, 1.0)
+    again = add(GUIDANCE)
+    heard_s = item.owner.heard_s
+    assert is_believed(again, 2.0)
+    assert item.owner.heard_s - heard_s >= 0.5  # not before input_max_age_s
+    assert item.refused == 0
+
+
+def test_two_of_one_name_are_told_apart_by_gid(listening, context):
+    add, is_believed, item = listening
+    first, second = add(GUIDANCE), add(GUIDANCE)
+    for _ in range(20):
+        assert is_believed(first, 1.0)
+        assert not is_believed(second, 2.0, 0.05)
+    assert item.refused > 0
+    infos = {
+        bytes(info.endpoint_gid) for info in first.node.get_publishers_info_by_topic('reference')
+    }
+    (gid,) = infos - {item.owner.gid}
+    shown = '.'.join(f'{byte:02x}' for byte in gid)
+    said = peers.stranger(first.node, item.topic, gid)
+    assert said == f'/glider/reference is published by /glider/guidance_node ({shown}) too'
+
+
+@pytest.mark.parametrize('is_first', [True, False])
+def test_silence_of_the_first_is_no_chance_for_a_stranger(listening, is_first):
+    """Neither for one that came before it, nor for one that comes in its silence."""
+    add, is_believed, item = listening
+    if is_first:
+        stranger = add('stranger', '/other')
+        assert not is_believed(stranger, 9.0, 0.5)
+    first = add(GUIDANCE)
+    assert is_believed(first, 1.0)
+    stranger = stranger if is_first else add('stranger', '/other')
+    assert not is_believed(stranger, 9.0, 1.5)
+    assert is_believed(first, 2.0)
+    assert item.refused > 10
 
 
 @pytest.mark.parametrize('lockstep', [True, False])
@@ -452,6 +580,83 @@ def test_other_frames_are_refused_and_named(make_graph, context, field, frame):
     message.header.frame_id, message.child_frame_id = 'map', 'one/base_link'
     item.accept(to_cdr(message))
     assert item.values == 17 * (0.5,)
+
+
+def test_parameter_that_there_is_not_is_refused_by_its_name(make_graph, context):
+    graph = make_graph(lockstep=False)
+    client_node = rclpy.create_node('client', namespace='/glider', context=context)
+    graph.nodes.append(client_node)
+    graph.executor.add_node(client_node)
+    client = client_node.create_client(SetParameters, f'{CONTROL}/set_parameters')
+    assert graph.spin(client.service_is_ready) is None
+    one = Parameter('nonsense', value=1.0).to_parameter_msg()
+    future = client.call_async(SetParameters.Request(parameters=[one]))
+    assert graph.spin(future.done) is None
+    (result,) = future.result().results
+    assert not result.successful
+    assert result.reason.startswith('control_node: parameter nonsense: unknown (allowed: ')
+
+
+@pytest.mark.parametrize(
+    'durability', [DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL]
+)
+def test_how_a_node_is_is_repeated_each_second_for_who_listens_now(
+    make_graph, context, durability
+):
+    """Who asks for what was said before, as a recorder does, gets what changes and no more."""
+    graph = make_graph(last_tick=101, speed=20.0)
+    listener = rclpy.create_node('listener', namespace='/other', context=context)
+    graph.nodes.append(listener)
+    graph.executor.add_node(listener)
+    heard = defaultdict(list)
+
+    def hear(array) -> None:
+        for status in array.status:
+            heard[status.name].append((health.stamp_of(array), status.message))
+
+    profile = QoSProfile(depth=100, durability=durability)
+    listener.create_subscription(DiagnosticArray, '/diagnostics', hear, profile)
+
+    def is_all_said() -> bool:
+        over_s = graph.plant.over_since_s
+        return over_s is not None and time.monotonic() > over_s + 0.5
+
+    while not is_all_said():
+        stop = graph.spin(is_all_said)
+        assert stop is None or stop.code == 0  # the nodes leave
+    names = {f'/glider/{name}' for name in (PLANT, *INPUTS)}
+    stamps = {name: [stamp for stamp, said in heard[name] if said == 'running'] for name in names}
+    seconds = [k * 1_000_000_000 for k in range(11)]
+    if durability == DurabilityPolicy.VOLATILE:
+        # the first may be said before the middleware has connected the two
+        assert {name: found[-10:] for name, found in stamps.items()} == dict.fromkeys(
+            names, seconds[1:]
+        )
+    else:
+        assert stamps == dict.fromkeys(names, [])
+        assert heard[f'/glider/{PLANT}'][-1][1] == health.COMPLETE
+
+
+def test_a_node_without_its_inputs_repeats_that_it_is_not_well(make_graph, context):
+    graph = make_graph(last_tick=10**9, lockstep=False, input_max_age_s=0.3)
+    levels, listener = [], rclpy.create_node('listener', namespace='/other', context=context)
+    graph.nodes.append(listener)
+    graph.executor.add_node(listener)
+    listener.create_subscription(
+        DiagnosticArray,
+        '/diagnostics',
+        lambda array: levels.extend(
+            (one.level, one.message) for one in array.status if one.name == f'/glider/{CONTROL}'
+        ),
+        10,
+    )
+    control, guidance = graph.blocks[CONTROL], graph.blocks[GUIDANCE]
+    assert graph.spin(lambda: len(control.steps) > 2) is None
+    guidance.mute_from_ns = 0
+    said = 'missing or stale: reference; silent until then'
+    assert graph.spin(lambda: levels.count((health.ERROR, said)) >= 3) is None
+    guidance.mute_from_ns = None
+    assert graph.spin(lambda: levels[-1:] == [(health.OK, 'running')]) is None
 
 
 def test_speed_is_kept_without_drift(make_graph):

@@ -25,10 +25,8 @@ from glider_model.vehicle.perturb import PerturbSettings, perturbed
 from glider_model.vehicle.rigid_body import GRAVITY, make_inertia, solve_mass
 
 # Flights are not shrunk, which would take minutes, and are the same ones each time.
-flights = settings(
-    max_examples=15, deadline=None, derandomize=True, phases=[Phase.explicit, Phase.generate]
-)
-quick = settings(max_examples=60, deadline=None)
+flights = settings(max_examples=15, derandomize=True, phases=[Phase.explicit, Phase.generate])
+quick = settings(max_examples=60)
 GLIDERS = ['zhang2021', 'seawing']
 names = st.sampled_from(GLIDERS)
 STILL = Water(0.0, 0.0, 0.0)

@@ -13,7 +13,7 @@ from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.hydrodynamics import hydrodynamics
 from glider_model.vehicle.rigid_body import coriolis, make_inertia, rigid_body, solve_mass
 
-quick = settings(max_examples=60, deadline=None)
+quick = settings(max_examples=60)
 NAMES = ['zhang2021', 'zhang2021_table1', 'seawing']
 #: A hull that is symmetric about nothing, so that no term is zero by chance.
 CROOKED = load_vehicle('seawing').params()._replace(s_y=0.7, a_26=3.0, a_35=-2.0)

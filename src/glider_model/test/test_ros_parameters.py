@@ -111,9 +111,7 @@ TEXTS = st.one_of(
         ),
     )
 )
-@settings(
-    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_parameter_file_gives_back_the_same_settings(make_node, tmp_path, example):
     file = tmp_path / 'parameters.yaml'
     text = parameters_yaml({'example_node': to_parameters(example)}, '/glider')
@@ -134,7 +132,7 @@ def test_parameter_file_gives_back_the_same_settings(make_node, tmp_path, exampl
         legs=st.lists(st.tuples(FLOATS, FLOATS), max_size=3),
     )
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_settings_come_back_from_parameters_and_from_what_was_changed(example):
     assert from_parameters(Example, {**to_parameters(example), 'other': 1}, 'file') == example
     changed = changed_parameters(Example(), example)

@@ -39,7 +39,7 @@ from glider_model.plant.sensors import (
     take_sample,
 )
 
-quick = settings(max_examples=100, deadline=None)
+quick = settings(max_examples=100)
 
 NOISE = {
     'attitude_std_deg': 0.2,

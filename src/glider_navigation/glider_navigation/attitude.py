@@ -31,6 +31,11 @@ DENSE_S = 1.0
 TURN_STD, K_WANDERS, D_SHARE = math.radians(0.5), 0.01, 0.05
 #: The vehicle's file may be wrong by all of k, and by this (rad/s) where it says next to nothing.
 LEAST_K_STD = 0.005
+#: No glider turns faster (rad/s); one that tumbles would have it learn that it does.
+MOST_TURN = 0.2
+#: Pitched or rolled by more than this (rad), as a vehicle that bobs at the surface is, it tells
+#: nothing of turning.
+STEEP = 1.0
 #: Time constants with which roll and pitch follow the moving mass (s).
 ROLL_S, PITCH_S = 2.0, 2.0
 #: Time constant with which differences of samples are believed as rates (s).
@@ -86,7 +91,16 @@ class AttitudeState(NamedTuple):
 def initial_attitude(vehicle: Vehicle) -> AttitudeState:
     """Nothing is measured yet."""
     level = Angles(0.0, 0.0, 0.0)
-    return AttitudeState(level, level, level, level, make_turn(vehicle), 0.0, False, False)
+    return AttitudeState(
+        sample=level,
+        rates=level,
+        balance=level,
+        balance_then=level,
+        turn=make_turn(vehicle),
+        age_s=0.0,
+        seen=False,
+        dense=False,
+    )
 
 
 class Attitude(NamedTuple):
@@ -108,11 +122,17 @@ def _follow_mass(balance, joints, mass, dt):
 
 
 @kernel
+def _bounded(rate):
+    """A rate of turn (rad/s) that a glider may have."""
+    return min(MOST_TURN, max(-MOST_TURN, rate))
+
+
+@kernel
 def _learn(turning, roll_s, off):
     """How roll turns the vehicle, by how far off its heading was after a time of roll."""
     p = turning.p + (K_WANDERS * turning.k) ** 2
     gain = p * roll_s / (p * roll_s * roll_s + TURN_STD * TURN_STD)
-    return Turning(turning.k + gain * off, p * (1.0 - gain * roll_s))
+    return Turning(_bounded(turning.k + gain * off), p * (1.0 - gain * roll_s))
 
 
 @kernel
@@ -124,7 +144,7 @@ def _take_turn(turn, turned, age_s, dives):
         dive = _learn(dive, turn.roll_s, off)
     else:
         climb = _learn(climb, turn.roll_s, off)
-    return Turn(dive, climb, turn.d + D_SHARE * off / age_s, 0.0, 0.0)
+    return Turn(dive, climb, _bounded(turn.d + D_SHARE * off / age_s), 0.0, 0.0)
 
 
 @kernel
@@ -134,6 +154,12 @@ def _go_on_turning(turn, phi, theta, dt):
     rate = (turn.dive.k if theta < 0.0 else turn.climb.k) * sine + turn.d
     roll_s, turned = turn.roll_s + dt * sine, turn.turned + dt * rate
     return Turn(turn.dive, turn.climb, turn.d, roll_s, turned), rate
+
+
+@kernel
+def _is_steep(angles):
+    """Whether roll or pitch leave a heading without a meaning."""
+    return abs(angles.theta) > STEEP or abs(angles.phi) > STEEP
 
 
 @kernel
@@ -161,7 +187,8 @@ def attitude_step(state, imu, joints, mass, dt):
     if is_new:
         then, dense = balance, state.seen and age_s <= DENSE_S
         change = wrap_angle(sample.psi - before.psi)
-        if state.seen and age_s > DENSE_S:
+        is_glide = not _is_steep(sample) and not _is_steep(before)
+        if state.seen and age_s > DENSE_S and is_glide:
             turn = _take_turn(turn, change, age_s, before.theta < 0.0)
         else:
             turn = Turn(turn.dive, turn.climb, turn.d, 0.0, 0.0)
@@ -175,7 +202,16 @@ def attitude_step(state, imu, joints, mass, dt):
             psi = state.rates.psi + share * (change / age_s - state.rates.psi)
             rates = Angles(tilts.phi, tilts.theta, psi)
         before, age_s = sample, 0.0
-    state = AttitudeState(before, rates, balance, then, turn, age_s, True, dense)
+    state = AttitudeState(
+        sample=before,
+        rates=rates,
+        balance=balance,
+        balance_then=then,
+        turn=turn,
+        age_s=age_s,
+        seen=True,
+        dense=dense,
+    )
     angles = Angles(
         wrap_angle(before.phi + balance.phi - then.phi),
         before.theta + balance.theta - then.theta,

@@ -30,8 +30,8 @@ def _hear(inputs, origin):
     joints, odom, imu, pressure, fix = inputs[0], inputs[1], inputs[2], inputs[3], inputs[4]
     p_n, p_e = from_geodetic(fix[1], fix[2], origin)
     return Heard(
-        Joints(joints[0], joints[1], joints[2], joints[3]),
-        (
+        joints=Joints(joints[0], joints[1], joints[2], joints[3]),
+        odom=(  # of a recording it is an array
             odom[0],
             odom[1],
             odom[2],
@@ -46,11 +46,11 @@ def _hear(inputs, origin):
             odom[11],
             odom[12],
         ),
-        odometry_from_wire(odom),
-        imu_from_wire(imu),
-        depth_at(pressure[0]),
-        Fix(fix[0] >= 0.0, p_n, p_e, 0.5 * (fix[3] + fix[4])),
-        inputs[5][0],
+        odometry=odometry_from_wire(odom),
+        imu=imu_from_wire(imu),
+        depth=depth_at(pressure[0]),
+        fix=Fix(fix[0] >= 0.0, p_n, p_e, 0.5 * (fix[3] + fix[4])),
+        altitude=inputs[5][0],
     )
 
 

@@ -4,29 +4,37 @@
 
 A mean and, if that is asked for, a tide: c(t) = m + a cos(w t) + b sin(w t) on each axis. A
 Kalman filter takes in the mean over each way under water between fixes (the depth-averaged
-current, DAC). The mean wanders: over a way of T s after one of T' s its variance grows by
-q (T + T') / 3. How much it wanders, q, is learnt from how far the means were off so far, so that
-what is told of the errors holds (innovation-based adaptive estimation, Mehra 1970). With the tide
-left out this is persistence: the last mean holds for the next way. Where there is a forecast, all
-of this is about the difference between the sea and the forecast.
+current, DAC). The mean wanders: over a way of T s, G s after one of T' s, its variance grows by
+q (T / 3 + G + T' / 3). How much it wanders, q, is learnt from how far the means were off so far,
+so that what is told of the errors holds (innovation-based adaptive estimation, Mehra 1970); as it
+is learnt from a few ways, w, the variance that is told is 1 + 1 / w times as large. With the tide
+left out this is persistence: the last mean holds for the next way. In a long stay at the surface
+the drift tells how the current changes. Where there is a forecast, all of this is about the
+difference between the sea and the forecast.
 """
 
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.signals import Vector
+from glider_model.ocean.current_profile import MAX_SPEED_MPS
 
 #: Principal lunar tide M2 (rad/s).
 TIDE = 2.0 * math.pi / (12.4206012 * 3600.0)
 #: Before the first way: standard deviation of the mean and of the amplitude of a tide (m/s).
 MEAN_STD, TIDE_STD = 0.3, 0.05
-#: How far a mean over 1.5 hours is off that of the 1.5 hours before, at first (m/s); by what
-#: number of ways that is outweighed; and over how many at most q is learnt.
-FIRST_CHANGE, FIRST_WEIGHT, MOST_WEIGHT = 0.035, 0.5, 3.0
+#: How far a mean over 1.5 hours is off that of the 1.5 hours before, at first (m/s); how many ways
+#: that counts for; and from how many at most q is learnt.
+FIRST_CHANGE, FIRST_WEIGHT, MOST_WEIGHT = 0.05, 1.0, 4.0
 #: The mean over a way is no better known than this, however steady the sea: turn-overs, where the
 #: flight model does not hold, are not all alike (m/s).
 LEAST_STD = 0.0007
+#: No current is faster, in whatever scenario (m/s).
+FASTEST = MAX_SPEED_MPS
+#: From so long a stay at the surface on (s) the change of the drift tells that of the current: the
+#: drift changes by this much more variance, by wind and shear.
+LONG_STAY_S, SURFACE_MORE = 1800.0, 0.1
 FIRST_Q = 3.0 * FIRST_CHANGE * FIRST_CHANGE / (2.0 * 5400.0)
 
 
@@ -60,25 +68,52 @@ class CurrentBelief(NamedTuple):
     weight: float  #: ways that q was learnt from
     glide: Vector  #: mean velocity through the water in the last way that was taken in (m/s)
     way_s: float  #: its time; 0.0: none yet
+    carried: Vector  #: change of the current since then, by the drift at the surface (m/s)
+    gap_s: float  #: time since then for which nothing tells how the current has changed
 
 
 def initial_belief(tide: bool, mean_std: float = MEAN_STD) -> CurrentBelief:
     """Nothing is known yet, but how far the mean may be off (m/s)."""
     still, tide2 = Vector(0.0, 0.0), TIDE_STD * TIDE_STD if tide else 0.0
-    p = Uncertainty(mean_std * mean_std, 0.0, 0.0, tide2, 0.0, tide2)
-    return CurrentBelief(still, still, still, p, FIRST_Q, FIRST_WEIGHT, still, 0.0)
+    p = Uncertainty(mm=mean_std * mean_std, ma=0.0, mb=0.0, aa=tide2, ab=0.0, bb=tide2)
+    return CurrentBelief(
+        mean=still,
+        cos=still,
+        sin=still,
+        p=p,
+        q=FIRST_Q,
+        weight=FIRST_WEIGHT,
+        glide=still,
+        way_s=0.0,
+        carried=still,
+        gap_s=0.0,
+    )
 
 
 @kernel
 def current_at(belief, t_s):
     """Current (m/s) that is believed for a time since the start (s)."""
+    mean = Vector(belief.mean.n + belief.carried.n, belief.mean.e + belief.carried.e)
     if belief.p.aa <= 0.0:
-        return belief.mean
+        return mean
     c, s = math.cos(TIDE * t_s), math.sin(TIDE * t_s)
     return Vector(
-        belief.mean.n + c * belief.cos.n + s * belief.sin.n,
-        belief.mean.e + c * belief.cos.e + s * belief.sin.e,
+        mean.n + c * belief.cos.n + s * belief.sin.n,
+        mean.e + c * belief.cos.e + s * belief.sin.e,
     )
+
+
+@kernel
+def last_mean(belief, t_s):
+    """The same (m/s) as the last way told it, whatever the drift at the surface told since."""
+    now, carried = current_at(belief, t_s), belief.carried
+    return Vector(now.n - carried.n, now.e - carried.e)
+
+
+@kernel
+def _apart_s(belief, way_s):
+    """Time (s) in which the mean over a way comes to differ from that of the way before."""
+    return (belief.way_s + way_s) / 3.0 + belief.gap_s
 
 
 @kernel
@@ -86,7 +121,8 @@ def wandered(belief, way_s):
     """Variance (m^2/s^2) by which the mean over a way differs from that of the way before."""
     if belief.way_s <= 0.0:
         return 0.0
-    return belief.q * (belief.way_s + way_s) / 3.0 + LEAST_STD * LEAST_STD
+    apart_s = _apart_s(belief, way_s)
+    return belief.q * apart_s * (1.0 + 1.0 / belief.weight) + LEAST_STD * LEAST_STD
 
 
 @kernel
@@ -104,6 +140,15 @@ def mean_variance(belief, h):
     """Variance (m^2/s^2) of the mean current over a way, by what is known."""
     m, a, b = _loaded(belief.p, h)
     return h.one * m + h.cos * a + h.sin * b
+
+
+@kernel
+def _bounded(current):
+    """A current (m/s) that is no faster than `FASTEST`."""
+    speed = math.sqrt(current.n * current.n + current.e * current.e)
+    if speed <= FASTEST:
+        return current
+    return Vector(FASTEST / speed * current.n, FASTEST / speed * current.e)
 
 
 @kernel
@@ -129,30 +174,59 @@ def take_in(belief, off, h, way_s, glide, variance, bias):
     """
     wander = wandered(belief, way_s)
     p = belief.p
-    grown = Uncertainty(p.mm + wander + bias, p.ma, p.mb, p.aa, p.ab, p.bb)
+    grown = replace(p, mm=p.mm + wander + bias)
     m, a, b = _loaded(grown, h)
     s = h.one * m + h.cos * a + h.sin * b + variance
     k_m, k_a, k_b = m / s, a / s, b / s
     q, weight = belief.q, belief.weight
     if belief.way_s > 0.0:
         known = s - wander
-        seen = (0.5 * (off.n * off.n + off.e * off.e) - known) / ((belief.way_s + way_s) / 3.0)
+        seen = (0.5 * (off.n * off.n + off.e * off.e) - known) / _apart_s(belief, way_s)
         q = max(0.0, (weight * q + max(0.0, seen)) / (weight + 1.0))
         weight = min(MOST_WEIGHT, weight + 1.0)
-    return CurrentBelief(
-        Vector(belief.mean.n + k_m * off.n, belief.mean.e + k_m * off.e),
-        Vector(belief.cos.n + k_a * off.n, belief.cos.e + k_a * off.e),
-        Vector(belief.sin.n + k_b * off.n, belief.sin.e + k_b * off.e),
-        Uncertainty(
-            grown.mm - k_m * m,
-            grown.ma - k_m * a,
-            grown.mb - k_m * b,
-            grown.aa - k_a * a,
-            grown.ab - k_a * b,
-            grown.bb - k_b * b,
-        ),
-        q,
-        weight,
-        glide,
-        way_s,
+    mean = Vector(
+        belief.mean.n + belief.carried.n + k_m * off.n,
+        belief.mean.e + belief.carried.e + k_m * off.e,
     )
+    return CurrentBelief(
+        mean=_bounded(mean),
+        cos=Vector(belief.cos.n + k_a * off.n, belief.cos.e + k_a * off.e),
+        sin=Vector(belief.sin.n + k_b * off.n, belief.sin.e + k_b * off.e),
+        p=Uncertainty(
+            mm=grown.mm - k_m * m,
+            ma=grown.ma - k_m * a,
+            mb=grown.mb - k_m * b,
+            aa=grown.aa - k_a * a,
+            ab=grown.ab - k_a * b,
+            bb=grown.bb - k_b * b,
+        ),
+        q=q,
+        weight=weight,
+        glide=glide,
+        way_s=way_s,
+        carried=Vector(0.0, 0.0),
+        gap_s=0.0,
+    )
+
+
+@kernel
+def carry(belief, change, stay_s, variance):
+    """What is believed after a stay at the surface.
+
+    Parameters
+    ----------
+    belief : CurrentBelief
+        After the way before it.
+    change : Vector
+        Of the drift in the stay, beyond what was believed to change (m/s).
+    stay_s : float
+        Time at the surface (s).
+    variance : float
+        Of ``change``, by that of the fixes (m^2/s^2).
+    """
+    share = 0.0
+    if stay_s >= LONG_STAY_S:
+        wander = belief.q * stay_s
+        share = wander / ((1.0 + SURFACE_MORE) * wander + variance)
+    n, e = belief.carried.n + share * change.n, belief.carried.e + share * change.e
+    return replace(belief, carried=Vector(n, e), gap_s=belief.gap_s + (1.0 - share) * stay_s)

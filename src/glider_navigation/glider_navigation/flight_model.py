@@ -56,6 +56,12 @@ def follow_depth(flight, depth, is_new, dt):
 
 
 @kernel
+def set_anew(flight, by):
+    """The same flight where the depth is shown so much deeper (m) from now on."""
+    return Flight(flight.depth + by, flight.rate, flight.speed, flight.age_s, flight.seen)
+
+
+@kernel
 def reckon_speed(flight, theta, polar, dt):
     """Speed through the water at a pitch (rad)."""
     if abs(theta) > LEAST_PITCH and abs(flight.rate) > LEAST_RATE and theta * flight.rate < 0.0:

@@ -11,7 +11,7 @@ vehicle up. Whether a fix lies where the vehicle can be is for the method to say
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.signals import Imu, Joints
 from glider_model.onboard.gate import (
     INITIAL_GATE,
@@ -55,15 +55,15 @@ class IntakeState(NamedTuple):
 
 
 INITIAL_INTAKE = IntakeState(
-    INITIAL_GATE,
-    Joints(0.0, 0.0, 0.0, 0.0),
-    Imu(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False),
-    0.0,
-    0.0,
-    0.0,
-    False,
-    False,
-    REFUSAL_TOLD_S,
+    odometry=INITIAL_GATE,
+    joints=Joints(0.0, 0.0, 0.0, 0.0),
+    imu=Imu(q_w=1.0, q_x=0.0, q_y=0.0, q_z=0.0, p=0.0, q=0.0, r=0.0, has_rates=False),
+    imu_s=0.0,
+    depth=0.0,
+    depth_s=0.0,
+    seen=False,
+    sounded=False,
+    refused_s=REFUSAL_TOLD_S,
 )
 
 
@@ -100,9 +100,7 @@ def _scaled(imu):
     if abs(norm2 - 1.0) <= NORM_SCALED:
         return imu
     s = 1.0 / math.sqrt(norm2)
-    return Imu(
-        s * imu.q_w, s * imu.q_x, s * imu.q_y, s * imu.q_z, imu.p, imu.q, imu.r, imu.has_rates
-    )
+    return replace(imu, q_w=s * imu.q_w, q_x=s * imu.q_x, q_y=s * imu.q_y, q_z=s * imu.q_z)
 
 
 @kernel
@@ -156,8 +154,26 @@ def take_in(state, heard, params, dt):
         fix, refused = Fix(False, 0.0, 0.0, 0.0), True
     altitude = heard.altitude if math.isfinite(heard.altitude) else 0.0
     refused_s = 0.0 if refused else state.refused_s + dt
-    taken = Heard(joints, heard.odom, odometry.odometry, imu, depth, fix, altitude)
-    state = IntakeState(odometry, joints, imu, imu_s, depth, depth_s, seen, sounded, refused_s)
+    taken = Heard(
+        joints=joints,
+        odom=heard.odom,
+        odometry=odometry.odometry,
+        imu=imu,
+        depth=depth,
+        fix=fix,
+        altitude=altitude,
+    )
+    state = IntakeState(
+        odometry=odometry,
+        joints=joints,
+        imu=imu,
+        imu_s=imu_s,
+        depth=depth,
+        depth_s=depth_s,
+        seen=seen,
+        sounded=sounded,
+        refused_s=refused_s,
+    )
     return state, taken
 
 

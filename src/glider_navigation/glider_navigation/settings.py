@@ -116,14 +116,14 @@ class NavigationSettings(NavigationLawSettings):
     @property
     def _start(self) -> Start:
         return Start(
-            load_vehicle(self.vehicle),
-            self.origin.params(),
-            self.north_m,
-            self.east_m,
-            self.imu_period_s,
-            self.gyro,
-            self.current,
-            self.forecast,
+            vehicle=load_vehicle(self.vehicle),
+            origin=self.origin.params(),
+            p_n=self.north_m,
+            p_e=self.east_m,
+            imu_period_s=self.imu_period_s,
+            gyro=self.gyro,
+            current=self.current,
+            forecast=self.forecast,
         )
 
     def params(self) -> 'NavigationParams':

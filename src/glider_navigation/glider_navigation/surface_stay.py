@@ -1,16 +1,17 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""A stay at the surface: where the vehicle came up, and how it drifts, from its fixes.
+"""A stay at the surface: where the vehicle came up, where it is, and how it drifts, by its fixes.
 
-Least squares for the straight line p + v t with what was believed before as the first knowledge,
-the same for both axes. Fixes count once in `FIX_EVERY_S`: the error of one is that of the next.
-A fix where the vehicle can hardly be is set aside; another one beside it, later, says that the
-vehicle is there after all, and what was believed of the place is forgotten.
+A Kalman filter, the same for both axes: the place goes on with the drift, and the drift wanders as
+tides and wind do. Where the vehicle came up is kept beside the two: the first fixes tell it, and
+what comes hours later does not. Fixes count once in `FIX_EVERY_S`: the error of one is that of the
+next. A fix where the vehicle can hardly be is set aside; another one beside it, later, says that
+the vehicle is there after all, and what was believed of the place is forgotten.
 """
 
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.signals import Vector
 
 #: Time from a fix that counts to the next (s).
@@ -19,6 +20,12 @@ FIX_EVERY_S = 60.0
 LEAST_VARIANCE = 0.25
 #: Before the first fixes: standard deviation of the drift about what is believed (m/s).
 DRIFT_STD = 0.15
+#: The same where the place was believed wrongly, and so is the drift (m/s).
+LOST_DRIFT_STD = 1.5
+#: Growth of the variance of the drift (m^2/s^3): by 0.03 m/s in an hour.
+DRIFT_WANDERS = 3e-7
+#: The drift by the fixes up to so long after the surfacing is that of the surfacing (s).
+EARLY_S = 900.0
 #: Farther from where the vehicle is believed to be than so many standard deviations, and than so
 #: far (m), a fix is set aside.
 FARTHEST_STD, FARTHEST_M = 6.0, 100.0
@@ -26,15 +33,34 @@ FARTHEST_STD, FARTHEST_M = 6.0, 100.0
 CONFIRMED_S, CONFIRMED_M = 10.0, 100.0
 
 
+class Known(NamedTuple):
+    """Covariance of where it came up (c), place now (p) and drift (v) (m^2, m^2/s, m^2/s^2)."""
+
+    cc: float
+    cp: float
+    cv: float
+    pp: float
+    pv: float
+    vv: float
+
+
+class Early(NamedTuple):
+    """The drift soon after the surfacing."""
+
+    drift: Vector  #: (m/s)
+    variance: float  #: (m^2/s^2)
+    t_s: float  #: time of the stay for which that holds
+
+
 class Stay(NamedTuple):
     """What is known of a stay."""
 
     t_s: float  #: since the vehicle came up, or since the start
-    place: Vector  #: where that was (m)
+    came_up: Vector  #: where that was (m)
+    place: Vector  #: where it is now (m)
     drift: Vector  #: (m/s)
-    pp: float  #: covariance of both (m^2, m^2/s, m^2/s^2)
-    pv: float
-    vv: float
+    known: Known
+    early: Early
     fixes: int
     fixed_s: float  #: time of the last fix that counted
     aside: Vector  #: a fix that was set aside (m)
@@ -49,7 +75,20 @@ NO_FIX_ASIDE = -1.0
 def begin(place, variance, drift):
     """Come up at a place (m) that is known with a variance (m^2)."""
     vv = DRIFT_STD * DRIFT_STD
-    return Stay(0.0, place, drift, variance, 0.0, vv, 0, 0.0, Vector(0.0, 0.0), NO_FIX_ASIDE)
+    known = Known(cc=variance, cp=variance, cv=0.0, pp=variance, pv=0.0, vv=vv)
+    early = Early(drift, vv, 0.0)
+    return Stay(
+        t_s=0.0,
+        came_up=place,
+        place=place,
+        drift=drift,
+        known=known,
+        early=early,
+        fixes=0,
+        fixed_s=0.0,
+        aside=Vector(0.0, 0.0),
+        aside_s=NO_FIX_ASIDE,
+    )
 
 
 def launched(place: Vector, variance: float) -> Stay:
@@ -58,19 +97,9 @@ def launched(place: Vector, variance: float) -> Stay:
 
 
 @kernel
-def now(stay):
-    """Where the vehicle is now (m)."""
-    return Vector(
-        stay.place.n + stay.drift.n * stay.t_s,
-        stay.place.e + stay.drift.e * stay.t_s,
-    )
-
-
-@kernel
-def variance_now(stay):
-    """Variance (m^2) of where the vehicle is now."""
-    t = stay.t_s
-    return stay.pp + 2.0 * t * stay.pv + t * t * stay.vv
+def drifted_variance(stay):
+    """Variance (m^2) of the way from where the vehicle came up to where it is."""
+    return stay.known.cc - 2.0 * stay.known.cp + stay.known.pp
 
 
 @kernel
@@ -82,39 +111,47 @@ def counts(stay, fix):
 @kernel
 def wait(stay, dt):
     """Drift for a tick."""
-    return Stay(
-        stay.t_s + dt,
-        stay.place,
-        stay.drift,
-        stay.pp,
-        stay.pv,
-        stay.vv,
-        stay.fixes,
-        stay.fixed_s,
-        stay.aside,
-        stay.aside_s,
+    k = stay.known
+    known = replace(
+        k,
+        cp=k.cp + dt * k.cv,
+        pp=k.pp + dt * (2.0 * k.pv + dt * (k.vv + DRIFT_WANDERS * dt / 3.0)),
+        pv=k.pv + dt * (k.vv + 0.5 * DRIFT_WANDERS * dt),
+        vv=k.vv + DRIFT_WANDERS * dt,
     )
+    place = Vector(stay.place.n + dt * stay.drift.n, stay.place.e + dt * stay.drift.e)
+    return replace(stay, t_s=stay.t_s + dt, place=place, known=known)
 
 
 @kernel
 def take_fix(stay, fix):
     """Take in a fix."""
-    t, here = stay.t_s, now(stay)
-    g_p, g_v = stay.pp + t * stay.pv, stay.pv + t * stay.vv
-    s = g_p + t * g_v + max(LEAST_VARIANCE, fix.variance)
-    k_p, k_v = g_p / s, g_v / s
-    off_n, off_e = fix.p_n - here.n, fix.p_e - here.e
+    k = stay.known
+    s = k.pp + max(LEAST_VARIANCE, fix.variance)
+    k_c, k_p, k_v = k.cp / s, k.pp / s, k.pv / s
+    off_n, off_e = fix.p_n - stay.place.n, fix.p_e - stay.place.e
+    drift = Vector(stay.drift.n + k_v * off_n, stay.drift.e + k_v * off_e)
+    vv, early = k.vv - k_v * k.pv, stay.early
+    if stay.t_s <= EARLY_S or stay.fixes == 0:
+        early = Early(drift, vv, stay.t_s)
     return Stay(
-        t,
-        Vector(stay.place.n + k_p * off_n, stay.place.e + k_p * off_e),
-        Vector(stay.drift.n + k_v * off_n, stay.drift.e + k_v * off_e),
-        stay.pp - k_p * g_p,
-        stay.pv - k_p * g_v,
-        stay.vv - k_v * g_v,
-        stay.fixes + 1,
-        t,
-        stay.aside,
-        NO_FIX_ASIDE,
+        t_s=stay.t_s,
+        came_up=Vector(stay.came_up.n + k_c * off_n, stay.came_up.e + k_c * off_e),
+        place=Vector(stay.place.n + k_p * off_n, stay.place.e + k_p * off_e),
+        drift=drift,
+        known=Known(
+            cc=k.cc - k_c * k.cp,
+            cp=k.cp - k_c * k.pp,
+            cv=k.cv - k_c * k.pv,
+            pp=k.pp - k_p * k.pp,
+            pv=k.pv - k_p * k.pv,
+            vv=vv,
+        ),
+        early=early,
+        fixes=stay.fixes + 1,
+        fixed_s=stay.t_s,
+        aside=stay.aside,
+        aside_s=NO_FIX_ASIDE,
     )
 
 
@@ -125,44 +162,42 @@ def _distance2(fix, n, e):
 
 
 @kernel
-def _set_aside(stay, aside, aside_s):
+def _set_aside(stay, fix):
     """The same stay with a fix that is set aside."""
-    return Stay(
-        stay.t_s,
-        stay.place,
-        stay.drift,
-        stay.pp,
-        stay.pv,
-        stay.vv,
-        stay.fixes,
-        stay.fixed_s,
-        aside,
-        aside_s,
-    )
+    return replace(stay, aside=Vector(fix.p_n, fix.p_e), aside_s=stay.t_s)
 
 
 @kernel
 def _begin_at(stay, fix):
     """The same stay, of whose place nothing is known but this fix."""
-    t, vv = stay.t_s, DRIFT_STD * DRIFT_STD
-    place = Vector(fix.p_n - t * stay.drift.n, fix.p_e - t * stay.drift.e)
-    variance = max(LEAST_VARIANCE, fix.variance) + t * t * vv
+    t, drift, vv = stay.t_s, stay.drift, LOST_DRIFT_STD * LOST_DRIFT_STD
+    variance = max(LEAST_VARIANCE, fix.variance)
+    back = variance + t * t * (vv + DRIFT_WANDERS * t / 3.0)
     return Stay(
-        t, place, stay.drift, variance, -t * vv, vv, stay.fixes + 1, t, stay.aside, NO_FIX_ASIDE
+        t_s=t,
+        came_up=Vector(fix.p_n - t * drift.n, fix.p_e - t * drift.e),
+        place=Vector(fix.p_n, fix.p_e),
+        drift=drift,
+        known=Known(cc=back, cp=variance, cv=-t * vv, pp=variance, pv=0.0, vv=vv),
+        early=Early(drift, vv, t),
+        fixes=stay.fixes + 1,
+        fixed_s=t,
+        aside=stay.aside,
+        aside_s=NO_FIX_ASIDE,
     )
 
 
 @kernel
 def hear_fix(stay, fix):
     """Take in a fix that counts, if the vehicle can be there, or if another one has said so."""
-    here = now(stay)
-    variance = variance_now(stay) + max(LEAST_VARIANCE, fix.variance)
+    here = stay.place
+    variance = stay.known.pp + max(LEAST_VARIANCE, fix.variance)
     farthest2 = max(FARTHEST_M * FARTHEST_M, FARTHEST_STD * FARTHEST_STD * variance)
     if _distance2(fix, here.n, here.e) <= farthest2:
         return take_fix(stay, fix)
     beside = _distance2(fix, stay.aside.n, stay.aside.e) <= CONFIRMED_M * CONFIRMED_M
     if stay.aside_s == NO_FIX_ASIDE or not beside:
-        return _set_aside(stay, Vector(fix.p_n, fix.p_e), stay.t_s)
+        return _set_aside(stay, fix)
     if stay.t_s - stay.aside_s >= CONFIRMED_S:
         return _begin_at(stay, fix)
     return stay

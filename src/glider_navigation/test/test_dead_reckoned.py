@@ -14,7 +14,7 @@ from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation.current_belief import Uncertainty, initial_belief
 from glider_navigation.method import Fix, Heard, method_step
-from glider_navigation.methods.dead_reckoned import Way, place_covariance
+from glider_navigation.methods.dead_reckoned import Drift, Way, place_covariance
 from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
 from glider_navigation.settings import NavigationSettings
 
@@ -262,16 +262,18 @@ def test_covariance_of_a_place_is_that_of_its_errors_drawn_by_lot(tide):
     belief = initial_belief(tide)._replace(
         p=Uncertainty(*(float(P[i, j]) for i in range(3) for j in range(i, 3))),
         q=2e-8,
+        weight=4.0,
         glide=Vector(*before.tolist()),
         way_s=before_s,
     )
     through = Vector(*(t_s * glide).tolist())
-    way = Way(Vector(0.0, 0.0), 900.0, through, Vector(0.0, 0.0), t_s, h[1] * t_s, h[2] * t_s)
+    still = Vector(0.0, 0.0)
+    way = Way(still, 900.0, Drift(still, 1.0), through, still, t_s, h[1] * t_s, h[2] * t_s)
 
     rng, count = np.random.default_rng(8), 400_000
     start = rng.normal(0.0, 30.0, (count, 2))
     sea = np.stack([rng.multivariate_normal(np.zeros(3), P, count) @ h for _ in range(2)], axis=1)
-    sea += rng.normal(0.0, math.sqrt(2e-8 * (t_s + before_s) / 3.0 + 0.0007**2), (count, 2))
+    sea += rng.normal(0.0, math.sqrt(1.25 * 2e-8 * (t_s + before_s) / 3.0 + 0.0007**2), (count, 2))
     share, turn = rng.normal(0.0, 0.05, count), rng.normal(0.0, math.radians(2.0), count)
 
     def flown(velocity):

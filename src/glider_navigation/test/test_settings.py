@@ -85,4 +85,4 @@ def test_settings_become_what_kernels_know():
     assert not params.believes_current
     assert params.speed_variance == pytest.approx(0.01)
     assert tuple(state.place) == tuple(state.stay.place) == (30.0, -40.0)
-    assert state.stay.pp == 49.0
+    assert state.stay.known.pp == 49.0

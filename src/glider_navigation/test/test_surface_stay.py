@@ -1,6 +1,8 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""A stay at the surface against Bayesian linear regression with matrices."""
+"""A stay at the surface against regression over a random walk, with matrices; and under a tide."""
+
+import math
 
 import numpy as np
 import pytest
@@ -9,12 +11,14 @@ from hypothesis import strategies as st
 
 from glider_model.base.signals import Vector
 from glider_navigation.method import Fix
-from glider_navigation.surface_stay import begin, counts, now, take_fix, variance_now, wait
+from glider_navigation.surface_stay import begin, counts, drifted_variance, take_fix, wait
 
-quick = settings(max_examples=50, deadline=None)
+quick = settings(max_examples=50)
 
 #: What is believed of the drift before there is a fix is off by so much (m/s).
 DRIFT_STD = 0.15
+#: Its variance grows by so much (m^2/s^3).
+WANDERS = 3e-7
 metres = st.floats(-5000.0, 5000.0)
 # by rounding, a fix after 60 s sharp may be one too early
 fixes = st.lists(
@@ -22,14 +26,26 @@ fixes = st.lists(
 )
 
 
-def regression(prior, covariance, times, seen, variances):
-    """Posterior mean and covariance of [p, v] in p + v t, in information form."""
-    H = np.stack([np.ones_like(times), times], axis=1)
-    R_inverse = np.diag(1.0 / np.asarray(variances))
-    information = np.linalg.inv(covariance) + H.T @ R_inverse @ H
-    posterior = np.linalg.inv(information)
-    mean = posterior @ (np.linalg.solve(covariance, prior) + H.T @ R_inverse @ seen)
-    return mean, posterior
+def regression(place, drift, variance, times, seen, variances):
+    """Posterior mean and covariance of [p(0), p(t), v(t)] at the last of the times.
+
+    The place is p(0) + v(0) t + the integral of a random walk, all that jointly Gaussian: the
+    covariance of that integral at s and t >= s is q (s^2 t / 2 - s^3 / 6), and that of the walk at
+    t with the integral at s is q s^2 / 2.
+    """
+    at = np.concatenate([[0.0], times])
+    s, t = np.minimum.outer(at, at), np.maximum.outer(at, at)
+    places = variance + DRIFT_STD**2 * s * t + WANDERS * (s**2 * t / 2.0 - s**3 / 6.0)
+    with_v = DRIFT_STD**2 * at + WANDERS * at**2 / 2.0
+    v = DRIFT_STD**2 + WANDERS * at[-1]
+    everything = np.block([[places, with_v[:, None]], [with_v[None, :], np.array([[v]])]])
+    mean = np.concatenate([place + drift * at, [drift]])
+    H = np.eye(len(mean))[1:-1]
+    gain = everything @ H.T @ np.linalg.inv(H @ everything @ H.T + np.diag(variances))
+    mean = mean + gain @ (seen - H @ mean)
+    covariance = everything - gain @ H @ everything
+    wanted = [0, -2, -1]
+    return mean[wanted], covariance[np.ix_(wanted, wanted)]
 
 
 def stay_with(stay, fixes):
@@ -47,30 +63,36 @@ def stay_with(stay, fixes):
 def test_fixes_are_taken_in_as_by_regression(place, variance, drift, fixes):
     stay = stay_with(begin(Vector(*place), variance, Vector(drift, -drift)), fixes)
     after, n, e, variances = np.array(fixes).T
-    times, prior = np.cumsum(after), np.diag([variance, DRIFT_STD**2])
+    times = np.cumsum(after)
     for axis, start, at_first, seen in (('n', drift, place[0], n), ('e', -drift, place[1], e)):
-        mean, covariance = regression([at_first, start], prior, times, seen, variances)
-        there = [getattr(stay.place, axis), getattr(stay.drift, axis)]
-        assert there == pytest.approx(mean, rel=1e-6, abs=1e-5)
-        t = np.array([1.0, times[-1]])
-        assert getattr(now(stay), axis) == pytest.approx(t @ mean, rel=1e-6, abs=1e-4)
-        assert [stay.pp, stay.pv, stay.vv] == pytest.approx(
-            covariance[[0, 0, 1], [0, 1, 1]], rel=1e-6, abs=1e-9
+        mean, covariance = regression(at_first, start, variance, times, seen, variances)
+        there = [getattr(vector, axis) for vector in (stay.came_up, stay.place, stay.drift)]
+        assert there == pytest.approx(mean, rel=1e-5, abs=1e-4)
+        scale = np.sqrt(np.diag(covariance))
+        known = np.array(stay.known)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+        assert known / np.outer(scale, scale) == pytest.approx(
+            covariance / np.outer(scale, scale), abs=1e-5
         )
-        assert variance_now(stay) == pytest.approx(t @ covariance @ t, rel=1e-6)
     assert stay.fixes == len(fixes)
 
 
-def test_with_nothing_known_before_it_is_the_least_squares_line():
-    rng = np.random.default_rng(3)
-    times = np.arange(60.0, 1200.0, 60.0)
-    track = np.outer(times, [0.2, -0.1]) + [300.0, -200.0] + rng.normal(0.0, 5.0, (len(times), 2))
-    stay = begin(Vector(0.0, 0.0), 1e12, Vector(0.1, 0.1))._replace(vv=1e6)
-    stay = stay_with(stay, [(60.0, n, e, 25.0) for n, e in track])
-    for axis, seen in zip('ne', track.T, strict=True):
-        drift, place = np.polyfit(times, seen, 1)
-        assert getattr(stay.drift, axis) == pytest.approx(drift, abs=1e-5)
-        assert getattr(stay.place, axis) == pytest.approx(place, abs=1e-2)
+@pytest.mark.parametrize('hours', [0.25, 2.0, 6.0, 12.0, 24.0])
+def test_where_it_came_up_and_how_it_drifts_hold_in_a_long_stay_under_a_tide(hours):
+    """A tide of 0.25 m/s and fixes of 4 m: what comes later does not bend what was before."""
+    rng = np.random.default_rng(4)
+    rate, amplitude = 2.0 * math.pi / (12.42 * 3600.0), 0.25
+    for phase in np.linspace(0.0, 2.0 * math.pi, 8, endpoint=False):
+        stay = begin(Vector(40.0, -30.0), 60.0**2, Vector(0.0, 0.0))
+        for t in 60.0 * np.arange(1, round(60.0 * hours) + 1):
+            angles = rate * t + phase
+            east = amplitude / rate * (math.sin(angles) - math.sin(phase))
+            seen = np.array([0.1 * t, east]) + rng.normal(0.0, 4.0, 2)
+            stay = take_fix(wait(stay, 60.0), Fix(True, *seen.tolist(), 16.0))
+        assert math.hypot(*stay.came_up) < 15.0
+        assert math.hypot(stay.place.n - 0.1 * t, stay.place.e - east) < 15.0
+        off = stay.drift.n - 0.1, stay.drift.e - amplitude * math.cos(angles)
+        assert math.hypot(*off) < 0.05
+        assert 1.0 < math.sqrt(stay.known.cc) < 8.0
 
 
 @pytest.mark.parametrize('fix_every_s', [1.0, 7.0, 60.0, 150.0])
@@ -93,5 +115,8 @@ def test_without_a_fix_the_place_drifts_and_is_known_less():
     for _ in range(600):
         stay = wait(stay, 1.0)
         assert not counts(stay, Fix(False, 0.0, 0.0, 25.0))
-    assert tuple(now(stay)) == pytest.approx((220.0, 20.0))
-    assert variance_now(stay) == pytest.approx(400.0 + (600.0 * DRIFT_STD) ** 2)
+    assert tuple(stay.place) == pytest.approx((220.0, 20.0))
+    assert tuple(stay.came_up) == (100.0, 200.0)
+    drifted = (600.0 * DRIFT_STD) ** 2 + WANDERS * 600.0**3 / 3.0
+    assert drifted_variance(stay) == pytest.approx(drifted)
+    assert stay.known.pp == pytest.approx(400.0 + drifted)

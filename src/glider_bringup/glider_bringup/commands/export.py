@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from glider_bringup.console import Run, beside, counter, messages, output
+from glider_bringup.console import Json, Run, beside, counter, messages, print_written
 
 app = typer.Typer()
 Kind = Enum('Kind', {text: text for text in ('netcdf', 'csv', 'mat')})
@@ -28,17 +28,18 @@ def export(
         Path | None,
         typer.Option(metavar='FILE', help='Default: run.nc, run.csv or run.mat beside the bag.'),
     ] = None,
+    as_json: Json = False,
 ) -> None:
     """Write every number of a run's bag into one file, with names and units.
 
     World NED, body FRD, SI and radians, whatever the topics carry; docs/python.md has the names.
     """
-    from glider_bringup.door.export import SUFFIXES, WRITERS
+    from glider_bringup.door.export import SUFFIXES, WRITERS, dataset_of
     from glider_bringup.door.run import open_run
 
     file = out or beside(run, f'run{SUFFIXES[to.value]}')
     with messages.status('reading the bag'):
-        dataset = open_run(run).to_xarray()
+        dataset = dataset_of(open_run(run))
     with counter('writing', dataset.sizes['time']) as update:
         WRITERS[to.value](dataset, file, update)
-    output.print(f'written: {file}', soft_wrap=True)
+    print_written('written', run, file, as_json)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from glider_bringup.console import Run, beside, counter, output
+from glider_bringup.console import Json, Run, beside, counter, print_written
 
 app = typer.Typer()
 
@@ -19,6 +19,7 @@ def figure(
         Path | None,
         typer.Option(help='Image file: png, svg or pdf. Default: run.png beside the bag.'),
     ] = None,
+    as_json: Json = False,
 ) -> None:
     """Draw a run: track, depth, errors, attitude, current and actuators."""
     from glider_bringup.showing.flown_run import draw
@@ -26,4 +27,4 @@ def figure(
     file = out or beside(run, 'run.png')
     with counter('reading the bag', None) as update:
         draw(run, file, update)
-    output.print(f'drawn: {file}', soft_wrap=True)
+    print_written('drawn', run, file, as_json)

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from glider_bringup.console import Run, beside, counter, messages, output
+from glider_bringup.console import Json, Run, beside, counter, messages, print_written
+from glider_bringup.showing.scorecard import print_status
 
 app = typer.Typer()
 
@@ -20,6 +21,7 @@ def report(
     out: Annotated[
         Path | None, typer.Option(metavar='FILE', help='Default: report.html beside the bag.')
     ] = None,
+    as_json: Json = False,
 ) -> None:
     """Write the report of a run again: one HTML file that needs no network."""
     from glider_bringup.mission.run_folder import REPORT_FILE
@@ -30,6 +32,7 @@ def report(
         flown = read_run(run, update)
     with messages.status('writing the report'):
         write_report(flown, file)
-    output.print(f'report: {file}', soft_wrap=True)
+    print_status(flown.card)
+    print_written('report', run, file, as_json)
     if show and not webbrowser.open(file.resolve().as_uri()):
         messages.print(f'no browser found; open {file} in one', style='red', soft_wrap=True)

@@ -16,6 +16,7 @@ from glider_bringup.console import (
     Json,
     changed_fields,
     choices,
+    compiling,
     messages,
     number,
     progress,
@@ -28,9 +29,10 @@ from glider_bringup.mission.scenario import (
     Scenario,
     load_scenario,
 )
-from glider_bringup.showing.scorecard import print_card, print_places
+from glider_bringup.scoring.card import STOPPED
+from glider_bringup.showing.scorecard import STYLES, print_card, print_places
 from glider_guidance.settings import LosSettings
-from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_SURFACED
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_S
 from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
@@ -41,6 +43,7 @@ When = Literal['never', 'end', 'chunk']
 Guidance = choices(LosSettings, 'method')
 
 
+# long: its options stand where it begins, each with its help.
 @app.command(epilog='Example: ./glider run current_8deg --engine direct --duration full --json')
 def run(
     scenario: Annotated[
@@ -49,7 +52,7 @@ def run(
     engine: Annotated[
         Engine,
         typer.Option(
-            help='nodes: ROS 2 processes over topics; direct: one compiled loop. Same results.'
+            help='nodes: six ROS 2 nodes over topics; direct: one compiled loop. Same results.'
         ),
     ] = 'nodes',
     controller: Annotated[
@@ -94,6 +97,14 @@ def run(
         bool,
         typer.Option('--report/--no-report', help='Write report.html, and what it is drawn from.'),
     ] = True,
+    processes: Annotated[
+        bool,
+        typer.Option(
+            '--processes',
+            help='A process for each node, as launch files have them, instead of one for all but '
+            'the recorder (nodes only).',
+        ),
+    ] = False,
     view: Annotated[
         bool, typer.Option('--view', help='Show the flight live in Foxglove (nodes only).')
     ] = False,
@@ -102,17 +113,21 @@ def run(
     ] = 8765,
     as_json: Json = False,
 ) -> None:
-    """Fly a scenario; record it, write its report and print the scorecard."""
+    """Fly a scenario; record it, write its report and print the scorecard.
+
+    Exit code 0: completed or infeasible. 3: surfaced, the guard ended the mission. 1: the vehicle
+    is lost, or the run failed. 2: what was asked for cannot be done. 130: interrupted.
+    """
     from glider_bringup.mission.run_folder import REPORT_FILE
 
     if duration not in (None, 'full'):
         duration = number('--duration', duration, 'full', TICK_S, 1e8)
     fields = chosen_fields(changed_fields(changes), controller, guidance, seed, duration)
-    rate, place = _checked(engine, speed, namespace, view)
+    rate, place = _checked(engine, speed, namespace, view, processes)
     flown = load_scenario(scenario, fields)
     with _view(view_port, place) if view else nullcontext() as begin_view:
         card, folder, has_room = _fly(
-            flown, engine, rate, place, out, bag, sync, report, begin_view
+            flown, engine, rate, place, out, bag, sync, report, begin_view, processes
         )
     page = folder / REPORT_FILE
     if as_json:
@@ -124,7 +139,7 @@ def run(
 
 
 def _checked(
-    engine: Engine, speed: str, namespace: str | None, view: bool
+    engine: Engine, speed: str, namespace: str | None, view: bool, processes: bool
 ) -> tuple[float, str | None]:
     """Speed (0.0: max) and absolute namespace of a flight, if its engine knows what is asked.
 
@@ -140,6 +155,8 @@ def _checked(
     if namespace and (place is None or engine == 'direct'):
         allowed = 'nothing, with the direct engine' if place else NAMESPACE_ALLOWED
         raise ConfigurationError(f'--namespace {namespace}: not usable (allowed: {allowed})')
+    if processes and engine == 'direct':
+        raise ConfigurationError('--processes: the direct engine has no nodes')
     if view and engine == 'direct':
         raise ConfigurationError('--view: the direct engine has no topics to show; use nodes')
     if engine == 'nodes':
@@ -149,9 +166,11 @@ def _checked(
 
 def _exit_code(card: dict, has_room: bool) -> int:
     """Exit code of a flight; its score is there, whatever became of it."""
-    if card['status'] in ('aborted', 'failed'):
+    if card['status'] in STOPPED:
         return EXIT_INTERRUPTED if card['reason'].startswith('stopped by') else EXIT_FAILED
-    return 0 if has_room else EXIT_FAILED
+    if card['status'] == 'lost' or not has_room:
+        return EXIT_FAILED
+    return EXIT_SURFACED if card['status'] == 'surfaced' else 0
 
 
 @contextmanager
@@ -178,10 +197,11 @@ def _fly(
     sync: str,
     report: bool,
     begin_view: Callable[[], None] | None,
+    processes: bool,
 ) -> tuple[dict, Path, bool]:
     """Fly and score a scenario with a progress bar.
 
-    Returns the scorecard, the run folder, and whether the disk had room for the report.
+    Returns the scorecard, the run folder, and whether the disk had room for score and report.
     """
     from glider_bringup.engines.compiling import told
     from glider_bringup.engines.flight import fly
@@ -195,12 +215,12 @@ def _fly(
         from glider_bringup.engines.recorded import fly_nodes, fly_recorded
 
     folder = make_run_folder(scenario, out)
-    messages.print(f'{scenario.name}: {scenario.description}')
+    messages.print(f'{scenario.name}: {scenario.described}')
     scorer, tracer = make_scorer(scenario), make_tracer(scenario) if report else None
     takers = [scorer, tracer] if tracer else [scorer]
     with (
         progress(planned_ticks(scenario)) as (flying, reading),
-        told(combination_of(scenario), tell) if engine == 'direct' else nullcontext(),
+        told(combination_of(scenario), compiling) if engine == 'direct' else nullcontext(),
     ):
         if engine == 'nodes':
             if begin_view:
@@ -215,16 +235,24 @@ def _fly(
                 on_log=tell,
                 on_read=reading,
                 sync=sync,
+                layout='processes' if processes else 'together',
             )
         elif bag:
             flight = fly_recorded(scenario, folder, takers, flying, sync)
         else:
             flight = fly(scenario, takers, flying)
     card = scorecard(scenario, engine, flight, scores_of(scenario, scorer))
-    write_score(folder, card)
-    has_room = _write_report(scenario, folder, card, tracer) if tracer else True
+    has_room = True
+    try:
+        write_score(folder, card)
+    except ConfigurationError as error:  # what was flown is told all the same
+        messages.print(f'no score: {error}', style='red', soft_wrap=True)
+        has_room = False
+    if tracer and has_room:
+        has_room = _write_report(scenario, folder, card, tracer)
     if card['reason']:
-        messages.print(f'{card["status"]}: {card["reason"]}', style='red', soft_wrap=True)
+        text = f'{card["status"]}: {card["reason"]}'
+        messages.print(text, style=STYLES[card['status']], soft_wrap=True)
     return card, folder, has_room
 
 

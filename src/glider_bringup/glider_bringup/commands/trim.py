@@ -12,7 +12,7 @@ from rich.table import Table
 
 from glider_bringup.console import Json, changed_fields, messages, output
 from glider_bringup.mission.scenario import split_changes
-from glider_model.base.exits import EXIT_FAILED
+from glider_model.base.errors import EXIT_FAILED
 from glider_model.base.settings import ConfigurationError
 from glider_model.plant.trim import Trim, solve_trim
 from glider_model.vehicle.coefficients import LIFT_AND_DRAG

@@ -6,14 +6,13 @@ Topics are ENU and FLU; here everything is NED (world) and FRD (body), as in the
 books on marine craft, SI and radians. `glider_model.base.frames` turns one into the other.
 """
 
-import json
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
+from xarray.plot.accessor import DataArrayPlotAccessor
 
 from glider_bringup.blocks import COLUMNS
-from glider_bringup.mission.run_folder import VEHICLE_FILE
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.true_motion import wire_of
 from glider_control.block import CONTROL
@@ -40,7 +39,7 @@ from glider_model.base.frames import (
 from glider_model.base.kernel import kernel, source_digest
 from glider_model.base.signals import TICK_NS, Adaptation
 from glider_model.base.wiring import NO_ECHO
-from glider_model.vehicle.file import steers_by, vehicle_file
+from glider_model.vehicle.file import steers_by
 
 NED, FRD, PATH = 'NED', 'FRD', 'path'
 _AXES = ('north', 'east', 'down')
@@ -83,6 +82,8 @@ class _Variable(NamedTuple):
     @property
     def attributes(self) -> dict[str, str]:
         attributes = {'units': self.unit, 'long_name': self.text, 'topic': self.topic}
+        if self.quantity == 'depth':
+            attributes['positive'] = 'down'
         return attributes | ({'frame': self.frame} if self.frame else {})
 
 
@@ -362,6 +363,44 @@ def _flags(log: np.ndarray) -> dict[str, tuple]:
     }
 
 
+class _Plot(DataArrayPlotAccessor):
+    """xarray's plots, with what is positive downward drawn so."""
+
+    def __call__(self, **choices):
+        return super().__call__(**self._downward(choices))
+
+    def line(self, *places, **choices):
+        return super().line(*places, **self._downward(choices))
+
+    def step(self, *places, **choices):
+        return super().step(*places, **self._downward(choices))
+
+    def _downward(self, choices: dict[str, Any]) -> dict[str, Any]:
+        """Choices of a plot over time. Only of our variables: they name their topic."""
+        about = self._da.attrs
+        is_down = about.get('positive') == 'down' and 'topic' in about and self._da.ndim == 1
+        return {'yincrease': False, **choices} if is_down and 'y' not in choices else choices
+
+
+# xarray looks at `positive` (CF) nowhere, so that depth would be drawn upward
+xarray.DataArray.plot = property(_Plot)
+
+
+def _variables(log: np.ndarray, scenario: Scenario) -> dict[str, tuple]:
+    """Every variable: dimension, values, attributes."""
+    return {
+        **_numbers(log, steers_by(scenario)),
+        **_beside(log, scenario),
+        **_flags(log),
+    }
+
+
+def numbers_of(row: np.ndarray, scenario: Scenario) -> dict[str, Any]:
+    """Numbers of one tick, float64[ROW] as on the wire, by the names that a Dataset has."""
+    variables = _variables(row[None, :], scenario)
+    return {name: values[0].item() for name, (_, values, *_) in variables.items()}
+
+
 def make_dataset(log: np.ndarray, scenario: Scenario, score: dict[str, Any]) -> xarray.Dataset:
     """Dataset of a run.
 
@@ -383,23 +422,16 @@ def make_dataset(log: np.ndarray, scenario: Scenario, score: dict[str, Any]) -> 
     time_s = np.arange(len(log)) * TICK_NS / 1e9
     about = ('scenario', 'vehicle', 'controller', 'guidance', 'seed', 'status')
     return xarray.Dataset(
-        {
-            **_numbers(log, steers_by(scenario)),
-            **_beside(log, scenario),
-            **_flags(log),
-        },
+        _variables(log, scenario),
         coords={
             'time': ('time', time_s, {'units': 's', 'long_name': 'simulated time of the tick'})
         },
         attrs={
             'Conventions': 'CF-1.8',
-            'title': scenario.description or scenario.name,
+            'title': scenario.described or scenario.name,
             'source': 'glider stack',
             'frames': 'world NED, body FRD, SI and radians; path: along, to starboard, below',
             **{name: score[name] for name in about},
-            'score_json': json.dumps(score),
-            'scenario_yaml': scenario.to_yaml(vehicle=VEHICLE_FILE),  # as in a run folder
-            'vehicle_yaml': vehicle_file(scenario.vehicle).decode(),
             'code_digest': source_digest(),
         },
     )

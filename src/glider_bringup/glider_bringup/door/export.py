@@ -2,14 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run's dataset as a file of another world: NetCDF, CSV, MATLAB."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
 import xarray
 from scipy.io import savemat
 
+from glider_bringup.door.run import Run
 from glider_bringup.mission.disk import whole_file
+from glider_bringup.mission.run_folder import VEHICLE_FILE
 from glider_bringup.studies.sweep.netcdf import write_dataset
+from glider_model.vehicle.file import vehicle_file
 
 #: Rows of a CSV file that are written at once: an hour.
 _ROWS = 36_000
@@ -18,6 +22,15 @@ SUFFIXES = {'netcdf': '.nc', 'csv': '.csv', 'mat': '.mat'}
 
 #: Called with the rows that are written.
 Progress = Callable[[int], None]
+
+
+def dataset_of(run: Run) -> xarray.Dataset:
+    """Dataset of a run, with its score, scenario and vehicle as they stand in a run folder."""
+    return run.to_xarray().assign_attrs(
+        score_json=json.dumps(run.score),
+        scenario_yaml=run.scenario.to_yaml(vehicle=VEHICLE_FILE),
+        vehicle_yaml=vehicle_file(run.scenario.vehicle).decode(),
+    )
 
 
 def write_netcdf(dataset: xarray.Dataset, file: Path, progress: Progress) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.compiling import told
-from glider_bringup.engines.flight import Flight
+from glider_bringup.engines.flight import Outcome
 from glider_bringup.engines.flight import fly as fly_direct
 from glider_bringup.mission.choices import ENGINES, chosen_fields, combination_of
 from glider_bringup.mission.planned import planned_ticks
@@ -29,6 +29,7 @@ from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
     ScenarioSource,
+    know_law,
     load_scenario,
     make_scenario,
 )
@@ -37,6 +38,8 @@ from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.scoring.traces import make_tracer
+from glider_control.law import LawSettings
+from glider_control.own_law import own_law
 from glider_model.base.files import parse_yaml
 from glider_model.base.settings import ConfigurationError
 from glider_model.base.signals import TICK_S
@@ -154,11 +157,34 @@ def _scenario(scenario: str | Path | Scenario, fields: dict[str, Any]) -> Scenar
     return make_scenario(ScenarioSource(Path(scenario.name), values), fields)
 
 
+def chosen_scenario(
+    scenario: str | Path | Scenario,
+    fields: Mapping[str, Any],
+    controller: str | None,
+    law: type[LawSettings] | Callable | None,
+    guidance: str | None,
+    seed: int | None,
+    duration: float | str | None,
+) -> Scenario:
+    """The scenario that the arguments of `fly` ask for."""
+    from glider_bringup.console import number
+
+    if duration not in (None, 'full'):
+        duration = number('--duration', str(duration), 'full', TICK_S, 1e8)
+    if law is not None and controller is not None:
+        raise ConfigurationError(f'--controller {controller}: not with a law of your own')
+    if law is not None:
+        controller = know_law(own_law(law))
+    return _scenario(scenario, chosen_fields(fields, controller, guidance, seed, duration))
+
+
+# long: most of it says what its parameters are.
 def fly(
     scenario: str | Path | Scenario = DEFAULT_SCENARIO,
     set: Mapping[str, Any] | None = None,
     *,
     controller: str | None = None,
+    law: type[LawSettings] | Callable | None = None,
     guidance: str | None = None,
     seed: int | None = None,
     duration: float | str | None = None,
@@ -179,6 +205,11 @@ def fly(
         Scenario fields to change, by dotted name, such as ``{'current.speed_kn': 0.8}``.
     controller, guidance, seed : optional
         Attitude law, line of sight and seed instead of those of the scenario.
+    law : type or callable, optional
+        A control law of your own program or notebook, called by its name: a subclass of
+        `glider_control.law.LawSettings`, or a function of what a law sees that returns the roll
+        and the pitch moment (N m). Direct engine only. Who verifies or scores the recording needs
+        the law, too.
     duration : float or 'full', optional
         Simulated time (s), or that of the whole scenario. By default its dives.
     engine : str
@@ -196,18 +227,20 @@ def fly(
     ConfigurationError
         Naming field, value and allowed range.
     """
-    from glider_bringup.console import number, tell
+    from glider_bringup.console import compiling
     from glider_bringup.console import progress as bar
 
-    if duration not in (None, 'full'):
-        duration = number('--duration', str(duration), 'full', TICK_S, 1e8)
     if engine not in ENGINES:
         raise ConfigurationError(f'--engine {engine}: unknown (allowed: {", ".join(ENGINES)})')
     if bag and out is None:
         raise ConfigurationError('--bag: a bag needs a run folder (allowed: with --out)')
+    if law is not None and engine != 'direct':
+        raise ConfigurationError(
+            f'--engine {engine}: its processes have no law of your program (allowed: direct)'
+        )
     if engine == 'nodes':
         given_domain()
-    flown = _scenario(scenario, chosen_fields(set or {}, controller, guidance, seed, duration))
+    flown = chosen_scenario(scenario, set or {}, controller, law, guidance, seed, duration)
     kept = out is not None
     scorer, rows, tracer = make_scorer(flown), Rows(), make_tracer(flown)
     in_bag = kept and (bag or engine == 'nodes')
@@ -215,7 +248,7 @@ def fly(
     with (
         _run_folder(flown, out, engine) as folder,
         bar(planned_ticks(flown)) if progress else nullcontext((None, None)) as shown,
-        told(combination_of(flown), tell) if engine == 'direct' else nullcontext(),
+        told(combination_of(flown), compiling) if engine == 'direct' else nullcontext(),
     ):
         flight = _fly(flown, takers, engine, folder, bag, *shown)
         card = scorecard(flown, engine, flight, scores_of(flown, scorer))
@@ -246,7 +279,7 @@ def _fly(
     bag: bool,
     flying: Callable[[int, float], None] | None,
     reading: Callable[[int], None] | None,
-) -> Flight:
+) -> Outcome:
     """Fly with the engine of this name, into the folder if there is a bag."""
     if engine == 'direct' and not bag:
         return fly_direct(scenario, takers, flying)
@@ -285,11 +318,6 @@ def open_run(path: str | Path) -> Run:
 
 def _rows_of(path: Path, vehicle: str) -> np.ndarray:
     """Rows of the bag of a run, float64[ticks, ROW]."""
-    if not has_bag(path):
-        raise ConfigurationError(
-            f'{path}: what was flown is not in it, it has no bag (allowed: a run over nodes, or a '
-            f'direct one with --bag)'
-        )
     from glider_bringup.recording.read_back import read_back
 
     rows = Rows()

@@ -20,8 +20,8 @@ from glider_model.vehicle.file import load_vehicle, vehicle_path
 
 #: Depth of a profile that is compiled and not flown, if the vehicle is rated for it (m).
 DEPTH_M = 100.0
-#: Gets one line for a person.
-Tell = Callable[[str], None]
+#: Gets one line for a person; may return what is to be called when that is over.
+Tell = Callable[[str], Callable[[], None] | None]
 
 
 def told(combination: Combination, tell: Tell) -> AbstractContextManager[None]:
@@ -54,8 +54,10 @@ def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
                 'faults': [{'kind': 'gps_silent'}] if one.breaks else [],
             }
             if one.steered:
+                vehicle = load_vehicle(one.steered)
                 changes['vehicle'] = one.steered
-                changes['profile.depth_m'] = min(DEPTH_M, load_vehicle(one.steered).rated_depth_m)
+                changes['profile.depth_m'] = min(DEPTH_M, vehicle.rated_depth_m)
+                changes['profile.net_heaviness_kg'] = 0.5 * vehicle.params().m_b_max
             state, params = mission_of(load_scenario(changes=changes))
             with told(one, tell):
                 fly(state, params, nothing, TICK_S)

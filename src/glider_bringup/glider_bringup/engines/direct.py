@@ -6,10 +6,11 @@ What a message would do to the numbers (NED to ENU and back, through a quaternio
 too, so that a run over topics and a direct run of one scenario agree to the last bit.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numba.typed import List
 
 from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_control.block import control_tick
@@ -20,19 +21,14 @@ from glider_guidance.block import guidance_tick
 from glider_guidance.guidance import GuidanceParams, GuidanceState
 from glider_model.base.block import put
 from glider_model.base.frames import odometry_from_wire, water_to_wire
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.signals import TICK_S, Joints
-from glider_model.base.wiring import FIELDS, PLANT, publisher
+from glider_model.base.wiring import FIELDS, publisher
 from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
-from glider_model.plant.block import plant_move, plant_outputs
+from glider_model.plant.block import Measured, plant_move, plant_outputs
 from glider_model.plant.plant import PlantParams, PlantState, not_finite, state_fault
 from glider_navigation.block import navigation_tick
 from glider_navigation.settings import NavigationParams
-
-#: Places among what the plant measures, which does not include /clock.
-PRESSURE, ALTITUDE, HEALTH, BATTERY = (
-    PLANT.outputs.index(topic) - 1 for topic in ('pressure', 'altitude', 'health', 'battery')
-)
 
 
 class NotFiniteError(Exception):
@@ -85,11 +81,14 @@ def fly(state, params, log, dt):
         Whether the mission has ended.
     """
     plant, current, navigation, guidance, control, guard = state
+    rows, finished = 0, False
     for row in range(log.shape[0]):
         t_s = plant.tick * dt
-        measured, finished = plant_outputs(plant, params.plant)
-        joints, sensors = measured[-1], measured[1:-3]
-        place = odometry_from_wire(measured[0])
+        numbers, finished = plant_outputs(plant, params.plant)
+        measured = Measured(*numbers)
+        joints, pressure = measured.joint_states, measured.pressure
+        sensors = (measured.measured_odom, measured.imu, pressure, measured.fix, measured.altitude)
+        place = odometry_from_wire(measured.ground_truth_odom)
         position = (place.p_n, place.p_e, place.p_d)
         current, velocity = current_step_in_place(current, position, t_s, params.current, dt)
         water = water_to_wire(velocity)
@@ -100,21 +99,66 @@ def fly(state, params, log, dt):
         guidance, guided, stage = guidance_tick(guidance, t_s, (odom,), params.guidance, dt)
         seen = (guided[0], odom, joints)
         control, controlled, limits = control_tick(control, t_s, seen, params.control, dt)
-        well, power = measured[HEALTH], measured[BATTERY]
-        pressure, altitude = measured[PRESSURE], measured[ALTITUDE]
-        seen = (controlled[0], guided[0], odom, joints, well, power, pressure, altitude)
-        guard, guarded, told = guard_tick(guard, t_s, seen, params.guard, dt)
+        condition = (measured.health, measured.battery, pressure, measured.altitude)
+        heard = (controlled[0], guided[0], odom, joints, *condition)
+        guard, guarded, told = guard_tick(guard, t_s, heard, params.guard, dt)
         plant = plant_move(plant, (guarded[0], water, guarded[1]), params.plant, dt)
         said = (phase, stage, limits, told)
-        put(log, row, 0, (*measured, water, *believed, *guided, *controlled, *guarded, *said))
+        put(log, row, 0, (*numbers, water, *believed, *guided, *controlled, *guarded, *said))
+        rows = row + 1
         if finished:
-            state = MissionState(plant, current, navigation, guidance, control, guard)
-            return state, row + 1, True
-    state = MissionState(plant, current, navigation, guidance, control, guard)
-    return state, log.shape[0], False
+            break
+    state = MissionState(
+        plant=plant,
+        current=current,
+        navigation=navigation,
+        guidance=guidance,
+        control=control,
+        guard=guard,
+    )
+    return state, rows, finished
 
 
-def _finite_rows(log: np.ndarray) -> int:
+@kernel
+def hold(state, params):
+    """State and parameters where compiled code finds them: a list of one each.
+
+    To hand a state to Python and back costs many times what the tick itself does.
+    """
+    held, with_params = List(), List()
+    held.append(apart(state))
+    with_params.append(params)
+    return held, with_params
+
+
+@kernel
+def apart(state):
+    """The same state, which a flight of the other one does not change."""
+    current = CurrentState(state.current.tick, state.current.values.copy())
+    return replace(state, current=current)
+
+
+@kernel
+def fly_held(held, params, log, dt):
+    """Fly on what is held, as `fly` does; rows filled, and whether the mission has ended."""
+    state, rows, finished = fly(held[0], params[0], log, dt)
+    held[0] = state
+    return rows, finished
+
+
+@kernel
+def held_state(held):
+    """What is held: a state of one's own."""
+    return apart(held[0])
+
+
+@kernel
+def set_held(held, state):
+    """Hold another state."""
+    held[0] = apart(state)
+
+
+def finite_rows(log: np.ndarray) -> int:
     """Number of rows before the first one with a number that is not finite."""
     if np.isfinite(log.sum()):
         return len(log)
@@ -122,7 +166,7 @@ def _finite_rows(log: np.ndarray) -> int:
     return int(wrong[0]) if len(wrong) else len(log)
 
 
-def _fault(row: np.ndarray, tick: int) -> str:
+def fault_of(row: np.ndarray, tick: int) -> str:
     """What of a log row is not finite, in words; the first in the order of the blocks."""
     odometry = odometry_from_wire(tuple(row[COLUMNS['ground_truth/odom']]))
     fault = state_fault(odometry, Joints(*row[COLUMNS['joint_states']]), tick)
@@ -131,8 +175,8 @@ def _fault(row: np.ndarray, tick: int) -> str:
     return fault or next(not_finite(f'{publisher(name).name}: {name}', tick) for name in wrong)
 
 
-def fly_blocks(state: MissionState, params: MissionParams) -> Iterator[np.ndarray]:
-    """Fly a mission block by block.
+def blocks_of(advance: Callable[[np.ndarray], tuple[int, bool]]) -> Iterator[np.ndarray]:
+    """Fly block by block; ``advance`` fills rows of a log, and says how many, and if it is over.
 
     Yields
     ------
@@ -145,14 +189,25 @@ def fly_blocks(state: MissionState, params: MissionParams) -> Iterator[np.ndarra
         After the last tick of which every number is finite.
     """
     log = np.empty((BLOCK_TICKS, ROW))
-    current = CurrentState(state.current.tick, state.current.values.copy())
-    state = state._replace(current=current)
     finished, ticks = False, 0
     while not finished:
-        state, rows, finished = fly(state, params, log, TICK_S)
-        good = _finite_rows(log[:rows])
+        rows, finished = advance(log)
+        good = finite_rows(log[:rows])
         if good:
             yield log[:good]
         if good < rows:
-            raise NotFiniteError(_fault(log[good], ticks + good))
+            raise NotFiniteError(fault_of(log[good], ticks + good))
         ticks += rows
+
+
+def fly_blocks(state: MissionState, params: MissionParams) -> Iterator[np.ndarray]:
+    """Fly a mission block by block; see `blocks_of`. No orders are followed."""
+    current = CurrentState(state.current.tick, state.current.values.copy())
+    state = state._replace(current=current)
+
+    def advance(log: np.ndarray) -> tuple[int, bool]:
+        nonlocal state
+        state, rows, finished = fly(state, params, log, TICK_S)
+        return rows, finished
+
+    return blocks_of(advance)

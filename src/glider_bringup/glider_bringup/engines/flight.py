@@ -8,16 +8,42 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from glider_bringup.engines.direct import MissionParams, MissionState, NotFiniteError, fly_blocks
+from glider_bringup.blocks import COLUMNS, ROW
+from glider_bringup.engines.direct import (
+    MissionParams,
+    MissionState,
+    NotFiniteError,
+    blocks_of,
+    fly_blocks,
+    fly_held,
+    held_state,
+    hold,
+    set_held,
+)
 from glider_bringup.engines.interrupts import interrupts_noted
+from glider_bringup.mission.disk import VANISHED, DiskError
 from glider_bringup.mission.scenario import Scenario
+from glider_guidance.guidance import guidance_abort
+from glider_guidance.order import Order
+from glider_guidance.orders import (
+    changed,
+    check_orders,
+    due,
+    is_surfaced,
+    ticks_alone,
+    wait_for_surface,
+)
+from glider_guidance.settings import GuidanceSettings
 from glider_model.base.settings import ConfigurationError
+from glider_model.base.signals import NOT_FINITE, TICK_S
+
+_STAGE = COLUMNS['stage']
 
 #: Called now and then with the ticks flown and the depth (m).
 Progress = Callable[[int, float], None]
 
 
-class Flight(NamedTuple):
+class Outcome(NamedTuple):
     """How a flight ended, apart from what its topics tell."""
 
     status: str  #: completed, aborted, or failed: a number was not finite
@@ -41,7 +67,123 @@ def mission_of(scenario: Scenario) -> tuple[MissionState, MissionParams]:
     return state, MissionParams(*(block.params() for block in blocks))
 
 
-def _refuse_message_faults(scenario: Scenario) -> None:
+class Kept(NamedTuple):
+    """A mission between two ticks; a value, which can be pickled."""
+
+    mission: MissionState
+    tick: int  #: ticks flown
+    stage: int  #: of guidance, at the last one; -1: there was none
+    settings: GuidanceSettings  #: by the orders that hold
+    has_held: bool  #: by one of them: from then on it ends by its time alone
+    waiting: tuple[Order, ...]  #: those to come
+
+
+class Held:
+    """A mission between two ticks, where compiled code finds it, and the orders that it follows.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    mission : tuple, optional
+        State and parameters to fly with, if they are not `mission_of` the scenario.
+    """
+
+    def __init__(
+        self, scenario: Scenario, mission: tuple[MissionState, MissionParams] | None = None
+    ) -> None:
+        state, self._params = mission or mission_of(scenario)
+        self._held, self._with_params = hold(state, self._params)
+        self.tick, self._stage = 0, -1
+        self._settings, self._has_held = scenario.guidance_settings(), False
+        self._waiting = tuple(scenario.orders)
+        fly_held(self._held, self._with_params, np.empty((0, ROW)), TICK_S)
+
+    def keep(self) -> Kept:
+        """All that it is at this moment."""
+        return Kept(
+            mission=held_state(self._held),
+            tick=self.tick,
+            stage=self._stage,
+            settings=self._settings,
+            has_held=self._has_held,
+            waiting=self._waiting,
+        )
+
+    def restore(self, kept: Kept) -> None:
+        """Go on from there."""
+        set_held(self._held, kept.mission)
+        self.tick, self._stage, self._waiting = kept.tick, kept.stage, kept.waiting
+        self._tell(kept.settings, kept.has_held)
+
+    def order(self, order: Order) -> None:
+        """Take an order in.
+
+        Raises
+        ------
+        ConfigurationError
+            If it makes no sense, now or with those to come.
+        """
+        if held_state(self._held).guidance.profile.aborted:
+            raise ConfigurationError('the mission is aborted (allowed: nothing more)')
+        waiting = (*self._waiting, order)
+        check_orders(self._settings, waiting, '')
+        self._waiting = waiting
+
+    def fly(self, log: np.ndarray) -> tuple[int, bool]:
+        """Fill a log, float64[n, ROW]; rows filled, and whether the mission has ended."""
+        filled, is_over = 0, False
+        while filled < len(log) and not is_over:
+            for order in due(self._waiting, self.tick, self._stage):
+                self._follow(order)
+            ticks = int(min(len(log) - filled, ticks_alone(self._waiting, self.tick)))
+            flown, is_over = self._until_surface(log[filled : filled + ticks])
+            filled += flown
+            self.tick += flown
+            self._stage = int(log[filled - 1, _STAGE])
+        return filled, is_over
+
+    def _until_surface(self, log: np.ndarray) -> tuple[int, bool]:
+        """Fill a log, but not beyond where an order waits for the surface."""
+        waits = wait_for_surface(self._waiting, self.tick)
+        before = held_state(self._held) if waits else None
+        rows, is_over = fly_held(self._held, self._with_params, log, TICK_S)
+        up = np.flatnonzero(is_surfaced(log[:rows, _STAGE])) if waits else ()
+        if len(up) and up[0] + 1 < rows:  # again, and no further
+            set_held(self._held, before)
+            rows, is_over = fly_held(self._held, self._with_params, log[: up[0] + 1], TICK_S)
+        return rows, is_over
+
+    def _follow(self, order: Order) -> None:
+        """Do what an order says."""
+        self._waiting = tuple(one for one in self._waiting if one is not order)
+        if order.abort:
+            self._waiting = ()
+            state = held_state(self._held)
+            set_held(self._held, state._replace(guidance=guidance_abort(state.guidance)))
+            return
+        self._tell(changed(self._settings, order), self._has_held or order.hold)
+
+    def _tell(self, settings: GuidanceSettings, has_held: bool) -> None:
+        """Fly on with other settings of guidance."""
+        if (settings, has_held) == (self._settings, self._has_held):
+            return
+        self._settings, self._has_held = settings, has_held
+        params = self._params._replace(guidance=settings.params())
+        if has_held:
+            plant = params.plant._replace(stop_after_dives=0, stop_afloat_ticks=0)
+            params = params._replace(plant=plant)
+        self._with_params[0] = params
+
+
+def ended(complete: bool, reason: str) -> str:
+    """Status of a flight that was complete, or ended early for a reason."""
+    if complete:
+        return 'completed'
+    return 'failed' if NOT_FINITE in reason or VANISHED in reason else 'aborted'
+
+
+def refuse_message_faults(scenario: Scenario) -> None:
+    """Refuse a scenario in which messages go wrong: there are none."""
     for fault in scenario.message_faults:
         raise ConfigurationError(
             f"faults.{scenario.faults.index(fault)}.kind = '{fault.kind}': the direct engine has "
@@ -54,10 +196,11 @@ def fly(
     takers: Iterable[Taker] = (),
     progress: Progress | None = None,
     mission: tuple[MissionState, MissionParams] | None = None,
-) -> Flight:
+) -> Outcome:
     """Fly with the direct engine; Ctrl-C ends it as aborted with what was flown.
 
-    A number that is not finite ends it as failed, with what was flown before.
+    A number that is not finite ends it as failed, with what was flown before. So does a recording
+    that is gone; a disk that takes no more ends it as aborted.
 
     Parameters
     ----------
@@ -73,14 +216,15 @@ def fly(
     ConfigurationError
         If messages are to go wrong, for there are none.
     """
-    _refuse_message_faults(scenario)
+    refuse_message_faults(scenario)
     takers = tuple(takers)
     status, reason, ticks = 'completed', '', 0
     with interrupts_noted() as interrupts:
         state, params = mission or mission_of(scenario)
         start = time.perf_counter()
         try:
-            for log in fly_blocks(state, params):
+            held = Held(scenario, (state, params)) if scenario.orders else None
+            for log in blocks_of(held.fly) if held else fly_blocks(state, params):
                 for taker in takers:
                     taker.add(log)
                 ticks += len(log)
@@ -89,6 +233,6 @@ def fly(
                 if interrupts:
                     status, reason = 'aborted', 'stopped by SIGINT'
                     break
-        except NotFiniteError as error:
-            status, reason = 'failed', str(error)
-    return Flight(status, reason, time.perf_counter() - start)
+        except (NotFiniteError, DiskError) as error:
+            status, reason = ended(False, str(error)), str(error)
+    return Outcome(status, reason, time.perf_counter() - start)

@@ -32,6 +32,8 @@ FORK_SERVER = 'fork_server'
 NAME_LENGTH = 15
 _PR_SET_PDEATHSIG = 1
 _LIBC = ctypes.CDLL(None)
+#: Where the command line lies in memory, among what /proc/PID/stat says after the name.
+_ARGUMENTS = slice(45, 47)
 
 
 def tie_to(parent: int, last_signal: int) -> None:
@@ -39,6 +41,19 @@ def tie_to(parent: int, last_signal: int) -> None:
     _LIBC.prctl(_PR_SET_PDEATHSIG, int(last_signal))
     if os.getppid() != parent:
         os._exit(1)
+
+
+def set_title(title: str) -> None:
+    """Have ``ps`` show another command line for this process, as far as there is room.
+
+    A copy of a process has the command line of the first one, which lies in its own memory.
+    """
+    stat = Path('/proc/self/stat').read_text(encoding='ascii', errors='replace')
+    numbers = stat.rpartition(')')[2].split()
+    start, end = (int(number) for number in numbers[_ARGUMENTS])
+    if start:
+        room = end - start
+        ctypes.memmove(start, title.encode()[: room - 1].ljust(room, b'\0'), room)
 
 
 def children_of(pid: int) -> list[int]:
@@ -86,6 +101,7 @@ def _start(server: int, name: str, command: list[str], out: int, error: int, las
     os.dup2(error, 2)
     os.closerange(3, max(map(int, os.listdir('/proc/self/fd'))) + 1)
     Path('/proc/self/comm').write_text(name[:NAME_LENGTH], encoding='utf-8')
+    set_title(f'{name} ({" ".join(command[1:3])})')
     _become(command)
     sys.exit()
 

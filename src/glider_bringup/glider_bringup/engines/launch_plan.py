@@ -229,14 +229,21 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
         parameters[TF] = {'frame_prefix': text['frame_prefix']}
     write_parameters(parameters, folder / PARAMETERS_FILE, namespace)
     remappings = (OWN_CLOCK,) if text['clock'] == OWN_CLOCK[1] else ()
-    return LaunchPlan(scenario, folder / PARAMETERS_FILE, namespace, remappings, lockstep, nodes)
+    return LaunchPlan(
+        scenario=scenario,
+        parameters_file=folder / PARAMETERS_FILE,
+        namespace=namespace,
+        remappings=remappings,
+        lockstep=lockstep,
+        nodes=nodes,
+    )
 
 
 def _nodes(
     simulate: bool, navigation: bool, autopilot: bool, record: bool, with_tf: bool
 ) -> tuple[LaunchedNode, ...]:
     """Nodes to start."""
-    modules, words = process_modules(autopilot), {}
+    modules, words = process_modules('autopilot' if autopilot else 'processes'), {}
     if not simulate:
         del modules[PLANT], modules[CURRENT]
     if not navigation and autopilot:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from glider_bringup.engines.processes import OWN_CLOCK
-from glider_model.base.exits import FATAL
+from glider_model.base.errors import FATAL
 from glider_model.base.settings import ConfigurationError
 from glider_model.ros.places import NAMESPACE, domain_id
 

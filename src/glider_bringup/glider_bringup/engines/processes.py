@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Flies a scenario over ROS 2: one process per node, started, watched and stopped together."""
+"""Flies a scenario over ROS 2: its processes, started, watched and stopped together."""
 
 import json
 import os
@@ -14,12 +14,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any, Literal, NamedTuple
 
 from glider_bringup.engines.fork_server import FORK_SERVER, tie_to
 from glider_bringup.engines.janitor import is_alive
 from glider_model.base import wiring
-from glider_model.base.exits import FATAL
+from glider_model.base.errors import FATAL
 from glider_model.base.wiring import WIRING
 from glider_model.ros.places import NAMESPACE, domain_id
 
@@ -33,12 +33,18 @@ MODULES |= {RECORDER: 'glider_bringup.nodes.recorder_node', PLANT: wiring.PLANT.
 #: The process that has the nodes of these blocks in it, and its module.
 AUTOPILOT, AUTOPILOT_MODULE = 'autopilot', 'glider_bringup.nodes.autopilot'
 ON_BOARD = (wiring.NAVIGATION, wiring.GUIDANCE, wiring.CONTROL, wiring.GUARD)
+#: The process that has all nodes in it but the recorder, and its module.
+STACK, STACK_MODULE = 'stack', 'glider_bringup.nodes.stack'
+#: Which nodes share a process: all but the recorder, those on board, none.
+Layout = Literal['together', 'autopilot', 'processes']
 
 #: Who sees the nodes if nobody says else: those on this machine.
 RANGE, LOCAL = 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST'
 
 #: Remapping that brings the clock into the namespace: docs/adr/0013.
 OWN_CLOCK = ('/clock', 'clock')
+#: Processes that have the plant in them.
+_MAKES_TIME = (PLANT, STACK)
 #: Signals of a stop, and how long (s) a process has after each.
 _ESCALATION = ((signal.SIGINT, 2.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 2.0))
 #: Nodes have this long (s) to leave by themselves after a completed run.
@@ -63,10 +69,12 @@ class RunnerResult(NamedTuple):
     progress: Mapping[str, Any] = {}  #: last word of the recorder
 
 
-def process_modules(autopilot: bool = False) -> dict[str, str]:
-    """Module of every process: of each node, or of the autopilot in the place of four of them."""
-    if not autopilot:
+def process_modules(layout: Layout = 'processes') -> dict[str, str]:
+    """Module of every process: of each node, or of what has several of them in it."""
+    if layout == 'processes':
         return dict(MODULES)
+    if layout == 'together':
+        return {RECORDER: MODULES[RECORDER], STACK: STACK_MODULE}
     aboard = {wired.node for wired in ON_BOARD}
     others = {name: module for name, module in MODULES.items() if name not in aboard}
     return {AUTOPILOT: AUTOPILOT_MODULE, **others}
@@ -76,17 +84,16 @@ def node_commands(
     params_file: Path,
     namespace: str = NAMESPACE,
     own_clock: bool = False,
-    autopilot: bool = False,
+    layout: Layout = 'processes',
 ) -> dict[str, list[str]]:
     """Command line of every process.
 
     With ``own_clock`` the clock lies in the namespace, so that gliders can share a ROS domain.
-    With ``autopilot`` navigation, guidance, control and guard are one process.
     """
     ros = ['--ros-args', '--params-file', str(params_file), '-r', f'__ns:={namespace}']
     if own_clock:
         ros += ['-r', ':='.join(OWN_CLOCK)]
-    modules = process_modules(autopilot)
+    modules = process_modules(layout)
     return {name: [sys.executable, '-m', module, *ros] for name, module in modules.items()}
 
 
@@ -317,7 +324,7 @@ class _Run:
         """Whether the run has come to its end, by the word of the recorder if there is one."""
         if RECORDER in self.processes:
             return bool(self.progress.get('complete'))
-        return self.processes[PLANT].code == 0
+        return all(p.code == 0 for p in self.processes.values() if p.name in _MAKES_TIME)
 
     def _culprit(self) -> _Process:
         """Of the dead, the one that did not merely notice that another one was ill.
@@ -351,8 +358,8 @@ class _Run:
         if any(p.pid is None for p in by_name):  # in the middle of the start
             self._server.finish(0.0)
         groups = (
-            [p for p in by_name if p.name == PLANT],
-            [p for p in by_name if p.name not in (PLANT, RECORDER)],
+            [p for p in by_name if p.name in _MAKES_TIME],
+            [p for p in by_name if p.name not in (*_MAKES_TIME, RECORDER)],
             [p for p in by_name if p.name == RECORDER],
         )
         first = 0 if self.first_tick_s is not None else 1
@@ -437,7 +444,13 @@ def _result(run: _Run, status: str, culprit: _Process | None) -> RunnerResult:
             named = [other for other in run.processes if other in reason]
             name = min(named, key=reason.index, default=name)
     return RunnerResult(
-        status, reason, name, code, first - run.started_s, now - first, run.progress
+        status=status,
+        reason=reason,
+        culprit=name,
+        exit_code=code,
+        startup_s=first - run.started_s,
+        flight_s=now - first,
+        progress=run.progress,
     )
 
 

@@ -5,9 +5,10 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from glider_bringup.engines.flight import Flight, Progress, Taker, fly
+from glider_bringup.engines.flight import Outcome, Progress, Taker, ended, fly
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.engines.processes import node_commands, run_nodes
+from glider_bringup.engines.processes import Layout, node_commands, run_nodes
+from glider_bringup.mission.disk import DiskError, vanished
 from glider_bringup.mission.run_folder import (
     LOG_FILE,
     PARAMETERS_FILE,
@@ -17,10 +18,10 @@ from glider_bringup.mission.run_folder import (
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.recording.bag_files import has_bag
 from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.read_back import Reader, ended, read_back
+from glider_bringup.recording.read_back import Reader, read_back
 from glider_bringup.recording.ros.log_writer import LogWriter
 from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
-from glider_model.base.exits import EXIT_USAGE
+from glider_model.base.errors import EXIT_USAGE
 from glider_model.base.settings import ConfigurationError
 from glider_model.ros.places import NAMESPACE
 from glider_model.ros.wire.topics import recorded_topics
@@ -33,18 +34,22 @@ def fly_recorded(
     takers: Iterable[Taker] = (),
     progress: Progress | None = None,
     sync: Sync = 'end',
-) -> Flight:
+) -> Outcome:
     """Fly with the direct engine, as `fly` does, and write the bag of the run."""
     attachments = [folder / SCENARIO_FILE, folder / VEHICLE_FILE]
-    points = scenario.path.points(500)
     topics = scenario.topics
     recorded = recorded_topics(topics)
     writer = BagWriter(folder, scenario.name, attachments=attachments, topics=recorded, sync=sync)
-    bag = LogWriter(writer, points, topics, steers_by(scenario))
+    bag = LogWriter(writer, scenario.guidance_settings(), topics, steers_by(scenario))
     flight = fly(scenario, [*takers, bag], progress)
-    if flight.status != 'aborted':
-        bag.finish(flight.reason)
-    return flight._replace(messages_recorded=bag.close())
+    try:
+        if flight.status != 'aborted':
+            bag.finish(flight.reason)
+        bag.close()
+    except DiskError as error:
+        if not flight.reason:
+            flight = flight._replace(status=ended(False, str(error)), reason=str(error))
+    return flight._replace(messages_recorded=bag.messages)
 
 
 def fly_nodes(
@@ -58,9 +63,9 @@ def fly_nodes(
     on_log: Callable[[str], None] = lambda line: None,
     on_read: Callable[[int], None] = lambda ticks: None,
     sync: Sync = 'end',
-    autopilot: bool = False,
-) -> Flight:
-    """Fly over node processes and topics; what takers are given is read back from the bag.
+    layout: Layout = 'together',
+) -> Outcome:
+    """Fly over nodes and topics; what takers are given is read back from the bag.
 
     Parameters
     ----------
@@ -79,8 +84,9 @@ def fly_nodes(
         Gets the ticks that have been read back.
     sync : str
         When the bag is synced to disk.
-    autopilot : bool
-        Navigation, guidance, control and guard are nodes of one process.
+    layout : str
+        Which nodes share a process: 'together' all but the recorder, 'autopilot' those on board,
+        'processes' none.
     """
     attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)
     as_flown = scenario.model_copy(update={'vehicle': str((folder / VEHICLE_FILE).resolve())})
@@ -95,7 +101,7 @@ def fly_nodes(
             progress(said['tick'], said['depth_m'])
 
     result = run_nodes(
-        node_commands(folder / PARAMETERS_FILE, place, namespace is not None, autopilot),
+        node_commands(folder / PARAMETERS_FILE, place, namespace is not None, layout),
         folder / LOG_FILE,
         on_progress=tell,
         on_log=on_log,
@@ -109,4 +115,6 @@ def fly_nodes(
         if completed and (missing := log.missing(None)):
             completed, reason = False, missing
         recorded, lost = sum(log.counts.values()), log.lost(completed)
-    return Flight(ended(completed, reason), reason, result.flight_s, recorded, lost)
+    elif completed:
+        completed, reason = False, str(vanished(folder))
+    return Outcome(ended(completed, reason), reason, result.flight_s, recorded, lost)

@@ -69,7 +69,14 @@ def read_og1(place: Path, progress: Callable[[int, int], None]) -> Flight:
         parts.append(_instruments(found, origins[-1][0]))
     table = np.concatenate([np.stack(part) for part in parts], axis=1)
     table = table[:, np.argsort(table[0], kind='stable')]
-    return Flight('og1', [path.name for path in files], [], [], origins[0], Instruments(*table))
+    return Flight(
+        kind='og1',
+        files=[path.name for path in files],
+        segments=[],
+        notes=[],
+        origin_deg=origins[0],
+        instruments=Instruments(*table),
+    )
 
 
 def _read(path: Path) -> dict[str, np.ndarray]:

@@ -153,7 +153,15 @@ def read_seaglider(place: Path, progress: Callable[[int, int], None]) -> Flight:
     recorded = np.concatenate([_of_one_zero(dive, body) for dive in dives], axis=1)
     recorded = Instruments(*recorded[:, np.argsort(recorded[0], kind='stable')])
     read = [path.name for path in files]
-    return Flight('seaglider', read, segments, notes + left_out, origin, recorded, body)
+    return Flight(
+        kind='seaglider',
+        files=read,
+        segments=segments,
+        notes=notes + left_out,
+        origin_deg=origin,
+        instruments=recorded,
+        body=body,
+    )
 
 
 def _of_one_zero(dive: Dive, body: dict[str, float]) -> np.ndarray:

@@ -154,7 +154,14 @@ def read_slocum(
             notes += unread
         recorded = _instruments(sensors | _by_ctd(water), declined, origin)
     read = [path.name for path in files]
-    return Flight('slocum', read, segments, notes + left_out, origin, recorded)
+    return Flight(
+        kind='slocum',
+        files=read,
+        segments=segments,
+        notes=notes + left_out,
+        origin_deg=origin,
+        instruments=recorded,
+    )
 
 
 def _science_file(path: Path) -> Path | None:

@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 from glider_bringup.mission.scenario import Scenario
 from glider_model.vehicle.file import steers_by
 
-#: The engines: node processes over topics, or one compiled loop. Same results.
+#: The engines: nodes over topics, or one compiled loop. Same results.
 ENGINES = ('nodes', 'direct')
 
 

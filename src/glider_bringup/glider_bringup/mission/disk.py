@@ -16,7 +16,32 @@ _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 class DiskError(ConfigurationError):
-    """The disk takes no more. Nothing is wrong with what was asked for: exit code 1, not 2."""
+    """The disk takes no more, or what it had is gone. What was asked for is right: exit code 1."""
+
+
+#: What is said of a recording that is no longer where it was begun.
+VANISHED = 'the recording vanished'
+
+
+def vanished(file: Path) -> DiskError:
+    """What to tell the person about a recording that is gone."""
+    return DiskError(f'{file}: {VANISHED}: it or its folder was deleted or renamed')
+
+
+def refuse_vanished(file: Path, stream: IO[bytes]) -> None:
+    """Refuse to go on writing a file that has been deleted, moved, or exchanged for another.
+
+    Raises
+    ------
+    DiskError
+        Naming it.
+    """
+    try:
+        is_there = os.path.samestat(os.stat(file), os.fstat(stream.fileno()))
+    except OSError:
+        is_there = False
+    if not is_there:
+        raise vanished(file)
 
 
 def not_written(file: Path, error: OSError) -> ConfigurationError:

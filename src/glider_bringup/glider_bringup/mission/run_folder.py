@@ -93,10 +93,11 @@ def find_scenario(
     Raises
     ------
     ConfigurationError
-        If it is not valid.
+        If it is not valid, or not what the bag says was flown.
     """
     file = folder / SCENARIO_FILE
     if file.is_file():
+        _refuse_another(folder, attachments)
         scenario = load_scenario(str(file), recorded=True)
         return FlownScenario(scenario, file.read_text(encoding='utf-8'), str(file))
     if SCENARIO_FILE not in attachments:
@@ -110,6 +111,17 @@ def find_scenario(
         raise ConfigurationError(text) from None
     text = attachments[SCENARIO_FILE].decode()
     return FlownScenario(scenario, text, f'{SCENARIO_FILE} attached to {run}')
+
+
+def _refuse_another(folder: Path, attachments: Mapping[str, bytes]) -> None:
+    """Refuse files of a run that are not those that were flown, which its bag has."""
+    for name in (SCENARIO_FILE, VEHICLE_FILE):
+        file = folder / name
+        if name in attachments and file.is_file() and file.read_bytes() != attachments[name]:
+            raise ConfigurationError(
+                f'{file}: not the one that was flown, which is attached to the bag (allowed: that '
+                f'one, or none)'
+            )
 
 
 @contextmanager

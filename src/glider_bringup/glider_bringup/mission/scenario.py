@@ -5,19 +5,22 @@
 import math
 from copy import deepcopy
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import pydantic
 from pydantic import Field
 
 from glider_bringup.mission.rules import Rules
-from glider_control.settings import ControlLawSettings, ControlSettings
+from glider_control.law import LawSettings
+from glider_control.settings import ControlLawSettings, ControlSettings, check_law, with_law
 from glider_guard.settings import GuardLimitSettings, GuardSettings
+from glider_guidance.order import Order
+from glider_guidance.orders import check_orders
 from glider_guidance.path.curve import path_length, path_point
 from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
-from glider_model.base.errors import clipped, told_changes
+from glider_model.base.errors import clipped, shown, told_changes
 from glider_model.base.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
 from glider_model.base.frames import OriginSettings
 from glider_model.base.settings import (
@@ -70,12 +73,18 @@ _ALTERNATIVES = (
 class Scenario(Settings):
     """A mission: vehicle, water, path, profile, current, guidance, control, and its end."""
 
+    #: What the control node is told, as a type: it knows the same laws.
+    control_kind: ClassVar[type[ControlSettings]] = ControlSettings
+
     name: str = Field(
         pattern=r'^[A-Za-z0-9_][A-Za-z0-9_.-]*$',
         max_length=100,
         description='name, used for files',
     )
     description: str = Field('', max_length=2000, description='what the scenario shows')
+    changed: dict[str, str] = Field(
+        {}, description='fields that were changed since there was a file, by options and --set'
+    )
     vehicle: str = Field(
         'zhang2021', description='vehicle by name, or path of a file relative to this one'
     )
@@ -115,6 +124,7 @@ class Scenario(Settings):
         StraightPath(kind='straight', length_m=25000.0), description='path to follow'
     )
     profile: ProfileSettings = Field(ProfileSettings(), description='sawtooth')
+    orders: list[Order] = Field([], description='what the vehicle is told in flight, and when')
     guidance: GuidanceLawSettings = Field(GuidanceLawSettings(), description='guidance')
     control: ControlLawSettings = Field(ControlLawSettings(), description='control')
     guard: GuardLimitSettings = Field(
@@ -127,6 +137,12 @@ class Scenario(Settings):
         if 'seed' in current.model_fields_set:
             raise ValueError('seed belongs to the scenario, not to its current')
         return current
+
+    @property
+    def described(self) -> str:
+        """Its description, and what is not as described."""
+        but = f'but with {told_fields(self.changed)}' if self.changed else ''
+        return ', '.join(filter(None, (self.description, but)))
 
     @property
     def vehicle_faults(self) -> list[FaultSettings]:
@@ -145,7 +161,7 @@ class Scenario(Settings):
             water=self.water,
             initial=self.initial,
             duration_s=self.duration_s,
-            dives=self.dives,
+            dives=0 if self._holds else self.dives,
             dive_depth_m=self.profile.depth_m,
             afloat_s=self._afloat_s(),
             seed=self.seed,
@@ -161,9 +177,14 @@ class Scenario(Settings):
         """Those of the topics that not every run has that there are in a run of this."""
         return tuple(dict.fromkeys((*self.navigation.topics, *self.sensors.also_fitted)))
 
+    @property
+    def _holds(self) -> bool:
+        """Whether the vehicle is told to hold: such a mission ends by its time alone."""
+        return any(order.hold for order in self.orders)
+
     def _afloat_s(self) -> float:
         """Time (s) afloat that ends a run: longer than any wait of its mission; 0: never."""
-        if self.path.at_end == 'continue':
+        if self.path.at_end == 'continue' or self._holds:
             return 0.0
         profile = self.profile
         waits_s = profile.wait_s + profile.prepare_s if profile.surface_every_dives else 0.0
@@ -209,6 +230,7 @@ class Scenario(Settings):
             profile=self.profile,
             dives=self.dives,
             duration_s=self.duration_s,
+            orders=self.orders,
             **self._believing(self.guidance),
         )
 
@@ -226,7 +248,7 @@ class Scenario(Settings):
 
     def control_settings(self) -> ControlSettings:
         """What the control node is told."""
-        return ControlSettings(vehicle=self.vehicle, **self._believing(self.control))
+        return self.control_kind(vehicle=self.vehicle, **self._believing(self.control))
 
     def guard_settings(self) -> GuardSettings:
         """What the guard node is told."""
@@ -235,6 +257,8 @@ class Scenario(Settings):
             pressure='pressure' in self.topics,
             altitude='altitude' in self.topics,
             imu_period_s=self.sensors.imu_period_s,
+            imu_missed_share=self.sensors.imu_missed_share,
+            depth_resolution_m=self.sensors.depth_resolution_m,
             **self._believing(self.guard),
         )
 
@@ -287,6 +311,7 @@ class Scenario(Settings):
             What the file calls the vehicle, if something else than the scenario does.
         """
         left_out = {
+            **({} if self.changed else {'changed': True}),
             'current': {'seed'},
             'navigation': self.navigation.idle,
             'guidance': self.guidance.idle,
@@ -294,6 +319,38 @@ class Scenario(Settings):
         }
         values = self.model_dump(mode='json', exclude_none=True, exclude=left_out)
         return yaml_text({**values, 'vehicle': vehicle or self.vehicle})
+
+
+#: Kinds of scenario that know one law more, which this program brought, by its name.
+_WITH_LAW: dict[str, type[Scenario]] = {}
+
+
+def know_law(law: type[LawSettings]) -> str:
+    """Let scenarios of this program fly a law that is not registered; returns its name.
+
+    A later class of the same name takes the place of an earlier one.
+
+    Raises
+    ------
+    ConfigurationError
+        If it cannot be called by its name, or one of its fields has no default.
+    """
+    name = law.__name__
+    check_law(name, law)
+    told, flown = with_law(name, law)
+    known = pydantic.create_model(
+        'Scenario', __base__=Scenario, control=(told, Field(told(), description='control'))
+    )
+    known.control_kind = flown
+    _WITH_LAW[name] = known
+    return name
+
+
+def _kind(values: dict[str, Any]) -> type[Scenario]:
+    """Type of the scenario of a file: that which knows its law."""
+    control = values.get('control')
+    law = control.get('law') if isinstance(control, dict) else None
+    return _WITH_LAW.get(law, Scenario) if isinstance(law, str) else Scenario
 
 
 def scenario_names() -> list[str]:
@@ -356,6 +413,10 @@ def make_scenario(
     own, in_vehicle = split_changes(changes or {})
     for field, value in own.items():
         _set_field(values, field, value)
+    if changes:
+        before = values.get('changed')
+        before = before if isinstance(before, dict) else {}
+        values['changed'] = {**before, **{field: shown(value) for field, value in changes.items()}}
     changed = told_changes(changes or {})
 
     def line_of(location: tuple[str, ...]) -> int | None:
@@ -363,7 +424,7 @@ def make_scenario(
         here = any(overlap(field, name) for field in own)
         return None if here else yaml_line(path, location)
 
-    scenario = validate(Scenario, values, str(path), path.parent, line_of, changed)
+    scenario = validate(_kind(values), values, str(path), path.parent, line_of, changed)
     scenario = _find_vehicle(scenario, path.parent, in_vehicle, f'{path}{changed}')
     if not recorded:
         try:
@@ -383,9 +444,10 @@ def split_changes(changes: dict[str, Any]) -> tuple[dict[str, Any], dict[str, An
 
 
 def _check_glide(scenario: Scenario) -> None:
-    """Refuse a mission that begins, or goes, deeper than its vehicle can, or more shallowly."""
-    scenario.guidance_settings().check_depth()
-    scenario.guidance_settings().check_pitch()
+    """Refuse a mission that its vehicle cannot fly, or water that there is not."""
+    scenario.guidance_settings().check()
+    check_orders(scenario.guidance_settings(), scenario.orders)
+    scenario.water.check_stable()
     start_m, rated_m = scenario.initial.depth_m, load_vehicle(scenario.vehicle).rated_depth_m
     if start_m > rated_m:
         raise ConfigurationError(
@@ -447,6 +509,11 @@ def _set_field(values: dict, field: str, value) -> None:
     for other in _alternatives(last):
         holder.pop(other, None)
     holder[last] = value
+
+
+def told_fields(changed: dict[str, str]) -> str:
+    """Fields that were changed, as a person set them."""
+    return ', '.join(f'{field}={value}' for field, value in changed.items())
 
 
 def parse_assignment(text: str) -> tuple[str, Any]:

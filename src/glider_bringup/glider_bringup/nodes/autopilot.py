@@ -14,7 +14,7 @@ from rclpy.utilities import remove_ros_args
 from glider_control.nodes.control_node import ControlNode
 from glider_guard.nodes.guard_node import GuardNode
 from glider_guidance.nodes.guidance_node import GuidanceNode
-from glider_model.base.exits import EXIT_USAGE, say_fatal
+from glider_model.base.errors import EXIT_USAGE, say_fatal
 from glider_model.ros.lockstep.process import run_together
 from glider_navigation.nodes.navigation_node import NavigationNode
 

@@ -18,15 +18,17 @@ from std_msgs.msg import Header
 from glider_bringup.mission.disk import DiskError
 from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
 from glider_bringup.recording.tick_sorter import TickSorter
-from glider_model.base.exits import EXIT_FAILED
+from glider_model.base.errors import EXIT_FAILED
 from glider_model.base.settings import ConfigurationError, Settings
 from glider_model.base.signals import TICK_NS
 from glider_model.base.wiring import BELIEFS, SENSORS, WIRING
-from glider_model.ros.lockstep import health
+from glider_model.ros.hearing.gids import gid_of
+from glider_model.ros.hearing.inputs import Input
+from glider_model.ros.lockstep import health, peers
 from glider_model.ros.lockstep.executor import take, take_with_info
-from glider_model.ros.lockstep.inputs import Input
 from glider_model.ros.lockstep.node import TickNode
 from glider_model.ros.lockstep.process import Stop, run
+from glider_model.ros.lockstep.pulse import Condition
 from glider_model.ros.lockstep.watch import FAREWELL_S
 from glider_model.ros.parameters import declare_settings
 from glider_model.ros.wire import qos, topics
@@ -79,6 +81,7 @@ class RecorderNode(TickNode):
         self.recorded_ns = -TICK_NS  #: newest tick that outlives this process
         self.heard_ns = -TICK_NS  #: newest tick of which it has said that all messages are here
         self.has_path = self.replayed = False
+        self.held: dict[str, tuple[bytes, dict]] = {}  #: messages of nobody knows whom, by topic
         self.stage, self.last_odom, self.newest_ns, self.depth_m = '', b'', 0, 0.0
         self.end: tuple[int, bytes] | None = None  #: what the plant said last
         self.heard: Counter[str] = Counter()  #: events by the node that told of them
@@ -106,13 +109,23 @@ class RecorderNode(TickNode):
 
     def add_input(self, name: str) -> Input:
         """Subscribe without waiting for messages: `drain` takes them all."""
-        item = Input(TOPICS[name])
+        item = Input(TOPICS[name], self.ticks.lockstep, topics.REPLAY)
         profile = None if self.ticks.lockstep else qos.EVERYTHING
         item.subscription = self._subscription(
             item.topic, lambda raw, info: self.keep(item, raw, info), profile=profile
         )
         self.inputs.append(item)
         return item
+
+    def refuse_stranger(self, item: Input, gid: bytes) -> None:
+        """Pass over a message of somebody else: those who need the topic tell."""
+
+    def tell_successor(self, item: Input, silent_s: float) -> None:
+        """Nothing: those who need the topic tell."""
+
+    def condition(self) -> Condition:
+        """How this node is."""
+        return Condition(health.OK, 'recording')
 
     def on_signal(self, number, frame) -> None:
         """Remember to stop; `drain` does it, with everything that is under way."""
@@ -145,11 +158,12 @@ class RecorderNode(TickNode):
                     pass
 
     def on_path(self, raw: bytes) -> None:
-        """Keep the path, under the stamp it carries; once in step, no other."""
-        if self.begun and not self.is_replayed():
-            return  # of a second glider
+        """Keep a path, under the stamp it carries; once in step, only one that was ordered."""
         sec, nanosec = struct.unpack_from('<iI', raw, 4)
-        self.order.add_event('path', sec * 1_000_000_000 + nanosec, raw)
+        stamp_ns = sec * 1_000_000_000 + nanosec
+        if stamp_ns == 0 and self.begun and not self.is_replayed():
+            return  # of a second glider
+        self.order.add_event('path', stamp_ns, raw)
         self.has_path = True
 
     def on_count(self, array) -> None:
@@ -186,18 +200,18 @@ class RecorderNode(TickNode):
     def keep(self, item: Input, raw: bytes, info: dict) -> None:
         """Keep a message until its tick is complete.
 
-        Passed over are an old one in lockstep, one of a second publisher, and bytes that are no
-        message: those who need it tell.
+        Passed over are an old one in lockstep, one of a second publisher, one from before the
+        beginning of time, and bytes that are no message: those who need it tell.
         """
         try:
             stamp_ns = item.topic.codec.decode_stamp(raw)
         except MessageError:
             return
-        if item.is_from_another(info):
+        if stamp_ns < 0 or not self.is_of_owner(item, info):
             return
         if self.ticks.lockstep and not self.begun:
             if stamp_ns > 0 and not self.is_replayed():
-                item.number = 0
+                item.owner.restart()
                 return  # of a run that is under way: one's own begins with tick 0
             self.begun = True
         if stamp_ns > item.stamp_ns or not self.ticks.lockstep:
@@ -206,10 +220,25 @@ class RecorderNode(TickNode):
             if item.topic.name == 'odom':
                 self.last_odom, self.newest_ns = raw, stamp_ns
 
+    def next_of(self, item: Input) -> tuple[bytes, dict] | None:
+        """Next message of an input; in lockstep the first one waits until it is known whose it is.
+
+        A replay publishes as soon as its subscribers are there, and its name may come later.
+        """
+        name = item.topic.name
+        taken = self.held.pop(name, None) or take_with_info(item.subscription)
+        if taken is None or item.owner.gid or not self.ticks.lockstep:
+            return taken
+        gid = gid_of(taken[1])
+        if gid and not peers.publishers(self, item.topic).get(gid):
+            self.held[name] = taken
+            return None
+        return taken
+
     def drain(self) -> None:
         """Take and write whatever has come; end when the run is over and all of it is here."""
         for item in self.inputs if self.running else ():
-            while (taken := take_with_info(item.subscription)) is not None:
+            while (taken := self.next_of(item)) is not None:
                 self.keep(item, *taken)
                 self.came_s = time.monotonic()
         for subscription, hear in ((self.counts, self.on_count), (self.events, self.on_event)):
@@ -219,6 +248,8 @@ class RecorderNode(TickNode):
             self.save()
         except DiskError as error:
             raise Stop(EXIT_FAILED, str(error)) from None
+        if self.running:
+            self._pulse.beat(self.newest_ns, self.newest_ns)
         if self.last_odom and time.monotonic() - self.progress_s > _PROGRESS_S:
             self.print_progress()
         if self.is_stopped() or (
@@ -286,7 +317,11 @@ class RecorderNode(TickNode):
         print(json.dumps({**line, **more}), flush=True)
 
     def watch(self) -> None:
-        """Do not wait for ever for ticks that do not come."""
+        """Do not wait for ever for ticks that do not come, nor write what nobody will find."""
+        try:
+            self.bag.refuse_vanished()
+        except DiskError as error:
+            raise Stop(EXIT_FAILED, str(error)) from None
         if self.over_since_s is not None and time.monotonic() - self.over_since_s > FAREWELL_S:
             raise Stop(0)
 
@@ -297,7 +332,7 @@ class RecorderNode(TickNode):
             if self.end:
                 self.bag.write('/diagnostics', *self.end)
             self.bag.close()
-        except DiskError as error:
+        except ConfigurationError as error:
             raise Stop(EXIT_FAILED, str(error)) from None
         complete = self.final_ns is not None and 0 <= self.final_ns <= self.order.written_ns
         self.print_progress(complete=complete, counts=self.bag.counts)

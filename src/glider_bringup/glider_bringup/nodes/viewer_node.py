@@ -15,12 +15,13 @@ from collections import deque
 
 import rclpy
 from pydantic import Field
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
 
 from glider_bringup.recording.ros.rosbag2 import message_definition
-from glider_model.base.exits import EXIT_USAGE, say_fatal
+from glider_model.base.errors import EXIT_USAGE, say_fatal
 from glider_model.base.settings import ConfigurationError, Settings
 from glider_model.ros.lockstep.executor import take
 from glider_model.ros.parameters import declare_settings, refuse_unknown
@@ -109,7 +110,12 @@ class ViewerNode(Node):
         for name, topic in self.topics.items():
             profile = qos.NEWEST if topic.per_tick else topic.qos
             self.incoming[name] = self.create_subscription(
-                topic.message_type, name, lambda raw: None, profile, raw=True
+                topic.message_type,
+                name,
+                lambda raw: None,
+                profile,
+                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+                raw=True,
             )
 
     def pass_on(self) -> None:

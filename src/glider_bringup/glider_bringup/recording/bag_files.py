@@ -24,7 +24,10 @@ def bag_files(path: Path) -> list[Path]:
     listed = _listed_files(path / METADATA_FILE)
     files = listed or sorted(path.glob('*.mcap'))
     if not files:
-        raise ConfigurationError(f'{path}: no .mcap file in it')
+        raise ConfigurationError(
+            f'{path}: no .mcap file in it (allowed: the folder of a bag, of a run over nodes, or '
+            f'of a direct one with --bag)'
+        )
     for file in files:
         if not file.is_file():
             raise ConfigurationError(f'{file}: missing; {path / METADATA_FILE} lists it')

@@ -241,7 +241,16 @@ class Bag:
             start_ns, end_ns, unpacked = struct.unpack('<QQQ', stream.read(24))
             if unpacked:
                 order, body = len(found.chunks), at + HEAD.size
-                self._parts.append(_Part(number, order, body, length, start_ns, end_ns))
+                self._parts.append(
+                    _Part(
+                        file=number,
+                        number=order,
+                        start=body,
+                        length=length,
+                        start_ns=start_ns,
+                        end_ns=end_ns,
+                    )
+                )
         elif opcode == Opcode.MESSAGE:
             self._note_loose(number, at, stream.read(_MESSAGE_HEAD), length)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT):
@@ -340,7 +349,9 @@ class Bag:
                 end_ns=max(last.end_ns, log_ns),
             )
         else:
-            self._parts.append(_Part(file, 0, at, length, log_ns, log_ns))
+            self._parts.append(
+                _Part(file=file, number=0, start=at, length=length, start_ns=log_ns, end_ns=log_ns)
+            )
 
     def _note(self, file: int, opcode: int, data: bytes) -> None:
         """Take a schema, a channel or an attachment."""
@@ -364,12 +375,12 @@ class Bag:
         self._channels[file, channel.id] = channel
         schema = self._schemas.get((file, channel.schema_id))
         topic = BagTopic(
-            channel.topic,
-            schema.name if schema else '',
-            channel.message_encoding,
-            schema.encoding if schema else '',
-            schema.data if schema else b'',
-            channel.metadata.get('offered_qos_profiles', ''),
+            name=channel.topic,
+            type_name=schema.name if schema else '',
+            encoding=channel.message_encoding,
+            schema_encoding=schema.encoding if schema else '',
+            schema=schema.data if schema else b'',
+            qos=channel.metadata.get('offered_qos_profiles', ''),
         )
         names = [one.name for one in self.topics]
         if topic.name not in names:

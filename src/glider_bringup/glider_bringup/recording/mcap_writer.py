@@ -34,7 +34,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from glider_bringup.mission.disk import not_written
+from glider_bringup.mission.disk import not_written, refuse_vanished
 
 MAGIC = b'\x89MCAP0\r\n'
 _MESSAGE = struct.Struct('<BQHIQQ')
@@ -221,6 +221,10 @@ class McapWriter:
         if self._chunk_start_ns is not None:
             self._end_chunk(self._chunk_start_ns)
         self._hand_over()
+
+    def refuse_vanished(self) -> None:
+        """Raise a `DiskError` if the file is no longer where it was begun."""
+        refuse_vanished(self._path, self._file)
 
     def sync(self) -> None:
         """Bring what was flushed to disk, and wait until it is there."""

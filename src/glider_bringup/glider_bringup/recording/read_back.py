@@ -9,7 +9,6 @@ import numpy as np
 
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros.recorded_log import RecordedLog
-from glider_model.base.signals import NOT_FINITE
 from glider_model.vehicle.file import load_vehicle
 
 
@@ -43,10 +42,3 @@ def read_back(
             taker.add(rows)
         progress(log.ticks)
     return log
-
-
-def ended(complete: bool, reason: str) -> str:
-    """Status of a flight that was complete, or ended early for a reason."""
-    if complete:
-        return 'completed'
-    return 'failed' if NOT_FINITE in reason else 'aborted'

@@ -88,12 +88,12 @@ def recover(path: Path, progress: Progress = lambda done, total: None) -> Recove
         rebuilt.append(METADATA_FILE)
     bag = Bag(path)  # which tests all checksums
     return Recovered(
-        tuple(rebuilt),
-        dropped_bytes,
-        tuple(dropped),
-        {topic.name: topic.count for topic in topics},
-        bag.start_ns,
-        bag.end_ns,
+        rebuilt=tuple(rebuilt),
+        dropped_bytes=dropped_bytes,
+        dropped=tuple(dropped),
+        counts={topic.name: topic.count for topic in topics},
+        start_ns=bag.start_ns,
+        end_ns=bag.end_ns,
     )
 
 

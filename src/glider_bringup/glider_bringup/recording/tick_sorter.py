@@ -51,8 +51,11 @@ class TickSorter:
         return min(self._newest_ns.values(), default=-self._period_ns)
 
     def add_event(self, topic: str, stamp_ns: int, payload: bytes) -> None:
-        """Take a message that belongs to a tick, but does not come with every tick."""
-        self._events.append((stamp_ns, topic, payload))
+        """Take a message that belongs to a tick, but does not come with every tick.
+
+        One that is stamped before the beginning of time, as that of anybody may be, is of tick 0.
+        """
+        self._events.append((max(0, stamp_ns), topic, payload))
 
     def write_complete(self, end_tick: Callable[[int], bool], until_ns: float = math.inf) -> bool:
         """Hand on every tick that is complete, with its events.

@@ -5,15 +5,15 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from glider_bringup.engines.flight import Flight
+from glider_bringup.engines.flight import Outcome, ended
 from glider_bringup.mission.planned import planned_ticks
 from glider_bringup.mission.run_folder import PARAMETERS_FILE, scenario_of
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.recording.bag_files import has_bag
 from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.read_back import Reader, ended, read_back
+from glider_bringup.recording.read_back import Reader, read_back
 from glider_bringup.recording.ros.recorded_log import RecordedLog
-from glider_bringup.scoring.card import read_score, scorecard
+from glider_bringup.scoring.card import STOPPED, read_score, scorecard
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_model.base.settings import ConfigurationError
 from glider_model.ros.lockstep.health import FINISHED
@@ -65,7 +65,8 @@ def score_bag(
     )
     missing = log.missing(old.get('ticks'))
     if old:
-        complete, reason = old['status'] not in ('aborted', 'failed'), old['reason']
+        complete = old['status'] not in STOPPED
+        reason = '' if complete else old['reason']
     else:
         complete, reason = _end_of_run(log)
     lost = log.lost(complete)
@@ -79,7 +80,7 @@ def score_bag(
         complete, reason = False, '; '.join(one for one in (reason, missing) if one)
     status = ended(complete, reason)
     recorded = sum(log.counts.values())
-    flight = Flight(status, reason, old.get('wall_time_s'), recorded, lost)
+    flight = Outcome(status, reason, old.get('wall_time_s'), recorded, lost)
     engine = old.get('engine') or ('nodes' if (run / PARAMETERS_FILE).exists() else None)
     return scorecard(scenario, engine, flight, scores_of(scenario, scorer))
 

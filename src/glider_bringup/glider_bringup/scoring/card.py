@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from glider_bringup.engines.flight import Flight, Progress, Taker, fly
+from glider_bringup.engines.flight import Outcome, Progress, Taker, fly
 from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.run_folder import SCORE_FILE
 from glider_bringup.mission.scenario import Scenario
@@ -38,31 +38,34 @@ CARD_GROUPS = {
 }
 #: North and east.
 _Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
-STATUSES = ('completed', 'infeasible', 'aborted', 'failed')
+STATUSES = ('completed', 'surfaced', 'lost', 'infeasible', 'aborted', 'failed')
+#: Statuses of runs that were not flown to their end.
+STOPPED = ('aborted', 'failed')
 
 
 def fly_scored(
     scenario: Scenario, takers: Iterable[Taker] = (), progress: Progress | None = None
-) -> tuple[Flight, dict]:
+) -> tuple[Outcome, dict]:
     """Fly with the direct engine, as `fly` does, and give the scores too."""
     scorer = make_scorer(scenario)
     flight = fly(scenario, [scorer, *takers], progress)
     return flight, scores_of(scenario, scorer)
 
 
-def scorecard(scenario: Scenario, engine: str | None, flight: Flight, scores: dict) -> dict:
+def scorecard(scenario: Scenario, engine: str | None, flight: Outcome, scores: dict) -> dict:
     """Contents of ``score.json``; a figure that is not finite is None there, and a failure."""
     scores, wrong = dict(scores), list(_not_finite(scores))
-    infeasible = scores.pop('infeasible')
-    status = flight.status
-    if status == 'completed' and infeasible:
-        status = 'infeasible'
-    reason = flight.reason
+    status, reason = became, why = scores.pop('status'), scores.pop('reason')
+    if flight.status != 'completed':
+        status, reason = flight.status, flight.reason
+        if became == 'lost' and why not in reason:
+            reason = f'{reason}; {why}'
     if wrong and status != 'failed':
         status, reason = 'failed', f'the score is not finite: {", ".join(wrong)}'
     sim_time_s = scores['sim_time_s']
     return {
         'scenario': scenario.name,
+        'changed': scenario.changed,
         'vehicle': load_vehicle(scenario.vehicle).name,
         'controller': scenario.control.law,
         'guidance': scenario.guidance.los.method,
@@ -141,10 +144,16 @@ def _is_card(card) -> bool:
             if card['ticks'] or group != 'final_state'  # a run without a tick has none
         )
         and _is_guard(card.get('guard', {}))
+        and _are_texts(card.get('changed', {}))
         and _are_faults(card.get('faults', []))
         and _is(_Navigation, card.get('navigation'))
         and _is(_Energy, card.get('energy'))
     )
+
+
+def _are_texts(changed) -> bool:
+    """Whether a value is what was changed in a scenario; older runs tell nothing of it."""
+    return isinstance(changed, dict) and all(isinstance(text, str) for text in changed.values())
 
 
 def _is_guard(guard) -> bool:

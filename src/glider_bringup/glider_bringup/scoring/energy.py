@@ -64,7 +64,7 @@ class EnergyScorer:
             self._ledger, self._surfacing, last, log, self._params
         )
 
-    def result(self, sim_time_s: float, dives: int, way_m: float) -> dict:
+    def result(self, sim_time_s: float, dives: int, way_m: float | None) -> dict:
         """The part ``energy`` of ``score.json``; None where nothing is known.
 
         Endurance and range are those of the usable part of a full battery at the mean power and
@@ -74,8 +74,8 @@ class EnergyScorer:
         ----------
         sim_time_s : float
         dives : int
-        way_m : float
-            Along the path.
+        way_m : float or None
+            Along the path; None: the mission ended, and nothing goes on at this pace.
         """
         names = ('pump', 'hotel', 'masses', 'calls')
         wh = spent(self._ledger) / _J_PER_WH
@@ -92,6 +92,6 @@ class EnergyScorer:
             'wh': wh,
             'wh_per_dive': wh / dives if dives else None,
             'by': {name: getattr(self._ledger, name) / _J_PER_WH for name in names},
-            'endurance_days': flights * sim_time_s / _DAY_S,
-            'range_km': 1e-3 * flights * way_m,
+            'endurance_days': None if way_m is None else flights * sim_time_s / _DAY_S,
+            'range_km': None if way_m is None else 1e-3 * flights * max(0.0, way_m),
         }

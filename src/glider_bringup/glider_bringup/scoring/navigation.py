@@ -138,15 +138,15 @@ class NavigationScorer:
         mean = self._current / ticks
         self.surfacings.append(
             Surfacing(
-                tick,
-                (float(true[_ODOM]), float(true[_ODOM + 1])),
-                (float(row[_ODOM]), float(row[_ODOM + 1])),
-                tuple(float(row[i]) for i in _COVARIANCE),
-                float(true[_E2]),
-                float(row[_E2]),
-                (float(mean[0]), float(mean[1])),
-                math.sqrt(self._squares / ticks),
-                self._dive_tick,
+                tick=tick,
+                true=(float(true[_ODOM]), float(true[_ODOM + 1])),
+                believed=(float(row[_ODOM]), float(row[_ODOM + 1])),
+                covariance=tuple(float(row[i]) for i in _COVARIANCE),
+                cross_track_m=float(true[_E2]),
+                believed_cross_track_m=float(row[_E2]),
+                true_current=(float(mean[0]), float(mean[1])),
+                way_rms_m=math.sqrt(self._squares / ticks),
+                dive_tick=self._dive_tick,
             )
         )
         self._waits_for_fix = True

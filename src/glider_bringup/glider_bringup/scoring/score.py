@@ -23,10 +23,17 @@ from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.energy import EnergyScorer
 from glider_bringup.scoring.faults import FaultTimes
 from glider_bringup.scoring.navigation import NavigationScorer
+from glider_bringup.scoring.outcome import (
+    COMPLETED,
+    INFEASIBLE,
+    ends_mission,
+    outcome_of,
+    told_by_guard,
+)
 from glider_bringup.scoring.true_motion import TrueMotion, wire_of
 from glider_control.intake import REFUSED
 from glider_guard.block import TELL_EVERY_NS
-from glider_guard.rows import ALL, LATCHED, NOTE, REACTIONS, ROWS, reaction_of
+from glider_guard.rows import ALL, DROP, LATCHED, NOTE, REACTIONS, ROWS, SURFACE, reaction_of
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_model.base.block import changes_to_tell
 from glider_model.base.frames import (
@@ -42,23 +49,24 @@ from glider_model.plant.faults.settings import FaultSettings
 from glider_model.plant.plant import dive_depths
 from glider_model.plant.readings import Readings, make_readings, noise_of_readings
 from glider_model.plant.sensors import SensorParams
-from glider_model.vehicle.energy import EnergySettings
-from glider_model.vehicle.file import load_vehicle, steers_by
+from glider_model.vehicle.file import Vehicle, load_vehicle
 
 #: Heading fluctuation is about the mean over this time (s).
 HEADING_MEAN_S = 300.0
 #: A run is infeasible if the course could not be held for this share of the scored time.
 INFEASIBLE_SHARE = 0.5
 
+#: The course of the path is told by so much of it (m).
+COURSE_M = 1.0
 #: So many events of the guard are kept.
 EVENTS_KEPT = 100
 #: What the event of a refused measurement says.
 REFUSED_SAYS = 'a measurement was refused, the last good one serves'
 
-_SERIES = 15
+_SERIES = 16
 _DEPTH, _E2, _PITCH, _PITCH_REF, _HEADING, _RATE_REF = range(6)
 _TARGET_N, _TARGET_E, _INFEASIBLE, _NET_HEAVINESS, _PITCH_MASS, _ROLL_MASS = range(6, 12)
-_MASK, _TOLD_E2, _SURFACE = 12, 13, 14
+_MASK, _TOLD_E2, _FIN, _GUARD = 12, 13, 14, 15
 
 _ODOM, _REFERENCE = COLUMNS['odom'], COLUMNS['reference']
 _E2_COLUMN = COLUMNS['tracking_error'].start + 1
@@ -91,7 +99,8 @@ def _extract(log, series):
         series[_PITCH_MASS, row] = log[row, _JOINTS_START + 1]
         series[_ROLL_MASS, row] = log[row, _JOINTS_START + 2]
         series[_MASK, row] = np.int64(log[row, _MASK_COLUMN]) | np.int64(log[row, _GUARD_COLUMN])
-        series[_SURFACE, row] = log[row, _JOINTS_START + 3]
+        series[_FIN, row] = log[row, _JOINTS_START + 3]
+        series[_GUARD, row] = log[row, _GUARD_COLUMN]
 
 
 @kernel
@@ -116,14 +125,14 @@ class Scorer:
         To which fixes are relative.
     topics : tuple of str
         What there is of navigation in the run; empty of a vehicle that knows its place.
-    steers_by : str
-        Name of the vehicle's steering surface, whose travel is scored; empty without.
     faults : sequence of FaultSettings
         What breaks in the run.
-    energy : EnergySettings, optional
-        Battery of the vehicle and what is taken out of it.
+    vehicle : Vehicle, optional
+        Its steering surface, battery, crush depth and drop weight; without it there are none.
     readings : Readings, optional
         Noise of where its actuators say that they are: no way that they go.
+    course_rad : float
+        Of the path at its start, for a vehicle whose target never moved along it.
     """
 
     def __init__(
@@ -131,20 +140,24 @@ class Scorer:
         sensors: SensorParams | None = None,
         origin: Origin | None = None,
         topics: tuple[str, ...] = (),
-        steers_by: str = '',
         faults: Sequence[FaultSettings] = (),
-        energy: EnergySettings | None = None,
+        vehicle: Vehicle | None = None,
         readings: Readings | None = None,
+        course_rad: float = 0.0,
     ) -> None:
         self.topics = topics  #: that it needs, beside those that are always read
-        self._steers_by = steers_by
+        self._steers_by = vehicle.steers_by if vehicle else ''
+        self._crush_depth_m = vehicle.crush_depth_m if vehicle else math.inf
+        self._has_weight = bool(vehicle and vehicle.drop_weight)
+        self._course_rad = course_rad
         self._truth = TrueMotion(sensors)
         origin = origin or OriginSettings().params()
         self._navigation = NavigationScorer(origin, reckons=bool(topics))
         self._faults = FaultTimes(faults)
-        self._energy = EnergyScorer(energy)
+        self._energy = EnergyScorer(vehicle.energy if vehicle else None)
         self._readings = readings if readings and readings.is_noisy else None
         self._blocks: list[np.ndarray] = []
+        self._first: np.ndarray | None = None
         self._last: np.ndarray | None = None
         self._end: np.ndarray | None = None
 
@@ -163,6 +176,8 @@ class Scorer:
         _extract(log, series)
         series[_TOLD_E2] = told[:, _E2_COLUMN]
         self._blocks.append(series)
+        if self._first is None:
+            self._first = log[0].copy()
         self._last = log[-1].copy()
         at_end = np.flatnonzero(log[:, _STAGE_COLUMN] == AT_END_OF_PATH)
         if self._end is None and len(at_end):
@@ -185,19 +200,27 @@ class Scorer:
         dict
             The run's part of ``score.json``: ticks, settle_s, dives, distance_along_path_m,
             end_of_path_m, cross_track_m, pitch_error_deg, heading_fluctuation_deg, depth_m,
-            actuator_travel, energy, guard, faults, navigation, final_state, and ``infeasible``.
-            A figure without data is None.
+            actuator_travel, energy, guard, faults, navigation, final_state, and ``status`` and
+            ``reason`` of a run that was flown to its end. A figure without data is None.
         """
         series, ticks = self._series, self.ticks
         depth, e2 = series(_DEPTH), series(_E2)
+        told = told_by_guard(series(_GUARD))
+        flies = ~ends_mission(told) & ~(np.maximum.accumulate(depth) > self._crush_depth_m)
         steady, scored = windows(depth, series(_RATE_REF) > 0.0, rules, TICK_S)
+        steady &= flies
         pitch_error = np.degrees(series(_PITCH) - series(_PITCH_REF))
         heading = _heading_fluctuation_deg(series(_HEADING))
         whole = steady & _has_whole_mean(ticks)
         deepest = float(np.max(depth)) if ticks else None
         dives = _count_dives(depth, *dive_depths(rules.depth_m))
-        way_m, time_s = _length(series(_TARGET_N), series(_TARGET_E)), _round(ticks * TICK_S)
+        way_m, time_s = self._along_path_m(), _round(ticks * TICK_S)
+        held = ~(series(_INFEASIBLE)[scored & flies] > 0.0)
+        infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)
+        ended = outcome_of(depth, told, self._crush_depth_m, infeasible)
+        pace_m = way_m if ended.status in (COMPLETED, INFEASIBLE) else None
         return {
+            **ended._asdict(),
             'ticks': ticks,
             'sim_time_s': time_s,
             'settle_s': rules.settle_s,
@@ -218,17 +241,24 @@ class Scorer:
                 'overshoot': None if deepest is None else max(0.0, deepest - rules.depth_m),
             },
             'actuator_travel': self._actuator_travel(),
-            'energy': self._energy.result(time_s, dives, way_m),
-            'guard': _guard(series(_MASK)),
+            'energy': self._energy.result(time_s, dives, pace_m),
+            'guard': _guard(series(_MASK), self._has_weight),
             'faults': self._faults.result(),
             'navigation': self._navigation.result(
                 rules.navigation, _cross_track(series(_TOLD_E2), steady, scored)
             ),
             'final_state': self._final_state(),
-            'infeasible': bool(
-                scored.any() and np.mean(series(_INFEASIBLE)[scored]) >= INFEASIBLE_SHARE
-            ),
         }
+
+    def _along_path_m(self) -> float:
+        """Way of the vehicle along its path (m): that of its target, and how far off it ends."""
+        if self._last is None:
+            return 0.0
+        target = np.stack((self._series(_TARGET_N), self._series(_TARGET_E)), axis=1)
+        courses = self._course_rad, self._course_rad + math.pi  # looking ahead, looking back
+        ahead_m = _along_m(self._first, target, courses[0])
+        behind_m = _along_m(self._last, target[::-1], courses[1])
+        return _length(target) - ahead_m - behind_m
 
     def _actuator_travel(self) -> dict:
         """Ways that the actuators have gone, to and fro."""
@@ -238,7 +268,7 @@ class Scorer:
             'roll_mass_deg': math.degrees(_travel(self._series(_ROLL_MASS))),
         }
         if self._steers_by:
-            travel[f'{self._steers_by}_deg'] = math.degrees(_travel(self._series(_SURFACE)))
+            travel[f'{self._steers_by}_deg'] = math.degrees(_travel(self._series(_FIN)))
         return travel
 
     def _end_of_path_m(self, path_end: tuple[float, float] | None) -> float | None:
@@ -267,9 +297,9 @@ def make_scorer(scenario: Scenario) -> Scorer:
     if scenario.navigation.jumps:
         topics = ('fix', 'believed_current', 'current_velocity')
     sensors, origin = scenario.sensors.params(scenario.seed), scenario.origin.params()
-    energy = load_vehicle(scenario.vehicle).energy
-    readings = make_readings(load_vehicle(scenario.vehicle).params(), scenario.seed)
-    return Scorer(sensors, origin, topics, steers_by(scenario), scenario.faults, energy, readings)
+    vehicle, course_rad = load_vehicle(scenario.vehicle), scenario.path.course_rad()
+    readings = make_readings(vehicle.params(), scenario.seed)
+    return Scorer(sensors, origin, topics, scenario.faults, vehicle, readings, course_rad)
 
 
 def scores_of(scenario: Scenario, scorer: Scorer) -> dict:
@@ -287,7 +317,7 @@ def _cross_track(e2: np.ndarray, steady: np.ndarray, scored: np.ndarray) -> dict
     }
 
 
-def _guard(mask: np.ndarray) -> dict:
+def _guard(mask: np.ndarray, has_weight: bool) -> dict:
     """What the guard noticed in flight and did, and what control refused, as they told it.
 
     Parameters
@@ -295,6 +325,8 @@ def _guard(mask: np.ndarray) -> dict:
     mask : float64[ticks]
         Sum of the bits of `glider_guard.rows` and of `glider_control`. Before there was a guard
         they were told together.
+    has_weight : bool
+        The vehicle can drop a weight: one that cannot does no more than surface.
 
     Returns
     -------
@@ -302,7 +334,8 @@ def _guard(mask: np.ndarray) -> dict:
         state: flying, or latched; reaction at the end; and the first `EVENTS_KEPT` events
         {t_s, row, reaction, message}.
     """
-    rows = {row.bit: (row.name, REACTIONS[row.reaction], row.says) for row in ROWS}
+    gravest = DROP if has_weight else SURFACE
+    rows = {row.bit: (row.name, REACTIONS[min(row.reaction, gravest)], row.says) for row in ROWS}
     rows[REFUSED] = ('measurement_refused', REACTIONS[NOTE], REFUSED_SAYS)
     bits = mask.astype(np.int64) & (ALL | REFUSED)
     stamps_ns = np.arange(len(bits)) * TICK_NS
@@ -318,7 +351,7 @@ def _guard(mask: np.ndarray) -> dict:
         ]
     return {
         'state': 'latched' if before & LATCHED else 'flying',
-        'reaction': REACTIONS[reaction_of(before)],
+        'reaction': REACTIONS[min(reaction_of(before), gravest)],
         'events': events[:EVENTS_KEPT],
     }
 
@@ -376,9 +409,23 @@ def _count_dives(depth: np.ndarray, below_m: float, above_m: float) -> int:
     return int(np.count_nonzero((zone[:-1] == 1) & (zone[1:] == -1)))
 
 
-def _length(north: np.ndarray, east: np.ndarray) -> float:
-    """Horizontal way of the virtual target along the path (m)."""
-    return float(np.sum(np.hypot(np.diff(north), np.diff(east))))
+def _length(target: np.ndarray) -> float:
+    """Horizontal way of the virtual target, float64[n, 2], along the path (m)."""
+    return float(np.sum(np.hypot(*np.diff(target, axis=0).T)))
+
+
+def _along_m(row: np.ndarray, target: np.ndarray, course_rad: float) -> float:
+    """How far the vehicle of a log row is from the first of some targets towards the others (m).
+
+    That is on the course to the first of them that is away by `COURSE_M`, or else ``course_rad``.
+    """
+    away = target - target[0]
+    far = np.flatnonzero(np.hypot(*away.T) > COURSE_M)
+    towards = np.array([math.cos(course_rad), math.sin(course_rad)])
+    if len(far):
+        towards = away[far[0]] / np.hypot(*away[far[0]])
+    odometry = odometry_from_wire(tuple(float(x) for x in row[_ODOM]))
+    return float(towards @ (odometry.p_n - target[0, 0], odometry.p_e - target[0, 1]))
 
 
 def _travel(position: np.ndarray) -> float:

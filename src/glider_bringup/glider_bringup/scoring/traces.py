@@ -31,9 +31,9 @@ from glider_model.vehicle.file import VehicleParams, load_vehicle
 #: Most buckets that are kept of a run.
 BUCKETS = 2**15
 #: Topics that traces are made from, beside those that the score needs.
-TRACED = ('current_velocity', 'current_estimate', 'command', 'adaptation')
+TRACED = ('current_velocity', 'current_estimate', 'command', 'adaptation', 'battery')
 #: Of what is kept: changes with names and meaning.
-VERSION = 2
+VERSION = 3
 
 _FLAGS = (
     *('buoyancy_engine_at_limit', 'pitch_mass_at_limit', 'roll_mass_at_limit'),
@@ -48,6 +48,7 @@ CURVES = (
     *('buoyancy_engine_kg', 'pitch_mass_mm', 'roll_mass_deg'),
     *('buoyancy_engine_ref_kg', 'pitch_mass_ref_mm', 'roll_mass_ref_deg'),
     *('surface_deg', 'surface_ref_deg'),  # of a vehicle with a steering surface
+    'battery_percent',  # of one that tells of its battery
     *('descending', *_FLAGS),
     *Adaptation._fields,
     *(f'measured_{name}' for name in _MEASURED),
@@ -271,6 +272,10 @@ def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[
             'surface_deg': np.degrees(joints[:, 3]),
             'surface_ref_deg': np.degrees(command[:, 3]),
         }
+    battery = {}
+    left = log[:, COLUMNS['battery']][:, -1]
+    if np.any(left >= 0.0):  # less than nothing is not known
+        battery = {'battery_percent': np.where(left >= 0.0, 100.0 * left, np.nan)}
     _unwrap(odom[:, 5], reference[:, 5], heading_before)
     return {
         'depth_m': odom[:, 2],
@@ -293,6 +298,7 @@ def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[
         'pitch_mass_ref_mm': 1e3 * command[:, 1],
         'roll_mass_ref_deg': np.degrees(command[:, 2]),
         **surface,
+        **battery,
         'descending': np.where(np.isfinite(rising), rising < 0.0, np.nan),
         'buoyancy_engine_at_limit': held[0],
         'pitch_mass_at_limit': held[1],

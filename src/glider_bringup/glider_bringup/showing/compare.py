@@ -7,6 +7,8 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from glider_bringup.mission.scenario import told_fields
+from glider_bringup.scoring.card import STOPPED
 from glider_bringup.showing.panels import ACTUATORS, SURFACE
 from glider_bringup.showing.scorecard import guard_texts, reckoned, show
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page, page_data
@@ -85,7 +87,9 @@ def differences(runs: list[FlownRun]) -> list[dict[str, Any]]:
     """
     flat = []
     for run in runs:
-        values = run.scenario.model_dump(mode='json', exclude={'vehicle', 'description'})
+        values = run.scenario.model_dump(
+            mode='json', exclude={'vehicle', 'description', 'changed'}
+        )
         vehicle = run.vehicle.model_dump(mode='json', exclude={'description'})
         flat.append(dict(_fields({**values, 'vehicle': vehicle})))
     names = dict.fromkeys(name for fields in flat for name in fields)
@@ -155,8 +159,22 @@ FIGURES = (
     Figure('believed place, surfacing, p95', (*_PLACE, 'p95'), 'm', 1, True),
     Figure('believed place, surfacing, worst', (*_PLACE, 'worst'), 'm', 1, True),
     Figure('cross-track believed, steady, max', (*_BELIEVED, 'max_steady'), 'm', 3),
-    Figure('mean current learnt, error, rms', (*_DAC, 'rms'), 'kn', 3, True, 1.0 / KNOT_MPS),
-    Figure('inside the 95 % ellipse', (_NAVIGATION, 'ellipse_95_share'), '%', 0, False, 100.0),
+    Figure(
+        name='mean current learnt, error, rms',
+        keys=(*_DAC, 'rms'),
+        unit='kn',
+        digits=3,
+        less_is_better=True,
+        scale=1.0 / KNOT_MPS,
+    ),
+    Figure(
+        name='inside the 95 % ellipse',
+        keys=(_NAVIGATION, 'ellipse_95_share'),
+        unit='%',
+        digits=0,
+        less_is_better=False,
+        scale=100.0,
+    ),
     Figure('pitch error, steady, rms', (_PITCH, 'rms_steady'), 'deg', 3, True),
     Figure('pitch error, steady, max', (_PITCH, 'max_steady'), 'deg', 3, True),
     Figure('heading fluctuation, rms', (_HEADING, 'rms_steady'), 'deg', 3, True),
@@ -218,7 +236,8 @@ def _best(figure: Figure, cards: list[dict[str, Any]]) -> float | None:
 
 
 def _was_stopped(card: dict[str, Any]) -> bool:
-    return card['status'] in ('aborted', 'failed')
+    """Whether a run ended before its mission did."""
+    return card['status'] in ('surfaced', 'lost', *STOPPED)
 
 
 def _cells(figure: Figure, cards: list[dict[str, Any]]) -> list[Cell]:
@@ -248,6 +267,10 @@ def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
         ),
         told('engine', lambda card: f'{card["engine"] or "not known"}, seed {card["seed"]}'),
     ]
+    if any(card.get('changed') for card in cards):
+        rows.append(
+            told('changed', lambda card: told_fields(card.get('changed', {})) or 'nothing')
+        )
     if any(map(reckoned, cards)):
         rows.append(
             told('navigation', lambda card: (reckoned(card) or {'method': 'known'})['method'])
@@ -281,7 +304,7 @@ def caveats(cards: list[dict[str, Any]]) -> list[str]:
             f'The runs last from {span(min(times))} to {span(max(times))}: their scores are of '
             'different times, and each curve ends where its run does.'
         )
-    for status in ('aborted', 'failed'):
+    for status in ('lost', 'surfaced', *STOPPED):
         stopped = sum(card['status'] == status for card in cards)
         if stopped:
             found.append(f'{status.capitalize()} before its end: {stopped} of {len(cards)} runs.')

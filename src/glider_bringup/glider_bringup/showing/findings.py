@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from glider_bringup.mission.rules import STEADY_DEPTH_M
+from glider_bringup.scoring.card import STOPPED
 from glider_bringup.scoring.traces import Traces
 from glider_bringup.showing.panels import actuators_of
 from glider_bringup.showing.scorecard import fault_texts, guard_texts, reckoned
@@ -16,8 +17,10 @@ from glider_bringup.showing.words import count, small, span, way
 from glider_model.base.signals import TICK_S
 from glider_model.ocean.current_settings import KNOT_MPS
 
-#: A track is lost if the vehicle is farther off its path than this until the end (m).
+#: Farther off than this (m) something went wrong, and a track that is until the end is lost.
 LOST_M = 100.0
+#: No vehicle rolls farther than this in flight (deg).
+ROLLED_DEG = 60.0
 #: A current is learnt from the surfacing on after which the vehicle comes up no farther off its
 #: path than this share of the first time.
 LEARNT_SHARE = 0.1
@@ -27,34 +30,53 @@ UNLIKELY = 1e-3
 
 
 def verdict(card: dict[str, Any], settle_s: float) -> str:
-    """What happened, in a sentence or two."""
+    """What happened, in some sentences: how it ended, how bad it was, what was flown."""
     if not card['ticks']:
         return f'It ended before the first tick: {card["reason"] or "no reason is known"}.'
+    texts = [_ended(card), _worst(card), _flown(card), _steady(card, settle_s)]
+    if card.get('end_of_path_m') is not None:
+        texts.append(f'It came up {small(card["end_of_path_m"])} from the end of the path.')
+    return ' '.join(filter(None, texts))
+
+
+def _ended(card: dict[str, Any]) -> str:
+    """How a run ended that is not complete; empty of one that is."""
+    status = card['status']
+    if status in STOPPED:
+        return f'Stopped after {span(card["sim_time_s"])}: {card["reason"]}.'
+    if status == 'infeasible':
+        return 'The current was too strong to hold the course for half of the time or more.'
+    return '' if status == 'completed' else f'{status.capitalize()}: {card["reason"]}.'
+
+
+def _worst(card: dict[str, Any]) -> str:
+    """Largest errors of the whole run, settling and turns included."""
+    off, texts = card['cross_track_m'].get('max_run'), []
+    if off is not None:
+        texts.append(f'it was {small(off)} off its path')
+    place = ((reckoned(card) or {}).get('error_m') or {}).get('worst')
+    if place is not None:
+        texts.append(f'came up {small(place)} from where it believed to be')
+    return f'At worst {" and ".join(texts)}.' if texts else ''
+
+
+def _flown(card: dict[str, Any]) -> str:
+    """What was flown."""
     time, along = span(card['sim_time_s']), way(card['distance_along_path_m'])
-    depth = f'{card["depth_m"]["max"]:,.0f} m'
-    dives = card['dives']
+    depth, dives = f'{card["depth_m"]["max"]:,.0f} m', card['dives']
     flown = f'{count(dives, "dive")} to {depth}' if dives else f'Down to {depth}'
-    text = f'{flown}, {along} along the path in {time}.'
-    if card['status'] in ('aborted', 'failed'):
-        text = f'Stopped after {time}: {card["reason"]}. Until then: {flown[0].lower()}{flown[1:]}'
-        text += f', {along} along the path.'
-    if card['status'] == 'infeasible':
-        text += ' The current was too strong to hold the course for half of the time or more.'
+    return f'{flown}, {along} along the path in {time}.'
+
+
+def _steady(card: dict[str, Any], settle_s: float) -> str:
+    """Errors where nothing disturbs: in steady glide, or at least after settling."""
     track = card['cross_track_m']
     if track['max_steady'] is not None:
-        text += (
-            f' In steady glide it stayed within {small(track["max_steady"])} of the path '
-            f'(rms {small(track["rms_steady"])}).'
-        )
-    elif track['max_all'] is not None:
-        text += f' After settling it was at most {small(track["max_all"])} off the path.'
-    else:
-        text += f' It ended within the settling time of {span(settle_s)}, so errors have no score.'
-    if track.get('max_run') is not None:
-        text += f' In the whole run, settling and turns included: {small(track["max_run"])}.'
-    if card.get('end_of_path_m') is not None:
-        text += f' It came up {small(card["end_of_path_m"])} from the end of the path.'
-    return text
+        within, rms = small(track['max_steady']), small(track['rms_steady'])
+        return f'In steady glide it stayed within {within} of the path (rms {rms}).'
+    if track['max_all'] is not None:
+        return f'After settling it was at most {small(track["max_all"])} off the path.'
+    return f'It ended within the settling time of {span(settle_s)}, so errors have no score.'
 
 
 def lost_since_s(traces: Traces) -> float | None:
@@ -126,6 +148,24 @@ def _came_up(off: list[float], learns: bool) -> str:
     )
 
 
+def _how_bad(card: dict[str, Any], traces: Traces) -> tuple[list[str], list[str]]:
+    """How the run ended, if not as it was to, and its largest errors: problems, and notes."""
+    problems, notes = [], []
+    if card['status'] in STOPPED:
+        ended = 'was aborted' if card['status'] == 'aborted' else 'failed'
+        problems.append(f'The run {ended} at {span(card["sim_time_s"])}: {card["reason"]}.')
+    elif card['status'] in ('lost', 'surfaced'):
+        problems.append(_ended(card))
+    place = ((reckoned(card) or {}).get('error_m') or {}).get('worst') or 0.0
+    worst = max(card['cross_track_m'].get('max_run') or 0.0, place)
+    if worst > 0.0:
+        (problems if worst > LOST_M else notes).append(_worst(card))
+    roll_deg = traces.largest('roll_deg')
+    if roll_deg > ROLLED_DEG:
+        problems.append(f'It rolled by {roll_deg:.0f} deg.')
+    return problems, notes
+
+
 def findings(run: FlownRun) -> list[tuple[str, str]]:
     """What went wrong, and what is worth a look: kind (problem, note, fine) and sentence."""
     card, traces = run.card, run.traces
@@ -137,12 +177,9 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
         return f'{span(ticks * TICK_S)} ({100.0 * ticks / traces.ticks:.2g} % of the time)'
 
     told = reckoned(card)
-    problems, notes = [], []
+    problems, notes = _how_bad(card, traces)
     if told:
         notes += navigation_notes(told, run.scenario.navigation.current != 'none')
-    if card['status'] in ('aborted', 'failed'):
-        ended = 'was aborted' if card['status'] == 'aborted' else 'failed'
-        problems.append(f'The run {ended} at {at(card["sim_time_s"])}: {card["reason"]}.')
     notes += [f'Broken on purpose: {text}.' for text in fault_texts(card)]
     problems += [f'The guard, {text}.' for text in guard_texts(card)]
     if card['messages_lost']:

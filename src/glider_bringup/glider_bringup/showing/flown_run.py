@@ -5,7 +5,12 @@
 from pathlib import Path
 
 from glider_bringup.mission.disk import write_whole
-from glider_bringup.mission.run_folder import SCENARIO_FILE, TRACES_FILE, scenario_of
+from glider_bringup.mission.run_folder import (
+    SCENARIO_FILE,
+    SCORE_FILE,
+    TRACES_FILE,
+    scenario_of,
+)
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.recording.bag_files import has_bag
 from glider_bringup.recording.mcap_reader import Bag
@@ -42,6 +47,7 @@ def read_run(
     bag = Bag(run) if has_bag(run) else None
     with scenario_of(run, bag.attachments if bag else {}) as found:
         scenario = found.scenario
+        _refuse_another(card, scenario, found.source)
         is_kept = card and (not traced or kept.is_file())
         if is_kept and (bag is None or _covers(bag, card)):
             traces = load_traces(kept) if traced else None
@@ -57,6 +63,23 @@ def read_run(
         return flown_run(run, scenario, found.text, card, traces)
 
 
+def _refuse_another(card: dict, scenario: Scenario, source: str) -> None:
+    """Refuse a scenario of which the scorecard of the run says that it was not flown."""
+    flown = {
+        'scenario': scenario.name,
+        'vehicle': load_vehicle(scenario.vehicle).name,
+        'controller': scenario.control.law,
+        'guidance': scenario.guidance.los.method,
+        'seed': scenario.seed,
+    }
+    for name, value in flown.items():
+        if card and card[name] != value:
+            raise ConfigurationError(
+                f'{source}: {name} = {value!r}: not what was flown (allowed: {card[name]!r}, by '
+                f'{SCORE_FILE})'
+            )
+
+
 def _covers(bag: Bag, card: dict) -> bool:
     """Whether a bag goes as far as the scorecard of its run."""
     return not bag.cut and bag.end_ns >= (card['ticks'] - 1) * TICK_NS
@@ -68,7 +91,15 @@ def flown_run(
     """A run with its name and vehicle."""
     vehicle = load_vehicle(scenario.vehicle)
     rules = scenario.score_rules(card['sim_time_s'])
-    return FlownRun(run.resolve().name, scenario, as_flown, vehicle, card, traces, rules)
+    return FlownRun(
+        label=run.resolve().name,
+        scenario=scenario,
+        as_flown=as_flown,
+        vehicle=vehicle,
+        card=card,
+        traces=traces,
+        rules=rules,
+    )
 
 
 def keep_traces(scenario: Scenario, folder: Path, card: dict, tracer: Tracer) -> FlownRun:
@@ -105,5 +136,5 @@ def draw(run: Path, file: Path, progress: Reading = lambda ticks, total: None) -
         If it holds no run, or the image cannot be written.
     """
     flown = read_run(run, progress)
-    title = f'{flown.scenario.name}: {flown.scenario.description}'
+    title = f'{flown.scenario.name}: {flown.scenario.described}'
     draw_run(flown.traces, title, file)

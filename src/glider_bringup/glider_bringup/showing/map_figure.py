@@ -143,8 +143,8 @@ def draw_map(stability: StabilityMap, file: Path) -> None:
 def _title(name: str, share: dict[str, Any]) -> str:
     """Name of a panel, and how much of it is stable."""
     held = share['stable_of_feasible']
-    of = 'no cell is feasible' if held is None else f'{held:.0%} of the feasible'
-    stable = f'stable: {share[STABLE]:.0%} of all cells,\n{of}'
+    of = 'no cell is feasible' if held is None else f'{held:.1%} of the feasible'
+    stable = f'stable: {share[STABLE]:.1%} of all cells,\n{of}'
     return f'{name.replace("_", " ")}\n{stable}' if name else stable
 
 

@@ -82,6 +82,15 @@ _LEARNT = (
         ('lyapunov_1', 'lyapunov_2'),
     ),
 )
+_BATTERY = Panel(
+    'battery',
+    'Battery',
+    'Charge that is left, as the battery tells it.',
+    'battery (%)',
+    (Curve('battery_percent', 'left', 'measured'),),
+)
+#: Heading over what is known of each surfacing.
+SURFACINGS = 'Each surfacing'
 _ROLES = ('measured', 'reference', 'third', 'fourth')
 
 
@@ -174,6 +183,21 @@ def _flight_panels(run: FlownRun) -> list[Panel]:
     ]
 
 
+def _surfacing_panels(run: FlownRun) -> list[Panel]:
+    """Where it came up, around where it believed to be; nothing without a surfacing."""
+    if not (reckoned(run.card) or {}).get('reports'):
+        return []
+    return [
+        Panel(
+            'places',
+            'Where it came up, around where it believed to be',
+            'From above, each to its own scale, in metres east and north of the believed place, '
+            'before the first fix. Of many surfacings those that were farthest off.',
+            kind='places',
+        )
+    ]
+
+
 def _navigation_panels(run: FlownRun) -> list[Panel]:
     """Where the vehicle was, and where it believed to be; nothing of one that knows its place."""
     told = reckoned(run.card)
@@ -184,8 +208,8 @@ def _navigation_panels(run: FlownRun) -> list[Panel]:
         Panel(
             'plan',
             'True and believed track',
-            'From above; north and east each have a scale of their own. Drag a box to zoom in. '
-            'Numbers: surfacings, as in the table.',
+            'From above, not to scale: north and east each have one of their own. Drag a box to '
+            'zoom in. Numbers: surfacings, as in the table.',
             kind='plan',
         ),
         Panel(
@@ -340,10 +364,11 @@ def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
     if not run.traces.ticks:
         return {}
     groups = {
+        SURFACINGS: _surfacing_panels(run),
         'Where it went': _maps(),
         'How it knew where it was': _navigation_panels(run),
         'How it flew': _flight_panels(run),
-        'What the actuators did': _actuator_panels(run),
+        'What the actuators did, and the battery': [*_actuator_panels(run), _BATTERY],
         'What the guard did': _guard_panels(run),
         'The current': _current_panels(run),
         'What control learnt': _learnt_panels(run),

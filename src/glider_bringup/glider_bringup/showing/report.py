@@ -2,22 +2,34 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report of a run: one web page that says what happened, to someone who was not there."""
 
+import math
 from typing import Any
 
+from glider_bringup.mission.scenario import told_fields
+from glider_bringup.scoring.dives import dives_of
 from glider_bringup.showing.findings import findings, verdict
-from glider_bringup.showing.panels import report_panels
+from glider_bringup.showing.panels import SURFACINGS, report_panels
 from glider_bringup.showing.scorecard import card_rows, reckoned
 from glider_bringup.showing.web_page import FlownRun, make_page, page_data
 from glider_bringup.showing.words import count, span, way
 from glider_model.base.files import yaml_text
+from glider_model.base.signals import TICK_S
 from glider_model.ocean.current_settings import KNOT_MPS
 
 _BADGES = {
     'completed': '✓ Completed',
+    'surfaced': '! Surfaced',
+    'lost': '✕ Lost',
     'infeasible': '! Infeasible',
     'aborted': '✕ Aborted',
     'failed': '✕ Failed',
 }
+
+
+def _title(run: FlownRun) -> str:
+    """Name of what was flown, and what was changed in it."""
+    changed = told_fields(run.scenario.changed)
+    return f'{run.scenario.name} with {changed}' if changed else run.scenario.name
 
 
 def _number(value: float | None, digits: int, unit: str) -> str:
@@ -30,10 +42,19 @@ def _tiles(run: FlownRun) -> list[tuple[str, str, str]]:
     card, depth_m = run.card, run.scenario.profile.depth_m
     track, pitch = card['cross_track_m'], card['pitch_error_deg']
     heading, depth = card['heading_fluctuation_deg'], card['depth_m']
+    speed = card['distance_along_path_m'] / max(TICK_S, card['sim_time_s'])
     beyond = f'{_number(depth["overshoot"], 1, "m")} beyond {_number(depth_m, 0, "m")}'
     return [
-        ('simulated time', span(card['sim_time_s']), f'{card["ticks"]:,} ticks of 0.1 s'),
-        ('along the path', way(card['distance_along_path_m']), count(card['dives'], 'dive')),
+        (
+            'simulated time',
+            span(card['sim_time_s']),
+            count(card['dives'], 'dive') if card['dives'] else '',
+        ),
+        (
+            'along the path',
+            way(card['distance_along_path_m']),
+            f'{speed:.2f} m/s on average',
+        ),
         (
             'cross-track, steady',
             _number(track['max_steady'], 2, 'm'),
@@ -63,7 +84,7 @@ def _what_was_set(run: FlownRun) -> str:
 
     So are those of the vehicle that are not as in its file.
     """
-    told = {'name', 'vehicle', 'description'}
+    told = {'name', 'vehicle', 'description', 'changed'}
     values = run.scenario.model_dump(mode='json', exclude_defaults=True, exclude=told)
     named = {'name': run.scenario.name, 'vehicle': run.card['vehicle']}
     changed = {f'vehicle.{field}': value for field, value in run.vehicle.changed().items()}
@@ -110,22 +131,55 @@ def _surfacings(card: dict[str, Any]) -> list[list[str]]:
     return [list(_SURFACING), *lines] if lines else []
 
 
+#: Head of the table of dives.
+_DIVE = (
+    *('', 'from', 'lasted', 'deepest (m)', 'way made good (m)', 'over ground (m/s)'),
+    *('largest off the path (m)', 'battery left (%)'),
+)
+
+
+def _dives(run: FlownRun) -> list[list[str]]:
+    """Head and lines of the table of dives; empty without one."""
+    if not run.traces.ticks:
+        return []
+    lines = []
+    for number, one in enumerate(dives_of(run.traces), 1):
+        lasted_s = one.to_s - one.from_s
+        left = '-' if math.isnan(one.battery_percent) else f'{one.battery_percent:.1f}'
+        lines.append(
+            [
+                str(number),
+                span(one.from_s),
+                span(lasted_s),
+                f'{one.deepest_m:,.1f}',
+                f'{one.way_m:,.0f}',
+                f'{one.way_m / lasted_s:.3f}',
+                f'{one.off_path_m:,.1f}',
+                left,
+            ]
+        )
+    return [list(_DIVE), *lines] if lines else []
+
+
 def report_page(run: FlownRun) -> str:
     """Text of the report of a run."""
     card, rules = run.card, run.rules
     sections = report_panels(run)
+    data = page_data([run], [panel for group in sections.values() for panel in group])
     return make_page(
         'report.html',
-        page_data([run], [panel for group in sections.values() for panel in group]),
-        title=f'{run.scenario.name}: {card["status"]}',
+        data,
+        title=f'{_title(run)}: {card["status"]}',
         scenario=run.scenario,
         status=card['status'],
         badge=_BADGES[card['status']],
         verdict=verdict(card, rules.settle_s),
         tiles=_tiles(run),
         findings=findings(run),
+        first={SURFACINGS: sections.pop(SURFACINGS)} if SURFACINGS in sections else {},
         sections=sections,
         surfacings=_surfacings(card),
+        dives=_dives(run),
         card=card_rows(card),
         settle=span(rules.settle_s),
         margin=span(rules.margin_s),

@@ -9,8 +9,19 @@ from rich.console import Console
 from rich.table import Table
 
 from glider_bringup.console import output
+from glider_bringup.mission.scenario import told_fields
 from glider_bringup.scoring.card import CARD_GROUPS
 from glider_model.ocean.current_settings import KNOT_MPS
+
+#: Colours of what became of a run.
+STYLES = {
+    'completed': 'green',
+    'infeasible': 'yellow',
+    'surfaced': 'yellow',
+    'lost': 'bold red',
+    'aborted': 'red',
+    'failed': 'red',
+}
 
 
 def show(value: float | None, unit: str, digits: int = 2) -> str:
@@ -45,6 +56,11 @@ def _navigation_rows(told: dict) -> list[tuple[str, str]]:
     ]  # fmt: skip
 
 
+def status_text(card: dict) -> str:
+    """What became of a run, and why."""
+    return card['status'] + (f' ({card["reason"]})' if card['reason'] else '')
+
+
 def card_rows(card: dict) -> list[tuple[str, str]]:
     """Name and text of every line of a scorecard."""
     track, pitch = card['cross_track_m'], card['pitch_error_deg']
@@ -54,7 +70,7 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
     end_m, navigation = card.get('end_of_path_m'), reckoned(card)
     energy = card.get('energy') or {'wh': None}
     return [
-        ('status', card['status'] + (f' ({card["reason"]})' if card['reason'] else '')),
+        ('status', status_text(card)),
         ('flown', f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}'),
         ('engine', f'{card["engine"] or "not known"}, seed {card["seed"]}'),
         ('simulated time', show(card['sim_time_s'], 's', 1)),
@@ -90,12 +106,12 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
 def _energy_rows(told: dict) -> list[tuple[str, str]]:
     """Lines of what was taken out of the battery."""
     by = ', '.join(f'{name} {show(told["by"][name], "", 1)}' for name in told['by'])
-    return [
-        ('energy', f'{show(told["wh"], "Wh", 1)}: {by}; {show(told["wh_per_dive"], "Wh", 1)} a '
-         'dive'),
-        ('battery lasts', f'{show(told["endurance_days"], "days", 1)}, '
-         f'{show(told["range_km"], "km", 0)} at this pace'),
-    ]  # fmt: skip
+    a_dive = f'; {show(told["wh_per_dive"], "Wh", 1)} a dive' if told['wh_per_dive'] else ''
+    rows = [('energy', f'{show(told["wh"], "Wh", 1)}: {by}{a_dive}')]
+    if told['endurance_days'] is not None:  # else the mission ended: nothing goes on so
+        lasts, far = show(told['endurance_days'], 'days', 1), show(told['range_km'], 'km', 0)
+        rows.append(('battery lasts', f'{lasts}, {far} at this pace'))
+    return rows
 
 
 def _surface_travel(travel: dict) -> str:
@@ -134,11 +150,19 @@ def guard_texts(card: dict) -> list[str]:
 
 def print_card(card: dict, folder: Path, report: Path | None = None) -> None:
     """Print the scorecard for a person, and where the run and its report are."""
-    table = Table(title=card['scenario'], show_header=False, title_justify='left')
+    changed = told_fields(card.get('changed', {}))
+    title = f'{card["scenario"]} with {changed}' if changed else card['scenario']
+    table = Table(title=title, show_header=False, title_justify='left')
     for name, text in card_rows(card):
-        table.add_row(name, text)
+        table.add_row(name, text, style=STYLES[card['status']] if name == 'status' else None)
     output.print(table)
     print_places(output, folder, report)
+
+
+def print_status(card: dict) -> None:
+    """Print what became of a run."""
+    text = f'status: {status_text(card)}'
+    output.print(text, style=STYLES[card['status']], soft_wrap=True)
 
 
 def print_places(console: Console, folder: Path, report: Path | None) -> None:

@@ -102,15 +102,15 @@ def load_map(file: Path, by: str = 'steady') -> StabilityMap:
     horizontal_mps, vehicle = _horizontal_speed(file, data)
     speeds, angles = data[speed].values, data[angle].values
     return StabilityMap(
-        data.attrs['title'],
-        vehicle,
-        speeds,
-        angles,
-        panels,
-        classes.reshape(len(panels), len(speeds), len(angles)),
-        _feasible(horizontal_mps, speeds, angles),
-        horizontal_mps / KNOT_MPS,
-        measure,
+        title=data.attrs['title'],
+        vehicle=vehicle,
+        speed_kn=speeds,
+        angle_deg=angles,
+        panels=panels,
+        classes=classes.reshape(len(panels), len(speeds), len(angles)),
+        feasible=_feasible(horizontal_mps, speeds, angles),
+        horizontal_kn=horizontal_mps / KNOT_MPS,
+        measure=measure,
     )
 
 
@@ -148,8 +148,9 @@ def _classify(data: xarray.Dataset, measure: Measure) -> np.ndarray:
     classes = np.full(error.shape, CLASSES.index(LOST))
     classes[error <= measure.critical_m] = CLASSES.index(CRITICAL)
     classes[error <= measure.stable_m] = CLASSES.index(STABLE)
-    for name in (INFEASIBLE, FAILED):
-        classes[status == statuses.index(name)] = CLASSES.index(name)
+    for code, name in enumerate(statuses):
+        if name != 'completed':
+            classes[status == code] = CLASSES.index(INFEASIBLE if name == INFEASIBLE else FAILED)
     return classes
 
 

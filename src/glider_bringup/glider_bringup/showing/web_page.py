@@ -14,6 +14,7 @@ from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.traces import SAMPLES, Traces
 from glider_bringup.showing.scorecard import reckoned
+from glider_guidance.path.curve import path_length, path_point, path_tangent
 from glider_model.vehicle.file import Vehicle
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class Panel(NamedTuple):
     axis: str = ''  #: name and unit of the vertical axis
     curves: tuple[Curve, ...] = ()
     limits: tuple[float, ...] = ()  #: horizontal lines
-    kind: str = 'time'  #: time, track, space or plan
+    kind: str = 'time'  #: time, track, space, plan or places
     inflections: int = -1  #: run whose inflections are marked
     surfacings: int = -1  #: run whose surfacings are marked
     steps: tuple[Steps, ...] = ()
@@ -70,7 +71,7 @@ class Panel(NamedTuple):
         """How the style calls its shape: low, map, map plan, or none."""
         if self.kind == 'time':
             return 'low' if self.id.startswith('learnt') else ''
-        return 'map plan' if self.kind == 'plan' else 'map'
+        return 'map' if self.kind in ('track', 'space') else f'map {self.kind}'
 
 
 def pack(data: bytes) -> str:
@@ -99,7 +100,24 @@ class FlownRun(NamedTuple):
     traces: Traces | None  #: None if only the score is wanted
     rules: Rules  #: by which it is scored
 
-    def data(self, names: set[str], own_path: bool) -> dict[str, Any]:
+    def path_points(self) -> list[list[float]]:
+        """The desired path (m, NED): as far as it was followed, where it goes on at its end."""
+        path, samples = self.scenario.path, self.traces.samples
+        points = path.points(_PATH_POINTS)
+        if path.at_end == 'continue':
+            params = path.params()
+            end, ahead = np.array(
+                [f(path_length(params), params) for f in (path_point, path_tangent)]
+            )
+            north, east = (samples[f'track_{name}_m'] for name in ('north', 'east'))
+            along = (north - end[0]) * ahead[0] + (east - end[1]) * ahead[1]
+            beyond = float(np.max(along, initial=0.0, where=np.isfinite(along)))
+            beyond /= float(np.dot(ahead[:2], ahead[:2]))
+            if beyond > 0.0:
+                points = np.vstack((points, path_point(path_length(params) + beyond, params)))
+        return np.round(points, 2).tolist()
+
+    def data(self, names: set[str]) -> dict[str, Any]:
         """What the page's script needs of it: the curves of these names, track and path."""
         traces = self.traces
         arrays = {name: traces.curves[name] for name in sorted(names)} | {
@@ -107,14 +125,12 @@ class FlownRun(NamedTuple):
             for name in SAMPLES
             if not name.startswith('believed_') or np.any(np.isfinite(traces.samples[name]))
         }
-        points = self.scenario.path.points(_PATH_POINTS)
         return {
             'label': self.label,
             'spacing': traces.spacing_s,
             'packed': pack_arrays(arrays),
             'inflections': [round(float(time), 3) for time in traces.inflections_s()],
-            'path': np.round(points, 2).tolist(),
-            'own_path': own_path,
+            'path': self.path_points(),
             'faults': [one for one in self.card.get('faults', []) if one['t_s'] is not None],
             'surfacings': (reckoned(self.card) or {}).get('reports', []),
         }
@@ -129,10 +145,12 @@ def page_data(runs: list[FlownRun], panels: list[Panel]) -> dict[str, Any]:
     """What the page's script needs to draw these panels."""
     duration_s = max(run.card['sim_time_s'] for run in runs)
     unit, seconds = time_unit(duration_s)
-    paths = [run.scenario.path for run in runs]
     names: list[set[str]] = [set() for _ in runs]
     for curve in (curve for panel in panels for curve in panel.curves):
         names[curve.run] |= {curve.name, curve.flag} - {''}
+    drawn = [run.data(names[i]) for i, run in enumerate(runs)]
+    for i, run in enumerate(drawn):
+        run['own_path'] = run['path'] not in [other['path'] for other in drawn[:i]]
     return {
         'duration': duration_s,
         'unit': {'name': unit, 'seconds': seconds},
@@ -144,9 +162,7 @@ def page_data(runs: list[FlownRun], panels: list[Panel]) -> dict[str, Any]:
             }
             for panel in panels
         ],
-        'runs': [
-            run.data(names[i], run.scenario.path not in paths[:i]) for i, run in enumerate(runs)
-        ],
+        'runs': drawn,
     }
 
 

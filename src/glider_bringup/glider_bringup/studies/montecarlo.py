@@ -236,7 +236,8 @@ def make_scenarios(
 def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
     """Figures of one flight, and whether it diverged; a figure that is not finite is None.
 
-    A flight that failed has diverged, whatever it was like before.
+    A flight that failed, was lost, or could not hold its course has diverged, whatever it was
+    like before.
     """
     figures = {name: scores[group][field] for name, (group, field) in FIGURES.items()}
     numbers = [number for number in figures.values() if number is not None]
@@ -250,7 +251,7 @@ def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
     }
     failed = status == 'failed' or not finite
     told = scores['navigation']
-    diverged = failed or far or scores['infeasible']
+    diverged = failed or far or scores['status'] in ('infeasible', 'lost')
     return {
         'diverged': diverged,
         'outcome': outcome(scores, failed, diverged),

@@ -3,62 +3,135 @@
 """Faults drawn at random, and what became of flights with them."""
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pydantic
 
 from glider_model.plant.faults.settings import Fault, FaultSettings
 
-#: Fields of what is drawn, by kind: numbers between two limits, else one of some words.
 _MOVES = ('buoyancy_engine', 'pitch_mass', 'roll_mass')
-_SHOWS = ('attitude', 'heading', 'rates', 'depth', 'position')
-_SHARE = (0.05, 0.5)
+_SURFACE = 'steering_surface'
+#: What is shown, and the largest error that is drawn (deg, deg/s, m or m/s).
+_SHOWS = {
+    'attitude': 30.0,
+    'roll': 30.0,
+    'pitch': 30.0,
+    'heading': 180.0,
+    'rates': 30.0,
+    'depth': 300.0,
+    'position': 5000.0,
+    'velocity': 1.0,
+    'fix': 5000.0,
+}
+
+
+class Large(NamedTuple):
+    """A number of either sign whose size is drawn over three decades below the largest."""
+
+    largest: float | None  #: None: by what is measured
+
+
+class Decades(NamedTuple):
+    """A number between two limits, whose logarithm is drawn evenly."""
+
+    least: float
+    most: float
+
+
+#: Fields of what is drawn, by kind: numbers between two limits, sizes, or some words.
 DRAWN: dict[str, dict[str, Any]] = {
-    'leak': {'rate_kgps': (1e-5, 1e-3), 'limit_kg': (0.05, 1.0)},
-    'mass': {'mass_kg': (-0.3, 0.3)},
-    'fouling': {'drag': (1.1, 2.5), 'lift': (0.6, 1.0)},
+    'leak': {
+        'rate_kgps': Decades(1e-5, 1e-2),
+        'limit_kg': Decades(0.05, 3.0),
+        'detected': (True, False),
+    },
+    'mass': {'mass_kg': Large(1.0)},
+    'fouling': {'drag': (1.1, 4.0), 'lift': (0.3, 1.0)},
     'loose_roll_mass': {},
-    'gust': {'north_mps': (-1.0, 1.0), 'east_mps': (-1.0, 1.0)},
+    'gust': {'north_mps': (-1.0, 1.0), 'east_mps': (-1.0, 1.0), 'down_mps': Large(0.1)},
     'stuck': {'actuator': _MOVES},
-    'slow': {'actuator': _MOVES, 'rate': (0.05, 0.8)},
-    'offset': {'actuator': _MOVES, 'offset': (-0.3, 0.3)},
-    'partial': {'actuator': _MOVES, 'low': (-0.9, -0.2), 'high': (0.2, 0.9)},
-    'jam': {'actuator': _MOVES, 'period_s': (2.0, 600.0), 'share': (0.1, 0.9)},
+    'slow': {'actuator': _MOVES, 'rate': Decades(0.005, 0.8)},
+    'offset': {'actuator': _MOVES, 'offset': (-0.5, 0.5)},
+    'partial': {'actuator': _MOVES, 'low': (-0.9, -0.1), 'high': (0.1, 0.9)},
+    'jam': {'actuator': _MOVES, 'period_s': Decades(2.0, 3600.0), 'share': (0.1, 0.95)},
     'frozen': {'sensor': _SHOWS},
-    'biased': {'sensor': _SHOWS, 'error': (-20.0, 20.0)},
-    'spike': {'sensor': _SHOWS, 'error': (1.0, 1000.0), 'share': (0.0001, 0.1)},
-    'dropout': {'sensor': _SHOWS, 'share': _SHARE},
-    'noisier': {'sensor': _SHOWS, 'std': (0.1, 10.0)},
-    'compass': {'deviation_deg': (-20.0, 20.0), 'phase_deg': (-180.0, 180.0)},
+    'biased': {'sensor': _SHOWS, 'error': Large(None)},
+    'spike': {'sensor': _SHOWS, 'error': Decades(1.0, 1000.0), 'share': Decades(1e-4, 0.5)},
+    'dropout': {'sensor': _SHOWS, 'share': (0.05, 0.99)},
+    'noisier': {'sensor': _SHOWS, 'std': Decades(0.1, 30.0)},
+    'compass': {'deviation_deg': (-60.0, 60.0), 'phase_deg': (-180.0, 180.0)},
     'gps_silent': {},
-    'battery': {'drop_v': (1.0, 8.0)},
-    'vacuum': {'rate_paps': (1.0, 1000.0)},
+    'battery': {'drop_v': (1.0, 15.0)},
+    'vacuum': {'rate_paps': Decades(1.0, 1000.0)},
     'no_contact': {},
 }
 #: They begin within this share of the flight, and half of them end after a time between these (s).
-BEGINS = (0.05, 0.6)
-LASTS_S = (60.0, 3600.0)
+BEGINS = (0.0, 0.95)
+LASTS_S = Decades(10.0, 36000.0)
+#: Shares of them that wait for a phase, and for a depth.
+BY_PHASE, BY_DEPTH = 0.25, 0.25
+_PHASES = ('dive', 'turn', 'climb', 'surface')
 #: Sets the draw apart from that of the plant of the same seed.
 _STREAM = 13
 _FAULT = pydantic.TypeAdapter(Fault)
 
 
-def sample_faults(seed: int, count: int, duration_s: float) -> list[dict[str, Any]]:
-    """Draw faults of a flight of some length: fields of a scenario, rounded so as to be typed."""
+def sample_faults(
+    seed: int, count: int, duration_s: float, steered: bool = False, depth_m: float = 0.0
+) -> list[dict[str, Any]]:
+    """Draw faults: fields of a scenario, rounded so as to be typed.
+
+    Parameters
+    ----------
+    seed : int
+    count : int
+    duration_s : float
+        Time within which they begin (s).
+    steered : bool
+        The vehicle has a steering surface, which may break too.
+    depth_m : float
+        Depth of its dives (m), in which some of them begin; 0.0: by time alone.
+    """
     draw = np.random.Generator(np.random.PCG64([seed, _STREAM]))
-    return [_sample(draw, duration_s) for _ in range(count)]
+    return [_sample(draw, duration_s, steered, depth_m) for _ in range(count)]
 
 
-def _sample(draw: np.random.Generator, duration_s: float) -> dict[str, Any]:
+def _typed(number: float) -> float:
+    return float(f'{number:.4g}')
+
+
+def _number(draw: np.random.Generator, of: Any, largest: float) -> float:
+    if isinstance(of, Decades):
+        return _typed(of.least * (of.most / of.least) ** draw.random())
+    if isinstance(of, Large):
+        size = (of.largest or largest) * 10.0 ** -draw.uniform(0.0, 3.0)
+        return _typed(size if draw.random() < 0.5 else -size)
+    return _typed(draw.uniform(*of))
+
+
+def _sample(
+    draw: np.random.Generator, duration_s: float, steered: bool, depth_m: float
+) -> dict[str, Any]:
     kind = str(draw.choice(sorted(DRAWN)))
     fields: dict[str, Any] = {'kind': kind}
     for name, of in DRAWN[kind].items():
-        numbers = isinstance(of[0], float)
-        fields[name] = float(f'{draw.uniform(*of):.4g}') if numbers else str(draw.choice(of))
+        if name == 'actuator':
+            fields[name] = str(draw.choice([*of, _SURFACE] if steered else of))
+        elif name == 'sensor':
+            fields[name] = str(draw.choice(sorted(of)))
+        elif name == 'detected':
+            fields[name] = bool(draw.choice(of))
+        else:
+            fields[name] = _number(draw, of, _SHOWS.get(fields.get('sensor'), 1.0))
     fields['at_s'] = round(draw.uniform(*BEGINS) * duration_s, 1)
+    when = draw.random()
+    if depth_m and when < BY_PHASE + BY_DEPTH:
+        fields['phase'] = str(draw.choice(_PHASES))
+        if when < BY_DEPTH and fields['phase'] in ('dive', 'climb'):
+            fields['at_depth_m'] = round(draw.uniform(0.0, 1.0) * depth_m, 1)
     if draw.random() < 0.5:
-        fields['for_s'] = round(draw.uniform(*LASTS_S), 1)
+        fields['for_s'] = round(_number(draw, LASTS_S, 1.0), 1)
     return fields
 
 
@@ -68,10 +141,9 @@ def validated(fields: Iterable[dict[str, Any]]) -> list[FaultSettings]:
 
 
 def outcome(scores: dict, failed: bool, diverged: bool) -> str:
-    """What became of a flight, in a word or two: the worst that is true of it."""
+    """What became of a flight, in a word or two: its status, or that it was off its path."""
     if failed:
         return 'failed'
-    reaction = scores.get('guard', {}).get('reaction', 'none')
-    if reaction != 'none':
-        return f'guard: {reaction}'
-    return 'off its path' if diverged else 'flew on'
+    if scores['status'] != 'completed':
+        return scores['status']
+    return 'off its path' if diverged else 'completed'

@@ -91,14 +91,14 @@ class ChannelSettings(Settings):
     def params(self, inertia: float) -> 'ChannelParams':
         """Kernel parameters of a channel that turns an inertia (kg m^2)."""
         return ChannelParams(
-            self.l1_per_s,
-            self.b1,
-            self.b2,
-            self.gamma,
-            self.sigma_per_s,
-            self.dead_zone_radps,
-            self.bound,
-            inertia,
+            l1=self.l1_per_s,
+            b1=self.b1,
+            b2=self.b2,
+            gamma=self.gamma,
+            sigma=self.sigma_per_s,
+            dead_zone=self.dead_zone_radps,
+            bound=self.bound,
+            inertia=inertia,
         )
 
 
@@ -151,29 +151,29 @@ class AdaptiveSettings(LawSettings):
         steering = self.steering.params(bank.limit > 0.0, kernel_vehicle.slowest_glide)
         _, _, _, i_xx, i_yy, *_ = rigid_body(0.0, 0.0, kernel_vehicle)
         return AdaptiveParams(
-            self.roll.params(i_xx + kernel_vehicle.a_44),
-            self.pitch.params(i_yy + kernel_vehicle.a_55),
-            self.heading_kp_per_s,
-            self.heading_ki_per_s2,
-            self.heading_kd,
-            steering._replace(bank=min(steering.bank, math.sin(bank.limit))),
-            kernel_vehicle.m,
-            bank.limit,
-            bank.filter,
+            roll=self.roll.params(i_xx + kernel_vehicle.a_44),
+            pitch=self.pitch.params(i_yy + kernel_vehicle.a_55),
+            heading_kp=self.heading_kp_per_s,
+            heading_ki=self.heading_ki_per_s2,
+            heading_kd=self.heading_kd,
+            steering=steering._replace(bank=min(steering.bank, math.sin(bank.limit))),
+            mass=kernel_vehicle.m,
+            roll_limit=bank.limit,
+            roll_filter=bank.filter,
         )
 
     def initial_state(self) -> 'AdaptiveState':
         """State of a law that knows nothing yet."""
-        channel = ChannelState(Filtered(0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
+        channel = ChannelState(rate=Filtered(0.0, 0.0), xi=0.0, zeta=0.0, tau=0.0, k1=0.0, k2=0.0)
         return AdaptiveState(
-            Filtered(0.0, 0.0),
-            channel,
-            channel,
-            (0.0, 0.0, 0.0),
-            (0.0, 0.0, 0.0, 0.0),
-            self.steering.initial_state(),
-            0.0,
-            0.0,
+            roll=Filtered(0.0, 0.0),
+            roll_channel=channel,
+            pitch_channel=channel,
+            roll_theta=(0.0, 0.0, 0.0),
+            pitch_theta=(0.0, 0.0, 0.0, 0.0),
+            steering=self.steering.initial_state(),
+            disturbance_dive=0.0,
+            disturbance_climb=0.0,
         )
 
 
@@ -392,14 +392,18 @@ def adaptive_step(state, seen, params, dt):
             _project(th_q[3], phi_q[3] * k2bar_q, s, params.pitch, dt),
         )
     new_state = AdaptiveState(
-        roll,
-        ChannelState(rate_p, xi_p, zeta_p, tau_p, k1_p, k2bar_p),
-        ChannelState(rate_q, xi_q, zeta_q, tau_q, k1_q, k2bar_q),
-        th_p,
-        th_q,
-        steering,
-        d_dive,
-        d_climb,
+        roll=roll,
+        roll_channel=ChannelState(
+            rate=rate_p, xi=xi_p, zeta=zeta_p, tau=tau_p, k1=k1_p, k2=k2bar_p
+        ),
+        pitch_channel=ChannelState(
+            rate=rate_q, xi=xi_q, zeta=zeta_q, tau=tau_q, k1=k1_q, k2=k2bar_q
+        ),
+        roll_theta=th_p,
+        pitch_theta=th_q,
+        steering=steering,
+        disturbance_dive=d_dive,
+        disturbance_climb=d_climb,
     )
     return new_state, tau_p, tau_q
 
@@ -419,17 +423,17 @@ def adaptation(state, params):
     )
     th_p, th_q = state.roll_theta, state.pitch_theta
     return Adaptation(
-        th_p[0],
-        th_p[1],
-        th_p[2],
-        th_q[0],
-        th_q[1],
-        th_q[2],
-        th_q[3],
-        state.steering.dive.b,
-        state.disturbance_dive,
-        state.steering.climb.b,
-        state.disturbance_climb,
-        v_1,
-        v_2,
+        roll_bias_nm=th_p[0],
+        roll_side_force_nm=th_p[1],
+        roll_damping_nm=th_p[2],
+        pitch_bias_nm=th_q[0],
+        pitch_alpha_nm=th_q[1],
+        pitch_speed_nm=th_q[2],
+        pitch_damping_nm=th_q[3],
+        steering_dive_radps=state.steering.dive.b,
+        disturbance_dive_radps=state.disturbance_dive,
+        steering_climb_radps=state.steering.climb.b,
+        disturbance_climb_radps=state.disturbance_climb,
+        lyapunov_1=v_1,
+        lyapunov_2=v_2,
     )

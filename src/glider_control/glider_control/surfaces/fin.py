@@ -23,7 +23,7 @@ from pydantic import Field
 
 from glider_control.surface import SurfaceLawSettings, steer, surface_learnt
 from glider_model.base.frames import wrap_angle
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.signals import Adaptation
 from glider_model.onboard.learnt_steering import LEARN_SPEED, STEERING_SPEED
 from glider_model.vehicle.file import Vehicle
@@ -83,23 +83,33 @@ class FinLawSettings(SurfaceLawSettings):
     def params(self, vehicle: Vehicle) -> 'FinLawParams':
         """Kernel parameters for a vehicle whose fin is known."""
         return FinLawParams(
-            self.heading_kp_per_s,
-            self.heading_ki_per_s2,
-            self.heading_kd,
-            vehicle.fin.turn_rate.value,
-            math.radians(vehicle.fin.range.value),
-            self.share_drift**2 / 1000.0 if self.share_std > 0.0 else 0.0,
-            self.noise_radps,
-            self.correlation_s,
-            self.build_up_s,
-            self.smoothing_s,
-            self.lasting_s,
-            self.after_s,
+            heading_kp=self.heading_kp_per_s,
+            heading_ki=self.heading_ki_per_s2,
+            heading_kd=self.heading_kd,
+            turn_rate=vehicle.fin.turn_rate.value,
+            limit=math.radians(vehicle.fin.range.value),
+            share_drift=self.share_drift**2 / 1000.0 if self.share_std > 0.0 else 0.0,
+            noise=self.noise_radps,
+            correlation_s=self.correlation_s,
+            build_up_s=self.build_up_s,
+            smoothing_s=self.smoothing_s,
+            lasting_s=self.lasting_s,
+            after_s=self.after_s,
         )
 
     def initial_state(self) -> 'FinLawState':
         """Integral at zero, a fin as in the file."""
-        return FinLawState(0.0, 1.0, self.share_std**2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return FinLawState(
+            heading_integral=0.0,
+            share=1.0,
+            variance=self.share_std**2,
+            built_up=0.0,
+            sine=0.0,
+            turn=0.0,
+            lasting_sine=0.0,
+            lasting_turn=0.0,
+            steady_s=0.0,
+        )
 
 
 class FinLawParams(NamedTuple):
@@ -161,15 +171,15 @@ def learn_share(state, seen, params, dt):
         share = min(MOST_SHARE, max(LEAST_SHARE, share))
         variance -= variance * square / spread
     return FinLawState(
-        state.heading_integral,
-        share,
-        variance,
-        built_up,
-        sine,
-        turn,
-        lasting_sine,
-        lasting_turn,
-        steady_s,
+        heading_integral=state.heading_integral,
+        share=share,
+        variance=variance,
+        built_up=built_up,
+        sine=sine,
+        turn=turn,
+        lasting_sine=lasting_sine,
+        lasting_turn=lasting_turn,
+        steady_s=steady_s,
     )
 
 
@@ -195,18 +205,7 @@ def steer_by_fin(state, seen, params, dt):
     if abs(delta) < params.limit or delta * error < 0.0:
         moved = integral + dt * params.heading_ki * error
         integral = min(INTEGRAL_MAX, max(-INTEGRAL_MAX, moved))
-    state = FinLawState(
-        integral,
-        learnt.share,
-        learnt.variance,
-        learnt.built_up,
-        learnt.sine,
-        learnt.turn,
-        learnt.lasting_sine,
-        learnt.lasting_turn,
-        learnt.steady_s,
-    )
-    return state, min(params.limit, max(-params.limit, delta))
+    return replace(learnt, heading_integral=integral), min(params.limit, max(-params.limit, delta))
 
 
 @surface_learnt.body(FinLawParams)

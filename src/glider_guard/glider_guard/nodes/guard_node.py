@@ -54,10 +54,11 @@ class GuardNode(BlockNode):
         super().compile_kernels()
         self._come_up()
 
-    def _come_up(self) -> Joints:
-        """Command of a tick in which nothing is seen."""
-        m_b = self.state.taken.joints.m_b
-        self.ascent, command = come_up(self.ascent, 0.0, False, m_b, self.params.ascent, TICK_S)
+    def _come_up(self, cycles: int = 1) -> Joints:
+        """Command of a cycle, or of some at once, in which nothing is seen."""
+        m_b, limits = self.state.taken.joints.m_b, self.params.ascent
+        for _ in range(cycles):
+            self.ascent, command = come_up(self.ascent, 0.0, False, True, m_b, limits, TICK_S)
         return command
 
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
@@ -65,15 +66,15 @@ class GuardNode(BlockNode):
         self.stale_ticks, self.ascent = 0, INITIAL_ASCENT
         super().step(stamp_ns, *inputs)
 
-    def on_stale(self, stamp_ns: int) -> None:
+    def on_stale(self, stamp_ns: int, cycles: int) -> None:
         """Command what surfaces the vehicle, after a while for good."""
-        self.stale_ticks += 1
-        if self.stale_ticks == round(self.settings.lost_after_s / TICK_S):
+        before, self.stale_ticks = self.stale_ticks, self.stale_ticks + cycles
+        if before < round(self.settings.lost_after_s / TICK_S) <= self.stale_ticks:
             self.surface(SURFACE)
             said = f'input lost for {self.settings.lost_after_s:g} s: surfacing for good'
             self.event(stamp_ns, health.ERROR, said)
         publish_command = self.senders[0]
-        publish_command(stamp_ns, self._come_up())
+        publish_command(stamp_ns, self._come_up(cycles))
 
 
 def main(args=None) -> int:

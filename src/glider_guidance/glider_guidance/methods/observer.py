@@ -197,4 +197,11 @@ def observer_method_step(state, seen, params, dt):
         heading, _, _ = crab_heading(seen.course, seen.glide_speed, current.v_n, current.v_e)
     elif leg.turns_over:
         heading = seen.heading
-    return state, Asked(heading, elevation, speed, current.v_n, current.v_e, feasible)
+    return state, Asked(
+        heading=heading,
+        elevation=elevation,
+        speed=speed,
+        current_n=current.v_n,
+        current_e=current.v_e,
+        feasible=feasible,
+    )

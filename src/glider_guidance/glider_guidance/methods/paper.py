@@ -49,4 +49,11 @@ def paper_step(state, seen, params, dt):
     _, _, feasible = crab_heading(seen.course, seen.speed, current.v_n, current.v_e)
     if seen.leg.turns_over:
         heading = seen.heading
-    return state, Asked(heading, elevation, seen.speed, 0.0, 0.0, feasible)
+    return state, Asked(
+        heading=heading,
+        elevation=elevation,
+        speed=seen.speed,
+        current_n=0.0,
+        current_e=0.0,
+        feasible=feasible,
+    )

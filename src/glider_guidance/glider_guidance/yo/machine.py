@@ -20,14 +20,16 @@ from glider_guidance.yo.stage import (
     WAITING_ON_SURFACE,
     is_descending,
 )
-from glider_guidance.yo.turns import turn_lead_s
-from glider_model.base.kernel import kernel
+from glider_guidance.yo.turns import SLOW, turn_lead_m, turn_lead_s
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_S
 from glider_model.onboard.glide_polar import Polar, glide_vertical_rate
 
 #: Share of the glide's vertical rate at which the pitch goes over in a turn.
 PITCH_OVER = 0.5
+#: A vehicle that goes so fast (m/s) the new way, or at half of its glide's rate, has turned.
+TURNED_MPS = 0.05
 #: Largest lead that is believed, in leads by the vehicle's file.
 LEAD_RANGE = 6.0
 #: The flight model is believed this long after a glide began (s), or after this share of it.
@@ -43,12 +45,22 @@ class ProfileSettings(Settings):
         'profile',
         description='profile: sawtooth at fixed pitch over the path; path: full 3-D line of sight',
     )
-    depth_m: float = Field(1000.0, ge=10.0, le=12000.0, description='depth of the lower turn (m)')
+    depth_m: float = Field(
+        1000.0,
+        ge=10.0,
+        le=12000.0,
+        description='depth of the lower turn (m)',
+        json_schema_extra={'tunable': True},
+    )
     top_depth_m: float = Field(
         10.0, ge=2.0, le=1000.0, description='depth of the upper turn between dives (m)'
     )
     pitch_deg: float = Field(
-        30.0, ge=8.0, le=60.0, description='glide pitch, nose down diving and up climbing (deg)'
+        30.0,
+        ge=8.0,
+        le=60.0,
+        description='glide pitch, nose down diving and up climbing (deg)',
+        json_schema_extra={'tunable': True},
     )
     net_heaviness_kg: float = Field(
         0.4,
@@ -84,22 +96,26 @@ class ProfileSettings(Settings):
         rate = _mean_rate(dive_rate, climb_rate)
         top_depth = min(self.top_depth_m, 0.5 * self.depth_m)
         return ProfileParams(
-            self.mode == 'path',
-            self.depth_m,
-            top_depth,
-            pitch,
-            climb_pitch,
-            heavy,
-            light,
-            dive_rate,
-            climb_rate,
-            rate,
-            dives,
-            self.surface_every_dives,
-            round(self.prepare_s / TICK_S),
-            round(self.wait_s / TICK_S),
-            min(SETTLED_S, SETTLED_SHARE * (self.depth_m - top_depth) / rate),
-            2.0 / 3.0 * (heavy if light == heavy else 0.5 * (heavy + light)) / pump_rate_kgps,
+            follows_path=self.mode == 'path',
+            depth=self.depth_m,
+            top_depth=top_depth,
+            pitch=pitch,
+            climb_pitch=climb_pitch,
+            net_heaviness=heavy,
+            climb_net_heaviness=light,
+            dive_rate=dive_rate,
+            climb_rate=climb_rate,
+            glide_rate=rate,
+            dives=dives,
+            surface_every=self.surface_every_dives,
+            prepare_ticks=round(self.prepare_s / TICK_S),
+            wait_ticks=round(self.wait_s / TICK_S),
+            holds=False,
+            settled_s=min(SETTLED_S, SETTLED_SHARE * (self.depth_m - top_depth) / rate),
+            lead_s=2.0
+            / 3.0
+            * (heavy if light == heavy else 0.5 * (heavy + light))
+            / pump_rate_kgps,
         )
 
 
@@ -129,6 +145,13 @@ class ProfileParams(NamedTuple):
     wait_ticks: int
     settled_s: float  #: the flight model is believed this long after a glide began (s)
     lead_s: float  #: way left once the pump starts, over the speed, by the file's pump (s)
+    holds: bool  #: comes up, and waits at the surface
+
+
+@kernel
+def surfacing_every_dive(params):
+    """The same profile with a wait on the surface after every dive."""
+    return replace(params, surface_every=1)
 
 
 class ProfileState(NamedTuple):
@@ -141,9 +164,19 @@ class ProfileState(NamedTuple):
     lead_up_s: float  #: lead of the turn at depth, as learnt from the last one; 0: none yet (s)
     lead_down_s: float  #: lead of the upper turn
     turn_depth: float  #: planned lower turn of this dive, or of the next; 0: none is to come (m)
+    depth: float  #: of a dive, when that was planned (m)
 
 
-INITIAL_PROFILE = ProfileState(SURFACE_PREPARATION, 0, 0, False, 0.0, 0.0, math.inf)
+INITIAL_PROFILE = ProfileState(
+    stage=SURFACE_PREPARATION,
+    ticks=0,
+    dives=0,
+    aborted=False,
+    lead_up_s=0.0,
+    lead_down_s=0.0,
+    turn_depth=math.inf,
+    depth=math.inf,
+)
 #: Of a mission that does not end with its path.
 NO_END = WayLeft(math.inf, 0.0)
 
@@ -179,9 +212,15 @@ def look_ahead_s(params):
 def _next_stage(state, depth, vertical_rate, turn_depth, params):
     """Stage that follows from where the vehicle is; ``turn_depth`` is that of `coming_turn`."""
     stage = state.stage
-    lead = abs(vertical_rate) * turn_lead_s(state, params)
+    full = params.dive_rate if is_descending(stage) else params.climb_rate
+    is_first = state.lead_up_s == 0.0 and state.lead_down_s == 0.0
+    lead = turn_lead_m(vertical_rate, full, turn_lead_s(state, params), is_first)
     if state.aborted:
         return WAITING_ON_SURFACE if depth < AT_SURFACE_M else SURFACING
+    if params.holds and depth < AT_SURFACE_M:
+        return WAITING_ON_SURFACE
+    if params.holds and is_descending(stage):
+        return INFLECTING_UP
     is_over = turn_depth <= 0.0
     if stage == SURFACE_PREPARATION and is_over:
         return AT_END_OF_PATH
@@ -189,7 +228,10 @@ def _next_stage(state, depth, vertical_rate, turn_depth, params):
         return GLIDING_DOWN
     if stage == GLIDING_DOWN and depth + lead >= turn_depth:
         return INFLECTING_UP
-    if stage == INFLECTING_UP and vertical_rate < -0.05:
+    rises = vertical_rate < -min(TURNED_MPS, SLOW * params.climb_rate)
+    if stage == INFLECTING_UP and (rises or depth < AT_SURFACE_M):
+        return GLIDING_UP
+    if stage == GLIDING_UP and params.holds:
         return GLIDING_UP
     if stage == GLIDING_UP:
         done = state.dives + 1
@@ -199,8 +241,12 @@ def _next_stage(state, depth, vertical_rate, turn_depth, params):
         if last or (params.surface_every > 0 and done % params.surface_every == 0):
             return WAITING_ON_SURFACE if depth < AT_SURFACE_M else GLIDING_UP
         return INFLECTING_DOWN if depth - lead <= params.top_depth else GLIDING_UP
+    # one that never reaches its rate turns where it was sent all the same
+    if stage == INFLECTING_DOWN and vertical_rate > 0.0 and depth + lead >= turn_depth:
+        return INFLECTING_UP
     # a vehicle that came up to the surface bobs there before it sinks
-    if stage == INFLECTING_DOWN and vertical_rate > 0.05 and depth > 2.0 * AT_SURFACE_M:
+    sinks = vertical_rate > min(TURNED_MPS, SLOW * params.dive_rate)
+    if stage == INFLECTING_DOWN and sinks and depth > 2.0 * AT_SURFACE_M:
         return GLIDING_DOWN
     finished = params.dives > 0 and state.dives >= params.dives
     if stage == WAITING_ON_SURFACE and state.ticks >= params.wait_ticks and not finished:
@@ -221,6 +267,8 @@ def profile_step(state, depth, vertical_rate, left, params):
         What is left of the path; ``NO_END`` if the mission does not end with it.
     params : ProfileParams
     """
+    if state.depth != params.depth and is_descending(state.stage):  # another one since it began
+        state = replace(state, turn_depth=params.depth)
     planned = _planned_turn(state, depth, left, params)
     turn_depth = coming_turn(state, depth, left, params)
     stage = _next_stage(state, depth, vertical_rate, turn_depth, params)
@@ -235,11 +283,27 @@ def profile_step(state, depth, vertical_rate, left, params):
         elif stage == INFLECTING_DOWN and vertical_rate < -PITCH_OVER * params.climb_rate:
             down_s = took_s
         return ProfileState(
-            stage, state.ticks + 1, state.dives, state.aborted, up_s, down_s, planned
+            stage=stage,
+            ticks=state.ticks + 1,
+            dives=state.dives,
+            aborted=state.aborted,
+            lead_up_s=up_s,
+            lead_down_s=down_s,
+            turn_depth=planned,
+            depth=params.depth,
         )
-    climbed = state.stage == GLIDING_UP and not state.aborted
+    climbed = state.stage == GLIDING_UP and not params.holds and not state.aborted
     dives = state.dives + (1 if climbed else 0)
-    return ProfileState(stage, 0, dives, state.aborted, up_s, down_s, planned)
+    return ProfileState(
+        stage=stage,
+        ticks=0,
+        dives=dives,
+        aborted=state.aborted,
+        lead_up_s=up_s,
+        lead_down_s=down_s,
+        turn_depth=planned,
+        depth=params.depth,
+    )
 
 
 @kernel

@@ -9,6 +9,11 @@ from glider_model.base.kernel import kernel
 
 #: The desired track is led between these times before a turn, and comes back in this time (s).
 LEAD_FROM_S, LEAD_TO_S, RETURN_S = 400.0, 150.0, 240.0
+#: A vehicle slower than this share of its glide's vertical rate is not in its glide; one faster
+#: than this is heavier than its file says.
+SLOW, FAST = 0.5, 1.1
+#: That much more lead it gets at most: its rate, at a tick, may be noise.
+MOST_LEAD = 2.0
 
 
 @kernel
@@ -24,6 +29,20 @@ def turn_lead_s(state, params):
     if same_s > 0.0:
         return same_s
     return other_s if other_s > 0.0 else params.lead_s
+
+
+@kernel
+def turn_lead_m(vertical_rate, full, lead_s, is_first):
+    """Way (m) by which a turn is led.
+
+    The weight goes with the square of the rate, and the lead with the weight. A vehicle that goes
+    at less than half of its ``full`` vertical rate (m/s) has its pump nearly in the middle yet.
+    One that is heavier than its file says shows it before its first turn; later ones know.
+    """
+    rate = abs(vertical_rate)
+    share = rate / full
+    lead = rate * lead_s * min(1.0, share * share / (SLOW * SLOW))
+    return lead * min(MOST_LEAD, share * share) if is_first and share > FAST else lead
 
 
 @kernel

@@ -1,8 +1,12 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is told to a person: short, printable, whatever a file or an option holds."""
+"""What is told to a person: short, printable, whatever a file or an option holds.
+
+And how a process ends: its exit code, and the last words of a node that gives up.
+"""
 
 import reprlib
+import sys
 from typing import Any
 
 #: Lines that an error has at most, but for one that says how many more there are.
@@ -13,6 +17,21 @@ MAX_LINE = 900
 MAX_SHOWN = 80
 #: So many of the fields that were changed are told with what is wrong.
 CHANGES_TOLD = 4
+
+#: The machine or the result is to blame: a full disk, a failed flight, a vehicle that is lost,
+#: something that differs.
+EXIT_FAILED = 1
+#: What was asked for cannot be done: an option, a file, a parameter.
+EXIT_USAGE = 2
+#: A node: a peer is missing, late or wrong.
+EXIT_PEER = 3
+#: A flight: the guard ended the mission.
+EXIT_SURFACED = 3
+#: Stopped by SIGINT.
+EXIT_INTERRUPTED = 130
+
+#: What the last words of a node begin with, on standard error.
+FATAL = 'fatal: '
 
 
 class ConfigurationError(ValueError):
@@ -71,3 +90,8 @@ def told_changes(changes: dict[str, Any]) -> str:
     told = [f'{clipped(field)}={shown(value)}' for field, value in changes.items()]
     more = [f'{len(told) - CHANGES_TOLD} more'] if len(told) > CHANGES_TOLD else []
     return ' with ' + ', '.join(told[:CHANGES_TOLD] + more) if told else ''
+
+
+def say_fatal(reason: object) -> None:
+    """Last words of a node."""
+    print(f'{FATAL}{reason}', file=sys.stderr, flush=True)

@@ -18,7 +18,7 @@ from pydantic import Field
 
 from glider_model.base.kernel import kernel
 from glider_model.base.settings import Settings
-from glider_model.base.signals import Imu, Odometry, Reference, Water, Wrench
+from glider_model.base.signals import Covariance, Imu, Odometry, Reference, Water, Wrench
 
 _HALF_SQRT2 = math.sqrt(0.5)
 #: WGS 84: semi-major axis (m), and the first eccentricity squared (-).
@@ -140,19 +140,19 @@ def odometry_from_wire(wire):
     """Odometry from the 13 numbers of ``odometry_to_wire``."""
     q_w, q_x, q_y, q_z = swap_world(wire[3], wire[4], wire[5], wire[6])
     return Odometry(
-        wire[1],
-        wire[0],
-        -wire[2],
-        q_w,
-        q_x,
-        q_y,
-        q_z,
-        wire[7],
-        -wire[8],
-        -wire[9],
-        wire[10],
-        -wire[11],
-        -wire[12],
+        p_n=wire[1],
+        p_e=wire[0],
+        p_d=-wire[2],
+        q_w=q_w,
+        q_x=q_x,
+        q_y=q_y,
+        q_z=q_z,
+        u=wire[7],
+        v=-wire[8],
+        w=-wire[9],
+        p=wire[10],
+        q=-wire[11],
+        r=-wire[12],
     )
 
 
@@ -168,7 +168,16 @@ def imu_to_wire(imu):
 def imu_from_wire(wire):
     """Attitude and rates from the 8 numbers of ``imu_to_wire``."""
     q_w, q_x, q_y, q_z = swap_world(wire[0], wire[1], wire[2], wire[3])
-    return Imu(q_w, q_x, q_y, q_z, wire[4], -wire[5], -wire[6], wire[7] >= 0.0)
+    return Imu(
+        q_w=q_w,
+        q_x=q_x,
+        q_y=q_y,
+        q_z=q_z,
+        p=wire[4],
+        q=-wire[5],
+        r=-wire[6],
+        has_rates=wire[7] >= 0.0,
+    )
 
 
 @kernel
@@ -220,18 +229,18 @@ def reference_from_wire(wire):
     q_w, q_x, q_y, q_z = swap_world(wire[3], wire[4], wire[5], wire[6])
     phi, theta, psi = euler_from_quaternion(q_w, q_x, q_y, q_z)
     return Reference(
-        wire[1],
-        wire[0],
-        -wire[2],
-        phi,
-        theta,
-        psi,
-        wire[8],
-        wire[7],
-        -wire[9],
-        wire[10],
-        -wire[11],
-        -wire[12],
+        p_n=wire[1],
+        p_e=wire[0],
+        p_d=-wire[2],
+        phi=phi,
+        theta=theta,
+        psi=psi,
+        v_n=wire[8],
+        v_e=wire[7],
+        v_d=-wire[9],
+        phi_dot=wire[10],
+        theta_dot=-wire[11],
+        psi_dot=-wire[12],
     )
 
 
@@ -251,6 +260,12 @@ def water_from_wire(wire):
 def covariance_to_wire(covariance):
     """Covariance of a horizontal vector as that of east and north, row by row (4)."""
     return covariance.ee, covariance.ne, covariance.ne, covariance.nn
+
+
+@kernel
+def covariance_from_wire(odom):
+    """Covariance of the horizontal place of an odometry, from its numbers."""
+    return Covariance(odom[16], odom[14], odom[13])
 
 
 @kernel

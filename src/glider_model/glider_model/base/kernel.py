@@ -1,27 +1,20 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The one decorator that compiles the mathematics, and where compiled code is kept.
+"""The one decorator that compiles the mathematics, what tells that it does, and `replace`."""
 
-numba decides whether a cached function is stale by looking at the file that defines it, not at the
-files of the functions it calls. A change in ``hydrodynamics.py`` would go unnoticed in a cached
-``plant_step``. The cache folder is therefore named by a digest over the sources of all packages
-whose kernels call each other, those of other distributions that fill a slot among them: change any
-of them and everything is compiled afresh.
-"""
-
-import fcntl
 import hashlib
 import importlib.util
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple, TypeVar
 
 import numba
 from numba.core import event
-from numba.core.caching import FunctionCache
+from numba.extending import overload
 
+from glider_model.base.kernel_cache import KernelCache, is_kept
 from glider_model.base.plugins import registered, sources
 
 #: Packages whose kernels call each other.
@@ -29,6 +22,8 @@ PACKAGES = (
     *('glider_model', 'glider_navigation', 'glider_guidance', 'glider_control', 'glider_guard'),
     'glider_bringup',
 )
+
+Values = TypeVar('Values', bound=NamedTuple)
 
 
 @cache
@@ -51,32 +46,6 @@ def source_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def cache_folder() -> Path:
-    """Folder of the compiled kernels, in ``$GLIDER_CACHE`` or ``~/.cache/glider``."""
-    default = Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / 'glider'
-    return Path(os.environ.get('GLIDER_CACHE') or default) / f'kernels-{source_digest()}'
-
-
-if not os.environ.get('NUMBA_CACHE_DIR'):
-    numba.config.CACHE_DIR = str(cache_folder())
-
-
-class _Cache(FunctionCache):
-    """numba's cache of a function, which one process at a time adds to.
-
-    numba looks for a free name, writes the index and then the file. Two processes that compile a
-    function for different types at the same time would give their code the same name, and one of
-    them would later run that of the other.
-    """
-
-    def save_overload(self, sig, data) -> None:
-        """Save what was compiled for a signature."""
-        os.makedirs(self.cache_path, exist_ok=True)
-        with open(os.path.join(self.cache_path, 'lock'), 'w') as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            super().save_overload(sig, data)
-
-
 def kernel(function: Callable) -> numba.core.dispatcher.Dispatcher:
     """Compile a pure function, when it is called first.
 
@@ -85,29 +54,61 @@ def kernel(function: Callable) -> numba.core.dispatcher.Dispatcher:
     by number at every call.
     """
     compiled = numba.njit(error_model='numpy', forceinline=True)(function)
-    compiled._cache = _Cache(function)  # as its enable_caching() does
+    if is_kept(function):
+        compiled._cache = KernelCache(function)  # as its enable_caching() does
     return compiled
 
 
-class _Once(event.Listener):
-    """Calls ``tell`` when numba begins to compile for the first time."""
+def replace(values: Values, **changes) -> Values:
+    """The same NamedTuple with other values of the fields that are named.
 
-    def __init__(self, tell: Callable[[], None]) -> None:
-        self._tell = [tell]
+    Examples
+    --------
+    >>> replace(state, tick=0, told=state.told | ORDERED)
+    """
+    return values._replace(**changes)
+
+
+@overload(replace, jit_options={'error_model': 'numpy', 'forceinline': True}, strict=False)
+def _compiled(values, **changes):
+    """Write the constructor out, as numba has it: all fields, in their order."""
+    made = values.instance_class
+    if unknown := set(changes) - set(made._fields):
+        raise TypeError(f'{made.__name__} has no field {", ".join(sorted(unknown))}')
+    fields = (name if name in changes else f'values.{name}' for name in made._fields)
+    names = {'made': made}
+    exec(f'def replaced(values, {", ".join(changes)}): return made({", ".join(fields)})', names)
+    return names['replaced']
+
+
+#: Tells that something is compiled; may return what is to be called when it is done.
+Tell = Callable[[], Callable[[], None] | None]
+
+
+class _Compiling(event.Listener):
+    """Tells when numba begins to compile, and ends what was told when it has."""
+
+    def __init__(self, tell: Tell) -> None:
+        self._tell, self._depth, self._is_told = tell, 0, False
+        self._end: Callable[[], None] | None = None
 
     def on_start(self, event) -> None:
-        if self._tell:
-            self._tell.pop()()
+        if not self._depth and (self._end or not self._is_told):
+            self._end, self._is_told = self._tell(), True
+        self._depth += 1
 
     def on_end(self, event) -> None:
-        pass
+        self._depth -= 1
+        if not self._depth and self._end:
+            self._end()
 
 
 @contextmanager
-def compiling_told(tell: Callable[[], None]) -> Iterator[None]:
-    """Call ``tell`` once if something in the block has to be compiled, before it is.
+def compiling_told(tell: Tell) -> Iterator[None]:
+    """Call ``tell`` if something in the block has to be compiled, before it is.
 
-    What is found in the cache is not compiled.
+    What is found in the cache is not compiled. If ``tell`` returns a function, this is called when
+    it is compiled, and ``tell`` again for what comes later; else it is called once.
     """
-    with event.install_listener('numba:compile', _Once(tell)):
+    with event.install_listener('numba:compile', _Compiling(tell)):
         yield

@@ -3,7 +3,7 @@
 """Base of everything a person configures, and how its errors read."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin
 
@@ -20,6 +20,15 @@ class Settings(pydantic.BaseModel):
     model_config = pydantic.ConfigDict(
         extra='forbid', allow_inf_nan=False, frozen=True, validate_default=True
     )
+
+    def check(self) -> None:
+        """Refuse what no field shows by itself, such as a depth that a vehicle is not rated for.
+
+        Raises
+        ------
+        ConfigurationError
+            Naming field, value and allowed range.
+        """
 
 
 #: Numeric limits as pydantic calls them, and in a person's words.
@@ -213,6 +222,7 @@ def validate(
     ConfigurationError
         Naming ``source``, the line, the field, its value and the allowed range.
     """
+    _refuse_flags_for_numbers(model, values, f'{source}{changed}')
     try:
         return model.model_validate(values, context={'folder': folder} if folder else None)
     except pydantic.ValidationError as error:
@@ -223,6 +233,26 @@ def validate(
                 f'{source}:{line}{changed}: {text}' if line else f'{source}{changed}: {text}'
             )
         raise ConfigurationError('\n'.join(told)) from None
+
+
+def _flags(values: Any, name: str = '') -> Iterator[tuple[str, bool]]:
+    """Every true and false in nested values, with its dotted name."""
+    if isinstance(values, dict | list):
+        items = values.items() if isinstance(values, dict) else enumerate(values)
+        for key, inner in items:
+            yield from _flags(inner, f'{name}.{key}' if name else str(key))
+    elif isinstance(values, bool):
+        yield name, values
+
+
+def _refuse_flags_for_numbers(model: type[Settings], values: Any, source: str) -> None:
+    """Refuse true and false where a number stands: Python takes them for 1 and 0."""
+    for name, value in _flags(values):
+        field = find_field(model, name)
+        kinds = get_args(field.annotation) or (field.annotation,) if field is not None else ()
+        if bool not in kinds and (int in kinds or float in kinds):
+            told = str(value).lower()
+            raise ConfigurationError(f'{source}: {name} = {told}: no number (allowed: a number)')
 
 
 def file_names(folder: Path) -> list[str]:

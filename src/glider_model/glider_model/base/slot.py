@@ -21,6 +21,8 @@ from typing import Any
 
 from numba.extending import overload
 
+from glider_model.base.kernel_cache import BODIES, Body
+
 
 def slot(stub: Callable) -> Callable:
     """Make a slot of a function that has a parameter ``params``.
@@ -48,6 +50,7 @@ def slot(stub: Callable) -> Callable:
             if params_type in bodies:
                 raise TypeError(f'{stub.__name__}: {params_type.__name__} has a body already')
             bodies[params_type] = kernel
+            BODIES.append(Body(stub.__module__, params_type.__module__, kernel.__module__))
             return kernel
 
         return fill

@@ -452,13 +452,13 @@ class SumOfCurrents(_Flow):
                 first[i], last[i] = row, row + len(part.rows)
                 row = last[i]
         return CurrentParams(
-            kind,
-            numbers,
-            first,
-            last,
-            stream,
-            np.array(table, dtype=float).reshape(-1, 4),
-            self.field.params() if self.field else NoField(),
+            kind=kind,
+            numbers=numbers,
+            first=first,
+            last=last,
+            stream=stream,
+            table=np.array(table, dtype=float).reshape(-1, 4),
+            field=self.field.params() if self.field else NoField(),
         )
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import pydantic
 from pydantic import Field
 
+from glider_model.base.errors import ConfigurationError
 from glider_model.base.kernel import kernel
 from glider_model.base.signals import Vector, Water
 from glider_model.ocean.cast import CastParams, cast_params, check_cast, read_cast
@@ -21,6 +22,9 @@ from glider_model.ocean.density import DensityParams, DensitySettings
 
 #: The drift of wind is whole above the first depth, and there is none below the second (m).
 WIND_WHOLE_M, WIND_NONE_M = 0.5, 1.5
+#: Density of a cast falls with depth by no more than this (kg/m^3): the density inversion test of
+#: the Argo quality control manual (test 14, doi 10.13155/33951).
+INVERSION_KGPM3 = 0.03
 
 
 class WaterSettings(DensitySettings):
@@ -79,6 +83,23 @@ class WaterSettings(DensitySettings):
                     '(allowed: 0.0 beside a profile)'
                 )
         return self
+
+    def check_stable(self) -> None:
+        """Refuse measured water that is lighter at depth than above by more than is measured.
+
+        Raises
+        ------
+        ConfigurationError
+        """
+        heaviest = (0.0, 0.0)
+        for depth, density, *_ in self.profile or ():
+            if heaviest[1] - density > INVERSION_KGPM3:
+                raise ConfigurationError(
+                    f'water.profile: {density:g} kg/m^3 at {depth:g} m is lighter than '
+                    f'{heaviest[1]:g} kg/m^3 at {heaviest[0]:g} m: such water turns over '
+                    f'(allowed: lighter by <= {INVERSION_KGPM3:g} kg/m^3)'
+                )
+            heaviest = max(heaviest, (depth, density), key=lambda row: row[1])
 
     def params(self) -> DensityParams | CastParams:
         """Kernel parameters of the density; their type says how it is told."""

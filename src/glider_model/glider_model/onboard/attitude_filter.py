@@ -40,15 +40,23 @@ def measure(state, odometry, first, time_constant, dt):
     _, _, down = rotate_to_ned(q_w, q_x, q_y, q_z, odometry.u, odometry.v, odometry.w)
     phi_dot, theta_dot, psi_dot = euler_rates(phi, theta, odometry.p, odometry.q, odometry.r)
     if first:
-        return Measured(phi, theta, psi, phi_dot, theta_dot, psi_dot, down)
+        return Measured(
+            phi=phi,
+            theta=theta,
+            psi=psi,
+            phi_dot=phi_dot,
+            theta_dot=theta_dot,
+            psi_dot=psi_dot,
+            vertical_rate=down,
+        )
     share = dt / (time_constant + dt)
     fast = dt / (0.25 * time_constant + dt)
     return Measured(
-        _follow(state.phi, phi, phi_dot, share, dt),
-        _follow(state.theta, theta, theta_dot, share, dt),
-        _follow(state.psi, psi, psi_dot, share, dt),
-        state.phi_dot + fast * (phi_dot - state.phi_dot),
-        state.theta_dot + fast * (theta_dot - state.theta_dot),
-        state.psi_dot + fast * (psi_dot - state.psi_dot),
-        state.vertical_rate + fast * (down - state.vertical_rate),
+        phi=_follow(state.phi, phi, phi_dot, share, dt),
+        theta=_follow(state.theta, theta, theta_dot, share, dt),
+        psi=_follow(state.psi, psi, psi_dot, share, dt),
+        phi_dot=state.phi_dot + fast * (phi_dot - state.phi_dot),
+        theta_dot=state.theta_dot + fast * (theta_dot - state.theta_dot),
+        psi_dot=state.psi_dot + fast * (psi_dot - state.psi_dot),
+        vertical_rate=state.vertical_rate + fast * (down - state.vertical_rate),
     )

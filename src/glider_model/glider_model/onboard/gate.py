@@ -14,7 +14,7 @@ from typing import NamedTuple
 from pydantic import Field
 
 from glider_model.base.frames import rotate_to_ned
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.settings import Settings
 from glider_model.base.signals import Odometry
 
@@ -56,14 +56,14 @@ class GateSettings(Settings):
     def params(self) -> 'GateParams':
         """Kernel parameters."""
         return GateParams(
-            self.rate_max_radps,
-            self.speed_max_mps**2,
-            self.rate_jump_radps,
-            self.speed_jump_mps**2,
-            math.cos(0.5 * math.radians(self.attitude_jump_deg)),
-            self.position_jump_m**2,
-            self.depth_jump_m,
-            self.hold_s,
+            rate_max=self.rate_max_radps,
+            speed_max2=self.speed_max_mps**2,
+            rate_jump=self.rate_jump_radps,
+            speed_jump2=self.speed_jump_mps**2,
+            attitude_cosine=math.cos(0.5 * math.radians(self.attitude_jump_deg)),
+            position_jump2=self.position_jump_m**2,
+            depth_jump=self.depth_jump_m,
+            hold_s=self.hold_s,
         )
 
 
@@ -152,21 +152,7 @@ def _scaled(odometry):
     if abs(norm2 - 1.0) <= NORM_SCALED:
         return odometry
     s = 1.0 / math.sqrt(norm2)
-    return Odometry(
-        x.p_n,
-        x.p_e,
-        x.p_d,
-        s * x.q_w,
-        s * x.q_x,
-        s * x.q_y,
-        s * x.q_z,
-        x.u,
-        x.v,
-        x.w,
-        x.p,
-        x.q,
-        x.r,
-    )
+    return replace(x, q_w=s * x.q_w, q_x=s * x.q_x, q_y=s * x.q_y, q_z=s * x.q_z)
 
 
 @kernel

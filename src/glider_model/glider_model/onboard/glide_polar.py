@@ -9,7 +9,7 @@ rate, both measured, it gives the speed through the water.
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.vehicle.file import VehicleParams
 from glider_model.vehicle.rigid_body import GRAVITY
 
@@ -36,12 +36,12 @@ LARGEST_ALPHA = math.radians(15.0)
 def make_polar(vehicle: VehicleParams) -> Polar:
     """Polar of a vehicle; linear drag, where a vehicle has it, is taken at 0.5 m/s."""
     return Polar(
-        max(1e-3, vehicle.K_D0 + vehicle.D_u / 0.5),
-        max(1e-3, vehicle.K_D),
-        vehicle.K_L0,
-        max(1e-3, vehicle.K_L),
-        vehicle.speed_exponent,
-        vehicle.shallowest_glide,
+        K_D0=max(1e-3, vehicle.K_D0 + vehicle.D_u / 0.5),
+        K_D=max(1e-3, vehicle.K_D),
+        K_L0=vehicle.K_L0,
+        K_L=max(1e-3, vehicle.K_L),
+        n=vehicle.speed_exponent,
+        shallowest=vehicle.shallowest_glide,
     )
 
 
@@ -51,7 +51,7 @@ def _at_speed(speed, polar):
     if polar.n == 0.0:
         return polar
     drag = polar.K_D0 * max(speed, _SLOWEST) ** polar.n
-    return Polar(drag, polar.K_D, polar.K_L0, polar.K_L, 0.0, polar.shallowest)
+    return replace(polar, K_D0=drag, n=0.0)
 
 
 @kernel

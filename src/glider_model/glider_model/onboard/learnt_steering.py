@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.settings import Settings
 from glider_model.vehicle.file import SLOWEST_GLIDE_MPS
 
@@ -108,35 +108,43 @@ class SteeringLearningSettings(Settings):
         One that does not bank to turn learns nothing.
         """
         return SteeringParams(
-            self.drift_radps**2 / 1000.0,
-            self.bend_drift_radps**2 / 1000.0,
-            self.kick_drift**2 / 1000.0,
-            self.disturbance_drift_radps**2 / 1000.0,
-            self.noise_radps**2 * self.correlation_s,
-            self.after_s if banks else NEVER_S,
-            self.smoothing_s,
-            math.sin(math.radians(self.bank_deg)),
-            slowest_glide,
+            drift=self.drift_radps**2 / 1000.0,
+            bend_drift=self.bend_drift_radps**2 / 1000.0,
+            kick_drift=self.kick_drift**2 / 1000.0,
+            disturbance_drift=self.disturbance_drift_radps**2 / 1000.0,
+            noise=self.noise_radps**2 * self.correlation_s,
+            after_s=self.after_s if banks else NEVER_S,
+            smoothing_s=self.smoothing_s,
+            bank=math.sin(math.radians(self.bank_deg)),
+            slowest_glide=slowest_glide,
         )
 
     def initial_state(self) -> 'Steering':
         """Estimates before the first turn."""
-        return Steering(self._phase(1.0), self._phase(-1.0), 0.0, 0.0, 0.0, 0.0, 0.0)
+        return Steering(
+            dive=self._phase(1.0),
+            climb=self._phase(-1.0),
+            bank=0.0,
+            bend=0.0,
+            roll_rate=0.0,
+            yaw_rate=0.0,
+            steady_s=0.0,
+        )
 
     def _phase(self, sign: float) -> 'SteeringState':
         return SteeringState(
-            sign * self.prior_radps,
-            0.0,
-            0.0,
-            0.0,
-            (
+            b=sign * self.prior_radps,
+            c=0.0,
+            k=0.0,
+            d=0.0,
+            p=(
                 *(self.prior_std_radps**2, 0.0, 0.0, 0.0),
                 *(self.bend_std_radps**2, 0.0, 0.0),
                 *(self.kick_std**2, 0.0),
                 self.disturbance_std_radps**2,
             ),
-            False,
-            0.0,
+            is_kicked=False,
+            kept_s=0.0,
         )
 
 
@@ -208,11 +216,11 @@ def learn_steering(state, bank, bend, roll_rate, yaw_rate, params, dt):
     spread = g_b * bank + g_c * bend + g_k * roll_rate + g_d + params.noise / dt
     gain = (yaw_rate - state.b * bank - state.c * bend - state.k * roll_rate - state.d) / spread
     return SteeringState(
-        state.b + g_b * gain,
-        state.c + g_c * gain,
-        state.k + g_k * gain,
-        state.d + g_d * gain,
-        (
+        b=state.b + g_b * gain,
+        c=state.c + g_c * gain,
+        k=state.k + g_k * gain,
+        d=state.d + g_d * gain,
+        p=(
             bb - g_b * g_b / spread,
             bc - g_b * g_c / spread,
             bk - g_b * g_k / spread,
@@ -224,8 +232,8 @@ def learn_steering(state, bank, bend, roll_rate, yaw_rate, params, dt):
             kd - g_k * g_d / spread,
             dd - g_d * g_d / spread,
         ),
-        state.is_kicked,
-        state.kept_s + dt,
+        is_kicked=state.is_kicked,
+        kept_s=state.kept_s + dt,
     )
 
 
@@ -283,7 +291,7 @@ def choose_steering(state, sine, bank):
     is_enough = state.is_kicked and abs(sine) < AT_LIMIT * bank and not turns_well(state, bank)
     if is_kicked == state.is_kicked or is_enough or state.kept_s < KEPT_S:
         return state
-    return SteeringState(state.b, state.c, state.k, state.d, state.p, is_kicked, 0.0)
+    return replace(state, is_kicked=is_kicked, kept_s=0.0)
 
 
 @kernel
@@ -331,4 +339,12 @@ def learn(steering, measured, speed, params, dt):
         else:
             climb = learn_steering(climb, bank, bend, roll_rate, yaw_rate, params, dt)
             climb = choose_steering(climb, bank / ratio, params.bank)
-    return Steering(dive, climb, bank, bend, roll_rate, yaw_rate, steady_s)
+    return Steering(
+        dive=dive,
+        climb=climb,
+        bank=bank,
+        bend=bend,
+        roll_rate=roll_rate,
+        yaw_rate=yaw_rate,
+        steady_s=steady_s,
+    )

@@ -26,8 +26,24 @@ class MovingMass(NamedTuple):
 def make_moving_mass(vehicle: VehicleParams) -> MovingMass:
     """Moving mass of a vehicle."""
     return MovingMass(
-        vehicle.s_x, vehicle.s_z, vehicle.m_p, vehicle.x_p0, vehicle.R_p, vehicle.pump_x
+        s_x=vehicle.s_x,
+        s_z=vehicle.s_z,
+        m_p=vehicle.m_p,
+        x_p0=vehicle.x_p0,
+        R_p=vehicle.R_p,
+        pump_x=vehicle.pump_x,
     )
+
+
+@kernel
+def mass_place(s_x, m_b, x_p_max, mass):
+    """Position x_p (m from neutral) where hull, mass and oil have the first moment ``s_x`` (kg m).
+
+    Held within the range (m), beside oil that makes a net heaviness m_b (kg). With 0.0 the
+    vehicle lies level.
+    """
+    x_p = (s_x - mass.s_x - m_b * mass.pump_x) / mass.m_p - mass.x_p0
+    return min(x_p_max, max(-x_p_max, x_p))
 
 
 @kernel

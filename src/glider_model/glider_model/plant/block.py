@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The plant as a block: what it measures begins a tick, and it moves when the tick is over."""
 
+from collections import namedtuple
+
 from glider_model.base.block import Block
 from glider_model.base.frames import water_from_wire
 from glider_model.base.kernel import kernel
@@ -9,6 +11,9 @@ from glider_model.base.signals import Joints
 from glider_model.base.wiring import PLANT as WIRED
 from glider_model.plant.plant import PlantSettings, plant_finished, plant_step, tell
 from glider_model.vehicle.file import steers_by
+
+#: Numbers of what the plant measures, by the names of the topics. The clock has none.
+Measured = namedtuple('Measured', (topic.replace('/', '_') for topic in WIRED.outputs[1:]))
 
 
 @kernel

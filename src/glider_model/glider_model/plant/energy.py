@@ -25,7 +25,7 @@ class Ledger(NamedTuple):
     call_s: float  #: what is left of a call (s)
 
 
-FULL = Ledger(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+FULL = Ledger(pump=0.0, hotel=0.0, masses=0.0, calls=0.0, power=0.0, call_s=0.0)
 #: What is not known of a battery.
 NOT_MEASURED = -1.0
 
@@ -86,12 +86,12 @@ def spend(ledger, before, after, depths, surfacings, params, dt):
     masses = params.pitch * abs(after.x_p - before.x_p) + params.roll * abs(after.mu - before.mu)
     masses += params.steer * abs(after.delta - before.delta)
     return Ledger(
-        ledger.pump + pump,
-        ledger.hotel + hotel * dt,
-        ledger.masses + masses,
-        ledger.calls + call,
-        (pump + masses + call) / dt + hotel,
-        call_s,
+        pump=ledger.pump + pump,
+        hotel=ledger.hotel + hotel * dt,
+        masses=ledger.masses + masses,
+        calls=ledger.calls + call,
+        power=(pump + masses + call) / dt + hotel,
+        call_s=call_s,
     )
 
 

@@ -65,10 +65,10 @@ def decay_weights(pole, h):
     phi_2 = 0.25 * ((half + 1.0) * half_2 + half_1)
     phi_3 = 0.125 * ((half + 1.0) * half_3 + half_2 + 0.5 * half_1)
     return Decay(
-        half,
-        0.5 * h * half_1,
-        half * half,
-        h * (phi_1 - 3.0 * phi_2 + 4.0 * phi_3),
-        h * (2.0 * phi_2 - 4.0 * phi_3),
-        h * (4.0 * phi_3 - phi_2),
+        half=half,
+        half_input=0.5 * h * half_1,
+        whole=half * half,
+        first=h * (phi_1 - 3.0 * phi_2 + 4.0 * phi_3),
+        middle=h * (2.0 * phi_2 - 4.0 * phi_3),
+        last=h * (4.0 * phi_3 - phi_2),
     )

@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 from glider_model.base.frames import rotate_to_body, rotate_to_ned
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.signals import Joints
 from glider_model.ocean.density import emerged_fraction, immersed
 from glider_model.plant.exponential import decay_weights
@@ -116,19 +116,19 @@ def derivative(motion, joints, inertia, current, water_rate, vehicle, density):
     d_n, d_e, d_d = rotate_to_ned(q_w, q_x, q_y, q_z, motion.u, motion.v, motion.w)
     a = acceleration(motion, joints, inertia, water_rate, vehicle, density)
     return Motion(
-        d_n + current.v_n,
-        d_e + current.v_e,
-        d_d + current.v_d,
-        0.5 * (-q_x * p - q_y * q - q_z * r),
-        0.5 * (q_w * p + q_y * r - q_z * q),
-        0.5 * (q_w * q + q_z * p - q_x * r),
-        0.5 * (q_w * r + q_x * q - q_y * p),
-        a[0],
-        a[1],
-        a[2],
-        a[3],
-        a[4],
-        a[5],
+        p_n=d_n + current.v_n,
+        p_e=d_e + current.v_e,
+        p_d=d_d + current.v_d,
+        q_w=0.5 * (-q_x * p - q_y * q - q_z * r),
+        q_x=0.5 * (q_w * p + q_y * r - q_z * q),
+        q_y=0.5 * (q_w * q + q_z * p - q_x * r),
+        q_z=0.5 * (q_w * r + q_x * q - q_y * p),
+        u=a[0],
+        v=a[1],
+        w=a[2],
+        p=a[3],
+        q=a[4],
+        r=a[5],
     )
 
 
@@ -136,19 +136,19 @@ def derivative(motion, joints, inertia, current, water_rate, vehicle, density):
 def _along(x, h, k, rates):
     """Point ``x + h k`` along a derivative, with rates of its own."""
     return Motion(
-        x.p_n + h * k.p_n,
-        x.p_e + h * k.p_e,
-        x.p_d + h * k.p_d,
-        x.q_w + h * k.q_w,
-        x.q_x + h * k.q_x,
-        x.q_y + h * k.q_y,
-        x.q_z + h * k.q_z,
-        x.u + h * k.u,
-        x.v + h * k.v,
-        x.w + h * k.w,
-        rates.p,
-        rates.q,
-        rates.r,
+        p_n=x.p_n + h * k.p_n,
+        p_e=x.p_e + h * k.p_e,
+        p_d=x.p_d + h * k.p_d,
+        q_w=x.q_w + h * k.q_w,
+        q_x=x.q_x + h * k.q_x,
+        q_y=x.q_y + h * k.q_y,
+        q_z=x.q_z + h * k.q_z,
+        u=x.u + h * k.u,
+        v=x.v + h * k.v,
+        w=x.w + h * k.w,
+        p=rates.p,
+        q=rates.q,
+        r=rates.r,
     )
 
 
@@ -217,21 +217,7 @@ def _energy(u, v, w, p, q, r, inertia, vehicle):
 def _normalised(x):
     """The motion with a quaternion of length 1."""
     norm = math.sqrt(x.q_w * x.q_w + x.q_x * x.q_x + x.q_y * x.q_y + x.q_z * x.q_z)
-    return Motion(
-        x.p_n,
-        x.p_e,
-        x.p_d,
-        x.q_w / norm,
-        x.q_x / norm,
-        x.q_y / norm,
-        x.q_z / norm,
-        x.u,
-        x.v,
-        x.w,
-        x.p,
-        x.q,
-        x.r,
-    )
+    return replace(x, q_w=x.q_w / norm, q_x=x.q_x / norm, q_y=x.q_y / norm, q_z=x.q_z / norm)
 
 
 @kernel

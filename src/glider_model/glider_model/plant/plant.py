@@ -49,6 +49,8 @@ DIVE_BELOW_SHARE, DIVE_ABOVE_SHARE = 0.7, 0.6
 SURFACE_S = 60.0
 #: Shallower than this the vehicle is at the surface (m).
 SURFACE_M = 1.5
+#: No sea is deeper (m).
+DEEPEST_SEA_M = 12000.0
 #: A vehicle that has been below this has dived, not only bobbed (m).
 DIVED_M = 3.0
 
@@ -199,19 +201,19 @@ class PlantSettings(Settings):
         )
         m_b = min(limit, max(-limit, start.net_heaviness_kg))
         return PlantState(
-            motion,
-            Joints(m_b, 0.0, 0.0, 0.0),
-            Water(0.0, 0.0, 0.0),
-            0,
-            False,
-            0,
-            0,
-            -1,
-            NO_SAMPLE,
-            LAUNCHED,
-            fault_state(self.faults),
-            False,
-            FULL,
+            motion=motion,
+            joints=Joints(m_b, 0.0, 0.0, 0.0),
+            water=Water(0.0, 0.0, 0.0),
+            tick=0,
+            deep=False,
+            dives=0,
+            surface_ticks=0,
+            afloat_ticks=-1,
+            sample=NO_SAMPLE,
+            surfacing=LAUNCHED,
+            faults=fault_state(self.faults),
+            is_dropped=False,
+            ledger=FULL,
         )
 
 
@@ -221,19 +223,19 @@ def plant_odometry(state):
     x, water = state.motion, state.water
     u, v, w = rotate_to_body(x.q_w, x.q_x, x.q_y, x.q_z, water.v_n, water.v_e, water.v_d)
     return Odometry(
-        x.p_n,
-        x.p_e,
-        x.p_d,
-        x.q_w,
-        x.q_x,
-        x.q_y,
-        x.q_z,
-        x.u + u,
-        x.v + v,
-        x.w + w,
-        x.p,
-        x.q,
-        x.r,
+        p_n=x.p_n,
+        p_e=x.p_e,
+        p_d=x.p_d,
+        q_w=x.q_w,
+        q_x=x.q_x,
+        q_y=x.q_y,
+        q_z=x.q_z,
+        u=x.u + u,
+        v=x.v + v,
+        w=x.w + w,
+        p=x.p,
+        q=x.q,
+        r=x.r,
     )
 
 
@@ -322,19 +324,19 @@ def plant_step(state, command, water, params, dt, drops=False):
     surfacing = surface_after(state.surfacing, motion.p_d)
     depths, surfacings = (state.motion.p_d, motion.p_d), (state.surfacing, surfacing)
     return PlantState(
-        motion,
-        joints,
-        water,
-        state.tick + 1,
-        deep,
-        dives,
-        surface_ticks,
-        afloat_ticks,
-        sample,
-        surfacing,
-        _after_telling(state, faults, params, params.faults),
-        is_dropped,
-        spend(state.ledger, state.joints, joints, depths, surfacings, params.energy, dt),
+        motion=motion,
+        joints=joints,
+        water=water,
+        tick=state.tick + 1,
+        deep=deep,
+        dives=dives,
+        surface_ticks=surface_ticks,
+        afloat_ticks=afloat_ticks,
+        sample=sample,
+        surfacing=surfacing,
+        faults=_after_telling(state, faults, params, params.faults),
+        is_dropped=is_dropped,
+        ledger=spend(state.ledger, state.joints, joints, depths, surfacings, params.energy, dt),
     )
 
 
@@ -366,14 +368,15 @@ def _afloat(ticks, depth, fills):
 
 @kernel
 def plant_finished(state, params):
-    """Whether the tick of this state is the last one of the run."""
+    """Whether the tick of this state is the last one of the run; there is no deeper sea."""
     surfaced = (
         params.stop_after_dives > 0
         and state.dives >= params.stop_after_dives
         and state.surface_ticks >= params.stop_surface_ticks
     )
     afloat = 0 < params.stop_afloat_ticks <= state.afloat_ticks
-    return state.tick + 1 >= params.max_ticks or surfaced or afloat
+    lies_deep = state.motion.p_d > DEEPEST_SEA_M
+    return state.tick + 1 >= params.max_ticks or surfaced or afloat or lies_deep
 
 
 def state_fault(odometry: Odometry, joints: Joints, tick: int) -> str:

@@ -36,10 +36,10 @@ from glider_model.base.frames import (
     quaternion_from_euler,
     to_geodetic,
 )
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.noise import normal_pair, random_stream, uniform
 from glider_model.base.settings import Settings
-from glider_model.base.signals import TICK_S, Imu, Odometry
+from glider_model.base.signals import TICK_S, Imu
 from glider_model.base.wiring import NO_ECHO, SENSORS
 from glider_model.ocean.density import pressure_at
 from glider_model.plant.altimeter import AltimeterParams, echo
@@ -147,12 +147,12 @@ class SensorSettings(Settings):
         charted = self.chart_declination_deg
         wrong = 0.0 if charted is None else charted - self.declination_deg
         return ImuErrors(
-            math.radians(self.compass_bias_deg + wrong),
-            math.radians(self.compass_deviation_deg),
-            math.radians(self.compass_deviation_phase_deg - self.declination_deg),
-            self.pitch_scale,
-            math.radians(self.pitch_offset_deg),
-            math.radians(self.roll_bias_deg),
+            compass_bias=math.radians(self.compass_bias_deg + wrong),
+            compass_deviation=math.radians(self.compass_deviation_deg),
+            compass_phase=math.radians(self.compass_deviation_phase_deg - self.declination_deg),
+            pitch_scale=self.pitch_scale,
+            pitch_offset=math.radians(self.pitch_offset_deg),
+            roll_bias=math.radians(self.roll_bias_deg),
         )
 
     def params(
@@ -173,30 +173,30 @@ class SensorSettings(Settings):
         )
         waits = altimeter.is_fitted and altimeter.period_ticks > 1
         return SensorParams(
-            np.uint64(random_stream(seed, _STREAM_OFFSET, 0)),
-            math.radians(self.attitude_std_deg),
-            math.radians(self.heading_std_deg),
-            math.radians(self.rate_std_dps),
-            self.position_std_m,
-            self._imu_errors(),
-            round(self.imu_period_s / TICK_S),
-            self.imu_missed_share,
-            self.gyro,
-            self.depth_offset_m,
-            self.depth_resolution_m,
-            GpsParams(
-                np.uint64(random_stream(seed, _STREAM_OFFSET, 1)),
-                self.gps_std_m,
-                round(self.gps_first_fix_s / TICK_S),
-                self.fix_missed_share,
-                int(pattern[::-1], 2),
-                len(pattern),
-                (origin or OriginSettings()).params(),
+            stream=np.uint64(random_stream(seed, _STREAM_OFFSET, 0)),
+            attitude=math.radians(self.attitude_std_deg),
+            heading=math.radians(self.heading_std_deg),
+            rate=math.radians(self.rate_std_dps),
+            position=self.position_std_m,
+            errors=self._imu_errors(),
+            period_ticks=round(self.imu_period_s / TICK_S),
+            missed_share=self.imu_missed_share,
+            gyro=self.gyro,
+            depth_offset=self.depth_offset_m,
+            depth_resolution=self.depth_resolution_m,
+            gps=GpsParams(
+                stream=np.uint64(random_stream(seed, _STREAM_OFFSET, 1)),
+                std=self.gps_std_m,
+                first_fix_ticks=round(self.gps_first_fix_s / TICK_S),
+                missed_share=self.fix_missed_share,
+                missed_bits=int(pattern[::-1], 2),
+                missed_count=len(pattern),
+                origin=(origin or OriginSettings()).params(),
             ),
-            altimeter,
-            'measured_odom' in fitted,
-            bool({'imu', 'pressure', 'fix'} & set(fitted)),
-            self.imu_period_s > TICK_S or self.imu_missed_share > 0.0 or waits,
+            altimeter=altimeter,
+            has_position='measured_odom' in fitted,
+            has_parts=bool({'imu', 'pressure', 'fix'} & set(fitted)),
+            is_held=self.imu_period_s > TICK_S or self.imu_missed_share > 0.0 or waits,
         )
 
 
@@ -260,7 +260,9 @@ class Sample(NamedTuple):
 
 #: What stands in the place of sensors that are not fitted.
 NO_POSITION, NO_IMU = 13 * (0.0,), 8 * (0.0,)
-NO_SAMPLE = Sample(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, NO_ECHO)
+NO_SAMPLE = Sample(
+    q_w=1.0, q_x=0.0, q_y=0.0, q_z=0.0, p=0.0, q=0.0, r=0.0, p_d=0.0, altitude=NO_ECHO
+)
 
 
 class Noise(NamedTuple):
@@ -295,15 +297,15 @@ def noise_of_tick(tick, params):
     n_7, n_8 = normal_pair(params.stream, first + np.uint64(3))
     n_9, _ = normal_pair(params.stream, first + np.uint64(4))
     return Noise(
-        params.position * n_1,
-        params.position * n_2,
-        params.position * n_3,
-        params.attitude * n_4,
-        params.attitude * n_5,
-        params.heading * n_6,
-        params.rate * n_7,
-        params.rate * n_8,
-        params.rate * n_9,
+        p_n=params.position * n_1,
+        p_e=params.position * n_2,
+        p_d=params.position * n_3,
+        phi=params.attitude * n_4,
+        theta=params.attitude * n_5,
+        psi=params.heading * n_6,
+        p=params.rate * n_7,
+        q=params.rate * n_8,
+        r=params.rate * n_9,
     )
 
 
@@ -339,20 +341,18 @@ def add_noise(odometry, tick, params):
     heading = quaternion_from_euler(0.0, 0.0, n.psi)
     tilt = quaternion_from_euler(n.phi, n.theta, 0.0)
     q = _product(_product(heading, (x.q_w, x.q_x, x.q_y, x.q_z)), tilt)
-    return Odometry(
-        x.p_n + n.p_n,
-        x.p_e + n.p_e,
-        x.p_d + n.p_d,
-        q[0],
-        q[1],
-        q[2],
-        q[3],
-        x.u,
-        x.v,
-        x.w,
-        x.p + n.p,
-        x.q + n.q,
-        x.r + n.r,
+    return replace(
+        x,
+        p_n=x.p_n + n.p_n,
+        p_e=x.p_e + n.p_e,
+        p_d=x.p_d + n.p_d,
+        q_w=q[0],
+        q_x=q[1],
+        q_y=q[2],
+        q_z=q[3],
+        p=x.p + n.p,
+        q=x.q + n.q,
+        r=x.r + n.r,
     )
 
 
@@ -404,9 +404,8 @@ def take_sample(measured, depth, sample, tick, params):
     altitude = sample.altitude
     if params.altimeter.is_fitted and tick % params.altimeter.period_ticks == 0:
         altitude = echo(depth, tick, params.altimeter)
-    x = sample
     if not _is_sampled(tick, params):
-        return Sample(x.q_w, x.q_x, x.q_y, x.q_z, x.p, x.q, x.r, x.p_d, altitude)
+        return replace(sample, altitude=altitude)
     x = measured
     q_w, q_x, q_y, q_z = _with_errors(x.q_w, x.q_x, x.q_y, x.q_z, params.errors)
     shown = x.p_d
@@ -415,8 +414,12 @@ def take_sample(measured, depth, sample, tick, params):
     if params.depth_resolution > 0.0:
         shown = params.depth_resolution * math.floor(shown / params.depth_resolution + 0.5)
     if not params.gyro:
-        return Sample(q_w, q_x, q_y, q_z, 0.0, 0.0, 0.0, shown, altitude)
-    return Sample(q_w, q_x, q_y, q_z, x.p, x.q, x.r, shown, altitude)
+        return Sample(
+            q_w=q_w, q_x=q_x, q_y=q_y, q_z=q_z, p=0.0, q=0.0, r=0.0, p_d=shown, altitude=altitude
+        )
+    return Sample(
+        q_w=q_w, q_x=q_x, q_y=q_y, q_z=q_z, p=x.p, q=x.q, r=x.r, p_d=shown, altitude=altitude
+    )
 
 
 @kernel
@@ -461,30 +464,36 @@ def sense(odometry, joints, sample, out_ticks, surfacings, tick, params):
     """
     truth = odometry_to_wire(odometry)
     measured = add_noise(odometry, tick, params)
-    sample = take_sample(measured, odometry.p_d, sample, tick, params)
+    sample = x = take_sample(measured, odometry.p_d, sample, tick, params)
     position, imu, pressure = NO_POSITION, NO_IMU, 0.0
     fix = (NO_FIX, 0.0, 0.0, 0.0, 0.0)
     if params.has_position:
         position = odometry_to_wire(
-            Odometry(
-                measured.p_n,
-                measured.p_e,
-                sample.p_d,
-                sample.q_w,
-                sample.q_x,
-                sample.q_y,
-                sample.q_z,
-                measured.u,
-                measured.v,
-                measured.w,
-                sample.p,
-                sample.q,
-                sample.r,
+            replace(
+                measured,
+                p_d=x.p_d,
+                q_w=x.q_w,
+                q_x=x.q_x,
+                q_y=x.q_y,
+                q_z=x.q_z,
+                p=x.p,
+                q=x.q,
+                r=x.r,
             )
         )
     if params.has_parts:
-        x = sample
-        imu = imu_to_wire(Imu(x.q_w, x.q_x, x.q_y, x.q_z, x.p, x.q, x.r, params.gyro))
+        imu = imu_to_wire(
+            Imu(
+                q_w=x.q_w,
+                q_x=x.q_x,
+                q_y=x.q_y,
+                q_z=x.q_z,
+                p=x.p,
+                q=x.q,
+                r=x.r,
+                has_rates=params.gyro,
+            )
+        )
         pressure = pressure_at(sample.p_d)
         fix = _take_fix(odometry, out_ticks, surfacings, tick, params)
     return (
@@ -507,18 +516,16 @@ def remove_noise(measured, tick, params):
     heading = quaternion_from_euler(0.0, 0.0, -n.psi)
     w, i, j, k = quaternion_from_euler(n.phi, n.theta, 0.0)
     q = _product(_product(heading, (x.q_w, x.q_x, x.q_y, x.q_z)), (w, -i, -j, -k))
-    return Odometry(
-        x.p_n - n.p_n,
-        x.p_e - n.p_e,
-        x.p_d - n.p_d,
-        q[0],
-        q[1],
-        q[2],
-        q[3],
-        x.u,
-        x.v,
-        x.w,
-        x.p - n.p,
-        x.q - n.q,
-        x.r - n.r,
+    return replace(
+        x,
+        p_n=x.p_n - n.p_n,
+        p_e=x.p_e - n.p_e,
+        p_d=x.p_d - n.p_d,
+        q_w=q[0],
+        q_x=q[1],
+        q_y=q[2],
+        q_z=q[3],
+        p=x.p - n.p,
+        q=x.q - n.q,
+        r=x.r - n.r,
     )

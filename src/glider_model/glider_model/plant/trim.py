@@ -92,7 +92,14 @@ def solve_trim(
     theta = None if pitch_deg is None else math.radians(pitch_deg)
     mu, delta = math.radians(roll_mass_deg), math.radians(fin_deg)
     # its whole net weight is given: the hull that displaces it is of no account
-    glide = _Glide(vehicle._replace(volume=0.0), net_heaviness_kg, theta, pitch_mass_m, mu, delta)
+    glide = _Glide(
+        vehicle=vehicle._replace(volume=0.0),
+        net_heaviness=net_heaviness_kg,
+        theta=theta,
+        x_p=pitch_mass_m,
+        mu=mu,
+        delta=delta,
+    )
     sign = math.copysign(1.0, net_heaviness_kg)
     for guess_deg in (-30.0, -20.0, -45.0, -10.0):
         guess = sign * math.radians(guess_deg if pitch_deg is None else -abs(pitch_deg))

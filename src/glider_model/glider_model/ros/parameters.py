@@ -10,7 +10,7 @@ read-only unless their field says ``json_schema_extra={'tunable': True}``.
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Literal, NamedTuple, TypeVar, get_args, get_origin
 
 import pydantic
@@ -183,7 +183,9 @@ def _validated(node: Node, model: type[SettingsT], leaves, values: dict[str, Any
             reason = f'not JSON or YAML: {error}'
             raise _refuse(node, leaf, values[leaf.name], reason) from None
     try:
-        return model.model_validate(_nested(tree))
+        settings = model.model_validate(_nested(tree))
+        settings.check()
+        return settings
     except pydantic.ValidationError as error:
         lines = [f'{node.get_name()}: parameter {text}' for _, text in mistakes(error, model)]
         raise ConfigurationError('\n'.join(lines)) from None
@@ -248,19 +250,19 @@ def refuse_unknown(node: Node) -> None:
     """
     # rclpy has no public name for what the command line and parameter files give to a node
     given = sorted(node._parameter_overrides)
-    unknown = [
-        name
-        for name in given
-        if not (node.has_parameter(name) or name.startswith('qos_overrides.'))
-    ]
-    if unknown:
-        known = ', '.join(sorted(node.get_parameters_by_prefix('')))
-        raise ConfigurationError(
-            '\n'.join(
-                f'{node.get_name()}: parameter {clipped(name)}: unknown (allowed: {known})'
-                for name in unknown
-            )
-        )
+    reason = unknown_parameters(node, [x for x in given if not x.startswith('qos_overrides.')])
+    if reason:
+        raise ConfigurationError(reason)
+
+
+def unknown_parameters(node: Node, names: Iterable[str]) -> str:
+    """Which parameters a node does not have, and those that it has, in words; empty if none."""
+    unknown = [name for name in names if not node.has_parameter(name)]
+    known = ', '.join(sorted(node.get_parameters_by_prefix(''))) if unknown else ''
+    return '\n'.join(
+        f'{node.get_name()}: parameter {clipped(name)}: unknown (allowed: {known})'
+        for name in unknown
+    )
 
 
 def to_parameters(settings: Settings) -> dict[str, Any]:

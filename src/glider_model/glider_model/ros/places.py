@@ -60,24 +60,42 @@ def domain_id() -> Iterator[int]:
         If all of them are taken, or $ROS_DOMAIN_ID is none.
     """
     given = given_domain()
-    if given is not None:
-        yield given
+    if given is not None:  # others may have been given it too, but nobody shall draw it
+        lock = _locked(given, fcntl.LOCK_SH)
+        try:
+            yield given
+        finally:
+            if lock is not None:
+                os.close(lock)
         return
     for offset in range(len(_DOMAINS)):
         domain = _DOMAINS[(os.getpid() + offset) % len(_DOMAINS)]
-        path = Path(tempfile.gettempdir()) / f'glider-ros-domain-{domain}.lock'
-        try:
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        except OSError:
-            continue
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            os.close(descriptor)
+        lock = _locked(domain, fcntl.LOCK_EX, fcntl.LOCK_SH)
+        if lock is None:
             continue
         try:
             yield domain
         finally:
-            os.close(descriptor)
+            os.close(lock)
         return
     raise ConfigurationError('every ROS domain from 1 to 101 is in use by another run')
+
+
+def _locked(domain: int, *kinds: int) -> int | None:
+    """Lock of a domain, taken in these ways one after the other; None if somebody has it.
+
+    Who draws a domain takes it alone first, so that nobody has it, and then shares it with those
+    that are given it: so it is in use until the last of them ends.
+    """
+    path = Path(tempfile.gettempdir()) / f'glider-ros-domain-{domain}.lock'
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError:
+        return None
+    try:
+        for kind in kinds:
+            fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor

@@ -50,21 +50,21 @@ class EnergySettings(Settings):
         """Kernel parameters."""
         surface = self.steering_surface.value if self.steering_surface else 0.0
         return EnergyParams(
-            3600.0 * self.capacity.value,
-            self.voltage.value,
-            CC_PER_KG * self.pump_out.value,
-            CC_PER_KG * self.pump_out_per_m.value,
-            CC_PER_KG * self.pump_in.value,
-            CC_PER_KG * self.pump_in_per_m.value,
-            self.hotel_dive.value,
-            self.hotel_climb.value,
-            self.hotel_surface.value,
-            self.pitch_mass.value,
-            math.degrees(self.roll_mass.value),
-            math.degrees(surface),
-            self.call_start.value,
-            self.call_power.value,
-            self.call_duration.value,
+            capacity=3600.0 * self.capacity.value,
+            voltage=self.voltage.value,
+            out=CC_PER_KG * self.pump_out.value,
+            out_per_m=CC_PER_KG * self.pump_out_per_m.value,
+            let_in=CC_PER_KG * self.pump_in.value,
+            let_in_per_m=CC_PER_KG * self.pump_in_per_m.value,
+            dive=self.hotel_dive.value,
+            climb=self.hotel_climb.value,
+            surface=self.hotel_surface.value,
+            pitch=self.pitch_mass.value,
+            roll=math.degrees(self.roll_mass.value),
+            steer=math.degrees(surface),
+            call_start=self.call_start.value,
+            call=self.call_power.value,
+            call_s=self.call_duration.value,
         )
 
 

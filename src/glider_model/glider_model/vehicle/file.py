@@ -47,6 +47,8 @@ VEHICLE_FOLDER = Path(__file__).parent / 'vehicles'
 SHALLOWEST_GLIDE_DEG = 12.0
 #: Vertical rate of the slowest glide, if the file says nothing (m/s).
 SLOWEST_GLIDE_MPS = 0.12
+#: Share of what lies between rated and crush depth that is its drop margin, if the file says none.
+DROP_MARGIN_SHARE = 0.2
 #: Share of its rate that a pump keeps at the rated depth at least (-).
 LEAST_PUMP_SHARE = 0.05
 #: Source of a number that a person changed for a run.
@@ -72,6 +74,11 @@ class _Body(Settings):
     ) = None
     drop_weight: meaning(
         quantity('kg', gt=0.0, le=100.0) | None, 'weight in water of what is let go in need'
+    ) = None
+    drop_margin: meaning(
+        quantity('m', gt=0.0, le=5000.0) | None,
+        'it is let go where the vehicle would come as near as this to its crush depth; a fifth of '
+        'what lies between that and its rating without',
     ) = None
     volume: meaning(
         quantity('m^3', also=LITRE, gt=0.0, le=10.0) | None,
@@ -199,6 +206,15 @@ class Vehicle(_Steered):
     def crush_depth_m(self) -> float:
         """Depth at which the hull may give way (m); infinite if its file does not say."""
         return self.crush_depth.value if self.crush_depth else math.inf
+
+    @property
+    def drop_margin_m(self) -> float:
+        """How near to its crush depth its weight is let go (m)."""
+        if self.drop_margin:
+            return self.drop_margin.value
+        if self.crush_depth and self.rated_depth:
+            return DROP_MARGIN_SHARE * (self.crush_depth.value - self.rated_depth.value)
+        return 0.0
 
     def params(self) -> 'VehicleParams':
         """Kernel parameters, SI and radians."""

@@ -89,21 +89,21 @@ def make_inertia(x_p, mu, vehicle):
     c_xz = d_xy * d_yz - d_xz * d_yy
     scale = 1.0 / (d_xx * c_xx + d_xy * c_xy + d_xz * c_xz)
     return Inertia(
-        s_x,
-        s_y,
-        s_z,
-        i_xx,
-        i_yy,
-        i_zz,
-        i_xy,
-        i_xz,
-        i_yz,
-        c_xx * scale,
-        (d_xx * d_zz - d_xz * d_xz) * scale,
-        (d_xx * d_yy - d_xy * d_xy) * scale,
-        c_xy * scale,
-        c_xz * scale,
-        (d_xz * d_xy - d_xx * d_yz) * scale,
+        s_x=s_x,
+        s_y=s_y,
+        s_z=s_z,
+        i_xx=i_xx,
+        i_yy=i_yy,
+        i_zz=i_zz,
+        i_xy=i_xy,
+        i_xz=i_xz,
+        i_yz=i_yz,
+        n_xx=c_xx * scale,
+        n_yy=(d_xx * d_zz - d_xz * d_xz) * scale,
+        n_zz=(d_xx * d_yy - d_xy * d_xy) * scale,
+        n_xy=c_xy * scale,
+        n_xz=c_xz * scale,
+        n_yz=(d_xz * d_xy - d_xx * d_yz) * scale,
     )
 
 

@@ -14,7 +14,7 @@ from typing import ClassVar, NamedTuple
 from pydantic import Field
 
 from glider_model.base.frames import odometry_to_wire, quaternion_from_euler, rotate_to_body
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.signals import Covariance, Odometry, Vector
 from glider_model.onboard.glide_polar import Polar, make_polar
 from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
@@ -23,13 +23,21 @@ from glider_navigation.current_belief import (
     TIDE,
     CurrentBelief,
     Regressors,
+    carry,
     current_at,
     initial_belief,
+    last_mean,
     mean_variance,
     take_in,
     wandered,
 )
-from glider_navigation.flight_model import INITIAL_FLIGHT, Flight, follow_depth, reckon_speed
+from glider_navigation.flight_model import (
+    INITIAL_FLIGHT,
+    Flight,
+    follow_depth,
+    reckon_speed,
+    set_anew,
+)
 from glider_navigation.forecast import Forecast, forecast_at, make_forecast
 from glider_navigation.method import (
     Believed,
@@ -38,19 +46,21 @@ from glider_navigation.method import (
     method_step,
 )
 from glider_navigation.phase import AT_SURFACE, DIVES_M, FIXED, SURFACES_M, UNDER_WATER
+from glider_navigation.surface_depth import INITIAL_ZERO, Zero, find_zero
 from glider_navigation.surface_stay import (
     Stay,
     begin,
     counts,
+    drifted_variance,
     hear_fix,
     launched,
-    now,
-    variance_now,
     wait,
 )
 
 #: Shorter than this (s) a way under water tells no current.
-SHORTEST_WAY_S = 300.0
+SHORTEST_WAY_S = 120.0
+#: Drifts are known alike where the variance of one is at most so many times that of the other.
+KNOWN_ALIKE = 4.0
 
 
 class DeadReckonedSettings(NavigationMethodSettings):
@@ -73,33 +83,44 @@ class DeadReckonedSettings(NavigationMethodSettings):
         """Kernel parameters."""
         vehicle = start.vehicle.params()
         return DeadReckonedParams(
-            make_polar(vehicle),
-            make_moving_mass(vehicle),
-            make_forecast(start.forecast, start.current == 'forecast'),
-            start.current != 'none',
-            self.speed_error_share**2,
-            math.radians(self.heading_error_deg) ** 2,
+            polar=make_polar(vehicle),
+            mass=make_moving_mass(vehicle),
+            forecast=make_forecast(start.forecast, start.current == 'forecast'),
+            believes_current=start.current != 'none',
+            speed_variance=self.speed_error_share**2,
+            heading_variance=math.radians(self.heading_error_deg) ** 2,
         )
 
     def initial_state(self, start: Start) -> 'DeadReckonedState':
         """At the surface, where the vehicle was put into the water."""
         place, still = Vector(start.p_n, start.p_e), Vector(0.0, 0.0)
-        way = Way(place, self.start_std_m**2, still, still, 0.0, 0.0, 0.0)
+        drift = Drift(still, math.inf)
+        way = Way(
+            begun=place,
+            variance=self.start_std_m**2,
+            drift=drift,
+            through=still,
+            believed=still,
+            t_s=0.0,
+            cos_s=0.0,
+            sin_s=0.0,
+        )
         stay = launched(place, self.start_std_m**2)
         current = initial_belief(start.current == 'tidal')
         if start.current == 'forecast':
             current = initial_belief(False, start.forecast.error_std_mps)
         return DeadReckonedState(
-            0,
-            initial_attitude(start.vehicle),
-            INITIAL_FLIGHT,
-            False,
-            place,
-            way,
-            stay,
-            current,
-            still,
-            0.0,
+            tick=0,
+            attitude=initial_attitude(start.vehicle),
+            flight=INITIAL_FLIGHT,
+            under=False,
+            place=place,
+            way=way,
+            stay=stay,
+            current=current,
+            column=still,
+            depth=0.0,
+            zero=INITIAL_ZERO,
         )
 
 
@@ -114,11 +135,19 @@ class DeadReckonedParams(NamedTuple):
     heading_variance: float  #: (rad^2)
 
 
+class Drift(NamedTuple):
+    """How the vehicle drifted at the surface."""
+
+    velocity: Vector  #: (m/s)
+    variance: float  #: (m^2/s^2)
+
+
 class Way(NamedTuple):
     """The way under water since the last fix."""
 
     begun: Vector  #: where that was (m)
     variance: float  #: (m^2)
+    drift: Drift  #: there
     through: Vector  #: way through the water, and by drift where nothing fixed it (m)
     believed: Vector  #: way by the current that was believed (m)
     t_s: float  #: time under water
@@ -139,6 +168,7 @@ class DeadReckonedState(NamedTuple):
     current: CurrentBelief
     column: Vector  #: mean of the forecast over the last way that told something (m/s)
     depth: float  #: that was shown last (m)
+    zero: Zero  #: what is shown at the surface
 
 
 @kernel
@@ -179,8 +209,8 @@ def _learn(current, way, stay, params):
         return current
     t = way.t_s
     off = Vector(
-        (stay.place.n - way.begun.n - way.through.n - way.believed.n) / t,
-        (stay.place.e - way.begun.e - way.through.e - way.believed.e) / t,
+        (stay.came_up.n - way.begun.n - way.through.n - way.believed.n) / t,
+        (stay.came_up.e - way.begun.e - way.through.e - way.believed.e) / t,
     )
     unlike = _unlike(way, current)
     bias = 0.5 * (params.speed_variance + params.heading_variance)
@@ -190,7 +220,7 @@ def _learn(current, way, stay, params):
         _regressors(way),
         t,
         Vector(way.through.n / t, way.through.e / t),
-        (way.variance + stay.pp) / (t * t),
+        (way.variance + stay.known.cc) / (t * t),
         bias * (unlike.n * unlike.n + unlike.e * unlike.e),
     )
 
@@ -198,40 +228,45 @@ def _learn(current, way, stay, params):
 @kernel
 def _dive(way, stay):
     """The way that begins with a dive: a new one, if the stay had a fix."""
-    here = now(stay)
     if stay.fixes > 0:
         still = Vector(0.0, 0.0)
-        return Way(here, variance_now(stay), still, still, 0.0, 0.0, 0.0)
+        drift = Drift(stay.drift, stay.known.vv)
+        return Way(
+            begun=stay.place,
+            variance=stay.known.pp,
+            drift=drift,
+            through=still,
+            believed=still,
+            t_s=0.0,
+            cos_s=0.0,
+            sin_s=0.0,
+        )
     drifted = Vector(
-        way.through.n + stay.drift.n * stay.t_s,
-        way.through.e + stay.drift.e * stay.t_s,
+        way.through.n + stay.place.n - stay.came_up.n,
+        way.through.e + stay.place.e - stay.came_up.e,
     )
-    more = stay.t_s * stay.t_s * stay.vv
-    return Way(
-        way.begun, way.variance + more, drifted, way.believed, way.t_s, way.cos_s, way.sin_s
-    )
+    more = drifted_variance(stay)
+    return replace(way, variance=way.variance + more, through=drifted)
 
 
 @kernel
 def _go_on(way, through, current, t_s, dt):
     """The way a tick later, at velocities through the water and of the current (m/s)."""
-    return Way(
-        way.begun,
-        way.variance,
-        Vector(way.through.n + dt * through.n, way.through.e + dt * through.e),
-        Vector(way.believed.n + dt * current.n, way.believed.e + dt * current.e),
-        way.t_s + dt,
-        way.cos_s + dt * math.cos(TIDE * t_s),
-        way.sin_s + dt * math.sin(TIDE * t_s),
+    return replace(
+        way,
+        through=Vector(way.through.n + dt * through.n, way.through.e + dt * through.e),
+        believed=Vector(way.believed.n + dt * current.n, way.believed.e + dt * current.e),
+        t_s=way.t_s + dt,
+        cos_s=way.cos_s + dt * math.cos(TIDE * t_s),
+        sin_s=way.sin_s + dt * math.sin(TIDE * t_s),
     )
 
 
 @kernel
 def _forecast_mean(way, current):
     """Mean (m/s) of the forecast over a way, of what was believed in it."""
-    return Vector(
-        way.believed.n / way.t_s - current.mean.n, way.believed.e / way.t_s - current.mean.e
-    )
+    learnt = current_at(current, 0.0)
+    return Vector(way.believed.n / way.t_s - learnt.n, way.believed.e / way.t_s - learnt.e)
 
 
 @kernel
@@ -239,6 +274,31 @@ def _water_at(place, depth, t_s, current, params):
     """Current (m/s) that is believed for a place (m), depth (m) and time since the start (s)."""
     learnt, told = current_at(current, t_s), forecast_at(params.forecast, place, depth, t_s)
     return Vector(learnt.n + told.n, learnt.e + told.e)
+
+
+@kernel
+def _unforeseen(drift, place, t_s, current, params):
+    """A drift (m/s) at a place (m) and time (s), less the water that is believed to be there."""
+    water = _water_at(place, 0.0, t_s, current, params)
+    return Vector(drift.n - water.n, drift.e - water.e)
+
+
+@kernel
+def _carry(current, way, stay, t_s, params):
+    """What is believed of the current as a stay ends, by how the drift has changed since the way.
+
+    The drift of the way is that at both of its ends, where that at the first is as well known.
+    """
+    if current.way_s <= 0.0:
+        return current
+    early, up_s = stay.early, t_s - stay.t_s
+    now = _unforeseen(stay.drift, stay.place, t_s, current, params)
+    then = _unforeseen(early.drift, stay.came_up, up_s + early.t_s, current, params)
+    if way.drift.variance <= KNOWN_ALIKE * early.variance:
+        first = _unforeseen(way.drift.velocity, way.begun, up_s - way.t_s, current, params)
+        then = Vector(0.5 * (then.n + first.n), 0.5 * (then.e + first.e))
+    change = Vector(now.n - then.n, now.e - then.e)
+    return carry(current, change, stay.t_s, stay.known.vv + early.variance)
 
 
 @kernel
@@ -278,6 +338,7 @@ def _change_over(state, under, t_s, params):
             if params.forecast.is_believed and way.t_s >= SHORTEST_WAY_S:
                 column = _forecast_mean(way, current)
             current = _learn(current, way, stay, params)
+            current = _carry(current, way, stay, t_s, params)
         way = _dive(way, stay)
     elif state.under and not under:
         covariance = place_covariance(way, current, params)
@@ -295,7 +356,21 @@ def _odometry(place, attitude, flight, velocity):
     q_w, q_x, q_y, q_z = quaternion_from_euler(angles.phi, angles.theta, angles.psi)
     u, v, w = rotate_to_body(q_w, q_x, q_y, q_z, velocity.n, velocity.e, flight.rate)
     p, q, r = attitude.p, attitude.q, attitude.r
-    odometry = Odometry(place.n, place.e, flight.depth, q_w, q_x, q_y, q_z, u, v, w, p, q, r)
+    odometry = Odometry(
+        p_n=place.n,
+        p_e=place.e,
+        p_d=flight.depth,
+        q_w=q_w,
+        q_x=q_x,
+        q_y=q_y,
+        q_z=q_z,
+        u=u,
+        v=v,
+        w=w,
+        p=p,
+        q=q,
+        r=r,
+    )
     return odometry_to_wire(odometry)
 
 
@@ -307,7 +382,10 @@ def dead_reckoned_step(state, heard, params, dt):
     followed, attitude, sampled = attitude_step(
         state.attitude, heard.imu, heard.joints, params.mass, dt
     )
-    flight = follow_depth(state.flight, heard.depth, sampled or heard.depth != state.depth, dt)
+    is_new = sampled or heard.depth != state.depth
+    zero = find_zero(state.zero, heard.depth, is_new, heard.fix.is_fix, dt)
+    flight = set_anew(state.flight, state.zero.offset - zero.offset)
+    flight = follow_depth(flight, heard.depth - zero.offset, is_new, dt)
     flight = reckon_speed(flight, attitude.angles.theta, params.polar, dt)
     under = flight.depth > (SURFACES_M if state.under else DIVES_M)
     way, stay, current, column = _change_over(state, under, t_s, params)
@@ -322,21 +400,31 @@ def dead_reckoned_step(state, heard, params, dt):
         stay = wait(stay, dt)
         if counts(stay, heard.fix):
             stay = hear_fix(stay, heard.fix)
-        place, velocity, variance = now(stay), stay.drift, variance_now(stay)
+        place, velocity, variance = stay.place, stay.drift, stay.known.pp
         covariance = Covariance(variance, 0.0, variance)
         phase = FIXED if stay.fixes > 0 else AT_SURFACE
-    learnt = current_at(current, t_s)
+    learnt = last_mean(current, t_s)
     wandering = current.p.mm + wandered(current, current.way_s)
     believed = Believed(
-        _odometry(place, attitude, flight, velocity),
-        covariance,
-        Vector(learnt.n + column.n, learnt.e + column.e),
-        Covariance(wandering, 0.0, wandering),
-        stay.drift,
-        Covariance(stay.vv, 0.0, stay.vv),
-        phase,
+        odom=_odometry(place, attitude, flight, velocity),
+        place=covariance,
+        current=Vector(learnt.n + column.n, learnt.e + column.e),
+        current_covariance=Covariance(wandering, 0.0, wandering),
+        surface=stay.drift,
+        surface_covariance=Covariance(stay.known.vv, 0.0, stay.known.vv),
+        phase=phase,
     )
     state = DeadReckonedState(
-        state.tick + 1, followed, flight, under, place, way, stay, current, column, heard.depth
+        tick=state.tick + 1,
+        attitude=followed,
+        flight=flight,
+        under=under,
+        place=place,
+        way=way,
+        stay=stay,
+        current=current,
+        column=column,
+        depth=heard.depth,
+        zero=zero,
     )
     return state, believed

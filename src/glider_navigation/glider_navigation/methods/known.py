@@ -14,8 +14,8 @@ from glider_model.base.frames import (
     odometry_to_wire,
     quaternion_from_euler,
 )
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import TICK_S, Imu, Odometry, Vector
+from glider_model.base.kernel import kernel, replace
+from glider_model.base.signals import TICK_S, Imu, Vector
 from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
 from glider_navigation.attitude import AttitudeState, attitude_step, initial_attitude
 from glider_navigation.method import (
@@ -64,25 +64,21 @@ def known_step(state, heard, params, dt):
     odom, attitude = heard.odom, state.attitude
     if not params.as_measured:
         x = heard.odometry
-        imu = Imu(x.q_w, x.q_x, x.q_y, x.q_z, x.p, x.q, x.r, params.gyro)
+        imu = Imu(
+            q_w=x.q_w, q_x=x.q_x, q_y=x.q_y, q_z=x.q_z, p=x.p, q=x.q, r=x.r, has_rates=params.gyro
+        )
         attitude, now, _ = attitude_step(state.attitude, imu, heard.joints, params.mass, dt)
         q = quaternion_from_euler(now.angles.phi, now.angles.theta, now.angles.psi)
         odom = odometry_to_wire(
-            Odometry(
-                x.p_n,
-                x.p_e,
-                x.p_d,
-                q[0],
-                q[1],
-                q[2],
-                q[3],
-                x.u,
-                x.v,
-                x.w,
-                now.p,
-                now.q,
-                now.r,
-            )
+            replace(x, q_w=q[0], q_x=q[1], q_y=q[2], q_z=q[3], p=now.p, q=now.q, r=now.r)
         )
     nothing = Vector(0.0, 0.0)
-    return KnownState(attitude), Believed(odom, NONE, nothing, NONE, nothing, NONE, KNOWN)
+    return KnownState(attitude), Believed(
+        odom=odom,
+        place=NONE,
+        current=nothing,
+        current_covariance=NONE,
+        surface=nothing,
+        surface_covariance=NONE,
+        phase=KNOWN,
+    )

@@ -17,7 +17,7 @@ from glider_bringup.console import (
     output,
     progress_bar,
 )
-from glider_model.base.exits import EXIT_INTERRUPTED
+from glider_model.base.errors import EXIT_INTERRUPTED
 
 app = typer.Typer()
 

@@ -11,8 +11,17 @@ from typing import Annotated, Literal
 import typer
 from rich.table import Table
 
-from glider_bringup.console import Json, Run, messages, output, picked, repeatable, shares, tell
-from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_bringup.console import (
+    Json,
+    Run,
+    compiling,
+    messages,
+    output,
+    picked,
+    repeatable,
+    shares,
+)
+from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED
 from glider_model.base.wiring import WIRING
 
 app = typer.Typer()
@@ -48,7 +57,9 @@ def verify(
     from glider_model.base.kernel import compiling_told
 
     wanted = picked(only, BlockName)
-    compiling = partial(tell, 'compiling the mathematics of a block for these settings, once')
+    told_compiling = partial(
+        compiling, 'compiling the mathematics of a block for these settings, once'
+    )
     try:
         with tempfile.TemporaryDirectory() as scratch, shares() as update:
             bag = Bag(run)
@@ -56,7 +67,7 @@ def verify(
             recording = Recording(
                 bag, namespace, lambda share: update('reading', share), told.steers_by
             )
-            with interrupts_at(update) as update, compiling_told(compiling):
+            with interrupts_at(update) as update, compiling_told(told_compiling):
                 verdicts = list(verify_blocks(recording, told, wanted, update))
     except KeyboardInterrupt:
         messages.print('stopped by SIGINT', style='red')

@@ -20,7 +20,7 @@ from glider_bringup.console import (
     workers_at_work,
 )
 from glider_bringup.mission.disk import write_whole
-from glider_model.base.exits import EXIT_FAILED
+from glider_model.base.errors import EXIT_FAILED
 
 app = typer.Typer()
 Group = Literal[
@@ -33,6 +33,7 @@ Group = Literal[
     'envelope',
     'navigation',
     'faults',
+    'random_faults',
 ]
 
 
@@ -42,6 +43,12 @@ def experiments(
         list[repeatable(Group)] | None,
         typer.Option(help='Group; can be repeated. Default: all of them.'),
     ] = None,
+    flights: Annotated[
+        int, typer.Option(min=1, max=1_000_000, help='Missions of random_faults.')
+    ] = 200,
+    seed: Annotated[
+        int, typer.Option(min=0, max=2**31 - 1, help='Seed of the missions of random_faults.')
+    ] = 0,
     workers: Workers = None,
     scheduler: Scheduler = None,
     out: Annotated[
@@ -52,21 +59,32 @@ def experiments(
     """Fly the experiments of the paper and what goes beyond them; exit code 1 if one fails.
 
     By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
-    engine; the flights of the paper last 30 hours.
+    engine; the flights of the paper last 30 hours. random_faults breaks random missions in two or
+    three random ways, and judges them by their true motion alone.
     """
     from glider_bringup.mission.run_folder import make_result_folder
     from glider_bringup.showing import paper_figures
+    from glider_bringup.studies.hunt import search
     from glider_bringup.studies.paper import catalogue, flying, tables, verdicts
 
-    planned = catalogue.make_experiments(picked(only, Group))
-    flights = flying.count_flights(planned)
+    groups = picked(only, Group)
+    planned = catalogue.make_experiments(groups)
+    hunts = search.NAME in groups
+    total = flying.count_flights(planned) + hunts * flights
     if out:
         make_result_folder(out, verdicts.RESULT_FILE)
-    messages.print(f'{len(planned)} experiments, {flights} flights')
+    messages.print(f'{len(planned) + hunts} experiments, {total} flights')
     loops = flying.combinations(planned)
-    with workers_at_work(workers, scheduler, loops) as pool, counter('flying', flights) as update:
+    if hunts:
+        loops |= search.combinations(seed, flights)
+    with workers_at_work(workers, scheduler, loops) as pool, counter('flying', total) as update:
         rows, records = flying.fly(planned, pool, update)
-    result = verdicts.report(planned, rows)
+        result = verdicts.report(planned, rows)
+        if hunts:
+            before = total - flights
+            found = search.search(seed, flights, pool, lambda done: update(before + done))
+            result['experiments'].append(found)
+            result |= found['counts']
     if out:
         with messages.status('drawing'):
             drawn = paper_figures.draw(planned, rows, records, out)

@@ -21,7 +21,7 @@ from glider_bringup.console import (
     output,
     workers_at_work,
 )
-from glider_model.base.exits import EXIT_FAILED
+from glider_model.base.errors import EXIT_FAILED
 
 app = typer.Typer()
 #: So many of the cells that failed are told one by one.

@@ -93,13 +93,13 @@ def fly(track: Track, model: Model, impose: Imposed) -> Simulated:
         fly_free(table, model.vehicle, TICK_S, flown)
     own = Flown(*flown.T)
     return Simulated(
-        vertical_rate(track.instruments.time_s, own.down, RATE_S),
-        own.speed,
-        own.ahead,
-        own.abeam,
-        own.heading,
-        own.phi,
-        own.theta,
+        rate_mps=vertical_rate(track.instruments.time_s, own.down, RATE_S),
+        speed_mps=own.speed,
+        ahead_m=own.ahead,
+        abeam_m=own.abeam,
+        heading_rad=own.heading,
+        roll_rad=own.phi,
+        pitch_rad=own.theta,
     )
 
 

@@ -15,7 +15,7 @@ from glider_model.base.frames import (
     rotate_to_ned,
     wrap_angle,
 )
-from glider_model.base.kernel import kernel
+from glider_model.base.kernel import kernel, replace
 from glider_model.base.signals import Joints, Water
 from glider_model.ocean.density import displacing, immersed
 from glider_model.plant.motion import Motion, acceleration, integrate
@@ -87,16 +87,16 @@ def _in_measured_water(depth, m_b, vehicle, params):
 def _between(one, other, share):
     """Forcing a share of the way from one row to the next."""
     return Forcing(
-        one[0] + share * (other[0] - one[0]),
-        one[1] + share * (other[1] - one[1]),
-        one[2] + share * (other[2] - one[2]),
-        one[3] + share * (other[3] - one[3]),
-        one[4] + share * (other[4] - one[4]),
-        one[5] + share * (other[5] - one[5]),
-        one[6] + share * (other[6] - one[6]),
-        one[7] + share * (other[7] - one[7]),
-        one[8] + share * (other[8] - one[8]),
-        one[9] + share * (other[9] - one[9]),
+        time=one[0] + share * (other[0] - one[0]),
+        depth=one[1] + share * (other[1] - one[1]),
+        phi=one[2] + share * (other[2] - one[2]),
+        theta=one[3] + share * (other[3] - one[3]),
+        m_b=one[4] + share * (other[4] - one[4]),
+        x_p=one[5] + share * (other[5] - one[5]),
+        mu=one[6] + share * (other[6] - one[6]),
+        delta=one[7] + share * (other[7] - one[7]),
+        ratio=one[8] + share * (other[8] - one[8]),
+        temperature=one[9] + share * (other[9] - one[9]),
     )
 
 
@@ -137,19 +137,19 @@ def _held(u, v, w, turn, forcing, phi_dot, theta_dot, vehicle):
     r = -theta_dot * s_f + turn * c_f * c_t
     attitude = quaternion_from_euler(forcing.phi, forcing.theta, 0.0)
     motion = Motion(
-        0.0,
-        0.0,
-        forcing.depth,
-        attitude[0],
-        attitude[1],
-        attitude[2],
-        attitude[3],
-        u,
-        v,
-        w,
-        p,
-        q,
-        r,
+        p_n=0.0,
+        p_e=0.0,
+        p_d=forcing.depth,
+        q_w=attitude[0],
+        q_x=attitude[1],
+        q_y=attitude[2],
+        q_z=attitude[3],
+        u=u,
+        v=v,
+        w=w,
+        p=p,
+        q=q,
+        r=r,
     )
     inertia = make_inertia(forcing.x_p, forcing.mu, vehicle)
     water = MeasuredWater(forcing.ratio, forcing.temperature)
@@ -251,7 +251,21 @@ def fly_free(table, vehicle, step, flown):
     """Fly with the actuators imposed; attitude is the plant's own. See `fly_held`."""
     start = table[0]
     q_w, q_x, q_y, q_z = quaternion_from_euler(start[2], start[3], 0.0)
-    x = Motion(0.0, 0.0, start[1], q_w, q_x, q_y, q_z, START_MPS, 0.0, 0.0, 0.0, 0.0, 0.0)
+    x = Motion(
+        p_n=0.0,
+        p_e=0.0,
+        p_d=start[1],
+        q_w=q_w,
+        q_x=q_x,
+        q_y=q_y,
+        q_z=q_z,
+        u=START_MPS,
+        v=0.0,
+        w=0.0,
+        p=0.0,
+        q=0.0,
+        r=0.0,
+    )
     down, ahead, abeam, heading, last = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(len(table)):
         here = table[k]
@@ -283,9 +297,7 @@ def fly_free(table, vehicle, step, flown):
 @kernel
 def _stepped(x, begin, end, vehicle, h):
     """Motion a step later, under actuators and in water that are imposed."""
-    placed = Motion(
-        0.0, 0.0, begin.depth, x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w, x.p, x.q, x.r
-    )
+    placed = replace(x, p_n=0.0, p_e=0.0, p_d=begin.depth)
     middle = MeasuredWater(
         0.5 * (begin.ratio + end.ratio), 0.5 * (begin.temperature + end.temperature)
     )

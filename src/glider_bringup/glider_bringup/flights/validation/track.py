@@ -96,13 +96,13 @@ def _track(own: Instruments, origin_deg: np.ndarray) -> Track:
         phase[begin : end + 1] = math.copysign(1.0, depth[-1] - depth[0])
         counts[begin : end + 1] = _compared(depth)
     return Track(
-        own,
-        pressure,
-        density,
-        vertical_rate(own.time_s, own.depth_m, RATE_S),
-        half,
-        phase,
-        counts,
+        instruments=own,
+        pressure_dbar=pressure,
+        density_kgpm3=density,
+        rate_mps=vertical_rate(own.time_s, own.depth_m, RATE_S),
+        half=half,
+        phase=phase,
+        counts=counts,
     )
 
 

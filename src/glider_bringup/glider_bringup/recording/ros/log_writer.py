@@ -3,21 +3,28 @@
 """Log rows of the direct engine to the bag that the nodes would have left."""
 
 from collections.abc import Iterable
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 
 from glider_bringup.blocks import BLOCKS, COLUMNS
 from glider_bringup.recording.ros.rosbag2 import BagWriter
-from glider_guidance.nodes.guidance_node import path_message
+from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
+from glider_guidance.order import Order
+from glider_guidance.orders import changed, first_ticks
+from glider_guidance.settings import GuidanceSettings
 from glider_model.base.block import Telling
 from glider_model.base.signals import TICK_NS
-from glider_model.base.wiring import present
+from glider_model.base.wiring import GUIDANCE, present
 from glider_model.ros.lockstep import health
+from glider_model.ros.lockstep.orders import ABORT, PARAMETERS_SET
+from glider_model.ros.parameters import changed_parameters
 from glider_model.ros.wire import topics
 from glider_model.ros.wire.codec import to_cdr
 from glider_model.ros.wire.topics import TOPICS, topic_of
 
-_PLANT = f'/glider/{topics.PLANT}'
+_PLANT, _GUIDANCE = f'/glider/{topics.PLANT}', f'/glider/{GUIDANCE.node}'
 _PER_TICK = [topic.name for topic in TOPICS.values() if topic.per_tick]
 
 
@@ -27,8 +34,8 @@ class LogWriter:
     Parameters
     ----------
     bag : BagWriter
-    path_points : float64[n, 3]
-        Path that guidance publishes, NED (m).
+    settings : GuidanceSettings
+        What guidance is told before the first tick, and its orders.
     topics : iterable of str
         Those of the topics that not every run has that there are in this one.
     steers_by : str
@@ -38,7 +45,7 @@ class LogWriter:
     def __init__(
         self,
         bag: BagWriter,
-        path_points: np.ndarray,
+        settings: GuidanceSettings,
         topics: Iterable[str],
         steers_by: str = '',
     ) -> None:
@@ -46,11 +53,13 @@ class LogWriter:
         self._topics = [topic_of(name, steers_by) for name in present(_PER_TICK, topics)]
         self._tick = 0
         self._tellings = [Telling(block) for block in BLOCKS if block.say]
-        bag.write('path', 0, to_cdr(path_message(path_points)))
+        self._settings, self._waiting, self._stage = settings, [*settings.orders], -1
+        self._tell_path(0)
 
     def add(self, log: np.ndarray) -> None:
         """Add a block of rows, float64[n, ROW]."""
         stamps = (np.arange(len(log)) + self._tick) * TICK_NS
+        self._tell_orders(stamps, log)
         self._tell(stamps, log)
         payloads = {}
         for topic in self._topics:
@@ -70,6 +79,37 @@ class LogWriter:
                 event = health.said_array(stamp_ns, node, block.say(*flags[row].tolist()))
                 self._bag.write('/diagnostics', stamp_ns, to_cdr(event))
 
+    def _tell_path(self, stamp_ns: int) -> None:
+        """Write the path that is followed from now on."""
+        points = self._settings.path.points(PATH_POINTS)
+        self._bag.write('path', stamp_ns, to_cdr(path_message(points, stamp_ns)))
+
+    def _tell_orders(self, stamps: np.ndarray, log: np.ndarray) -> None:
+        """Write the orders that hold from one of the ticks on, as the guidance node tells them."""
+        if not self._waiting:
+            return
+        stages = np.concatenate([[self._stage], log[:, COLUMNS['stage']]]).astype(np.int64)
+        self._stage = int(stages[-1])
+        found = first_ticks(self._waiting, self._tick, stages[:-1])
+        for row, group in groupby(found, key=itemgetter(0)):
+            self._follow(int(stamps[row]), [order for _, order in group])
+
+    def _follow(self, stamp_ns: int, orders: list[Order]) -> None:
+        """Write the orders that hold from a tick on: one event of a kind, and one path."""
+        path, told = self._settings.path, {}
+        for order in orders:
+            before, message = self._settings, ABORT if order.abort else PARAMETERS_SET
+            self._settings = changed(before, order)
+            values = told.setdefault(message, {})
+            values.update(changed_parameters(before, self._settings))
+            rest = [one for one in self._waiting if one is not order]
+            self._waiting = [] if order.abort else rest
+        if self._settings.path != path:
+            self._tell_path(stamp_ns)
+        for message, values in told.items():
+            event = health.status_array(stamp_ns, _GUIDANCE, health.OK, message, values)
+            self._bag.write('/diagnostics', stamp_ns, to_cdr(event))
+
     def finish(self, failure: str = '') -> None:
         """Write that the run is complete or why it failed, as the plant says it at its end."""
         stamp_ns = max(0, self._tick - 1) * TICK_NS
@@ -78,7 +118,11 @@ class LogWriter:
             report = health.Report(_PLANT, health.FAILED, failure, stamp_ns, level=health.ERROR)
         self._bag.write('/diagnostics', stamp_ns, to_cdr(health.report_array(report)))
 
-    def close(self) -> int:
-        """Complete the bag; the number of messages in it."""
+    def close(self) -> None:
+        """Complete the bag."""
         self._bag.close()
+
+    @property
+    def messages(self) -> int:
+        """Number of messages in the bag."""
         return sum(self._bag.counts.values())

@@ -119,12 +119,12 @@ def plan_replay(
         )
     renamed = {name: _rename(name, recorded, published) for name in wanted}
     return Plan(
-        bag,
-        {index: renamed[name] for index, name in enumerate(names) if name in wanted},
-        published,
-        start_ns,
-        end_ns,
-        frozenset(renamed[name] for name in asked),
+        bag=bag,
+        names={index: renamed[name] for index, name in enumerate(names) if name in wanted},
+        namespace=published,
+        start_ns=start_ns,
+        end_ns=end_ns,
+        asked=frozenset(renamed[name] for name in asked),
     )
 
 
@@ -336,7 +336,12 @@ class Replay:
         given_domain()
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         try:
-            self._node = Node(topics.REPLAY, enable_rosout=False, start_parameter_services=False)
+            self._node = Node(
+                topics.REPLAY,
+                namespace=plan.namespace,
+                enable_rosout=False,
+                start_parameter_services=False,
+            )
             self._outputs = {
                 index: _Output(self._node, name, plan.bag.topics[index])
                 for index, name in plan.names.items()

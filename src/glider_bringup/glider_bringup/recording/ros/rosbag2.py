@@ -120,7 +120,7 @@ class BagWriter:
     ------
     OSError
         If a recording is there already, or the file cannot be made. All methods that write raise
-        a `DiskError` if the disk takes no more.
+        a `DiskError` if the disk takes no more, or the file is no longer there.
     """
 
     def __init__(
@@ -198,8 +198,13 @@ class BagWriter:
     def flush(self) -> None:
         """Write everything so far into the file, and sync it if every chunk is."""
         self._mcap.flush()
+        self.refuse_vanished()
         if self._sync == 'chunk':
             self._mcap.sync()
+
+    def refuse_vanished(self) -> None:
+        """Raise a `DiskError` if the recording was deleted or renamed, or the folder of it."""
+        self._mcap.refuse_vanished()
 
     @property
     def counts(self) -> dict[str, int]:
@@ -208,7 +213,7 @@ class BagWriter:
 
     def close(self) -> None:
         """Complete the file, and write metadata.yaml in one go."""
-        self._mcap.flush()
+        self.flush()
         text = self._metadata()
         self._mcap.add_metadata(ROSBAG2, {'serialized_metadata': text})
         self._mcap.close(sync=self._sync != 'never')

@@ -20,7 +20,6 @@ class Told(NamedTuple):
     blocks: dict[str, Settings | None]  #: by name of the block; None: it is not known
     source: str  #: where it stands
     lockstep: bool | None  #: None: it does not say
-    note: str = ''
 
     @property
     def steers_by(self) -> str:
@@ -58,11 +57,7 @@ def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
         return Told(_from_scenario(load_scenario(str(file), recorded=True)), str(file), lockstep)
     found = find_scenario(bag.files[0], folder, bag.attachments, scratch)
     if found is not None:
-        beside, attached = folder / SCENARIO_FILE, bag.attachments.get(SCENARIO_FILE)
-        both = attached is not None and beside.is_file()
-        differs = both and attached != beside.read_bytes()
-        note = f'{beside} is not the scenario that is attached to the bag' if differs else ''
-        return Told(_from_scenario(found.scenario), found.source, lockstep, note)
+        return Told(_from_scenario(found.scenario), found.source, lockstep)
     if parameters.is_file():
         values = read_yaml(parameters)
         return Told(_from_parameters(values, str(parameters)), str(parameters), lockstep)

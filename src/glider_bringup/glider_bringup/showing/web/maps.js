@@ -87,7 +87,7 @@ function drawTrack(panel, element, from, to) {
     ...look(element),
     margin: { l: 60, r: 10, t: 46, b: 40 },
     showlegend: true,
-    legend: { orientation: 'h', x: 0, y: 1.01, yanchor: 'bottom' },
+    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1.01 },
     hovermode: 'closest',
     dragmode: 'pan',
     xaxis: axis(`east (${frame.unit})`, {
@@ -98,7 +98,7 @@ function drawTrack(panel, element, from, to) {
 }
 
 /** How far away the eye starts: everything with its labels is in view. */
-const farOf = (element) => (isNarrow(element) ? 1.5 : 1.15);
+const farOf = (element) => (isNarrow(element) ? 1.75 : 1.15);
 
 /** Traces and layout of the view in three dimensions, turned as the element has it. */
 function spaceFigure(panel, element) {
@@ -125,7 +125,11 @@ function spaceFigure(panel, element) {
   const side = 1.25 / Math.max(width, height);
   const km = ([low, high], span) => spread([low * frame.scale, high * frame.scale], span * frame.scale);
   const far = farOf(element);
-  const paint = { backgroundcolor: values('--card'), showbackground: false };
+  const paint = { backgroundcolor: values('--card'), showbackground: false, tickfont: { size: 11 } };
+  const deepest = Math.max(frame.depth[1], 10) * 1.1;
+  const level = (name, range, span) => axis(`${name} (${frame.unit})`, {
+    ...paint, range, tickvals: innerTicks(...range, Math.max(2, Math.round((5 * span) / Math.max(width, height)))),
+  });
   const camera = element.layout?.scene.camera || {
     eye: { x: 1.5 * far, y: -1.35 * far, z: 0.8 * far }, center: { x: 0, y: 0, z: -0.1 },
   };
@@ -133,14 +137,16 @@ function spaceFigure(panel, element) {
     ...look(element),
     margin: { l: 0, r: 0, t: 0, b: 0 },
     showlegend: true,
-    legend: { orientation: 'h', x: 0, y: 1, yanchor: 'top' },
+    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1, yanchor: 'top' },
     scene: {
       aspectmode: 'manual',
       aspectratio: { x: width * side, y: height * side, z: 0.75 },
       camera,
-      xaxis: axis(`east (${frame.unit})`, { ...paint, range: km(frame.east, width), nticks: 5 }),
-      yaxis: axis(`north (${frame.unit})`, { ...paint, range: km(frame.north, height), nticks: 5 }),
-      zaxis: axis('depth (m)', { ...paint, range: [Math.max(frame.depth[1], 10) * 1.02, 0], nticks: 5 }),
+      xaxis: level('east', km(frame.east, width), width),
+      yaxis: level('north', km(frame.north, height), height),
+      zaxis: axis('depth (m)', {
+        ...paint, range: [deepest, 0], tickvals: [0, ...innerTicks(0, deepest, 4)],
+      }),
     },
   };
   return { data: traces, layout };
@@ -192,7 +198,7 @@ function drawSide(panel, element) {
     ...look(element),
     margin: { l: 60, r: 10, t: 46, b: 40 },
     showlegend: true,
-    legend: { orientation: 'h', x: 0, y: 1.01, yanchor: 'bottom' },
+    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1.01 },
     hovermode: 'closest',
     dragmode: false,
     xaxis: axis(`distance flown (${unit})`, { fixedrange: true, nticks: 6 }),

@@ -1,9 +1,12 @@
 // Draws the panels, zooms into all of them, fits them to their places, and puts them on paper.
 
-const DRAW = { time: drawTime, track: drawTrack, space: drawSpace, side: drawSide, plan: drawPlan };
+const DRAW = { time: drawTime, track: drawTrack, space: drawSpace, side: drawSide, plan: drawPlan, places: drawPlaces };
+/** Panels of the whole run, whatever span of it is shown. */
+const WHOLE = ['space', 'side', 'places'];
 const root = document.documentElement;
-/** How far away the eye is on paper, where a view is half a page wide; see farOf. */
-const FAR_ON_PAPER = 1.65;
+/** How far away the eye is on paper; see farOf. How much smaller letters are there. */
+const FAR_ON_PAPER = 1.2;
+const FINER_ON_PAPER = 1.6;
 /** What is shown (s), and how wide each panel was drawn (px). */
 let shown = [0, page.duration];
 const widths = new Map();
@@ -28,7 +31,7 @@ function draw(panel) {
 
 /**
  * Show a span of time in every panel, those in view at once; a newer call ends an older one.
- * The view in three dimensions shows the whole run; it is drawn again only with everything.
+ * Some panels show the whole run; they are drawn again only with everything.
  */
 async function show(from, to, everything = false) {
   turn += 1;
@@ -40,7 +43,7 @@ async function show(from, to, everything = false) {
     const box = place(panel).getBoundingClientRect();
     return box.bottom > 0 && box.top < window.innerHeight;
   };
-  const panels = page.panels.filter(({ kind }) => everything || !['space', 'side'].includes(kind));
+  const panels = page.panels.filter(({ kind }) => everything || !WHOLE.includes(kind));
   const near = new Set(panels.filter(inView));
   for (const panel of [...near, ...panels.filter((one) => !near.has(one))]) {
     if (!near.has(panel)) await new Promise((resolve) => { setTimeout(resolve); });
@@ -88,8 +91,10 @@ async function takePicture(panel) {
   };
   const image = new Image();
   image.alt = panel.title;
+  layout.width *= FINER_ON_PAPER;
+  layout.height *= FINER_ON_PAPER;
   const { width, height } = layout;
-  image.src = await Plotly.toImage({ data, layout }, { format: 'png', width, height, scale: 3 });
+  image.src = await Plotly.toImage({ data, layout }, { format: 'png', width, height, scale: 2 });
   await image.decode();
   figure.querySelector('img')?.remove();
   figure.append(image);

@@ -5,8 +5,8 @@ const ELLIPSE_95 = 5.991;
 /** Most surfacings that have their number beside them. */
 const NUMBERED = 25;
 
-/** Points of the 95 % ellipse around a believed place, east and north (m). */
-function ellipse({ believed_ned_m: [north, east], covariance_m2: [nn, ne, ee] }) {
+/** Points of the 95 % ellipse around a believed place, to the east and north of it (m). */
+function ellipse({ covariance_m2: [nn, ne, ee] }) {
   const points = [];
   const a = Math.sqrt(ELLIPSE_95 * nn);
   const b = a > 0 ? (ELLIPSE_95 * ne) / a : 0;
@@ -14,7 +14,7 @@ function ellipse({ believed_ned_m: [north, east], covariance_m2: [nn, ne, ee] })
   for (let i = 0; i <= 48; i += 1) {
     const turned = (2 * Math.PI * i) / 48;
     const [cos, sin] = [Math.cos(turned), Math.sin(turned)];
-    points.push([east + b * cos + c * sin, north + a * cos]);
+    points.push([b * cos + c * sin, a * cos]);
   }
   return points;
 }
@@ -48,10 +48,6 @@ function planTraces(run, scale, unit) {
     pathTrace(run, scale, {
       hoverinfo: 'skip', line: { color: values('--limit'), width: 1.5, dash: 'dash' },
     }),
-    lineOf(surfacings.flatMap((one) => [...ellipse(one), null]), scale, {
-      name: '95 % ellipse of the believed place', fill: 'toself',
-      fillcolor: `${values('--reference')}22`, line: { color: values('--reference'), width: 1.2 },
-    }),
     track('track', 'true track', '--measured', 'solid'),
     track('believed', 'believed track', '--reference', 'dash'),
     places('true_ned_m', 'true place at surfacing', '--measured', 'circle', {
@@ -83,10 +79,82 @@ function drawPlan(panel, element, from, to) {
     ...look(element),
     margin: { l: 60, r: 10, t: 46, b: 40 },
     showlegend: true,
-    legend: { orientation: 'h', x: 0, y: 1.01, yanchor: 'bottom' },
+    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1.01 },
     hovermode: 'closest',
     dragmode: 'zoom',
     xaxis: axis(`east (${unit})`, { range: scaled(east), nticks: 8 }),
     yaxis: axis(`north (${unit})`, { range: scaled(north), nticks: 8 }),
   }, { displayModeBar: false, scrollZoom: false });
+}
+
+// ------------------------------------------------------------------------------- surfacings
+
+/** Most surfacings that have a map of their own. */
+const MAPS = 12;
+/** How wide and high a map is, at least; room for legend, numbers and titles; fonts (px). */
+const ON_SCREEN = { wide: 170, high: 205, legend: 34, left: 46, right: 8, top: 24, bottom: 30, font: 12 };
+const ON_PAPER = { wide: 105, high: 132, legend: 24, left: 32, right: 4, top: 18, bottom: 20, font: 9 };
+
+/** Those surfacings that were farthest off, in the order of time, with their numbers. */
+function farthestOff({ surfacings }) {
+  const numbered = surfacings.map((one, i) => ({ ...one, number: i + 1 }));
+  const far = [...numbered].sort((a, b) => b.error_m - a.error_m).slice(0, MAPS);
+  return numbered.filter((one) => far.includes(one));
+}
+
+/** Where the vehicle came up, around where it believed to be: a small map for each, to scale. */
+function drawPlaces(panel, element) {
+  const shown = farthestOff(page.runs[0]);
+  const room = root.classList.contains('paper') ? ON_PAPER : ON_SCREEN;
+  const columns = Math.min(shown.length, Math.max(2, Math.floor(element.clientWidth / room.wide)));
+  const rows = Math.ceil(shown.length / columns);
+  element.style.height = `${room.legend + rows * room.high}px`;
+  const [width, height] = [element.clientWidth, element.clientHeight];
+  const cell = Math.min(width / columns, 1.6 * room.high);
+  const traces = [];
+  const layout = {};
+  const annotations = [];
+  shown.forEach((one, i) => {
+    const [column, row] = [i % columns, Math.floor(i / columns)];
+    const id = i ? `${i + 1}` : '';
+    const off = [0, 1].map((k) => one.true_ned_m[k] - one.believed_ned_m[k]);
+    const ring = ellipse(one);
+    const reach = 1.15 * Math.max(1, ...off.map(Math.abs), ...ring.flat().map(Math.abs));
+    const top = room.legend + row * room.high;
+    const x = [column * cell + room.left, (column + 1) * cell - room.right].map((px) => px / width);
+    const y = [top + room.high - room.bottom, top + room.top].map((px) => 1 - px / height);
+    const common = { xaxis: `x${id}`, yaxis: `y${id}`, showlegend: i === 0 };
+    const at = 'east %{x:,.1f} m, north %{y:,.1f} m';
+    const place = (name, point, role, symbol) => ({
+      ...common, ...lineOf([point], 1, {}), mode: 'markers', name, hoverinfo: 'all', hovertemplate: at,
+      marker: { color: values(role), size: 9, symbol, line: { color: values('--card'), width: 1.5 } },
+    });
+    traces.push(
+      lineOf(ring, 1, {
+        ...common, name: '95 % ellipse', fill: 'toself', fillcolor: `${values('--reference')}22`,
+        line: { color: values('--reference'), width: 1.2 },
+      }),
+      place('believed place', [0, 0], '--reference', 'diamond'),
+      place('true place', eastNorth(off), '--measured', 'circle'),
+    );
+    const ticks = { tickmode: 'array', tickvals: evenTicks(reach), tickformat: ',~r', tickfont: { size: room.font - 2 } };
+    const more = { range: [-reach, reach], automargin: false, fixedrange: true, ...ticks };
+    layout[`xaxis${id}`] = axis('', { ...more, domain: x, anchor: `y${id}`, scaleanchor: `y${id}` });
+    layout[`yaxis${id}`] = axis('', { ...more, domain: y, anchor: `x${id}` });
+    annotations.push({
+      text: `<b>${one.number}</b> off by ${Number(one.error_m.toPrecision(3)).toLocaleString('en')} m`,
+      xref: 'paper', yref: 'paper', x: x[0], y: y[1], xanchor: 'left', yanchor: 'bottom',
+      showarrow: false, font: { size: room.font },
+    });
+  });
+  return Plotly.react(element, traces, {
+    ...look(element),
+    ...layout,
+    annotations,
+    margin: { l: 0, r: 0, t: 0, b: 0 },
+    showlegend: true,
+    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1, yanchor: 'top' },
+    hovermode: 'closest',
+    dragmode: false,
+  }, { displayModeBar: false });
 }

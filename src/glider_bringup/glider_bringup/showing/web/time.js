@@ -4,6 +4,11 @@ const values = (tag) => getComputedStyle(document.documentElement).getPropertyVa
 
 const isNarrow = (element) => element.clientWidth < 480;
 
+const legendOf = (element) => ({
+  orientation: 'h', x: 1, xanchor: 'right', y: 1.02, yanchor: 'bottom',
+  font: { size: isNarrow(element) ? 10 : 13 },
+});
+
 /** Colours, fonts and size that panels have in common; the size is that of their place. */
 function look(element) {
   const ink = values('--ink');
@@ -15,7 +20,7 @@ function look(element) {
     plot_bgcolor: 'rgba(0,0,0,0)',
     font: { family: getComputedStyle(document.body).fontFamily, size, color: ink },
     hoverlabel: { bgcolor: values('--card'), bordercolor: values('--line'), font: { color: ink } },
-    legend: { orientation: 'h', x: 1, xanchor: 'right', y: 1.02, yanchor: 'bottom' },
+    legend: legendOf(element),
   };
 }
 
@@ -28,6 +33,27 @@ const axis = (title, more) => ({
   automargin: true,
   ...more,
 });
+
+/** A round step (1, 2 or 5 and zeros) of which a span has no more than so many. */
+function roundStep(span, most) {
+  const power = 10 ** Math.floor(Math.log10(span / most));
+  return power * [1, 2, 5, 10].find((one) => one * power * most >= span);
+}
+
+/** Round numbers in a range, none of them near its ends, where other axes have their labels. */
+function innerTicks(low, high, most) {
+  const step = roundStep(high - low, most);
+  const margin = 0.08 * (high - low);
+  const ticks = [];
+  for (let k = Math.ceil((low + margin) / step); k * step <= high - margin; k += 1) ticks.push(k * step);
+  return ticks;
+}
+
+/** Zero and a round number to either side, for a range from -reach to reach. */
+function evenTicks(reach) {
+  const step = roundStep(0.4 * reach, 1); // at most 2.5 times as much: inside
+  return [-step, 0, step];
+}
 
 function curveData(panel, curve, from, to, width) {
   return thin(page.runs[curve.run], curve.name, curve.flag, from, to, width);

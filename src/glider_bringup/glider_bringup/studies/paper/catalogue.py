@@ -12,7 +12,7 @@ from typing import Any
 
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.studies.montecarlo import airframe
-from glider_bringup.studies.paper import broken
+from glider_bringup.studies.paper import broken, seas
 from glider_bringup.studies.paper.cases import Case, Experiment
 from glider_bringup.studies.paper.limits import (
     ALL_LIMITS_M,
@@ -170,12 +170,14 @@ SENSOR_ERRORS = {
 }
 #: Current that every vehicle is flown in.
 _HALF_KNOT = {'current.speed_kn': 0.5, 'current.angle_deg': 20.0}
+#: What a vehicle is spared that is to know its place throughout.
+_KNOWS = {'navigation.method': 'known', 'profile.surface_every_dives': 0, 'sensors': {}}
 #: Scenario and changed fields of each vehicle.
 _VEHICLES = {
     'zhang2021': ('current_8deg', _HALF_KNOT),
     'seawing': ('current_8deg', {**_HALF_KNOT, 'vehicle': 'seawing'}),
-    'slocum_g2': ('slocum_shelf', _HALF_KNOT),
-    'seaglider': ('seaglider_1000m', _HALF_KNOT),
+    'slocum_g2': ('slocum_shelf', {**_HALF_KNOT, **_KNOWS}),
+    'seaglider': ('seaglider_1000m', {**_HALF_KNOT, **_KNOWS}),
 }
 
 
@@ -470,6 +472,24 @@ def _navigation_experiments() -> list[Experiment]:
             assumed,
             _sparse(),
             judge_limits({'cross_track_m.max_steady': SPARSE_LIMIT_M}),
+        ),
+        Experiment(
+            'navigation',
+            'long_stays',
+            '',
+            'rough_water, hours at the surface under its tide',
+            assumed,
+            seas.stays(),
+            seas.judge_stays,
+        ),
+        Experiment(
+            'navigation',
+            'hard_seas',
+            '',
+            'rough_water made harder, 30 h each: is the ellipse as large as it has to be',
+            assumed,
+            seas.hard_seas(),
+            seas.judge_hard,
         ),
     ]
 

@@ -40,10 +40,9 @@ def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
 def _row(scores: dict[str, Any], failed: bool = False) -> dict[str, Any]:
     """Scores with status; a number that is not finite becomes None, and is told."""
     scores = dict(scores)
-    status = 'infeasible' if scores.pop('infeasible') else 'completed'
     clean = finite(scores)
     whole = not failed and bool(scores['final_state']) and clean == scores
-    return {'status': 'failed' if failed else status, 'finite': whole, **clean}
+    return {'finite': whole, **clean, **({'status': 'failed'} if failed else {})}
 
 
 def fly(

@@ -180,6 +180,8 @@ _TABLES: dict[str, Callable[[list[dict]], Table]] = {
     'reckoned_rough': _RECKONED,
     'reckoned_beliefs': _RECKONED,
     'missed_fixes': _RECKONED,
+    'long_stays': _RECKONED,
+    'hard_seas': _RECKONED,
 }
 _RECKONED_REMARK = (
     'Error: of the believed place when it comes up. Beside: largest true distance from the path '
@@ -192,6 +194,8 @@ _REMARKS = {
     'reckoned_rough': _RECKONED_REMARK,
     'reckoned_beliefs': _RECKONED_REMARK,
     'missed_fixes': _RECKONED_REMARK,
+    'long_stays': _RECKONED_REMARK,
+    'hard_seas': _RECKONED_REMARK,
     'robustness': (
         'The PID is told the steering of the vehicle file, also where the plant differs from it; '
         'PID of zhang2021: that of another vehicle. '
@@ -213,6 +217,11 @@ def show(result: dict[str, Any], output: Console) -> None:
     """Print experiment by experiment: the paper's figure, ours, verdict."""
     for one in result['experiments']:
         head = f'{one["section"]}: {one["title"]}' if one['section'] else one['title']
+        if 'counts' in one:
+            output.print(f'\n{head}', soft_wrap=True)
+            _show_search(one, output)
+            _show_verdict(one, output)
+            continue
         make = _TABLES.get(one['name']) or _by_flight(compared(one['rows']))
         output.print(f'\n{head}\npaper: {one["paper"]}', soft_wrap=True)
         output.print(make(one['rows']))
@@ -225,6 +234,18 @@ def show(result: dict[str, Any], output: Console) -> None:
         _show_verdict(one, output)
     verdicts = [one['verdict'] for one in result['experiments']]
     output.print(f'\n{verdicts.count(PASSED)} of {len(verdicts)} experiments passed')
+
+
+def _show_search(one: dict[str, Any], output: Console) -> None:
+    """Print what random faults did, and the lines that fly it again."""
+    counts = one['counts']
+    told = ', '.join(f'{name.replace("_", " ")} {number:,}' for name, number in counts.items())
+    output.print(told, soft_wrap=True)
+    for row in one['rows'][:LISTED]:
+        output.print(f'flight {row["flight"]}: {row["kind"]}: {row["why"]}', soft_wrap=True)
+        output.print(f'  {row["command"]}', soft_wrap=True)
+    if len(one['rows']) > LISTED:
+        output.print(f'and {len(one["rows"]) - LISTED} more')
 
 
 def _show_verdict(one: dict[str, Any], output: Console) -> None:

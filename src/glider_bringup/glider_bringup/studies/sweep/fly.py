@@ -13,7 +13,7 @@ from pathlib import Path
 from socket import gethostname
 from typing import Any, NamedTuple
 
-from glider_bringup.engines.flight import Flight
+from glider_bringup.engines.flight import Outcome
 from glider_bringup.mission.disk import whole_file
 from glider_bringup.mission.planned import planned_ticks
 from glider_bringup.mission.rules import Rules
@@ -36,7 +36,9 @@ from glider_model.base.signals import TICK_S
 from glider_model.vehicle.file import vehicle_path
 
 JOURNAL_FILE, RESULT_FILE = 'journal.jsonl', 'sweep.nc'
-COMPLETED, INFEASIBLE, FAILED = STATUSES = ('completed', 'infeasible', 'failed')
+#: Those of before come first: a result keeps a status as its place among them.
+STATUSES = ('completed', 'infeasible', 'failed', 'surfaced', 'lost')
+FAILED = 'failed'
 
 #: A worker is given so much simulated time at once (s): seconds of work, milliseconds of overhead.
 CHUNK_S = 100_000.0
@@ -159,7 +161,7 @@ def _is_finite(figure: Any) -> bool:
 def result_names(scenario: Scenario) -> set[str]:
     """Names in a result, apart from its dimensions; a scorecard without a flight has them too."""
     empty = Scorer().result(Rules())
-    card = scorecard(scenario, 'direct', Flight('completed', '', 0.0, 0, 0), empty)
+    card = scorecard(scenario, 'direct', Outcome('completed', '', 0.0, 0, 0), empty)
     return NOT_FIGURES | {variable_name(figure) for figure, _ in _figures(card)}
 
 

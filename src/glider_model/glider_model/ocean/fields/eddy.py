@@ -51,13 +51,13 @@ class EddySettings(FieldSettings):
     def params(self) -> 'EddyParams':
         """Kernel parameters."""
         return EddyParams(
-            self.north_m,
-            self.east_m,
-            self.drift_north_mps,
-            self.drift_east_mps,
-            self.radius_m,
-            self.peak_mps * (1.0 + 0.5 / ALPHA),
-            self.depth_m,
+            north=self.north_m,
+            east=self.east_m,
+            drift_n=self.drift_north_mps,
+            drift_e=self.drift_east_mps,
+            radius=self.radius_m,
+            speed=self.peak_mps * (1.0 + 0.5 / ALPHA),
+            depth=self.depth_m,
         )
 
 

@@ -41,13 +41,13 @@ class JetSettings(FieldSettings):
         """Kernel parameters."""
         direction = math.radians(self.direction_deg)
         return JetParams(
-            self.north_m,
-            self.east_m,
-            math.cos(direction),
-            math.sin(direction),
-            self.width_m,
-            self.peak_mps,
-            self.depth_m,
+            north=self.north_m,
+            east=self.east_m,
+            along_n=math.cos(direction),
+            along_e=math.sin(direction),
+            width=self.width_m,
+            speed=self.peak_mps,
+            depth=self.depth_m,
         )
 
 

@@ -433,15 +433,15 @@ def fault_params(faults: Sequence[FaultSettings], seed: int) -> NamedTuple:
     depths = [np.nan if fault.at_depth_m is None else fault.at_depth_m for fault in faults]
     streams = [random_stream(seed, _STREAM_OFFSET, i) for i in range(len(faults))]
     return FaultParams(
-        np.array([one.kind for one in packed], np.int64),
-        np.array([one.target for one in packed], np.int64),
-        np.array([one.count for one in packed], np.int64),
-        numbers,
-        np.array([round(fault.at_s / TICK_S) for fault in faults], np.int64),
-        np.array(depths, np.float64),
-        np.array([PHASES.index(fault.phase) for fault in faults], np.int64),
-        np.array([fault.lasts for fault in faults], np.int64),
-        np.array(streams, np.uint64),
+        kind=np.array([one.kind for one in packed], np.int64),
+        target=np.array([one.target for one in packed], np.int64),
+        count=np.array([one.count for one in packed], np.int64),
+        numbers=numbers,
+        from_tick=np.array([round(fault.at_s / TICK_S) for fault in faults], np.int64),
+        depth=np.array(depths, np.float64),
+        phase=np.array([PHASES.index(fault.phase) for fault in faults], np.int64),
+        ticks=np.array([fault.lasts for fault in faults], np.int64),
+        stream=np.array(streams, np.uint64),
     )
 
 

@@ -9,6 +9,7 @@ from glider_model.base.signals import TICK_NS, TICK_S
 from glider_model.base.wiring import at_rest, present
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.orders import CLEAR, PARAMETERS_SET, Orders
+from glider_model.ros.lockstep.pulse import Condition
 from glider_model.ros.lockstep.step_node import StepNode
 from glider_model.ros.parameters import changed_parameters, declare_settings
 
@@ -36,6 +37,8 @@ class BlockNode(StepNode):
         self.state = self.settings.initial_state()
         self.orders = Orders(self)
         self.telling = Telling(block)
+        self.said = (0, ())  #: stamp and numbers of the last answer
+        self.flags: tuple[int, ...] | None = None  #: and its flags
         for topic in present(block.wired.inputs, topics):
             self.add_input(topic)
         self.compile_kernels()
@@ -50,7 +53,11 @@ class BlockNode(StepNode):
         """Call every kernel once, so that no tick waits for the compiler."""
         inputs = tuple(at_rest(topic) for topic in self.block.wired.inputs)
         said = f'compiling the mathematics of {self.block.wired.name} for its settings, once'
-        with compiling_told(lambda: self.get_logger().info(said)):
+
+        def tell() -> None:
+            self.get_logger().info(said)
+
+        with compiling_told(tell):
             state, _, _ = self.block.tick(self.state, 0.0, inputs, self.params, TICK_S)
             for order in self.block.orders:
                 order(state)
@@ -68,12 +75,28 @@ class BlockNode(StepNode):
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
         """Answer one tick."""
         self.orders.tell(stamp_ns)
-        t_s = stamp_ns // TICK_NS * TICK_S
         for place, values in self.absent:
             inputs = (*inputs[:place], values, *inputs[place:])
-        self.state, outputs, flags = self.block.tick(self.state, t_s, inputs, self.params, TICK_S)
+        for tick in range(stamp_ns // TICK_NS + 1 - self.passed, stamp_ns // TICK_NS + 1):
+            self.state, outputs, flags = self.block.tick(
+                self.state, tick * TICK_S, inputs, self.params, TICK_S
+            )
         if self.block.say and self.telling.is_due(flags, stamp_ns):
             self.tell(stamp_ns, flags)
+        self.said, self.flags = (stamp_ns, outputs), flags
+        self.repeat()
+
+    def condition(self) -> Condition:
+        """How this node is: what its block says."""
+        condition = super().condition()
+        if self.flags is None or not self.block.say or condition.level != health.OK:
+            return condition
+        said = self.block.say(*self.flags)
+        return Condition(health.LEVELS[said.level], said.message, said.values)
+
+    def repeat(self) -> None:
+        """Send the last answer, once more if no time has passed since."""
+        stamp_ns, outputs = self.said
         for send, place in zip(self.senders, self.sent, strict=True):
             send(stamp_ns, outputs[place])
 

@@ -14,9 +14,10 @@ from rclpy.subscription import Subscription
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
-from glider_model.base.exits import EXIT_PEER
+from glider_model.base.errors import EXIT_PEER
 from glider_model.base.signals import TICK_NS, TICK_S
 from glider_model.base.wiring import WIRING
+from glider_model.ros.hearing.inputs import Input
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.executor import take
 from glider_model.ros.lockstep.health import Report, seconds
@@ -176,6 +177,7 @@ class ClockNode(TickNode):
     def _on_cycle(self) -> None:
         """One free-running tick, with whatever inputs came last."""
         if not self._paused and self.over_since_s is None:
+            self._pulse.beat(self.tick * TICK_NS, self.tick * TICK_NS)
             self.step(self.tick * TICK_NS, *[item.values for item in self.inputs])
 
     def _release(self) -> None:
@@ -199,16 +201,17 @@ class ClockNode(TickNode):
         self._pace_timer.cancel()
         self._release()
 
-    def rivals(self) -> list[str]:
-        """Who else publishes what only this node may publish, in words.
+    def too_early(self, item: Input) -> str:
+        """What is wrong with the answer to a tick that this plant has not published, in words.
 
-        Who answers a tick that this plant has not published answers another one, which may not
-        have been discovered yet.
+        There may be another plant, which has not been discovered yet.
         """
-        answered = any(item.stamp_ns > self.tick * TICK_NS for item in self.inputs)
-        name = self.get_fully_qualified_name()
-        hidden = [f'/clock is published by {name} too'] if answered and self.ticks.lockstep else []
-        return super().rivals() or hidden
+        place = self.get_namespace().rstrip('/')
+        return (
+            f'{self.resolve_topic_name(item.topic.name)} is published by '
+            f'{place}/{item.topic.publisher} for {seconds(item.stamp_ns)} when '
+            f'{seconds(self._due_ns)} is due: it follows another plant, or is wrong; {ALONE}'
+        )
 
     def _is_ahead(self, lead: _Lead) -> bool:
         while lead.is_too_long(self.tick) and (message := take(lead.subscription)) is not None:

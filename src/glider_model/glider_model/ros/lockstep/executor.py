@@ -20,6 +20,8 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.subscription import Subscription
 
+from glider_model.ros.hearing import gids
+
 try:
     from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 except ImportError:
@@ -74,11 +76,14 @@ class Gate(CallbackGroup):
 def take_with_info(subscription: Subscription) -> tuple | None:
     """Oldest message of a `Gate` subscription that no callback has had, and what is known of it.
 
-    That is what a callback with two arguments gets, such as the number that its publisher gave it.
+    That is what a callback with two arguments gets: who published it (`gids.gid_of`), where the
+    bytes are what is taken.
     """
     if not can_take():
         return None
     with subscription.handle:
+        if subscription.raw and (taker := gids.taker()) is not None:
+            return taker.take(subscription.handle.pointer)
         return subscription.handle.take_message(subscription.msg_type, subscription.raw)
 
 

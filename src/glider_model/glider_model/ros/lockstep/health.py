@@ -16,7 +16,7 @@ from glider_model.ros.wire.topics import PLANT
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
-_LEVELS = {'ok': OK, 'warn': WARN, 'error': ERROR}
+LEVELS = {'ok': OK, 'warn': WARN, 'error': ERROR}
 
 STARTING, READY, WAITING, FINISHED, FAILED = 'starting', 'ready', 'waiting', 'finished', 'failed'
 
@@ -54,7 +54,7 @@ def status_array(stamp_ns: int, name: str, level: bytes, message: str, values: d
 def said_array(stamp_ns: int, node: str, said: Said) -> DiagnosticArray:
     """Event of a block at a tick; ``node`` is the full name of the node that tells it."""
     values = {**said.values, 't_s': stamp_ns / 1e9}
-    return status_array(stamp_ns, node, _LEVELS[said.level], said.message, values)
+    return status_array(stamp_ns, node, LEVELS[said.level], said.message, values)
 
 
 def report_array(report: Report) -> DiagnosticArray:

@@ -12,24 +12,29 @@ from collections.abc import Callable
 from uuid import uuid4
 
 from pydantic import Field
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
-from glider_model.base.exits import EXIT_PEER
+from glider_model.base.errors import EXIT_PEER
 from glider_model.base.settings import Settings
 from glider_model.base.signals import TICK_NS, not_finite
 from glider_model.base.wiring import WHEN_SILENT
+from glider_model.ros.hearing.gids import gid_of, shown
+from glider_model.ros.hearing.inputs import Input
+from glider_model.ros.hearing.owner import Verdict
 from glider_model.ros.lockstep import health, peers
 from glider_model.ros.lockstep.bad_line import BadLine
 from glider_model.ros.lockstep.executor import Gate, take_with_info
 from glider_model.ros.lockstep.health import Report, seconds
-from glider_model.ros.lockstep.inputs import Input
 from glider_model.ros.lockstep.peers import ALONE
 from glider_model.ros.lockstep.process import Stop
+from glider_model.ros.lockstep.pulse import Condition, Pulse
 from glider_model.ros.lockstep.watch import FAREWELL_S, REPORT_AFTER, Watch, wait_of
 from glider_model.ros.message_fault import MessageFault
-from glider_model.ros.parameters import declare_settings
+from glider_model.ros.parameters import declare_settings, unknown_parameters
 from glider_model.ros.wire import qos, topics
 from glider_model.ros.wire.codec import MessageError, NotFiniteFieldError, to_cdr
 from glider_model.ros.wire.topics import TOPICS, Topic, topic_of
@@ -90,6 +95,7 @@ class TickNode(Node):
         events, reports = TOPICS['/diagnostics'], TOPICS['lockstep']
         self._events, self._reports = self._publisher(events), self._publisher(reports)
         self.outputs[events.name] = (events, self._events)
+        self._pulse = Pulse(self)
         self._event_counts, self.events_told = self._publisher(TOPICS['told']), 0
         self._reports_in = self._subscription(reports, self._on_reports, raw=False)
         self.gate.awaited.add(self._reports_in)
@@ -101,6 +107,16 @@ class TickNode(Node):
         self._created_s = time.monotonic()
         self.running = False
         self.over_since_s: float | None = None
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set parameters at run time; one that there is not is refused by its name.
+
+        rclpy refuses it too, and says ``undeclared parameter(s): []``.
+        """
+        unknown = unknown_parameters(self, [parameter.name for parameter in parameter_list])
+        if unknown:
+            return SetParametersResult(successful=False, reason=unknown)
+        return super().set_parameters_atomically(parameter_list)
 
     # ------------------------------------------------------------------ inputs and outputs
 
@@ -136,7 +152,7 @@ class TickNode(Node):
 
     def add_input(self, name: str) -> Input:
         """Subscribe to a per-tick topic. Add the one that comes last in a tick first."""
-        item = Input(topic_of(name, self.steers_by))
+        item = Input(topic_of(name, self.steers_by), self.ticks.lockstep)
         if self.ticks.lockstep:
             item.subscription = self._subscription(
                 item.topic, lambda raw, info: self._on_message(item, raw, info)
@@ -145,11 +161,9 @@ class TickNode(Node):
                 self._await(item)
         else:
             item.subscription = self._subscription(
-                item.topic,
-                lambda raw, info: self._on_newest(item, raw, info),
-                gated=False,
-                profile=qos.NEWEST,
+                item.topic, lambda raw, info: self._on_free(item, raw, info), profile=qos.FREE
             )
+            self.gate.awaited.add(item.subscription)
         self.inputs.append(item)
         return item
 
@@ -164,6 +178,10 @@ class TickNode(Node):
         """Put a DiagnosticArray on /diagnostics."""
         self.events_told += 1
         self._events.publish(to_cdr(array))
+
+    def condition(self) -> Condition:
+        """How this node is, as it repeats it on /diagnostics."""
+        return Condition(health.OK, 'running')
 
     def count_events(self, stamp_ns: int) -> None:
         """Tell the recorder how many events there were up to a tick, so that it has them all."""
@@ -279,8 +297,7 @@ class TickNode(Node):
             self._fire()
 
     def _accept(self, item: Input, raw: bytes, info: dict) -> None:
-        if item.is_from_another(info):
-            self.refuse(item, self._others(item))
+        if not self.is_of_owner(item, info):
             return
         try:
             item.accept(raw)
@@ -292,22 +309,57 @@ class TickNode(Node):
             return
         if self._due_ns is None and item.stamp_ns > 0:
             # of a run that is under way: one's own begins with tick 0
-            item.stamp_ns, item.number = -1, 0
+            item.stamp_ns = -1
+            item.owner.restart()
 
     def refuse(self, item: Input, why: str) -> None:
         """Tell that a message was refused, the first one at once and then now and then."""
-        if not item.refuse():
-            return
+        if item.refuse():
+            self._tell_refused(item, why)
+
+    def _tell_refused(self, item: Input, why: str) -> None:
         stamp_ns = max(0, self._due_ns if self._due_ns is not None else item.stamp_ns)
         values = {f'{item.topic.name}_refused': item.refused}
         self.event(stamp_ns, health.ERROR, f'message refused: {why}', **values)
 
-    def _others(self, item: Input) -> str:
-        """Who else publishes an input, in words."""
-        owner = item.owner
-        if self.ticks.lockstep:
-            owner = f'{self.get_namespace().rstrip("/")}/{item.topic.publisher}'
-        return peers.other_publishers(self, item.topic, owner)
+    def is_of_owner(self, item: Input, info: dict) -> bool:
+        """Whether a message is of whom the topic belongs to; tells if not, and if that changes."""
+        gid, owner = gid_of(info), item.owner
+        now_s = 0.0 if self.ticks.lockstep else self.now_s()
+        if owner.owns(gid, now_s):
+            return True
+        before, silent_s = owner.gid, now_s - owner.heard_s
+        verdict = Verdict.STRANGE
+        if not owner.is_strange(gid):
+            names = peers.publishers(self, item.topic)
+            patience_s = self.max_age_s(item.topic.name)
+            verdict = owner.claimed(gid, names, self.get_namespace(), now_s, patience_s)
+        if verdict is Verdict.STRANGE:
+            self.refuse_stranger(item, gid)
+        elif verdict is Verdict.TAKEN_OVER:
+            for other in self.inputs:
+                if other is not item:
+                    other.owner.follow(before, gid)
+            self.tell_successor(item, silent_s)
+        return verdict in (Verdict.OWNED, Verdict.TAKEN_OVER)
+
+    def max_age_s(self, topic: str) -> float:
+        """Age (s) from which on an input is old in free-running mode."""
+        return self.ticks.input_max_age_s
+
+    def refuse_stranger(self, item: Input, gid: bytes) -> None:
+        """Tell that somebody else publishes an input."""
+        if item.refuse():
+            self._tell_refused(item, peers.stranger(self, item.topic, gid))
+
+    def tell_successor(self, item: Input, silent_s: float) -> None:
+        """Tell that an input is somebody else's from now on."""
+        owner, topic = item.owner, self.resolve_topic_name(item.topic.name)
+        said = (
+            f'{topic}: {owner.name} ({shown(owner.gid)}) takes the place of '
+            f'{owner.before or "a node without a name"}, which was silent for {silent_s:.1f} s'
+        )
+        self.event(max(0, item.stamp_ns), health.WARN, said)
 
     def _fire(self) -> None:
         """Act on every tick that is complete, then wait for the input that is missing."""
@@ -317,6 +369,7 @@ class TickNode(Node):
                     self._await(item)
                     return
             self.step(self._due_ns, *[item.values for item in self.inputs])
+            self._pulse.beat(self._due_ns, self._due_ns)
             if not (self._due_ns // TICK_NS + 1) % COUNT_TICKS:
                 self.count_events(self._due_ns)
             self._due_ns += TICK_NS
@@ -337,14 +390,16 @@ class TickNode(Node):
                 return False
             self._accept(item, *taken)
         if item.stamp_ns > self._due_ns:
-            if rivals := self.rivals():
-                raise Stop(EXIT_PEER, f'{rivals[0]}; {ALONE}')
-            raise Stop(
-                EXIT_PEER,
-                f'{item.topic.publisher} skipped a tick: {item.topic.name} came for '
-                f'{seconds(item.stamp_ns)} when {seconds(self._due_ns)} was due',
-            )
+            rivals = self.rivals()
+            raise Stop(EXIT_PEER, f'{rivals[0]}; {ALONE}' if rivals else self.too_early(item))
         return True
+
+    def too_early(self, item: Input) -> str:
+        """What is wrong with an input whose publisher is ahead, in words."""
+        return (
+            f'{item.topic.publisher} skipped a tick: {item.topic.name} came for '
+            f'{seconds(item.stamp_ns)} when {seconds(self._due_ns)} was due'
+        )
 
     # ------------------------------------------------------------------ watching
 
@@ -377,20 +432,22 @@ class TickNode(Node):
         """Time (s) on the clock of the free-running cycles."""
         return self.cycle_clock.now().nanoseconds / 1e9
 
+    def _on_free(self, item: Input, raw: bytes, info: dict) -> None:
+        """Keep an input, and what has come behind it: a stranger may say more than the owner."""
+        taken = raw, info
+        while taken is not None:
+            self._on_newest(item, *taken)
+            taken = take_with_info(item.subscription)
+
     def _on_newest(self, item: Input, raw: bytes, info: dict) -> None:
         """Keep an input in free-running mode."""
-        if item.is_from_another(info):
-            self.refuse(item, self._others(item))
+        if not self.is_of_owner(item, info):
             return
         try:
-            kept = item.accept_newest(raw, self.now_s(), self.ticks.input_max_age_s)
+            item.accept_newest(raw, self.now_s(), self.ticks.input_max_age_s)
         except NotFiniteFieldError as error:
             if item.topic.name not in WHEN_SILENT:  # a receiver without a fix has no place
                 self.refuse(item, str(error))
             return
         except MessageError as error:
             self.refuse(item, str(error))
-            return
-        if kept and not item.owner:
-            names = set(peers.publisher_names(self, item.topic))
-            item.owner = names.pop() if len(names) == 1 else ''

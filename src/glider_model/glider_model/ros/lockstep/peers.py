@@ -6,17 +6,26 @@ from collections.abc import Iterable
 
 from rclpy.node import Node
 
-from glider_model.ros.lockstep.inputs import Input
+from glider_model.ros.hearing.gids import shown
+from glider_model.ros.hearing.inputs import Input
 from glider_model.ros.wire.topics import Topic
 
 #: What to do about a second glider.
 ALONE = 'each glider in a ROS domain needs a namespace and a clock of its own'
 
 
-def publisher_names(node: Node, topic: Topic) -> list[str]:
-    """Full names of the nodes that publish a topic, as often as they do."""
-    infos = node.get_publishers_info_by_topic(topic.name)
-    return [f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in infos]
+#: What rclpy calls a node whose name has not been discovered yet.
+_UNKNOWN = '_NODE_NAME_UNKNOWN_'
+
+
+def publishers(node: Node, topic: Topic) -> dict[bytes, str]:
+    """Full names of the nodes that publish a topic, by gid; empty for one not known yet."""
+    return {
+        bytes(info.endpoint_gid): ''
+        if info.node_name == _UNKNOWN
+        else f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+        for info in node.get_publishers_info_by_topic(topic.name)
+    }
 
 
 def rivals(node: Node, topics: Iterable[Topic]) -> list[str]:
@@ -25,7 +34,7 @@ def rivals(node: Node, topics: Iterable[Topic]) -> list[str]:
     for topic in topics:
         if topic.publisher != node.get_name():
             continue
-        names = publisher_names(node, topic)
+        names = list(publishers(node, topic).values())
         if node.get_fully_qualified_name() in names:
             names.remove(node.get_fully_qualified_name())
         found += [
@@ -34,11 +43,13 @@ def rivals(node: Node, topics: Iterable[Topic]) -> list[str]:
     return found
 
 
-def other_publishers(node: Node, topic: Topic, owner: str) -> str:
-    """Who publishes a topic beside its owner, in words."""
-    names = set(publisher_names(node, topic)) - {owner}
-    others = ' and '.join(sorted(names)) or 'a second publisher'
-    return f'{node.resolve_topic_name(topic.name)} is published by {others} too'
+def stranger(node: Node, topic: Topic, gid: bytes) -> str:
+    """Who publishes a topic that is not its own, in words; by gid too if that is not the name."""
+    names = publishers(node, topic)
+    name = names.get(gid) or 'somebody without a name'
+    if list(names.values()).count(name) != 1:
+        name += f' ({shown(gid)})'
+    return f'{node.resolve_topic_name(topic.name)} is published by {name} too'
 
 
 def missing_readers(node: Node, topic: Topic, publisher, readers: list[str]) -> list[str]:

@@ -13,7 +13,7 @@ import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
-from glider_model.base.exits import EXIT_USAGE, say_fatal
+from glider_model.base.errors import EXIT_USAGE, say_fatal
 from glider_model.base.settings import ConfigurationError
 from glider_model.ros.lockstep.executor import make_executor
 from glider_model.ros.parameters import refuse_unknown

@@ -4,9 +4,9 @@
 
 import time
 
+from glider_model.ros.hearing.inputs import Input
 from glider_model.ros.lockstep import health
 from glider_model.ros.lockstep.health import seconds
-from glider_model.ros.lockstep.inputs import Input
 from glider_model.ros.wire import topics
 
 #: A node waits this long (wall time, s) for the recorder and its peers at the end of a run.

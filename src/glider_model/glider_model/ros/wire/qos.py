@@ -13,10 +13,19 @@ PER_TICK = QoSProfile(
     durability=DurabilityPolicy.VOLATILE,
 )
 
-#: Free-running inputs: the newest value only, from reliable and best-effort publishers alike.
+#: For who looks on: the newest value only, from reliable and best-effort publishers alike.
 NEWEST = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=1,
+    reliability=ReliabilityPolicy.BEST_EFFORT,
+    durability=DurabilityPolicy.VOLATILE,
+)
+
+#: What free-running nodes ask for: they keep the newest, and pass over what a stranger says, of
+#: which there may be many before they look.
+FREE = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=256,
     reliability=ReliabilityPolicy.BEST_EFFORT,
     durability=DurabilityPolicy.VOLATILE,
 )
@@ -35,6 +44,15 @@ EVENTS = QoSProfile(
     depth=256,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+
+#: What a node repeats on /diagnostics, for who listens now: neither a recorder nor anybody else
+#: who asks for what was said before is given it.
+REPEATED = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
 )
 
 #: What a recorder asks for in free-running mode: everything, from whatever publisher there is.

@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from nav_msgs.msg import Path
 
 from glider_bringup.recording.recorded_inputs import RecordedBlock
 from glider_bringup.recording.ros.recorded_run import Event, Recording, Series
@@ -54,6 +53,8 @@ class Check:
         self.notes: list[str] = []
         self.flags = np.zeros((len(stamps_ns), len(block.block.flags)), np.int64)
         self.ticks = 0
+        #: paths that guidance followed, one after the other, and from when (ns)
+        self.paths = [(block.settings.path, 0)] if block.block.wired == wiring.GUIDANCE else []
         self._orders = _orders(recording.events, recording.node(block.block.wired.node))
 
     def add(self, difference: Difference) -> None:
@@ -105,7 +106,10 @@ class Check:
                 self.block.clear()
                 continue
             try:
-                self.block.tune(with_parameters(self.block.settings, order.values))
+                settings = with_parameters(self.block.settings, order.values)
+                if self.paths and settings.path != self.paths[-1][0]:
+                    self.paths.append((settings.path, order.stamp_ns))
+                self.block.tune(settings)
             except ConfigurationError as error:
                 self.notes.append(f'parameters set at {time_text(order.stamp_ns)}: {error}')
 
@@ -152,20 +156,21 @@ class Check:
 
     # .................................................................. events, path, verdict
 
-    def compare_path(self) -> None:
-        """Compare the path that guidance published."""
+    def compare_paths(self) -> None:
+        """Compare the paths that guidance published: that of its settings, and those ordered."""
         if 'path' not in self.recording.recorded:
             self.notes.append('path is not recorded')
             return
-        path: Path = path_message(self.block.settings.path.points(PATH_POINTS))
-        raw = to_cdr(path)
+        paths = [path_message(path.points(PATH_POINTS), at_ns) for path, at_ns in self.paths]
+        expected = [to_cdr(path) for path in paths]
         stamp_ns = int(self.stamps_ns[0])
         self.compared['path'] += len(self.recording.paths)
         for recorded in self.recording.paths:
-            if recorded != raw:
-                self.add(Difference(stamp_ns, 'path', *field_difference(path, recorded)))
-        if not self.recording.paths:
-            self.add(Difference(stamp_ns, 'path', WHOLE, 'a message', NOT_RECORDED))
+            if recorded not in expected:
+                self.add(Difference(stamp_ns, 'path', *field_difference(paths[0], recorded)))
+        for raw in expected:
+            if raw not in self.recording.paths:
+                self.add(Difference(stamp_ns, 'path', WHOLE, 'a message', NOT_RECORDED))
 
     def compare_events(self, expected: list[DiagnosticArray], is_ours) -> None:
         """Compare the events that the block tells with those on record."""
@@ -211,14 +216,14 @@ class Check:
         self.differing = Counter({name: n for name, n in self.differing.items() if n})
         first = min(self.found, key=lambda one: one.stamp_ns, default=None)
         return Verdict(
-            self.block.block.wired.name,
-            DIFFERENT if first else IDENTICAL,
-            '',
-            self.ticks,
-            dict(self.compared),
-            dict(self.differing),
-            first,
-            self.notes,
+            block=self.block.block.wired.name,
+            status=DIFFERENT if first else IDENTICAL,
+            reason='',
+            ticks=self.ticks,
+            compared=dict(self.compared),
+            differing=dict(self.differing),
+            first=first,
+            notes=self.notes,
         )
 
 
@@ -242,7 +247,7 @@ def finish_events(check: Check) -> None:
     block = check.block.block
     node = check.recording.node(block.wired.node)
     if block.wired == wiring.GUIDANCE:
-        check.compare_path()
+        check.compare_paths()
     if block.say:
         told = Telling(block, int(stamps_ns[0])).among(flags, stamps_ns)
         arrays = [

@@ -18,8 +18,10 @@ from glider_bringup.recording.ros.verify.verdict import (
     skipped,
 )
 
+#: A step has the newest message of an input, or one that is so many older.
+_OLDER = range(4)
 #: An input goes on by one message from step to step, or by one of these.
-_ADVANCES = (1, 0, 2, 3, 4, 5, 6, 7, 8)
+_ADVANCES = (1, 0, 2)
 
 
 def _by_stamp(series: Series, stamps_ns: np.ndarray) -> tuple[Track, list[int]]:
@@ -55,9 +57,10 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
         'which belongs to no step',
     )
     start, cuts = 0, check.cuts(len(stamps_ns))
-    first = {name: _newest(series[name], stamps_ns[0]) for name in block.inputs}
-    options = _options({name: [n, n - 1, n - 2, n - 3] for name, n in first.items()})
+    last = None
     while start < len(stamps_ns):
+        newest = {name: _newest(series[name], stamps_ns[start]) for name in block.inputs}
+        options = _options({name: _places(newest[name], last and last[name]) for name in newest})
         check.follow_orders(start)
         end = min([start + 1024, len(stamps_ns), *(cut for cut in cuts if cut > start)])
         for begin in options:
@@ -70,7 +73,6 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
             break
         start += good
         last = {name: int(index[good - 1]) for name, index in rows.items()}
-        options = _options({name: [n + more for more in _ADVANCES] for name, n in last.items()})
         progress(start / len(stamps_ns))
     if check.found:
         check.notes.append('free-running: compared up to the first difference')
@@ -81,6 +83,19 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
 
 def _newest(series: Series, stamp_ns: int) -> int:
     return int(np.searchsorted(series.stamps_ns, stamp_ns, 'right')) - 1
+
+
+def _places(newest: int, last: int | None) -> list[int]:
+    """Messages of an input that a step may have had, the likely ones first.
+
+    What an input was is not always seen in what came of it, so that the one of the step before
+    may be taken wrongly: by the newest the steps that follow are right again.
+    """
+    likely = [newest - older for older in _OLDER]
+    if last is None:
+        return likely
+    likely[1:1] = [last + more for more in _ADVANCES]
+    return [place for place in dict.fromkeys(likely) if place >= last]
 
 
 def _options(choices: dict[str, list[int]]) -> list[dict[str, int]]:

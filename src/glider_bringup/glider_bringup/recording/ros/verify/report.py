@@ -16,7 +16,7 @@ def report(bag: Bag, recording: Recording, told: Told, verdicts: list[Verdict]) 
     """Verdicts as one JSON object, with hints for whoever looks for a cause."""
     lockstep = is_lockstep(recording, told)
     compared = [verdict for verdict in verdicts if verdict.status != SKIPPED]
-    notes = [note for note in (bag.cut, told.note) if note]
+    notes = [bag.cut] if bag.cut else []
     if not compared:
         notes.append('nothing could be compared')
     if not lockstep:

@@ -42,7 +42,16 @@ class Verdict(NamedTuple):
 
 def skipped(block: str, reason: str) -> Verdict:
     """Verdict on a block that cannot be compared."""
-    return Verdict(block, SKIPPED, reason, 0, {}, {}, None, [])
+    return Verdict(
+        block=block,
+        status=SKIPPED,
+        reason=reason,
+        ticks=0,
+        compared={},
+        differing={},
+        first=None,
+        notes=[],
+    )
 
 
 def time_text(stamp_ns: int) -> str:

@@ -24,10 +24,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fuzzing.counts import HANG_S, Counter
 from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive, left_over, mapped
 from glider_bringup.engines.processes import MODULES
-from glider_bringup.fuzzing.counts import HANG_S, Counter
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.nodes.flight_listener import Heard, flight_heard
 from glider_bringup.recording.mcap_reader import Bag
@@ -136,6 +136,7 @@ def _flight(folder: Path, domain: int) -> Iterator[subprocess.Popen]:
     process = subprocess.Popen(
         [
             *(sys.executable, '-m', 'glider_bringup.cli', 'run', SCENARIO, '--json'),
+            '--processes',
             *('--duration', str(TICKS * TICK_S), '--no-report', '--out', str(folder)),
         ],
         env={**os.environ, 'ROS_DOMAIN_ID': str(domain)},

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.fuzzing.counts import Counter
-from glider_bringup.fuzzing.watch import badly_told, outcome_of
+from fuzzing.counts import Counter
+from fuzzing.watch import badly_told, outcome_of
 from glider_bringup.mission.scenario import load_scenario, scenario_names, scenario_path
 from glider_bringup.studies.sweep.plan import SWEEP_FOLDER, load_sweep, sweep_names
 from glider_model.base.errors import ConfigurationError

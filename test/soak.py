@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""``./glider soak``: a long flight over nodes, and what it costs and loses."""
+"""``./glider test --only soak``: a long flight over nodes, and what it costs and loses."""
 
 import json
 import subprocess
@@ -14,10 +14,10 @@ from rich.table import Table
 
 from glider_bringup.console import Json, messages, number, output, progress, tell
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED
 from glider_model.base.signals import TICK_S
 
-app = typer.Typer()
+app = typer.Typer(pretty_exceptions_enable=False)
 #: Memory is looked at so often (s of wall time).
 _SAMPLE_S = 2.0
 #: A process whose memory grows by more is not flat (MB per simulated hour); in a flight of less
@@ -28,7 +28,7 @@ FLAT_MB_PER_H = 1.0
 Samples = dict[str, list[tuple[float, float]]]
 
 
-@app.command(epilog='Example: ./glider soak current_12deg --duration 7200')
+@app.command(epilog='Example: ./glider test --only soak current_12deg --duration 7200')
 def soak(
     scenario: Annotated[
         str, typer.Argument(help='Scenario by name (./glider list) or path of its YAML file.')
@@ -148,3 +148,7 @@ def _print(result: dict[str, Any]) -> None:
     for row in rows.items():
         table.add_row(*row)
     output.print(table)
+
+
+if __name__ == '__main__':
+    app(prog_name='./glider test --only soak')

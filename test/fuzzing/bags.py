@@ -18,11 +18,11 @@ from typing import Any
 
 from mcap.opcode import Opcode
 
+from fuzzing.counts import Counter
+from fuzzing.watch import outcome_of
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.fuzzing.counts import Counter
-from glider_bringup.fuzzing.watch import outcome_of
 from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.recover import recover
 from glider_bringup.recording.ros.recorded_run import Recording
@@ -108,16 +108,21 @@ def _compare(name: str, folder: Path, expected: Answer) -> tuple[str, str]:
     return '', ''
 
 
-def _fly(scratch: Path) -> list[Path]:
-    """Folders of one flight: bags of today and of before, with all that a run has and alone."""
-    scenario = load_scenario('rough_water', FLIGHT)
-    run = make_run_folder(scenario, scratch / 'run')
+def fly_whole(scenario: Scenario, folder: Path) -> Path:
+    """Fly into a folder with all that a run has."""
+    run = make_run_folder(scenario, folder)
     tracer = make_tracer(scenario)
     scorer = make_scorer(scenario)
     flight = fly_recorded(scenario, run, [scorer, tracer])
     card = scorecard(scenario, 'direct', flight, scores_of(scenario, scorer))
     write_score(run, card)
     keep_traces(scenario, run, card, tracer)
+    return run
+
+
+def _fly(scratch: Path) -> list[Path]:
+    """Folders of one flight: bags of today and of before, with all that a run has and alone."""
+    run = fly_whole(load_scenario('rough_water', FLIGHT), scratch / 'run')
     folders = [run, *(scratch / name for name in ('alone', 'run_of_before', 'alone_of_before'))]
     data = _bag_of(run).read_bytes()
     at = data.rindex(_DATA_END) + len(_DATA_END)

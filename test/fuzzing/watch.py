@@ -8,7 +8,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from glider_bringup.fuzzing.counts import HANG_S
+from fuzzing.counts import HANG_S
 
 #: Characters that an error may have.
 MAX_TOLD = 20_000

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fuzzing.counts import Counter
+from fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import MissionParams, MissionState, fly
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.fuzzing.counts import Counter
-from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission.scenario import load_scenario
 from glider_control.control import control_step
 from glider_guard.block import guard_tick
@@ -26,7 +26,7 @@ from glider_model.base.signals import TICK_NS, TICK_S, Battery, Joints, Water
 from glider_model.base.wiring import GUARD, NAVIGATION, SENSORS
 from glider_model.ocean.current import current_step
 from glider_model.plant.plant import plant_step
-from glider_model.ros.lockstep.inputs import Input
+from glider_model.ros.hearing.inputs import Input
 from glider_model.ros.wire.codec import MessageError, to_cdr
 from glider_model.ros.wire.topics import TOPICS
 from glider_navigation.block import navigation_tick
@@ -156,7 +156,7 @@ def _outputs(scene: Scene, name: str, values: tuple[float, ...]) -> list[float]:
 
 
 def _try(draw: np.random.Generator, scene: Scene, name: str, mutate) -> tuple[str, str]:
-    item = Input(TOPICS[name])
+    item = Input(TOPICS[name], lockstep=False)
     try:
         item.accept(mutate(draw, item.topic.codec, scene.wires[name]))
     except MessageError:

@@ -1,27 +1,27 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""``./glider fuzz``: hostile use, counted."""
+"""``./glider test --only fuzz``: hostile use, counted."""
 
 import json
 from importlib import import_module
-from types import ModuleType
 from typing import Annotated, Literal
 
 import typer
 from rich.table import Table
 
+from fuzzing.counts import Counter
 from glider_bringup.console import Json, counter, messages, output, picked, repeatable
-from glider_model.base.exits import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED
 
-app = typer.Typer()
-#: Doors, each a module of `glider_bringup.fuzzing`, with the cases tried by default.
+app = typer.Typer(pretty_exceptions_enable=False)
+#: Doors, each a module beside this one, with the cases tried by default.
 COUNTS = {'files': 1000, 'lines': 200, 'messages': 1000, 'bags': 500, 'flights': 500, 'kills': 20}
 Door = Literal[tuple(COUNTS)]
 
 
-@app.command(epilog='Example: ./glider fuzz --only bags --count 100 --seed 7')
+@app.command(epilog='Example: ./glider test --only fuzz --door bags --count 100 --seed 7')
 def fuzz(
-    only: Annotated[
+    door: Annotated[
         list[repeatable(Door)] | None,
         typer.Option(help='Door; can be repeated. Default: all of them.'),
     ] = None,
@@ -45,16 +45,16 @@ def fuzz(
     """
     counts, interrupted = {}, False
     try:
-        for door in picked(only, Door):
-            cases = count or COUNTS[door]
-            with counter(door, cases) as update:
-                counts[door] = _fuzzing('counts').Counter(update)
-                _fuzzing(door).fuzz(seed, cases, counts[door])
+        for one in picked(door, Door):
+            cases = count or COUNTS[one]
+            with counter(one, cases) as update:
+                counts[one] = Counter(update)
+                import_module(f'fuzzing.{one}').fuzz(seed, cases, counts[one])
     except KeyboardInterrupt:
         interrupted = True
-    found = {door: one.result() for door, one in counts.items()}
+    found = {name: one.result() for name, one in counts.items()}
     if as_json:
-        print(json.dumps({door: one._asdict() for door, one in found.items()}))
+        print(json.dumps({name: one._asdict() for name, one in found.items()}))
     else:
         _print(found)
     if interrupted:
@@ -62,11 +62,6 @@ def fuzz(
         raise typer.Exit(EXIT_INTERRUPTED)
     if not all(one.clean for one in found.values()):
         raise typer.Exit(EXIT_FAILED)
-
-
-def _fuzzing(name: str) -> ModuleType:
-    """Module of the room that tries commands too, which therefore stands above them."""
-    return import_module(f'glider_bringup.fuzzing.{name}')
 
 
 def _print(found: dict) -> None:
@@ -80,3 +75,7 @@ def _print(found: dict) -> None:
     for door, one in found.items():
         for example in one.examples:
             messages.print(f'{door}: {example}', soft_wrap=True)
+
+
+if __name__ == '__main__':
+    app(prog_name='./glider test --only fuzz')

@@ -20,9 +20,9 @@ from pathlib import Path
 
 import typer
 
-from glider_bringup.fuzzing.counts import Counter
-from glider_bringup.fuzzing.files import SCALARS
-from glider_bringup.fuzzing.watch import badly_told, outcome_of
+from fuzzing.counts import Counter
+from fuzzing.files import SCALARS
+from fuzzing.watch import badly_told, outcome_of
 
 #: Words that have broken command lines; numbers that are in no range, or limit to nothing.
 WORDS = (
@@ -76,7 +76,6 @@ _BEGIN: dict[str, tuple[list[str], dict[str, str]]] = {
     'compare': (['flown', 'flown'], {}),
     'replay': (['flown'], {'--rate': 'max', '--duration': '0.2'}),
     'verify': (['flown'], {}),
-    'fuzz': ([], {'--only': 'nothing'}),
     'trim': (['zhang2021'], {'--net-heaviness-kg': '0.4', '--pitch-deg': '-30'}),
     'list': ([], {}),
     'bench': ([], {}),

@@ -16,11 +16,12 @@ from typing import Any, get_args
 import numpy as np
 import pydantic
 
-from glider_bringup.fuzzing.counts import Counter
-from glider_bringup.fuzzing.watch import outcome_of, time_limit_after
+from fuzzing.counts import Counter
+from fuzzing.watch import outcome_of, time_limit_after
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.scoring.card import finite, fly_scored, scorecard
 from glider_bringup.studies.random_faults import sample_faults
+from glider_guidance.yo.machine import ProfileSettings
 from glider_model.base.settings import ConfigurationError
 from glider_model.ocean.current_profile import MAX_SPEED_MPS
 from glider_model.vehicle.file import load_vehicle, vehicle_names
@@ -105,6 +106,9 @@ def draw_changes(seed: int, case: int) -> dict[str, Any]:
         'current.speed_mps': draw.uniform(0.0, MAX_SPEED_MPS),
         'current.angle_deg': draw.uniform(-180.0, 180.0),
     }
+    most = load_vehicle(changes['vehicle']).params().m_b_max
+    if most < ProfileSettings().net_heaviness_kg:
+        changes['profile.net_heaviness_kg'] = most
     if draw.random() < 0.5:
         changes['profile.depth_m'] = draw.uniform(*SHALLOW_M)
     if load_vehicle(changes['vehicle']).steers_by:
@@ -144,10 +148,12 @@ def fuzz(seed: int, count: int, counter: Counter) -> None:
     loops.append({**RECKONS, 'faults': sample_faults(0, FAULTS, 1.0)})
     flights = [{'control.law': law, **loop} for law, loop in product(LAWS, loops)]
     flights += [
-        {'vehicle': name, **STEERS} for name in vehicle_names() if load_vehicle(name).steers_by
+        {'vehicle': name, **STEERS, 'profile.net_heaviness_kg': 0.1}
+        for name in vehicle_names()
+        if load_vehicle(name).steers_by
     ]
     for changes in flights:  # has kernels compiled, which is no case's fault
-        _fly({'dives': 0, 'duration_s': 1.0, 'profile.depth_m': SHALLOW_M[0], **changes})
+        _fly({'dives': 0, 'duration_s': 1.0, 'profile.depth_m': SHALLOW_M[1], **changes})
     for case in range(count):
         changes = draw_changes(seed, case)
         told = ' '.join(f'--set {name}={value}' for name, value in changes.items())

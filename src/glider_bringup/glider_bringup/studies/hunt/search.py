@@ -1,0 +1,125 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flies missions with their faults and without, and shrinks what goes wrong."""
+
+import json
+import shlex
+from typing import Any, NamedTuple
+
+from glider_bringup.engines.flight import fly
+from glider_bringup.mission.choices import Combination, combination_of
+from glider_bringup.mission.scenario import Scenario
+from glider_bringup.scoring.card import fly_scored, scorecard
+from glider_bringup.studies.hunt.missions import Mission, draw_mission
+from glider_bringup.studies.hunt.oracle import Truth, Verdict, judge, unfounded
+from glider_bringup.studies.paper.limits import Check
+from glider_bringup.studies.workers import Pool, Progress
+from glider_guard.rows import LATCHED, ROWS
+
+NAME = 'random_faults'
+#: What may go wrong with a flight with faults.
+KINDS = ('lost', 'untold', 'late', 'not_finite')
+_TITLE = 'two or three random faults in random missions, and the same missions without'
+
+
+class Flown(NamedTuple):
+    """What became of a mission."""
+
+    verdict: Verdict  #: with its faults
+    faults: list[dict[str, Any]]  #: the smallest set that does the same harm
+    latched: str  #: what the guard told of the same mission without faults
+    hours: float  #: of that mission
+
+
+def _verdict(scenario: Scenario) -> Verdict:
+    """Fly, and judge."""
+    truth = Truth()
+    flight, scores = fly_scored(scenario, [truth])
+    card = scorecard(scenario, 'direct', flight, scores)
+    begun_s = [one['t_s'] for one in scores['faults'] if one['t_s'] is not None]
+    return judge(scenario, truth, card['status'], card['reason'], begun_s)
+
+
+def _shrunk(mission: Mission, verdict: Verdict) -> tuple[Verdict, list[dict[str, Any]]]:
+    """The same kind of harm by as few faults as possible."""
+    faults = mission.faults
+    for fault in mission.faults:
+        fewer = [one for one in faults if one is not fault]
+        smaller = _verdict(mission.load(fewer))
+        if smaller.kind == verdict.kind:
+            verdict, faults = smaller, fewer
+    return verdict, faults
+
+
+def _fly_mission(place: tuple[int, int]) -> Flown:
+    """Fly a mission, by seed and number, in a worker."""
+    mission = draw_mission(*place)
+    verdict, faults = _verdict(mission.load()), mission.faults
+    if verdict.kind:
+        verdict, faults = _shrunk(mission, verdict)
+    truth = Truth()
+    flight = fly(mission.load([]), [truth])
+    rows = unfounded(truth, LATCHED)
+    latched = ', '.join(row.name for row in ROWS if rows & row.bit)
+    if flight.status == 'failed':
+        latched = flight.reason
+    return Flown(verdict, faults, latched, len(truth.depth) / 3600.0)
+
+
+def combinations(seed: int, flights: int) -> set[Combination]:
+    """What loops the flights need."""
+    found = set()
+    for number in range(flights):
+        mission = draw_mission(seed, number)
+        found |= {combination_of(mission.load()), combination_of(mission.load([]))}
+    return found
+
+
+def command(mission: Mission, faults: list[dict[str, Any]]) -> str:
+    """Shell command that flies a mission with some faults again."""
+    fields = {**mission.changes, 'faults': [*mission.aging, *faults]}
+    sets = ' '.join(
+        f'--set {shlex.quote(f"{field}={json.dumps(value)}")}' for field, value in fields.items()
+    )
+    return f'./glider run {mission.scenario} --engine direct --duration full {sets}'
+
+
+def search(seed: int, flights: int, pool: Pool, progress: Progress) -> dict[str, Any]:
+    """Fly missions 0 to ``flights`` of a seed.
+
+    Returns
+    -------
+    dict
+        An entry of ``experiments.json``, and in it ``counts``: flights, lost, untold, late,
+        not_finite, false_reactions, hours.
+    """
+    places = {number: (seed, number) for number in range(flights)}
+    flown = pool.results(_fly_mission, places, progress)
+    rows = []
+    for number, one in flown.items():
+        mission = draw_mission(seed, number)
+        if one.verdict.kind:
+            said = one.verdict._asdict()
+            rows.append({'flight': number, **said, 'command': command(mission, one.faults)})
+        if one.latched:
+            said = {'kind': 'false_reaction', 'why': one.latched}
+            rows.append({'flight': number, **said, 'command': command(mission, [])})
+    counts: dict[str, Any] = {'flights': flights}
+    counts |= {kind: sum(row['kind'] == kind for row in rows) for kind in KINDS}
+    counts['false_reactions'] = sum(row['kind'] == 'false_reaction' for row in rows)
+    counts['hours'] = round(sum(one.hours for one in flown.values()), 1)
+    checks = [
+        Check(kind, counts[kind], 0, counts[kind] == 0) for kind in (*KINDS, 'false_reactions')
+    ]
+    return {
+        'name': NAME,
+        'group': NAME,
+        'section': '',
+        'title': f'{_TITLE}, seed {seed}',
+        'paper': '-',
+        'rows': rows,
+        'pid_better': [],
+        'checks': [check._asdict() for check in checks],
+        'counts': counts,
+        'verdict': 'passed' if all(check.passed for check in checks) else 'failed',
+    }

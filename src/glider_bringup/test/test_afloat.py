@@ -1,0 +1,58 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""At the surface there is nothing to steer by: no vehicle is swung there, by either law."""
+
+import numpy as np
+import pytest
+
+from glider_bringup.blocks import COLUMNS
+from glider_bringup.engines.flight import fly
+from glider_bringup.mission.scenario import load_scenario
+from glider_model.base.frames import poses_from_wire
+
+#: Shallow dives, up after each for ten minutes.
+DIVES = {
+    'duration_s': 7200.0,
+    'dives': 0,
+    'profile.surface_every_dives': 1,
+    'profile.depth_m': 100.0,
+    'profile.wait_s': 600.0,
+    'profile.net_heaviness_kg': 0.15,
+    'profile.pitch_deg': 25.0,
+}
+#: No glider rolls further (deg), nor is deeper at the surface (m).
+MOST_ROLL_DEG, AFLOAT_M = 45.0, 1.0
+
+
+class Motion:
+    """True depth (m) and roll (deg), and roll mass and steering surface (rad), once a second."""
+
+    def __init__(self) -> None:
+        self._rows = []
+
+    def add(self, log) -> None:
+        self._rows.append(log[::10].copy())
+
+    def result(self):
+        log = np.concatenate(self._rows)
+        pose = poses_from_wire(log[:, COLUMNS['ground_truth/odom']])
+        joints = log[:, COLUMNS['joint_states']]
+        return pose[:, 2], np.degrees(pose[:, 3]), joints[:, 2:4]
+
+
+@pytest.mark.parametrize('law', ['adaptive', 'pid'])
+@pytest.mark.parametrize('method', ['known', 'dead_reckoned'])
+@pytest.mark.parametrize('vehicle', ['zhang2021', 'seawing', 'seaglider', 'slocum_g2'])
+def test_no_vehicle_swings_at_the_surface(vehicle, method, law):
+    changes = {**DIVES, 'vehicle': vehicle, 'navigation.method': method, 'control.law': law}
+    motion = Motion()
+    fly(load_scenario('current_8deg', changes), [motion])
+    depth, roll, steering = motion.result()
+    assert np.abs(roll).max() < MOST_ROLL_DEG
+    afloat = depth < AFLOAT_M
+    assert np.count_nonzero(np.diff(afloat.astype(int)) == 1) >= 2  # it came up twice
+    # a minute after it came up nothing moves any more until it dives
+    rests = np.array([afloat[max(0, i - 60) : i + 1].all() for i in range(len(afloat))])
+    moved = np.abs(np.diff(steering, axis=0)).max(axis=1)
+    assert rests.sum() > 600
+    assert moved[rests[1:] & rests[:-1]].max() == 0.0

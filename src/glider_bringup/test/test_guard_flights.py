@@ -1,0 +1,283 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flights with faults, judged by where the vehicle truly is: nobody sinks who has the means."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from glider_bringup.blocks import COLUMNS
+from glider_bringup.engines.direct import fly_blocks
+from glider_bringup.engines.flight import mission_of
+from glider_bringup.mission.scenario import load_scenario
+from glider_guard import rows
+from glider_guard.weight import LEVEL_M, LEVEL_S
+from glider_model.base.signals import TICK_S
+from glider_model.vehicle.file import load_vehicle
+
+#: Shallower than this is at the surface (m).
+AT_SURFACE_M = 5.0
+RECKONED = {'navigation.method': 'dead_reckoned', 'profile.surface_every_dives': 1}
+NOISE = {
+    'attitude_std_deg': 0.2,
+    'heading_std_deg': 0.5,
+    'rate_std_dps': 0.1,
+    'position_std_m': 1.0,
+}
+
+
+class Flown(NamedTuple):
+    """True depth (m), rows and whether the weight has been let go, tick by tick."""
+
+    depth: np.ndarray
+    told: np.ndarray
+    drops: np.ndarray
+
+    def first(self, row: int) -> float:
+        """When a row was told first (s); infinite: never."""
+        holds = (self.told & row) != 0
+        return float(np.argmax(holds)) * TICK_S if holds.any() else np.inf
+
+    def dropped_at(self) -> float:
+        """Depth at which the weight was let go (m); NaN: it was not."""
+        return float(self.depth[np.argmax(self.drops)]) if self.drops.any() else np.nan
+
+
+def fly(name, duration_s, faults=(), **changes):
+    """Fly a scenario with some faults."""
+    fields = {'duration_s': duration_s, 'faults': list(faults), **changes}
+    logs = [
+        log[
+            :, [COLUMNS['ground_truth/odom'].start + 2, COLUMNS['guard'], *_columns('drop_weight')]
+        ]
+        for log in fly_blocks(*mission_of(load_scenario(name, fields)))
+    ]
+    depth, told, drops = np.concatenate(logs).T
+    return Flown(-depth, told.astype(np.int64), drops > 0.5)
+
+
+def _columns(topic):
+    return range(COLUMNS[topic].start, COLUMNS[topic].stop)
+
+
+def broken(kind, depth_m=None, phase='dive', **fields):
+    """A fault, from a depth in the dive on."""
+    when = {} if depth_m is None else {'at_depth_m': depth_m, 'phase': phase}
+    return {'kind': kind, **fields, **when}
+
+
+@pytest.mark.parametrize(
+    ('name', 'depth_m', 'within_m'), [('slocum_shelf', 120.0, 30.0), ('current_8deg', 800.0, 60.0)]
+)
+def test_a_pressure_that_freezes_in_the_dive_brings_a_vehicle_up_that_reckons(
+    name, depth_m, within_m
+):
+    flown = fly(name, 9000.0, [broken('frozen', depth_m, sensor='depth')], **RECKONED)
+    began_s = float(np.argmax(flown.depth >= depth_m)) * TICK_S
+    assert flown.first(rows.SURFACES) - began_s < 120.0
+    assert flown.depth.max() < depth_m + within_m
+    assert flown.depth[-1] < AT_SURFACE_M
+    assert not flown.drops.any()
+
+
+@pytest.mark.parametrize('changes', [RECKONED, {}])
+def test_a_pressure_that_freezes_before_the_dive_is_no_reason_to_dive(changes):
+    flown = fly('current_8deg', 4000.0, [broken('frozen', sensor='depth', at_s=20.0)], **changes)
+    assert flown.depth.max() < 60.0
+    assert flown.depth[-1] < AT_SURFACE_M
+
+
+@pytest.mark.parametrize(
+    'sensors',
+    [
+        {'imu_period_s': 10.0, 'imu_missed_share': 0.3},
+        {'depth_resolution_m': 1.0},
+        {'imu_period_s': 4.0, 'depth_resolution_m': 0.5, **NOISE},
+    ],
+)
+def test_samples_that_repeat_by_nature_are_no_alarm(sensors):
+    """Nor is a yo of 20 m at .02 kg: the depth hardly moves."""
+    slow = {'profile.depth_m': 20.0, 'profile.net_heaviness_kg': 0.02, 'dives': 0}
+    flown = fly('rough_water', 10000.0, sensors=sensors, **RECKONED, **slow)
+    assert not flown.told.any()
+
+
+@pytest.mark.parametrize(
+    ('name', 'crush_m', 'faults'),
+    [
+        ('rough_water', 1250.0, [broken('leak', 950.0, rate_kgps=0.005, limit_kg=2.0)]),
+        (
+            'current_8deg',
+            1250.0,
+            [
+                broken('stuck', 900.0, actuator='buoyancy_engine'),
+                broken('mass', 900.0, mass_kg=0.5),
+            ],
+        ),
+        (
+            'slocum_shelf',
+            250.0,
+            [
+                broken('stuck', 180.0, actuator='buoyancy_engine'),
+                broken('mass', 180.0, mass_kg=0.15),
+            ],
+        ),
+    ],
+)
+def test_the_weight_goes_before_the_crush_depth_and_not_after_it(name, crush_m, faults):
+    flown = fly(name, 9000.0, faults)
+    assert flown.dropped_at() < crush_m
+    assert flown.depth.max() < crush_m
+    assert flown.depth[-1] < AT_SURFACE_M
+
+
+def test_a_leak_that_outgrows_the_pump_takes_nobody_below_where_it_began():
+    leak = broken('leak', 590.0, rate_kgps=0.0009, limit_kg=1.6)
+    flown = fly('current_8deg', 12000.0, [leak], **{'profile.depth_m': 600.0})
+    assert flown.depth.max() < 640.0
+    assert flown.depth[-1] < AT_SURFACE_M
+
+
+def test_a_pump_that_still_turns_the_vehicle_spares_the_weight():
+    """0.5 kg more at 950 m, of 0.6 kg that the pump has left."""
+    flown = fly('current_8deg', 9000.0, [broken('mass', 950.0, mass_kg=0.5)])
+    assert not flown.drops.any()
+    assert flown.depth[-1] < AT_SURFACE_M
+
+
+@pytest.mark.parametrize('changes', [RECKONED, {}])
+def test_a_depth_that_is_60_m_off_at_launch_is_no_depth_to_dive_by(changes):
+    bias = broken('biased', sensor='depth', error=-60.0)
+    flown = fly('slocum_shelf', 4000.0, [bias], **changes)
+    assert flown.first(rows.DEPTH_WRONG) < 60.0
+    assert flown.depth.max() < AT_SURFACE_M
+
+
+@pytest.mark.parametrize('error', [-15.0, 12.0])
+def test_an_offset_is_taken_off_at_the_surface_and_told(error):
+    """Dives go to 200 m of water, and not to 215 or 188."""
+    bias = broken('biased', sensor='depth', error=error)
+    flown = fly('slocum_shelf', 9000.0, [bias], **RECKONED)
+    assert flown.first(rows.DEPTH_OFFSET) < 60.0
+    assert not (flown.told & rows.SURFACES).any()
+    assert 195.0 < flown.depth.max() < 204.0
+
+
+@pytest.mark.parametrize('changes', [RECKONED, {}])
+def test_a_depth_that_jumps_and_stays_there_is_not_set_anew_quietly(changes):
+    bias = broken('biased', 600.0, sensor='depth', error=-300.0)
+    flown = fly('current_8deg', 9000.0, [bias], **changes)
+    assert flown.depth.max() < 650.0
+    assert flown.first(rows.DEPTH_WRONG) < np.inf
+    assert flown.depth[-1] < AT_SURFACE_M
+
+
+@pytest.mark.parametrize('changes', [RECKONED, {}])
+def test_guidance_and_guard_agree_about_the_rated_depth(changes):
+    """45 deg with the whole pump in rough water to the depth that the hull is rated for."""
+    steep = {'profile.pitch_deg': 45.0, 'profile.net_heaviness_kg': 1.0, 'dives': 0}
+    flown = fly('rough_water', 20000.0, sensors=NOISE, **steep, **changes)
+    assert 950.0 < flown.depth.max() < 1015.0
+    assert not flown.told.any()
+
+
+@pytest.mark.parametrize(
+    ('vehicle', 'pitch_deg', 'heavier_kg'),
+    [('seaglider', 20.0, 0.1), ('zhang2021', 20.0, 0.3), ('seawing', 45.0, 0.3)],
+)
+def test_a_vehicle_that_is_held_level_sinks_on_by_no_more_than_is_reckoned_with(
+    vehicle, pitch_deg, heavier_kg
+):
+    """With nearly all of its buoyancy against it, and more that its file does not know of."""
+    most = load_vehicle(vehicle).params().m_b_max
+    flown = fly(
+        'current_8deg',
+        7000.0,
+        [{'kind': 'vacuum', 'rate_paps': 5000.0, 'at_s': 1000.0}],
+        vehicle=vehicle,
+        **{
+            'dives': 0,
+            'profile.depth_m': 900.0,
+            'profile.pitch_deg': pitch_deg,
+            'profile.net_heaviness_kg': round(0.95 * most, 3),
+            'perturb.net_heaviness_kg': heavier_kg,
+        },
+    )
+    at = round(flown.first(rows.VACUUM) / TICK_S)
+    rate = (flown.depth[at] - flown.depth[at - 100]) / (100 * TICK_S)
+    assert flown.depth[at] > 100.0 and rate > 0.15
+    assert flown.depth.max() - flown.depth[at] < LEVEL_M + LEVEL_S * rate
+
+
+@pytest.mark.parametrize(
+    ('vehicle', 'rate_kgps', 'limit_kg'), [('slocum_g2', 4.8e-5, 0.6), ('zhang2021', 1.0e-4, 2.5)]
+)
+@pytest.mark.parametrize('is_detected', [True, False])
+def test_who_floats_with_a_leak_stays_up_when_the_water_outgrows_the_pump(
+    vehicle, rate_kgps, limit_kg, is_detected
+):
+    """The weight goes as soon as the vehicle sinks again, whatever it was sent up for."""
+    leak = {'kind': 'leak', 'rate_kgps': rate_kgps, 'limit_kg': limit_kg, 'at_s': 600.0}
+    faults = [{**leak, 'detected': is_detected}]
+    if not is_detected:
+        faults.append({'kind': 'vacuum', 'rate_paps': 5000.0, 'at_s': 700.0})
+    shelf = {'profile.depth_m': 50.0, 'profile.net_heaviness_kg': 0.1, 'dives': 0}
+    flown = fly('current_8deg', 16000.0, faults, vehicle=vehicle, sensors=NOISE, **shelf)
+    up = np.argmax((flown.depth < 1.0) & ((flown.told & rows.SURFACES) != 0))
+    assert 0 < up and flown.drops[-1]
+    assert flown.depth[up:].max() < AT_SURFACE_M
+
+
+def test_a_pump_stuck_in_the_dive_leaves_a_vehicle_that_is_held_level_slower_by_far():
+    """A Seaglider is not level with its mass in the middle, nor nose up while it sinks."""
+    stuck = broken('stuck', 120.0, actuator='buoyancy_engine')
+    steep = {'profile.pitch_deg': 45.0, 'profile.net_heaviness_kg': 0.341}
+    flown = fly('seaglider_1000m', 3600.0, [stuck], **steep)
+    told = round(flown.first(rows.SURFACES) / TICK_S)
+    dives = (flown.depth[told] - flown.depth[told - 100]) / 10.0
+    level = (flown.depth[told + 3000] - flown.depth[told + 2000]) / 100.0
+    assert dives > 0.4
+    assert level < 0.1
+
+
+SEAGLIDER = {'vehicle': 'seaglider', 'dives': 0, 'guard.depth_margin_m': 500.0}
+
+
+def test_a_glide_too_slow_for_the_thresholds_turns_where_it_was_sent():
+    """At 0.045 m/s, which is all that 0.02 kg make."""
+    slow = {
+        'profile.depth_m': 100.0,
+        'profile.pitch_deg': 25.0,
+        'profile.net_heaviness_kg': 0.02,
+        'perturb.net_heaviness_kg': 0.007,
+    }
+    flown = fly('current_8deg', 20000.0, **SEAGLIDER, **slow)
+    deep = flown.depth > 90.0
+    assert flown.depth.max() < 110.0
+    assert np.count_nonzero(deep[1:] & ~deep[:-1]) > 2
+
+
+def test_the_first_turn_is_led_by_the_rate_that_a_vehicle_shows():
+    """It weighs a third more at 1000 m than its file says: it turned 45 m too late."""
+    steep = {
+        'profile.depth_m': 1000.0,
+        'profile.pitch_deg': 45.0,
+        'profile.net_heaviness_kg': 0.341,
+        'perturb.net_heaviness_kg': 0.05,
+    }
+    flown = fly('current_8deg', 4000.0, **SEAGLIDER, **steep)
+    assert 950.0 < flown.depth.max() < 1025.0
+
+
+def test_a_shallow_yo_with_a_slow_pump_is_flown():
+    """10 m at 45 deg with the whole pump: turned by a full lead it hung at 8 m."""
+    steep = {
+        'profile.depth_m': 20.0,
+        'profile.pitch_deg': 45.0,
+        'profile.net_heaviness_kg': 0.95,
+        'dives': 0,
+    }
+    flown = fly('current_8deg', 4000.0, **steep)
+    assert 12.0 < flown.depth.max() < 25.0
+    assert not flown.told.any()

@@ -1,0 +1,135 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A flight in one's own hands: the bits of a flight at once, however it is cut up or carried."""
+
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import glider_bringup as glider
+from glider_guard.rows import LATCHED
+
+WATERS = {
+    'rough_water': {},
+    'current_8deg': {'faults': [{'kind': 'leak', 'at_s': 800.0, 'rate_kgps': 0.002}]},
+    'slocum_shelf': {},
+}
+END_S = 1000.0
+
+
+def numbers(flight) -> dict:
+    """Numbers of the last tick, with the bits of each."""
+    return {name: np.float64(value).tobytes() for name, value in flight.now.items()}
+
+
+@pytest.fixture(scope='module', params=WATERS)
+def at_once(request):
+    """Name of a scenario, and a flight of it that was flown at once."""
+    flight = glider.Flight(request.param, WATERS[request.param], seed=3)
+    assert flight.until(t_s=END_S) == ('time', 10000)
+    return request.param, flight
+
+
+def test_steps_of_one_have_the_same_bits(at_once):
+    name, whole = at_once
+    flight = glider.Flight(name, WATERS[name], seed=3)
+    assert not flight.now
+    for _ in range(10000):
+        flight.step()
+    assert numbers(flight) == numbers(whole)
+    assert flight.t_s == END_S and not flight.is_over
+
+
+def test_it_is_what_fly_flies(at_once):
+    name, whole = at_once
+    run = glider.fly(name, WATERS[name], seed=3, duration=END_S).to_xarray().isel(time=-1)
+    theirs = {one: np.float64(run[one].item()).tobytes() for one in run.data_vars}
+    assert numbers(whole) == theirs
+
+
+def test_a_state_can_be_kept_and_flown_on_as_often_as_one_likes(at_once):
+    name, whole = at_once
+    flight = glider.Flight(name, WATERS[name], seed=3)
+    flight.until(t_s=400.0)
+    kept, then = flight.state, numbers(flight)
+    for _ in range(2):
+        flight.until(t_s=END_S)
+        assert numbers(flight) == numbers(whole)
+        flight.restore(kept)
+        assert numbers(flight) == then and flight.tick == 4000
+
+
+ELSEWHERE = """
+import pickle, sys
+import glider_bringup as glider
+
+name, changes, state = pickle.load(sys.stdin.buffer)
+flight = glider.Flight(name, changes, seed=3).restore(state)
+flight.until(t_s=1000.0)
+sys.stdout.buffer.write(pickle.dumps(flight.now))
+"""
+
+
+def test_a_state_goes_to_another_process(at_once):
+    name, whole = at_once
+    flight = glider.Flight(name, WATERS[name], seed=3)
+    flight.step(2503)
+    sent = pickle.dumps((name, WATERS[name], flight.state))
+    done = subprocess.run([sys.executable, '-c', ELSEWHERE], input=sent, stdout=subprocess.PIPE)
+    assert pickle.loads(done.stdout) == pytest.approx(whole.now, rel=0.0, abs=0.0, nan_ok=True)
+
+
+def test_two_fly_side_by_side_and_do_not_touch_each_other(at_once):
+    name, whole = at_once
+    one, other = (glider.Flight(name, WATERS[name], seed=seed) for seed in (3, 4))
+    for _ in range(100):
+        one.step(100)
+        other.step(100)
+    assert numbers(one) == numbers(whole)
+
+
+def test_it_is_flown_until_something_happens():
+    flight = glider.Flight('current_8deg', {'profile.depth_m': 60.0, 'dives': 2})
+    rows = glider.fly('current_8deg', {'profile.depth_m': 60.0, 'dives': 2}).to_xarray()
+    depth = rows.ground_truth_odom_depth.values
+    name, tick = flight.until('surfacing')
+    assert name == 'surfacing'
+    assert depth[tick - 2] >= 1.0 > depth[tick - 1] and depth[: tick - 1].max() > 50.0
+    assert flight.now['ground_truth_odom_depth'] == depth[tick - 1]
+    assert flight.until('surfacing', t_s=flight.t_s + 1.0) == ('time', tick + 10)
+    assert flight.until() == ('end', len(depth))
+    assert flight.is_over and flight.step() == ('end', len(depth))
+
+
+def test_it_stops_where_the_guard_acts():
+    changes = {'faults': [{'kind': 'leak', 'at_s': 300.0, 'rate_kgps': 0.002}]}
+    flight = glider.Flight('current_8deg', changes)
+    name, tick = flight.until('guard', t_s=3600.0)
+    assert name == 'guard' and tick > 3000
+    assert int(flight.state.past.row[-1]) & LATCHED  # the guard is the last column
+    again = glider.Flight('current_8deg', changes)
+    again.step(tick - 1)
+    assert not int(again.state.past.row[-1]) & LATCHED
+
+
+def test_it_arrives():
+    short = {'path.waypoints': [[0, 0], [300, 0]], 'profile.depth_m': 60.0}
+    flight = glider.Flight('survey', short)
+    assert flight.until('arrival').name == 'arrival'
+
+
+@pytest.mark.parametrize(
+    ('act', 'named'),
+    [
+        (lambda flight: flight.until('lunch'), "event = 'lunch'.*surfacing, arrival, guard, end"),
+        (lambda flight: flight.step(0), 'n = 0.*1 and more'),
+        (lambda flight: glider.Flight('nowhere'), 'nowhere'),
+        (lambda flight: glider.Flight(law=abs, controller='pid'), '--controller pid'),
+    ],
+)
+def test_what_cannot_be_done_is_said(at_once, act, named):
+    with pytest.raises(glider.ConfigurationError, match=named):
+        act(at_once[1])

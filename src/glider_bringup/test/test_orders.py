@@ -1,0 +1,209 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Orders in flight: what they do, that they are data, and that every engine follows them alike."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from rosbags.typesys import Stores, get_typestore
+from typer.testing import CliRunner
+
+import glider_bringup as glider
+from glider_bringup.cli import app
+from glider_model.base.settings import ConfigurationError
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+SHALLOW = {'profile.depth_m': 200.0, 'dives': 0}
+EAST = {'kind': 'straight', 'course_deg': 90.0, 'length_m': 5000.0}
+#: Orders at odd times, one of each kind.
+ORDERS = [
+    {'at_s': 900.0, 'depth_m': 100.0, 'pitch_deg': 25.0},
+    {'at_s': 1000.0, 'path': EAST, 'when': 'surfacing'},
+    {'at_s': 1700.3, 'hold': True},
+    {'at_s': 2600.0, 'resume': True},
+    {'at_s': 3400.0, 'abort': True},
+]
+
+
+def depths(flight, end_s: float) -> np.ndarray:
+    """True depth (m) every 10 s until a time."""
+    found = []
+    while flight.t_s < end_s and not flight.is_over:
+        flight.until(t_s=flight.t_s + 10.0)
+        found.append(flight.now['ground_truth_odom_depth'])
+    return np.array(found)
+
+
+def ordered(*orders, start_s=900.0, **fields) -> glider.Flight:
+    """A flight that was told something in its first dive."""
+    flight = glider.Flight('current_8deg', {**SHALLOW, **fields})
+    flight.until(t_s=start_s)
+    for order in orders:
+        flight.order(**order)
+    return flight
+
+
+def test_another_depth_holds_in_the_dive_itself():
+    before = ordered(start_s=500.0)
+    assert before.now['ground_truth_odom_depth'] < 120.0
+    before.order(depth_m=120.0)
+    assert 115.0 < depths(before, 4000.0).max() < 135.0
+
+
+def test_shallower_than_it_is_it_turns_at_once():
+    depth = depths(ordered({'depth_m': 100.0}, start_s=650.0), 4000.0)
+    assert 120.0 < depth[0] < 160.0 and depth.max() < 175.0
+    assert 90.0 < depth[120:].max() < 110.0
+
+
+def test_another_pitch_is_flown():
+    flight = ordered({'pitch_deg': 45.0}, start_s=400.0)
+    flight.until(t_s=700.0)
+    assert np.degrees(flight.now['ground_truth_odom_pitch']) == pytest.approx(-45.0, abs=3.0)
+
+
+def test_who_holds_waits_at_the_surface_until_it_is_told_to_resume():
+    """However long, and whoever flies on from there; a flight that went back has not held."""
+    ends = {'dives': 1, 'path.at_end': 'stop'}
+    flight = ordered(start_s=500.0, **ends)
+    before = flight.state
+    flight.order(hold=True)
+    depth = depths(flight, 9000.0)
+    assert not flight.is_over and depth[100:].max() < 1.0
+    assert depth.max() < depth[0] + 20.0  # it does not slide down nose up
+    other = glider.Flight('current_8deg', {**SHALLOW, **ends}).restore(flight.state)
+    for one in (flight, other):
+        one.order(resume=True)
+        assert depths(one, 11000.0).max() > 190.0
+    assert flight.restore(before).until('end', t_s=5000.0).name == 'end'
+
+
+@pytest.mark.parametrize('when', ['once', 'surfacing'])
+def test_another_path_is_entered_at_its_nearest_point(when):
+    flight = ordered({'path': EAST, 'when': when}, **{'profile.surface_every_dives': 1})
+    north = flight.now['reference_north']
+    flight.step()
+    jumps = abs(flight.now['reference_north'] - north) > 10.0
+    assert jumps == (when == 'once')
+    flight.until('surfacing')
+    flight.step(100)
+    assert abs(flight.now['reference_north']) < 1e-6
+    east = flight.now['odom_east']
+    flight.until(t_s=flight.t_s + 4000.0)
+    assert flight.now['odom_east'] > east + 100.0
+
+
+def test_who_aborts_comes_up_for_good():
+    flight = ordered({'abort': True})
+    assert depths(flight, 5000.0)[-1] < 1.0
+    for order in ({'depth_m': 50.0}, {'resume': True}, {'abort': True}):
+        with pytest.raises(ConfigurationError, match='aborted'):
+            flight.order(**order)
+
+
+@pytest.mark.parametrize(
+    ('asked', 'says'),
+    [
+        ({}, 'nothing: not one order'),
+        ({'hold': True, 'depth_m': 50.0}, 'hold, depth_m: not one order'),
+        ({'depth_m': 5000.0}, r'profile.depth_m = 5000: deeper .* \(allowed: <= 1000 m'),
+        ({'depth_m': 10.0}, 'profile.top_depth_m = 10: not above the lower turn'),
+        ({'pitch_deg': 61.0}, r'pitch_deg = 61.0: .*<= 60'),
+        ({'resume': True}, 'resume: the vehicle does not hold'),
+        ({'hold': True, 'when': 'surfacing'}, 'not with hold'),
+        ({'path': {'kind': 'straight'}}, 'path.length_m: missing'),
+        ({'speed': 1.0}, 'speed = 1.0: unknown field'),
+        ({'hold': True, 'at_s': 2000.0}, 'at_s: it holds from the next tick on'),
+    ],
+)
+def test_what_makes_no_sense_is_refused_and_changes_nothing(asked, says):
+    flight, same = ordered(), ordered()
+    with pytest.raises(ConfigurationError, match=says):
+        flight.order(**asked)
+    flight.step(10)
+    same.step(10)
+    assert pickle.dumps(flight.state) == pickle.dumps(same.state)
+
+
+def test_a_path_in_three_dimensions_takes_no_depth():
+    flight = glider.Flight('helix')
+    for asked in ({'depth_m': 50.0}, {'pitch_deg': 20.0}, {'hold': True}):
+        with pytest.raises(ConfigurationError, match='three dimensions'):
+            flight.order(**asked)
+
+
+def test_orders_of_a_scenario_are_checked_one_after_the_other():
+    with pytest.raises(ConfigurationError, match=r'orders.1.resume: the vehicle does not hold'):
+        glider.Flight('current_8deg', {'orders': [ORDERS[0], ORDERS[3]]})
+    with pytest.raises(ConfigurationError, match='aborted before'):
+        glider.Flight('current_8deg', {'orders': [ORDERS[4], {'at_s': 4000.0, 'hold': True}]})
+
+
+def test_an_order_is_refused_that_would_leave_one_to_come_without_sense():
+    fields = {**SHALLOW, 'orders': [{'at_s': 950.0, 'hold': True}, {'at_s': 960.0, 'abort': True}]}
+    flight = glider.Flight('current_8deg', fields)
+    flight.until(t_s=900.0)
+    for asked, says in (({'hold': True}, 'holds already'), ({'abort': True}, 'aborted before')):
+        with pytest.raises(ConfigurationError, match=says):
+            flight.order(**asked)
+    flight.order(depth_m=100.0)
+    flight.until(t_s=970.0)
+    with pytest.raises(ConfigurationError, match='aborted'):
+        flight.order(depth_m=50.0)
+
+
+@pytest.fixture(scope='module')
+def flown():
+    """All orders as data, flown at once, row by row."""
+    run = glider.fly('current_8deg', {**SHALLOW, 'orders': ORDERS}, duration=4000.0)
+    return run.to_xarray()
+
+
+def test_given_in_flight_they_have_the_bits_of_those_in_the_scenario(flown):
+    """And of a flight whose state is kept and restored while an order waits for the surface."""
+    flight = glider.Flight('current_8deg', SHALLOW, duration=4000.0)
+    for one in ORDERS:
+        flight.until(t_s=one['at_s'])
+        flight.order(**{name: value for name, value in one.items() if name != 'at_s'})
+        kept = pickle.dumps(flight.state)
+        flight.until(t_s=one['at_s'] + 100.0)
+        flight.restore(pickle.loads(kept))
+    flight.until(t_s=4000.0)
+    assert flight.orders == ORDERS
+    last = flown.isel(time=-1)
+    for name in last.data_vars:
+        assert np.float64(flight.now[name]).tobytes() == np.float64(last[name].item()).tobytes()
+
+
+def test_nodes_follow_them_to_the_same_bits_and_verify_says_so(flown, tmp_path):
+    fields = {**SHALLOW, 'orders': ORDERS}
+    run = glider.fly(
+        'current_8deg', fields, duration=4000.0, engine='nodes', bag=True, out=tmp_path / 'run'
+    )
+    nodes = run.to_xarray()
+    for name in flown.data_vars:
+        assert flown[name].values.tobytes() == nodes[name].values.tobytes(), name
+    direct = tmp_path / 'direct'
+    glider.fly('current_8deg', fields, duration=4000.0, bag=True, out=direct)
+    told = []
+    for folder in (tmp_path / 'run', direct):
+        done = CliRunner().invoke(app, ['verify', str(folder), '--json'])
+        assert done.exit_code == 0 and json.loads(done.stdout)['identical'], done.output
+        told.append(orders_in(folder))
+    assert told[0] == told[1] and len(told[0]) == len(ORDERS)
+
+
+def orders_in(folder) -> list[tuple[int, str, str]]:
+    """Orders on record: tick, what, and what it changed."""
+    reader, found = make_reader(next(folder.glob('**/*.mcap')).open('rb')), []
+    for _, _, message in reader.iter_messages(topics=['/diagnostics']):
+        array = STORE.deserialize_cdr(message.data, 'diagnostic_msgs/msg/DiagnosticArray')
+        for status in array.status:
+            if status.message in ('parameters set', 'abort'):
+                stamp = array.header.stamp
+                values = sorted((pair.key, pair.value) for pair in status.values)
+                found.append((stamp.sec * 10 + stamp.nanosec // 10**8, status.message, values))
+    return found

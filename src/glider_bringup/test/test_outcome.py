@@ -1,0 +1,223 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What became of a vehicle: the same word wherever it is told, by its true depth."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from glider_bringup.blocks import COLUMNS, ROW
+from glider_bringup.mission.rules import Rules
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.scoring.card import fly_scored
+from glider_bringup.scoring.score import Scorer
+from glider_guard.rows import CRUSHING, LEAK, NOT_RISING, STUCK_ROLL
+from glider_model.base.signals import TICK_S
+from glider_model.vehicle.file import load_vehicle
+
+TRUTH, BELIEF = COLUMNS['ground_truth/odom'], slice(*[COLUMNS['odom'].start + i for i in (0, 13)])
+
+
+def scores(depth, guard=0, believed=None, vehicle='zhang2021', north=0.0, target=0.0, e2=0.0):
+    """Scores of a made-up flight at some true depths (m), with what the guard tells."""
+    log = np.zeros((len(depth), ROW))
+    log[:, TRUTH.start + 1], log[:, TRUTH.start + 2] = north, -depth
+    log[:, TRUTH.start + 3] = 1.0
+    log[:, BELIEF] = log[:, TRUTH.start : TRUTH.start + 13]
+    if believed is not None:
+        log[:, BELIEF.start + 2] = -believed
+    reference = COLUMNS['reference'].start
+    log[:, reference + 1], log[:, reference + 3] = target, 1.0
+    log[:, COLUMNS['tracking_error'].start + 1] = e2
+    log[:, COLUMNS['guard']] = guard
+    scorer = Scorer(vehicle=load_vehicle(vehicle))
+    scorer.add(log)
+    return scorer.result(Rules(0.0, 1000.0))
+
+
+def ticks(seconds):
+    return TICK_S * np.arange(round(seconds / TICK_S))
+
+
+T = ticks(4000.0)
+DIVE = np.interp(T, (0.0, 2000.0, 4000.0), (0.0, 900.0, 0.0))
+
+
+def from_s(start_s, bits):
+    return np.where(start_s <= T, bits, 0)
+
+
+@pytest.mark.parametrize(
+    ('depth', 'guard', 'status'),
+    [
+        (DIVE, 0, 'completed'),
+        (DIVE, from_s(1000.0, STUCK_ROLL), 'completed'),
+        (DIVE, from_s(1000.0, STUCK_ROLL) * (T < 2000.0), 'completed'),
+        (DIVE, from_s(1500.0, LEAK), 'surfaced'),
+        (DIVE, from_s(1500.0, LEAK | NOT_RISING), 'surfaced'),
+        # on its way when the run ends, and just beginning with its last means
+        (np.minimum(T, 900.0), from_s(1500.0, LEAK), 'surfaced'),
+        (np.minimum(T, 900.0), from_s(3900.0, LEAK | NOT_RISING), 'surfaced'),
+        # all has been done for long, and it lies there
+        (np.minimum(T, 900.0), from_s(1500.0, LEAK | NOT_RISING), 'lost'),
+        # by its true depth, whatever became of it later and whatever the guard did
+        (1.5 * DIVE, 0, 'lost'),
+        (1.5 * DIVE, from_s(1500.0, CRUSHING), 'lost'),
+    ],
+)
+def test_status_is_what_became_of_the_vehicle(depth, guard, status):
+    assert scores(depth, guard)['status'] == status
+
+
+@pytest.mark.parametrize('beyond_m', [-0.1, 0.1])
+def test_hull_gives_way_at_its_crush_depth(beyond_m):
+    crush_m = load_vehicle('slocum_g2').crush_depth_m
+    depth = DIVE / 900.0 * (crush_m + beyond_m)
+    told = scores(depth, vehicle='slocum_g2')
+    assert told['status'] == ('lost' if beyond_m > 0.0 else 'completed')
+
+
+def test_a_vehicle_that_sinks_for_ever_is_lost_at_the_bottom_of_the_deepest_sea():
+    """It goes on for a day by the scenario: 8 kg too heavy it would be 600 km deep by then."""
+    heavy = {'faults': [{'kind': 'mass', 'at_s': 600.0, 'mass_kg': 8.0}], 'dives': 0}
+    scenario = load_scenario('current_8deg', {**heavy, 'duration_s': 86400.0})
+    _, told = fly_scored(scenario, [])
+    assert told['status'] == 'lost'
+    assert told['depth_m']['max'] == pytest.approx(12000.0, abs=1.0)
+
+
+def test_what_it_believed_of_its_depth_saves_no_vehicle():
+    told = scores(1.5 * DIVE, believed=0.5 * DIVE)
+    assert told['status'] == 'lost'
+    assert '1,350.0 m' in told['reason']
+
+
+def test_what_cannot_be_held_is_infeasible_but_not_if_the_vehicle_is_lost():
+    for depth, status in ((DIVE, 'infeasible'), (1.5 * DIVE, 'lost')):
+        log_scores = scorer_with(depth, infeasible=True)
+        assert log_scores['status'] == status
+
+
+def scorer_with(depth, infeasible):
+    log = np.zeros((len(depth), ROW))
+    log[:, TRUTH.start + 2], log[:, TRUTH.start + 3] = -depth, 1.0
+    log[:, BELIEF] = log[:, TRUTH.start : TRUTH.start + 13]
+    log[:, COLUMNS['reference'].start + 3] = 1.0
+    log[:, COLUMNS['infeasible']] = infeasible
+    scorer = Scorer(vehicle=load_vehicle('zhang2021'))
+    scorer.add(log)
+    return scorer.result(Rules(0.0, 1000.0))
+
+
+def test_nothing_is_steady_after_the_guard_has_acted_or_the_hull_gave_way():
+    """1 m off before, 50 m off after."""
+    for depth, guard in (
+        (0 * T + 500.0, from_s(2000.0, LEAK)),
+        (np.where(T < 2000.0, 500.0, 1300.0), 0),
+    ):
+        track = scores(depth, guard, e2=np.where(T < 2000.0, 1.0, 50.0))['cross_track_m']
+        assert track['max_steady'] == 1.0
+        assert track['max_run'] == 50.0
+
+
+@pytest.mark.parametrize('guard', [0, from_s(1500.0, LEAK)])
+def test_battery_of_a_mission_that_ended_lasts_for_nothing(guard):
+    energy = scores(DIVE, guard, north=0.3 * T, target=0.3 * T)['energy']
+    assert energy['wh'] > 0.0
+    for name in ('endurance_days', 'range_km'):
+        assert (energy[name] is None) == np.any(guard)
+
+
+@pytest.mark.parametrize(
+    ('vehicle', 'reaction'), [('zhang2021', 'drop'), ('seaglider', 'surface')]
+)
+def test_no_weight_is_dropped_by_a_vehicle_that_has_none(vehicle, reaction):
+    guard = scores(DIVE, from_s(1500.0, NOT_RISING), vehicle=vehicle)['guard']
+    assert guard['reaction'] == guard['events'][0]['reaction'] == reaction
+
+
+@pytest.mark.parametrize('speed', [0.5, 0.0, -0.67])
+def test_way_along_the_path_is_that_of_the_vehicle(speed):
+    """The target waits for a vehicle that is carried back; range is that of the vehicle too."""
+    target = np.maximum(0.0, speed * T) + np.minimum(T, 49.0)
+    told = scores(DIVE, north=speed * T, target=target)
+    assert told['distance_along_path_m'] == pytest.approx(speed * T[-1], abs=1e-6)
+    flights = told['energy']['endurance_days'] * 86400.0 / told['sim_time_s']
+    expected = 1e-3 * flights * max(0.0, speed * T[-1])
+    assert told['energy']['range_km'] == pytest.approx(expected, abs=1e-9)
+
+
+# ------------------------------------------------------------------------------------ told
+
+
+def glider(*arguments):
+    return subprocess.run(
+        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        env={**os.environ, 'COLUMNS': '160', 'PYTHONUTF8': '1', 'FORCE_COLOR': '1'},
+        timeout=300,
+        check=False,
+    )
+
+
+DEEP = ('--set', 'profile.depth_m=800', '--set', 'initial.depth_m=600')
+LEAKS = {
+    # of what the pump takes off, and of more than pump and weight together
+    'surfaced': ('rough_water', '{kind: leak, rate_kgps: 0.001, limit_kg: 0.2, at_s: 200}'),
+    'lost': ('seaglider_1000m', '{kind: leak, rate_kgps: 0.02, limit_kg: 8.0, at_s: 200}'),
+}
+CODES = {'surfaced': 3, 'lost': 1}
+
+
+@pytest.fixture(scope='module', params=['surfaced', 'lost'])
+def ended(request, tmp_path_factory):
+    """Status, process and folder of a flight that springs a leak."""
+    folder = tmp_path_factory.mktemp(request.param) / 'flight'
+    name, fault = LEAKS[request.param]
+    known = ('--set', 'navigation.method=known')
+    flight = ('--engine', 'direct', '--duration', '3000', *DEEP, *known)
+    process = glider('run', name, *flight, '--set', f'faults=[{fault}]', '--out', folder)
+    return request.param, process, folder
+
+
+def test_run_ends_with_the_exit_code_of_its_status(ended):
+    status, process, _ = ended
+    assert process.returncode == CODES[status], process.stderr
+    assert f'{status} (' in process.stdout
+    assert 'battery lasts' not in process.stdout
+
+
+def test_card_and_report_say_the_same_word_first(ended):
+    status, _, folder = ended
+    card = json.loads((folder / 'score.json').read_text())
+    assert card['status'] == status
+    page = (folder / 'report.html').read_text(encoding='utf-8')
+    badge, verdict = page.partition(f'<span class="badge {status}">')[2].split('</span>', 1)
+    assert status in badge.lower()
+    assert verdict.startswith(f'{status.capitalize()}: ')
+    first = page.partition('<ul class="findings">')[2].partition('</li>')[0]
+    assert 'class="problem"' in first
+    assert f'{status.capitalize()}: ' in first
+
+
+@pytest.mark.parametrize('command', ['score', 'report'])
+def test_commands_about_it_succeed_and_say_the_word(ended, command):
+    status, _, folder = ended
+    process = glider(command, folder)
+    assert process.returncode == 0, process.stderr
+    assert status in process.stdout
+
+
+def test_compare_says_it_of_each_run(ended):
+    status, _, folder = ended
+    other = folder.parent / 'other'
+    if not other.exists():
+        glider('run', '--engine', 'direct', '--duration', '60', '--out', other)
+    process = glider('compare', folder, other)
+    assert process.returncode == 0, process.stderr
+    assert f'{status.capitalize()} before its end: 1 of 2 runs' in process.stdout

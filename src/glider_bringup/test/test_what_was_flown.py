@@ -1,0 +1,133 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What was flown is told as it was flown: what was changed in a scenario, and no other one."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from glider_bringup.door.run import fly, open_run
+from glider_bringup.mission.scenario import load_scenario
+from glider_model.base.settings import ConfigurationError
+
+CHANGED = {'current.speed_kn': 0.6, 'profile.depth_m': 300}
+SHORT = ('--engine', 'direct', '--duration', '30')
+TOLD = 'with current.speed_kn=0.6, profile.depth_m=300'
+
+
+def glider(*arguments):
+    return subprocess.run(
+        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        env={**os.environ, 'COLUMNS': '200', 'PYTHONUTF8': '1'},
+        timeout=300,
+        check=False,
+    )
+
+
+def refused(*arguments):
+    process = glider(*arguments)
+    assert process.returncode == 2, process.stderr
+    assert 'Traceback' not in process.stderr
+    return process.stderr
+
+
+@pytest.fixture(scope='module')
+def changed(tmp_path_factory):
+    """Process and folder of a flight with two fields changed, and its bag."""
+    folder = tmp_path_factory.mktemp('changed') / 'flight'
+    sets = [word for field, value in CHANGED.items() for word in ('--set', f'{field}={value}')]
+    return glider('run', *SHORT, *sets, '--bag', '--out', folder), folder
+
+
+def test_what_was_changed_stands_in_every_title(changed, tmp_path):
+    process, folder = changed
+    assert process.returncode == 0, process.stderr
+    assert TOLD in process.stdout
+    assert f'but {TOLD}' in process.stderr.replace('\n', ' ')
+    page = (folder / 'report.html').read_text(encoding='utf-8')
+    assert TOLD in page.partition('<title>')[2].partition('</title>')[0]
+    assert f'but {TOLD}' in page.partition('<h1>')[2].partition('</h1>')[0]
+    assert TOLD in glider('score', folder).stdout
+    assert glider('figure', folder, '--out', tmp_path / 'run.svg').returncode == 0
+    assert open_run(folder).to_xarray().attrs['title'].partition('but ')[2].startswith(TOLD)
+
+
+def test_comparison_says_what_was_changed_in_each(changed, tmp_path):
+    other = tmp_path / 'other'
+    assert glider('run', *SHORT, '--out', other).returncode == 0
+    out = glider('compare', changed[1], other).stdout
+    (line,) = [line for line in out.splitlines() if line.startswith('│ changed')]
+    assert 'current.speed_kn=0.6' in line
+
+
+def test_it_is_known_from_the_bag_alone_and_adds_up(changed):
+    (bag,) = changed[1].glob('*.mcap')
+    assert open_run(bag).score['changed'] == open_run(changed[1]).score['changed']
+    again = load_scenario(str(changed[1] / 'scenario.yaml'), {'seed': 3, 'profile.depth_m': 200})
+    assert again.changed['current.speed_kn'] == '0.6'
+    assert (again.changed['profile.depth_m'], again.changed['seed']) == ('200', '3')
+
+
+def test_nothing_is_told_where_nothing_was_changed():
+    scenario = load_scenario('survey')
+    assert scenario.described == scenario.description
+    assert 'changed' not in scenario.to_yaml()
+
+
+def test_python_tells_it_too():
+    run = fly('current_8deg', {'current.speed_kn': 0.6}, duration=1.0)
+    assert run.score['changed']['current.speed_kn'] == '0.6'
+
+
+@pytest.mark.parametrize('command', ['score', 'report'])
+@pytest.mark.parametrize('name', ['scenario.yaml', 'vehicle.yaml'])
+def test_a_scenario_that_was_exchanged_is_refused(changed, tmp_path, command, name):
+    """Name, vehicle and rules of another flight are not put beside the numbers of this one."""
+    folder = tmp_path / 'flight'
+    shutil.copytree(changed[1], folder)
+    other = fly('slocum_shelf', duration=1.0, out=tmp_path / 'other').folder
+    shutil.copy(other / name, folder / name)
+    message = refused(command, folder)
+    assert name in message
+    assert 'flown' in message
+
+
+def test_so_it_is_in_a_run_without_a_bag(tmp_path):
+    folder = fly('current_8deg', duration=1.0, out=tmp_path / 'flight').folder
+    other = fly('slocum_shelf', duration=1.0, out=tmp_path / 'other').folder
+    for name in ('scenario.yaml', 'vehicle.yaml'):
+        shutil.copy(other / name, folder / name)
+    assert 'not what was flown' in refused('report', folder)
+    assert json.loads(glider('score', folder, '--json').stdout)['scenario'] == 'current_8deg'
+
+
+@pytest.mark.parametrize(
+    ('changes', 'words'),
+    [
+        ({'profile.depth_m': 50, 'profile.top_depth_m': 50}, 'not above the lower turn'),
+        ({'profile.depth_m': 50, 'profile.top_depth_m': 80}, 'not above the lower turn'),
+        ({'profile.net_heaviness_kg': 1.01}, 'more than the pump of the vehicle makes'),
+        ({'profile.climb_net_heaviness_kg': 1.01}, 'more than the pump of the vehicle makes'),
+        ({'water': {'profile': [[0, 1025.0], [50, 1024.9], [90, 1026.0]]}}, 'turns over'),
+        ({'seed': True}, 'no number'),
+        ({'current.speed_kn': True}, 'no number'),
+        ({'settle_s': False}, 'no number'),
+    ],
+)
+def test_what_cannot_be_flown_is_refused(changes, words):
+    with pytest.raises(ConfigurationError, match=words):
+        load_scenario('current_8deg', changes)
+
+
+def test_what_can_be_flown_is_not_refused():
+    """Up to the limits; a cast may be unstable by what instruments err, and true is no number."""
+    water = {'profile': [[0, 1025.0], [50, 1024.98], [90, 1026.0]]}
+    limits = {'profile.net_heaviness_kg': 1.0, 'profile.top_depth_m': 49.9}
+    load_scenario('current_8deg', {'profile.depth_m': 50, 'water': water, **limits})
+    assert load_scenario('current_8deg', {'sensors.gyro': False}).sensors.gyro is False

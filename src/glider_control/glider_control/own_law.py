@@ -1,0 +1,72 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A control law of a program or a notebook: a class of settings, or a function alone."""
+
+import inspect
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numba
+
+from glider_control.law import LawSettings, law_step
+from glider_model.base.errors import ConfigurationError
+
+
+def own_law(law: type[LawSettings] | Callable) -> type[LawSettings]:
+    """Settings of a law, from a class of them, or from a function that is the law.
+
+    Parameters
+    ----------
+    law : type or callable
+        A subclass of `LawSettings`; or a function of a `Seen` that returns the roll and the pitch
+        moment (N m), of which numba compiles the body.
+
+    Raises
+    ------
+    ConfigurationError
+        If it is neither.
+    """
+    if isinstance(law, type) and issubclass(law, LawSettings):
+        return law
+    function = getattr(law, 'py_func', law)
+    if not inspect.isfunction(function):
+        raise ConfigurationError(
+            f'law {law!r:.80}: not usable (allowed: a subclass of glider_control.law.LawSettings, '
+            'or a function of what the law sees; the name of a law goes to controller)'
+        )
+    names = list(inspect.signature(function).parameters)
+    if len(names) != 1:
+        raise ConfigurationError(
+            f'law {function.__name__}({", ".join(names)}): not usable (allowed: a function of one '
+            'parameter, what the law sees; a law with a state is a class)'
+        )
+    return _stateless(function)
+
+
+def _stateless(function: Callable) -> type[LawSettings]:
+    """Settings without a field, of a law that is a function of what it sees."""
+    # compiled for this session alone, as whoever calls it is: see KernelCache
+    compiled = numba.njit(error_model='numpy', forceinline=True)(function)
+
+    class Params(NamedTuple):
+        nothing: int
+
+    class State(NamedTuple):
+        nothing: int
+
+    class Stateless(LawSettings):
+        def params(self, vehicle, bank) -> Params:
+            return Params(0)
+
+        def initial_state(self) -> State:
+            return State(0)
+
+    @law_step.body(Params)
+    @numba.njit(error_model='numpy', forceinline=True)
+    def step(state, seen, params, dt):
+        tau_p, tau_q = compiled(seen)
+        return state, float(tau_p), float(tau_q)
+
+    Stateless.__name__ = function.__name__
+    Stateless.__doc__ = function.__doc__ or f'The function {function.__name__}.'
+    return Stateless

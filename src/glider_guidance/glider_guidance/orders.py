@@ -1,0 +1,121 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The orders of a flight: what guidance is told by each, and when it holds.
+
+Whoever has them flies again to the same bits: the direct engine stops at their ticks, the guidance
+node sets its parameters there, which is on record.
+"""
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from glider_guidance.order import Order
+from glider_guidance.settings import GuidanceSettings
+from glider_guidance.yo.stage import AT_END_OF_PATH, SURFACE_PREPARATION, WAITING_ON_SURFACE
+from glider_model.base.settings import ConfigurationError
+
+
+def changed(settings: GuidanceSettings, order: Order) -> GuidanceSettings:
+    """What guidance is told when an order holds.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the order, and why it makes no sense.
+    """
+    follows = settings.profile.mode == 'path'
+    for name in ('depth_m', 'pitch_deg', 'hold'):
+        if follows and getattr(order, name):
+            raise ConfigurationError(
+                f'{name} = {getattr(order, name)}: a path in three dimensions says it itself '
+                "(allowed: with profile.mode = 'profile')"
+            )
+    if order.hold and settings.hold:
+        raise ConfigurationError('hold: the vehicle holds already (allowed: resume, abort)')
+    if order.resume and not settings.hold:
+        raise ConfigurationError('resume: the vehicle does not hold (allowed: after a hold)')
+    changes = order.changes()
+    of_profile = {name: changes.pop(f'profile.{name}', None) for name in ('depth_m', 'pitch_deg')}
+    kept = {name: value for name, value in of_profile.items() if value is not None}
+    profile = settings.profile.model_copy(update=kept)
+    told = settings.model_copy(update={**changes, 'profile': profile})
+    told.check()
+    return told
+
+
+def due(orders: Iterable[Order], tick: int, stage: int) -> list[Order]:
+    """Those that hold from a tick on; ``stage`` is that of guidance a tick before."""
+    return [order for _, order in first_ticks(orders, tick, np.array([stage]))]
+
+
+def first_ticks(orders: Iterable[Order], tick: int, stages: np.ndarray) -> list[tuple[int, Order]]:
+    """Those that hold from one of some ticks on, in order, and from which; none after an abort.
+
+    Parameters
+    ----------
+    orders : iterable of Order
+    tick : int
+        The first of the ticks.
+    stages : int64[n]
+        Stage of guidance a tick before each.
+
+    Returns
+    -------
+    list of (int, Order)
+        Row of the tick, from 0 on.
+    """
+    ticks, up = np.arange(len(stages)) + tick, is_surfaced(stages)
+    found = []
+    for order in orders:
+        rows = np.flatnonzero((ticks >= order.tick) & (up | (order.when == 'once')))
+        found += [(int(rows[0]), order)] if len(rows) else []
+    found.sort(key=lambda one: (one[0], one[1].tick))
+    last = next((i for i, (_, order) in enumerate(found) if order.abort), len(found))
+    return found[: last + 1]
+
+
+def ticks_alone(orders: Iterable[Order], tick: int) -> float:
+    """For so many ticks none becomes due by its time."""
+    return min((one.tick - tick for one in orders if one.tick > tick), default=math.inf)
+
+
+def wait_for_surface(orders: Iterable[Order], tick: int) -> bool:
+    """Whether one holds as soon as the vehicle is at the surface."""
+    return any(one.tick <= tick and one.when == 'surfacing' for one in orders)
+
+
+def is_surfaced(stage):
+    """Whether guidance has the vehicle at the surface, int or int[n]."""
+    return (
+        (stage == WAITING_ON_SURFACE) | (stage == SURFACE_PREPARATION) | (stage == AT_END_OF_PATH)
+    )
+
+
+def check_orders(
+    settings: GuidanceSettings, orders: Iterable[Order], name: str = 'orders.{}.'
+) -> None:
+    """Refuse orders of a mission that make no sense one after the other.
+
+    Parameters
+    ----------
+    settings : GuidanceSettings
+        Before the first of them.
+    orders : iterable of Order
+    name : str
+        What an order is called, by its number.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the order.
+    """
+    is_aborted = False
+    for i, order in sorted(enumerate(orders), key=lambda one: one[1].tick):
+        try:
+            if is_aborted:
+                raise ConfigurationError('the mission is aborted before (allowed: nothing more)')
+            settings, is_aborted = changed(settings, order), order.abort
+        except ConfigurationError as error:
+            raise ConfigurationError(f'{name.format(i)}{error}') from None

@@ -1,0 +1,259 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where compiled kernels are kept, and when what is kept is stale.
+
+numba decides whether a cached function is stale by looking at the file that defines it, not at the
+files of the functions it calls. Here a kernel is kept under a digest over the sources of all
+modules that its code can come from: its own module and what that imports, the modules of the types
+that it is compiled for, and those of the bodies that these types choose for slots. A change
+compiles again what it can reach, and nothing else. Paths are not in it: another checkout finds
+what is there.
+"""
+
+import fcntl
+import hashlib
+import importlib.util
+import os
+import re
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numba
+from numba.core import types
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+
+#: What is kept at most (bytes), and how old it was before it is marked as used again (s).
+LARGEST, USED_S = 2_000_000_000, 86_400.0
+_IMPORT = re.compile(
+    r'^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+([^\n]*))', re.M
+)
+#: Where packages of others are installed. Only what holds kernels is looked at there.
+_INSTALLED = (f'{os.sep}site-packages{os.sep}', f'{os.sep}dist-packages{os.sep}')
+
+
+class Body(NamedTuple):
+    """A kernel that fills a slot: the modules of the slot, of its params and of the kernel."""
+
+    slot: str
+    params: str
+    kernel: str
+
+
+#: Of all slots that have been filled in this process.
+BODIES: list[Body] = []
+#: Top-level modules that hold kernels.
+HOLDERS: set[str] = set()
+
+
+@cache
+def _file_of(module: str) -> str | None:
+    """Python source of a module, imported or not; None if there is none."""
+    if module in sys.modules:
+        path = getattr(sys.modules[module], '__file__', None)
+    elif '.' in module:
+        parent, _, name = module.rpartition('.')
+        above = _file_of(parent) or ''
+        if not above.endswith('__init__.py'):
+            return None
+        inside = Path(above).parent
+        found = (inside / name / '__init__.py', inside / f'{name}.py')
+        path = next((str(one) for one in found if one.is_file()), None)
+    else:
+        try:
+            spec = importlib.util.find_spec(module)
+        except (ImportError, ValueError):
+            return None
+        path = spec.origin if spec and spec.has_location else None
+    return path if path and path.endswith('.py') else None
+
+
+def _counts(module: str) -> bool:
+    """Whether kernels can come from a module: it is ours, a user's, or of a holder of kernels."""
+    top = module.partition('.')[0]
+    if top in sys.stdlib_module_names and top != '__main__':
+        return False
+    path = _file_of(module)
+    return path is not None and (top in HOLDERS or not any(one in path for one in _INSTALLED))
+
+
+class _Source(NamedTuple):
+    """A module's digest, and the modules that it imports."""
+
+    digest: bytes
+    imports: frozenset[str]
+
+
+@cache
+def _source(module: str) -> _Source:
+    data = Path(_file_of(module)).read_bytes()
+    names = set()
+    for origin, members, plain in _IMPORT.findall(data.decode('utf-8', 'replace')):
+        if origin:
+            names.add(origin)
+            names |= {f'{origin}.{one}' for one in re.findall(r'\w+', members)}
+        names |= {part.split()[0] for part in plain.split(',') if part.strip()}
+    parents = {name[:at] for name in names for at in range(len(name)) if name[at] == '.'}
+    return _Source(hashlib.sha256(data).digest(), frozenset(names | parents))
+
+
+def _reach(modules: Iterable[str], seen: dict[str, bytes]) -> None:
+    """Add modules and all that they import to those that are seen, with their digests."""
+    open_ = [*modules]
+    while open_:
+        module = open_.pop()
+        if module not in seen and _counts(module):
+            seen[module], imports = _source(module)
+            open_ += imports
+
+
+@cache
+def closure(modules: frozenset[str], bodies: int, holders: int) -> str:
+    """Digest of all sources that code of some modules can come from.
+
+    Parameters
+    ----------
+    modules : frozenset of str
+    bodies, holders : int
+        How many of `BODIES` and `HOLDERS` there are: more may change the answer.
+    """
+    seen: dict[str, bytes] = {}
+    _reach(modules, seen)
+    chosen = True
+    while chosen:
+        chosen = {
+            body.kernel
+            for body in BODIES[:bodies]
+            if body.slot in seen and body.params in seen and body.kernel not in seen
+        }
+        _reach(chosen, seen)
+    digest = hashlib.sha256(numba.__version__.encode())
+    for module in sorted(seen):
+        digest.update(module.encode() + b'\0' + seen[module])
+    return digest.hexdigest()[:16]
+
+
+def _classes(kinds: Iterable) -> Iterator[type]:
+    """Classes of NamedTuples among numba types, and in them."""
+    for kind in kinds:
+        if isinstance(kind, types.BaseNamedTuple):
+            yield kind.instance_class
+        if isinstance(kind, types.BaseTuple):
+            # all of a uniform tuple are alike
+            yield from _classes(set(kind.types))
+
+
+def _outlive(arguments: Iterable) -> bool:
+    """Whether all classes of arguments are there in the next session, too.
+
+    Those of a notebook, of the program itself and of functions are made anew in each.
+    """
+    return not any(
+        one.__module__ == '__main__' or '<locals>' in one.__qualname__
+        for one in _classes(arguments)
+    )
+
+
+def is_kept(function) -> bool:
+    """Whether a function stands in a file, not in a notebook: then its code is kept."""
+    path = _file_of(function.__module__)
+    own = os.path.realpath(function.__code__.co_filename)
+    return path is not None and os.path.realpath(path) == own
+
+
+def folder() -> Path:
+    """Folder of the compiled kernels, in ``$GLIDER_CACHE`` or ``~/.cache/glider``."""
+    default = Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / 'glider'
+    return Path(os.environ.get('GLIDER_CACHE') or default) / 'kernels'
+
+
+class _Locator:
+    """Where a kernel is kept: a folder of its module's name, wherever its source lies."""
+
+    def __init__(self, function) -> None:
+        self._py_file = function.__code__.co_filename  # numba names it in warnings
+        self._folder = str(folder() / function.__module__)
+
+    @classmethod
+    def from_function(cls, function, _):
+        return cls(function)
+
+    def ensure_cache_path(self) -> None:
+        os.makedirs(self._folder, exist_ok=True)
+
+    def get_cache_path(self) -> str:
+        return self._folder
+
+    def get_source_stamp(self) -> str:
+        return ''
+
+    def get_disambiguator(self) -> str:
+        return ''
+
+
+class _Impl(CompileResultCacheImpl):
+    _locator_classes = (_Locator,)
+
+
+class KernelCache(FunctionCache):
+    """numba's cache of a function, which one process at a time adds to.
+
+    numba looks for a free name, writes the index and then the file. Two processes that compile a
+    function for different types at the same time would give their code the same name, and one of
+    them would later run that of the other.
+    """
+
+    _impl_class = _Impl
+
+    def __init__(self, function) -> None:
+        super().__init__(function)
+        HOLDERS.add(function.__module__.partition('.')[0])
+
+    def _select(self, sig) -> None:
+        """Turn to what is kept of the sources as they are, for a signature."""
+        arguments = getattr(sig, 'args', sig)
+        modules = {one.__module__ for one in _classes(arguments)} | {self._py_func.__module__}
+        digest = closure(frozenset(modules), len(BODIES), len(HOLDERS))
+        name = f'{self._impl.filename_base}.{digest}'
+        self._cache_file = IndexDataCacheFile(self._cache_path, name, digest)
+
+    def load_overload(self, sig, target_context):
+        """What was compiled for a signature, or None."""
+        if not _outlive(getattr(sig, 'args', sig)):
+            return None
+        self._select(sig)
+        found = super().load_overload(sig, target_context)
+        if found is not None:
+            path = self._cache_file._index_path
+            if time.time() - os.stat(path).st_mtime > USED_S:
+                os.utime(path)
+        return found
+
+    def save_overload(self, sig, data) -> None:
+        """Save what was compiled for a signature, if it can be of use to another session."""
+        if not _outlive(getattr(sig, 'args', sig)):
+            return
+        self._select(sig)
+        os.makedirs(self.cache_path, exist_ok=True)
+        with open(os.path.join(self.cache_path, 'lock'), 'w') as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            super().save_overload(sig, data)
+
+
+def forget_old(largest: int = LARGEST) -> None:
+    """Remove what has not been used for longest, until the rest is not larger (bytes)."""
+    found = []
+    for index in folder().rglob('*.nbi'):
+        files = [index, *index.parent.glob(f'{index.stem}.*.nbc')]
+        status = [one.stat() for one in files]
+        found.append((status[0].st_mtime, sum(one.st_size for one in status), files))
+    size = sum(one[1] for one in found)
+    for _, own, files in sorted(found):
+        if size <= largest:
+            return
+        size -= own
+        for path in files:
+            path.unlink(missing_ok=True)

@@ -1,0 +1,191 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A driver that is killed in flight and is back within seconds: flown on, told, recorded.
+
+Driver, autopilot and recorder are processes of their own. What the middleware knows of the dead
+driver stays listed for longer than the guard would wait.
+"""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from mcap.reader import make_reader
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import JointState
+
+from glider_bringup.engines.node_parameters import node_parameters, write_parameters
+from glider_bringup.engines.processes import (
+    AUTOPILOT,
+    RECORDER,
+    node_commands,
+    node_environment,
+)
+from glider_bringup.mission.scenario import load_scenario
+from glider_model.ros.lockstep import health
+from glider_model.ros.places import domain_id
+from glider_model.ros.wire import qos
+
+EXAMPLES = Path(__file__).resolve().parents[1] / 'examples'
+#: A vehicle that glides down whatever happens, by the clock of the machine, and whose actuators
+#: are where they were told to be; they stay there while nobody drives.
+DRIVER = """
+import json, math, sys, time
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import rclpy
+from driver import Driver, JOINTS
+
+START_S, PLACES = float(sys.argv[2]), Path(sys.argv[3])
+
+
+class Glider:
+    def time_ns(self):
+        return time.time_ns()
+
+    def navigation(self):
+        t_s, half = time.time() - START_S, math.radians(10.0)
+        pose = (0.0, 0.3 * t_s, -50.0 - 0.1 * t_s)
+        facing = (math.cos(half) * math.sqrt(0.5), -math.sin(half) * math.sqrt(0.5),
+                  math.sin(half) * math.sqrt(0.5), math.cos(half) * math.sqrt(0.5))
+        return pose, facing, (0.316, 0.0, 0.0), (0.0, 0.0, 0.0)
+
+    def actuators(self):
+        return json.loads(PLACES.read_text())
+
+    def move(self, targets):
+        draft = PLACES.with_suffix('.part')
+        draft.write_text(json.dumps([targets[joint] for joint in JOINTS]))
+        draft.replace(PLACES)
+
+
+rclpy.init(args=sys.argv)
+driver = Driver(Glider())
+driver.start()
+rclpy.spin(driver)
+"""
+#: The driver is away for so long (s), and what follows.
+AWAY_S, AFTER_S, DEADLINE_S = 3.5, 6.0, 120.0
+
+
+class Heard:
+    """What passed between driver and autopilot, with the wall time."""
+
+    def __init__(self, context: Context) -> None:
+        self.node = rclpy.create_node('watch', namespace='/glider', context=context)
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(self.node)
+        self.commands, self.told, self.ready = [], [], set()
+        self.node.create_subscription(JointState, 'command', self.on_command, 100)
+        self.node.create_subscription(DiagnosticArray, '/diagnostics', self.on_told, qos.EVENTS)
+        self.node.create_subscription(DiagnosticArray, 'lockstep', self.on_report, qos.EVENTS)
+
+    def on_command(self, command) -> None:
+        pump = dict(zip(command.name, command.position, strict=True))['buoyancy_engine']
+        self.commands.append((time.monotonic(), pump))
+
+    def on_told(self, array) -> None:
+        for status in array.status:
+            self.told.append((time.monotonic(), status.name, status.message))
+
+    def on_report(self, array) -> None:
+        self.ready |= {r.node for r in health.reports_in(array) if r.phase == health.READY}
+
+    def until(self, condition) -> None:
+        end = time.monotonic() + DEADLINE_S
+        while not condition():
+            assert time.monotonic() < end
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def listen(self, for_s: float) -> None:
+        end = time.monotonic() + for_s
+        self.until(lambda: time.monotonic() > end)
+
+
+@pytest.fixture(scope='module')
+def flight(tmp_path_factory):
+    """What was heard; when the driver was killed, and when it was started again; the recording."""
+    folder = tmp_path_factory.mktemp('restart')
+    script, places = folder / 'driver.py', folder / 'places.json'
+    script.write_text(DRIVER)
+    places.write_text('[0.4, 0.0, 0.0]')
+    scenario = load_scenario('current_8deg', {'profile.prepare_s': 0.0})
+    write_parameters(
+        node_parameters(scenario, lockstep=False, record_to=folder), folder / 'nodes.yaml'
+    )
+    commands = node_commands(folder / 'nodes.yaml', layout='autopilot')
+    python, option, module, *ros = commands[AUTOPILOT]
+    aboard = [python, option, module, 'guidance', 'control', 'guard', *ros]
+    driver = [sys.executable, script, EXAMPLES, str(time.time()), places]
+    driver += ['--ros-args', '-r', '__ns:=/glider']
+    context, processes = Context(), []
+    with domain_id() as domain:
+        environment = node_environment(domain)
+
+        def start(command) -> subprocess.Popen:
+            processes.append(subprocess.Popen(list(map(str, command)), env=environment))
+            return processes[-1]
+
+        rclpy.init(context=context, domain_id=domain)
+        heard = Heard(context)
+        try:
+            autopilot = start([*aboard, '-p', 'record:=false'])
+            recorder = start(commands[RECORDER])
+            nodes = {'guidance_node', 'control_node', 'guard_node', RECORDER}
+            heard.until(lambda: heard.ready >= nodes)
+            first = start(driver)
+            heard.until(lambda: heard.commands and heard.commands[-1][1] > 0.2)
+            heard.listen(2.0)
+            first.kill()
+            killed_s = time.monotonic()
+            heard.listen(AWAY_S)
+            start(driver)
+            back_s = time.monotonic()
+            heard.listen(AFTER_S)
+            for process in (autopilot, recorder):
+                process.terminate()
+                assert process.wait(DEADLINE_S) == 0
+        finally:
+            for process in processes:
+                process.kill()
+                process.wait()
+            heard.executor.shutdown()
+            heard.node.destroy_node()
+            rclpy.try_shutdown(context=context)
+    (bag,) = folder.glob('*.mcap')
+    return heard, killed_s, back_s, bag
+
+
+def test_it_is_flown_on(flight):
+    heard, killed_s, back_s, _ = flight
+    away = [pump for when_s, pump in heard.commands if killed_s + 1.5 < when_s < back_s]
+    assert away and max(away) < 0.0  # the safe state, all the buoyancy there is
+    after = [pump for when_s, pump in heard.commands if when_s > back_s + AFTER_S - 1.5]
+    assert len(after) > 5 and min(after) > 0.2
+    assert not [told for *_, told in heard.told if 'for good' in told]
+
+
+def test_successor_is_told_with_its_gid_and_is_no_stranger(flight):
+    heard, _, back_s, _ = flight
+    told = [(node, said) for when_s, node, said in heard.told if when_s > back_s]
+    taken = [(node, said) for node, said in told if 'takes the place of /glider/driver' in said]
+    assert {node for node, _ in taken} == {
+        f'/glider/{name}_node' for name in ('guidance', 'control', 'guard')
+    }
+    assert all(said.startswith('/glider/') and '(01.0f.' in said for _, said in taken)
+    assert not [said for _, said in told if 'is published by' in said]
+
+
+def test_recording_goes_on(flight):
+    *_, bag = flight
+    with bag.open('rb') as stream:
+        read = make_reader(stream).iter_messages(topics=['/glider/odom'])
+        stamps_s = [message.log_time / 1e9 for _, _, message in read]
+    gaps_s = [after - before for before, after in zip(stamps_s[:-1], stamps_s[1:], strict=True)]
+    assert AWAY_S < max(gaps_s) < AWAY_S + 5.0
+    assert stamps_s[-1] - stamps_s[gaps_s.index(max(gaps_s)) + 1] > 1.0
