@@ -92,7 +92,7 @@ class TickSorter:
         for topic, queue in self._queues.items():
             while queue and queue[0][0] == stamp_ns:
                 self._write(topic, stamp_ns, queue.popleft()[1])
-        self.written_ns = stamp_ns
+        self.written_ns = max(self.written_ns, stamp_ns)  # free-running, an answer may be late
         if self._events:
             self._write_events(stamp_ns)
 
