@@ -16,14 +16,12 @@ from glider_control.law import HeadingSettings, LawSettings
 from glider_control.surface import NoSteering, SurfaceLawSettings
 from glider_control.vertical_rate import Trim
 from glider_model.base import plugins
-from glider_model.base.settings import ConfigurationError, Settings
+from glider_model.base.settings import TUNABLE, ConfigurationError, Settings
 from glider_model.base.signals import Joints
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.gate import GateSettings
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
-
-_TUNABLE = {'tunable': True}
 
 
 class BuoyancySettings(Settings):
@@ -34,14 +32,14 @@ class BuoyancySettings(Settings):
         ge=0.0,
         le=10.0,
         description='integral of the vertical-rate error (kg/m)',
-        json_schema_extra=_TUNABLE,
+        json_schema_extra=TUNABLE,
     )
     drag_ki_kg_per_m: float = Field(
         0.002,
         ge=0.0,
         le=10.0,
         description='integral that changes sides with dive and climb (kg/m)',
-        json_schema_extra=_TUNABLE,
+        json_schema_extra=TUNABLE,
     )
     trim_limit_kg: float = Field(
         0.3, ge=0.0, le=20.0, description='largest correction by each integral (kg)'

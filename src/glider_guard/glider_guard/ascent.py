@@ -37,9 +37,8 @@ class Ascent(NamedTuple):
     waits_s: float  #: since it was sent up
     rate: float  #: averaged (m/s, + down)
     turned: bool  #: nose up
-    slow_s: (
-        float  #: for which it has risen too slowly so; less than 0: is still held level for that
-    )
+    #: for which it has risen too slowly so; less than 0: is still held level for that
+    slow_s: float
 
 
 INITIAL_ASCENT = Ascent(0.0, 0.0, False, 0.0)

@@ -310,7 +310,7 @@ def test_a_vehicle_is_level_while_it_sinks_and_nose_up_while_it_rises(pump_kg):
 
 
 def test_a_vehicle_that_hardly_rises_with_its_nose_up_is_held_level_for_a_while():
-    """A Seaglider rose at .012 m/s in a stall, and at .27 out of it: five minutes each way."""
+    """It may be in a stall that it does not leave by itself: five minutes each way."""
     vehicle, pump = Vehicle(depth_m=500.0, stall_s=3600.0), Joints(-0.96, 0.0, 0.0, 0.0)
     vehicle.target, asked = SURFACE_TARGET, []
     for _ in range(120):

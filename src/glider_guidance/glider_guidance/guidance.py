@@ -302,13 +302,10 @@ def advance(state, place, params, dt):
     before, depth, rate = state.profile, place.depth, place.ground_d
     left = _way_left(state, place.error.e1, params)
     if place.follows_path and not before.aborted:
-        profile = ProfileState(
+        profile = replace(
+            before,
             stage=GLIDING_DOWN,
             ticks=before.ticks + 1,
-            dives=before.dives,
-            aborted=False,
-            lead_up_s=0.0,
-            lead_down_s=0.0,
             turn_depth=0.0,
             depth=params.profile.depth,
         )

@@ -11,13 +11,11 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.settings import Settings
+from glider_model.base.settings import TUNABLE, Settings
 from glider_model.base.signals import TrackingError, Water
 from glider_model.base.slot import slot
 from glider_model.onboard.learnt_steering import Steering
 from glider_model.vehicle.file import Vehicle
-
-_TUNABLE = {'tunable': True}
 
 
 class LosGains(Settings):
@@ -28,14 +26,14 @@ class LosGains(Settings):
         ge=1.0,
         le=10000.0,
         description='least lookahead of the observer method (m)',
-        json_schema_extra=_TUNABLE,
+        json_schema_extra=TUNABLE,
     )
     lookahead_s: float = Field(
         150.0,
         ge=0.0,
         le=3600.0,
         description='lookahead of the observer method in time at the speed over ground (s)',
-        json_schema_extra=_TUNABLE,
+        json_schema_extra=TUNABLE,
     )
     lead_turns: bool = Field(
         True, description='share the drift of a turn between before and after (observer method)'
@@ -45,21 +43,21 @@ class LosGains(Settings):
         ge=0.1,
         le=10000.0,
         description="Delta1, lookahead of the paper's method (m)",
-        json_schema_extra=_TUNABLE,
+        json_schema_extra=TUNABLE,
     )
     delta1_per_s: float = Field(
         0.1,
         gt=0.0,
         le=5.0,
         description='delta1, pull of the virtual target toward the vehicle (1/s)',
-        json_schema_extra=_TUNABLE,
+        json_schema_extra=TUNABLE,
     )
     delta2: float = Field(
         1.0,
         ge=0.05,
         le=20.0,
         description='delta2, ratio of the vertical lookahead to the distance (-)',
-        json_schema_extra=_TUNABLE,
+        json_schema_extra=TUNABLE,
     )
 
 

@@ -61,6 +61,6 @@ class Order(Settings):
             'path': self.path,
             'profile.depth_m': self.depth_m,
             'profile.pitch_deg': self.pitch_deg,
-            'hold': {(True, False): True, (False, True): False}.get((self.hold, self.resume)),
+            'hold': self.hold if self.hold or self.resume else None,
         }
         return {name: value for name, value in asked.items() if value is not None}

@@ -17,7 +17,7 @@ from glider_guidance.order import Order
 from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.yo.machine import INITIAL_PROFILE, ProfileSettings
 from glider_model.base import plugins
-from glider_model.base.settings import ConfigurationError, Settings
+from glider_model.base.settings import TUNABLE, ConfigurationError, Settings
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import Filtered, FilterParams
 from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH
@@ -69,14 +69,14 @@ class ObserverSettings(Settings):
         gt=0.0,
         le=1.0,
         description='K3, gain on position (1/s)',
-        json_schema_extra={'tunable': True},
+        json_schema_extra=TUNABLE,
     )
     k4_per_s2: float = Field(
         1e-4,
         gt=0.0,
         le=0.1,
         description='K4, gain on the current (1/s^2)',
-        json_schema_extra={'tunable': True},
+        json_schema_extra=TUNABLE,
     )
 
     @pydantic.model_validator(mode='after')
@@ -147,7 +147,7 @@ class GuidanceSettings(GuidanceLawSettings):
     path: PathSettings = Field(
         StraightPath(kind='straight', length_m=25000.0),
         description='path to follow',
-        json_schema_extra={'tunable': True},
+        json_schema_extra=TUNABLE,
     )
     profile: ProfileSettings = Field(ProfileSettings(), description='sawtooth')
     dives: int = Field(
@@ -162,7 +162,7 @@ class GuidanceSettings(GuidanceLawSettings):
     hold: bool = Field(
         False,
         description='come up, and wait at the surface until it is false',
-        json_schema_extra={'tunable': True},
+        json_schema_extra=TUNABLE,
     )
     orders: list[Order] = Field([], description='what the vehicle is told in flight, and when')
 
@@ -246,7 +246,7 @@ class GuidanceSettings(GuidanceLawSettings):
         polar = make_polar(kernel_vehicle)
         filters = self.filters
         pump_rate = vehicle.slowest_pump_rate(self.profile.depth_m)
-        profile = self.profile.params(self.dives, pump_rate, polar)._replace(holds=self.hold)
+        profile = self.profile.params(self.dives, pump_rate, polar, holds=self.hold)
         return GuidanceParams(
             path=self.path.params(),
             path_id=zlib.crc32(self.path.model_dump_json().encode()),

@@ -24,7 +24,7 @@ from glider_control.law import Bank, LawSettings, law_learnt, law_step
 from glider_control.turning import roll_to_kick, roll_to_turn, sure_disturbance
 from glider_model.base.frames import wrap_angle
 from glider_model.base.kernel import kernel
-from glider_model.base.settings import Settings
+from glider_model.base.settings import TUNABLE, Settings
 from glider_model.base.signals import Adaptation
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
 from glider_model.onboard.learnt_steering import (
@@ -37,8 +37,6 @@ from glider_model.onboard.learnt_steering import (
 )
 from glider_model.vehicle.file import Vehicle
 from glider_model.vehicle.rigid_body import GRAVITY, rigid_body
-
-_TUNABLE = {'tunable': True}
 
 #: Typical size of the regressors: V^2 alpha, V^2 (m^2/s^2), side force (N), rates (rad/s).
 SCALE_ALPHA, SCALE_V2, SCALE_SIDE, SCALE_ROLL_RATE, SCALE_PITCH_RATE = 0.01, 0.25, 2.0, 0.05, 0.03
@@ -61,30 +59,30 @@ class ChannelSettings(Settings):
     """Gains of one channel, roll or pitch."""
 
     l1_per_s: float = Field(
-        0.15, gt=0.0, le=5.0, description='L1, angle error (1/s)', json_schema_extra=_TUNABLE
+        0.15, gt=0.0, le=5.0, description='L1, angle error (1/s)', json_schema_extra=TUNABLE
     )
     b1: float = Field(
-        6.0, gt=0.0, le=500.0, description='B1, angle (N m/rad)', json_schema_extra=_TUNABLE
+        6.0, gt=0.0, le=500.0, description='B1, angle (N m/rad)', json_schema_extra=TUNABLE
     )
     b2: float = Field(
-        14.0, gt=0.0, le=500.0, description='B2, rate (N m s/rad)', json_schema_extra=_TUNABLE
+        14.0, gt=0.0, le=500.0, description='B2, rate (N m s/rad)', json_schema_extra=TUNABLE
     )
     gamma: float = Field(
-        0.3, ge=0.0, le=50.0, description='Gamma, adaptation (N m/rad)', json_schema_extra=_TUNABLE
+        0.3, ge=0.0, le=50.0, description='Gamma, adaptation (N m/rad)', json_schema_extra=TUNABLE
     )
     sigma_per_s: float = Field(
         1e-5,
         ge=0.0,
         le=1.0,
         description='sigma, leakage (rad/(N m s))',
-        json_schema_extra=_TUNABLE,
+        json_schema_extra=TUNABLE,
     )
     dead_zone_radps: float = Field(
         5e-5,
         ge=0.0,
         le=0.1,
         description='rate error below which nothing is learnt (rad/s)',
-        json_schema_extra=_TUNABLE,
+        json_schema_extra=TUNABLE,
     )
     bound: float = Field(3.0, gt=0.0, le=100.0, description='projection: largest parameter (N m)')
 
@@ -106,20 +104,20 @@ class RollChannelSettings(ChannelSettings):
     """Gains of the roll channel."""
 
     l1_per_s: float = Field(
-        0.3, gt=0.0, le=5.0, description='L1, angle error (1/s)', json_schema_extra=_TUNABLE
+        0.3, gt=0.0, le=5.0, description='L1, angle error (1/s)', json_schema_extra=TUNABLE
     )
     b1: float = Field(
-        8.0, gt=0.0, le=500.0, description='B1, angle (N m/rad)', json_schema_extra=_TUNABLE
+        8.0, gt=0.0, le=500.0, description='B1, angle (N m/rad)', json_schema_extra=TUNABLE
     )
     b2: float = Field(
-        12.0, gt=0.0, le=500.0, description='B2, rate (N m s/rad)', json_schema_extra=_TUNABLE
+        12.0, gt=0.0, le=500.0, description='B2, rate (N m s/rad)', json_schema_extra=TUNABLE
     )
     dead_zone_radps: float = Field(
         5e-4,
         ge=0.0,
         le=0.1,
         description='rate error below which nothing is learnt (rad/s)',
-        json_schema_extra=_TUNABLE,
+        json_schema_extra=TUNABLE,
     )
 
 
@@ -129,17 +127,17 @@ class AdaptiveSettings(LawSettings):
     pitch: ChannelSettings = Field(ChannelSettings(), description='pitch channel')
     roll: RollChannelSettings = Field(RollChannelSettings(), description='roll channel')
     heading_kp_per_s: float = Field(
-        0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=_TUNABLE
+        0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=TUNABLE
     )
     heading_ki_per_s2: float = Field(
         2e-4,
         ge=0.0,
         le=0.1,
         description='adaptation of the turn-rate disturbance (1/s^2)',
-        json_schema_extra=_TUNABLE,
+        json_schema_extra=TUNABLE,
     )
     heading_kd: float = Field(
-        0.1, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=_TUNABLE
+        0.1, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=TUNABLE
     )
     steering: SteeringLearningSettings = Field(
         SteeringLearningSettings(), description='estimator of the steering effectiveness'

@@ -14,11 +14,10 @@ from pydantic import Field
 from glider_control.law import Bank, LawSettings, law_step
 from glider_model.base.frames import wrap_angle
 from glider_model.base.kernel import kernel
+from glider_model.base.settings import TUNABLE
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
 from glider_model.onboard.learnt_steering import speed_ratio
 from glider_model.vehicle.file import Vehicle
-
-_TUNABLE = {'tunable': True}
 
 
 class PidSettings(LawSettings):
@@ -28,31 +27,31 @@ class PidSettings(LawSettings):
     """
 
     pitch_kp: float = Field(
-        8.0, ge=0.0, le=1000.0, description='pitch (N m/rad)', json_schema_extra=_TUNABLE
+        8.0, ge=0.0, le=1000.0, description='pitch (N m/rad)', json_schema_extra=TUNABLE
     )
     pitch_ki: float = Field(
-        0.08, ge=0.0, le=100.0, description='pitch (N m/(rad s))', json_schema_extra=_TUNABLE
+        0.08, ge=0.0, le=100.0, description='pitch (N m/(rad s))', json_schema_extra=TUNABLE
     )
     pitch_kd: float = Field(
-        10.0, ge=0.0, le=1000.0, description='pitch rate (N m s/rad)', json_schema_extra=_TUNABLE
+        10.0, ge=0.0, le=1000.0, description='pitch rate (N m s/rad)', json_schema_extra=TUNABLE
     )
     roll_kp: float = Field(
-        8.0, ge=0.0, le=1000.0, description='roll (N m/rad)', json_schema_extra=_TUNABLE
+        8.0, ge=0.0, le=1000.0, description='roll (N m/rad)', json_schema_extra=TUNABLE
     )
     roll_ki: float = Field(
-        0.4, ge=0.0, le=100.0, description='roll (N m/(rad s))', json_schema_extra=_TUNABLE
+        0.4, ge=0.0, le=100.0, description='roll (N m/(rad s))', json_schema_extra=TUNABLE
     )
     roll_kd: float = Field(
-        2.0, ge=0.0, le=1000.0, description='roll rate (N m s/rad)', json_schema_extra=_TUNABLE
+        2.0, ge=0.0, le=1000.0, description='roll rate (N m s/rad)', json_schema_extra=TUNABLE
     )
     heading_kp_per_s: float = Field(
-        0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=_TUNABLE
+        0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=TUNABLE
     )
     heading_ki_per_s2: float = Field(
-        2e-4, ge=0.0, le=0.1, description='heading integral (1/s^2)', json_schema_extra=_TUNABLE
+        2e-4, ge=0.0, le=0.1, description='heading integral (1/s^2)', json_schema_extra=TUNABLE
     )
     heading_kd: float = Field(
-        0.3, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=_TUNABLE
+        0.3, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=TUNABLE
     )
 
     def params(self, vehicle: Vehicle, bank: Bank) -> 'PidParams':

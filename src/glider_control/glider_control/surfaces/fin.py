@@ -24,11 +24,10 @@ from pydantic import Field
 from glider_control.surface import SurfaceLawSettings, steer, surface_learnt
 from glider_model.base.frames import wrap_angle
 from glider_model.base.kernel import kernel, replace
+from glider_model.base.settings import TUNABLE
 from glider_model.base.signals import Adaptation
 from glider_model.onboard.learnt_steering import LEARN_SPEED, STEERING_SPEED
 from glider_model.vehicle.file import Vehicle
-
-_TUNABLE = {'tunable': True}
 
 #: Below this vertical rate the vehicle turns over, or floats: the speed is not known (m/s).
 GLIDING_VERTICAL_RATE = 0.05
@@ -44,13 +43,13 @@ class FinLawSettings(SurfaceLawSettings):
     """Gains of steering by a tail fin."""
 
     heading_kp_per_s: float = Field(
-        0.05, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=_TUNABLE
+        0.05, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=TUNABLE
     )
     heading_ki_per_s2: float = Field(
-        2e-4, ge=0.0, le=0.1, description='heading integral (1/s^2)', json_schema_extra=_TUNABLE
+        2e-4, ge=0.0, le=0.1, description='heading integral (1/s^2)', json_schema_extra=TUNABLE
     )
     heading_kd: float = Field(
-        0.5, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=_TUNABLE
+        0.5, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=TUNABLE
     )
     share_std: float = Field(
         0.7,

@@ -22,7 +22,7 @@ from glider_guidance.yo.stage import (
 )
 from glider_guidance.yo.turns import SLOW, turn_lead_m, turn_lead_s
 from glider_model.base.kernel import kernel, replace
-from glider_model.base.settings import Settings
+from glider_model.base.settings import TUNABLE, Settings
 from glider_model.base.signals import TICK_S
 from glider_model.onboard.glide_polar import Polar, glide_vertical_rate
 
@@ -50,7 +50,7 @@ class ProfileSettings(Settings):
         ge=10.0,
         le=12000.0,
         description='depth of the lower turn (m)',
-        json_schema_extra={'tunable': True},
+        json_schema_extra=TUNABLE,
     )
     top_depth_m: float = Field(
         10.0, ge=2.0, le=1000.0, description='depth of the upper turn between dives (m)'
@@ -60,7 +60,7 @@ class ProfileSettings(Settings):
         ge=8.0,
         le=60.0,
         description='glide pitch, nose down diving and up climbing (deg)',
-        json_schema_extra={'tunable': True},
+        json_schema_extra=TUNABLE,
     )
     net_heaviness_kg: float = Field(
         0.4,
@@ -84,7 +84,9 @@ class ProfileSettings(Settings):
         600.0, ge=0.0, le=864000.0, description='waiting on the surface between dives (s)'
     )
 
-    def params(self, dives: int, pump_rate_kgps: float, polar: Polar) -> 'ProfileParams':
+    def params(
+        self, dives: int, pump_rate_kgps: float, polar: Polar, holds: bool = False
+    ) -> 'ProfileParams':
         """Kernel parameters for so many dives (0: no end) with this pump: turns are led."""
         pitch, heavy = math.radians(self.pitch_deg), self.net_heaviness_kg
         climb_pitch = pitch if self.climb_pitch_deg is None else math.radians(self.climb_pitch_deg)
@@ -110,7 +112,7 @@ class ProfileSettings(Settings):
             surface_every=self.surface_every_dives,
             prepare_ticks=round(self.prepare_s / TICK_S),
             wait_ticks=round(self.wait_s / TICK_S),
-            holds=False,
+            holds=holds,
             settled_s=min(SETTLED_S, SETTLED_SHARE * (self.depth_m - top_depth) / rate),
             lead_s=2.0
             / 3.0
@@ -231,9 +233,7 @@ def _next_stage(state, depth, vertical_rate, turn_depth, params):
     rises = vertical_rate < -min(TURNED_MPS, SLOW * params.climb_rate)
     if stage == INFLECTING_UP and (rises or depth < AT_SURFACE_M):
         return GLIDING_UP
-    if stage == GLIDING_UP and params.holds:
-        return GLIDING_UP
-    if stage == GLIDING_UP:
+    if stage == GLIDING_UP and not params.holds:
         done = state.dives + 1
         last = params.dives > 0 and done >= params.dives
         if is_over:
@@ -282,11 +282,9 @@ def profile_step(state, depth, vertical_rate, left, params):
             up_s = took_s
         elif stage == INFLECTING_DOWN and vertical_rate < -PITCH_OVER * params.climb_rate:
             down_s = took_s
-        return ProfileState(
-            stage=stage,
+        return replace(
+            state,
             ticks=state.ticks + 1,
-            dives=state.dives,
-            aborted=state.aborted,
             lead_up_s=up_s,
             lead_down_s=down_s,
             turn_depth=planned,
@@ -294,15 +292,8 @@ def profile_step(state, depth, vertical_rate, left, params):
         )
     climbed = state.stage == GLIDING_UP and not params.holds and not state.aborted
     dives = state.dives + (1 if climbed else 0)
-    return ProfileState(
-        stage=stage,
-        ticks=0,
-        dives=dives,
-        aborted=state.aborted,
-        lead_up_s=up_s,
-        lead_down_s=down_s,
-        turn_depth=planned,
-        depth=params.depth,
+    return replace(
+        state, stage=stage, ticks=0, dives=dives, turn_depth=planned, depth=params.depth
     )
 
 

@@ -31,6 +31,8 @@ class Settings(pydantic.BaseModel):
         """
 
 
+#: ``json_schema_extra`` of a field that can be set on a node while it flies.
+TUNABLE = {'tunable': True}
 #: Numeric limits as pydantic calls them, and in a person's words.
 _BOUNDS = (('ge', '>='), ('gt', '>'), ('le', '<='), ('lt', '<'))
 _NOT_A_MAPPING = ('dict_type', 'model_type', 'model_attributes_type')
