@@ -9,6 +9,9 @@ from glider_model.onboard.glide_polar import glide_net_heaviness
 
 #: The integrals of the vertical-rate law wait until the pump is this near to where it goes (kg).
 PUMP_ARRIVED_KG = 0.05
+#: No hull has less than this share of the drag in its file. What is learnt beyond is no drag but
+#: ballast, and must not change its sign when the vehicle turns over.
+LEAST_DRAG = 0.5
 
 
 class Trim(NamedTuple):
@@ -30,11 +33,14 @@ def vertical_rate_law(trim, measured, reference, joints, params, dt):
     """
     sign = 1.0 if reference.v_d > 0.0 else -1.0
     ballast, drag = trim.ballast, trim.drag
-    wanted = glide_net_heaviness(reference.theta, reference.v_d, params.polar) + sign * drag
+    glide = glide_net_heaviness(reference.theta, reference.v_d, params.polar)
+    least = (LEAST_DRAG - 1.0) * abs(glide)
+    wanted = glide + sign * max(least, drag)
     error = reference.v_d - measured.vertical_rate
     limit = params.allocation.m_b_max
     if abs(joints.m_b - wanted - ballast) < PUMP_ARRIVED_KG:
         most = params.buoyancy_trim_max
         ballast = min(most, max(-most, ballast + dt * params.buoyancy_ki * error))
-        drag = min(most, max(-most, drag + dt * params.drag_ki * error * sign))
+        learnt = drag + dt * params.drag_ki * error * sign
+        drag = min(most, max(min(drag, least), learnt))
     return min(limit, max(-limit, wanted + ballast)), Trim(ballast, drag)

@@ -197,6 +197,20 @@ def test_drag_that_differs_is_known_when_the_vehicle_turns_over(perturb):
     assert errors[0.002] < 0.34 * errors[0.0]
 
 
+@pytest.mark.parametrize('ballast', [-0.15, 0.15])
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+def test_a_slow_glide_that_turns_over_is_pumped_the_right_way_at_once(sign, ballast):
+    """Seven times its weight is missing: that is ballast, and is none when it turns over."""
+    flight = Flight('zhang2021', sign)
+    pitch = math.radians(-22.0 * sign)
+    rate = glide_vertical_rate(pitch, 0.02 * sign, flight.params.polar)
+    flight.ballast = ballast
+    flight.fly(5000.0, theta=pitch, rate=rate)
+    before = flight.c_m_b[-1]
+    flight.fly(20.0, theta=pitch, rate=-rate)
+    assert np.all(sign * flight.c_m_b[-200:] < sign * before)
+
+
 def travel(column):
     """Way that a motor is sent (m or rad)."""
     return float(np.sum(np.abs(np.diff(column))))
