@@ -30,13 +30,14 @@ MAY_IMPORT = {
         'glider_control',
         'glider_guard',
     },
+    'glider_flights': {'glider_model', 'glider_bringup'},
 }
 
 #: Rooms of two packages by floors, from below: a room imports from the floors beneath it only.
 FLOORS = {
     'glider_model': (('base',), ('vehicle', 'ocean', 'ros'), ('onboard', 'plant'), ('nodes',)),
     'glider_bringup': (
-        ('blocks', 'mission', 'flights'),
+        ('blocks', 'mission'),
         ('recording',),
         ('engines', 'nodes'),
         ('scoring',),

@@ -78,6 +78,7 @@ BROKEN = {
         'number': ('broken:NUMBER', 'TypeError: it is no subclass of'),
         'bare': ('broken:Bare', 'ValueError: its field gain has no usable default'),
     },
+    'glider.commands': {'dry': ('no_such_module:app', 'ModuleNotFoundError: No module named')},
     'glider.guidance_methods': {'los': ('broken:Law', 'ValueError: its name is taken')},
     'glider.currents': {'whirl': ('broken:Whirl', "TypeError: it needs kind: Literal['whirl']")},
 }

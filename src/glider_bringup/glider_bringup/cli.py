@@ -27,6 +27,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
         printable,
         shown,
     )
+    from glider_model.base.plugins import COMMANDS, loaded
 except KeyboardInterrupt:
     sys.exit(130)  # EXIT_INTERRUPTED, which may not be there yet
 except (OSError, ImportError) as error:
@@ -76,12 +77,12 @@ OF_THE_SCRIPT = {
 
 
 def found_commands() -> dict[str, typer.Typer]:
-    """Commands by name, from the modules in commands/ and its folders, in their order."""
+    """Commands by name, in their order: modules in commands/, and what packages register."""
     modules = pkgutil.walk_packages(commands.__path__, f'{commands.__name__}.')
-    places = {one.name.rpartition('.')[2]: one.name for one in modules if not one.ispkg}
-    named = [name for name in ORDER if name in places]
-    others = [name for name in sorted(places) if name not in ORDER]
-    return {name: import_module(places[name]).app for name in named + others}
+    names = (one.name for one in modules if not one.ispkg)
+    apps = loaded(COMMANDS) | {name.rpartition('.')[2]: import_module(name).app for name in names}
+    order = [name for name in ORDER if name in apps]
+    return {name: apps[name] for name in order + sorted(set(apps) - set(ORDER))}
 
 
 def _script() -> typer.Typer:

@@ -20,7 +20,7 @@ from glider_model.base.plugins import registered, sources
 #: Packages whose kernels call each other.
 PACKAGES = (
     *('glider_model', 'glider_navigation', 'glider_guidance', 'glider_control', 'glider_guard'),
-    'glider_bringup',
+    *('glider_bringup', 'glider_flights'),
 )
 
 Values = TypeVar('Values', bound=NamedTuple)

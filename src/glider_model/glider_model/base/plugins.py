@@ -18,7 +18,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pydantic
 
@@ -27,6 +27,8 @@ from glider_model.base.errors import ConfigurationError
 CONTROL_LAWS, GUIDANCE_METHODS = 'glider.control_laws', 'glider.guidance_methods'
 CURRENTS, NAVIGATION_METHODS = 'glider.currents', 'glider.navigation_methods'
 SURFACES, SURFACE_LAWS = 'glider.surfaces', 'glider.surface_laws'
+#: Typer applications: commands of ``./glider``.
+COMMANDS = 'glider.commands'
 GROUPS = (
     CONTROL_LAWS,
     CURRENTS,
@@ -97,6 +99,17 @@ def classes(
             check(point.name, loaded)
             found[point.name] = loaded
         except (Exception, SystemExit) as error:  # it is not our code
+            _tell(point, f'{type(error).__name__}: {error}'.partition('\n')[0])
+    return found
+
+
+def loaded(group: str) -> dict[str, Any]:
+    """Whatever is registered in a group, by name; what cannot be loaded is told, and not there."""
+    found = {}
+    for point in sorted(entry_points(group=group), key=lambda point: point.name):
+        try:
+            found[point.name] = point.load()
+        except (Exception, SystemExit) as error:  # it may not be our code
             _tell(point, f'{type(error).__name__}: {error}'.partition('\n')[0])
     return found
 

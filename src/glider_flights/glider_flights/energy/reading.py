@@ -5,11 +5,11 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from glider_bringup.flights.energy.seaglider import seaglider_uses
-from glider_bringup.flights.energy.slocum import slocum_uses
-from glider_bringup.flights.energy.uses import Uses
-from glider_bringup.flights.seaglider import seaglider_files
-from glider_bringup.flights.slocum import slocum_files
+from glider_flights.energy.seaglider import seaglider_uses
+from glider_flights.energy.slocum import slocum_uses
+from glider_flights.energy.uses import Uses
+from glider_flights.seaglider import seaglider_files
+from glider_flights.slocum import slocum_files
 from glider_model.base.errors import ConfigurationError
 
 

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.flights.folders import files_in
-from glider_bringup.flights.netcdf import SUFFIXES, datasets, seconds
-from glider_bringup.flights.record import Flight, Instruments, instruments
-from glider_bringup.flights.seawater import depth_of
+from glider_flights.folders import files_in
+from glider_flights.netcdf import SUFFIXES, datasets, seconds
+from glider_flights.record import Flight, Instruments, instruments
+from glider_flights.seawater import depth_of
 from glider_model.base.errors import ConfigurationError
 
 #: Names of variables in capitals, by ours, and what their values are multiplied by.

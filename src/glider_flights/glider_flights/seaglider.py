@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_bringup.flights.folders import files_in
-from glider_bringup.flights.netcdf import SUFFIXES, datasets, seconds
-from glider_bringup.flights.record import (
+from glider_flights.folders import files_in
+from glider_flights.netcdf import SUFFIXES, datasets, seconds
+from glider_flights.record import (
     NOT_KNOWN,
     Fixes,
     Flight,
@@ -30,7 +30,7 @@ from glider_bringup.flights.record import (
     instruments,
     local_metres,
 )
-from glider_bringup.flights.segments import cut
+from glider_flights.segments import cut
 from glider_model.base.errors import ConfigurationError
 
 #: Files of dives: the number of the vehicle, three digits, and of the dive, four.
@@ -104,7 +104,7 @@ class Dive(NamedTuple):
     way_m: np.ndarray
     polar: Polar
     instruments: Instruments
-    #: Constants of the body that the file names, see `glider_bringup.flights.record.BODY`.
+    #: Constants of the body that the file names, see `glider_flights.record.BODY`.
     body: dict[str, float]
 
 
