@@ -28,17 +28,13 @@ class Track(NamedTuple):
     """A stretch under water without a gap; arrays of shape (n,)."""
 
     instruments: Instruments
-    #: Pressure (dbar, above that of the air).
-    pressure_dbar: np.ndarray
-    #: Density in situ (kg/m^3), NaN where it is not known.
-    density_kgpm3: np.ndarray
-    #: Recorded vertical rate (m/s, + down).
-    rate_mps: np.ndarray
+    pressure_dbar: np.ndarray  #: pressure (dbar, above that of the air)
+    density_kgpm3: np.ndarray  #: density in situ (kg/m^3), NaN where it is not known
+    rate_mps: np.ndarray  #: recorded vertical rate (m/s, + down)
     #: Number of the half dive, and whether it is a dive (1) or a climb (-1).
     half: np.ndarray
     phase: np.ndarray
-    #: Whether it is compared.
-    counts: np.ndarray
+    counts: np.ndarray  #: whether it is compared
 
 
 def tracks(flight: Flight) -> list[Track]:
