@@ -7,7 +7,7 @@ Positions are north and east (m) of the first fix, angles in the world NED and t
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -103,13 +103,12 @@ class Flight(NamedTuple):
     notes: list[str]  #: what a person should know of the files: a sentence each
     origin_deg: np.ndarray  #: latitude and longitude of its first fix (degrees), shape (2,)
     instruments: Instruments | None = None  #: what else was recorded; None if it was not asked for
-    #: Constants of the body that the files name, by the names of `BODY`.
+    #: Constants of the body that the files name: mass_kg, and volume_m3 with the engine at zero.
+    #: Those of a base station for compressibility belong to its own way of computing.
     body: dict[str, float] | None = None
 
 
-#: Constants of a body that files may name: mass (kg), volume with the engine at zero (m^3). Those
-#: of a base station for compressibility belong to its own way of computing, and are not taken.
-BODY = ('mass_kg', 'volume_m3')
+SamplesOrInstruments = TypeVar('SamplesOrInstruments', Samples, Instruments)
 NOT_KNOWN = np.full(2, math.nan)
 
 
@@ -125,6 +124,13 @@ def joined(parts: Iterable[Instruments]) -> Instruments:
     """Instruments of several files, in the order of time."""
     table = np.concatenate([np.stack(part) for part in parts], axis=1)
     return Instruments(*table[:, np.argsort(table[0], kind='stable')])
+
+
+def in_order(values: SamplesOrInstruments, needed: int) -> SamplesOrInstruments:
+    """Values in the order of time, each time once, where the first ``needed`` are known."""
+    table = np.stack(values)
+    table = table[:, np.isfinite(table[:needed]).all(axis=0)]
+    return type(values)(*table[:, np.unique(table[0], return_index=True)[1]])
 
 
 def usual(values: Sequence[float]) -> float:

@@ -106,7 +106,7 @@ class Dive(NamedTuple):
     way_m: np.ndarray
     polar: Polar
     instruments: Instruments
-    #: Constants of the body that the file names, see `glider_bringup.flights.record.BODY`.
+    #: Constants of the body that the file names, see `glider_bringup.flights.record.Flight`.
     body: dict[str, float]
 
 

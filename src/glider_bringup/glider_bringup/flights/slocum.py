@@ -246,17 +246,16 @@ def read_sensors(
                 file = DBD(str(path), scratch)
                 known = [name for name in parts if file.has_parameter(name)]
                 read = dict(zip(known, file.get(*known), strict=True)) if len(known) > 1 else {}
-            except DbdError as error:
-                if getattr(error.data, 'missing_cache_files', None):
+            except Exception as error:  # noqa: BLE001 - of a damaged file dbdreader says anything
+                lacking = getattr(getattr(error, 'data', None), 'missing_cache_files', None)
+                if lacking:
                     raise ConfigurationError(
-                        f'{path}: its cache {"".join(error.data.missing_cache_files)}.cac is '
+                        f'{path}: its cache {"".join(lacking)}.cac is '
                         f'neither beside it nor in a folder {" or ".join(CACHE_FOLDERS[:2])} '
                         'there or above; give the folder that has it with --cache'
                     ) from None
-                unread.append(f'{path.name}: cannot be read: {error}')
-                continue
-            except Exception as error:  # noqa: BLE001 - of a damaged file dbdreader says anything
-                unread.append(f'{path.name}: cannot be read: {type(error).__name__}: {error}')
+                kind = '' if isinstance(error, DbdError) else f'{type(error).__name__}: '
+                unread.append(f'{path.name}: cannot be read: {kind}{error}')
                 continue
             for name, pair in read.items():
                 parts[name].append(pair)

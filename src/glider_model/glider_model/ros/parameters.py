@@ -44,6 +44,10 @@ _TYPES = {
 }
 _MISSING = object()
 _LARGEST = {float: sys.float_info.max, int: 2**63 - 1}
+_RANGES = {
+    float: ('floating_point_range', FloatingPointRange),
+    int: ('integer_range', IntegerRange),
+}
 
 
 class _Leaf(NamedTuple):
@@ -68,6 +72,17 @@ class _Leaf(NamedTuple):
         words = get_args(self.field.annotation)
         return words if all(isinstance(word, str) for word in words) else ()
 
+    @property
+    def limits(self) -> tuple | None:
+        """Smallest and largest value of a number; None if everything is allowed."""
+        found, largest = {}, _LARGEST.get(self.kind)
+        for item in self.field.metadata if largest else ():
+            for key in ('ge', 'gt', 'le', 'lt'):
+                limit = getattr(item, key, None)
+                if limit is not None:
+                    found[key[0]] = self.kind(limit)
+        return (found.get('g', -largest), found.get('l', largest)) if found else None
+
 
 def _is_model(kind) -> bool:
     return isinstance(kind, type) and issubclass(kind, pydantic.BaseModel)
@@ -90,18 +105,6 @@ def _text(field: FieldInfo, value) -> str:
     return pydantic.TypeAdapter(field.annotation).dump_json(value).decode()
 
 
-def _limits(field: FieldInfo, kind: type) -> tuple | None:
-    found = {}
-    for item in field.metadata:
-        for key in ('ge', 'gt', 'le', 'lt'):
-            limit = getattr(item, key, None)
-            if limit is not None:
-                found[key[0]] = kind(limit)
-    if not found or kind not in _LARGEST:
-        return None
-    return found.get('g', -_LARGEST[kind]), found.get('l', _LARGEST[kind])
-
-
 def _descriptor(leaf: _Leaf) -> ParameterDescriptor:
     extra = leaf.field.json_schema_extra
     descriptor = ParameterDescriptor(
@@ -113,19 +116,15 @@ def _descriptor(leaf: _Leaf) -> ParameterDescriptor:
         descriptor.additional_constraints = 'JSON or YAML text'
     if leaf.choices:
         descriptor.additional_constraints = f'one of {", ".join(leaf.choices)}'
-    limits = _limits(leaf.field, leaf.kind) if leaf.kind else None
-    if limits and leaf.kind is float:
-        descriptor.floating_point_range = [
-            FloatingPointRange(from_value=limits[0], to_value=limits[1])
-        ]
-    elif limits:
-        descriptor.integer_range = [IntegerRange(from_value=limits[0], to_value=limits[1])]
+    if limits := leaf.limits:
+        name, kind = _RANGES[leaf.kind]
+        setattr(descriptor, name, [kind(from_value=limits[0], to_value=limits[1])])
     return descriptor
 
 
 def _refuse(node: Node, leaf: _Leaf, value, reason: str) -> ConfigurationError:
     """Error that says which parameter cannot be used, its value, and what is allowed."""
-    limits = _limits(leaf.field, leaf.kind) if leaf.kind else None
+    limits = leaf.limits
     allowed = f' (allowed: {limits[0]} to {limits[1]})' if limits else ''
     return ConfigurationError(
         f'{node.get_name()}: parameter {leaf.name} = {shown(value)}: {reason}{allowed}'
@@ -277,13 +276,11 @@ def to_parameters(settings: Settings) -> dict[str, Any]:
 
 def changed_parameters(before: Settings, after: Settings) -> dict[str, str]:
     """Parameters in which two settings of one kind differ: the later values, as JSON, by name."""
-
-    def texts(settings: Settings) -> dict[str, str]:
-        leaves = _leaves(type(settings), settings)
-        return {leaf.name: _text(leaf.field, leaf.default) for leaf in leaves}
-
-    old = texts(before)
-    return {name: text for name, text in texts(after).items() if text != old[name]}
+    old, new = (
+        {leaf.name: _text(leaf.field, leaf.default) for leaf in _leaves(type(one), one)}
+        for one in (before, after)
+    )
+    return {name: text for name, text in new.items() if text != old[name]}
 
 
 def with_parameters(settings: SettingsT, values: dict[str, str]) -> SettingsT:
