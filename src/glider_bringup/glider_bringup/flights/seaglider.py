@@ -221,23 +221,21 @@ def _read_dive(path: Path, notes: list[str]) -> Dive:
     if math.isnan(declination):
         notes.append(f'{path.name}: magnetic_variation is missing: 0 deg is taken')
         declination = 0.0
+    named = DIVE_FILE.fullmatch(path.name)
+    samples = _samples(found, math.radians(declination))
     return Dive(
         path.name,
-        *_numbers(path),
+        named[1] if named else '',
+        int(named[2]) if named else 0,
         fixes[good],
-        _samples(found, math.radians(declination)),
+        samples,
         np.array([_number(found, 'dac_north'), _number(found, 'dac_east')]),
         np.array([_number(found, 'speed_north'), _number(found, 'speed_east')])
         * _number(found, 'flight_s'),
         _polar(found),
-        _instruments(found, math.radians(declination)),
+        _instruments(found, samples),
         _body(found),
     )
-
-
-def _numbers(path: Path) -> tuple[str, int]:
-    named = DIVE_FILE.fullmatch(path.name)
-    return (named[1], int(named[2])) if named else ('', 0)
 
 
 def _samples(found: dict[str, np.ndarray], declination: float) -> Samples:
@@ -252,17 +250,16 @@ def _samples(found: dict[str, np.ndarray], declination: float) -> Samples:
     return Samples(time_s, found['depth'], at_times(time_s, time_s, pitch), heading, buoyancy)
 
 
-def _instruments(found: dict[str, np.ndarray], declination: float) -> Instruments:
-    samples, time_s = _samples(found, declination), found['time']
+def _instruments(found: dict[str, np.ndarray], samples: Samples) -> Instruments:
     measured = {}
     for name, (_, unit) in MEASURED.items():
         # What the CTD measured, and what was made of it, has times of its own.
         for times in ('time', 'buoyancy_time'):
             if name in found and len(found.get(times, ())) == len(found[name]):
-                measured[name] = unit * at_times(time_s, found[times], found[name])
+                measured[name] = unit * at_times(samples.time_s, found[times], found[name])
                 break
     return instruments(
-        time_s,
+        samples.time_s,
         depth_m=samples.depth_m,
         pitch_rad=samples.pitch_rad,
         heading_rad=samples.heading_rad,

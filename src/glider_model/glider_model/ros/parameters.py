@@ -152,14 +152,16 @@ def _declare(node: Node, leaf: _Leaf) -> None:
         raise _refuse(node, leaf, given, reason) from None
 
 
-def _parse(leaf: _Leaf, value):
+def _parse(leaf: _Leaf, value, source: str):
     """Value of a parameter as the model takes it."""
     if leaf.kind is not None or not isinstance(value, str):
         return value
-    try:
-        return parse_json(value, leaf.name)
-    except ConfigurationError:
-        return parse_yaml(value, leaf.name)
+    for parse in (parse_json, parse_yaml):
+        try:
+            return parse(value, leaf.name)
+        except ConfigurationError as error:
+            why = f'not JSON or YAML: {error}'
+    raise ConfigurationError(f'{source} {leaf.name} = {shown(value)}: {why}')
 
 
 def _nested(values: dict[str, Any]) -> dict[str, Any]:
@@ -174,19 +176,14 @@ def _nested(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _validated(node: Node, model: type[SettingsT], leaves, values: dict[str, Any]) -> SettingsT:
-    tree = {}
-    for leaf in leaves:
-        try:
-            tree[leaf.name] = _parse(leaf, values[leaf.name])
-        except ConfigurationError as error:
-            reason = f'not JSON or YAML: {error}'
-            raise _refuse(node, leaf, values[leaf.name], reason) from None
+    source = f'{node.get_name()}: parameter'
+    tree = {leaf.name: _parse(leaf, values[leaf.name], source) for leaf in leaves}
     try:
         settings = model.model_validate(_nested(tree))
         settings.check()
         return settings
     except pydantic.ValidationError as error:
-        lines = [f'{node.get_name()}: parameter {text}' for _, text in mistakes(error, model)]
+        lines = (f'{source} {text}' for _, text in mistakes(error, model))
         raise ConfigurationError('\n'.join(lines)) from None
 
 
@@ -313,12 +310,7 @@ def from_parameters(model: type[SettingsT], values: dict[str, Any], source: str)
         for part in leaf.name.split('.'):
             branch = branch.get(part, _MISSING) if isinstance(branch, dict) else _MISSING
         if branch is not _MISSING:
-            try:
-                tree[leaf.name] = _parse(leaf, branch)
-            except ConfigurationError as error:
-                raise ConfigurationError(
-                    f'{source}: {leaf.name} = {shown(branch)}: not JSON or YAML: {error}'
-                ) from None
+            tree[leaf.name] = _parse(leaf, branch, f'{source}:')
     return validate(model, _nested(tree), source)
 
 

@@ -145,9 +145,8 @@ def _way(segment: Segment, pairs) -> np.ndarray | None:
     way, seconds = np.zeros(2), 0.0
     for track, one in pairs:
         time_s, heading = track.instruments.time_s, track.instruments.heading_rad
-        if not segment.before.time_s[-1] <= 0.5 * (time_s[0] + time_s[-1]):
-            continue
-        if not 0.5 * (time_s[0] + time_s[-1]) <= segment.after.time_s[0]:
+        middle_s = 0.5 * (time_s[0] + time_s[-1])
+        if not segment.before.time_s[-1] <= middle_s <= segment.after.time_s[0]:
             continue
         ahead, abeam = np.diff(one.ahead_m), np.diff(one.abeam_m)
         middle = np.unwrap(heading)

@@ -333,7 +333,7 @@ class TickNode(Node):
             patience_s = self.max_age_s(item.topic.name)
             verdict = owner.claimed(gid, names, self.get_namespace(), now_s, patience_s)
         if verdict is Verdict.STRANGE:
-            self.refuse(item, lambda: peers.stranger(self, item.topic, gid))
+            self.refuse_stranger(item, gid)
         elif verdict is Verdict.TAKEN_OVER:
             for other in self.inputs:
                 if other is not item:
@@ -344,6 +344,10 @@ class TickNode(Node):
     def max_age_s(self, topic: str) -> float:
         """Age (s) from which on an input is old in free-running mode."""
         return self.ticks.input_max_age_s
+
+    def refuse_stranger(self, item: Input, gid: bytes) -> None:
+        """Tell that somebody else publishes an input."""
+        self.refuse(item, lambda: peers.stranger(self, item.topic, gid))
 
     def tell_successor(self, item: Input, silent_s: float) -> None:
         """Tell that an input is somebody else's from now on."""
