@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.flights.folders import files_in
-from glider_bringup.flights.netcdf import SUFFIXES, datasets, refuse_missing, variables
-from glider_bringup.flights.record import Flight, Instruments, instruments, joined, usual
-from glider_bringup.flights.seawater import depth_of
+from glider_flights.folders import files_in
+from glider_flights.netcdf import SUFFIXES, datasets, refuse_missing, variables
+from glider_flights.record import Flight, Instruments, instruments, joined, usual
+from glider_flights.seawater import depth_of
 
 #: Names of variables in capitals, by ours, and what their values are multiplied by.
 NAMES = {

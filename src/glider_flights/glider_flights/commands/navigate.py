@@ -36,9 +36,9 @@ def navigate(
 
     Depth-averaged current, way through the water, and where it would surface next.
     """
-    from glider_bringup.flights.comparison import navigate as navigated
-    from glider_bringup.flights.comparison import summary
-    from glider_bringup.flights.reading import read_flight
+    from glider_flights.comparison import navigate as navigated
+    from glider_flights.comparison import summary
+    from glider_flights.reading import read_flight
 
     with counter('reading', None) as update:
         found = read_flight(flight, cache, update)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_bringup.flights.record import (
+from glider_flights.record import (
     NOT_KNOWN,
     SURFACE_DEPTH_M,
     Fixes,

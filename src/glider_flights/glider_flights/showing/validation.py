@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.flights.validation.result import Validation
 from glider_bringup.mission.disk import save_figure
+from glider_flights.validation.result import Validation
 
 _BLUE, _ORANGE, _GREY, _GREEN = '#1f6fb4', '#e07b1a', '#8a8a8a', '#2f8f4e'
 #: The curves are those of one stretch: its first so many seconds.

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.flights.energy.uses import PUMP, Uses
-from glider_bringup.flights.netcdf import refuse_missing
-from glider_bringup.flights.seaglider import read_variables, seaglider_files
+from glider_flights.energy.uses import PUMP, Uses
+from glider_flights.netcdf import refuse_missing
+from glider_flights.seaglider import read_variables, seaglider_files
 from glider_model.base.errors import ConfigurationError
 
 #: Less than this is no pumping of a Seaglider: oil let in, or the valve (cc, A).

@@ -13,9 +13,9 @@ from scipy.optimize import brentq
 from typer.testing import CliRunner
 
 from glider_bringup.cli import app
-from glider_bringup.flights.comparison import navigate, summary
-from glider_bringup.flights.reading import read_flight, read_whole
-from glider_bringup.flights.slocum import slocum_files
+from glider_flights.comparison import navigate, summary
+from glider_flights.reading import read_flight, read_whole
+from glider_flights.slocum import slocum_files
 from glider_model.base.errors import ConfigurationError
 
 START_S = 1.6e9
@@ -379,7 +379,7 @@ def test_no_forecast_knows_what_comes_after_it(tmp_path):
 
 
 def test_errors_of_single_dives_are_averaged_once_that_has_proven_itself():
-    from glider_bringup.flights.forecast import Forecaster
+    from glider_flights.forecast import Forecaster
 
     generator = np.random.default_rng(7)
     missed = {'none': [], 'persistence': [], 'ours': []}

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.flights.comparison import comparable_current
-from glider_bringup.flights.reckoning import reckon
-from glider_bringup.flights.record import Flight, Segment, at_times
-from glider_bringup.flights.validation.flying import Simulated
-from glider_bringup.flights.validation.track import Track
+from glider_flights.comparison import comparable_current
+from glider_flights.reckoning import reckon
+from glider_flights.record import Flight, Segment, at_times
+from glider_flights.validation.flying import Simulated
+from glider_flights.validation.track import Track
 
 #: Heading turns over this time (s), so that noise of the compass is small beside a turn.
 TURN_S = 60.0

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_bringup.flights.validation.flying import Imposed, Model, fly
-from glider_bringup.flights.validation.score import Adcp, speed_off
-from glider_bringup.flights.validation.track import Track
+from glider_flights.validation.flying import Imposed, Model, fly
+from glider_flights.validation.score import Adcp, speed_off
+from glider_flights.validation.track import Track
 from glider_model.base.errors import ConfigurationError
 
 #: One of least squares: of the vertical rate (m/s), of pitch (rad), of speed by an ADCP (m/s).

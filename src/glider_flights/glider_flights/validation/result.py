@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.flights.record import Flight
-from glider_bringup.flights.validation.fit import BY_ADCP, CONSTANTS, chosen, fitted
-from glider_bringup.flights.validation.flying import (
+from glider_flights.record import Flight
+from glider_flights.validation.fit import BY_ADCP, CONSTANTS, chosen, fitted
+from glider_flights.validation.flying import (
     Imposed,
     Model,
     Simulated,
@@ -19,9 +19,9 @@ from glider_bringup.flights.validation.flying import (
     fly,
     model_of,
 )
-from glider_bringup.flights.validation.peers import peer
-from glider_bringup.flights.validation.score import Adcp, score, speed_off
-from glider_bringup.flights.validation.track import Track, tracks
+from glider_flights.validation.peers import peer
+from glider_flights.validation.score import Adcp, score, speed_off
+from glider_flights.validation.track import Track, tracks
 from glider_model.base.errors import ConfigurationError
 
 #: Speeds of an ADCP that come with a flight, in its folder or the one above it.

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.flights.forecast import FORECASTS, Forecaster
-from glider_bringup.flights.reckoning import Reckoned, mean_current, reckon
-from glider_bringup.flights.record import Flight, Segment
+from glider_flights.forecast import FORECASTS, Forecaster
+from glider_flights.reckoning import Reckoned, mean_current, reckon
+from glider_flights.record import Flight, Segment
 
 #: Over what a vehicle's own current is a mean: a base station counts the drift at the surface too.
 ON_BOARD_OVER = {'slocum': 'under water', 'seaglider': 'between fixes'}

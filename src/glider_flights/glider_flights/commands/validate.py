@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from glider_bringup.console import Cache, Json, counter, output
-from glider_bringup.flights.validation.flying import Imposed
+from glider_flights.validation.flying import Imposed
 
 app = typer.Typer()
 
@@ -61,10 +61,10 @@ def validate(
 
     Beside it the model of others: gliderflight, or what the base station of a Seaglider wrote.
     """
-    from glider_bringup.flights.reading import read_whole
-    from glider_bringup.flights.validation.result import find_adcp
-    from glider_bringup.flights.validation.result import validate as validated
-    from glider_bringup.showing.flights.validation import draw_validation
+    from glider_flights.reading import read_whole
+    from glider_flights.showing.validation import draw_validation
+    from glider_flights.validation.result import find_adcp
+    from glider_flights.validation.result import validate as validated
 
     measured = find_adcp(flight, adcp)
     with counter('reading', None) as update:

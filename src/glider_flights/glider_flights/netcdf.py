@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.flights.folders import installed
+from glider_flights.folders import installed
 from glider_model.base.errors import ConfigurationError
 
 SUFFIXES = ('.nc', '.ncdf', '.nc4')

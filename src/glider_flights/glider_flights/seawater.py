@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from glider_bringup.flights.folders import installed
+from glider_flights.folders import installed
 
 
 def _gsw():

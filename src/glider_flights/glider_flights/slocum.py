@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.flights.folders import files_in, installed
-from glider_bringup.flights.record import (
+from glider_flights.folders import files_in, installed
+from glider_flights.record import (
     NOT_KNOWN,
     Fixes,
     Flight,
@@ -29,8 +29,8 @@ from glider_bringup.flights.record import (
     local_metres,
     usual,
 )
-from glider_bringup.flights.seawater import depth_of, pressure_of, salinity_of
-from glider_bringup.flights.segments import DIVE_DEPTH_M, Cut, cut
+from glider_flights.seawater import depth_of, pressure_of, salinity_of
+from glider_flights.segments import DIVE_DEPTH_M, Cut, cut
 from glider_model.base.errors import ConfigurationError
 
 #: Kinds of files of the flight computer, fullest first: all that is measured, then what is sent.

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.flights.energy.uses import HOTEL, PUMP, Uses
-from glider_bringup.flights.reckoning import vertical_rate
-from glider_bringup.flights.record import SURFACE_DEPTH_M, at_times
-from glider_bringup.flights.slocum import Sensors, read_sensors, slocum_files
+from glider_flights.energy.uses import HOTEL, PUMP, Uses
+from glider_flights.reckoning import vertical_rate
+from glider_flights.record import SURFACE_DEPTH_M, at_times
+from glider_flights.slocum import Sensors, read_sensors, slocum_files
 from glider_model.base.errors import ConfigurationError
 
 #: A Slocum's parts are so long (s): several dives of a shallow one, less than one of a deep one.

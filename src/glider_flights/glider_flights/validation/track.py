@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_bringup.flights.reckoning import vertical_rate
-from glider_bringup.flights.record import SURFACE_DEPTH_M, Flight, Instruments, in_order
-from glider_bringup.flights.seawater import density_of, pressure_of
+from glider_flights.reckoning import vertical_rate
+from glider_flights.record import SURFACE_DEPTH_M, Flight, Instruments, in_order
+from glider_flights.seawater import density_of, pressure_of
 from glider_model.base.errors import ConfigurationError
 
 #: The recorded vertical rate is the slope of depth over about this time (s).

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_bringup.flights.folders import files_in
-from glider_bringup.flights.netcdf import SUFFIXES, refuse_missing, variables
-from glider_bringup.flights.record import (
+from glider_flights.folders import files_in
+from glider_flights.netcdf import SUFFIXES, refuse_missing, variables
+from glider_flights.record import (
     NOT_KNOWN,
     Fixes,
     Flight,
@@ -32,7 +32,7 @@ from glider_bringup.flights.record import (
     local_metres,
     usual,
 )
-from glider_bringup.flights.segments import cut
+from glider_flights.segments import cut
 from glider_model.base.errors import ConfigurationError
 
 #: Files of dives: the number of the vehicle, three digits, and of the dive, four.
@@ -106,7 +106,7 @@ class Dive(NamedTuple):
     way_m: np.ndarray
     polar: Polar
     instruments: Instruments
-    #: Constants of the body that the file names, see `glider_bringup.flights.record.Flight`.
+    #: Constants of the body that the file names, see `glider_flights.record.Flight`.
     body: dict[str, float]
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_bringup.flights.record import SURFACE_DEPTH_M, Fixes, Samples, in_order
+from glider_flights.record import SURFACE_DEPTH_M, Fixes, Samples, in_order
 
 #: Between two fixes with a sample deeper than this a glider has dived (m).
 DIVE_DEPTH_M = 5.0
