@@ -26,7 +26,7 @@ from glider_bringup.console import Json, messages, output, picked, repeatable
 from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED
 
 #: Modules of this folder, in the order in which they are measured.
-SECTIONS = ('compute', 'memory', 'nodes', 'nodes_memory', 'sweep', 'storage', 'against')
+SECTIONS = ('compute', 'memory', 'nodes', 'nodes_memory', 'sweep', 'against')
 
 Section = Literal[SECTIONS]
 

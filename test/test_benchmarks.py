@@ -97,13 +97,6 @@ def test_bench_prints_one_object_of_figures():
     assert figures['mission_30h_peak_rss_mb'] > figures['imported_rss_mb'] > 30.0
 
 
-def test_storage_of_a_sweep_fits_the_memory_that_its_limit_is_for():
-    figures = bench('storage')
-    assert figures['result_rss_mb'] < figures['result_peak_rss_mb']
-    assert figures['result_largest_peak_rss_mb'] < 600.0
-    assert figures['netcdf_bytes_per_cell'] < figures['journal_bytes_per_cell']
-
-
 def test_bench_of_the_command_line_sends_to_the_script(glider):
     done = glider('bench')
     assert (done.returncode, done.stdout) == (2, '')

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+import tracemalloc
 from contextlib import contextmanager
 from types import SimpleNamespace
 
@@ -429,6 +430,29 @@ def test_sweep_in_which_every_cell_failed_has_a_file(flown, tmp_path):
     assert (summary['failed'], summary['completed']) == (12, 0)
     with xarray.load_dataset(tmp_path / RESULT_FILE) as data:
         assert (data['reason'].values == 'broken').all()
+
+
+def test_result_of_the_largest_sweep_fits_into_memory(flown, tmp_path):
+    """500,000 cells in 400 MB beside what Python takes; memory grows evenly with the cells."""
+    path = tmp_path / 'large.yaml'
+    values = {'kind': 'grid', 'start': 0, 'step': 1}
+    dimensions = {
+        'a': {**values, 'field': 'initial.north_m', 'stop': 99},
+        'b': {**values, 'field': 'initial.east_m', 'stop': 199},
+    }
+    path.write_text(yaml.safe_dump({'dimensions': dimensions}))
+    plan, journal = load_sweep(str(path)), flown.out / JOURNAL_FILE
+    with Journal(journal, json.loads(journal.open().readline()), True) as lines:
+        record = json.dumps(next(iter(lines.records())))
+    cells = ({**json.loads(record), 'cell': cell} for cell in range(plan.cells))
+    tracemalloc.start()
+    try:
+        write_result(plan, SimpleNamespace(records=lambda: cells), tmp_path / RESULT_FILE)
+        peak_mb = tracemalloc.get_traced_memory()[1] / 1e6
+    finally:
+        tracemalloc.stop()
+    assert peak_mb * sweep_file.MAX_CELLS / plan.cells < 400.0
+    assert (tmp_path / RESULT_FILE).stat().st_size < len(record) * plan.cells
 
 
 def test_largest_sweep_is_planned_as_it_is_flown(tmp_path, monkeypatch):

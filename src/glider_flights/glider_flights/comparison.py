@@ -56,10 +56,8 @@ def navigate(flight: Flight, progress: Callable[[int, int], None]) -> list[Row]:
 
 def summary(flight: Flight, rows: list[Row]) -> dict[str, Any]:
     """Figures of a flight, as `--json` prints them."""
-    dac, way = [], []
-    for row in rows:
-        dac.append(np.hypot(*(row.comparable_mps - row.segment.on_board.dac_mps)))
-        way.append(np.hypot(*(row.reckoned.way_m - row.segment.on_board.way_m)))
+    dac = [np.hypot(*(row.comparable_mps - row.segment.on_board.dac_mps)) for row in rows]
+    way = [np.hypot(*(row.reckoned.way_m - row.segment.on_board.way_m)) for row in rows]
     through_water = [np.hypot(*row.reckoned.way_m) for row in rows]
     names = list(FORECASTS)
     if any(math.isfinite(row.missed_m['on_board']) for row in rows):

@@ -1,8 +1,9 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the files of a flight are."""
+"""Where the files of a flight are, and the libraries that read them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from glider_model.base.errors import ConfigurationError
@@ -29,3 +30,20 @@ def files_in(place: Path, wanted: Callable[[Path], bool]) -> list[Path]:
             f'{folders[0]} and {folders[1]}; give one of them'
         )
     return files
+
+
+@contextmanager
+def installed(library: str) -> Iterator[None]:
+    """Say of a library that is imported here, and is not there, how to get it.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    try:
+        yield
+    except ImportError:
+        raise ConfigurationError(
+            f'{library}, is not installed; install it with: '
+            './glider python -m pip install --no-deps -r requirements-flights.txt'
+        ) from None

@@ -3,10 +3,12 @@
 """NetCDF files of flights, of version 3 or 4."""
 
 import re
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from glider_flights.folders import installed
 from glider_model.base.errors import ConfigurationError
 
 SUFFIXES = ('.nc', '.ncdf', '.nc4')
@@ -22,20 +24,68 @@ def datasets(path: Path) -> list:
         return [xarray.open_dataset(path, engine='scipy', decode_times=False)]
     if start != b'\x89HDF':
         raise ValueError('it is neither NetCDF 3 nor NetCDF 4')
-    try:
+    with installed(f'{path}: h5netcdf, which reads NetCDF 4'):
         import h5netcdf  # noqa: F401 - xarray reads NetCDF 4 through it
-    except ImportError:
-        raise ConfigurationError(
-            f'{path}: h5netcdf, which reads NetCDF 4, is not installed; install it with: '
-            './glider python -m pip install --no-deps -r requirements-flights.txt'
-        ) from None
     return list(xarray.open_groups(path, engine='h5netcdf', decode_times=False).values())
 
 
-def seconds(xarray, variable) -> np.ndarray:
+def variables(
+    path: Path, wanted: dict[str, Sequence[str]], spelt: Callable[[str], str] = str
+) -> Iterator[tuple[str, str, np.ndarray, str]]:
+    """Variables of a file as flat arrays, each with our name, its own and its unit.
+
+    Parameters
+    ----------
+    path : Path
+    wanted : dict
+        Names that a variable may have in the file, by our own; times, in s since 1970, are those
+        of which ours ends with ``time``.
+    spelt : callable, optional
+        What makes such a name of one in the file.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    found = set()
+    try:
+        for dataset in datasets(path):
+            with dataset:
+                by_name = {spelt(str(name)): name for name in dataset.variables}
+                for key, names in wanted.items():
+                    name = next((name for name in names if name in by_name), None)
+                    if name is None or key in found:
+                        continue
+                    found.add(key)
+                    variable = dataset[by_name[name]]
+                    units = str(variable.attrs.get('units', ''))
+                    values = np.atleast_1d(variable.values).ravel()
+                    if values.dtype.kind not in 'SUO' or key.endswith('time'):
+                        values = values.astype(float)
+                    if key.endswith('time'):
+                        values = _seconds(values, units)
+                    yield key, name, values, units
+    except (OSError, ValueError, TypeError, KeyError, RuntimeError) as error:
+        raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
+
+
+def refuse_missing(path: Path, missing: Sequence[Sequence[str]], why: str) -> None:
+    """Refuse a file that lacks variables, each by the names that it may have.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    if missing:
+        names = ', '.join(' or '.join(names) for names in missing)
+        raise ConfigurationError(f'{path}: no variable {names} (needed {why})')
+
+
+def _seconds(values: np.ndarray, units: str) -> np.ndarray:
     """Times as s since 1970, whatever their unit."""
-    units = str(variable.attrs.get('units', 'seconds since 1970-1-1'))
-    values = np.atleast_1d(variable.values).ravel().astype(float)
+    import xarray
+
+    units = units or 'seconds since 1970-1-1'
     if re.match(r'seconds\s+since\s+1970-0?1-0?1\b', units):
         return values
     decoded = xarray.coding.times.decode_cf_datetime(values, units)

@@ -13,10 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from glider_flights.folders import files_in
-from glider_flights.netcdf import SUFFIXES, datasets, seconds
-from glider_flights.record import Flight, Instruments, instruments
+from glider_flights.netcdf import SUFFIXES, datasets, refuse_missing, variables
+from glider_flights.record import Flight, Instruments, instruments, joined, usual
 from glider_flights.seawater import depth_of
-from glider_model.base.errors import ConfigurationError
 
 #: Names of variables in capitals, by ours, and what their values are multiplied by.
 NAMES = {
@@ -64,44 +63,27 @@ def read_og1(place: Path, progress: Callable[[int, int], None]) -> Flight:
     for number, path in enumerate(files):
         progress(number, len(files))
         found = _read(path)
-        origin = np.array([_middle(found.get('latitude')), _middle(found.get('longitude'))])
+        origin = [usual(found.get(name, ())) for name in ('latitude', 'longitude')]
         origins.append(np.nan_to_num(origin))
         parts.append(_instruments(found, origins[-1][0]))
-    table = np.concatenate([np.stack(part) for part in parts], axis=1)
-    table = table[:, np.argsort(table[0], kind='stable')]
     return Flight(
         kind='og1',
         files=[path.name for path in files],
         segments=[],
         notes=[],
         origin_deg=origins[0],
-        instruments=Instruments(*table),
+        instruments=joined(parts),
     )
 
 
 def _read(path: Path) -> dict[str, np.ndarray]:
     """Variables by our names; times in s since 1970."""
-    import xarray
-
-    found: dict[str, np.ndarray] = {}
-    for dataset in datasets(path):
-        with dataset:
-            by_name = {str(name).upper(): name for name in dataset.variables}
-            for key, (names, unit) in NAMES.items():
-                name = next((by_name[one] for one in names if one in by_name), None)
-                if name is None or key in found:
-                    continue
-                variable = dataset[name]
-                if key == 'time':
-                    found[key] = seconds(xarray, variable)
-                    continue
-                if str(variable.attrs.get('units', '')).startswith('rad'):
-                    unit = 1.0
-                found[key] = unit * np.atleast_1d(variable.values).ravel().astype(float)
-    missing = [key for key in NEEDED if key not in found]
-    if missing:
-        names = ', '.join(' or '.join(NAMES[key][0]) for key in missing)
-        raise ConfigurationError(f'{path}: no variable {names} (needed of a flight in OG1 or CF)')
+    found = {}
+    wanted = {key: names for key, (names, _) in NAMES.items()}
+    for key, _, values, units in variables(path, wanted, str.upper):
+        found[key] = (1.0 if units.startswith('rad') else NAMES[key][1]) * values.astype(float)
+    missing = [NAMES[key][0] for key in NEEDED if key not in found]
+    refuse_missing(path, missing, 'of a flight in OG1 or CF')
     return found
 
 
@@ -113,11 +95,3 @@ def _instruments(found: dict[str, np.ndarray], latitude: float) -> Instruments:
     if len(found.get('pressure', ())) == count:
         known['depth_m'] = depth_of(found['pressure'], latitude)
     return instruments(found['time'], **known)
-
-
-def _middle(values: np.ndarray | None) -> float:
-    return (
-        math.nan
-        if values is None or not np.isfinite(values).any()
-        else float(np.nanmedian(values))
-    )

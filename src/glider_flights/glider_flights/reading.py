@@ -1,18 +1,24 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading a recorded flight, of whichever kind of vehicle its files are."""
+"""Reading a recorded flight, or its energy, of whichever kind of vehicle its files are."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+from glider_flights.energy.seaglider import seaglider_uses
+from glider_flights.energy.slocum import slocum_uses
+from glider_flights.energy.uses import Uses
 from glider_flights.og1 import og1_files, read_og1
 from glider_flights.record import Flight
 from glider_flights.seaglider import read_seaglider, seaglider_files
 from glider_flights.slocum import read_slocum, slocum_files
 from glider_model.base.errors import ConfigurationError
 
+Progress = Callable[[int, int], None]
 
-def read_flight(place: Path, cache: Path | None, progress: Callable[[int, int], None]) -> Flight:
+
+def read_flight(place: Path, cache: Path | None, progress: Progress) -> Flight:
     """Read a flight with at least one segment.
 
     Parameters
@@ -28,7 +34,7 @@ def read_flight(place: Path, cache: Path | None, progress: Callable[[int, int], 
     ------
     ConfigurationError
     """
-    flight = _read(place, cache, progress, whole=False)
+    flight = _read(place, cache, progress, read_slocum, read_seaglider)
     if not flight.segments:
         why = '; '.join(flight.notes)
         raise ConfigurationError(
@@ -38,26 +44,32 @@ def read_flight(place: Path, cache: Path | None, progress: Callable[[int, int], 
     return flight
 
 
-def read_whole(place: Path, cache: Path | None, progress: Callable[[int, int], None]) -> Flight:
+def read_whole(place: Path, cache: Path | None, progress: Progress) -> Flight:
     """Read a flight with its instruments, whether or not it has segments; see `read_flight`."""
-    return _read(place, cache, progress, whole=True)
+    return _read(
+        place, cache, progress, partial(read_slocum, whole=True), read_seaglider, read_og1
+    )
 
 
-def _read(
-    place: Path, cache: Path | None, progress: Callable[[int, int], None], whole: bool
-) -> Flight:
+def read_uses(place: Path, cache: Path | None, progress: Progress) -> Uses:
+    """Read what a flight took out of its battery; see `read_flight`."""
+    return _read(place, cache, progress, slocum_uses, seaglider_uses)
+
+
+def _read(place: Path, cache: Path | None, progress: Progress, slocum, seaglider, og1=None):
+    """What that function says of a flight which is for its kind of files."""
     if not place.exists():
         raise ConfigurationError(f'{place}: there is no such folder or file')
     if cache is not None and not cache.is_dir():
         raise ConfigurationError(f'--cache {cache}: there is no such folder')
     if slocum_files(place):
-        return read_slocum(place, cache, progress, whole)
-    if whole and og1_files(place):
-        return read_og1(place, progress)
+        return slocum(place, cache, progress)
+    if og1 and og1_files(place):
+        return og1(place, progress)
     if seaglider_files(place):
-        return read_seaglider(place, progress)
+        return seaglider(place, progress)
     raise ConfigurationError(
         f'{place}: no files of a flight in it (allowed: .dbd, .mbd, .sbd, .dcd, .mcd, .scd of '
         'a Slocum, p*.nc of a Seaglider'
-        + (', NetCDF with TIME and PITCH as OG1 has them)' if whole else ')')
+        + (', NetCDF with TIME and PITCH as OG1 has them)' if og1 else ')')
     )

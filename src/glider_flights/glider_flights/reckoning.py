@@ -43,8 +43,7 @@ class Reckoned(NamedTuple):
     #: Where, of shape (2,): north, east (m).
     dived_m: np.ndarray
     surfaced_m: np.ndarray
-    #: Way through the water between the two, of shape (2,): north, east (m).
-    way_m: np.ndarray
+    way_m: np.ndarray  #: way through the water between the two, of shape (2,): north, east (m)
 
     @property
     def seconds(self) -> float:

@@ -6,7 +6,8 @@ Positions are north and east (m) of the first fix, angles in the world NED and t
 """
 
 import math
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -19,25 +20,18 @@ SURFACE_DEPTH_M = 2.0
 class Fixes(NamedTuple):
     """Fixes of one stay at the surface, in the order of time; may be none."""
 
-    #: Shape (n,), s since 1970.
-    time_s: np.ndarray
-    #: Shape (n, 2): north, east (m) of the flight's first fix.
-    place_m: np.ndarray
+    time_s: np.ndarray  #: shape (n,), s since 1970
+    place_m: np.ndarray  #: shape (n, 2): north, east (m) of the flight's first fix
 
 
 class Samples(NamedTuple):
     """What was measured under water, all of shape (n,), in the order of time."""
 
-    #: Time (s since 1970).
-    time_s: np.ndarray
-    #: Depth (m, + down).
-    depth_m: np.ndarray
-    #: Pitch (rad, + nose up).
-    pitch_rad: np.ndarray
-    #: Heading (rad from true north, + to east).
-    heading_rad: np.ndarray
-    #: Buoyancy (kg, + rises), NaN where it is not known.
-    buoyancy_kg: np.ndarray
+    time_s: np.ndarray  #: time (s since 1970)
+    depth_m: np.ndarray  #: depth (m, + down)
+    pitch_rad: np.ndarray  #: pitch (rad, + nose up)
+    heading_rad: np.ndarray  #: heading (rad from true north, + to east)
+    buoyancy_kg: np.ndarray  #: buoyancy (kg, + rises), NaN where it is not known
 
 
 class OnBoard(NamedTuple):
@@ -46,10 +40,8 @@ class OnBoard(NamedTuple):
     Each of shape (2,): north, east.
     """
 
-    #: Depth-averaged current (m/s).
-    dac_mps: np.ndarray
-    #: Way through the water (m).
-    way_m: np.ndarray
+    dac_mps: np.ndarray  #: depth-averaged current (m/s)
+    way_m: np.ndarray  #: way through the water (m)
     #: Where it believed to be when it came up (m of the flight's first fix).
     surfaced_m: np.ndarray
 
@@ -60,18 +52,12 @@ class Polar(NamedTuple):
     Lift q A a alpha, drag q A (b q^s + c alpha^2), where A is an area.
     """
 
-    #: a (1/rad).
-    lift: float
-    #: b (Pa^-s).
-    drag: float
-    #: c (1/rad^2).
-    induced: float
-    #: s.
-    exponent: float
-    #: A (m^2).
-    area_m2: float
-    #: At shallower pitch the polar is not believed (rad).
-    shallowest_rad: float
+    lift: float  #: a (1/rad)
+    drag: float  #: b (Pa^-s)
+    induced: float  #: c (1/rad^2)
+    exponent: float  #: s
+    area_m2: float  #: A (m^2)
+    shallowest_rad: float  #: at shallower pitch the polar is not believed (rad)
 
 
 class Segment(NamedTuple):
@@ -92,28 +78,17 @@ class Instruments(NamedTuple):
     NaN where it is not known.
     """
 
-    #: Time (s since 1970).
-    time_s: np.ndarray
-    #: Depth (m, + down), of the finest pressure that was recorded.
-    depth_m: np.ndarray
-    #: Pitch (rad, + nose up).
-    pitch_rad: np.ndarray
-    #: Roll (rad, + to starboard).
-    roll_rad: np.ndarray
-    #: Heading (rad from true north, + to east).
-    heading_rad: np.ndarray
-    #: Volume of the buoyancy engine (m^3, + rises).
-    pumped_m3: np.ndarray
-    #: Position of the pitch mass (m, + forward: nose down).
-    mass_x_m: np.ndarray
-    #: Angle of the roll mass (rad, + to starboard).
-    mass_roll_rad: np.ndarray
-    #: Angle of the steering surface (rad, + nose to starboard).
-    surface_rad: np.ndarray
-    #: Temperature in situ (deg C, ITS-90).
-    temperature_degc: np.ndarray
-    #: Practical salinity (-).
-    salinity: np.ndarray
+    time_s: np.ndarray  #: time (s since 1970)
+    depth_m: np.ndarray  #: depth (m, + down), of the finest pressure that was recorded
+    pitch_rad: np.ndarray  #: pitch (rad, + nose up)
+    roll_rad: np.ndarray  #: roll (rad, + to starboard)
+    heading_rad: np.ndarray  #: heading (rad from true north, + to east)
+    pumped_m3: np.ndarray  #: volume of the buoyancy engine (m^3, + rises)
+    mass_x_m: np.ndarray  #: position of the pitch mass (m, + forward: nose down)
+    mass_roll_rad: np.ndarray  #: angle of the roll mass (rad, + to starboard)
+    surface_rad: np.ndarray  #: angle of the steering surface (rad, + nose to starboard)
+    temperature_degc: np.ndarray  #: temperature in situ (deg C, ITS-90)
+    salinity: np.ndarray  #: practical salinity (-)
     #: Vertical rate (m/s, + down) of the flight model of the vehicle's makers.
     own_rate_mps: np.ndarray
 
@@ -121,24 +96,19 @@ class Instruments(NamedTuple):
 class Flight(NamedTuple):
     """A recorded flight."""
 
-    #: Kind of vehicle: 'slocum' or 'seaglider'.
-    kind: str
+    kind: str  #: kind of vehicle: 'slocum' or 'seaglider'
     #: Names of the files that were read.
     files: list[str]
     segments: list[Segment]
-    #: What a person should know of the files: a sentence each.
-    notes: list[str]
-    #: Latitude and longitude of its first fix (degrees), shape (2,).
-    origin_deg: np.ndarray
-    #: What else was recorded; None if it was not asked for.
-    instruments: Instruments | None = None
-    #: Constants of the body that the files name, by the names of `BODY`.
+    notes: list[str]  #: what a person should know of the files: a sentence each
+    origin_deg: np.ndarray  #: latitude and longitude of its first fix (degrees), shape (2,)
+    instruments: Instruments | None = None  #: what else was recorded; None if it was not asked for
+    #: Constants of the body that the files name: mass_kg, and volume_m3 with the engine at zero.
+    #: Those of a base station for compressibility belong to its own way of computing.
     body: dict[str, float] | None = None
 
 
-#: Constants of a body that files may name: mass (kg), volume with the engine at zero (m^3). Those
-#: of a base station for compressibility belong to its own way of computing, and are not taken.
-BODY = ('mass_kg', 'volume_m3')
+SamplesOrInstruments = TypeVar('SamplesOrInstruments', Samples, Instruments)
 NOT_KNOWN = np.full(2, math.nan)
 
 
@@ -148,6 +118,26 @@ def instruments(time_s: np.ndarray, **known: np.ndarray) -> Instruments:
     return Instruments(
         time_s, **{name: known.get(name, nothing) for name in Instruments._fields[1:]}
     )
+
+
+def joined(parts: Iterable[Instruments]) -> Instruments:
+    """Instruments of several files, in the order of time."""
+    table = np.concatenate([np.stack(part) for part in parts], axis=1)
+    return Instruments(*table[:, np.argsort(table[0], kind='stable')])
+
+
+def in_order(values: SamplesOrInstruments, needed: int) -> SamplesOrInstruments:
+    """Values in the order of time, each time once, where the first ``needed`` are known."""
+    table = np.stack(values)
+    table = table[:, np.isfinite(table[:needed]).all(axis=0)]
+    return type(values)(*table[:, np.unique(table[0], return_index=True)[1]])
+
+
+def usual(values: Sequence[float]) -> float:
+    """The median of what is known; NaN if nothing is."""
+    values = np.asarray(values, float)
+    values = values[np.isfinite(values)]
+    return float(np.median(values)) if len(values) else math.nan
 
 
 def local_metres(origin_deg: np.ndarray, latitude_deg, longitude_deg) -> np.ndarray:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_flights.folders import files_in
-from glider_flights.netcdf import SUFFIXES, datasets, seconds
+from glider_flights.netcdf import SUFFIXES, refuse_missing, variables
 from glider_flights.record import (
     NOT_KNOWN,
     Fixes,
@@ -28,7 +28,9 @@ from glider_flights.record import (
     angles_at_times,
     at_times,
     instruments,
+    joined,
     local_metres,
+    usual,
 )
 from glider_flights.segments import cut
 from glider_model.base.errors import ConfigurationError
@@ -54,7 +56,7 @@ WANTED = {
     'dac_north': ('depth_avg_curr_north', 'depth_avg_curr_north_gsm'),
     'speed_east': ('flight_avg_speed_east', 'flight_avg_speed_east_gsm'),
     'speed_north': ('flight_avg_speed_north', 'flight_avg_speed_north_gsm'),
-    'flight_time': ('total_flight_time_s',),
+    'flight_s': ('total_flight_time_s',),
     'a': ('sg_cal_hd_a', 'log_HD_A'),
     'b': ('sg_cal_hd_b', 'log_HD_B'),
     'c': ('sg_cal_hd_c', 'log_HD_C'),
@@ -104,7 +106,7 @@ class Dive(NamedTuple):
     way_m: np.ndarray
     polar: Polar
     instruments: Instruments
-    #: Constants of the body that the file names, see `glider_flights.record.BODY`.
+    #: Constants of the body that the file names, see `glider_flights.record.Flight`.
     body: dict[str, float]
 
 
@@ -147,33 +149,29 @@ def read_seaglider(place: Path, progress: Callable[[int, int], None]) -> Flight:
         left_out += [one for one in said if one not in left_out]
     names = {name for dive in dives for name in dive.body}
     body = {
-        name: float(np.median([dive.body[name] for dive in dives if name in dive.body]))
-        for name in names
+        name: usual([dive.body[name] for dive in dives if name in dive.body]) for name in names
     }
-    recorded = np.concatenate([_of_one_zero(dive, body) for dive in dives], axis=1)
-    recorded = Instruments(*recorded[:, np.argsort(recorded[0], kind='stable')])
-    read = [path.name for path in files]
     return Flight(
         kind='seaglider',
-        files=read,
+        files=[path.name for path in files],
         segments=segments,
         notes=notes + left_out,
         origin_deg=origin,
-        instruments=recorded,
+        instruments=joined(_of_one_zero(dive, body) for dive in dives),
         body=body,
     )
 
 
-def _of_one_zero(dive: Dive, body: dict[str, float]) -> np.ndarray:
-    """Instruments of a dive, shape (12, n); the zero of its engine is that of the whole flight.
+def _of_one_zero(dive: Dive, body: dict[str, float]) -> Instruments:
+    """Instruments of a dive; the zero of its engine is that of the whole flight.
 
     Each dive may have another one: people move it between dives.
     """
-    shift = dive.body.get('volume_m3', 0.0) - body.get('volume_m3', 0.0)
-    if 'volume_m3' not in dive.body:
-        shift = 0.0
     own = dive.instruments
-    return np.stack(own._replace(pumped_m3=own.pumped_m3 + shift))
+    if 'volume_m3' not in dive.body:
+        return own
+    shift = dive.body['volume_m3'] - body['volume_m3']
+    return own._replace(pumped_m3=own.pumped_m3 + shift)
 
 
 def _runs(dives: list[Dive]) -> list[list[Dive]]:
@@ -211,11 +209,7 @@ def _read_dive(path: Path, notes: list[str]) -> Dive:
                 f'(allowed: as many as time, {len(found.get("time", ()))})'
             )
     missing = [names for key, names in NEEDED.items() if not len(found.get(key, ()))]
-    if missing:
-        raise ConfigurationError(
-            f'{path}: no variable {", ".join(" or ".join(names) for names in missing)} '
-            '(needed of a dive of a Seaglider)'
-        )
+    refuse_missing(path, missing, 'of a dive of a Seaglider')
     fixes = np.stack([found['fix_time'], found['fix_latitude'], found['fix_longitude']], axis=-1)
     good = np.isfinite(fixes).all(axis=-1) & (np.abs(fixes[:, 1:]) <= (90.0, 180.0)).all(axis=-1)
     quality = found.get('fix_quality', ())
@@ -227,23 +221,21 @@ def _read_dive(path: Path, notes: list[str]) -> Dive:
     if math.isnan(declination):
         notes.append(f'{path.name}: magnetic_variation is missing: 0 deg is taken')
         declination = 0.0
+    named = DIVE_FILE.fullmatch(path.name)
+    samples = _samples(found, math.radians(declination))
     return Dive(
         path.name,
-        *_numbers(path),
+        named[1] if named else '',
+        int(named[2]) if named else 0,
         fixes[good],
-        _samples(found, math.radians(declination)),
+        samples,
         np.array([_number(found, 'dac_north'), _number(found, 'dac_east')]),
         np.array([_number(found, 'speed_north'), _number(found, 'speed_east')])
-        * _number(found, 'flight_time'),
+        * _number(found, 'flight_s'),
         _polar(found),
-        _instruments(found, math.radians(declination)),
+        _instruments(found, samples),
         _body(found),
     )
-
-
-def _numbers(path: Path) -> tuple[str, int]:
-    named = DIVE_FILE.fullmatch(path.name)
-    return (named[1], int(named[2])) if named else ('', 0)
 
 
 def _samples(found: dict[str, np.ndarray], declination: float) -> Samples:
@@ -258,17 +250,16 @@ def _samples(found: dict[str, np.ndarray], declination: float) -> Samples:
     return Samples(time_s, found['depth'], at_times(time_s, time_s, pitch), heading, buoyancy)
 
 
-def _instruments(found: dict[str, np.ndarray], declination: float) -> Instruments:
-    samples, time_s = _samples(found, declination), found['time']
+def _instruments(found: dict[str, np.ndarray], samples: Samples) -> Instruments:
     measured = {}
     for name, (_, unit) in MEASURED.items():
         # What the CTD measured, and what was made of it, has times of its own.
         for times in ('time', 'buoyancy_time'):
             if name in found and len(found.get(times, ())) == len(found[name]):
-                measured[name] = unit * at_times(time_s, found[times], found[name])
+                measured[name] = unit * at_times(samples.time_s, found[times], found[name])
                 break
     return instruments(
-        time_s,
+        samples.time_s,
         depth_m=samples.depth_m,
         pitch_rad=samples.pitch_rad,
         heading_rad=samples.heading_rad,
@@ -309,37 +300,12 @@ def _polar(found: dict[str, np.ndarray]) -> Polar:
 
 def _number(found: dict[str, np.ndarray], name: str) -> float:
     """The usual value of a variable; NaN if it is missing."""
-    values = np.asarray(found.get(name, ()), float)
-    values = values[np.isfinite(values)]
-    return float(np.median(values)) if len(values) else math.nan
+    return usual(found.get(name, ()))
 
 
 def read_variables(path: Path, wanted: dict[str, tuple[str, ...]]) -> dict[str, np.ndarray]:
-    """Variables as flat arrays, by our names; times in s since 1970, depth in m.
-
-    Parameters
-    ----------
-    path : Path
-    wanted : dict
-        Names that a variable may have in the file, by our own.
-    """
-    import xarray
-
-    found = {}
-    try:
-        for dataset in datasets(path):
-            with dataset:
-                for key, names in wanted.items():
-                    name = next((name for name in names if name in dataset.variables), None)
-                    if name is None or key in found:
-                        continue
-                    variable = dataset[name]
-                    values = np.atleast_1d(variable.values).ravel()
-                    if key.endswith('time') and key != 'flight_time':
-                        values = seconds(xarray, variable)
-                    elif name == 'eng_depth':
-                        values = values / 100.0
-                    found[key] = values if values.dtype.kind in 'SUO' else values.astype(float)
-    except (OSError, ValueError, TypeError, KeyError, RuntimeError) as error:
-        raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
-    return found
+    """Variables by our names, see `variables`; depth in m."""
+    return {
+        key: values / 100.0 if name == 'eng_depth' else values
+        for key, name, values, _ in variables(path, wanted)
+    }

@@ -4,39 +4,31 @@
 
 import numpy as np
 
-from glider_model.base.errors import ConfigurationError
+from glider_flights.folders import installed
 
 
 def _gsw():
-    """The library, or one sentence on how to get it."""
-    try:
+    """The library."""
+    with installed('gsw, which knows sea water'):
         import gsw
-    except ImportError:
-        raise ConfigurationError(
-            'gsw, which knows sea water, is not installed; install it with: '
-            './glider python -m pip install --no-deps -r requirements-flights.txt'
-        ) from None
     return gsw
 
 
 def depth_of(pressure_dbar: np.ndarray, latitude_deg: float) -> np.ndarray:
     """Depth (m) of a pressure above that of the air (dbar)."""
-    gsw = _gsw()
-    return -gsw.z_from_p(pressure_dbar, latitude_deg)
+    return -_gsw().z_from_p(pressure_dbar, latitude_deg)
 
 
 def pressure_of(depth_m: np.ndarray, latitude_deg: float) -> np.ndarray:
     """Pressure above that of the air (dbar) at a depth (m)."""
-    gsw = _gsw()
-    return gsw.p_from_z(-depth_m, latitude_deg)
+    return _gsw().p_from_z(-depth_m, latitude_deg)
 
 
 def salinity_of(
     conductivity_mspcm: np.ndarray, temperature_degc: np.ndarray, pressure_dbar: np.ndarray
 ) -> np.ndarray:
     """Practical salinity of a conductivity (mS/cm)."""
-    gsw = _gsw()
-    return gsw.SP_from_C(conductivity_mspcm, temperature_degc, pressure_dbar)
+    return _gsw().SP_from_C(conductivity_mspcm, temperature_degc, pressure_dbar)
 
 
 def density_of(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_flights.record import SURFACE_DEPTH_M, Fixes, Samples
+from glider_flights.record import SURFACE_DEPTH_M, Fixes, Samples, in_order
 
 #: Between two fixes with a sample deeper than this a glider has dived (m).
 DIVE_DEPTH_M = 5.0
@@ -37,13 +37,6 @@ class Cut(NamedTuple):
     samples: Samples
 
 
-def finite(samples: Samples) -> Samples:
-    """Samples in the order of time, without those of which something but buoyancy is missing."""
-    table = np.stack(samples)
-    table = table[:, np.isfinite(table[:-1]).all(axis=0)]
-    return Samples(*table[:, np.unique(table[0], return_index=True)[1]])
-
-
 def stays(fixes: Fixes, samples: Samples) -> list[Fixes]:
     """Fixes by stay at the surface, without those told while deep and those far off."""
     order = np.unique(fixes.time_s, return_index=True)[1]
@@ -70,7 +63,7 @@ def _together(fixes: Fixes) -> Fixes:
 
 def cut(fixes: Fixes, samples: Samples) -> tuple[list[Cut], list[str]]:
     """Segments of a flight in the order of time, and what is to be said of those left out."""
-    samples = finite(samples)
+    samples = in_order(samples, len(samples) - 1)  # buoyancy may be missing
     at_surface = stays(fixes, samples)
     found, left_out = [], dict.fromkeys(WHY_LEFT_OUT, 0)
     for before, after in zip(at_surface[:-1], at_surface[1:], strict=True):
@@ -94,13 +87,9 @@ def _why_left_out(own: Samples, before: Fixes, after: Fixes) -> str:
     begin, end = before.time_s[-1], after.time_s[0]
     deep_s = own.time_s[own.depth_m > SURFACE_DEPTH_M]
     allowed_s = max(LONGEST_GAP_S, LONGEST_GAP * (end - begin))
-    if len(deep_s) < 2 or _longest_gap(own, begin, end) > allowed_s:
+    if len(deep_s) < 2 or np.diff(own.time_s, prepend=begin, append=end).max() > allowed_s:
         return 'gap'
     if np.ptp(deep_s) < SHORTEST_SEGMENT_S:
         return 'short'
     moved_m = float(np.hypot(*(after.place_m[0] - before.place_m[-1])))
     return 'far' if moved_m > FASTEST_MPS * (end - begin) else ''
-
-
-def _longest_gap(samples: Samples, begin: float, end: float) -> float:
-    return float(np.diff(np.concatenate([[begin], samples.time_s, [end]])).max())

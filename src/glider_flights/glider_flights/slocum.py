@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_flights.folders import files_in
+from glider_flights.folders import files_in, installed
 from glider_flights.record import (
     NOT_KNOWN,
     Fixes,
@@ -27,6 +27,7 @@ from glider_flights.record import (
     at_times,
     instruments,
     local_metres,
+    usual,
 )
 from glider_flights.seawater import depth_of, pressure_of, salinity_of
 from glider_flights.segments import DIVE_DEPTH_M, Cut, cut
@@ -34,15 +35,8 @@ from glider_model.base.errors import ConfigurationError
 
 #: Kinds of files of the flight computer, fullest first: all that is measured, then what is sent.
 KINDS = (('.dbd', '.dcd'), ('.mbd', '.mcd'), ('.sbd', '.scd'))
-#: Kinds of files of the science computer, by those of the flight computer.
-SCIENCE = {
-    '.dbd': ('.ebd', '.ecd'),
-    '.dcd': ('.ecd', '.ebd'),
-    '.mbd': ('.nbd', '.ncd'),
-    '.mcd': ('.ncd', '.nbd'),
-    '.sbd': ('.tbd', '.tcd'),
-    '.scd': ('.tcd', '.tbd'),
-}
+#: First letters of kinds of files of the science computer, by those of the flight computer.
+SCIENCE = {'d': 'e', 'm': 'n', 's': 't'}
 #: Folders in which the caches of a flight are, beside its files or above them.
 CACHE_FOLDERS = ('cache', 'cac', '.dinkumcache', 'dinkumcache')
 CACHES = '.cac'
@@ -123,7 +117,7 @@ def read_slocum(
             f'{place}: no value of {", ".join(missing)} in its {len(files)} files '
             f'*{files[0].suffix} (needed: {", ".join(NEEDED)})'
         )
-    declined = _value(sensors, 'm_gps_mag_var')
+    declined = usual(sensors['m_gps_mag_var'][1])
     if math.isnan(declined):
         declined = _turned(sensors)
         told = f'{-math.degrees(declined):.0f} deg east is how m_lat, m_lon turn from m_heading'
@@ -153,10 +147,9 @@ def read_slocum(
                 unread = [f'no water: {error}']
             notes += unread
         recorded = _instruments(sensors | _by_ctd(water), declined, origin)
-    read = [path.name for path in files]
     return Flight(
         kind='slocum',
-        files=read,
+        files=[path.name for path in files],
         segments=segments,
         notes=notes + left_out,
         origin_deg=origin,
@@ -167,7 +160,8 @@ def read_slocum(
 def _science_file(path: Path) -> Path | None:
     """File of the science computer that belongs to one of the flight computer."""
     of_stem = {one.suffix.lower(): one for one in path.parent.glob(f'{path.stem}.*')}
-    kinds = SCIENCE[path.suffix.lower()]
+    _, first, packed, _ = path.suffix.lower()
+    kinds = (f'.{SCIENCE[first]}{letter}d' for letter in (packed, *'bc'))
     return next((of_stem[suffix] for suffix in kinds if suffix in of_stem), None)
 
 
@@ -236,13 +230,8 @@ def read_sensors(
     A sensor that was never recorded has no times. Of the flight computer ``m_depth`` has to be
     among the names: it says when a file begins.
     """
-    try:
+    with installed(f'{files[0]}: dbdreader, which reads the files of a Slocum'):
         from dbdreader import DBD, DbdError
-    except ImportError:
-        raise ConfigurationError(
-            f'{files[0]}: dbdreader, which reads the files of a Slocum, is not installed; install '
-            'it with: ./glider python -m pip install --no-deps -r requirements-flights.txt'
-        ) from None
 
     parts: dict[str, list] = {name: [] for name in names}
     begun, unread = [], []
@@ -257,17 +246,16 @@ def read_sensors(
                 file = DBD(str(path), scratch)
                 known = [name for name in parts if file.has_parameter(name)]
                 read = dict(zip(known, file.get(*known), strict=True)) if len(known) > 1 else {}
-            except DbdError as error:
-                if getattr(error.data, 'missing_cache_files', None):
+            except Exception as error:  # noqa: BLE001 - of a damaged file dbdreader says anything
+                lacking = getattr(getattr(error, 'data', None), 'missing_cache_files', None)
+                if lacking:
                     raise ConfigurationError(
-                        f'{path}: its cache {"".join(error.data.missing_cache_files)}.cac is '
+                        f'{path}: its cache {"".join(lacking)}.cac is '
                         f'neither beside it nor in a folder {" or ".join(CACHE_FOLDERS[:2])} '
                         'there or above; give the folder that has it with --cache'
                     ) from None
-                unread.append(f'{path.name}: cannot be read: {error}')
-                continue
-            except Exception as error:  # noqa: BLE001 - of a damaged file dbdreader says anything
-                unread.append(f'{path.name}: cannot be read: {type(error).__name__}: {error}')
+                kind = '' if isinstance(error, DbdError) else f'{type(error).__name__}: '
+                unread.append(f'{path.name}: cannot be read: {kind}{error}')
                 continue
             for name, pair in read.items():
                 parts[name].append(pair)
@@ -294,17 +282,10 @@ def _gather_caches(folder: Path, cache: Path | None, into: Path) -> None:
 
 def _joined(pairs: list) -> tuple[np.ndarray, np.ndarray]:
     """Times and finite values of one sensor from all files, in the order of time."""
-    times = np.concatenate([np.asarray(pair[0], float) for pair in pairs] or [np.empty(0)])
-    values = np.concatenate([np.asarray(pair[1], float) for pair in pairs] or [np.empty(0)])
+    times, values = np.concatenate([np.empty((2, 0)), *map(np.asarray, pairs)], axis=1)
     good = np.isfinite(times) & np.isfinite(values) & (times > 0.0)
     order = np.argsort(times[good], kind='stable')
     return times[good][order], values[good][order]
-
-
-def _value(sensors: Sensors, name: str) -> float:
-    """The usual value of a sensor; NaN if it was never recorded."""
-    values = sensors[name][1]
-    return float(np.median(values)) if len(values) else math.nan
 
 
 def _places(sensors: Sensors, latitude: str, longitude: str) -> tuple[np.ndarray, np.ndarray]:
@@ -382,8 +363,7 @@ def _on_board(
     if inside.sum() > 1:
         time_s, level = speed_s[inside], np.maximum(speed[inside], 0.0)
         heading = at_times(time_s, one.samples.time_s, np.unwrap(one.samples.heading_rad))
-        velocity = np.stack([level * np.cos(heading), level * np.sin(heading)])
-        velocity = np.nan_to_num(velocity)
+        velocity = np.nan_to_num([level * np.cos(heading), level * np.sin(heading)])
         way = (0.5 * (velocity[:, 1:] + velocity[:, :-1]) * np.diff(time_s)).sum(axis=1)
     time_s, degrees = _places(sensors, 'm_lat', 'm_lon')
     under = (time_s > begin_s) & (time_s < surfaced_s)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from glider_flights.energy.uses import PUMP, Uses
+from glider_flights.netcdf import refuse_missing
 from glider_flights.seaglider import read_variables, seaglider_files
 from glider_model.base.errors import ConfigurationError
 
@@ -39,11 +40,7 @@ def seaglider_uses(place: Path, progress: Callable[[int, int], None]) -> Uses:
         progress(number, len(files))
         found = read_variables(path, MOVES | _of_masses())
         missing = [names for key, names in MOVES.items() if not len(found.get(key, ()))]
-        if missing:
-            raise ConfigurationError(
-                f'{path}: no variable {", ".join(" or ".join(names) for names in missing)} '
-                '(needed for the energy of a Seaglider)'
-            )
+        refuse_missing(path, missing, 'for the energy of a Seaglider')
         rows = {key: len(found[key]) for key in MOVES if key != 'cc_per_count'}
         if len(set(rows.values())) > 1:
             told = ', '.join(f'{MOVES[key][0]} {count}' for key, count in rows.items())

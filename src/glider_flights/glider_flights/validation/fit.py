@@ -35,13 +35,11 @@ class Constant(NamedTuple):
     """Something that can be fitted."""
 
     unit: str
-    #: A step of it that is felt, in its unit.
-    step: float
+    step: float  #: a step of it that is felt, in its unit
     #: Its value in a model, and the model with another one.
     read: Callable[[Model], float]
     write: Callable[[Model, float], Model]
-    #: It is no less.
-    lowest: float = -math.inf
+    lowest: float = -math.inf  #: it is no less
 
 
 def _of_vehicle(field: str, unit: str, step: float, lowest: float = -math.inf) -> Constant:

@@ -39,10 +39,8 @@ class Model(NamedTuple):
 class Simulated(NamedTuple):
     """What the plant did along a stretch, arrays of shape (n,)."""
 
-    #: Vertical rate (m/s, + down), over the same time as the recorded one.
-    rate_mps: np.ndarray
-    #: Speed through the water (m/s).
-    speed_mps: np.ndarray
+    rate_mps: np.ndarray  #: vertical rate (m/s, + down), over the same time as the recorded one
+    speed_mps: np.ndarray  #: speed through the water (m/s)
     #: Way through the water since the first sample (m), along the heading and to starboard.
     ahead_m: np.ndarray
     abeam_m: np.ndarray

@@ -135,22 +135,8 @@ def _held(u, v, w, turn, forcing, phi_dot, theta_dot, vehicle):
     p = phi_dot - turn * s_t
     q = theta_dot * c_f + turn * s_f * c_t
     r = -theta_dot * s_f + turn * c_f * c_t
-    attitude = quaternion_from_euler(forcing.phi, forcing.theta, 0.0)
-    motion = Motion(
-        p_n=0.0,
-        p_e=0.0,
-        p_d=forcing.depth,
-        q_w=attitude[0],
-        q_x=attitude[1],
-        q_y=attitude[2],
-        q_z=attitude[3],
-        u=u,
-        v=v,
-        w=w,
-        p=p,
-        q=q,
-        r=r,
-    )
+    q_w, q_x, q_y, q_z = quaternion_from_euler(forcing.phi, forcing.theta, 0.0)
+    motion = Motion(0.0, 0.0, forcing.depth, q_w, q_x, q_y, q_z, u, v, w, p, q, r)
     inertia = make_inertia(forcing.x_p, forcing.mu, vehicle)
     water = MeasuredWater(forcing.ratio, forcing.temperature)
     a = acceleration(motion, _joints(forcing), inertia, _STILL, vehicle, water)
@@ -161,16 +147,8 @@ def _held(u, v, w, turn, forcing, phi_dot, theta_dot, vehicle):
     f_x, f_y, f_z = _turned(inertia, a[3] - e_x, a[4] - e_y, a[5] - e_z)
     d_x, d_y, d_z = _turned(inertia, k_x, k_y, k_z)
     turn_dot = (k_x * f_x + k_y * f_y + k_z * f_z) / (k_x * d_x + k_y * d_y + k_z * d_z)
-    b = solve_mass(
-        0.0,
-        0.0,
-        0.0,
-        turn_dot * d_x - f_x,
-        turn_dot * d_y - f_y,
-        turn_dot * d_z - f_z,
-        inertia,
-        vehicle,
-    )
+    m_x, m_y, m_z = turn_dot * d_x - f_x, turn_dot * d_y - f_y, turn_dot * d_z - f_z
+    b = solve_mass(0.0, 0.0, 0.0, m_x, m_y, m_z, inertia, vehicle)
     return a[0] + b[0], a[1] + b[1], a[2] + b[2], turn_dot
 
 
@@ -251,21 +229,7 @@ def fly_free(table, vehicle, step, flown):
     """Fly with the actuators imposed; attitude is the plant's own. See `fly_held`."""
     start = table[0]
     q_w, q_x, q_y, q_z = quaternion_from_euler(start[2], start[3], 0.0)
-    x = Motion(
-        p_n=0.0,
-        p_e=0.0,
-        p_d=start[1],
-        q_w=q_w,
-        q_x=q_x,
-        q_y=q_y,
-        q_z=q_z,
-        u=START_MPS,
-        v=0.0,
-        w=0.0,
-        p=0.0,
-        q=0.0,
-        r=0.0,
-    )
+    x = Motion(0.0, 0.0, start[1], q_w, q_x, q_y, q_z, START_MPS, 0.0, 0.0, 0.0, 0.0, 0.0)
     down, ahead, abeam, heading, last = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(len(table)):
         here = table[k]

@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from glider_flights.folders import installed
 from glider_flights.reckoning import vertical_rate
 from glider_flights.record import Flight
 from glider_flights.validation.flying import Model
 from glider_flights.validation.score import rms
 from glider_flights.validation.track import RATE_S, Track
+from glider_model.base.errors import ConfigurationError
 
 #: As the documentation of gliderflight has it: lift slope of the hull (1/rad), induced drag
 #: (1/rad^2), and the parasitic drag that its fit begins with.
@@ -24,12 +26,10 @@ def peer(flight: Flight, found: list[Track], model: Model) -> tuple[dict[str, An
     if any(np.isfinite(rate).any() for rate in own):
         return _figures('basestation', found, own), ''
     try:
-        import gliderflight
-    except ImportError:
-        return None, (
-            'gliderflight, the model to compare with, is not installed; install it with: '
-            './glider python -m pip install --no-deps -r requirements-flights.txt'
-        )
+        with installed('gliderflight, the model to compare with'):
+            import gliderflight
+    except ConfigurationError as error:
+        return None, str(error)
     if any(np.isnan(track.density_kgpm3).all() for track in found):
         return None, 'gliderflight needs temperature and salinity, which were not recorded'
     return _figures('gliderflight', found, _gliderflight(gliderflight, found, model)), ''

@@ -37,8 +37,7 @@ class Validation(NamedTuple):
     flown: list[Simulated]
     model: Model
     adcp: Adcp | None
-    #: Figures, as `--json` prints them.
-    report: dict[str, Any]
+    report: dict[str, Any]  #: figures, as `--json` prints them
 
 
 def validate(

@@ -3,6 +3,7 @@
 """How far off the plant came out, beside the flight and beside the models of others."""
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,9 +60,9 @@ def score(
         'segments': len(found),
         'samples': len(rate),
         'w_rmse_cmps': rms(rate, 100.0),
-        'w_bias_cmps': mean(rate, 100.0),
+        'w_bias_cmps': figure(rate, 100.0),
         'u_adcp_rmse_cmps': rms(speed, 100.0),
-        'u_adcp_bias_cmps': mean(speed, 100.0),
+        'u_adcp_bias_cmps': figure(speed, 100.0),
         'pitch_rmse_deg': rms(pitch, math.degrees(1.0)),
         'turn_rate_per_sin_roll': {
             name: {
@@ -74,16 +75,17 @@ def score(
     }
 
 
+def figure(
+    values: np.ndarray, scale: float, of: Callable[[np.ndarray], float] = np.mean
+) -> float | None:
+    """A mean, or another figure, of what is known; None if nothing is."""
+    values = values[np.isfinite(values)]
+    return round(scale * float(of(values)), 4) if len(values) else None
+
+
 def rms(values: np.ndarray, scale: float) -> float | None:
     """Root mean square of what is known; None if nothing is."""
-    values = values[np.isfinite(values)]
-    return round(scale * float(np.sqrt(np.mean(values**2))), 4) if len(values) else None
-
-
-def mean(values: np.ndarray, scale: float) -> float | None:
-    """Mean of what is known; None if nothing is."""
-    values = values[np.isfinite(values)]
-    return round(scale * float(np.mean(values)), 4) if len(values) else None
+    return figure(values, scale, lambda known: np.sqrt(np.mean(known**2)))
 
 
 def speed_off(track: Track, flown: Simulated, adcp: Adcp) -> np.ndarray:
@@ -97,10 +99,8 @@ def _turn_rate(pairs, phase: float, recorded: bool) -> float | None:
     rows, rates = [], []
     for track, one in pairs:
         time_s = track.instruments.time_s
-        heading = one.heading_rad
-        roll = one.roll_rad
-        if recorded:
-            heading, roll = track.instruments.heading_rad, track.instruments.roll_rad
+        told = track.instruments if recorded else one
+        heading, roll = told.heading_rad, told.roll_rad
         good = np.isfinite(heading) & np.isfinite(roll)
         if good.sum() < 3:
             continue
@@ -133,10 +133,10 @@ def _closure(flight: Flight, pairs) -> dict[str, Any]:
             reckoned = reckon(segment)._replace(way_m=way)
             own = comparable_current(flight, segment, reckoned)
             off.append(float(np.hypot(*(own - segment.on_board.dac_mps))))
-    off = np.array([value for value in off if math.isfinite(value)])
+    off = np.array(off, float)
     return {
-        'median': round(100.0 * float(np.median(off)), 4) if len(off) else None,
-        'segments': len(off),
+        'median': figure(off, 100.0, np.median),
+        'segments': int(np.isfinite(off).sum()),
     }
 
 
@@ -145,9 +145,8 @@ def _way(segment: Segment, pairs) -> np.ndarray | None:
     way, seconds = np.zeros(2), 0.0
     for track, one in pairs:
         time_s, heading = track.instruments.time_s, track.instruments.heading_rad
-        if not segment.before.time_s[-1] <= 0.5 * (time_s[0] + time_s[-1]):
-            continue
-        if not 0.5 * (time_s[0] + time_s[-1]) <= segment.after.time_s[0]:
+        middle_s = 0.5 * (time_s[0] + time_s[-1])
+        if not segment.before.time_s[-1] <= middle_s <= segment.after.time_s[0]:
             continue
         ahead, abeam = np.diff(one.ahead_m), np.diff(one.abeam_m)
         middle = np.unwrap(heading)

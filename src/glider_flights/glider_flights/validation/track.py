@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_flights.reckoning import vertical_rate
-from glider_flights.record import SURFACE_DEPTH_M, Flight, Instruments
+from glider_flights.record import SURFACE_DEPTH_M, Flight, Instruments, in_order
 from glider_flights.seawater import density_of, pressure_of
 from glider_model.base.errors import ConfigurationError
 
@@ -28,17 +28,11 @@ class Track(NamedTuple):
     """A stretch under water without a gap; arrays of shape (n,)."""
 
     instruments: Instruments
-    #: Pressure (dbar, above that of the air).
-    pressure_dbar: np.ndarray
-    #: Density in situ (kg/m^3), NaN where it is not known.
-    density_kgpm3: np.ndarray
-    #: Recorded vertical rate (m/s, + down).
-    rate_mps: np.ndarray
-    #: Number of the half dive, and whether it is a dive (1) or a climb (-1).
-    half: np.ndarray
-    phase: np.ndarray
-    #: Whether it is compared.
-    counts: np.ndarray
+    pressure_dbar: np.ndarray  #: pressure (dbar, above that of the air)
+    density_kgpm3: np.ndarray  #: density in situ (kg/m^3), NaN where it is not known
+    rate_mps: np.ndarray  #: recorded vertical rate (m/s, + down)
+    phase: np.ndarray  #: whether it is a dive (1) or a climb (-1)
+    counts: np.ndarray  #: whether it is compared
 
 
 def tracks(flight: Flight) -> list[Track]:
@@ -49,7 +43,7 @@ def tracks(flight: Flight) -> list[Track]:
     ConfigurationError
         If there is none.
     """
-    whole = _usable(flight.instruments)
+    whole = in_order(flight.instruments, 3)  # time, depth and pitch
     under = whole.depth_m > SURFACE_DEPTH_M
     usual_s = float(np.median(np.diff(whole.time_s[under]))) if under.sum() > 1 else 0.0
     gap_s = max(LONGEST_GAP_S, LONGEST_GAP * usual_s)
@@ -70,13 +64,6 @@ def tracks(flight: Flight) -> list[Track]:
     return found
 
 
-def _usable(whole: Instruments) -> Instruments:
-    """Instruments in the order of time, where time, depth and pitch are known."""
-    table = np.stack(whole)
-    table = table[:, np.isfinite(table[:3]).all(axis=0)]
-    return Instruments(*table[:, np.unique(table[0], return_index=True)[1]])
-
-
 def _track(own: Instruments, origin_deg: np.ndarray) -> Track:
     water = {
         name: _by_depth(own.depth_m, getattr(own, name))
@@ -86,11 +73,8 @@ def _track(own: Instruments, origin_deg: np.ndarray) -> Track:
     pressure = pressure_of(own.depth_m, origin_deg[0])
     density = density_of(own.salinity, own.temperature_degc, pressure, origin_deg)
     turns = _turns(own.depth_m)
-    half = np.zeros(len(own.time_s), int)
-    half[turns[1:-1]] = 1
-    half = np.cumsum(half)
-    counts = np.zeros(len(half), bool)
-    phase = np.zeros(len(half))
+    counts = np.zeros(len(own.time_s), bool)
+    phase = np.zeros(len(own.time_s))
     for begin, end in zip(turns[:-1], turns[1:], strict=True):
         depth = own.depth_m[begin : end + 1]
         phase[begin : end + 1] = math.copysign(1.0, depth[-1] - depth[0])
@@ -100,7 +84,6 @@ def _track(own: Instruments, origin_deg: np.ndarray) -> Track:
         pressure_dbar=pressure,
         density_kgpm3=density,
         rate_mps=vertical_rate(own.time_s, own.depth_m, RATE_S),
-        half=half,
         phase=phase,
         counts=counts,
     )

@@ -11,6 +11,7 @@ import json
 import os
 import re
 import stat
+from collections.abc import Iterable, Iterator
 from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
@@ -136,101 +137,78 @@ def _scalar(event: yaml.ScalarEvent) -> Any:
         raise _RefusedError(line, f'{shown(text)} is not a number') from None
 
 
-class _Open:
-    """A mapping or list whose end has not come yet."""
+class _Builder:
+    """Builds the value of a text from its events.
 
-    def __init__(self, event: yaml.CollectionStartEvent, location: Location, count: int) -> None:
-        self.values: Any = {} if isinstance(event, yaml.MappingStartEvent) else []
-        self.anchor, self.location, self.count = event.anchor, location, count
-        self.key: str | None = None  #: of a mapping: name of the field whose value comes next
+    Neither deep nor repeated values cost anything before they are refused.
+    """
 
-    def next_key(self, event: yaml.Event) -> bool:
-        """Take in the name of a field, if one is due."""
-        if isinstance(self.values, list) or self.key is not None:
-            return False
+    def __init__(self, events: Iterable[yaml.Event]) -> None:
+        self._events = self._plain(events)
+        self._anchors: dict[str, tuple[Any, int]] = {}  #: value, and how many it is
+        self._count = 0
+        self.lines: dict[Location, int] = {}
+        first = next(self._events, None)
+        self.value = None if first is None else self._built(first, ())  #: nothing is None
+        for event in self._events:
+            raise _RefusedError(event.start_mark.line + 1, 'a second document (allowed: one)')
+
+    @staticmethod
+    def _plain(events: Iterable[yaml.Event]) -> Iterator[yaml.Event]:
+        """Events that values are made of; none of them has a tag."""
+        for event in events:
+            tag = getattr(event, 'tag', None)
+            if tag is not None:
+                name = shown(tag.replace('tag:yaml.org,2002:', '!!'))
+                line = event.start_mark.line + 1
+                raise _RefusedError(line, f'tag {name} (allowed: values without tags)')
+            if isinstance(event, yaml.NodeEvent | yaml.CollectionEndEvent):
+                yield event
+
+    def _built(self, event: yaml.NodeEvent, where: Location) -> Any:
+        """Value that begins with an event."""
+        line = event.start_mark.line + 1
+        self.lines.setdefault(where, line)
+        before = self._count
+        self._count_more(1, line)
+        if isinstance(event, yaml.AliasEvent):
+            if event.anchor not in self._anchors:
+                raise _RefusedError(line, f'alias {shown(event.anchor)} of nothing above')
+            value, count = self._anchors[event.anchor]
+            self._count_more(count - 1, line)
+            return deepcopy(value)
+        if isinstance(event, yaml.ScalarEvent):
+            value = _scalar(event)
+        elif len(where) >= MAX_DEPTH:
+            raise _RefusedError(line, f'nested more than {MAX_DEPTH} deep')
+        elif isinstance(event, yaml.SequenceStartEvent):
+            value = [self._built(one, (*where, str(i))) for i, one in enumerate(self._inside())]
+        else:
+            value = {}
+            for name in self._inside():
+                key = self._key(name, value)
+                self.lines[(*where, key)] = name.start_mark.line + 1
+                value[key] = self._built(next(self._events), (*where, key))
+        if event.anchor:
+            self._anchors[event.anchor] = value, self._count - before
+        return value
+
+    def _inside(self) -> Iterator[yaml.NodeEvent]:
+        """Events with which the values of a mapping or list begin, each once it is built."""
+        while not isinstance(event := next(self._events), yaml.CollectionEndEvent):
+            yield event
+
+    @staticmethod
+    def _key(event: yaml.NodeEvent, others: dict[str, Any]) -> str:
+        """Name of a field."""
         line = event.start_mark.line + 1
         if not isinstance(event, yaml.ScalarEvent) or event.anchor:
             raise _RefusedError(line, 'the name of a field must be plain text')
         if _CONTROL.search(event.value):
             raise _RefusedError(line, f'control character in the name {shown(event.value)}')
-        if event.value in self.values:
+        if event.value in others:
             raise _RefusedError(line, f'field {shown(event.value)} is given twice')
-        self.key = event.value
-        return True
-
-    def next_location(self) -> Location:
-        """Where the next value will be."""
-        part = str(len(self.values)) if isinstance(self.values, list) else self.key
-        return (*self.location, part)
-
-    def put(self, value: Any) -> None:
-        """Take in a value."""
-        if isinstance(self.values, list):
-            self.values.append(value)
-        else:
-            self.values[self.key], self.key = value, None
-
-
-class _Builder:
-    """Builds the values of a text from its events.
-
-    Neither deep nor repeated values cost anything before they are refused.
-    """
-
-    def __init__(self) -> None:
-        self.lines: dict[Location, int] = {}
-        self._top = _Open(yaml.SequenceStartEvent(None, None, True), (), 0)
-        self._open = [self._top]
-        self._anchors: dict[str, tuple[Any, int]] = {}  #: value, and how many it is
-        self._count = 0
-
-    @property
-    def value(self) -> Any:
-        """What the text says; nothing is None."""
-        return self._top.values[0] if self._top.values else None
-
-    def take(self, event: yaml.Event) -> None:
-        """Take in the next event."""
-        inside = self._open[-1]
-        if isinstance(event, yaml.CollectionEndEvent):
-            self._open.pop()
-            self._put(inside.values, inside.anchor, self._count - inside.count)
-            return
-        if not isinstance(event, yaml.NodeEvent):
-            return
-        line = event.start_mark.line + 1
-        tag = getattr(event, 'tag', None)
-        if tag is not None:
-            name = tag.replace('tag:yaml.org,2002:', '!!')
-            raise _RefusedError(line, f'tag {shown(name)} (allowed: values without tags)')
-        if inside.next_key(event):
-            self.lines[inside.next_location()] = line
-            return
-        if inside is self._top and inside.values:
-            raise _RefusedError(line, 'a second document (allowed: one)')
-        where = inside.next_location()
-        self.lines.setdefault(where, line)
-        self._count_more(1, line)
-        if isinstance(event, yaml.AliasEvent):
-            self._repeat(event, line)
-        elif isinstance(event, yaml.ScalarEvent):
-            self._put(_scalar(event), event.anchor, 1)
-        elif len(self._open) > MAX_DEPTH:
-            raise _RefusedError(line, f'nested more than {MAX_DEPTH} deep')
-        else:
-            self._open.append(_Open(event, where, self._count - 1))
-
-    def _put(self, value: Any, anchor: str | None, count: int) -> None:
-        self._open[-1].put(value)
-        if anchor:
-            self._anchors[anchor] = value, count
-
-    def _repeat(self, event: yaml.AliasEvent, line: int) -> None:
-        if event.anchor not in self._anchors:
-            raise _RefusedError(line, f'alias {shown(event.anchor)} of nothing above')
-        value, count = self._anchors[event.anchor]
-        self._count_more(count - 1, line)
-        self._put(deepcopy(value), None, count)
+        return event.value
 
     def _count_more(self, count: int, line: int) -> None:
         self._count += count
@@ -245,10 +223,8 @@ def _parse(text: str) -> tuple[Any, dict[Location, int]]:
     if odd:
         what = 'control character' if _CONTROL.match(odd[0]) else 'directive'
         raise _RefusedError(text.count('\n', 0, odd.start()) + 1, f'{what} {shown(odd[0])}')
-    builder = _Builder()
     try:
-        for event in yaml.parse(text, Loader=yaml.CSafeLoader):
-            builder.take(event)
+        builder = _Builder(yaml.parse(text, Loader=yaml.CSafeLoader))
     except yaml.MarkedYAMLError as error:
         what = ', '.join(part for part in (error.context, error.problem) if part)
         raise _RefusedError(error.problem_mark.line + 1, what) from None
@@ -290,11 +266,8 @@ def yaml_line(path: Path, location: Location) -> int | None:
         lines = _parse(read_text(path))[1]
     except (ConfigurationError, _RefusedError):  # it has changed since
         return None
-    for end in range(len(location), 0, -1):
-        line = lines.get(('0', *location[:end]))
-        if line:
-            return line
-    return None
+    owners = (location[:end] for end in range(len(location), 0, -1))
+    return next((lines[owner] for owner in owners if owner in lines), None)
 
 
 class _Dumper(yaml.SafeDumper):

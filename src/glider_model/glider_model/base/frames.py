@@ -117,43 +117,21 @@ def swap_world(q_w, q_x, q_y, q_z):
 @kernel
 def odometry_to_wire(odometry):
     """Odometry as ENU / FLU numbers: position, quaternion w x y z, linear, angular (13)."""
-    q_w, q_x, q_y, q_z = swap_world(odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z)
-    return (
-        odometry.p_e,
-        odometry.p_n,
-        -odometry.p_d,
-        q_w,
-        q_x,
-        q_y,
-        q_z,
-        odometry.u,
-        -odometry.v,
-        -odometry.w,
-        odometry.p,
-        -odometry.q,
-        -odometry.r,
-    )
+    place = odometry.p_e, odometry.p_n, -odometry.p_d
+    attitude = swap_world(odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z)
+    linear = odometry.u, -odometry.v, -odometry.w
+    angular = odometry.p, -odometry.q, -odometry.r
+    return place + attitude + linear + angular
 
 
 @kernel
 def odometry_from_wire(wire):
     """Odometry from the 13 numbers of ``odometry_to_wire``."""
+    p_n, p_e, p_d = wire[1], wire[0], -wire[2]
     q_w, q_x, q_y, q_z = swap_world(wire[3], wire[4], wire[5], wire[6])
-    return Odometry(
-        p_n=wire[1],
-        p_e=wire[0],
-        p_d=-wire[2],
-        q_w=q_w,
-        q_x=q_x,
-        q_y=q_y,
-        q_z=q_z,
-        u=wire[7],
-        v=-wire[8],
-        w=-wire[9],
-        p=wire[10],
-        q=-wire[11],
-        r=-wire[12],
-    )
+    u, v, w = wire[7], -wire[8], -wire[9]
+    p, q, r = wire[10], -wire[11], -wire[12]
+    return Odometry(p_n, p_e, p_d, q_w, q_x, q_y, q_z, u, v, w, p, q, r)
 
 
 @kernel
@@ -168,16 +146,7 @@ def imu_to_wire(imu):
 def imu_from_wire(wire):
     """Attitude and rates from the 8 numbers of ``imu_to_wire``."""
     q_w, q_x, q_y, q_z = swap_world(wire[0], wire[1], wire[2], wire[3])
-    return Imu(
-        q_w=q_w,
-        q_x=q_x,
-        q_y=q_y,
-        q_z=q_z,
-        p=wire[4],
-        q=-wire[5],
-        r=-wire[6],
-        has_rates=wire[7] >= 0.0,
-    )
+    return Imu(q_w, q_x, q_y, q_z, wire[4], -wire[5], -wire[6], wire[7] >= 0.0)
 
 
 @kernel
@@ -205,22 +174,10 @@ def reference_to_wire(reference):
     angular the Euler rates (roll, pitch, yaw) in the ENU sense.
     """
     q = quaternion_from_euler(reference.phi, reference.theta, reference.psi)
-    q_w, q_x, q_y, q_z = swap_world(q[0], q[1], q[2], q[3])
-    return (
-        reference.p_e,
-        reference.p_n,
-        -reference.p_d,
-        q_w,
-        q_x,
-        q_y,
-        q_z,
-        reference.v_e,
-        reference.v_n,
-        -reference.v_d,
-        reference.phi_dot,
-        -reference.theta_dot,
-        -reference.psi_dot,
-    )
+    place = reference.p_e, reference.p_n, -reference.p_d
+    linear = reference.v_e, reference.v_n, -reference.v_d
+    angular = reference.phi_dot, -reference.theta_dot, -reference.psi_dot
+    return place + swap_world(q[0], q[1], q[2], q[3]) + linear + angular
 
 
 @kernel
@@ -228,20 +185,10 @@ def reference_from_wire(wire):
     """Reference from the 13 numbers of ``reference_to_wire``."""
     q_w, q_x, q_y, q_z = swap_world(wire[3], wire[4], wire[5], wire[6])
     phi, theta, psi = euler_from_quaternion(q_w, q_x, q_y, q_z)
-    return Reference(
-        p_n=wire[1],
-        p_e=wire[0],
-        p_d=-wire[2],
-        phi=phi,
-        theta=theta,
-        psi=psi,
-        v_n=wire[8],
-        v_e=wire[7],
-        v_d=-wire[9],
-        phi_dot=wire[10],
-        theta_dot=-wire[11],
-        psi_dot=-wire[12],
-    )
+    p_n, p_e, p_d = wire[1], wire[0], -wire[2]
+    v_n, v_e, v_d = wire[8], wire[7], -wire[9]
+    phi_dot, theta_dot, psi_dot = wire[10], -wire[11], -wire[12]
+    return Reference(p_n, p_e, p_d, phi, theta, psi, v_n, v_e, v_d, phi_dot, theta_dot, psi_dot)
 
 
 @kernel

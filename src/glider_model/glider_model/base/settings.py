@@ -45,6 +45,11 @@ def _models(annotation: Any) -> list[type[pydantic.BaseModel]]:
     return [model for part in get_args(annotation) for model in _models(part)]
 
 
+def _field(models: list[type[pydantic.BaseModel]], name: str) -> pydantic.fields.FieldInfo | None:
+    """Field of the first of the models that has it; None if none has."""
+    return next((m.model_fields[name] for m in models if name in m.model_fields), None)
+
+
 def _has_tag(model: type[pydantic.BaseModel], tag: str) -> bool:
     """Whether a model is the member of a union that ``tag`` stands for."""
     return any(tag in get_args(field.annotation) for field in model.model_fields.values())
@@ -70,7 +75,7 @@ def _follow(model: type[pydantic.BaseModel], location: tuple):
             continue
         path.append(str(part))
         holders = inside
-        field = next((m.model_fields[part] for m in holders if part in m.model_fields), None)
+        field = _field(holders, part)
         if field is not None:
             inside = _models(field.annotation)
     return path, holders, field
@@ -113,7 +118,7 @@ def find_field(model: type[Settings], name: str) -> pydantic.fields.FieldInfo | 
     for part in name.split('.'):
         if field is not None and get_origin(field.annotation) is list and part.isdecimal():
             continue
-        field = next((m.model_fields[part] for m in inside if part in m.model_fields), None)
+        field = _field(inside, part)
         if field is None:
             return None
         inside = _models(field.annotation)

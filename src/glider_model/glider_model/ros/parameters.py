@@ -44,6 +44,10 @@ _TYPES = {
 }
 _MISSING = object()
 _LARGEST = {float: sys.float_info.max, int: 2**63 - 1}
+_RANGES = {
+    float: ('floating_point_range', FloatingPointRange),
+    int: ('integer_range', IntegerRange),
+}
 
 
 class _Leaf(NamedTuple):
@@ -68,6 +72,17 @@ class _Leaf(NamedTuple):
         words = get_args(self.field.annotation)
         return words if all(isinstance(word, str) for word in words) else ()
 
+    @property
+    def limits(self) -> tuple | None:
+        """Smallest and largest value of a number; None if everything is allowed."""
+        found, largest = {}, _LARGEST.get(self.kind)
+        for item in self.field.metadata if largest else ():
+            for key in ('ge', 'gt', 'le', 'lt'):
+                limit = getattr(item, key, None)
+                if limit is not None:
+                    found[key[0]] = self.kind(limit)
+        return (found.get('g', -largest), found.get('l', largest)) if found else None
+
 
 def _is_model(kind) -> bool:
     return isinstance(kind, type) and issubclass(kind, pydantic.BaseModel)
@@ -90,18 +105,6 @@ def _text(field: FieldInfo, value) -> str:
     return pydantic.TypeAdapter(field.annotation).dump_json(value).decode()
 
 
-def _limits(field: FieldInfo, kind: type) -> tuple | None:
-    found = {}
-    for item in field.metadata:
-        for key in ('ge', 'gt', 'le', 'lt'):
-            limit = getattr(item, key, None)
-            if limit is not None:
-                found[key[0]] = kind(limit)
-    if not found or kind not in _LARGEST:
-        return None
-    return found.get('g', -_LARGEST[kind]), found.get('l', _LARGEST[kind])
-
-
 def _descriptor(leaf: _Leaf) -> ParameterDescriptor:
     extra = leaf.field.json_schema_extra
     descriptor = ParameterDescriptor(
@@ -113,19 +116,15 @@ def _descriptor(leaf: _Leaf) -> ParameterDescriptor:
         descriptor.additional_constraints = 'JSON or YAML text'
     if leaf.choices:
         descriptor.additional_constraints = f'one of {", ".join(leaf.choices)}'
-    limits = _limits(leaf.field, leaf.kind) if leaf.kind else None
-    if limits and leaf.kind is float:
-        descriptor.floating_point_range = [
-            FloatingPointRange(from_value=limits[0], to_value=limits[1])
-        ]
-    elif limits:
-        descriptor.integer_range = [IntegerRange(from_value=limits[0], to_value=limits[1])]
+    if limits := leaf.limits:
+        name, kind = _RANGES[leaf.kind]
+        setattr(descriptor, name, [kind(from_value=limits[0], to_value=limits[1])])
     return descriptor
 
 
 def _refuse(node: Node, leaf: _Leaf, value, reason: str) -> ConfigurationError:
     """Error that says which parameter cannot be used, its value, and what is allowed."""
-    limits = _limits(leaf.field, leaf.kind) if leaf.kind else None
+    limits = leaf.limits
     allowed = f' (allowed: {limits[0]} to {limits[1]})' if limits else ''
     return ConfigurationError(
         f'{node.get_name()}: parameter {leaf.name} = {shown(value)}: {reason}{allowed}'
@@ -153,14 +152,16 @@ def _declare(node: Node, leaf: _Leaf) -> None:
         raise _refuse(node, leaf, given, reason) from None
 
 
-def _parse(leaf: _Leaf, value):
+def _parse(leaf: _Leaf, value, source: str):
     """Value of a parameter as the model takes it."""
     if leaf.kind is not None or not isinstance(value, str):
         return value
-    try:
-        return parse_json(value, leaf.name)
-    except ConfigurationError:
-        return parse_yaml(value, leaf.name)
+    for parse in (parse_json, parse_yaml):
+        try:
+            return parse(value, leaf.name)
+        except ConfigurationError as error:
+            why = f'not JSON or YAML: {error}'
+    raise ConfigurationError(f'{source} {leaf.name} = {shown(value)}: {why}')
 
 
 def _nested(values: dict[str, Any]) -> dict[str, Any]:
@@ -175,19 +176,14 @@ def _nested(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _validated(node: Node, model: type[SettingsT], leaves, values: dict[str, Any]) -> SettingsT:
-    tree = {}
-    for leaf in leaves:
-        try:
-            tree[leaf.name] = _parse(leaf, values[leaf.name])
-        except ConfigurationError as error:
-            reason = f'not JSON or YAML: {error}'
-            raise _refuse(node, leaf, values[leaf.name], reason) from None
+    source = f'{node.get_name()}: parameter'
+    tree = {leaf.name: _parse(leaf, values[leaf.name], source) for leaf in leaves}
     try:
         settings = model.model_validate(_nested(tree))
         settings.check()
         return settings
     except pydantic.ValidationError as error:
-        lines = [f'{node.get_name()}: parameter {text}' for _, text in mistakes(error, model)]
+        lines = (f'{source} {text}' for _, text in mistakes(error, model))
         raise ConfigurationError('\n'.join(lines)) from None
 
 
@@ -277,13 +273,11 @@ def to_parameters(settings: Settings) -> dict[str, Any]:
 
 def changed_parameters(before: Settings, after: Settings) -> dict[str, str]:
     """Parameters in which two settings of one kind differ: the later values, as JSON, by name."""
-
-    def texts(settings: Settings) -> dict[str, str]:
-        leaves = _leaves(type(settings), settings)
-        return {leaf.name: _text(leaf.field, leaf.default) for leaf in leaves}
-
-    old = texts(before)
-    return {name: text for name, text in texts(after).items() if text != old[name]}
+    old, new = (
+        {leaf.name: _text(leaf.field, leaf.default) for leaf in _leaves(type(one), one)}
+        for one in (before, after)
+    )
+    return {name: text for name, text in new.items() if text != old[name]}
 
 
 def with_parameters(settings: SettingsT, values: dict[str, str]) -> SettingsT:
@@ -316,12 +310,7 @@ def from_parameters(model: type[SettingsT], values: dict[str, Any], source: str)
         for part in leaf.name.split('.'):
             branch = branch.get(part, _MISSING) if isinstance(branch, dict) else _MISSING
         if branch is not _MISSING:
-            try:
-                tree[leaf.name] = _parse(leaf, branch)
-            except ConfigurationError as error:
-                raise ConfigurationError(
-                    f'{source}: {leaf.name} = {shown(branch)}: not JSON or YAML: {error}'
-                ) from None
+            tree[leaf.name] = _parse(leaf, branch, f'{source}:')
     return validate(model, _nested(tree), source)
 
 

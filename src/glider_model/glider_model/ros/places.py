@@ -59,26 +59,22 @@ def domain_id() -> Iterator[int]:
     ConfigurationError
         If all of them are taken, or $ROS_DOMAIN_ID is none.
     """
-    given = given_domain()
-    if given is not None:  # others may have been given it too, but nobody shall draw it
-        lock = _locked(given, fcntl.LOCK_SH)
-        try:
-            yield given
-        finally:
+    domain, lock = given_domain(), None
+    if domain is not None:  # others may have been given it too, but nobody shall draw it
+        lock = _locked(domain, fcntl.LOCK_SH)
+    else:
+        for offset in range(len(_DOMAINS)):
+            domain = _DOMAINS[(os.getpid() + offset) % len(_DOMAINS)]
+            lock = _locked(domain, fcntl.LOCK_EX, fcntl.LOCK_SH)
             if lock is not None:
-                os.close(lock)
-        return
-    for offset in range(len(_DOMAINS)):
-        domain = _DOMAINS[(os.getpid() + offset) % len(_DOMAINS)]
-        lock = _locked(domain, fcntl.LOCK_EX, fcntl.LOCK_SH)
-        if lock is None:
-            continue
-        try:
-            yield domain
-        finally:
+                break
+        else:
+            raise ConfigurationError('every ROS domain from 1 to 101 is in use by another run')
+    try:
+        yield domain
+    finally:
+        if lock is not None:
             os.close(lock)
-        return
-    raise ConfigurationError('every ROS domain from 1 to 101 is in use by another run')
 
 
 def _locked(domain: int, *kinds: int) -> int | None:

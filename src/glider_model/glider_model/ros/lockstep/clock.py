@@ -220,9 +220,8 @@ class ClockNode(TickNode):
 
     def _keep_said(self, lead: _Lead, message: Header) -> None:
         recorder = self.reports.get(topics.RECORDER)
-        if recorder is None or message.frame_id != recorder.process:
-            return  # of the recorder of a second glider
-        lead.said_ns = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
+        if recorder is not None and message.frame_id == recorder.process:  # no second glider's
+            lead.said_ns = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
 
     def _on_recorder(self, lead: _Lead, message: Header) -> None:
         self._keep_said(lead, message)

@@ -9,6 +9,7 @@ same result every time. Free-running nodes act at 10 Hz on the newest inputs and
 
 import time
 from collections.abc import Callable
+from functools import partial
 from uuid import uuid4
 
 from pydantic import Field
@@ -305,22 +306,19 @@ class TickNode(Node):
             tick = max(0, self._due_ns or 0) // TICK_NS
             raise Stop(EXIT_PEER, not_finite(f'{error}: that', tick)) from None
         except MessageError as error:
-            self.refuse(item, str(error))
+            self.refuse(item, partial(str, error))
             return
         if self._due_ns is None and item.stamp_ns > 0:
             # of a run that is under way: one's own begins with tick 0
             item.stamp_ns = -1
             item.owner.restart()
 
-    def refuse(self, item: Input, why: str) -> None:
+    def refuse(self, item: Input, why: Callable[[], str]) -> None:
         """Tell that a message was refused, the first one at once and then now and then."""
         if item.refuse():
-            self._tell_refused(item, why)
-
-    def _tell_refused(self, item: Input, why: str) -> None:
-        stamp_ns = max(0, self._due_ns if self._due_ns is not None else item.stamp_ns)
-        values = {f'{item.topic.name}_refused': item.refused}
-        self.event(stamp_ns, health.ERROR, f'message refused: {why}', **values)
+            stamp_ns = max(0, self._due_ns if self._due_ns is not None else item.stamp_ns)
+            values = {f'{item.topic.name}_refused': item.refused}
+            self.event(stamp_ns, health.ERROR, f'message refused: {why()}', **values)
 
     def is_of_owner(self, item: Input, info: dict) -> bool:
         """Whether a message is of whom the topic belongs to; tells if not, and if that changes."""
@@ -349,8 +347,7 @@ class TickNode(Node):
 
     def refuse_stranger(self, item: Input, gid: bytes) -> None:
         """Tell that somebody else publishes an input."""
-        if item.refuse():
-            self._tell_refused(item, peers.stranger(self, item.topic, gid))
+        self.refuse(item, lambda: peers.stranger(self, item.topic, gid))
 
     def tell_successor(self, item: Input, silent_s: float) -> None:
         """Tell that an input is somebody else's from now on."""
@@ -413,10 +410,8 @@ class TickNode(Node):
 
     def watch_tick(self) -> None:
         """Tell the peers if this node waits for one of them; the plant ends the run."""
-        if self._due_ns is not None:
-            self._report_wait()
-
-    def _report_wait(self) -> None:
+        if self._due_ns is None:
+            return
         if self._wait.stuck_s(self._due_ns) < REPORT_AFTER * self.ticks.tick_timeout_s:
             return
         self._wait.end_until_next_tick()
@@ -447,7 +442,6 @@ class TickNode(Node):
             item.accept_newest(raw, self.now_s(), self.ticks.input_max_age_s)
         except NotFiniteFieldError as error:
             if item.topic.name not in WHEN_SILENT:  # a receiver without a fix has no place
-                self.refuse(item, str(error))
-            return
+                self.refuse(item, partial(str, error))
         except MessageError as error:
-            self.refuse(item, str(error))
+            self.refuse(item, partial(str, error))

@@ -139,17 +139,17 @@ class Codec:
         raw += bytes(-len(raw) % 4)  # the middleware sends whole words
         places = {place.path: place for place in cdr_places(template)}
         self._stamp_at = places[f'{stamp}.sec'].start
-        found = [places[_indexed(template, path)] for path in self.fields]
-        self._offsets = [place.start for place in found]
+        split = [_split(template, path) for path in self.fields]
+        found = [places[name if i is None else f'{name}[{i}]'] for name, i in split]
         self._codes = [place.code for place in found]
-        self._lay_out(raw)
+        self._lay_out(raw, [place.start for place in found])
 
-    def _lay_out(self, raw: bytes) -> None:
+    def _lay_out(self, raw: bytes, offsets: list[int]) -> None:
         """Group the numbers into runs of neighbours and keep the constant rest."""
-        order = sorted(range(len(self.fields)), key=self._offsets.__getitem__)
+        order = sorted(range(len(offsets)), key=offsets.__getitem__)
         runs: list[tuple[str, int, list[int]]] = []
         for index in order:
-            at, code = self._offsets[index], self._codes[index]
+            at, code = offsets[index], self._codes[index]
             if runs and (code, at) == (runs[-1][0], runs[-1][1] + _size(code, len(runs[-1][2]))):
                 runs[-1][2].append(index)
             else:
@@ -334,40 +334,33 @@ def _value_at(message, path: str) -> str:
     return message
 
 
-def _split(path: str) -> tuple[str, str]:
+def _split(message, path: str) -> tuple[str, int | None]:
+    """Name of a field, and number of its entry, by a joint or by itself; None for all of it."""
     name, _, joint = path.partition('[')
-    return name, joint.rstrip(']')
-
-
-def _indexed(message, path: str) -> str:
-    """Path with the number of a joint in the place of its name."""
-    name, joint = _split(path)
+    joint, names = joint.rstrip(']'), list(getattr(message, 'name', ()))
     if not joint or joint.isdigit():
-        return path
-    return f'{name}[{list(message.name).index(joint)}]'
+        return name, int(joint) if joint else None
+    if joint not in names:
+        raise MessageError(f'joint {joint!r} is missing; the message has {names}')
+    return name, names.index(joint)
 
 
 def set_field(message, path: str, value: int) -> None:
     """Set the field at a dotted path; an entry of an array of float64 by its number."""
-    name, index = _split(path)
-    *owner, leaf = name.split('.')
-    holder = operator.attrgetter('.'.join(owner))(message) if owner else message
-    if index:
-        getattr(holder, leaf)[int(index)] = float(value)
-    else:
+    name, index = _split(message, path)
+    owner, _, leaf = name.rpartition('.')
+    holder = operator.attrgetter(owner)(message) if owner else message
+    if index is None:
         setattr(holder, leaf, value)
+    else:
+        getattr(holder, leaf)[index] = float(value)
 
 
 def _get(message, path: str) -> float:
-    name, joint = _split(path)
-    if not joint:
-        return operator.attrgetter(path)(message)
-    if joint.isdigit():
-        return operator.attrgetter(name)(message)[int(joint)]
-    names, values = list(message.name), getattr(message, name)
-    if joint not in names:
-        raise MessageError(f'joint {joint!r} is missing; the message has {names}')
-    index = names.index(joint)
+    name, index = _split(message, path)
+    values = operator.attrgetter(name)(message)
+    if index is None:
+        return values
     if index >= len(values):
-        raise MessageError(f'{name} of joint {joint!r} is missing')
+        raise MessageError(f'{name} of joint {message.name[index]!r} is missing')
     return values[index]
