@@ -33,10 +33,11 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
+from mcap.summary import Summary
 
 from glider_bringup.mission.disk import not_written, refuse_vanished
+from glider_bringup.recording.mcap_records import MAGIC
 
-MAGIC = b'\x89MCAP0\r\n'
 _MESSAGE = struct.Struct('<BQHIQQ')
 _INDEX_ENTRY = struct.Struct('<QQ')
 _LIBRARY = 'glider_bringup'
@@ -56,14 +57,8 @@ class McapWriter:
         self._pending = bytearray(MAGIC)  #: of the file, not yet handed to the operating system
         self._handed, self._checksum = 0, 0  #: length of what was, and its CRC
         self._compressor = zstandard.ZstdCompressor(level=3)
-        self._schemas: list[Schema] = []
-        self._channels: list[Channel] = []
-        self._chunks, self._chunk_indexes = 0, bytearray()  #: their number, and their records
-        self._attachment_indexes: list[AttachmentIndex] = []
-        self._metadata_indexes: list[MetadataIndex] = []
-        self.counts: dict[int, int] = {}
-        self.start_ns: int | None = None
-        self.end_ns = 0
+        self._summary = Summary()
+        self._counts: dict[int, int] = {}
         self._begin_chunk()
         self._put(Header(profile, _LIBRARY))
 
@@ -89,45 +84,27 @@ class McapWriter:
         except OSError as error:
             raise not_written(self._path, error) from None
 
-    def add_schema(self, name: str, encoding: str, data: bytes) -> int:
-        """Define a message type; returns its id."""
-        schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
-        self.define(schema)
-        return schema.id
-
-    def add_channel(self, topic: str, schema_id: int, metadata: dict[str, str]) -> int:
-        """Define a topic with CDR messages; returns its id."""
-        channel = Channel(
-            id=len(self._channels) + 1,
-            topic=topic,
-            message_encoding='cdr',
-            metadata=metadata,
-            schema_id=schema_id,
-        )
-        self.define(channel)
-        return channel.id
-
     def define(self, record: Schema | Channel) -> None:
-        """Define a message type or a topic under the id that it has."""
+        """Define a message type or a topic."""
         if isinstance(record, Channel):
-            self._channels.append(record)
-            self.counts[record.id] = 0
+            self._summary.channels[record.id] = record
+            self._counts[record.id] = 0
         else:
-            self._schemas.append(record)
+            self._summary.schemas[record.id] = record
         self._put(record)
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
         """Store a file beside the messages."""
         offset, length = self._put(Attachment(0, 0, name, media_type, data))
-        self._attachment_indexes.append(
+        self._summary.attachment_indexes.append(
             AttachmentIndex(offset, length, 0, 0, len(data), name, media_type)
         )
 
     def add_metadata(self, name: str, data: dict[str, str]) -> None:
         """Store named texts."""
         self.flush()
-        offset, length = self._put(Metadata(name=name, metadata=data))
-        self._metadata_indexes.append(MetadataIndex(offset=offset, length=length, name=name))
+        place = self._put(Metadata(name=name, metadata=data))
+        self._summary.metadata_indexes.append(MetadataIndex(*place, name))
 
     # ------------------------------------------------------------------ messages
 
@@ -203,7 +180,7 @@ class McapWriter:
         self.flush()
 
     def _note(self, channel_id: int, count: int, first_ns: int, last_ns: int) -> None:
-        self.counts[channel_id] += count
+        self._counts[channel_id] += count
         if self._chunk_start_ns is None or first_ns < self._chunk_start_ns:
             self._chunk_start_ns = first_ns
         self._chunk_end_ns = max(self._chunk_end_ns, last_ns)
@@ -263,10 +240,7 @@ class McapWriter:
             compressed_size=len(data),
             uncompressed_size=len(self._chunk),
         )
-        self._chunks += 1
-        self._chunk_indexes += _encoded(index)
-        self.start_ns = start_ns if self.start_ns is None else min(self.start_ns, start_ns)
-        self.end_ns = max(self.end_ns, self._chunk_end_ns)
+        self._summary.chunk_indexes.append(index)
         self._begin_chunk()
 
     # ------------------------------------------------------------------ end
@@ -277,11 +251,19 @@ class McapWriter:
         self._put(DataEnd(self._checksum))
         summary_start = self._tell()
         data, offsets = bytearray(), []
-        for opcode, records in self._summary().items():
+        summary = self.summary()
+        for records in (
+            [*summary.schemas.values()],
+            [*summary.channels.values()],
+            [summary.statistics],
+            summary.chunk_indexes,
+            summary.attachment_indexes,
+            summary.metadata_indexes,
+        ):
+            start, encoded = summary_start + len(data), b''.join(map(_encoded, records))
             if records:
-                start = summary_start + len(data)
-                offsets.append(SummaryOffset(opcode, start, len(records)))
-            data += records
+                offsets.append(SummaryOffset(encoded[0], start, len(encoded)))
+            data += encoded
         offsets_start = summary_start + len(data)
         data += b''.join(map(_encoded, offsets))
         head = struct.pack('<BQQQ', Opcode.FOOTER, 20, summary_start, offsets_start)
@@ -293,27 +275,23 @@ class McapWriter:
             self.sync()
         self._file.close()
 
-    def _summary(self) -> dict[Opcode, bytes]:
-        """Records that say what is in the file, by their kind."""
-        statistics = Statistics(
-            attachment_count=len(self._attachment_indexes),
-            channel_count=len(self._channels),
-            channel_message_counts={k: n for k, n in self.counts.items() if n},
-            chunk_count=self._chunks,
-            message_count=sum(self.counts.values()),
-            message_start_time=self.start_ns or 0,
-            message_end_time=self.end_ns,
-            metadata_count=len(self._metadata_indexes),
-            schema_count=len(self._schemas),
+    def summary(self) -> Summary:
+        """What is in the chunks that were flushed, and beside them."""
+        summary = self._summary
+        starts_ns = [index.message_start_time for index in summary.chunk_indexes]
+        ends_ns = [index.message_end_time for index in summary.chunk_indexes]
+        summary.statistics = Statistics(
+            attachment_count=len(summary.attachment_indexes),
+            channel_count=len(summary.channels),
+            channel_message_counts={k: n for k, n in self._counts.items() if n},
+            chunk_count=len(summary.chunk_indexes),
+            message_count=sum(self._counts.values()),
+            message_start_time=min(starts_ns, default=0),
+            message_end_time=max(ends_ns, default=0),
+            metadata_count=len(summary.metadata_indexes),
+            schema_count=len(summary.schemas),
         )
-        return {
-            Opcode.SCHEMA: b''.join(map(_encoded, self._schemas)),
-            Opcode.CHANNEL: b''.join(map(_encoded, self._channels)),
-            Opcode.STATISTICS: _encoded(statistics),
-            Opcode.CHUNK_INDEX: bytes(self._chunk_indexes),
-            Opcode.ATTACHMENT_INDEX: b''.join(map(_encoded, self._attachment_indexes)),
-            Opcode.METADATA_INDEX: b''.join(map(_encoded, self._metadata_indexes)),
-        }
+        return summary
 
 
 def _encoded(record) -> bytes:
