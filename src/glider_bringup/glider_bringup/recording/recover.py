@@ -211,7 +211,7 @@ class _Rebuilt:
         if strange:
             raise ValueError(f'messages of channel {min(strange)}, which is not defined')
         if len(found.channel):
-            self._writer.write_chunk(content, found.channel, found.log_ns, found.start)
+            self._writer.write_chunk(content)
 
     def close(self, stream: IO[bytes]) -> list[tuple[int, str]]:
         """Complete the new file, on disk; sizes of what was dropped, and what it is."""
