@@ -112,14 +112,14 @@ def _files(path: Path) -> tuple[list[Path], bool]:
 
 
 def _summary(file: Path) -> Summary | None:
-    """What the end of a file says is in it; None if that is not to be had."""
+    """What the end of a file says is in it; None if it does not count its messages."""
     try:
         with file.open('rb') as stream:
-            summary = read_summary(stream)
+            summary = read_summary(stream, is_checked=False)  # the bag is, in the end
     except OSError as error:
         raise ConfigurationError(f'{file}: {error.strerror or error}') from None
-    except ValueError:  # an index that is damaged is made anew, too
-        return None
+    except ValueError as error:
+        raise ConfigurationError(f'{file}: damaged: {error}') from None
     return summary if summary and summary.statistics else None
 
 
