@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags with one flipped bit, or cut, through all that reads bags.
 
-Half of them are as they are written today, half as they were before the data section had a
-checksum; half lie in a run folder, half alone. What a command makes of one counts as wrong if it
+Half of them are as we write them, half without a checksum of the data section, as those of ros2
+bag; half lie in a run folder, half alone. What a command makes of one counts as wrong if it
 is not what it makes of the unharmed bag, and says neither so nor what is missing.
 """
 
@@ -121,9 +121,9 @@ def fly_whole(scenario: Scenario, folder: Path) -> Path:
 
 
 def _fly(scratch: Path) -> list[Path]:
-    """Folders of one flight: bags of today and of before, with all that a run has and alone."""
+    """Folders of one flight: with a checksum and without, with all that a run has and alone."""
     run = fly_whole(load_scenario('rough_water', FLIGHT), scratch / 'run')
-    folders = [run, *(scratch / name for name in ('alone', 'run_of_before', 'alone_of_before'))]
+    folders = [run, *(scratch / name for name in ('alone', 'run_unchecked', 'alone_unchecked'))]
     data = _bag_of(run).read_bytes()
     at = data.rindex(_DATA_END) + len(_DATA_END)
     before = data[:at] + bytes(4) + data[at + 4 :]

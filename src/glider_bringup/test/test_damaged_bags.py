@@ -11,7 +11,6 @@ import time
 from pathlib import Path
 
 import pytest
-import zstandard
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 
@@ -22,8 +21,6 @@ from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros.recorded_run import Recording
 from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
-from glider_bringup.recording.ros.told import read_told
-from glider_bringup.recording.ros.verify.every_block import verify
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.traces import load_traces
 from glider_bringup.showing.flown_run import draw, read_run, write_report
@@ -34,7 +31,7 @@ from glider_model.ros.wire.codec import to_cdr
 from glider_model.ros.wire.topics import PLANT, TOPICS
 
 TICKS = 600
-#: The end of a data section, up to its checksum: what 1980cb2 wrote had none.
+#: The end of a data section, up to its checksum: what ros2 bag writes has none.
 DATA_END = struct.pack('<BQ', Opcode.DATA_END, 4)
 
 
@@ -64,8 +61,8 @@ def run(flown, tmp_path) -> Path:
 
 
 @pytest.fixture
-def run_of_before(run) -> Path:
-    """The same as it was before the data section had a checksum."""
+def run_unchecked(run) -> Path:
+    """The same without a checksum of the data section, as ros2 bag writes it."""
     data = bag_of(run).read_bytes()
     at = data.rindex(DATA_END) + len(DATA_END)
     bag_of(run).write_bytes(data[:at] + bytes(4) + data[at + 4 :])
@@ -128,31 +125,31 @@ def test_bit_in_a_chunk_is_told_with_time_and_ticks(run, share):
 
 
 @pytest.mark.parametrize('bit', range(8 * 9))
-def test_head_of_a_chunk_is_checked_in_bags_of_before(run_of_before, bit):
+def test_head_of_a_chunk_is_checked_in_bags_without_a_checksum(run_unchecked, bit):
     """Opcode or length: a chunk that is not seen as one is missed."""
-    file = bag_of(run_of_before)
+    file = bag_of(run_unchecked)
     place, _ = chunk_places(file)[2]
     file.write_bytes(flip(file.read_bytes(), 8 * place + bit))
     with pytest.raises(ConfigurationError, match='damaged'):
-        Bag(run_of_before)
+        Bag(run_unchecked)
 
 
 @pytest.mark.parametrize('field', [0, 8])
-def test_times_of_a_chunk_are_checked_in_bags_of_before(run_of_before, field):
-    file = bag_of(run_of_before)
+def test_times_of_a_chunk_are_checked_in_bags_without_a_checksum(run_unchecked, field):
+    file = bag_of(run_unchecked)
     place, _ = chunk_places(file)[2]
     file.write_bytes(flip(file.read_bytes(), 8 * (place + 9 + field) + 30))
     with pytest.raises(ConfigurationError, match='chunk 3 .*is not where it should be'):
-        Bag(run_of_before)
+        Bag(run_unchecked)
 
 
 @pytest.mark.parametrize('text', [b'/glider/odom', b'nav_msgs/msg/Odometry', b'transient_local'])
-def test_topics_are_checked_in_bags_of_before(run_of_before, text):
-    file = bag_of(run_of_before)
+def test_topics_are_checked_in_bags_without_a_checksum(run_unchecked, text):
+    file = bag_of(run_unchecked)
     data = file.read_bytes()
     file.write_bytes(flip(data, 8 * (data.index(text) + 4)))
     with pytest.raises(ConfigurationError, match='a topic or type is not that of its summary'):
-        Bag(run_of_before)
+        Bag(run_unchecked)
 
 
 def test_attachment_is_checked(run):
@@ -307,28 +304,3 @@ def test_metadata_that_is_damaged_is_named_or_does_not_matter(run):
             assert Bag(run).topics == topics
         except ConfigurationError as error:
             assert str(run) in str(error)
-
-
-# ---------------------------------------------------------------------- bags of before
-
-
-@pytest.mark.parametrize('engine', ['direct', 'nodes'])
-def test_bag_recorded_at_1980cb2_is_scored_shown_verified_and_replayed(tmp_path, engine):
-    """Three seconds of current_8deg; all that is known of them is in the file."""
-    packed = Path(__file__).with_name(f'of_before_{engine}.mcap.zst').read_bytes()
-    file = tmp_path / 'current_8deg_0.mcap'
-    file.write_bytes(zstandard.ZstdDecompressor().decompress(packed))
-    card = score_again(file)
-    assert (card['status'], card['ticks'], card['messages_lost']) == ('completed', 30, 0)
-    assert card['messages_recorded'] == 304
-    write_report(read_run(file), tmp_path / 'report.html')
-    assert (tmp_path / 'report.html').stat().st_size > 100_000
-    bag = Bag(file)
-    told = read_told(bag, file, None, tmp_path)
-    recording = Recording(bag, None, lambda share: None)
-    verdicts = list(verify(recording, told, [], lambda name, share: None))
-    assert [one.ticks for one in verdicts] == [30, 30, 0, 30, 30, 0]
-    for missing in (verdicts[2], verdicts[5]):
-        assert missing.reason == 'recorded before there was this block'
-    messages, _ = bags.COMMANDS['replay'](tmp_path)
-    assert len(messages) == 304

@@ -8,46 +8,38 @@ compiled scan does for a chunk at once: a flight of 30 h has ten million message
 Two kinds of harm are told apart. A file that was **cut**, as by a writer that was killed, reads as
 far as it goes, and `Bag.cut` says how far. A file that is **damaged** is refused, by an error that
 names the place: every checksum is tested, that of the data section as the file is opened. Where
-there is none (bags of before, and of others) the records are compared with the summary, which has
-a checksum of its own, so that no chunk, topic or attachment is missed in silence.
+there is none (ros2 bag writes none) the records are compared with the summary, which has a
+checksum of its own, so that no chunk, topic or attachment is missed in silence.
 """
 
 import struct
 import zlib
 from collections.abc import Iterator
-from io import BytesIO
 from pathlib import Path
 from typing import IO, NamedTuple
 
-import lz4.frame
 import numpy as np
-import zstandard
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema
+from mcap.summary import Summary
 
 from glider_bringup.recording.bag_files import bag_files
-from glider_bringup.recording.mcap_scan import find, gather
-from glider_bringup.recording.mcap_summary import (
-    CHECKED,
-    END_SIZE,
+from glider_bringup.recording.mcap_records import (
+    CHUNK_TIMES,
     HEAD,
-    Summary,
-    checksum_to,
-    parse_summary,
-    read_footer,
+    MAGIC,
+    UNREADABLE,
+    parse,
+    read_summary,
+    span,
+    unpack,
+    whole_records,
 )
-from glider_bringup.recording.mcap_writer import MAGIC
+from glider_bringup.recording.mcap_scan import Places, find, gather
 from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_NS
 
-_CHUNK_HEAD = struct.Struct('<QQQII')
+_DATA_END = HEAD.pack(Opcode.DATA_END, 4)
 _LOG_TIME_AT = 6  # in a message record: channel (2), sequence (4), log time (8), publish time (8)
-_MESSAGE_HEAD = 22
-#: What is raised about a record that is none.
-UNREADABLE = (McapError, struct.error, UnicodeDecodeError)
-_NOT_TOLD = -1  #: by a zstd frame: the size of its content
 
 
 class BagTopic(NamedTuple):
@@ -82,13 +74,6 @@ class Batch(NamedTuple):
         return rows
 
 
-class _Found(NamedTuple):
-    """Places of records in a file."""
-
-    chunks: list[int]
-    attachments: set[int]
-
-
 class _Part(NamedTuple):
     """A chunk of a file, or a run of messages that are in no chunk."""
 
@@ -100,43 +85,164 @@ class _Part(NamedTuple):
     end_ns: int
 
 
-def span(start_ns: int, end_ns: int) -> str:
-    """Times from which to which messages are, in words."""
-    ticks = max(0, end_ns - start_ns) // TICK_NS + 1
-    return f't = {start_ns / 1e9:.1f} s to {end_ns / 1e9:.1f} s, {ticks:,} ticks'
+class _File:
+    """Where in a file messages are, and what else is in it."""
 
+    def __init__(self, path: Path, number: int) -> None:
+        self.path, self._number = path, number
+        self.parts: list[_Part] = []
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.attachments: dict[str, bytes] = {}
+        self.cut = ''
+        self._chunks: dict[int, tuple[int, int]] = {}  #: times of each by its place
+        self._attached: set[int] = set()  #: places of the attachments
+        try:
+            with path.open('rb') as stream:
+                self._open(stream)
+        except OSError as error:
+            raise ConfigurationError(f'{path}: {error.strerror or error}') from None
 
-def unpack(data: bytes) -> bytes:
-    """Records of a chunk, decompressed and checked, from the content of its own record.
+    def _open(self, stream: IO[bytes]) -> None:
+        """Note the chunks, topics and attachments, and test the checksums."""
+        try:
+            summary, unsound = read_summary(stream), ''
+        except ValueError as error:
+            summary, unsound = Summary(), str(error)
+        stream.seek(0)
+        magic = stream.read(len(MAGIC))
+        if not MAGIC.startswith(magic):
+            raise ConfigurationError(f'{self.path}: not an MCAP file')
+        end, checksum = len(magic), zlib.crc32(magic)
+        for opcode, at, data in whole_records(stream):
+            try:
+                self._take(opcode, at, data)
+            except UNREADABLE:
+                raise self._harmed(f'the record at byte {at:,} cannot be read') from None
+            checksum = zlib.crc32(data, zlib.crc32(HEAD.pack(opcode, len(data)), checksum))
+            end = at + HEAD.size + len(data)
+        stream.seek(end)
+        rest = stream.read(HEAD.size + CHUNK_TIMES.size)
+        ends = rest.startswith(_DATA_END) and len(rest) >= len(_DATA_END) + 4
+        told = int.from_bytes(rest[len(_DATA_END) :][:4], 'little') if ends else 0
+        if told and told != checksum:
+            self._refuse('the checksum (CRC) of its data is wrong', summary)
+        if summary and not ends:
+            self._refuse(f'no record begins at byte {end:,}', summary)
+        if not told and summary is None:
+            self.cut = f'{self.path} ends early, after {end:,} bytes: {self._goes_to(rest)}'
+        if not told and unsound:
+            raise self._harmed(unsound)
+        if not summary or not summary.channels:  # topics may be defined in chunks only
+            for part in self.parts:
+                self.read(part)
+            return
+        if not told:
+            self._compare(summary)
+        self.schemas = summary.schemas | self.schemas
+        self.channels |= {i: one for i, one in summary.channels.items() if i not in self.channels}
 
-    Raises
-    ------
-    ValueError
-        Saying what is wrong with it.
-    """
-    try:
-        _, _, size, checksum, name_size = _CHUNK_HEAD.unpack_from(data)
-        at = _CHUNK_HEAD.size + name_size
-        compression = data[_CHUNK_HEAD.size : at].decode()
-        packed = memoryview(data)[at + 8 :]
-        if compression == 'zstd':
-            told = zstandard.frame_content_size(packed)
-            if told not in (size, _NOT_TOLD):
-                raise ValueError(f'{told:,} bytes in place of {size:,}')
-            content = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
-        elif compression == 'lz4':
-            content = lz4.frame.decompress(packed)
-        elif not compression:
-            content = bytes(packed)
-        else:
-            raise ValueError(f'unknown compression {compression!r}')
-    except (*UNREADABLE, zstandard.ZstdError, RuntimeError, MemoryError) as error:
-        raise ValueError(f'it does not decompress ({error})') from None
-    if len(content) != size:
-        raise ValueError(f'{len(content):,} bytes in place of {size:,}')
-    if checksum and zlib.crc32(content) != checksum:
-        raise ValueError('its checksum (CRC) is wrong')
-    return content
+    def _take(self, opcode: int, at: int, data: bytes) -> None:
+        """Note a record, in a chunk or in none."""
+        if opcode == Opcode.CHUNK:
+            start_ns, end_ns, unpacked = struct.unpack_from('<QQQ', data)
+            self._chunks[at] = start_ns, end_ns
+            if unpacked:
+                place = len(self._chunks), at + HEAD.size, len(data)
+                self.parts.append(_Part(self._number, *place, start_ns, end_ns))
+        elif opcode == Opcode.MESSAGE:
+            self._take_loose(at, data)
+        elif opcode == Opcode.SCHEMA:
+            schema = parse(Schema, data)
+            self.schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = parse(Channel, data)
+            self.channels.setdefault(channel.id, channel)
+        elif opcode == Opcode.ATTACHMENT:
+            one, told = parse(Attachment, data), int.from_bytes(data[-4:], 'little')
+            if told and zlib.crc32(memoryview(data)[:-4]) != told:
+                raise self._harmed(f'the checksum (CRC) of the attachment {one.name!r} is wrong')
+            self.attachments.setdefault(one.name, one.data)
+            self._attached.add(at)
+
+    def _take_loose(self, at: int, data: bytes) -> None:
+        """Note a message that is in no chunk, together with those before it."""
+        (log_ns,) = struct.unpack_from('<Q', data, _LOG_TIME_AT)
+        part = _Part(self._number, 0, at, HEAD.size + len(data), log_ns, log_ns)
+        last = self.parts[-1] if self.parts else None
+        if last and not last.number and last.start + last.length == at:
+            self.parts.pop()
+            part = last._replace(
+                length=last.length + part.length,
+                start_ns=min(last.start_ns, log_ns),
+                end_ns=max(last.end_ns, log_ns),
+            )
+        self.parts.append(part)
+
+    def _goes_to(self, rest: bytes) -> str:
+        """What is the last that is whole, and what only begins."""
+        ends_ns = [part.end_ns for part in self.parts]
+        goes = f'it goes to t = {max(ends_ns) / 1e9:.1f} s' if ends_ns else 'no message is whole'
+        if rest[:1] == bytes([Opcode.CHUNK]) and len(rest) == HEAD.size + CHUNK_TIMES.size:
+            _, end_ns = CHUNK_TIMES.unpack_from(rest, HEAD.size)
+            goes += f', and of the chunk up to t = {end_ns / 1e9:.1f} s only a part is there'
+        return goes
+
+    def _refuse(self, what: str, summary: Summary | None) -> None:
+        """Raise an error about a chunk, or what else can be found; else about the file."""
+        for part in self.parts:
+            self.read(part)
+        self._compare(summary or Summary())
+        raise self._harmed(what)
+
+    def _compare(self, summary: Summary) -> None:
+        """Raise an error that names what lacks, if a summary tells of more or of others."""
+        indexes = sorted(summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
+        for order, index in enumerate(indexes, 1):
+            times = index.message_start_time, index.message_end_time
+            if self._chunks.get(index.chunk_start_offset) != times:
+                raise self._harmed(f'chunk {order} ({span(*times)}) is not where it should be')
+        if {index.offset for index in summary.attachment_indexes} - self._attached:
+            raise self._harmed('an attachment is not where it should be')
+        here = len(self._chunks)
+        said = summary.statistics.chunk_count if summary.statistics else here
+        if said != here:
+            raise self._harmed(f'{here} chunks, {said} by its summary')
+        for mine, theirs in (
+            (self.schemas, summary.schemas),
+            (self.channels, summary.channels),
+        ):
+            if theirs and any(theirs.get(number) != one for number, one in mine.items()):
+                raise self._harmed('a topic or type is not that of its summary')
+
+    def read(self, part: _Part) -> tuple[np.ndarray, Places]:
+        """Content of a part, and its messages in the order of the file."""
+        with self.path.open('rb') as stream:
+            stream.seek(part.start)
+            content = stream.read(part.length)
+        try:
+            data = np.frombuffer(unpack(content) if part.number else content, np.uint8)
+            found = find(data)
+            for at in found.others:
+                opcode, length = HEAD.unpack_from(data, at)
+                if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                    body = int(at) + HEAD.size
+                    self._take(opcode, int(at), data[body : body + length].tobytes())
+            strange = set(np.unique(found.channel).tolist()).difference(self.channels)
+            if strange:
+                raise ValueError(f'messages of channel {min(strange)}, which is not defined')
+            if len(found.channel):
+                times = int(found.log_ns.min()), int(found.log_ns.max())
+                if times != (part.start_ns, part.end_ns):
+                    raise ValueError(f'its messages are of {span(*times)}')
+        except (ValueError, *UNREADABLE) as error:
+            place = f'bytes {part.start - HEAD.size:,} to {part.start + part.length:,}'
+            what = f'{error} ({place}, {span(part.start_ns, part.end_ns)})'
+            raise self._harmed(what, f'chunk {part.number} is ') from None
+        return data, found
+
+    def _harmed(self, what: str, which: str = '') -> ConfigurationError:
+        return ConfigurationError(f'{self.path}: {which}damaged: {what}')
 
 
 class Bag:
@@ -163,20 +269,25 @@ class Bag:
 
     def __init__(self, path: Path) -> None:
         self.files = bag_files(Path(path))
-        self.topics: list[BagTopic] = []
+        self._read = [_File(file, number) for number, file in enumerate(self.files)]
         self.attachments: dict[str, bytes] = {}
         self.cut = ''
-        self._parts: list[_Part] = []
-        self._schemas: dict[tuple[int, int], Schema] = {}
-        self._channels: dict[tuple[int, int], Channel] = {}
-        self._index: dict[tuple[int, int], int] = {}
-        for number, file in enumerate(self.files):
-            try:
-                with file.open('rb') as stream:
-                    self._open(number, stream)
-            except OSError as error:
-                raise ConfigurationError(f'{file}: {error.strerror or error}') from None
-        self._parts.sort(key=lambda part: part.start_ns)
+        topics: dict[str, BagTopic] = {}
+        for file in self._read:
+            self.attachments = file.attachments | self.attachments
+            self.cut = file.cut or self.cut
+            for channel in file.channels.values():
+                topic = _topic(channel, file.schemas.get(channel.schema_id))
+                known = topics.setdefault(topic.name, topic)
+                if known.type_name != topic.type_name:
+                    raise ConfigurationError(
+                        f'{file.path}: {topic.name} is recorded with two types, '
+                        f'{topic.type_name} and {known.type_name}'
+                    )
+        self.topics = [*topics.values()]
+        self._index = {name: index for index, name in enumerate(topics)}
+        parts = (part for file in self._read for part in file.parts)
+        self._parts = sorted(parts, key=lambda part: part.start_ns)
 
     @property
     def start_ns(self) -> int:
@@ -187,213 +298,6 @@ class Bag:
     def end_ns(self) -> int:
         """Log time (ns) of the last message; 0 if there is none."""
         return max((part.end_ns for part in self._parts), default=0)
-
-    # ------------------------------------------------------------------ records of a file
-
-    def _open(self, number: int, stream: IO[bytes]) -> None:
-        """Note the chunks of a file, its topics and attachments, and test its checksums."""
-        file = self.files[number]
-        size = stream.seek(0, 2)
-        footer = read_footer(stream, size)
-        stream.seek(0)
-        magic = stream.read(len(MAGIC))
-        if not MAGIC.startswith(magic):
-            raise ConfigurationError(f'{file}: not an MCAP file')
-        found, at = _Found([], set()), stream.tell()
-        while True:
-            head = stream.read(HEAD.size)
-            opcode, length = HEAD.unpack(head) if len(head) == HEAD.size else (0, 0)
-            body = at + HEAD.size
-            fits = opcode and body + length <= size
-            if not fits or opcode in (Opcode.DATA_END, Opcode.FOOTER):
-                break
-            try:
-                self._take(number, opcode, at, length, stream, found)
-            except UNREADABLE:
-                raise self._harmed(number, f'the record at byte {at:,} cannot be read') from None
-            at = stream.seek(body + length)
-        ends = fits and opcode == Opcode.DATA_END and length == 4
-        checksum = int.from_bytes(stream.read(4), 'little') if ends else 0
-        if checksum and checksum != checksum_to(stream, at):
-            raise self._harmed(number, 'the checksum (CRC) of its data is wrong', footer, found)
-        if footer and not ends:
-            raise self._harmed(number, f'no record begins at byte {at:,}', footer, found)
-        if not checksum and not footer:
-            self._note_cut(number, at, opcode, stream)
-        summary = self._summary(number, footer, bool(checksum))
-        if summary is None:  # topics may be defined in chunks only
-            for part in [one for one in self._parts if one.file == number]:
-                self._read(part)
-            return
-        if not checksum:
-            self._compare(number, summary, found)
-        for schema in summary.schemas:
-            self._schemas.setdefault((number, schema.id), schema)
-        for channel in summary.channels:
-            self._note_channel(number, channel)
-
-    def _take(
-        self, number: int, opcode: int, at: int, length: int, stream: IO[bytes], found: _Found
-    ) -> None:
-        """Note one record, whose content comes next in the stream."""
-        if opcode == Opcode.CHUNK:
-            found.chunks.append(at)
-            start_ns, end_ns, unpacked = struct.unpack('<QQQ', stream.read(24))
-            if unpacked:
-                order, body = len(found.chunks), at + HEAD.size
-                self._parts.append(
-                    _Part(
-                        file=number,
-                        number=order,
-                        start=body,
-                        length=length,
-                        start_ns=start_ns,
-                        end_ns=end_ns,
-                    )
-                )
-        elif opcode == Opcode.MESSAGE:
-            self._note_loose(number, at, stream.read(_MESSAGE_HEAD), length)
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT):
-            self._note(number, opcode, stream.read(length))
-            if opcode == Opcode.ATTACHMENT:
-                found.attachments.add(at)
-
-    def _note_cut(self, number: int, at: int, opcode: int, stream: IO[bytes]) -> None:
-        """Say where a file ends, and what is the last that is whole."""
-        parts = [part for part in self._parts if part.file == number]
-        end_ns = max((part.end_ns for part in parts), default=None)
-        goes = 'no message is whole' if end_ns is None else f'it goes to t = {end_ns / 1e9:.1f} s'
-        stream.seek(at + HEAD.size)
-        times = stream.read(16) if opcode == Opcode.CHUNK else b''
-        if len(times) == 16:
-            start_ns, end_ns = struct.unpack('<QQ', times)
-            goes += f', and of the chunk up to t = {end_ns / 1e9:.1f} s only a part is there'
-        self.cut = f'{self.files[number]} ends early, after {at:,} bytes: {goes}'
-
-    def _summary(self, number: int, footer: tuple | None, proven: bool) -> Summary | None:
-        """Summary of a file; None if it has none.
-
-        One that cannot be read does not matter where the data is ``proven`` to be whole.
-        """
-        if footer is None or not footer[0]:
-            return None
-        start, _, checksum = footer
-        with self.files[number].open('rb') as stream:
-            stream.seek(min(start, stream.seek(0, 2)))
-            data = stream.read()[: CHECKED - END_SIZE]
-        if checksum and zlib.crc32(data) != checksum:
-            if proven:
-                return None
-            raise self._harmed(number, 'the checksum (CRC) of its summary is wrong')
-        try:
-            return parse_summary(data[:-CHECKED])
-        except UNREADABLE:
-            raise self._harmed(number, 'its summary cannot be read') from None
-
-    def _compare(self, number: int, summary: Summary, found: _Found) -> None:
-        """Refuse a file in which a summary and what was found are not the same.
-
-        Raises
-        ------
-        ConfigurationError
-            Naming what lacks.
-        """
-        parts = {part.start - HEAD.size: part for part in self._parts if part.file == number}
-        places = set(found.chunks)
-        for order, (place, index) in enumerate(sorted(summary.chunks.items()), 1):
-            times = index.message_start_time, index.message_end_time
-            part = parts.get(place)
-            if place not in places or (part and (part.start_ns, part.end_ns) != times):
-                what = f'chunk {order} ({span(*times)}) is not where it should be'
-                raise self._harmed(number, what)
-        if summary.attachments - found.attachments:
-            raise self._harmed(number, 'an attachment is not where it should be')
-        said = summary.statistics.chunk_count if summary.statistics else len(places)
-        if said != len(places):
-            raise self._harmed(number, f'{len(places)} chunks, {said} by its summary')
-        for mine, theirs in (
-            (self._schemas, summary.schemas),
-            (self._channels, summary.channels),
-        ):
-            for (file, _), one in mine.items():
-                if file == number and theirs and one not in theirs:
-                    raise self._harmed(number, 'a topic or type is not that of its summary')
-
-    def _harmed(
-        self, number: int, what: str, footer: tuple | None = None, found: _Found | None = None
-    ) -> ConfigurationError:
-        """Error about a file; one about a chunk of it, if that can be found."""
-        if found is not None:
-            for part in [one for one in self._parts if one.file == number]:
-                try:
-                    self._read(part)
-                except ConfigurationError as error:
-                    return error
-            try:
-                summary = self._summary(number, footer, True)
-                if summary is not None:
-                    self._compare(number, summary, found)
-            except ConfigurationError as error:
-                return error
-        return ConfigurationError(f'{self.files[number]}: damaged: {what}')
-
-    def _note_loose(self, file: int, at: int, head: bytes, length: int) -> None:
-        """Note a message that is in no chunk, together with the one before it."""
-        (log_ns,) = struct.unpack_from('<Q', head, _LOG_TIME_AT)
-        length += HEAD.size
-        last = self._parts[-1] if self._parts else None
-        if last and last.file == file and not last.number and last.start + last.length == at:
-            self._parts[-1] = last._replace(
-                length=last.length + length,
-                start_ns=min(last.start_ns, log_ns),
-                end_ns=max(last.end_ns, log_ns),
-            )
-        else:
-            self._parts.append(
-                _Part(file=file, number=0, start=at, length=length, start_ns=log_ns, end_ns=log_ns)
-            )
-
-    def _note(self, file: int, opcode: int, data: bytes) -> None:
-        """Take a schema, a channel or an attachment."""
-        stream = ReadDataStream(BytesIO(data))
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(stream)
-            self._schemas[file, schema.id] = schema
-        elif opcode == Opcode.ATTACHMENT:
-            attachment = Attachment.read(stream)
-            checksum = int.from_bytes(data[-4:], 'little')
-            if checksum and zlib.crc32(memoryview(data)[:-4]) != checksum:
-                what = f'the checksum (CRC) of the attachment {attachment.name!r} is wrong'
-                raise self._harmed(file, what)
-            self.attachments.setdefault(attachment.name, attachment.data)
-        elif opcode == Opcode.CHANNEL:
-            self._note_channel(file, Channel.read(stream))
-
-    def _note_channel(self, file: int, channel: Channel) -> None:
-        if (file, channel.id) in self._index:
-            return
-        self._channels[file, channel.id] = channel
-        schema = self._schemas.get((file, channel.schema_id))
-        topic = BagTopic(
-            name=channel.topic,
-            type_name=schema.name if schema else '',
-            encoding=channel.message_encoding,
-            schema_encoding=schema.encoding if schema else '',
-            schema=schema.data if schema else b'',
-            qos=channel.metadata.get('offered_qos_profiles', ''),
-        )
-        names = [one.name for one in self.topics]
-        if topic.name not in names:
-            self.topics.append(topic)
-            names.append(topic.name)
-        elif self.topics[names.index(topic.name)].type_name != topic.type_name:
-            raise ConfigurationError(
-                f'{self.files[file]}: {topic.name} is recorded with two types, {topic.type_name} '
-                f'and {self.topics[names.index(topic.name)].type_name}'
-            )
-        self._index[file, channel.id] = names.index(topic.name)
-
-    # ------------------------------------------------------------------ messages
 
     def batches(self) -> Iterator[Batch]:
         """All messages in the order of their log times; equal ones in the order of the file.
@@ -410,7 +314,7 @@ class Bag:
             yield self._join(group)
 
     def _join(self, parts: list[_Part]) -> Batch:
-        read = [self._read(part) for part in sorted(parts)]
+        read = [self._batch(part) for part in sorted(parts)]
         shifts = np.cumsum([0, *(len(batch.data) for batch in read)])
         data, topic, log_ns, start, size = (
             np.concatenate(arrays) if len(read) > 1 else arrays[0]
@@ -423,45 +327,22 @@ class Bag:
         order = np.argsort(log_ns, kind='stable')
         return Batch(data, topic[order], log_ns[order], start[order], size[order])
 
-    def _read(self, part: _Part) -> Batch:
+    def _batch(self, part: _Part) -> Batch:
         """Messages of a part in the order of the file."""
-        data = np.frombuffer(self._content(part), np.uint8)
-        try:
-            found = find(data)
-        except ValueError as error:
-            raise self._damaged(part, str(error)) from None
-        for at in found.others:
-            opcode, length = HEAD.unpack_from(data, at)
-            body = int(at) + HEAD.size
-            try:
-                self._note(part.file, opcode, data[body : body + length].tobytes())
-            except UNREADABLE as error:
-                raise self._damaged(part, repr(error)) from None
+        file = self._read[part.file]
+        data, found = file.read(part)
         topic = np.zeros(len(found.channel), np.int64)
         for number in np.unique(found.channel):
-            if (part.file, int(number)) not in self._index:
-                raise self._damaged(part, f'messages of channel {number}, which is not defined')
-            topic[found.channel == number] = self._index[part.file, int(number)]
-        times = (int(found.log_ns.min()), int(found.log_ns.max())) if len(topic) else ()
-        if times and times != (part.start_ns, part.end_ns):
-            raise self._damaged(part, f'its messages are of {span(*times)}')
+            topic[found.channel == number] = self._index[file.channels[int(number)].topic]
         return Batch(data, topic, found.log_ns, found.start, found.size)
 
-    def _content(self, part: _Part) -> bytes:
-        """Records of a part, decompressed and checked."""
-        with self.files[part.file].open('rb') as stream:
-            stream.seek(part.start)
-            data = stream.read(part.length)
-        if not part.number:
-            return data
-        try:
-            return unpack(data)
-        except ValueError as error:
-            raise self._damaged(part, str(error)) from None
 
-    def _damaged(self, part: _Part, reason: str) -> ConfigurationError:
-        place = f'bytes {part.start - HEAD.size:,} to {part.start + part.length:,}'
-        return ConfigurationError(
-            f'{self.files[part.file]}: chunk {part.number} is damaged: {reason} ({place}, '
-            f'{span(part.start_ns, part.end_ns)})'
-        )
+def _topic(channel: Channel, schema: Schema | None) -> BagTopic:
+    return BagTopic(
+        name=channel.topic,
+        type_name=schema.name if schema else '',
+        encoding=channel.message_encoding,
+        schema_encoding=schema.encoding if schema else '',
+        schema=schema.data if schema else b'',
+        qos=channel.metadata.get('offered_qos_profiles', ''),
+    )

@@ -11,6 +11,7 @@ Chunks, attachments, the data section and the summary all carry checksums.
 import os
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -33,12 +34,13 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
+from mcap.summary import Summary
 
 from glider_bringup.mission.disk import not_written, refuse_vanished
+from glider_bringup.recording.mcap_records import MAGIC
+from glider_bringup.recording.mcap_scan import find
 
-MAGIC = b'\x89MCAP0\r\n'
 _MESSAGE = struct.Struct('<BQHIQQ')
-_INDEX_ENTRY = struct.Struct('<QQ')
 _LIBRARY = 'glider_bringup'
 
 
@@ -56,15 +58,9 @@ class McapWriter:
         self._pending = bytearray(MAGIC)  #: of the file, not yet handed to the operating system
         self._handed, self._checksum = 0, 0  #: length of what was, and its CRC
         self._compressor = zstandard.ZstdCompressor(level=3)
-        self._schemas: list[Schema] = []
-        self._channels: list[Channel] = []
-        self._chunks, self._chunk_indexes = 0, bytearray()  #: their number, and their records
-        self._attachment_indexes: list[AttachmentIndex] = []
-        self._metadata_indexes: list[MetadataIndex] = []
-        self.counts: dict[int, int] = {}
-        self.start_ns: int | None = None
-        self.end_ns = 0
-        self._begin_chunk()
+        self._summary = Summary()
+        self._counts: Counter[int] = Counter()  #: of messages in chunks that are finished
+        self._chunk = bytearray()
         self._put(Header(profile, _LIBRARY))
 
     def _put(self, record) -> tuple[int, int]:
@@ -89,57 +85,35 @@ class McapWriter:
         except OSError as error:
             raise not_written(self._path, error) from None
 
-    def add_schema(self, name: str, encoding: str, data: bytes) -> int:
-        """Define a message type; returns its id."""
-        schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
-        self.define(schema)
-        return schema.id
-
-    def add_channel(self, topic: str, schema_id: int, metadata: dict[str, str]) -> int:
-        """Define a topic with CDR messages; returns its id."""
-        channel = Channel(
-            id=len(self._channels) + 1,
-            topic=topic,
-            message_encoding='cdr',
-            metadata=metadata,
-            schema_id=schema_id,
-        )
-        self.define(channel)
-        return channel.id
-
     def define(self, record: Schema | Channel) -> None:
-        """Define a message type or a topic under the id that it has."""
+        """Define a message type or a topic."""
         if isinstance(record, Channel):
-            self._channels.append(record)
-            self.counts[record.id] = 0
+            self._summary.channels[record.id] = record
         else:
-            self._schemas.append(record)
+            self._summary.schemas[record.id] = record
         self._put(record)
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
         """Store a file beside the messages."""
         offset, length = self._put(Attachment(0, 0, name, media_type, data))
-        self._attachment_indexes.append(
+        self._summary.attachment_indexes.append(
             AttachmentIndex(offset, length, 0, 0, len(data), name, media_type)
         )
 
     def add_metadata(self, name: str, data: dict[str, str]) -> None:
         """Store named texts."""
         self.flush()
-        offset, length = self._put(Metadata(name=name, metadata=data))
-        self._metadata_indexes.append(MetadataIndex(offset=offset, length=length, name=name))
+        place = self._put(Metadata(name=name, metadata=data))
+        self._summary.metadata_indexes.append(MetadataIndex(*place, name))
 
     # ------------------------------------------------------------------ messages
 
     def write(self, channel_id: int, stamp_ns: int, payload: bytes) -> None:
         """Add one message; its log time and its publish time are ``stamp_ns``."""
-        index = self._indexes.setdefault(channel_id, bytearray())
-        index += _INDEX_ENTRY.pack(stamp_ns, len(self._chunk))
         self._chunk += _MESSAGE.pack(
             Opcode.MESSAGE, 22 + len(payload), channel_id, 0, stamp_ns, stamp_ns
         )
         self._chunk += payload
-        self._note(channel_id, 1, stamp_ns, stamp_ns)
 
     def write_rows(
         self,
@@ -163,7 +137,6 @@ class McapWriter:
         stamps = np.asarray(stamps_ns, '<u8')
         width = sum(_MESSAGE.size + payload.shape[1] for payload in payloads)
         rows = np.empty((count, width), np.uint8)
-        starts = len(self._chunk) + np.arange(count, dtype='<u8') * np.uint64(width)
         column = 0
         for channel_id, payload in zip(channel_ids, payloads, strict=True):
             size = payload.shape[1]
@@ -174,52 +147,20 @@ class McapWriter:
             rows[:, end - 16 : end - 8] = times
             rows[:, end - 8 : end] = times
             rows[:, end : end + size] = payload
-            index = self._indexes.setdefault(channel_id, bytearray())
-            index += np.stack((stamps, starts + np.uint64(column)), axis=1).tobytes()
-            self._note(channel_id, count, int(stamps[0]), int(stamps[-1]))
             column = end + size
         self._chunk += rows.data
 
-    def write_chunk(
-        self, content: bytes, channel_ids: np.ndarray, stamps_ns: np.ndarray, starts: np.ndarray
-    ) -> None:
-        """Add the records of a chunk as they are, and finish it.
-
-        Parameters
-        ----------
-        content : bytes
-            Not compressed.
-        channel_ids, stamps_ns, starts : int64[n]
-            Of its messages: channel, log time, and where the payload begins.
-        """
+    def write_chunk(self, content: bytes) -> None:
+        """Add the records of a chunk as they are, not compressed, and finish it."""
         self._chunk += content
-        for channel_id in np.unique(channel_ids):
-            of_it = channel_ids == channel_id
-            stamps, places = stamps_ns[of_it], starts[of_it] - _MESSAGE.size
-            self._indexes[int(channel_id)] = bytearray(
-                np.stack((stamps, places), axis=1).astype('<u8').tobytes()
-            )
-            self._note(int(channel_id), len(stamps), int(stamps.min()), int(stamps.max()))
         self.flush()
-
-    def _note(self, channel_id: int, count: int, first_ns: int, last_ns: int) -> None:
-        self.counts[channel_id] += count
-        if self._chunk_start_ns is None or first_ns < self._chunk_start_ns:
-            self._chunk_start_ns = first_ns
-        self._chunk_end_ns = max(self._chunk_end_ns, last_ns)
 
     # ------------------------------------------------------------------ chunks
 
-    def _begin_chunk(self) -> None:
-        self._chunk = bytearray()
-        self._indexes: dict[int, bytearray] = {}
-        self._chunk_start_ns: int | None = None
-        self._chunk_end_ns = 0
-
     def flush(self) -> None:
         """Finish the chunk at hand and hand it to the operating system."""
-        if self._chunk_start_ns is not None:
-            self._end_chunk(self._chunk_start_ns)
+        if self._chunk:
+            self._end_chunk()
         self._hand_over()
 
     def refuse_vanished(self) -> None:
@@ -233,41 +174,42 @@ class McapWriter:
         except OSError as error:
             raise not_written(self._path, error) from None
 
-    def _end_chunk(self, start_ns: int) -> None:
-        data = self._compressor.compress(self._chunk)
+    def _end_chunk(self) -> None:
+        content, self._chunk = self._chunk, bytearray()
+        found = find(np.frombuffer(bytes(content), np.uint8))
+        start_ns, end_ns = int(found.log_ns.min()), int(found.log_ns.max())
+        data = self._compressor.compress(content)
         chunk = Chunk(
             compression='zstd',
             data=data,
             message_start_time=start_ns,
-            message_end_time=self._chunk_end_ns,
-            uncompressed_crc=zlib.crc32(self._chunk),
-            uncompressed_size=len(self._chunk),
+            message_end_time=end_ns,
+            uncompressed_crc=zlib.crc32(content),
+            uncompressed_size=len(content),
         )
         offset, length = self._put(chunk)
         index_start = self._tell()
         index_offsets = {}
-        for channel_id, entries in sorted(self._indexes.items()):
-            index_offsets[channel_id] = self._tell()
-            head = struct.pack(
-                '<BQHI', Opcode.MESSAGE_INDEX, 6 + len(entries), channel_id, len(entries)
-            )
-            self._pending += head + entries
+        places = np.stack((found.log_ns, found.start - _MESSAGE.size), axis=1).astype('<u8')
+        for number in map(int, np.unique(found.channel)):
+            entries = places[found.channel == number]
+            self._counts[number] += len(entries)
+            index_offsets[number] = self._tell()
+            size = entries.nbytes
+            self._pending += struct.pack('<BQHI', Opcode.MESSAGE_INDEX, 6 + size, number, size)
+            self._pending += entries.tobytes()
         index = ChunkIndex(
             message_start_time=start_ns,
-            message_end_time=self._chunk_end_ns,
+            message_end_time=end_ns,
             chunk_start_offset=offset,
             chunk_length=length,
             message_index_offsets=index_offsets,
             message_index_length=self._tell() - index_start,
             compression='zstd',
             compressed_size=len(data),
-            uncompressed_size=len(self._chunk),
+            uncompressed_size=len(content),
         )
-        self._chunks += 1
-        self._chunk_indexes += _encoded(index)
-        self.start_ns = start_ns if self.start_ns is None else min(self.start_ns, start_ns)
-        self.end_ns = max(self.end_ns, self._chunk_end_ns)
-        self._begin_chunk()
+        self._summary.chunk_indexes.append(index)
 
     # ------------------------------------------------------------------ end
 
@@ -277,11 +219,19 @@ class McapWriter:
         self._put(DataEnd(self._checksum))
         summary_start = self._tell()
         data, offsets = bytearray(), []
-        for opcode, records in self._summary().items():
+        summary = self.summary()
+        for records in (
+            [*summary.schemas.values()],
+            [*summary.channels.values()],
+            [summary.statistics],
+            summary.chunk_indexes,
+            summary.attachment_indexes,
+            summary.metadata_indexes,
+        ):
+            start, encoded = summary_start + len(data), b''.join(map(_encoded, records))
             if records:
-                start = summary_start + len(data)
-                offsets.append(SummaryOffset(opcode, start, len(records)))
-            data += records
+                offsets.append(SummaryOffset(encoded[0], start, len(encoded)))
+            data += encoded
         offsets_start = summary_start + len(data)
         data += b''.join(map(_encoded, offsets))
         head = struct.pack('<BQQQ', Opcode.FOOTER, 20, summary_start, offsets_start)
@@ -293,27 +243,25 @@ class McapWriter:
             self.sync()
         self._file.close()
 
-    def _summary(self) -> dict[Opcode, bytes]:
-        """Records that say what is in the file, by their kind."""
-        statistics = Statistics(
-            attachment_count=len(self._attachment_indexes),
-            channel_count=len(self._channels),
-            channel_message_counts={k: n for k, n in self.counts.items() if n},
-            chunk_count=self._chunks,
-            message_count=sum(self.counts.values()),
-            message_start_time=self.start_ns or 0,
-            message_end_time=self.end_ns,
-            metadata_count=len(self._metadata_indexes),
-            schema_count=len(self._schemas),
+    def summary(self) -> Summary:
+        """What is in the file; messages are counted that wait for their chunk, too."""
+        summary = self._summary
+        waiting = find(np.frombuffer(bytes(self._chunk), np.uint8)).channel.tolist()
+        counts = self._counts + Counter(waiting)
+        starts_ns = [index.message_start_time for index in summary.chunk_indexes]
+        ends_ns = [index.message_end_time for index in summary.chunk_indexes]
+        summary.statistics = Statistics(
+            attachment_count=len(summary.attachment_indexes),
+            channel_count=len(summary.channels),
+            channel_message_counts=dict(sorted(counts.items())),
+            chunk_count=len(summary.chunk_indexes),
+            message_count=counts.total(),
+            message_start_time=min(starts_ns, default=0),
+            message_end_time=max(ends_ns, default=0),
+            metadata_count=len(summary.metadata_indexes),
+            schema_count=len(summary.schemas),
         )
-        return {
-            Opcode.SCHEMA: b''.join(map(_encoded, self._schemas)),
-            Opcode.CHANNEL: b''.join(map(_encoded, self._channels)),
-            Opcode.STATISTICS: _encoded(statistics),
-            Opcode.CHUNK_INDEX: bytes(self._chunk_indexes),
-            Opcode.ATTACHMENT_INDEX: b''.join(map(_encoded, self._attachment_indexes)),
-            Opcode.METADATA_INDEX: b''.join(map(_encoded, self._metadata_indexes)),
-        }
+        return summary
 
 
 def _encoded(record) -> bytes:

@@ -8,32 +8,36 @@ ours is then, byte by byte, what its recorder would have left had it been stoppe
 """
 
 import os
-import struct
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from io import BytesIO
-from itertools import chain
+from collections.abc import Callable
 from pathlib import Path
 from typing import IO, NamedTuple
 
 import numpy as np
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.reader import make_reader
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
+from mcap.summary import Summary
 
 from glider_bringup.mission.disk import not_written
 from glider_bringup.recording.bag_files import bag_files
-from glider_bringup.recording.mcap_reader import UNREADABLE, Bag, span, unpack
+from glider_bringup.recording.mcap_reader import Bag
+from glider_bringup.recording.mcap_records import (
+    CHUNK_TIMES,
+    HEAD,
+    MAGIC,
+    UNREADABLE,
+    parse,
+    read_summary,
+    span,
+    unpack,
+    whole_records,
+)
 from glider_bringup.recording.mcap_scan import find
-from glider_bringup.recording.mcap_summary import HEAD, read_footer
-from glider_bringup.recording.mcap_writer import MAGIC, McapWriter
+from glider_bringup.recording.mcap_writer import McapWriter
 from glider_bringup.recording.metadata import (
     METADATA_FILE,
     ROSBAG2,
-    FileFacts,
-    TopicFacts,
     metadata_text,
+    topic_counts,
     write_metadata,
 )
 from glider_model.base.settings import ConfigurationError
@@ -41,8 +45,6 @@ from glider_model.base.settings import ConfigurationError
 #: Messages that are in no chunk are put into chunks of about this size (B).
 _LOOSE_BYTES = 1 << 20
 
-#: What a chunk begins with: the log times of its first and its last message.
-_CHUNK_TIMES = struct.Struct('<QQ')
 #: Called with the bytes read of a file, and how many it has.
 Progress = Callable[[int, int], None]
 
@@ -74,24 +76,25 @@ def recover(path: Path, progress: Progress = lambda done, total: None) -> Recove
         room for the new file. All files are as they were, then.
     """
     files, is_listed = _files(path)
-    rebuilt, dropped_bytes, dropped = [], 0, []
+    rebuilt, dropped_bytes, dropped, summaries = [], 0, [], {}
     for file in files:
-        if not _has_end(file):
+        summary = _summary(file)
+        if summary is None:
             size, words = _rebuild(file, progress)
             rebuilt.append(file.name)
             dropped_bytes += size
             dropped += words
-    facts, topics = zip(*map(_facts, files), strict=True)
-    topics = _together(topics)
+            summary = _summary(file)
+        summaries[file.name] = summary
     if path.is_dir() and (rebuilt or not is_listed):
-        write_metadata(path, metadata_text(facts, topics))
+        write_metadata(path, metadata_text(summaries))
         rebuilt.append(METADATA_FILE)
     bag = Bag(path)  # which tests all checksums
     return Recovered(
         rebuilt=tuple(rebuilt),
         dropped_bytes=dropped_bytes,
         dropped=tuple(dropped),
-        counts={topic.name: topic.count for topic in topics},
+        counts=dict(topic_counts(summaries.values())),
         start_ns=bag.start_ns,
         end_ns=bag.end_ns,
     )
@@ -108,57 +111,16 @@ def _files(path: Path) -> tuple[list[Path], bool]:
         return files, False
 
 
-def _has_end(file: Path) -> bool:
-    """Whether a file has an index that says what is in it."""
+def _summary(file: Path) -> Summary | None:
+    """What the end of a file says is in it; None if it does not count its messages."""
     try:
         with file.open('rb') as stream:
-            if read_footer(stream, stream.seek(0, 2)) is None:
-                return False
-            stream.seek(0)
-            summary = make_reader(stream).get_summary()
+            summary = read_summary(stream, is_checked=False)  # the bag is, in the end
     except OSError as error:
         raise ConfigurationError(f'{file}: {error.strerror or error}') from None
-    except UNREADABLE as error:
-        raise ConfigurationError(f'{file}: damaged: its index cannot be read: {error}') from None
-    return summary is not None and summary.statistics is not None
-
-
-def _facts(file: Path) -> tuple[FileFacts, list[TopicFacts]]:
-    """What the end of a file says is in it."""
-    with file.open('rb') as stream:
-        summary = make_reader(stream).get_summary()
-    said = summary.statistics
-    start_ns, end_ns = said.message_start_time, said.message_end_time
-    topics = _topics(summary.channels, summary.schemas, said.channel_message_counts)
-    return FileFacts(file.name, start_ns, end_ns, said.message_count), topics
-
-
-def _topics(
-    channels: dict[int, Channel], schemas: dict[int, Schema], counts: dict[int, int]
-) -> list[TopicFacts]:
-    """What metadata.yaml says of the topics of a file."""
-    return [
-        TopicFacts(
-            channel.topic,
-            schemas[channel.schema_id].name if channel.schema_id in schemas else '',
-            channel.metadata.get('offered_qos_profiles', ''),
-            channel.metadata.get('topic_type_hash', ''),
-            counts.get(number, 0),
-        )
-        for number, channel in channels.items()
-    ]
-
-
-def _together(topics: Iterable[list[TopicFacts]]) -> list[TopicFacts]:
-    """Topics of all files of a bag."""
-    known, counts = {}, Counter()
-    for topic in chain.from_iterable(topics):
-        known.setdefault(topic.name, topic)
-        counts[topic.name] += topic.count
-    return [topic._replace(count=counts[name]) for name, topic in known.items()]
-
-
-# ---------------------------------------------------------------------- one file
+    except ValueError as error:
+        raise ConfigurationError(f'{file}: damaged: {error}') from None
+    return summary if summary and summary.statistics else None
 
 
 def _rebuild(file: Path, progress: Progress) -> tuple[int, list[str]]:
@@ -169,29 +131,16 @@ def _rebuild(file: Path, progress: Progress) -> tuple[int, list[str]]:
             if stream.read(len(MAGIC)) != MAGIC:
                 raise ConfigurationError(f'{file}: not an MCAP file, or nothing is left of it')
             rebuilt = _Rebuilt(file, draft)
-            for opcode, at, data in _records(stream):
+            for opcode, at, data in whole_records(stream):
                 rebuilt.take(opcode, at, data)
                 progress(stream.tell(), stream.seek(0, 2))
-            dropped_bytes, dropped = rebuilt.close(stream)
+            dropped = rebuilt.close(stream)
         os.replace(draft, file)
     except OSError as error:
         raise not_written(file, error) from None
     finally:
         draft.unlink(missing_ok=True)
-    return dropped_bytes, dropped
-
-
-def _records(stream: IO[bytes]) -> Iterator[tuple[int, int, bytes]]:
-    """Opcode, place and content of each whole record, up to the end of the data."""
-    size, at = stream.seek(0, 2), len(MAGIC)
-    while at + HEAD.size <= size:
-        stream.seek(at)
-        opcode, length = HEAD.unpack(stream.read(HEAD.size))
-        end = at + HEAD.size + length
-        if end > size or opcode in (0, Opcode.DATA_END, Opcode.FOOTER):
-            return
-        yield opcode, at, stream.read(length)
-        at = end
+    return sum(size for size, _ in dropped), [f'{file.name}: {what}' for _, what in dropped]
 
 
 class _Rebuilt:
@@ -201,10 +150,9 @@ class _Rebuilt:
         self._file, self._draft = file, draft
         self._writer: McapWriter | None = None
         self._loose = bytearray()  #: messages that are in no chunk
-        self._schemas: dict[int, Schema] = {}
-        self._channels: dict[int, Channel] = {}
+        self._known: set[tuple[type, int]] = set()  #: definitions, by their kinds and ids
         self._end = len(MAGIC)  #: of what was taken, in the old file
-        self._dropped_bytes, self._dropped = 0, []
+        self._dropped: list[tuple[int, str]] = []  #: size, and what it is
 
     def take(self, opcode: int, at: int, data: bytes) -> None:
         """Take a record."""
@@ -218,14 +166,14 @@ class _Rebuilt:
 
     def _take(self, opcode: int, at: int, data: bytes) -> None:
         if opcode == Opcode.HEADER:
-            self._writer = McapWriter(self._draft, _read(Header, data).profile)
+            self._writer = McapWriter(self._draft, parse(Header, data).profile)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self._define(opcode, data)
         elif opcode == Opcode.ATTACHMENT:
-            one = _read(Attachment, data)
+            one = parse(Attachment, data)
             self._writer.add_attachment(one.name, one.media_type, one.data)
         elif opcode == Opcode.METADATA:
-            one = _read(Metadata, data)
+            one = parse(Metadata, data)
             if one.name != ROSBAG2:
                 self._writer.add_metadata(one.name, one.metadata)
         elif opcode == Opcode.MESSAGE:
@@ -237,16 +185,15 @@ class _Rebuilt:
             try:
                 self._write(unpack(data))
             except ValueError as error:
-                times = span(*_CHUNK_TIMES.unpack_from(data))
-                self._drop(len(data), f'the chunk ({times}) at byte {at:,}: {error}')
+                times = span(*CHUNK_TIMES.unpack_from(data))
+                what = f'the chunk ({times}) at byte {at:,}: {error}'
+                self._dropped.append((len(data), what))
 
     def _define(self, opcode: int, data: bytes) -> None:
         """Take a definition; those that come again are not needed."""
-        is_schema = opcode == Opcode.SCHEMA
-        record = _read(Schema if is_schema else Channel, data)
-        known = self._schemas if is_schema else self._channels
-        if record.id not in known:
-            known[record.id] = record
+        record = parse(Schema if opcode == Opcode.SCHEMA else Channel, data)
+        if (type(record), record.id) not in self._known:
+            self._known.add((type(record), record.id))
             self._writer.define(record)
 
     def _write_loose(self) -> None:
@@ -254,60 +201,42 @@ class _Rebuilt:
         self._write(content)
 
     def _write(self, content: bytes) -> None:
-        """Write the records of a chunk.
-
-        Raises
-        ------
-        ValueError
-            If they are none.
-        """
-        data = np.frombuffer(content, np.uint8)
-        found = find(data)
+        """Write the records of a chunk; raise ValueError if they are none."""
+        found = find(np.frombuffer(content, np.uint8))
         for at in map(int, found.others):
             opcode, length = HEAD.unpack_from(content, at)
             if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self._define(opcode, content[at + HEAD.size : at + HEAD.size + length])
-        strange = set(found.channel.tolist()).difference(self._writer.counts)
+        strange = {one for one in found.channel.tolist() if (Channel, one) not in self._known}
         if strange:
             raise ValueError(f'messages of channel {min(strange)}, which is not defined')
         if len(found.channel):
-            self._writer.write_chunk(content, found.channel, found.log_ns, found.start)
+            self._writer.write_chunk(content)
 
-    def close(self, stream: IO[bytes]) -> tuple[int, list[str]]:
-        """Complete the new file, on disk; how much of the old one was dropped, and what."""
+    def close(self, stream: IO[bytes]) -> list[tuple[int, str]]:
+        """Complete the new file, on disk; sizes of what was dropped, and what it is."""
         if self._writer is None:
             raise self._damaged(len(MAGIC), 'nothing is left of it')
         self._write_loose()
         self._drop_rest(stream)
-        writer = self._writer
-        facts = FileFacts(
-            self._file.name, writer.start_ns or 0, writer.end_ns, sum(writer.counts.values())
-        )
-        topics = _topics(self._channels, self._schemas, writer.counts)
-        writer.add_metadata(ROSBAG2, {'serialized_metadata': metadata_text([facts], topics)})
-        writer.close(sync=True)
-        return self._dropped_bytes, self._dropped
+        text = metadata_text({self._file.name: self._writer.summary()})
+        self._writer.add_metadata(ROSBAG2, {'serialized_metadata': text})
+        self._writer.close(sync=True)
+        return self._dropped
 
     def _drop_rest(self, stream: IO[bytes]) -> None:
         """Note what is behind the last whole record, if it is more than an index."""
         size = stream.seek(0, 2)
         stream.seek(self._end)
-        rest = stream.read(HEAD.size + _CHUNK_TIMES.size)
+        rest = stream.read(HEAD.size + CHUNK_TIMES.size)
         if not rest or rest[0] in (Opcode.DATA_END, Opcode.FOOTER):
             return
         what = 'what begins'
-        if rest[0] == Opcode.CHUNK and len(rest) == HEAD.size + _CHUNK_TIMES.size:
-            what = f'the chunk ({span(*_CHUNK_TIMES.unpack_from(rest, HEAD.size))})'
-        self._drop(size - self._end, f'{what} at byte {self._end:,}: its end is missing')
-
-    def _drop(self, size: int, what: str) -> None:
-        self._dropped_bytes += size
-        self._dropped.append(f'{self._file.name}: {what}')
+        if rest[0] == Opcode.CHUNK and len(rest) == HEAD.size + CHUNK_TIMES.size:
+            what = f'the chunk ({span(*CHUNK_TIMES.unpack_from(rest, HEAD.size))})'
+        self._dropped.append(
+            (size - self._end, f'{what} at byte {self._end:,}: its end is missing')
+        )
 
     def _damaged(self, at: int, what: str) -> ConfigurationError:
         return ConfigurationError(f'{self._file}: cannot be recovered: {what} (byte {at:,})')
-
-
-def _read(kind: type, data: bytes):
-    """Record of a kind."""
-    return kind.read(ReadDataStream(BytesIO(data)))

@@ -21,21 +21,8 @@ from glider_model.ros.wire.topics import TOPICS, topic_of
 
 _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 
-#: Topics that the score is computed from. Bags from before there was navigation lack the first,
-#: and so do those from the sea, where nobody knows the truth.
+#: Topics that the score is computed from. Bags from the sea lack the first, as nobody knows it.
 SCORED = ('ground_truth/odom', 'odom', 'joint_states', 'reference', 'tracking_error')
-
-
-def is_before_navigation(recorded: Iterable[str]) -> bool:
-    """Whether topics were recorded when the plant still published odom, as it measured it."""
-    recorded = set(recorded)
-    return 'odom' in recorded and recorded.isdisjoint({'ground_truth/odom', *SENSORS})
-
-
-def is_before_guard(recorded: Iterable[str]) -> bool:
-    """Whether topics were recorded when control still had the last word on the command."""
-    recorded = set(recorded)
-    return 'command' in recorded and recorded.isdisjoint({'demand', 'drop_weight'})
 
 
 def _known_name(topic: str) -> str:

@@ -10,9 +10,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
 from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.ros.recorded_log import decode, is_before_guard, is_before_navigation
+from glider_bringup.recording.ros.recorded_log import decode
 from glider_model.base.settings import ConfigurationError
-from glider_model.base.wiring import at_rest
+from glider_model.ros.lockstep import health
 from glider_model.ros.wire.codec import Codec
 from glider_model.ros.wire.topics import TOPICS, topic_of
 
@@ -41,16 +41,6 @@ class Series:
         self.unusable: dict[int, str] = {}
         self._blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._count = 0
-
-    @classmethod
-    def at_rest(cls, topic: str, stamps_ns: np.ndarray) -> 'Series':
-        """Messages of a topic that says nothing, at stamps int64[n]."""
-        series = cls(TOPICS[topic].codec)
-        values = np.tile(at_rest(topic), (len(stamps_ns), 1))
-        series._blocks.append((stamps_ns, values, np.ones(len(stamps_ns), bool)))
-        series._count = len(stamps_ns)
-        series.close()
-        return series
 
     def add(self, batch, chosen: np.ndarray) -> None:
         """Take messages of a batch."""
@@ -123,7 +113,7 @@ class Recording:
         self.events: list[Event] = []
         self.recorded = set()  #: names of topics that are there, with or without messages
         self.ignored: list[str] = []  #: topics that are not ours, or of another type
-        takers: dict[int, list[Callable]] = {}
+        takers: dict[int, Callable] = {}
         for index, recorded in enumerate(bag.topics):
             topic = known.get(recorded.name)
             if topic is None or recorded.type_name != topic.type_name:
@@ -132,32 +122,20 @@ class Recording:
             self.recorded.add(topic.name)
             if topic.per_tick:
                 self.series[topic.name] = Series(topic_of(topic.name, steers_by).codec)
-                takers[index] = [self.series[topic.name].add]
+                takers[index] = self.series[topic.name].add
             elif topic.name == 'path':
-                takers[index] = [self._add_paths]
+                takers[index] = self._add_paths
             elif topic.name == '/diagnostics':
-                takers[index] = [self._add_events]
-        #: what the plant measured went straight to guidance and control, as odom
-        self.before_navigation = is_before_navigation(self.recorded)
-        if self.before_navigation:
-            measured = Series(TOPICS['measured_odom'].codec)
-            self.series['measured_odom'] = self.series['ground_truth/odom'] = measured
-            odom = self.series['odom'].add
-            next(found for found in takers.values() if odom in found).append(measured.add)
+                takers[index] = self._add_events
         for batch in bag.batches():
-            for index, found in takers.items():
+            for index, take in takers.items():
                 chosen = np.flatnonzero(batch.topic == index)
-                for take in found if len(chosen) else ():
+                if len(chosen):
                     take(batch, chosen)
             progress((batch.log_ns[-1] - bag.start_ns) / max(1, bag.end_ns - bag.start_ns))
         self.series = {name: series for name, series in self.series.items() if len(series)}
-        for series in {id(one): one for one in self.series.values()}.values():
+        for series in self.series.values():
             series.close()
-        #: control's demand went straight to the plant, as command, and no weight could be dropped
-        self.before_guard = is_before_guard(self.recorded)
-        if self.before_guard and 'command' in self.series:
-            demand = self.series['demand'] = self.series['command']
-            self.series['drop_weight'] = Series.at_rest('drop_weight', demand.stamps_ns)
 
     def node(self, name: str) -> str:
         """Full name of a node, as it stands on /diagnostics, or of a topic."""
@@ -175,9 +153,8 @@ class Recording:
             except Exception:  # damaged, or without a status
                 self.events.append(Event(int(batch.log_ns[index]), '', '', {}, raw))
                 continue
-            stamp = array.header.stamp
             values = {pair.key: pair.value for pair in status.values}
-            stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
+            stamp_ns = health.stamp_of(array)
             self.events.append(Event(stamp_ns, status.name, status.message, values, raw))
 
 

@@ -14,6 +14,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
 
 from glider_bringup.recording.mcap_reader import Bag, BagTopic
 from glider_bringup.recording.ros.recorded_run import choose_namespace
@@ -38,12 +39,6 @@ _PATIENCE_S = 0.1
 MAX_DURATION_S = 1e8
 #: Depth of a publisher where the recording does not say.
 _DEPTH = 1024
-
-_POLICIES = {
-    'history': (HistoryPolicy, {1: 'keep_last', 2: 'keep_all'}),
-    'reliability': (ReliabilityPolicy, {1: 'reliable', 2: 'best_effort'}),
-    'durability': (DurabilityPolicy, {1: 'transient_local', 2: 'volatile'}),
-}
 
 #: Called now and then with the recorded time that has passed since the start (s).
 Progress = Callable[[float], None]
@@ -181,18 +176,20 @@ def qos_of(topic: BagTopic) -> QoSProfile:
 
 
 def _profile(profile: dict) -> tuple[int, ReliabilityPolicy, DurabilityPolicy]:
-    policies = {}
-    for name, (kind, numbers) in _POLICIES.items():
-        word = profile.get(name, 0)
-        word = numbers.get(word, '') if isinstance(word, int) else word
-        policies[name] = kind[word.upper()] if word.upper() in kind.__members__ else None
-    keeps_last = policies['history'] is not HistoryPolicy.KEEP_ALL
-    depth = int(profile.get('depth') or 0) if keeps_last else _DEPTH
+    keeps_all = _policy(profile, 'history', HistoryPolicy.KEEP_LAST) is HistoryPolicy.KEEP_ALL
     return (
-        depth or _DEPTH,
-        policies['reliability'] or ReliabilityPolicy.RELIABLE,
-        policies['durability'] or DurabilityPolicy.VOLATILE,
+        _DEPTH if keeps_all else int(profile.get('depth') or _DEPTH),
+        _policy(profile, 'reliability', ReliabilityPolicy.RELIABLE),
+        _policy(profile, 'durability', DurabilityPolicy.VOLATILE),
     )
+
+
+def _policy(profile: dict, name: str, unknown):
+    """Policy of a profile, of the kind of that which is taken where none is known."""
+    kind, told = type(unknown), profile.get(name, 0)
+    if isinstance(told, int):
+        return kind(told) if told in (1, 2) else unknown
+    return kind.__members__.get(told.upper(), unknown)
 
 
 def message_class(topic: BagTopic) -> type:
@@ -272,7 +269,7 @@ class _Brake:
         while self._whole and log_ns - self._recorded_ns > MAX_TICKS_AHEAD['recorded'] * TICK_NS:
             message = take(self._subscription)
             if message is not None:
-                self._recorded_ns = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
+                self._recorded_ns = Time.from_msg(message.stamp).nanoseconds
             elif self._is_recorded():
                 time.sleep(0.001)
             else:

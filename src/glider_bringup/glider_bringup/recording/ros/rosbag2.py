@@ -11,15 +11,15 @@ from typing import Literal
 
 import numpy as np
 from ament_index_python.packages import get_package_share_directory
+from mcap.records import Channel, Schema
 from rclpy.qos import QoSProfile
 
 from glider_bringup.recording.mcap_writer import McapWriter
 from glider_bringup.recording.metadata import (
     METADATA_FILE,
     ROSBAG2,
-    FileFacts,
-    TopicFacts,
     metadata_text,
+    topic_counts,
     write_metadata,
 )
 from glider_model.base.signals import TICK_NS
@@ -140,23 +140,25 @@ class BagWriter:
             if path.exists():
                 reason = 'exists; a recording is never written over another'
                 raise FileExistsError(errno.EEXIST, reason, str(path))
-        self._topics = list(topics)
-        self._names = names or {topic.name: topic.full_name('/glider') for topic in self._topics}
+        topics = list(topics)
+        self._names = names or {topic.name: topic.full_name('/glider') for topic in topics}
         self._mcap = McapWriter(file, profile='ros2')
         schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
-        for topic in self._topics:
+        for number, topic in enumerate(topics, 1):
             kind = topic.type_name
             if kind not in schemas:
+                schemas[kind] = len(schemas) + 1
                 text = message_definition(kind).encode()
-                schemas[kind] = self._mcap.add_schema(kind, 'ros2msg', text)
+                self._mcap.define(Schema(schemas[kind], text, 'ros2msg', kind))
             metadata = {
                 'offered_qos_profiles': qos_yaml(topic.qos),
                 'topic_type_hash': type_hash(kind),
             }
-            self._channels[topic.name] = self._mcap.add_channel(
-                self._names[topic.name], schemas[kind], metadata
+            self._mcap.define(
+                Channel(number, self._names[topic.name], 'cdr', metadata, schemas[kind])
             )
+            self._channels[topic.name] = number
         for path in attachments:
             path = Path(path)
             self._mcap.add_attachment(path.name, 'application/yaml', path.read_bytes())
@@ -209,29 +211,13 @@ class BagWriter:
     @property
     def counts(self) -> dict[str, int]:
         """Messages written, by topic."""
-        return {name: self._mcap.counts[channel] for name, channel in self._channels.items()}
+        counts = topic_counts([self._mcap.summary()])
+        return {topic: counts[self._names[topic]] for topic in self._channels}
 
     def close(self) -> None:
         """Complete the file, and write metadata.yaml in one go."""
         self.flush()
-        text = self._metadata()
+        text = metadata_text({self._file_name: self._mcap.summary()})
         self._mcap.add_metadata(ROSBAG2, {'serialized_metadata': text})
         self._mcap.close(sync=self._sync != 'never')
         write_metadata(self._folder, text)
-
-    def _metadata(self) -> str:
-        counts = self.counts
-        file = FileFacts(
-            self._file_name, self._mcap.start_ns or 0, self._mcap.end_ns, sum(counts.values())
-        )
-        topics = [
-            TopicFacts(
-                self._names[topic.name],
-                topic.type_name,
-                qos_yaml(topic.qos),
-                type_hash(topic.type_name),
-                counts[topic.name],
-            )
-            for topic in self._topics
-        ]
-        return metadata_text([file], topics)

@@ -74,8 +74,6 @@ class Check:
         """
         tracks = {}
         for name in self.block.outputs:
-            if self.recording.before_navigation and name == 'ground_truth/odom':
-                continue  # what is taken for it may have been measured with noise
             series = self.recording.series.get(name)
             if series is None:
                 self.notes.append(f'{name} is not recorded')
@@ -193,42 +191,31 @@ class Check:
                 left[event.raw] -= 1
                 rest.append(event)
         for array, raw in missing:
-            stamp = array.header.stamp
-            stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
             alike = [e for e in rest if len(e.raw) == len(raw) and _alike(e.raw, raw)]
             if alike:
                 rest.remove(alike[0])
                 found = field_difference(array, alike[0].raw)
                 self.compared['/diagnostics'] += 1
             else:
-                found = (WHOLE, _text(array), NOT_RECORDED)
-            self.add(Difference(stamp_ns, '/diagnostics', *found))
+                found = (WHOLE, repr(array.status[0].message), NOT_RECORDED)
+            self.add(Difference(health.stamp_of(array), '/diagnostics', *found))
         for event in rest:
             if is_ours(event) and event.stamp_ns <= end_ns:
-                text = event.message
-                found = Difference(
-                    event.stamp_ns, '/diagnostics', WHOLE, repr(text), 'not computed'
-                )
-                self.add(found)
+                found = WHOLE, repr(event.message), 'not computed'
+                self.add(Difference(event.stamp_ns, '/diagnostics', *found))
 
     def verdict(self) -> Verdict:
         """What came out."""
-        self.differing = Counter({name: n for name, n in self.differing.items() if n})
         first = min(self.found, key=lambda one: one.stamp_ns, default=None)
         return Verdict(
             block=self.block.block.wired.name,
-            status=DIFFERENT if first else IDENTICAL,
-            reason='',
+            result=DIFFERENT if first else IDENTICAL,
             ticks=self.ticks,
             compared=dict(self.compared),
-            differing=dict(self.differing),
+            differing={name: n for name, n in self.differing.items() if n},
             first=first,
             notes=self.notes,
         )
-
-
-def _text(array: DiagnosticArray) -> str:
-    return repr(array.status[0].message)
 
 
 def _alike(one: bytes, other: bytes) -> bool:

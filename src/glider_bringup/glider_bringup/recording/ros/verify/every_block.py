@@ -16,7 +16,7 @@ from glider_bringup.recording.ros.recorded_run import Recording
 from glider_bringup.recording.ros.told import Told
 from glider_bringup.recording.ros.verify.free_running import free_running
 from glider_bringup.recording.ros.verify.lockstep import in_lockstep
-from glider_bringup.recording.ros.verify.verdict import Verdict, skipped
+from glider_bringup.recording.ros.verify.verdict import SKIPPED, Verdict
 from glider_model.base import wiring
 from glider_model.base.block import optional_topics
 from glider_model.base.signals import TICK_NS
@@ -41,10 +41,6 @@ def _keeps_step(recording: Recording) -> bool:
 def _reason_to_skip(wired: Wired, settings, recording: Recording, lockstep: bool) -> str:
     if settings is None:
         return 'the settings say nothing about it'
-    if wired == wiring.NAVIGATION and recording.before_navigation:
-        return 'recorded before there was this block'
-    if wired == wiring.GUARD and recording.before_guard:
-        return 'recorded before there was this block'
     topics = optional_topics(settings)
     missing = [name for name in present(wired.inputs, topics) if name not in recording.series]
     if missing:
@@ -89,7 +85,7 @@ def verify(
         settings = told.blocks[name]
         reason = _reason_to_skip(block.wired, settings, recording, lockstep)
         if reason:
-            yield skipped(name, reason)
+            yield Verdict(name, SKIPPED, reason)
             continue
         work = in_lockstep if lockstep else free_running
         recorded = RecordedBlock(block, settings)

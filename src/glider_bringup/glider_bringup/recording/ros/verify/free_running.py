@@ -12,10 +12,10 @@ from glider_bringup.recording.ros.verify.check import Check, finish_events
 from glider_bringup.recording.ros.verify.ticks import Track
 from glider_bringup.recording.ros.verify.verdict import (
     NOT_RECORDED,
+    SKIPPED,
     WHOLE,
     Difference,
     Verdict,
-    skipped,
 )
 
 #: A step has the newest message of an input, or one that is so many older.
@@ -49,7 +49,7 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
     # what is published first is published while an input is stale, too
     marker = next((name for name in reversed(wired.outputs) if name in series), None)
     if marker is None:
-        return skipped(wired.name, f'none of {", ".join(wired.outputs)} is recorded')
+        return Verdict(wired.name, SKIPPED, f'none of {", ".join(wired.outputs)} is recorded')
     stamps_ns = series[marker].stamps_ns
     check = Check(block, recording, stamps_ns)
     outputs = check.tracks(

@@ -12,10 +12,10 @@ from glider_bringup.recording.ros.verify.check import Check, finish_events
 from glider_bringup.recording.ros.verify.ticks import TICKS_OF_THE_END, by_tick, place_ticks
 from glider_bringup.recording.ros.verify.verdict import (
     NOT_RECORDED,
+    SKIPPED,
     WHOLE,
     Difference,
     Verdict,
-    skipped,
     time_text,
 )
 from glider_model.base.signals import TICK_NS
@@ -37,11 +37,8 @@ def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict
     late = [name for name, track in inputs.items() if track.index[0] < 0]
     if late:
         first_ns = int(series[late[0]].stamps_ns[0])
-        return skipped(
-            wired.name,
-            f'its state is not known: {late[0]} is recorded from {time_text(first_ns)} on, not '
-            f'from the first tick',
-        )
+        why = f'{late[0]} is recorded from {time_text(first_ns)} on, not from the first tick'
+        return Verdict(wired.name, SKIPPED, f'its state is not known: {why}')
     check = Check(block, recording, np.arange(ticks, dtype=np.int64) * TICK_NS)
     count = min(track.gap for track in inputs.values())
     if block.block is PLANT:  # publishes a tick before it needs the inputs of that tick

@@ -7,15 +7,13 @@ from glider_bringup.recording.ros.recorded_run import Recording
 from glider_bringup.recording.ros.told import Told
 from glider_bringup.recording.ros.verify.every_block import is_lockstep
 from glider_bringup.recording.ros.verify.verdict import IDENTICAL, SKIPPED, Verdict, time_text
-from glider_guidance.yo.stage import STAGE_NAMES, SURFACING
 from glider_model.base.wiring import WIRING
-from glider_model.ros.lockstep.orders import ABORT
 
 
 def report(bag: Bag, recording: Recording, told: Told, verdicts: list[Verdict]) -> dict:
     """Verdicts as one JSON object, with hints for whoever looks for a cause."""
     lockstep = is_lockstep(recording, told)
-    compared = [verdict for verdict in verdicts if verdict.status != SKIPPED]
+    compared = [verdict for verdict in verdicts if verdict.result != SKIPPED]
     notes = [bag.cut] if bag.cut else []
     if not compared:
         notes.append('nothing could be compared')
@@ -25,31 +23,26 @@ def report(bag: Bag, recording: Recording, told: Told, verdicts: list[Verdict]) 
             'the recording, looks like a difference'
         )
     return {
-        'identical': bool(compared) and all(one.status == IDENTICAL for one in compared),
+        'identical': bool(compared) and all(one.result == IDENTICAL for one in compared),
         'settings': told.source,
         'lockstep': lockstep,
         'namespace': recording.namespace,
-        'blocks': [_block_report(one, verdicts, recording) for one in verdicts],
+        'blocks': [_block_report(one, verdicts) for one in verdicts],
         'notes': notes,
         'ignored_topics': recording.ignored,
     }
 
 
-def _block_report(one: Verdict, verdicts: list[Verdict], recording: Recording) -> dict:
+def _block_report(one: Verdict, verdicts: list[Verdict]) -> dict:
     first = one.first
     return {
-        'block': one.block,
-        'result': one.status,
-        'reason': one.reason,
-        'ticks': one.ticks,
-        'compared': one.compared,
-        'differing': one.differing,
+        **one._asdict(),
         'first': first and {'tick': first.tick, 't_s': first.stamp_ns / 1e9, **first._asdict()},
-        'notes': one.notes + (_hints(one, verdicts, recording) if first else []),
+        'notes': [*one.notes, *(_hints(one, verdicts) if first else ())],
     }
 
 
-def _hints(one: Verdict, verdicts: list[Verdict], recording: Recording) -> list[str]:
+def _hints(one: Verdict, verdicts: list[Verdict]) -> list[str]:
     """What else may have led to the first difference of a block."""
     hints = []
     (wired,) = [wired for wired in WIRING if wired.name == one.block]
@@ -60,8 +53,4 @@ def _hints(one: Verdict, verdicts: list[Verdict], recording: Recording) -> list[
                 f'its input {source.topic} differs at {time_text(source.stamp_ns)} from what '
                 f'{other.block} computes: if the recording is damaged there, this is why'
             )
-    told = [event for event in recording.events if event.node == recording.node(wired.node)]
-    aborted = any(event.values.get('stage') == STAGE_NAMES[SURFACING] for event in told)
-    if aborted and not any(event.message == ABORT for event in told):
-        hints.append('an abort is not on record: older versions did not record the call itself')
     return hints

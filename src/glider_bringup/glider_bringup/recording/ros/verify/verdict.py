@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What verification says: a difference, and a verdict for each block."""
 
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from glider_model.base.signals import TICK_NS
@@ -31,27 +32,13 @@ class Verdict(NamedTuple):
     """What came out for one block."""
 
     block: str
-    status: str  #: IDENTICAL, DIFFERENT or SKIPPED
-    reason: str  #: why it was skipped
-    ticks: int  #: that were computed
-    compared: dict[str, int]  #: messages by topic
-    differing: dict[str, int]  #: those of them that differ, by topic
-    first: Difference | None
-    notes: list[str]
-
-
-def skipped(block: str, reason: str) -> Verdict:
-    """Verdict on a block that cannot be compared."""
-    return Verdict(
-        block=block,
-        status=SKIPPED,
-        reason=reason,
-        ticks=0,
-        compared={},
-        differing={},
-        first=None,
-        notes=[],
-    )
+    result: str  #: IDENTICAL, DIFFERENT or SKIPPED
+    reason: str = ''  #: why it was skipped
+    ticks: int = 0  #: that were computed
+    compared: Mapping[str, int] = {}  #: messages by topic
+    differing: Mapping[str, int] = {}  #: those of them that differ, by topic
+    first: Difference | None = None
+    notes: Sequence[str] = ()
 
 
 def time_text(stamp_ns: int) -> str:
