@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 from glider_bringup.mission.scenario import told_fields
 from glider_bringup.scoring.card import STOPPED
+from glider_bringup.scoring.scores import SCORES, Score, reckoned
 from glider_bringup.showing.panels import ACTUATORS, SURFACE
-from glider_bringup.showing.scorecard import guard_texts, reckoned, show
+from glider_bringup.showing.scorecard import engine_text, flown_text, guard_texts, show
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page, page_data
 from glider_bringup.showing.words import small, span
 from glider_model.base.settings import ConfigurationError
-from glider_model.ocean.current_settings import KNOT_MPS
 
 #: Curves that are laid over each other: panel, title, caption, axis, curve.
 _OVERLAID = (
@@ -118,17 +118,6 @@ def _said(field: str, value: Any) -> str:
 # ---------------------------------------------------------------------------------- scores
 
 
-class Figure(NamedTuple):
-    """A figure of a scorecard that is compared."""
-
-    name: str
-    keys: tuple[str, ...]  #: where it is in the card
-    unit: str  #: s: said as a time
-    digits: int
-    less_is_better: bool = False  #: else neither more nor less is
-    scale: float = 1.0  #: unit of the card in that which is shown
-
-
 class Cell(NamedTuple):
     """What a comparison shows of one run in one line."""
 
@@ -137,58 +126,6 @@ class Cell(NamedTuple):
     better: bool = False
 
 
-_TRACK, _PITCH, _HEADING = 'cross_track_m', 'pitch_error_deg', 'heading_fluctuation_deg'
-#: Said of vehicles that reckon their place alone.
-_NAVIGATION = 'navigation'
-_PLACE, _DAC = (_NAVIGATION, 'error_m'), (_NAVIGATION, 'dac_error_mps')
-_BELIEVED = (_NAVIGATION, 'believed_cross_track_m')
-FIGURES = (
-    Figure('simulated time', ('sim_time_s',), 's', 1),
-    Figure('real-time factor', ('real_time_factor',), '', 0),
-    Figure('messages recorded', ('messages_recorded',), '', 0),
-    Figure('messages lost', ('messages_lost',), '', 0, True),
-    Figure('dives', ('dives',), '', 0),
-    Figure('along path', ('distance_along_path_m',), 'm', 0),
-    Figure('came up from the end of path', ('end_of_path_m',), 'm', 1, True),
-    Figure('cross-track, steady, rms', (_TRACK, 'rms_steady'), 'm', 3, True),
-    Figure('cross-track, steady, max', (_TRACK, 'max_steady'), 'm', 3, True),
-    Figure('cross-track, after settling, max', (_TRACK, 'max_all'), 'm', 2, True),
-    Figure('cross-track, whole run, max', (_TRACK, 'max_run'), 'm', 2, True),
-    Figure('surfacings', (_NAVIGATION, 'surfacings'), '', 0),
-    Figure('believed place, surfacing, p50', (*_PLACE, 'p50'), 'm', 1, True),
-    Figure('believed place, surfacing, p95', (*_PLACE, 'p95'), 'm', 1, True),
-    Figure('believed place, surfacing, worst', (*_PLACE, 'worst'), 'm', 1, True),
-    Figure('cross-track believed, steady, max', (*_BELIEVED, 'max_steady'), 'm', 3),
-    Figure(
-        name='mean current learnt, error, rms',
-        keys=(*_DAC, 'rms'),
-        unit='kn',
-        digits=3,
-        less_is_better=True,
-        scale=1.0 / KNOT_MPS,
-    ),
-    Figure(
-        name='inside the 95 % ellipse',
-        keys=(_NAVIGATION, 'ellipse_95_share'),
-        unit='%',
-        digits=0,
-        less_is_better=False,
-        scale=100.0,
-    ),
-    Figure('pitch error, steady, rms', (_PITCH, 'rms_steady'), 'deg', 3, True),
-    Figure('pitch error, steady, max', (_PITCH, 'max_steady'), 'deg', 3, True),
-    Figure('heading fluctuation, rms', (_HEADING, 'rms_steady'), 'deg', 3, True),
-    Figure('heading fluctuation, max', (_HEADING, 'max_steady'), 'deg', 3, True),
-    Figure('depth, max', ('depth_m', 'max'), 'm', 1),
-    Figure('depth, overshoot', ('depth_m', 'overshoot'), 'm', 1, True),
-    Figure('pump travel', ('actuator_travel', 'buoyancy_engine_kg'), 'kg', 1, True),
-    Figure('pitch mass travel', ('actuator_travel', 'pitch_mass_m'), 'm', 2, True),
-    Figure('roll mass travel', ('actuator_travel', 'roll_mass_deg'), 'deg', 0, True),
-    Figure('energy', ('energy', 'wh'), 'Wh', 1, True),
-    Figure('energy, a dive', ('energy', 'wh_per_dive'), 'Wh', 1, True),
-    Figure('endurance', ('energy', 'endurance_days'), 'days', 1),
-    Figure('range', ('energy', 'range_km'), 'km', 0),
-)
 #: What a scorecard says of how a run was computed and recorded, not of the flight.
 _NOT_FLOWN = (
     *('engine', 'wall_time_s', 'real_time_factor'),
@@ -203,33 +140,29 @@ HOW_TO_READ = (
 )
 
 
-def _value(card: dict[str, Any], figure: Figure) -> float | None:
-    """A figure of a card, rounded as it is shown; cards of before lack some."""
-    if figure.keys[0] == _NAVIGATION and reckoned(card) is None:
-        return None
-    value: Any = card
-    for key in figure.keys:
-        value = value.get(key) if isinstance(value, dict) else None
-    return None if value is None else round(figure.scale * value, figure.digits)
+def _value(card: dict[str, Any], score: Score) -> float | None:
+    """A score of a card, rounded as it is shown."""
+    value = score.in_card(card)
+    return None if value is None else round(value, score.digits)
 
 
-def _change(figure: Figure, value: float | None, first: float | None) -> str:
+def _change(score: Score, value: float | None, first: float | None) -> str:
     """How a value differs from that of the first run."""
     if value is None or first is None:
         return ''
-    difference = round(value - first, figure.digits)
+    difference = round(value - first, score.digits)
     if not difference:
         return '='
-    if figure.unit == 's':
+    if score.unit == 's':
         return f'{"+" if difference > 0.0 else "-"}{span(abs(difference))}'
-    return f'{difference:+,.{figure.digits}f}'
+    return f'{difference:+,.{score.digits}f}'
 
 
-def _best(figure: Figure, cards: list[dict[str, Any]]) -> float | None:
-    """The better value of a figure, or None if none is better or they cannot be judged."""
+def _best(score: Score, cards: list[dict[str, Any]]) -> float | None:
+    """The better value of a score, or None if none is better or they cannot be judged."""
     judged = [card for card in cards if not _was_stopped(card)]
-    values = {_value(card, figure) for card in judged} - {None}
-    if not figure.less_is_better or len(values) < 2:
+    values = {_value(card, score) for card in judged} - {None}
+    if not score.less_is_better or len(values) < 2:
         return None
     times = [card['sim_time_s'] for card in judged]
     return min(values) if max(times) <= (1.0 + ALIKE) * min(times) else None
@@ -240,16 +173,16 @@ def _was_stopped(card: dict[str, Any]) -> bool:
     return card['status'] in ('surfaced', 'lost', *STOPPED)
 
 
-def _cells(figure: Figure, cards: list[dict[str, Any]]) -> list[Cell]:
-    """One figure of all runs."""
-    best, first = _best(figure, cards), _value(cards[0], figure)
+def _cells(score: Score, cards: list[dict[str, Any]]) -> list[Cell]:
+    """One score of all runs."""
+    best, first = _best(score, cards), _value(cards[0], score)
     cells = []
     for i, card in enumerate(cards):
-        value = _value(card, figure)
-        is_time = figure.unit == 's' and value is not None
-        text = span(value) if is_time else show(value, figure.unit, figure.digits)
+        value = _value(card, score)
+        is_time = score.unit == 's' and value is not None
+        text = span(value) if is_time else show(value, score.unit, score.digits)
         better = best is not None and value == best and not _was_stopped(card)
-        cells.append(Cell(text, _change(figure, value, first) if i else '', better))
+        cells.append(Cell(text, _change(score, value, first) if i else '', better))
     return cells
 
 
@@ -261,11 +194,8 @@ def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
 
     rows = [
         told('status', lambda card: ': '.join(filter(None, (card['status'], card['reason'])))),
-        told(
-            'flown',
-            lambda card: f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}',
-        ),
-        told('engine', lambda card: f'{card["engine"] or "not known"}, seed {card["seed"]}'),
+        told('flown', flown_text),
+        told('engine', engine_text),
     ]
     if any(card.get('changed') for card in cards):
         rows.append(
@@ -278,9 +208,9 @@ def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
     if any(guard_texts(card) for card in cards):
         rows.append(told('guard', lambda card: '; '.join(guard_texts(card)) or 'nothing'))
     return rows + [
-        (figure.name, _cells(figure, cards))
-        for figure in FIGURES
-        if any(_value(card, figure) is not None for card in cards)
+        (score.label, _cells(score, cards))
+        for score in SCORES
+        if any(score.in_card(card) is not None for card in cards)
     ]
 
 

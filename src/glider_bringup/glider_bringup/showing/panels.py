@@ -5,7 +5,7 @@
 import math
 from typing import NamedTuple
 
-from glider_bringup.showing.scorecard import reckoned
+from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, Steps
 from glider_guard.rows import REACTIONS, ROWS
 from glider_guard.rows import SURFACE as AT_LEAST

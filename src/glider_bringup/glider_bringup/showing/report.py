@@ -7,9 +7,10 @@ from typing import Any
 
 from glider_bringup.mission.scenario import told_fields
 from glider_bringup.scoring.dives import dives_of
+from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.findings import findings, verdict
 from glider_bringup.showing.panels import SURFACINGS, report_panels
-from glider_bringup.showing.scorecard import card_rows, reckoned
+from glider_bringup.showing.scorecard import card_rows
 from glider_bringup.showing.web_page import FlownRun, make_page, page_data
 from glider_bringup.showing.words import count, span, way
 from glider_model.base.files import yaml_text

@@ -12,8 +12,8 @@ import numpy as np
 
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
+from glider_bringup.scoring.scores import reckoned
 from glider_bringup.scoring.traces import SAMPLES, Traces
-from glider_bringup.showing.scorecard import reckoned
 from glider_guidance.path.curve import path_length, path_point, path_tangent
 from glider_model.vehicle.file import Vehicle
 
