@@ -18,7 +18,7 @@ SHALLOWEST = Score(
     *('depth, shallowest after settling', 'depth_m.shallowest', 'm', 2),
     less_is_better=True,
     of=lambda flown: float(np.min(flown.depth[flown.scored])),
-    study=('shallowest_m', 'shallowest (m)'),
+    study=(9, 'shallowest_m', 'shallowest (m)'),
 )
 
 
@@ -42,7 +42,9 @@ def test_a_score_added_in_one_place_is_in_card_comparison_and_study(stranger, tm
     rows = dict(score_rows([card, {**card, 'depth_m': {'max': 1.0, 'shallowest': value - 0.5}}]))
     first, second = rows['depth, shallowest after settling']
     assert (first.text, second.change, second.better) == (f'{value:,.2f} m', '-0.50', True)
-    study = summarise('x', 1, {(0, 'pid'): judge(scores)}, {0: {'unstable': 0, 'weak_steering': 0}})
+    study = summarise(
+        'x', 1, {(0, 'pid'): judge(scores)}, {0: {'unstable': 0, 'weak_steering': 0}}
+    )
     assert study['rows'][0]['shallowest_m']['worst'] == value
 
 

@@ -37,7 +37,7 @@ class Score(NamedTuple):
     less_is_better: bool = False  #: else neither more nor less is
     of: Callable[[Flown], float | None] | None = None  #: None: it is measured elsewhere
     scale: float = 1.0  #: unit of the card in that which is shown
-    study: tuple[str, str] | None = None  #: key and label in a study of many plants
+    study: tuple[int, str, str] | None = None  #: in one of many plants: place, key and label
 
     @property
     def line(self) -> str:
@@ -62,6 +62,11 @@ class Score(NamedTuple):
         for name in self.key.split('.'):
             value = value.get(name) if isinstance(value, dict) else None
         return None if value is None else self.scale * value
+
+
+def studied() -> list[tuple[str, str]]:
+    """Key and label of the scores that a study of many plants tells, in its order."""
+    return [study[1:] for study in sorted(one.study for one in SCORES if one.study)]
 
 
 def reckoned(card: dict) -> dict | None:
@@ -101,11 +106,11 @@ SCORES = [
           lambda flown: rms(flown.e2[flown.steady])),
     Score('cross-track, steady, max', 'cross_track_m.max_steady', 'm', 3, True,
           lambda flown: largest(flown.e2[flown.steady]),
-          study=('max_steady_m', 'max steady (m)')),
+          study=(1, 'max_steady_m', 'max steady (m)')),
     Score('cross-track, after settling, max', 'cross_track_m.max_all', 'm', 2, True,
-          lambda flown: largest(flown.e2[flown.scored]), study=('max_all_m', 'max all (m)')),
+          lambda flown: largest(flown.e2[flown.scored]), study=(2, 'max_all_m', 'max all (m)')),
     Score('cross-track, whole run, max', 'cross_track_m.max_run', 'm', 2, True,
-          lambda flown: largest(flown.e2), study=('max_run_m', 'max whole run (m)')),
+          lambda flown: largest(flown.e2), study=(3, 'max_run_m', 'max whole run (m)')),
     Score('surfacings', 'navigation.surfacings', '', 0),
     Score('believed place, surfacing, p50', 'navigation.error_m.p50', 'm', 1, True),
     Score('believed place, surfacing, p95', 'navigation.error_m.p95', 'm', 1, True),
@@ -117,12 +122,12 @@ SCORES = [
     Score('inside the 95 % ellipse', 'navigation.ellipse_95_share', '%', 0, scale=100.0),
     Score('pitch error, steady, rms', 'pitch_error_deg.rms_steady', 'deg', 3, True,
           lambda flown: rms(flown.pitch_error[flown.steady]),
-          study=('pitch_error_deg', 'pitch rms (deg)')),
+          study=(5, 'pitch_error_deg', 'pitch rms (deg)')),
     Score('pitch error, steady, max', 'pitch_error_deg.max_steady', 'deg', 3, True,
           lambda flown: largest(flown.pitch_error[flown.steady])),
     Score('heading fluctuation, rms', 'heading_fluctuation_deg.rms_steady', 'deg', 3, True,
           lambda flown: rms(flown.heading[flown.whole]),
-          study=('heading_fluctuation_deg', 'heading rms (deg)')),
+          study=(4, 'heading_fluctuation_deg', 'heading rms (deg)')),
     Score('heading fluctuation, max', 'heading_fluctuation_deg.max_steady', 'deg', 3, True,
           lambda flown: largest(flown.heading[flown.whole])),
     Score('depth, max', 'depth_m.max', 'm', 1, of=_deepest),
@@ -130,7 +135,7 @@ SCORES = [
     Score('pump travel', 'actuator_travel.buoyancy_engine_kg', 'kg', 1, True),
     Score('pitch mass travel', 'actuator_travel.pitch_mass_m', 'm', 2, True),
     Score('roll mass travel', 'actuator_travel.roll_mass_deg', 'deg', 0, True),
-    Score('energy', 'energy.wh', 'Wh', 1, True, study=('energy_wh', 'energy (Wh)')),
+    Score('energy', 'energy.wh', 'Wh', 1, True, study=(6, 'energy_wh', 'energy (Wh)')),
     Score('energy, a dive', 'energy.wh_per_dive', 'Wh', 1, True),
     Score('endurance', 'energy.endurance_days', 'days', 1),
     Score('range', 'energy.range_km', 'km', 0),

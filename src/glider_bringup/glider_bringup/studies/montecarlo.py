@@ -18,7 +18,7 @@ import numpy as np
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.navigation import FOURTH
-from glider_bringup.scoring.scores import SCORES
+from glider_bringup.scoring.scores import SCORES, studied
 from glider_bringup.studies.random_faults import outcome, sample_faults, validated
 from glider_bringup.studies.workers import Pool, Progress
 from glider_model.plant.sensors import SensorSettings
@@ -231,7 +231,7 @@ def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
     A flight that failed, was lost, or could not hold its course has diverged, whatever it was
     like before.
     """
-    figures = {one.study[0]: one.in_card(scores) for one in SCORES if one.study}
+    figures = {one.study[1]: one.in_card(scores) for one in SCORES if one.study}
     numbers = [number for number in figures.values() if number is not None]
     final = scores['final_state'] or {}
     numbers += [number for vector in final.values() for number in vector]
@@ -324,11 +324,7 @@ def summarise(
             {
                 'controller': controller,
                 'diverged': sum(flight['diverged'] for flight in of.values()),
-                **{
-                    one.study[0]: spread([flight[one.study[0]] for flight in of.values()])
-                    for one in SCORES
-                    if one.study
-                },
+                **{key: spread([flight[key] for flight in of.values()]) for key, _ in studied()},
                 'statically_unstable': sum(one['unstable'] for one in airframes.values()),
                 'weak_steering': sum(one['weak_steering'] for one in airframes.values()),
                 'navigation': _navigation([flight['navigation'] for flight in of.values()]),

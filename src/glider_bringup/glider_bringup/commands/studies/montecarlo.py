@@ -108,7 +108,7 @@ _RECKONED = (
 
 def _print_study(study: dict) -> None:
     """Print the result of a Monte Carlo study for a person."""
-    from glider_bringup.scoring.scores import SCORES
+    from glider_bringup.scoring.scores import studied
 
     def show(figure: dict) -> str:
         return ' / '.join('-' if x is None else f'{x:,.3f}' for x in figure.values())
@@ -121,10 +121,9 @@ def _print_study(study: dict) -> None:
     table.add_column('p50 / p95 / worst')
     for row in rows:
         table.add_column(row['controller'])
-    studied = [one.study for one in SCORES if one.study]
     lines = (
         ('diverged', lambda row: str(row['diverged'])),
-        *((label, lambda row, key=key: show(row[key])) for key, label in studied),
+        *((label, lambda row, key=key: show(row[key])) for key, label in studied()),
         ('surfacings', lambda row: f'{row["navigation"]["surfacings"]:,}'),
         ('error of place, from the 4th (m)', lambda row: show(row['navigation']['error_m'])),
         ('came up beside, from the 4th (m)', lambda row: show(row['navigation']['cross_track_m'])),
