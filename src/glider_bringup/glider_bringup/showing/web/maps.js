@@ -7,6 +7,20 @@ function visible(run, from, to) {
   return [begin, Math.max(begin, Math.min(last, Math.ceil(to / run.spacing / 2)))];
 }
 
+/** Scale and unit of a length (m). */
+const unitOf = (length) => (length > 2000 ? [1e-3, 'km'] : [1, 'm']);
+
+const marker = (role, symbol) => ({
+  color: values(role), size: 9, symbol, line: { color: values('--card'), width: 1.5 },
+});
+
+/** Draw a view from above or from the side, with its legend at the top left. */
+const reactMap = (element, traces, layout) => react(element, traces, {
+  margin: { l: 60, r: 10, t: 46, b: 40 },
+  legend: legendOf(element, { x: 0, xanchor: 'left', y: 1.01 }),
+  ...layout,
+});
+
 const spread = ([low, high], span) => [(low + high - span) / 2, (low + high + span) / 2];
 
 /** What both maps show: scale, unit, and the extent of what was flown. */
@@ -15,7 +29,7 @@ function mapFrame() {
   const north = extent(page.runs.map((run) => run.arrays.track_north_m));
   const depth = extent(page.runs.map((run) => run.arrays.track_depth_m));
   const span = Math.max(east[1] - east[0], north[1] - north[0], 20);
-  const [scale, unit] = span > 2000 ? [1e-3, 'km'] : [1, 'm'];
+  const [scale, unit] = unitOf(span);
   return { east, north, depth, span, scale, unit };
 }
 
@@ -83,18 +97,13 @@ function drawTrack(panel, element, from, to) {
   });
   const padded = 1.2 * frame.span * frame.scale;
   const centre = ([low, high]) => [low * frame.scale, high * frame.scale];
-  return Plotly.react(element, traces, {
-    ...look(element),
-    margin: { l: 60, r: 10, t: 46, b: 40 },
-    showlegend: true,
-    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1.01 },
-    hovermode: 'closest',
+  return reactMap(element, traces, {
     dragmode: 'pan',
     xaxis: axis(`east (${frame.unit})`, {
       range: spread(centre(frame.east), padded), nticks: 6, scaleanchor: 'y', constrain: 'range',
     }),
     yaxis: axis(`north (${frame.unit})`, { range: spread(centre(frame.north), padded), nticks: 8 }),
-  }, { displayModeBar: false, scrollZoom: false });
+  });
 }
 
 /** How far away the eye starts: everything with its labels is in view. */
@@ -136,8 +145,7 @@ function spaceFigure(panel, element) {
   const layout = {
     ...look(element),
     margin: { l: 0, r: 0, t: 0, b: 0 },
-    showlegend: true,
-    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1, yanchor: 'top' },
+    legend: legendOf(element, { x: 0, xanchor: 'left', y: 1, yanchor: 'top' }),
     scene: {
       aspectmode: 'manual',
       aspectratio: { x: width * side, y: height * side, z: 0.75 },
@@ -154,7 +162,7 @@ function spaceFigure(panel, element) {
 
 function drawSpace(panel, element) {
   const { data, layout } = spaceFigure(panel, element);
-  return Plotly.react(element, data, layout, { displayModeBar: false });
+  return react(element, data, layout);
 }
 
 // ------------------------------------------------------------------------------- from the side
@@ -188,20 +196,15 @@ function distances(run) {
 
 function drawSide(panel, element) {
   const flown = page.runs.map(distances);
-  const [scale, unit] = extent(flown)[1] > 2000 ? [1e-3, 'km'] : [1, 'm'];
+  const [scale, unit] = unitOf(extent(flown)[1]);
   const traces = page.runs.map((run, i) => ({
     x: pick(flown[i], 4000, scale), y: pick(run.arrays.track_depth_m, 4000, 1),
     mode: 'lines', name: trackName(run), line: { color: trackColour(i), width: lineWidth(i) + 0.4 },
     hovertemplate: `%{x:.3~f} ${unit}, depth %{y:.1f} m`,
   }));
-  return Plotly.react(element, traces, {
-    ...look(element),
-    margin: { l: 60, r: 10, t: 46, b: 40 },
-    showlegend: true,
-    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1.01 },
-    hovermode: 'closest',
+  return reactMap(element, traces, {
     dragmode: false,
     xaxis: axis(`distance flown (${unit})`, { fixedrange: true, nticks: 6 }),
     yaxis: axis('depth (m)', { fixedrange: true, nticks: 8, autorange: 'reversed' }),
-  }, { displayModeBar: false });
+  });
 }
