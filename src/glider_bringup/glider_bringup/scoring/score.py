@@ -290,19 +290,8 @@ def scores_of(scenario: Scenario, scorer: Scorer) -> dict:
 def _guard(mask: np.ndarray, has_weight: bool) -> dict:
     """What the guard noticed in flight and did, and what control refused, as they told it.
 
-    Parameters
-    ----------
-    mask : float64[ticks]
-        Sum of the bits of `glider_guard.rows` and of `glider_control`. Before there was a guard
-        they were told together.
-    has_weight : bool
-        The vehicle can drop a weight: one that cannot does no more than surface.
-
-    Returns
-    -------
-    dict
-        state: flying, or latched; reaction at the end; and the first `EVENTS_KEPT` events
-        {t_s, row, reaction, message}.
+    ``mask`` is the sum of the bits of `glider_guard.rows` and of `glider_control`, which were told
+    together before there was a guard; a vehicle that ``has_weight`` can do more than surface.
     """
     gravest = DROP if has_weight else SURFACE
     rows = {row.bit: (row.name, REACTIONS[min(row.reaction, gravest)], row.says) for row in ROWS}

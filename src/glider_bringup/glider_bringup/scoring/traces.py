@@ -364,16 +364,9 @@ def _widen(first, second, value):
 
 @kernel
 def _fold(values, tick, size, points):
-    """Take values into buckets of ``size`` ticks; returns how many are not finite.
+    """Take values of ticks from ``tick`` on into buckets of ``size`` ticks; count the not finite.
 
-    Parameters
-    ----------
-    values : float64[n]
-    tick : int
-        Of the first value.
-    size : int
-    points : float32[2 b]
-        Extremes of every bucket, NaN where there is none yet.
+    ``points``, float32[2 b], are the extremes of every bucket, NaN where there is none yet.
     """
     missing, start = 0, 0
     while start < len(values):

@@ -10,43 +10,24 @@ from typing import Any, NamedTuple
 from glider_bringup.mission.scenario import told_fields
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.scoring.scores import SCORES, Score, reckoned
-from glider_bringup.showing.panels import ACTUATORS, SURFACE
+from glider_bringup.showing.panels import ACTUATORS, SPACE, SURFACE, flown_panel
 from glider_bringup.showing.scorecard import engine_text, flown_text, guard_texts, show
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page, page_data
 from glider_bringup.showing.words import small, span
 from glider_model.base.settings import ConfigurationError
 
-#: Curves that are laid over each other: panel, title, caption, axis, curve.
-_OVERLAID = (
-    ('depth', 'Depth', 'How deep each was.', 'depth (m)', 'depth_m'),
-    (
-        'cross_track',
-        'Cross-track error',
-        'Distance from its own path, + to starboard of it.',
-        'off the path (m)',
-        'cross_track_m',
-    ),
-    (
-        'place_error',
-        'Error of the believed place',
+#: Curves that are laid over each other: caption and curve, by panel.
+_OVERLAID = {
+    'depth': ('How deep each was.', 'depth_m'),
+    'cross_track': ('Distance from its own path, + to starboard of it.', 'cross_track_m'),
+    'place_error': (
         'Horizontal distance between the true and the believed place.',
-        'error (m)',
         'place_error_m',
     ),
-    ('pitch', 'Pitch', 'Nose up is positive.', 'pitch (deg)', 'pitch_deg'),
-    ('heading', 'Heading', 'Clockwise from north.', 'heading (deg)', 'heading_deg'),
-    ('roll', 'Roll', 'Starboard side down is positive.', 'roll (deg)', 'roll_deg'),
-    *(
-        (
-            one.joint,
-            one.title,
-            f'{one.caption}.',
-            f'{one.title.lower()} ({one.unit})',
-            one.position,
-        )
-        for one in (*ACTUATORS, SURFACE)
-    ),
-)
+    'pitch': ('Nose up is positive.', 'pitch_deg'),
+    'heading': ('Clockwise from north.', 'heading_deg'),
+    'roll': ('Starboard side down is positive.', 'roll_deg'),
+}
 #: Colours before they come again, then dashed.
 _COLOURS = 8
 
@@ -245,16 +226,14 @@ def _headline(runs: list[FlownRun]) -> str:
     """How far off the path each was, in a sentence."""
     if are_equal([run.card for run in runs]):
         return EQUAL
-    errors = [
-        (run.label, run.card['cross_track_m']['max_steady'])
-        for run in runs
-        if run.card['cross_track_m']['max_steady'] is not None
-    ]
-    whole = [
-        (run.label, run.card['cross_track_m']['max_run'])
-        for run in runs
-        if run.card['cross_track_m'].get('max_run') is not None
-    ]
+    errors, whole = (
+        [
+            (run.label, run.card['cross_track_m'][name])
+            for run in runs
+            if run.card['cross_track_m'].get(name) is not None
+        ]
+        for name in ('max_steady', 'max_run')
+    )
     if not errors:
         return f'{len(runs)} runs; none has flown long enough for a score in steady glide.'
     return (
@@ -272,23 +251,22 @@ def _panels(runs: list[FlownRun]) -> dict[str, list[Panel]]:
     """Panels by heading."""
     flown = [(i, run) for i, run in enumerate(runs) if run.traces.ticks]
 
-    def overlaid(panel: str, title: str, caption: str, axis: str, name: str) -> Panel:
-        curves = tuple(
+    def curves(name: str) -> tuple[Curve, ...]:
+        return tuple(
             Curve(name, run.label, f'run{i % _COLOURS}', dashed=i >= _COLOURS, run=i)
             for i, run in flown
             if run.traces.has(name)
         )
-        return Panel(panel, title, caption, axis, curves, inverted=name == 'depth_m')
 
     if not flown:
         return {}
-    panels = [overlaid(*row) for row in _OVERLAID]
+    panels = [flown_panel(one, text, curves(name)) for one, (text, name) in _OVERLAID.items()]
+    tracks = Panel('track', 'Tracks', 'From above, to scale.', kind='track')
+    panels += [one.panel('', curves(one.position)) for one in (*ACTUATORS, SURFACE)]
     return {
         'Where they went': [
             Panel('track', 'Tracks', 'From above, to scale.', kind='track'),
-            Panel(
-                'space', 'In three dimensions', 'Drag to turn. Depth is stretched.', kind='space'
-            ),
+            SPACE,
         ],
         'How they flew': [panel for panel in panels if panel.curves],
     }

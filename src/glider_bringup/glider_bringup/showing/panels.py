@@ -35,6 +35,11 @@ class Actuator(NamedTuple):
         """Name of the curve that says when it is commanded to its limit."""
         return f'{self.joint}_at_limit'
 
+    def panel(self, more: str, curves: tuple[Curve, ...], **look) -> Panel:
+        """Panel of it, with more in its caption."""
+        axis = f'{self.title.lower()} ({self.unit})'
+        return Panel(self.joint, self.title, f'{self.caption}.{more}', axis, curves, **look)
+
 
 ACTUATORS = (
     Actuator('buoyancy_engine', 'kg', 'Buoyancy engine', 'Net heaviness, + sinks'),
@@ -89,6 +94,13 @@ _BATTERY = Panel(
     'battery (%)',
     (Curve('battery_percent', 'left', 'measured'),),
 )
+_TRACK = Panel(
+    'track',
+    'Track',
+    'From above, to scale. Arrows: where the current flows to. What is zoomed into below is drawn '
+    'bold.',
+    kind='track',
+)
 #: Heading over what is known of each surfacing.
 SURFACINGS = 'Each surfacing'
 _ROLES = ('measured', 'reference', 'third', 'fourth')
@@ -105,79 +117,70 @@ def actuators_of(run: FlownRun) -> list[tuple[Actuator, float]]:
     return [(one, limit) for one, limit in found if limit > 0.0]
 
 
-def _maps() -> list[Panel]:
-    """Plan view and three-dimensional view."""
-    return [
-        Panel(
-            'track',
-            'Track',
-            'From above, to scale. Arrows: where the current flows to. What is zoomed into below '
-            'is drawn bold.',
-            kind='track',
-        ),
-        Panel(
-            'space',
-            'In three dimensions',
-            'Drag to turn. Depth is stretched.',
-            kind='space',
-        ),
-    ]
+#: Panels of one run and of several: title and axis.
+_FLOWN = {
+    'depth': ('Depth', 'depth (m)'),
+    'cross_track': ('Cross-track error', 'off the path (m)'),
+    'place_error': ('Error of the believed place', 'error (m)'),
+    'pitch': ('Pitch', 'pitch (deg)'),
+    'heading': ('Heading', 'heading (deg)'),
+    'roll': ('Roll', 'roll (deg)'),
+}
+SPACE = Panel('space', 'In three dimensions', 'Drag to turn. Depth is stretched.', kind='space')
+
+
+def flown_panel(name: str, caption: str, curves: tuple[Curve, ...], **look) -> Panel:
+    """Panel of `_FLOWN`."""
+    title, axis = _FLOWN[name]
+    return Panel(name, title, caption, axis, curves, inverted=name == 'depth', **look)
+
+
+def _desired(name: str, label: str = 'desired') -> Curve:
+    """Curve of what was asked for, or believed."""
+    return Curve(name, label, 'reference', dashed=True)
 
 
 def _flight_panels(run: FlownRun) -> list[Panel]:
     """How it flew: depth, errors, attitude."""
-    traces = run.traces
-    noisy = traces.has('measured_depth_m')
+    noisy = run.traces.has('measured_depth_m')
     told = 'believed' if reckoned(run.card) else 'measured, with noise'
 
     def curves(name: str, *others: Curve) -> tuple[Curve, ...]:
-        label = 'true' if noisy else 'flown'
         measured = (Curve(f'measured_{name}', told, 'faint'),) if noisy else ()
-        return (*measured, Curve(name, label, 'measured'), *others)
+        return (*measured, Curve(name, 'true' if noisy else 'flown', 'measured'), *others)
 
     follows_path = run.scenario.profile.mode == 'path'
     target = 'virtual target' if follows_path else 'turn flown to'
     below = Curve('vertical_error_m', 'normal to the path, + below it', 'third')
     lost = Curve('cross_track_m', 'course cannot be held', 'alert', flag='infeasible')
     return [
-        Panel(
+        flown_panel(
             'depth',
-            'Depth',
             'How deep it was, and the depth it was flying to.',
-            'depth (m)',
-            curves('depth_m', Curve('depth_ref_m', target, 'reference', dashed=True)),
-            inverted=True,
+            curves('depth_m', _desired('depth_ref_m', target)),
         ),
-        Panel(
+        flown_panel(
             'cross_track',
-            'Cross-track error',
             'Distance from the path, + to starboard of it. A vehicle can hardly steer while it '
             'turns over between dive and climb: at the inflections.',
-            'off the path (m)',
             curves('cross_track_m', *((below,) if follows_path else ()), lost),
             inflections=0,
         ),
-        Panel(
+        flown_panel(
             'pitch',
-            'Pitch',
             'Nose up is positive: a dive has about minus, a climb plus the glide pitch.',
-            'pitch (deg)',
-            curves('pitch_deg', Curve('pitch_ref_deg', 'desired', 'reference', dashed=True)),
+            curves('pitch_deg', _desired('pitch_ref_deg')),
         ),
-        Panel(
+        flown_panel(
             'heading',
-            'Heading',
             'Clockwise from north, counted on through 180 deg. It differs from the course of the '
             'path by the crab angle against the current.',
-            'heading (deg)',
-            curves('heading_deg', Curve('heading_ref_deg', 'desired', 'reference', dashed=True)),
+            curves('heading_deg', _desired('heading_ref_deg')),
         ),
-        Panel(
+        flown_panel(
             'roll',
-            'Roll',
             'Starboard side down is positive. Control banks to turn; the roll it asks for is its '
             'own, so there is no reference.',
-            'roll (deg)',
             curves('roll_deg'),
         ),
     ]
@@ -203,7 +206,7 @@ def _navigation_panels(run: FlownRun) -> list[Panel]:
     told = reckoned(run.card)
     if told is None:
         return []
-    believed = Curve('measured_cross_track_m', 'believed', 'reference', dashed=True)
+    believed = _desired('measured_cross_track_m', 'believed')
     return [
         Panel(
             'plan',
@@ -220,15 +223,13 @@ def _navigation_panels(run: FlownRun) -> list[Panel]:
             (Curve('cross_track_m', 'true', 'measured'), believed),
             surfacings=0,
         ),
-        Panel(
+        flown_panel(
             'place_error',
-            'Error of the believed place',
             'Horizontal distance between the true and the believed place, and the bound that it '
             'should keep to 95 % of the time: the longer half axis of the ellipse.',
-            'error (m)',
             (
                 Curve('place_error_m', 'error', 'measured'),
-                Curve('place_bound_m', '95 % bound, as believed', 'reference', dashed=True),
+                _desired('place_bound_m', '95 % bound, as believed'),
             ),
             surfacings=0,
             log=True,
@@ -267,21 +268,16 @@ def _actuator_panels(run: FlownRun) -> list[Panel]:
     panels = []
     for one, limit in actuators_of(run):
         used = run.traces.largest(one.position) / limit
-        panels.append(
-            Panel(
-                one.joint,
-                one.title,
-                f'{one.caption}. Its limits of ±{limit:g} {one.unit} are drawn where it comes '
-                f'near them; the largest use of its range was {100.0 * used:.0f} %.',
-                f'{one.title.lower()} ({one.unit})',
-                (
-                    Curve(one.position, 'position', 'measured'),
-                    Curve(one.command, 'commanded', 'reference', dashed=True),
-                    Curve(one.command, 'at its limit', 'alert', flag=one.flag),
-                ),
-                limits=(-limit, limit),
-            )
+        more = (
+            f' Its limits of ±{limit:g} {one.unit} are drawn where it comes near them; '
+            f'the largest use of its range was {100.0 * used:.0f} %.'
         )
+        curves = (
+            Curve(one.position, 'position', 'measured'),
+            _desired(one.command, 'commanded'),
+            Curve(one.command, 'at its limit', 'alert', flag=one.flag),
+        )
+        panels.append(one.panel(more, curves, limits=(-limit, limit)))
     return panels
 
 
@@ -296,7 +292,7 @@ def _current_panels(run: FlownRun) -> list[Panel]:
             'current (kn)',
             (
                 Curve(f'current_{axis}_kn', 'true', 'measured'),
-                Curve(f'estimate_{axis}_kn', 'estimated', 'reference', dashed=True),
+                _desired(f'estimate_{axis}_kn', 'estimated'),
             ),
         )
         for axis in ('north', 'east')
@@ -365,7 +361,7 @@ def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
         return {}
     groups = {
         SURFACINGS: _surfacing_panels(run),
-        'Where it went': _maps(),
+        'Where it went': [_TRACK, SPACE],
         'How it knew where it was': _navigation_panels(run),
         'How it flew': _flight_panels(run),
         'What the actuators did, and the battery': [*_actuator_panels(run), _BATTERY],
