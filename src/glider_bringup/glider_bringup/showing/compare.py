@@ -12,7 +12,7 @@ from glider_bringup.scoring.card import STOPPED
 from glider_bringup.scoring.scores import SCORES, Score, reckoned
 from glider_bringup.showing.panels import ACTUATORS, SPACE, SURFACE, flown_panel
 from glider_bringup.showing.scorecard import engine_text, flown_text, guard_texts, show
-from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page, page_data
+from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page
 from glider_bringup.showing.words import small, span
 from glider_model.base.settings import ConfigurationError
 
@@ -264,20 +264,18 @@ def _panels(runs: list[FlownRun]) -> dict[str, list[Panel]]:
     tracks = Panel('track', 'Tracks', 'From above, to scale.', kind='track')
     panels += [one.panel('', curves(one.position)) for one in (*ACTUATORS, SURFACE)]
     return {
-        'Where they went': [
-            Panel('track', 'Tracks', 'From above, to scale.', kind='track'),
-            SPACE,
-        ],
+        'Where they went': [tracks, SPACE],
         'How they flew': [panel for panel in panels if panel.curves],
     }
 
 
 def compare_page(runs: list[FlownRun]) -> str:
     """Text of the page that lays runs over each other."""
-    sections, cards = _panels(runs), [run.card for run in runs]
+    cards = [run.card for run in runs]
     return make_page(
         'compare.html',
-        page_data(runs, [panel for group in sections.values() for panel in group]),
+        runs,
+        _panels(runs),
         title=f'{len(runs)} runs compared',
         headline=_headline(runs),
         keys=[(run.label, i % _COLOURS, i >= _COLOURS) for i, run in enumerate(runs)],
@@ -285,5 +283,4 @@ def compare_page(runs: list[FlownRun]) -> str:
         how_to_read=HOW_TO_READ.format(mark='✓'),
         notes=caveats(cards),
         differences=difference_rows(differences(runs)),
-        sections=sections,
     )

@@ -101,8 +101,6 @@ _TRACK = Panel(
     'bold.',
     kind='track',
 )
-#: Heading over what is known of each surfacing.
-SURFACINGS = 'Each surfacing'
 _ROLES = ('measured', 'reference', 'third', 'fourth')
 
 
@@ -360,7 +358,7 @@ def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
     if not run.traces.ticks:
         return {}
     groups = {
-        SURFACINGS: _surfacing_panels(run),
+        'Each surfacing': _surfacing_panels(run),
         'Where it went': [_TRACK, SPACE],
         'How it knew where it was': _navigation_panels(run),
         'How it flew': _flight_panels(run),

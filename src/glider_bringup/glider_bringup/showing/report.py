@@ -10,9 +10,9 @@ from glider_bringup.mission.scenario import told_fields
 from glider_bringup.scoring.dives import Dive, dives_of
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.findings import findings, verdict
-from glider_bringup.showing.panels import SURFACINGS, report_panels
+from glider_bringup.showing.panels import report_panels
 from glider_bringup.showing.scorecard import card_rows
-from glider_bringup.showing.web_page import FlownRun, make_page, page_data
+from glider_bringup.showing.web_page import FlownRun, make_page
 from glider_bringup.showing.words import count, span, way
 from glider_model.base.files import yaml_text
 from glider_model.base.signals import TICK_S
@@ -120,11 +120,10 @@ def _table(columns: dict[str, Callable[[Any], str]], things: Sequence) -> list[l
 def report_page(run: FlownRun) -> str:
     """Text of the report of a run."""
     card, rules = run.card, run.rules
-    sections = report_panels(run)
-    data = page_data([run], [panel for group in sections.values() for panel in group])
     return make_page(
         'report.html',
-        data,
+        [run],
+        report_panels(run),
         title=f'{_title(run)}: {card["status"]}',
         scenario=run.scenario,
         status=card['status'],
@@ -132,8 +131,6 @@ def report_page(run: FlownRun) -> str:
         verdict=verdict(card, rules.settle_s),
         tiles=_tiles(run),
         findings=findings(run),
-        first={SURFACINGS: sections.pop(SURFACINGS)} if SURFACINGS in sections else {},
-        sections=sections,
         surfacings=_table(_SURFACING, (reckoned(card) or {}).get('reports', [])),
         dives=_table(_DIVE, dives_of(run.traces) if run.traces.ticks else []),
         card=card_rows(card),
