@@ -102,18 +102,16 @@ class Scorer:
 
     Parameters
     ----------
-    sensors : SensorParams, optional
-        Noise of the odometry, for runs that do not tell the truth.
+    sensors, readings : SensorParams, Readings, optional
+        Noise of the odometry, for runs that do not tell the truth, and of where the actuators say
+        that they are: no way that they go.
     origin : Origin, optional
         To which fixes are relative.
     topics : tuple of str
         What there is of navigation in the run; empty of a vehicle that knows its place.
     faults : sequence of FaultSettings
-        What breaks in the run.
     vehicle : Vehicle, optional
         Its steering surface, battery, crush depth and drop weight; without it there are none.
-    readings : Readings, optional
-        Noise of where its actuators say that they are: no way that they go.
     course_rad : float
         Of the path at its start, for a vehicle whose target never moved along it.
     """

@@ -153,9 +153,8 @@ def _feasible(speed_mps: float, current_kn: np.ndarray, angle_deg: np.ndarray) -
     """Whether the path can be held in each current by any controller."""
 
     def is_held(current: float, angle: float) -> bool:
-        return crab_heading(0.0, speed_mps, current * math.cos(angle), current * math.sin(angle))[
-            2
-        ]
+        along, across = current * math.cos(angle), current * math.sin(angle)
+        return crab_heading(0.0, speed_mps, along, across)[2]
 
     angles = np.radians(angle_deg)
     return np.array([[is_held(one, angle) for angle in angles] for one in current_kn * KNOT_MPS])
