@@ -3,6 +3,7 @@
 """Runs side by side: their scores, what their scenarios differ in, and one page over the other."""
 
 from collections.abc import Iterator
+from itertools import compress
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -121,12 +122,6 @@ HOW_TO_READ = (
 )
 
 
-def _value(card: dict[str, Any], score: Score) -> float | None:
-    """A score of a card, rounded as it is shown."""
-    value = score.in_card(card)
-    return None if value is None else round(value, score.digits)
-
-
 def _change(score: Score, value: float | None, first: float | None) -> str:
     """How a value differs from that of the first run."""
     if value is None or first is None:
@@ -139,31 +134,21 @@ def _change(score: Score, value: float | None, first: float | None) -> str:
     return f'{difference:+,.{score.digits}f}'
 
 
-def _best(score: Score, cards: list[dict[str, Any]]) -> float | None:
-    """The better value of a score, or None if none is better or they cannot be judged."""
-    judged = [card for card in cards if not _was_stopped(card)]
-    values = {_value(card, score) for card in judged} - {None}
-    if not score.less_is_better or len(values) < 2:
-        return None
-    times = [card['sim_time_s'] for card in judged]
-    return min(values) if max(times) <= (1.0 + ALIKE) * min(times) else None
-
-
-def _was_stopped(card: dict[str, Any]) -> bool:
-    """Whether a run ended before its mission did."""
-    return card['status'] in ('surfaced', 'lost', *STOPPED)
-
-
 def _cells(score: Score, cards: list[dict[str, Any]]) -> list[Cell]:
-    """One score of all runs."""
-    best, first = _best(score, cards), _value(cards[0], score)
+    """One score of all runs, rounded as it is shown, and which is better if that can be said."""
+    values = [score.in_card(card) for card in cards]
+    values = [None if value is None else round(value, score.digits) for value in values]
+    judged = [card['status'] not in ('surfaced', 'lost', *STOPPED) for card in cards]
+    times = [card['sim_time_s'] for card in compress(cards, judged)]
+    known = set(compress(values, judged)) - {None}
+    alike = len(known) > 1 and max(times) <= (1.0 + ALIKE) * min(times)
+    best = min(known) if score.less_is_better and alike else None
     cells = []
-    for i, card in enumerate(cards):
-        value = _value(card, score)
+    for i, (value, is_judged) in enumerate(zip(values, judged, strict=True)):
         is_time = score.unit == 's' and value is not None
         text = span(value) if is_time else show(value, score.unit, score.digits)
-        better = best is not None and value == best and not _was_stopped(card)
-        cells.append(Cell(text, _change(score, value, first) if i else '', better))
+        better = is_judged and best is not None and value == best
+        cells.append(Cell(text, _change(score, value, values[0]) if i else '', better))
     return cells
 
 

@@ -240,11 +240,9 @@ def _mean_current_panel(reports: list[dict], axis: int) -> Panel:
     """Mean current to the north (0) or east (1) of every way under water."""
     name = ('north', 'east')[axis]
 
-    def steps(label: str, role: str, key: str, dashed: bool) -> Steps:
-        spans = tuple(
-            (one['dive_t_s'], one['t_s'], one[key][axis] / KNOT_MPS) for one in reports if one[key]
-        )
-        return Steps(label, role, spans, dashed)
+    def spans(key: str) -> tuple[tuple[float, float, float], ...]:
+        known = [one for one in reports if one[key]]
+        return tuple((one['dive_t_s'], one['t_s'], one[key][axis] / KNOT_MPS) for one in known)
 
     return Panel(
         f'mean_current_{name}',
@@ -254,8 +252,8 @@ def _mean_current_panel(reports: list[dict], axis: int) -> Panel:
         'current (kn)',
         (Curve(f'current_{name}_kn', 'true, where it is', 'faint'),),
         steps=(
-            steps('true mean of the way', 'measured', 'dac_true_mps', False),
-            steps('believed of it, after fixes', 'reference', 'dac_believed_mps', True),
+            Steps('true mean of the way', 'measured', spans('dac_true_mps')),
+            Steps('believed of it, after fixes', 'reference', spans('dac_believed_mps'), True),
         ),
         surfacings=0,
     )
@@ -330,22 +328,15 @@ def _guard_panels(run: FlownRun) -> list[Panel]:
 def _learnt_panels(run: FlownRun) -> list[Panel]:
     """What the adaptive law has learnt; nothing of what stayed zero."""
     panels = []
-    for panel, title, caption, axis, names in _LEARNT:
-        names = [name for name in names if run.traces.largest(name) > 0.0]
-        curves = tuple(
-            Curve(name, _label(name), role) for name, role in zip(names, _ROLES, strict=False)
-        )
+    for *told, names in _LEARNT:
+        curves = []
+        for name in names:
+            if run.traces.largest(name) > 0.0:
+                label = name.removesuffix('_nm').removesuffix('_radps').replace('_', ' ')
+                curves.append(Curve(name, label, _ROLES[len(curves)]))
         if curves:
-            log = panel == 'learnt_lyapunov'
-            panels.append(Panel(panel, title, caption, axis, curves, log=log))
+            panels.append(Panel(*told, tuple(curves), log='lyapunov_1' in names))
     return panels
-
-
-def _label(name: str) -> str:
-    """Name of something learnt, without its unit."""
-    for unit in ('_nm', '_radps'):
-        name = name.removesuffix(unit)
-    return name.replace('_', ' ')
 
 
 def _is_there(curve: Curve, run: FlownRun) -> bool:
@@ -369,10 +360,10 @@ def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
     }
     found = {}
     for heading, panels in groups.items():
-        drawn = (
+        drawn = [
             panel._replace(curves=tuple(curve for curve in panel.curves if _is_there(curve, run)))
             for panel in panels
-        )
+        ]
         found[heading] = [
             panel for panel in drawn if panel.curves or panel.steps or panel.kind != 'time'
         ]

@@ -37,7 +37,7 @@ function pathTrace(run, scale, more) {
   return {
     x: run.path.map((p) => p[1] * scale), y: run.path.map((p) => p[0] * scale), mode: 'lines',
     line: { color: values(page.runs.length > 1 ? '--limit' : '--reference'), width: 2, dash: 'dash' },
-    name: 'desired path', ...more,
+    name: 'desired path', hoverinfo: 'skip', ...more,
   };
 }
 
@@ -70,9 +70,7 @@ function drawTrack(panel, element, from, to) {
   const frame = mapFrame();
   const traces = [];
   page.runs.forEach((run, i) => {
-    if (run.own_path) {
-      traces.push(pathTrace(run, frame.scale, { showlegend: i === 0, hoverinfo: 'skip' }));
-    }
+    if (run.own_path) traces.push(pathTrace(run, frame.scale, { showlegend: i === 0 }));
   });
   if (page.runs.length === 1) traces.push(currentTrace(page.runs[0], frame));
   page.runs.forEach((run, i) => {
@@ -90,19 +88,18 @@ function drawTrack(panel, element, from, to) {
       line: { color: trackColour(i), width: 7 }, opacity: 0.5,
     });
     traces.push({
-      x: pick(e.slice(0, 1), 1, frame.scale), y: pick(n.slice(0, 1), 1, frame.scale),
+      x: pick(e, 1, frame.scale, 0, 0), y: pick(n, 1, frame.scale, 0, 0),
       mode: 'markers', name: 'start', showlegend: i === 0, hoverinfo: 'name',
       marker: { color: trackColour(i), size: 10, line: { color: values('--card'), width: 2 } },
     });
   });
-  const padded = 1.2 * frame.span * frame.scale;
-  const centre = ([low, high]) => [low * frame.scale, high * frame.scale];
+  const range = (ends) => spread(ends, 1.2 * frame.span).map((one) => one * frame.scale);
   return reactMap(element, traces, {
     dragmode: 'pan',
     xaxis: axis(`east (${frame.unit})`, {
-      range: spread(centre(frame.east), padded), nticks: 6, scaleanchor: 'y', constrain: 'range',
+      range: range(frame.east), nticks: 6, scaleanchor: 'y', constrain: 'range',
     }),
-    yaxis: axis(`north (${frame.unit})`, { range: spread(centre(frame.north), padded), nticks: 8 }),
+    yaxis: axis(`north (${frame.unit})`, { range: range(frame.north), nticks: 8 }),
   });
 }
 
@@ -120,7 +117,7 @@ function spaceFigure(panel, element) {
     const path = run.path.filter(clip);
     traces.push({
       ...pathTrace({ path }, frame.scale), type: 'scatter3d', z: path.map((p) => p[2]),
-      hoverinfo: 'skip', showlegend: i === 0, visible: run.own_path,
+      showlegend: i === 0, visible: run.own_path,
     });
     traces.push({
       type: 'scatter3d', mode: 'lines', name: trackName(run), line: { color: trackColour(i), width: 4 },

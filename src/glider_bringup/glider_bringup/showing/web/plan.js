@@ -39,9 +39,7 @@ function planTraces(run, scale, unit) {
     { mode: 'markers', name, hovertemplate: at, marker: marker(role, symbol), ...more });
   const every = Math.ceil(surfacings.length / NUMBERED);
   return [
-    pathTrace(run, scale, {
-      hoverinfo: 'skip', line: { color: values('--limit'), width: 1.5, dash: 'dash' },
-    }),
+    pathTrace(run, scale, { line: { color: values('--limit'), width: 1.5, dash: 'dash' } }),
     track('track', 'true track', '--measured', 'solid'),
     track('believed', 'believed track', '--reference', 'dash'),
     places('true_ned_m', 'true place at surfacing', '--measured', 'circle', {
