@@ -8,7 +8,14 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 
 from glider_bringup.engines.flight import Outcome, Progress, Taker, fly
 from glider_bringup.mission.disk import write_whole
@@ -195,6 +202,14 @@ class _Navigation(_Checked):
     reports: list[_Report] = []
 
 
+class _State(_Checked):
+    """Where the vehicle was at the end, and how it moved."""
+
+    position_ned_m: _Triple
+    attitude_rpy_rad: _Triple
+    velocity_mps: _Triple
+
+
 class _Card(_Checked):
     """A scorecard: what it has to have, and what is shown of it."""
 
@@ -220,8 +235,14 @@ class _Card(_Checked):
     heading_fluctuation_deg: _group('rms_steady max_steady')
     depth_m: _group('max overshoot')
     actuator_travel: _group('buoyancy_engine_kg pitch_mass_m roll_mass_deg')
-    final_state: dict[str, _Triple] | None  # a run without a tick has none
+    final_state: _State | None
     guard: _Guard = _Guard()
     faults: list[_Fault] = []
     navigation: _Navigation | None = None
     energy: _Energy | None = None
+
+    @model_validator(mode='after')
+    def _flown_or_never_flown(self) -> '_Card':
+        if self.ticks and self.final_state is None:
+            raise ValueError('only a run without a tick has no final state')
+        return self
