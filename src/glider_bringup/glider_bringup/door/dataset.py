@@ -14,7 +14,6 @@ from xarray.plot.accessor import DataArrayPlotAccessor
 
 from glider_bringup.blocks import COLUMNS
 from glider_bringup.mission.scenario import Scenario
-from glider_bringup.scoring.true_motion import wire_of
 from glider_control.block import CONTROL
 from glider_control.control import (
     SATURATED_BUOYANCY,
@@ -227,14 +226,14 @@ def _put(out, row, start, values):
 def _turn(log, out):
     """Fill ``out``, float64[len(_TURNED), n], from log rows, float64[n, ROW]."""
     for row in range(log.shape[0]):
-        odometry = odometry_from_wire(wire_of(log, row, _ODOM))
+        odometry = odometry_from_wire(log[row, _ODOM : _ODOM + 13])
         _put(out, row, 0, odometry)
         angles = euler_from_quaternion(odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z)
         _put(out, row, 13, angles)
-        _put(out, row, 16, reference_from_wire(wire_of(log, row, _REFERENCE)))
+        _put(out, row, 16, reference_from_wire(log[row, _REFERENCE : _REFERENCE + 13]))
         _put(out, row, 28, water_from_wire(log[row, _CURRENT : _CURRENT + 3]))
         _put(out, row, 31, water_from_wire(log[row, _ESTIMATE : _ESTIMATE + 3]))
-        true = odometry_from_wire(wire_of(log, row, _TRUTH))
+        true = odometry_from_wire(log[row, _TRUTH : _TRUTH + 13])
         _put(out, row, 34, (true.p_n, true.p_e, true.p_d))
         _put(out, row, 37, euler_from_quaternion(true.q_w, true.q_x, true.q_y, true.q_z))
         _put(out, row, 40, wrench_from_wire(log[row, _WRENCH : _WRENCH + 3]))

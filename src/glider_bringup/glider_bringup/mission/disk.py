@@ -83,22 +83,17 @@ def whole_file(file: Path) -> Iterator[IO[bytes]]:
 
 
 def save_figure(figure, file: Path, dpi: int) -> None:
-    """Write a figure of matplotlib into an image file, and close it.
+    """Write a figure of matplotlib into an image file.
 
     The suffix says which kind (png, svg, pdf; png without one); see `whole_file`.
     """
-    from matplotlib import pyplot
-
     kind = file.suffix.removeprefix('.').lower() or 'png'
-    try:
-        if kind not in figure.canvas.get_supported_filetypes():
-            raise ConfigurationError(
-                f'{file}: cannot be written: {kind!r} is no kind of image (allowed: png, svg, pdf)'
-            )
-        with whole_file(file) as stream:
-            figure.savefig(stream, format=kind, dpi=dpi)
-    finally:
-        pyplot.close(figure)
+    if kind not in figure.canvas.get_supported_filetypes():
+        raise ConfigurationError(
+            f'{file}: cannot be written: {kind!r} is no kind of image (allowed: png, svg, pdf)'
+        )
+    with whole_file(file) as stream:
+        figure.savefig(stream, format=kind, dpi=dpi)
 
 
 def write_whole(file: Path, content: str | bytes) -> None:

@@ -6,9 +6,16 @@ import json
 import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 
 from glider_bringup.engines.flight import Outcome, Progress, Taker, fly
 from glider_bringup.mission.disk import write_whole
@@ -20,24 +27,6 @@ from glider_model.base.files import is_file, read_json
 from glider_model.base.settings import ConfigurationError
 from glider_model.vehicle.file import load_vehicle
 
-#: Fields without which a score file is not a scorecard.
-CARD_FIELDS = {
-    *('scenario', 'vehicle', 'controller', 'guidance', 'engine', 'seed', 'status', 'reason'),
-    *('ticks', 'sim_time_s', 'wall_time_s', 'real_time_factor', 'messages_recorded'),
-    *('messages_lost', 'dives', 'distance_along_path_m', 'cross_track_m', 'pitch_error_deg'),
-    *('heading_fluctuation_deg', 'depth_m', 'actuator_travel', 'final_state'),
-}
-#: What these fields hold: numbers, lists of numbers, or None where there is no data.
-CARD_GROUPS = {
-    'cross_track_m': {'rms_steady', 'max_steady', 'max_all'},
-    'pitch_error_deg': {'rms_steady', 'max_steady'},
-    'heading_fluctuation_deg': {'rms_steady', 'max_steady'},
-    'depth_m': {'max', 'overshoot'},
-    'actuator_travel': {'buoyancy_engine_kg', 'pitch_mass_m', 'roll_mass_deg'},
-    'final_state': {'position_ned_m', 'attitude_rpy_rad', 'velocity_mps'},
-}
-#: North and east.
-_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 STATUSES = ('completed', 'surfaced', 'lost', 'infeasible', 'aborted', 'failed')
 #: Statuses of runs that were not flown to their end.
 STOPPED = ('aborted', 'failed')
@@ -118,88 +107,68 @@ def read_score(run: Path) -> dict:
             )
         return {}
     card = read_json(path)
-    if not _is_card(card):
-        raise ConfigurationError(f'{path}: not a scorecard of this program')
+    try:
+        _Card.model_validate(card)
+    except ValidationError:
+        raise ConfigurationError(f'{path}: not a scorecard of this program') from None
     return card
 
 
-def _is_card(card) -> bool:
-    """Whether a value, which may be anything, can be taken for a scorecard."""
-    if not isinstance(card, dict) or not CARD_FIELDS <= set(card):
-        return False
-    texts = ('scenario', 'vehicle', 'controller', 'guidance', 'status', 'reason')
-    numbers = ('sim_time_s', 'wall_time_s', 'real_time_factor', 'distance_along_path_m')
-    counts = ('seed', 'ticks', 'messages_recorded', 'messages_lost', 'dives')
-    return (
-        all(isinstance(card[name], str) for name in texts)
-        and card['status'] in STATUSES
-        and isinstance(card['engine'], str | None)
-        and all(isinstance(card[name], int) and card[name] >= 0 for name in counts)
-        and all(_is_figure(card[name]) for name in numbers)
-        and all(
-            isinstance(card[group], dict)
-            and names <= set(card[group])
-            and all(_is_figure(value) for value in card[group].values())
-            for group, names in CARD_GROUPS.items()
-            if card['ticks'] or group != 'final_state'  # a run without a tick has none
-        )
-        and _is_guard(card.get('guard', {}))
-        and _are_texts(card.get('changed', {}))
-        and _are_faults(card.get('faults', []))
-        and _is(_Navigation, card.get('navigation'))
-        and _is(_Energy, card.get('energy'))
-    )
+#: A number of a scorecard that is not known is None; north and east; in three dimensions.
+_Figure = float | None
+_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+_Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
+_Count = Annotated[int, Field(ge=0)]
 
 
-def _are_texts(changed) -> bool:
-    """Whether a value is what was changed in a scenario; older runs tell nothing of it."""
-    return isinstance(changed, dict) and all(isinstance(text, str) for text in changed.values())
+def _group(names: str) -> Any:
+    """Kind of a group of figures that has at least those of these names."""
 
+    def complete(told: dict) -> dict:
+        if not told.keys() >= set(names.split()):
+            raise ValueError(f'without one of {names}')
+        return told
 
-def _is_guard(guard) -> bool:
-    """Whether a value is what the guard told in a run; runs of before tell nothing of it."""
-    events = guard.get('events', []) if isinstance(guard, dict) else None
-    return isinstance(events, list) and all(
-        isinstance(event, dict)
-        and isinstance(event.get('message'), str)
-        and isinstance(event.get('t_s'), int | float)
-        for event in events
-    )
+    return Annotated[dict[str, _Figure], AfterValidator(complete)]
 
 
 class _Checked(BaseModel):
-    """Part of a score file, which may hold anything."""
+    """Part of a score file, which may hold anything; older runs lack what has a default."""
 
     model_config = ConfigDict(strict=True)
 
 
-class _Fault(_Checked):
-    """What broke in a run, and when; older runs tell nothing of it."""
+class _Event(_Checked):
+    """What the guard told."""
 
-    t_s: float | None
-    end_s: float | None
+    t_s: float
+    message: str
+
+
+class _Guard(_Checked):
+    """What the guard told in a run."""
+
+    events: list[_Event] = []
+
+
+class _Fault(_Checked):
+    """What broke in a run, and when."""
+
+    t_s: _Figure
+    end_s: _Figure
     kind: str
     message: str
     when: str
 
 
-class _EnergyBy(_Checked):
-    """What took it (Wh)."""
-
-    pump: float | None
-    hotel: float | None
-    masses: float | None
-    calls: float | None
-
-
 class _Energy(_Checked):
-    """What was taken out of the battery; older runs tell nothing of it."""
+    """What was taken out of the battery (Wh), and how long it lasts."""
 
-    wh: float | None
-    wh_per_dive: float | None
-    by: _EnergyBy
-    endurance_days: float | None
-    range_km: float | None
+    wh: _Figure
+    wh_per_dive: _Figure
+    by: _group('pump hotel masses calls')
+    endurance_days: _Figure
+    range_km: _Figure
 
 
 class _Report(_Checked):
@@ -209,7 +178,7 @@ class _Report(_Checked):
     dive_t_s: float
     true_ned_m: _Pair
     believed_ned_m: _Pair
-    covariance_m2: Annotated[list[float], Field(min_length=3, max_length=3)]
+    covariance_m2: _Triple
     fix_ned_m: _Pair | None
     cross_track_m: float
     believed_cross_track_m: float
@@ -219,60 +188,61 @@ class _Report(_Checked):
     dac_believed_mps: _Pair | None
 
 
-class _PlaceError(_Checked):
-    """How far the believed place was off at surfacings."""
-
-    p50: float | None
-    p95: float | None
-    worst: float | None
-
-
-class _CurrentError(_Checked):
-    """How far the believed current was off."""
-
-    rms: float | None
-    worst: float | None
-
-
-class _CrossTrack(_Checked):
-    """How far off the path the vehicle believed to be."""
-
-    rms_steady: float | None
-    max_steady: float | None
-
-
 class _Navigation(_Checked):
     """What is shown of how well the vehicle knew its place."""
 
     method: str
     surfacings: int
     fixed: int
-    error_m: _PlaceError
-    dac_error_mps: _CurrentError
-    believed_cross_track_m: _CrossTrack
+    error_m: _group('p50 p95 worst')
+    dac_error_mps: _group('rms worst')
+    believed_cross_track_m: _group('rms_steady max_steady')
     surfacing_cross_track_m: list[float]
-    ellipse_95_share: float | None
+    ellipse_95_share: _Figure
     reports: list[_Report] = []
 
 
-def _is(kind: type[_Checked], told) -> bool:
-    """Whether a value is a part of a scorecard, or nothing, as in older runs."""
-    try:
-        return told is None or bool(kind.model_validate(told))
-    except ValidationError:
-        return False
+class _State(_Checked):
+    """Where the vehicle was at the end, and how it moved."""
+
+    position_ned_m: _Triple
+    attitude_rpy_rad: _Triple
+    velocity_mps: _Triple
 
 
-def _are_faults(told) -> bool:
-    """Whether a value is what broke in a run."""
-    try:
-        return isinstance(told, list) and all(map(_Fault.model_validate, told))
-    except ValidationError:
-        return False
+class _Card(_Checked):
+    """A scorecard: what it has to have, and what is shown of it."""
 
+    scenario: str
+    changed: dict[str, str] = {}
+    vehicle: str
+    controller: str
+    guidance: str
+    engine: str | None
+    seed: _Count
+    status: Literal[STATUSES]
+    reason: str
+    ticks: _Count
+    sim_time_s: _Figure
+    wall_time_s: _Figure
+    real_time_factor: _Figure
+    messages_recorded: _Count
+    messages_lost: _Count
+    dives: _Count
+    distance_along_path_m: _Figure
+    cross_track_m: _group('rms_steady max_steady max_all')
+    pitch_error_deg: _group('rms_steady max_steady')
+    heading_fluctuation_deg: _group('rms_steady max_steady')
+    depth_m: _group('max overshoot')
+    actuator_travel: _group('buoyancy_engine_kg pitch_mass_m roll_mass_deg')
+    final_state: _State | None
+    guard: _Guard = _Guard()
+    faults: list[_Fault] = []
+    navigation: _Navigation | None = None
+    energy: _Energy | None = None
 
-def _is_figure(value) -> bool:
-    """Whether a value is a figure of a scorecard: a number, None, or three numbers."""
-    if isinstance(value, list):
-        return len(value) == 3 and all(isinstance(one, int | float) for one in value)
-    return value is None or isinstance(value, int | float)
+    @model_validator(mode='after')
+    def _flown_or_never_flown(self) -> '_Card':
+        if self.ticks and self.final_state is None:
+            raise ValueError('only a run without a tick has no final state')
+        return self

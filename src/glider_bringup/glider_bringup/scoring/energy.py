@@ -80,13 +80,8 @@ class EnergyScorer:
         names = ('pump', 'hotel', 'masses', 'calls')
         wh = spent(self._ledger) / _J_PER_WH
         if self._usable_wh is None or wh <= 0.0:
-            return {
-                'wh': None,
-                'wh_per_dive': None,
-                'by': dict.fromkeys(names),
-                'endurance_days': None,
-                'range_km': None,
-            }
+            empty = dict.fromkeys(('wh', 'wh_per_dive', 'by', 'endurance_days', 'range_km'))
+            return {**empty, 'by': dict.fromkeys(names)}
         flights = self._usable_wh / wh
         return {
             'wh': wh,

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_bringup.blocks import COLUMNS
+from glider_bringup.scoring.scores import largest, rms
 from glider_model.base.frames import Origin, from_geodetic
 from glider_model.base.signals import TICK_S
 from glider_navigation.phase import DIVES_M, SURFACES_M
@@ -172,7 +173,10 @@ class NavigationScorer:
 
     def result(self, method: str, believed_cross_track: dict) -> dict:
         """The part ``navigation`` of ``score.json``; a figure without data is None."""
-        errors = np.array([one.error_m for one in self.surfacings])
+        errors, beside, ways = (
+            np.array([getattr(one, name) for one in self.surfacings])
+            for name in ('error_m', 'cross_track_m', 'way_rms_m')
+        )
         within = [one.is_inside for one in self.surfacings if one.is_inside is not None]
         dac = np.array([math.hypot(*error) for error in self.dac_errors])
         return {
@@ -181,38 +185,23 @@ class NavigationScorer:
             'error_m': {
                 'p50': _percentile(errors, 50),
                 'p95': _percentile(errors, 95),
-                'worst': float(errors.max()) if len(errors) else None,
+                'worst': largest(errors),
             },
-            'surfacing_cross_track_m': [one.cross_track_m for one in self.surfacings],
+            'surfacing_cross_track_m': beside.tolist(),
             'surfacing_error_m': errors.tolist(),
             'surfacing_t_s': [_seconds(one.tick) for one in self.surfacings],
-            'under_water_rms_m': [one.way_rms_m for one in self.surfacings],
+            'under_water_rms_m': ways.tolist(),
             'from_fourth': {
-                'surfacing_cross_track_m': _largest(
-                    [one.cross_track_m for one in self.surfacings[FOURTH:]]
-                ),
-                'under_water_rms_m': _rms(
-                    [one.way_rms_m for one in self.surfacings[FOURTH + 1 :]]
-                ),
+                'surfacing_cross_track_m': largest(beside[FOURTH:]),
+                'under_water_rms_m': rms(ways[FOURTH + 1 :]),
             },
-            'dac_error_mps': {
-                'rms': _rms(dac),
-                'worst': float(dac.max()) if len(dac) else None,
-            },
+            'dac_error_mps': {'rms': rms(dac), 'worst': largest(dac)},
             'believed_cross_track_m': believed_cross_track,
             'ellipse_95_share': float(np.mean(within)) if within else None,
             'fixed': len(self.innovations),
             'innovation_squared': float(np.mean(self.innovations)) if self.innovations else None,
             'reports': [one.report() for one in self.surfacings] if self._reckons else [],
         }
-
-
-def _rms(values: list[float] | np.ndarray) -> float | None:
-    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else None
-
-
-def _largest(values: list[float]) -> float | None:
-    return max(map(abs, values), default=None)
 
 
 def _percentile(values: np.ndarray, share: float) -> float | None:

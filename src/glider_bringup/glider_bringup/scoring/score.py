@@ -30,7 +30,8 @@ from glider_bringup.scoring.outcome import (
     outcome_of,
     told_by_guard,
 )
-from glider_bringup.scoring.true_motion import TrueMotion, wire_of
+from glider_bringup.scoring.scores import Flown, measured
+from glider_bringup.scoring.true_motion import TrueMotion
 from glider_control.intake import REFUSED
 from glider_guard.block import TELL_EVERY_NS
 from glider_guard.rows import ALL, DROP, LATCHED, NOTE, REACTIONS, ROWS, SURFACE, reaction_of
@@ -41,10 +42,10 @@ from glider_model.base.frames import (
     OriginSettings,
     euler_from_quaternion,
     odometry_from_wire,
-    reference_from_wire,
+    poses_from_wire,
 )
 from glider_model.base.kernel import kernel
-from glider_model.base.signals import TICK_NS, TICK_S
+from glider_model.base.signals import TICK_NS, TICK_S, Odometry
 from glider_model.plant.faults.settings import FaultSettings
 from glider_model.plant.plant import dive_depths
 from glider_model.plant.readings import Readings, make_readings, noise_of_readings
@@ -63,55 +64,37 @@ EVENTS_KEPT = 100
 #: What the event of a refused measurement says.
 REFUSED_SAYS = 'a measurement was refused, the last good one serves'
 
-_SERIES = 16
-_DEPTH, _E2, _PITCH, _PITCH_REF, _HEADING, _RATE_REF = range(6)
-_TARGET_N, _TARGET_E, _INFEASIBLE, _NET_HEAVINESS, _PITCH_MASS, _ROLL_MASS = range(6, 12)
-_MASK, _TOLD_E2, _FIN, _GUARD = 12, 13, 14, 15
-
-_ODOM, _REFERENCE = COLUMNS['odom'], COLUMNS['reference']
-_E2_COLUMN = COLUMNS['tracking_error'].start + 1
-_INFEASIBLE_COLUMN = COLUMNS['infeasible']
-_STAGE_COLUMN = COLUMNS['stage']
-_MASK_COLUMN, _GUARD_COLUMN = COLUMNS['saturation'], COLUMNS['guard']
-_ODOM_START, _REFERENCE_START = _ODOM.start, _REFERENCE.start
-_JOINTS_START = COLUMNS['joint_states'].start
+#: What the score needs of every tick, in the order of `_series_of`.
+_SERIES = (
+    *('depth', 'e2', 'told_e2', 'pitch', 'pitch_ref', 'heading', 'rate_ref'),
+    *('target_n', 'target_e', 'infeasible', 'guard', 'mask'),
+    *('net_heaviness', 'pitch_mass', 'roll_mass', 'fin'),
+)
+_ODOM, _REFERENCE, _JOINTS = (COLUMNS[name] for name in ('odom', 'reference', 'joint_states'))
+_E2, _FIRST_JOINT = COLUMNS['tracking_error'].start + 1, _JOINTS.start
 
 
-@kernel
-def _extract(log, series):
-    """Fill ``series``, float64[_SERIES, n], from what the score needs of a ``log``."""
-    for row in range(log.shape[0]):
-        odometry = odometry_from_wire(wire_of(log, row, _ODOM_START))
-        reference = reference_from_wire(wire_of(log, row, _REFERENCE_START))
-        _, theta, psi = euler_from_quaternion(
-            odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
+def _series_of(log: np.ndarray, told: np.ndarray) -> np.ndarray:
+    """`_SERIES` of log rows with the true motion, and as they were told, float64[16, n]."""
+    odom, reference = poses_from_wire(log[:, _ODOM]), poses_from_wire(log[:, _REFERENCE])
+    guard = log[:, COLUMNS['guard']]
+    return np.stack(
+        (
+            *(odom[:, 2], log[:, _E2], told[:, _E2]),
+            *(odom[:, 4], reference[:, 4], odom[:, 5], -log[:, _REFERENCE.start + 9]),
+            *(reference[:, 0], reference[:, 1], log[:, COLUMNS['infeasible']], guard),
+            log[:, COLUMNS['saturation']].astype(np.int64) | guard.astype(np.int64),
+            *log[:, _JOINTS].T,
         )
-        series[_DEPTH, row] = odometry.p_d
-        series[_E2, row] = log[row, _E2_COLUMN]
-        series[_PITCH, row] = theta
-        series[_PITCH_REF, row] = reference.theta
-        series[_HEADING, row] = psi
-        series[_RATE_REF, row] = reference.v_d
-        series[_TARGET_N, row] = reference.p_n
-        series[_TARGET_E, row] = reference.p_e
-        series[_INFEASIBLE, row] = log[row, _INFEASIBLE_COLUMN]
-        series[_NET_HEAVINESS, row] = log[row, _JOINTS_START]
-        series[_PITCH_MASS, row] = log[row, _JOINTS_START + 1]
-        series[_ROLL_MASS, row] = log[row, _JOINTS_START + 2]
-        series[_MASK, row] = np.int64(log[row, _MASK_COLUMN]) | np.int64(log[row, _GUARD_COLUMN])
-        series[_FIN, row] = log[row, _JOINTS_START + 3]
-        series[_GUARD, row] = log[row, _GUARD_COLUMN]
+    )
 
 
 @kernel
 def _take_off_noise(log, first_tick, readings):
     """Put where the actuators are in the place of where they say that they are, in place."""
     for row in range(log.shape[0]):
-        noise = noise_of_readings(first_tick + row, readings)
-        log[row, _JOINTS_START] -= noise.m_b
-        log[row, _JOINTS_START + 1] -= noise.x_p
-        log[row, _JOINTS_START + 2] -= noise.mu
-        log[row, _JOINTS_START + 3] -= noise.delta
+        for joint, noise in enumerate(noise_of_readings(first_tick + row, readings)):
+            log[row, _FIRST_JOINT + joint] -= noise
 
 
 class Scorer:
@@ -119,18 +102,16 @@ class Scorer:
 
     Parameters
     ----------
-    sensors : SensorParams, optional
-        Noise of the odometry, for runs that do not tell the truth.
+    sensors, readings : SensorParams, Readings, optional
+        Noise of the odometry, for runs that do not tell the truth, and of where the actuators say
+        that they are: no way that they go.
     origin : Origin, optional
         To which fixes are relative.
     topics : tuple of str
         What there is of navigation in the run; empty of a vehicle that knows its place.
     faults : sequence of FaultSettings
-        What breaks in the run.
     vehicle : Vehicle, optional
         Its steering surface, battery, crush depth and drop weight; without it there are none.
-    readings : Readings, optional
-        Noise of where its actuators say that they are: no way that they go.
     course_rad : float
         Of the path at its start, for a vehicle whose target never moved along it.
     """
@@ -172,24 +153,22 @@ class Scorer:
         self._navigation.add(told, log)
         self._faults.add(log)
         self._energy.add(log)
-        series = np.empty((_SERIES, len(log)))
-        _extract(log, series)
-        series[_TOLD_E2] = told[:, _E2_COLUMN]
-        self._blocks.append(series)
+        self._blocks.append(_series_of(log, told))
         if self._first is None:
             self._first = log[0].copy()
         self._last = log[-1].copy()
-        at_end = np.flatnonzero(log[:, _STAGE_COLUMN] == AT_END_OF_PATH)
+        at_end = np.flatnonzero(log[:, COLUMNS['stage']] == AT_END_OF_PATH)
         if self._end is None and len(at_end):
-            self._end = log[at_end[0], _ODOM].copy()
+            self._end = log[at_end[0]].copy()
 
     @property
     def ticks(self) -> int:
         """Ticks taken in."""
         return sum(block.shape[1] for block in self._blocks)
 
-    def _series(self, column: int) -> np.ndarray:
+    def _series(self, name: str) -> np.ndarray:
         """One series over all blocks, float64[ticks]; not kept, for 30 h of all are 100 MB."""
+        column = _SERIES.index(name)
         return np.concatenate([np.empty(0), *(block[column] for block in self._blocks)])
 
     def result(self, rules: Rules) -> dict:
@@ -199,23 +178,29 @@ class Scorer:
         -------
         dict
             The run's part of ``score.json``: ticks, settle_s, dives, distance_along_path_m,
-            end_of_path_m, cross_track_m, pitch_error_deg, heading_fluctuation_deg, depth_m,
-            actuator_travel, energy, guard, faults, navigation, final_state, and ``status`` and
-            ``reason`` of a run that was flown to its end. A figure without data is None.
+            end_of_path_m, what is `measured`, actuator_travel, energy, guard, faults, navigation,
+            final_state, and ``status`` and ``reason`` of a run that was flown to its end. A figure
+            without data is None.
         """
         series, ticks = self._series, self.ticks
-        depth, e2 = series(_DEPTH), series(_E2)
-        told = told_by_guard(series(_GUARD))
+        depth, told = series('depth'), told_by_guard(series('guard'))
         flies = ~ends_mission(told) & ~(np.maximum.accumulate(depth) > self._crush_depth_m)
-        steady, scored = windows(depth, series(_RATE_REF) > 0.0, rules, TICK_S)
+        steady, scored = windows(depth, series('rate_ref') > 0.0, rules, TICK_S)
         steady &= flies
-        pitch_error = np.degrees(series(_PITCH) - series(_PITCH_REF))
-        heading = _heading_fluctuation_deg(series(_HEADING))
-        whole = steady & _has_whole_mean(ticks)
-        deepest = float(np.max(depth)) if ticks else None
+        flown = Flown(
+            depth=depth,
+            e2=series('e2'),
+            pitch_error=np.degrees(series('pitch') - series('pitch_ref')),
+            heading=_heading_fluctuation_deg(series('heading')),
+            steady=steady,
+            scored=scored,
+            whole=steady & _has_whole_mean(ticks),
+            turn_m=rules.depth_m,
+        )
+        believed = flown._replace(e2=series('told_e2'))
         dives = _count_dives(depth, *dive_depths(rules.depth_m))
         way_m, time_s = self._along_path_m(), _round(ticks * TICK_S)
-        held = ~(series(_INFEASIBLE)[scored & flies] > 0.0)
+        held = ~(series('infeasible')[scored & flies] > 0.0)
         infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)
         ended = outcome_of(depth, told, self._crush_depth_m, infeasible)
         pace_m = way_m if ended.status in (COMPLETED, INFEASIBLE) else None
@@ -227,25 +212,13 @@ class Scorer:
             'dives': dives,
             'distance_along_path_m': way_m,
             'end_of_path_m': self._end_of_path_m(rules.path_end),
-            'cross_track_m': _cross_track(e2, steady, scored),
-            'pitch_error_deg': {
-                'rms_steady': rms(pitch_error[steady]),
-                'max_steady': largest(pitch_error[steady]),
-            },
-            'heading_fluctuation_deg': {
-                'rms_steady': rms(heading[whole]),
-                'max_steady': largest(heading[whole]),
-            },
-            'depth_m': {
-                'max': deepest,
-                'overshoot': None if deepest is None else max(0.0, deepest - rules.depth_m),
-            },
+            **measured(flown),
             'actuator_travel': self._actuator_travel(),
             'energy': self._energy.result(time_s, dives, pace_m),
-            'guard': _guard(series(_MASK), self._has_weight),
+            'guard': _guard(series('mask'), self._has_weight),
             'faults': self._faults.result(),
             'navigation': self._navigation.result(
-                rules.navigation, _cross_track(series(_TOLD_E2), steady, scored)
+                rules.navigation, measured(believed, 'cross_track_m')['cross_track_m']
             ),
             'final_state': self._final_state(),
         }
@@ -254,7 +227,7 @@ class Scorer:
         """Way of the vehicle along its path (m): that of its target, and how far off it ends."""
         if self._last is None:
             return 0.0
-        target = np.stack((self._series(_TARGET_N), self._series(_TARGET_E)), axis=1)
+        target = np.stack((self._series('target_n'), self._series('target_e')), axis=1)
         courses = self._course_rad, self._course_rad + math.pi  # looking ahead, looking back
         ahead_m = _along_m(self._first, target, courses[0])
         behind_m = _along_m(self._last, target[::-1], courses[1])
@@ -263,32 +236,37 @@ class Scorer:
     def _actuator_travel(self) -> dict:
         """Ways that the actuators have gone, to and fro."""
         travel = {
-            'buoyancy_engine_kg': _travel(self._series(_NET_HEAVINESS)),
-            'pitch_mass_m': _travel(self._series(_PITCH_MASS)),
-            'roll_mass_deg': math.degrees(_travel(self._series(_ROLL_MASS))),
+            'buoyancy_engine_kg': _travel(self._series('net_heaviness')),
+            'pitch_mass_m': _travel(self._series('pitch_mass')),
+            'roll_mass_deg': math.degrees(_travel(self._series('roll_mass'))),
         }
         if self._steers_by:
-            travel[f'{self._steers_by}_deg'] = math.degrees(_travel(self._series(_FIN)))
+            travel[f'{self._steers_by}_deg'] = math.degrees(_travel(self._series('fin')))
         return travel
 
     def _end_of_path_m(self, path_end: tuple[float, float] | None) -> float | None:
         """Horizontal distance from the path's end when the mission ended there, at the surface."""
         if self._end is None or path_end is None:
             return None
-        odometry = odometry_from_wire(tuple(float(x) for x in self._end))
+        odometry = _odometry_of(self._end)
         return math.hypot(odometry.p_n - path_end[0], odometry.p_e - path_end[1])
 
     def _final_state(self) -> dict | None:
         """Position, attitude and velocity over ground (body axes FRD) of the last tick."""
         if self._last is None:
             return None
-        odometry = odometry_from_wire(tuple(float(x) for x in self._last[_ODOM]))
+        odometry = _odometry_of(self._last)
         attitude = euler_from_quaternion(odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z)
         return {
             'position_ned_m': [odometry.p_n, odometry.p_e, odometry.p_d],
             'attitude_rpy_rad': list(attitude),
             'velocity_mps': [odometry.u, odometry.v, odometry.w],
         }
+
+
+def _odometry_of(row: np.ndarray) -> Odometry:
+    """Odometry of a log row."""
+    return odometry_from_wire(tuple(row[_ODOM].tolist()))
 
 
 def make_scorer(scenario: Scenario) -> Scorer:
@@ -307,32 +285,11 @@ def scores_of(scenario: Scenario, scorer: Scorer) -> dict:
     return scorer.result(scenario.score_rules(scorer.ticks * TICK_S))
 
 
-def _cross_track(e2: np.ndarray, steady: np.ndarray, scored: np.ndarray) -> dict:
-    """Figures of a cross-track error, float64[ticks] (m), in masks bool[ticks]."""
-    return {
-        'rms_steady': rms(e2[steady]),
-        'max_steady': largest(e2[steady]),
-        'max_all': largest(e2[scored]),
-        'max_run': largest(e2),
-    }
-
-
 def _guard(mask: np.ndarray, has_weight: bool) -> dict:
     """What the guard noticed in flight and did, and what control refused, as they told it.
 
-    Parameters
-    ----------
-    mask : float64[ticks]
-        Sum of the bits of `glider_guard.rows` and of `glider_control`. Before there was a guard
-        they were told together.
-    has_weight : bool
-        The vehicle can drop a weight: one that cannot does no more than surface.
-
-    Returns
-    -------
-    dict
-        state: flying, or latched; reaction at the end; and the first `EVENTS_KEPT` events
-        {t_s, row, reaction, message}.
+    ``mask`` is the sum of the bits of `glider_guard.rows` and of `glider_control`, which were told
+    together before there was a guard; a vehicle that ``has_weight`` can do more than surface.
     """
     gravest = DROP if has_weight else SURFACE
     rows = {row.bit: (row.name, REACTIONS[min(row.reaction, gravest)], row.says) for row in ROWS}
@@ -424,23 +381,13 @@ def _along_m(row: np.ndarray, target: np.ndarray, course_rad: float) -> float:
     towards = np.array([math.cos(course_rad), math.sin(course_rad)])
     if len(far):
         towards = away[far[0]] / np.hypot(*away[far[0]])
-    odometry = odometry_from_wire(tuple(float(x) for x in row[_ODOM]))
+    odometry = _odometry_of(row)
     return float(towards @ (odometry.p_n - target[0, 0], odometry.p_e - target[0, 1]))
 
 
 def _travel(position: np.ndarray) -> float:
     """Way that an actuator has gone, to and fro."""
     return float(np.sum(np.abs(np.diff(position))))
-
-
-def rms(values: np.ndarray) -> float | None:
-    """Root of the mean square; None of nothing."""
-    return float(math.sqrt(np.mean(values * values))) if len(values) else None
-
-
-def largest(values: np.ndarray) -> float | None:
-    """Largest magnitude; None of nothing."""
-    return float(np.max(np.abs(values))) if len(values) else None
 
 
 def _round(seconds: float) -> float:

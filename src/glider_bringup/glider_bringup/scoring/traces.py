@@ -39,6 +39,13 @@ _FLAGS = (
     *('buoyancy_engine_at_limit', 'pitch_mass_at_limit', 'roll_mass_at_limit'),
     *('surface_at_limit', 'infeasible'),
 )
+#: Actuators, as a log row has them: name, unit of their curves, and a position in that unit.
+_JOINTS = (
+    ('buoyancy_engine', 'kg', np.asarray),
+    ('pitch_mass', 'mm', lambda metres: 1e3 * metres),
+    ('roll_mass', 'deg', np.degrees),
+    ('surface', 'deg', np.degrees),
+)
 _MEASURED = ('depth_m', 'cross_track_m', 'roll_deg', 'pitch_deg', 'heading_deg')
 #: Quantities of which extremes are kept.
 CURVES = (
@@ -266,12 +273,12 @@ def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[
     estimate = log[:, COLUMNS['current_estimate']] / KNOT_MPS
     command = log[:, COLUMNS['command']]
     held = (np.abs(command) >= limits).astype(float).T
-    surface = {}
-    if np.isfinite(limits[3]):  # there is one
-        surface = {
-            'surface_deg': np.degrees(joints[:, 3]),
-            'surface_ref_deg': np.degrees(command[:, 3]),
-        }
+    actuators = {}
+    for i, (joint, unit, shown) in enumerate(_JOINTS):
+        actuators[f'{joint}_at_limit'] = held[i]
+        if np.isfinite(limits[i]):  # there is one
+            actuators[f'{joint}_{unit}'] = shown(joints[:, i])
+            actuators[f'{joint}_ref_{unit}'] = shown(command[:, i])
     battery = {}
     left = log[:, COLUMNS['battery']][:, -1]
     if np.any(left >= 0.0):  # less than nothing is not known
@@ -291,19 +298,9 @@ def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[
         'current_east_kn': current[:, 0],
         'estimate_north_kn': estimate[:, 1],
         'estimate_east_kn': estimate[:, 0],
-        'buoyancy_engine_kg': joints[:, 0],
-        'pitch_mass_mm': 1e3 * joints[:, 1],
-        'roll_mass_deg': np.degrees(joints[:, 2]),
-        'buoyancy_engine_ref_kg': command[:, 0],
-        'pitch_mass_ref_mm': 1e3 * command[:, 1],
-        'roll_mass_ref_deg': np.degrees(command[:, 2]),
-        **surface,
+        **actuators,
         **battery,
         'descending': np.where(np.isfinite(rising), rising < 0.0, np.nan),
-        'buoyancy_engine_at_limit': held[0],
-        'pitch_mass_at_limit': held[1],
-        'roll_mass_at_limit': held[2],
-        'surface_at_limit': held[3],
         'infeasible': log[:, COLUMNS['infeasible']],
         **dict(zip(Adaptation._fields, log[:, COLUMNS['adaptation']].T, strict=True)),
     }
@@ -364,16 +361,9 @@ def _widen(first, second, value):
 
 @kernel
 def _fold(values, tick, size, points):
-    """Take values into buckets of ``size`` ticks; returns how many are not finite.
+    """Take values of ticks from ``tick`` on into buckets of ``size`` ticks; count the not finite.
 
-    Parameters
-    ----------
-    values : float64[n]
-    tick : int
-        Of the first value.
-    size : int
-    points : float32[2 b]
-        Extremes of every bucket, NaN where there is none yet.
+    ``points``, float32[2 b], are the extremes of every bucket, NaN where there is none yet.
     """
     missing, start = 0, 0
     while start < len(values):

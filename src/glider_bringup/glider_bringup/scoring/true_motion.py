@@ -21,40 +21,11 @@ _EAST, _NORTH = COLUMNS['reference'].start, COLUMNS['reference'].start + 1
 
 
 @kernel
-def wire_of(log, row, start):
-    """Thirteen numbers of a log row as a tuple: an odometry or a reference."""
-    return (
-        log[row, start],
-        log[row, start + 1],
-        log[row, start + 2],
-        log[row, start + 3],
-        log[row, start + 4],
-        log[row, start + 5],
-        log[row, start + 6],
-        log[row, start + 7],
-        log[row, start + 8],
-        log[row, start + 9],
-        log[row, start + 10],
-        log[row, start + 11],
-        log[row, start + 12],
-    )
-
-
-@kernel
 def _take_off(log, first_tick, sensors):
-    """Put the true odometry in the place of the measured one, in place.
-
-    Parameters
-    ----------
-    log : float64[n, ROW]
-    first_tick : int
-        Tick of the first row.
-    sensors : SensorParams
-    """
+    """Put the true odometry in the place of the measured one, in place."""
     for row in range(log.shape[0]):
-        true = remove_noise(
-            odometry_from_wire(wire_of(log, row, _ODOM_START)), first_tick + row, sensors
-        )
+        told = odometry_from_wire(log[row, _ODOM_START : _ODOM_START + 13])
+        true = remove_noise(told, first_tick + row, sensors)
         for i, value in enumerate(odometry_to_wire(true)):
             log[row, _ODOM_START + i] = value
 

@@ -3,50 +3,32 @@
 """Runs side by side: their scores, what their scenarios differ in, and one page over the other."""
 
 from collections.abc import Iterator
+from itertools import compress
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from glider_bringup.mission.scenario import told_fields
 from glider_bringup.scoring.card import STOPPED
-from glider_bringup.showing.panels import ACTUATORS, SURFACE
-from glider_bringup.showing.scorecard import guard_texts, reckoned, show
-from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page, page_data
+from glider_bringup.scoring.scores import SCORES, Score, reckoned
+from glider_bringup.showing.panels import ACTUATORS, SPACE, SURFACE, flown_panel
+from glider_bringup.showing.scorecard import engine_text, flown_text, guard_texts, show
+from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page
 from glider_bringup.showing.words import small, span
 from glider_model.base.settings import ConfigurationError
-from glider_model.ocean.current_settings import KNOT_MPS
 
-#: Curves that are laid over each other: panel, title, caption, axis, curve.
-_OVERLAID = (
-    ('depth', 'Depth', 'How deep each was.', 'depth (m)', 'depth_m'),
-    (
-        'cross_track',
-        'Cross-track error',
-        'Distance from its own path, + to starboard of it.',
-        'off the path (m)',
-        'cross_track_m',
-    ),
-    (
-        'place_error',
-        'Error of the believed place',
+#: Curves that are laid over each other: caption and curve, by panel.
+_OVERLAID = {
+    'depth': ('How deep each was.', 'depth_m'),
+    'cross_track': ('Distance from its own path, + to starboard of it.', 'cross_track_m'),
+    'place_error': (
         'Horizontal distance between the true and the believed place.',
-        'error (m)',
         'place_error_m',
     ),
-    ('pitch', 'Pitch', 'Nose up is positive.', 'pitch (deg)', 'pitch_deg'),
-    ('heading', 'Heading', 'Clockwise from north.', 'heading (deg)', 'heading_deg'),
-    ('roll', 'Roll', 'Starboard side down is positive.', 'roll (deg)', 'roll_deg'),
-    *(
-        (
-            one.joint,
-            one.title,
-            f'{one.caption}.',
-            f'{one.title.lower()} ({one.unit})',
-            one.position,
-        )
-        for one in (*ACTUATORS, SURFACE)
-    ),
-)
+    'pitch': ('Nose up is positive.', 'pitch_deg'),
+    'heading': ('Clockwise from north.', 'heading_deg'),
+    'roll': ('Starboard side down is positive.', 'roll_deg'),
+}
 #: Colours before they come again, then dashed.
 _COLOURS = 8
 
@@ -118,17 +100,6 @@ def _said(field: str, value: Any) -> str:
 # ---------------------------------------------------------------------------------- scores
 
 
-class Figure(NamedTuple):
-    """A figure of a scorecard that is compared."""
-
-    name: str
-    keys: tuple[str, ...]  #: where it is in the card
-    unit: str  #: s: said as a time
-    digits: int
-    less_is_better: bool = False  #: else neither more nor less is
-    scale: float = 1.0  #: unit of the card in that which is shown
-
-
 class Cell(NamedTuple):
     """What a comparison shows of one run in one line."""
 
@@ -137,58 +108,6 @@ class Cell(NamedTuple):
     better: bool = False
 
 
-_TRACK, _PITCH, _HEADING = 'cross_track_m', 'pitch_error_deg', 'heading_fluctuation_deg'
-#: Said of vehicles that reckon their place alone.
-_NAVIGATION = 'navigation'
-_PLACE, _DAC = (_NAVIGATION, 'error_m'), (_NAVIGATION, 'dac_error_mps')
-_BELIEVED = (_NAVIGATION, 'believed_cross_track_m')
-FIGURES = (
-    Figure('simulated time', ('sim_time_s',), 's', 1),
-    Figure('real-time factor', ('real_time_factor',), '', 0),
-    Figure('messages recorded', ('messages_recorded',), '', 0),
-    Figure('messages lost', ('messages_lost',), '', 0, True),
-    Figure('dives', ('dives',), '', 0),
-    Figure('along path', ('distance_along_path_m',), 'm', 0),
-    Figure('came up from the end of path', ('end_of_path_m',), 'm', 1, True),
-    Figure('cross-track, steady, rms', (_TRACK, 'rms_steady'), 'm', 3, True),
-    Figure('cross-track, steady, max', (_TRACK, 'max_steady'), 'm', 3, True),
-    Figure('cross-track, after settling, max', (_TRACK, 'max_all'), 'm', 2, True),
-    Figure('cross-track, whole run, max', (_TRACK, 'max_run'), 'm', 2, True),
-    Figure('surfacings', (_NAVIGATION, 'surfacings'), '', 0),
-    Figure('believed place, surfacing, p50', (*_PLACE, 'p50'), 'm', 1, True),
-    Figure('believed place, surfacing, p95', (*_PLACE, 'p95'), 'm', 1, True),
-    Figure('believed place, surfacing, worst', (*_PLACE, 'worst'), 'm', 1, True),
-    Figure('cross-track believed, steady, max', (*_BELIEVED, 'max_steady'), 'm', 3),
-    Figure(
-        name='mean current learnt, error, rms',
-        keys=(*_DAC, 'rms'),
-        unit='kn',
-        digits=3,
-        less_is_better=True,
-        scale=1.0 / KNOT_MPS,
-    ),
-    Figure(
-        name='inside the 95 % ellipse',
-        keys=(_NAVIGATION, 'ellipse_95_share'),
-        unit='%',
-        digits=0,
-        less_is_better=False,
-        scale=100.0,
-    ),
-    Figure('pitch error, steady, rms', (_PITCH, 'rms_steady'), 'deg', 3, True),
-    Figure('pitch error, steady, max', (_PITCH, 'max_steady'), 'deg', 3, True),
-    Figure('heading fluctuation, rms', (_HEADING, 'rms_steady'), 'deg', 3, True),
-    Figure('heading fluctuation, max', (_HEADING, 'max_steady'), 'deg', 3, True),
-    Figure('depth, max', ('depth_m', 'max'), 'm', 1),
-    Figure('depth, overshoot', ('depth_m', 'overshoot'), 'm', 1, True),
-    Figure('pump travel', ('actuator_travel', 'buoyancy_engine_kg'), 'kg', 1, True),
-    Figure('pitch mass travel', ('actuator_travel', 'pitch_mass_m'), 'm', 2, True),
-    Figure('roll mass travel', ('actuator_travel', 'roll_mass_deg'), 'deg', 0, True),
-    Figure('energy', ('energy', 'wh'), 'Wh', 1, True),
-    Figure('energy, a dive', ('energy', 'wh_per_dive'), 'Wh', 1, True),
-    Figure('endurance', ('energy', 'endurance_days'), 'days', 1),
-    Figure('range', ('energy', 'range_km'), 'km', 0),
-)
 #: What a scorecard says of how a run was computed and recorded, not of the flight.
 _NOT_FLOWN = (
     *('engine', 'wall_time_s', 'real_time_factor'),
@@ -203,53 +122,33 @@ HOW_TO_READ = (
 )
 
 
-def _value(card: dict[str, Any], figure: Figure) -> float | None:
-    """A figure of a card, rounded as it is shown; cards of before lack some."""
-    if figure.keys[0] == _NAVIGATION and reckoned(card) is None:
-        return None
-    value: Any = card
-    for key in figure.keys:
-        value = value.get(key) if isinstance(value, dict) else None
-    return None if value is None else round(figure.scale * value, figure.digits)
-
-
-def _change(figure: Figure, value: float | None, first: float | None) -> str:
+def _change(score: Score, value: float | None, first: float | None) -> str:
     """How a value differs from that of the first run."""
     if value is None or first is None:
         return ''
-    difference = round(value - first, figure.digits)
+    difference = round(value - first, score.digits)
     if not difference:
         return '='
-    if figure.unit == 's':
+    if score.unit == 's':
         return f'{"+" if difference > 0.0 else "-"}{span(abs(difference))}'
-    return f'{difference:+,.{figure.digits}f}'
+    return f'{difference:+,.{score.digits}f}'
 
 
-def _best(figure: Figure, cards: list[dict[str, Any]]) -> float | None:
-    """The better value of a figure, or None if none is better or they cannot be judged."""
-    judged = [card for card in cards if not _was_stopped(card)]
-    values = {_value(card, figure) for card in judged} - {None}
-    if not figure.less_is_better or len(values) < 2:
-        return None
-    times = [card['sim_time_s'] for card in judged]
-    return min(values) if max(times) <= (1.0 + ALIKE) * min(times) else None
-
-
-def _was_stopped(card: dict[str, Any]) -> bool:
-    """Whether a run ended before its mission did."""
-    return card['status'] in ('surfaced', 'lost', *STOPPED)
-
-
-def _cells(figure: Figure, cards: list[dict[str, Any]]) -> list[Cell]:
-    """One figure of all runs."""
-    best, first = _best(figure, cards), _value(cards[0], figure)
+def _cells(score: Score, cards: list[dict[str, Any]]) -> list[Cell]:
+    """One score of all runs, rounded as it is shown, and which is better if that can be said."""
+    values = [score.in_card(card) for card in cards]
+    values = [None if value is None else round(value, score.digits) for value in values]
+    judged = [card['status'] not in ('surfaced', 'lost', *STOPPED) for card in cards]
+    times = [card['sim_time_s'] for card in compress(cards, judged)]
+    known = set(compress(values, judged)) - {None}
+    alike = len(known) > 1 and max(times) <= (1.0 + ALIKE) * min(times)
+    best = min(known) if score.less_is_better and alike else None
     cells = []
-    for i, card in enumerate(cards):
-        value = _value(card, figure)
-        is_time = figure.unit == 's' and value is not None
-        text = span(value) if is_time else show(value, figure.unit, figure.digits)
-        better = best is not None and value == best and not _was_stopped(card)
-        cells.append(Cell(text, _change(figure, value, first) if i else '', better))
+    for i, (value, is_judged) in enumerate(zip(values, judged, strict=True)):
+        is_time = score.unit == 's' and value is not None
+        text = span(value) if is_time else show(value, score.unit, score.digits)
+        better = is_judged and best is not None and value == best
+        cells.append(Cell(text, _change(score, value, values[0]) if i else '', better))
     return cells
 
 
@@ -261,11 +160,8 @@ def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
 
     rows = [
         told('status', lambda card: ': '.join(filter(None, (card['status'], card['reason'])))),
-        told(
-            'flown',
-            lambda card: f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}',
-        ),
-        told('engine', lambda card: f'{card["engine"] or "not known"}, seed {card["seed"]}'),
+        told('flown', flown_text),
+        told('engine', engine_text),
     ]
     if any(card.get('changed') for card in cards):
         rows.append(
@@ -278,9 +174,9 @@ def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
     if any(guard_texts(card) for card in cards):
         rows.append(told('guard', lambda card: '; '.join(guard_texts(card)) or 'nothing'))
     return rows + [
-        (figure.name, _cells(figure, cards))
-        for figure in FIGURES
-        if any(_value(card, figure) is not None for card in cards)
+        (score.label, _cells(score, cards))
+        for score in SCORES
+        if any(score.in_card(card) is not None for card in cards)
     ]
 
 
@@ -315,16 +211,14 @@ def _headline(runs: list[FlownRun]) -> str:
     """How far off the path each was, in a sentence."""
     if are_equal([run.card for run in runs]):
         return EQUAL
-    errors = [
-        (run.label, run.card['cross_track_m']['max_steady'])
-        for run in runs
-        if run.card['cross_track_m']['max_steady'] is not None
-    ]
-    whole = [
-        (run.label, run.card['cross_track_m']['max_run'])
-        for run in runs
-        if run.card['cross_track_m'].get('max_run') is not None
-    ]
+    errors, whole = (
+        [
+            (run.label, run.card['cross_track_m'][name])
+            for run in runs
+            if run.card['cross_track_m'].get(name) is not None
+        ]
+        for name in ('max_steady', 'max_run')
+    )
     if not errors:
         return f'{len(runs)} runs; none has flown long enough for a score in steady glide.'
     return (
@@ -342,34 +236,31 @@ def _panels(runs: list[FlownRun]) -> dict[str, list[Panel]]:
     """Panels by heading."""
     flown = [(i, run) for i, run in enumerate(runs) if run.traces.ticks]
 
-    def overlaid(panel: str, title: str, caption: str, axis: str, name: str) -> Panel:
-        curves = tuple(
+    def curves(name: str) -> tuple[Curve, ...]:
+        return tuple(
             Curve(name, run.label, f'run{i % _COLOURS}', dashed=i >= _COLOURS, run=i)
             for i, run in flown
             if run.traces.has(name)
         )
-        return Panel(panel, title, caption, axis, curves, inverted=name == 'depth_m')
 
     if not flown:
         return {}
-    panels = [overlaid(*row) for row in _OVERLAID]
+    panels = [flown_panel(one, text, curves(name)) for one, (text, name) in _OVERLAID.items()]
+    tracks = Panel('track', 'Tracks', 'From above, to scale.', kind='track')
+    panels += [one.panel('', curves(one.position)) for one in (*ACTUATORS, SURFACE)]
     return {
-        'Where they went': [
-            Panel('track', 'Tracks', 'From above, to scale.', kind='track'),
-            Panel(
-                'space', 'In three dimensions', 'Drag to turn. Depth is stretched.', kind='space'
-            ),
-        ],
+        'Where they went': [tracks, SPACE],
         'How they flew': [panel for panel in panels if panel.curves],
     }
 
 
 def compare_page(runs: list[FlownRun]) -> str:
     """Text of the page that lays runs over each other."""
-    sections, cards = _panels(runs), [run.card for run in runs]
+    cards = [run.card for run in runs]
     return make_page(
         'compare.html',
-        page_data(runs, [panel for group in sections.values() for panel in group]),
+        runs,
+        _panels(runs),
         title=f'{len(runs)} runs compared',
         headline=_headline(runs),
         keys=[(run.label, i % _COLOURS, i >= _COLOURS) for i, run in enumerate(runs)],
@@ -377,5 +268,4 @@ def compare_page(runs: list[FlownRun]) -> str:
         how_to_read=HOW_TO_READ.format(mark='✓'),
         notes=caveats(cards),
         differences=difference_rows(differences(runs)),
-        sections=sections,
     )

@@ -3,6 +3,7 @@
 """A picture of a run: where it went, how deep, how far off, and what the actuators did."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,121 +15,116 @@ POINTS = 8192
 #: Arrows that show the current along the track.
 ARROWS = 12
 
-_BLUE, _ORANGE, _GREY, _GREEN = '#1f6fb4', '#e07b1a', '#8a8a8a', '#2f8f4e'
+BLUE, ORANGE, GREY, GREEN = '#1f6fb4', '#e07b1a', '#8a8a8a', '#2f8f4e'
+#: Panels by their place: title, axis, and curves with name, curve of the traces, colour, and how
+#: much of it is one.
+_PANELS = {
+    'depth': ('Depth', 'depth (m)', [('depth', 'depth_m', BLUE, 1.0)]),
+    'cross': (
+        'Cross-track error',
+        'off the path, + to starboard (m)',
+        [
+            ('believed', 'measured_cross_track_m', ORANGE, 1.0),
+            ('cross-track error', 'cross_track_m', BLUE, 1.0),
+        ],
+    ),
+    'heading': (
+        'Heading',
+        'heading (deg from north)',
+        [
+            ('desired', 'heading_ref_deg', ORANGE, 1.0),
+            ('heading', 'heading_deg', BLUE, 1.0),
+        ],
+    ),
+    'pitch': (
+        'Pitch',
+        'pitch, + nose up (deg)',
+        [('desired', 'pitch_ref_deg', ORANGE, 1.0), ('pitch', 'pitch_deg', BLUE, 1.0)],
+    ),
+    'current': (
+        'Current',
+        'water velocity (kn)',
+        [
+            ('north', 'current_north_kn', BLUE, 1.0),
+            ('north, estimated', 'estimate_north_kn', ORANGE, 1.0),
+            ('east', 'current_east_kn', GREEN, 1.0),
+            ('east, estimated', 'estimate_east_kn', GREY, 1.0),
+        ],
+    ),
+    'joints': (
+        'Actuators',
+        'share of 1 kg, 100 mm, 100 deg',
+        [
+            ('net heaviness / 1 kg', 'buoyancy_engine_kg', BLUE, 1.0),
+            ('pitch mass / 100 mm', 'pitch_mass_mm', ORANGE, 100.0),
+            ('roll mass / 100 deg', 'roll_mass_deg', GREEN, 100.0),
+        ],
+    ),
+}
+
+
+def new_figure(width: float, height: float) -> Any:
+    """Empty figure of matplotlib (inch)."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout='constrained')
+
+
+def dress(axis, title: str, x: str, y: str, legend: str = 'upper right', **more) -> None:
+    """Title, labels, grid and the place of a legend, empty without one."""
+    axis.set(title=title, xlabel=x, ylabel=y)
+    axis.grid(alpha=0.3)
+    if legend:
+        axis.legend(loc=legend, fontsize='small', **more)
+
+
+def draw_curves(axis, x, title: str, labels: tuple[str, str], curves, width: float = 1.2) -> None:
+    """Curves, each with name, values and colour, with a legend if there are several."""
+    for name, values, colour in curves:
+        axis.plot(x, values, color=colour, linewidth=width, label=name)
+    dress(axis, title, *labels, legend='upper right' if len(curves) > 1 else '')
 
 
 def draw_run(traces: Traces, title: str, file: Path) -> None:
     """Draw a run into an image file; the suffix of ``file`` says which kind (png, svg, pdf)."""
-    import matplotlib
-
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplot_mosaic(
-        [['track', 'depth'], ['track', 'cross'], ['heading', 'pitch'], ['current', 'joints']],
-        figsize=(12.0, 12.0),
-        height_ratios=[1.0, 1.0, 1.0, 1.0],
-        layout='constrained',
+    figure = new_figure(12.0, 12.0)
+    axes = figure.subplot_mosaic(
+        [['track', 'depth'], ['track', 'cross'], ['heading', 'pitch'], ['current', 'joints']]
     )
     traces = traces.thinned(POINTS)
-    curves = traces.curves
-    hours = traces.time_s() / 3600.0
+    hours, reckons = traces.time_s() / 3600.0, traces.has('place_error_m')
     _draw_track(axes['track'], traces.samples)
-    believed = ()
-    if traces.has('place_error_m'):
-        believed = (('believed', curves['measured_cross_track_m'], _ORANGE),)
-    _draw_curves(
-        axes['depth'], hours, 'Depth', 'depth (m)', (('depth', curves['depth_m'], _BLUE),)
-    )
+    for place, (name, label, curves) in _PANELS.items():
+        shown = [
+            (text, traces.curves[curve] / one, colour)
+            for text, curve, colour, one in curves
+            if reckons or not curve.startswith('measured_')
+        ]
+        draw_curves(axes[place], hours, name, ('time (h)', label), shown)
     axes['depth'].invert_yaxis()
-    _draw_curves(
-        axes['cross'],
-        hours,
-        'Cross-track error',
-        'off the path, + to starboard (m)',
-        (*believed, ('cross-track error', curves['cross_track_m'], _BLUE)),
-    )
     for turn_s in traces.inflections_s():
-        axes['cross'].axvline(turn_s / 3600.0, color=_GREY, linewidth=0.8, linestyle=':')
+        axes['cross'].axvline(turn_s / 3600.0, color=GREY, linewidth=0.8, linestyle=':')
     if len(hours):
-        axes['cross'].plot([], [], color=_GREY, linestyle=':', label='inflection')
+        axes['cross'].plot([], [], color=GREY, linestyle=':', label='inflection')
     axes['cross'].legend(loc='upper right', fontsize='small')
-    _draw_curves(
-        axes['heading'],
-        hours,
-        'Heading',
-        'heading (deg from north)',
-        (
-            ('desired', curves['heading_ref_deg'], _ORANGE),
-            ('heading', curves['heading_deg'], _BLUE),
-        ),
-    )
-    _draw_curves(
-        axes['pitch'],
-        hours,
-        'Pitch',
-        'pitch, + nose up (deg)',
-        (('desired', curves['pitch_ref_deg'], _ORANGE), ('pitch', curves['pitch_deg'], _BLUE)),
-    )
-    _draw_curves(
-        axes['current'],
-        hours,
-        'Current',
-        'water velocity (kn)',
-        (
-            ('north', curves['current_north_kn'], _BLUE),
-            ('north, estimated', curves['estimate_north_kn'], _ORANGE),
-            ('east', curves['current_east_kn'], _GREEN),
-            ('east, estimated', curves['estimate_east_kn'], _GREY),
-        ),
-    )
-    _draw_curves(
-        axes['joints'],
-        hours,
-        'Actuators',
-        'share of 1 kg, 100 mm, 100 deg',
-        (
-            ('net heaviness / 1 kg', curves['buoyancy_engine_kg'], _BLUE),
-            ('pitch mass / 100 mm', curves['pitch_mass_mm'] / 100.0, _ORANGE),
-            ('roll mass / 100 deg', curves['roll_mass_deg'] / 100.0, _GREEN),
-        ),
-    )
     figure.suptitle(title)
     save_figure(figure, file, dpi=100)
 
 
 def _draw_track(axis, samples: dict[str, np.ndarray]) -> None:
     """Plan view with the path and arrows of the current."""
-    north, east = samples['track_north_m'] / 1e3, samples['track_east_m'] / 1e3
-    target_north, target_east = samples['target_north_m'] / 1e3, samples['target_east_m'] / 1e3
-    axis.plot(target_east, target_north, color=_ORANGE, label='desired path')
-    axis.plot(east, north, color=_BLUE, label='track')
-    believed = samples['believed_north_m'] / 1e3, samples['believed_east_m'] / 1e3
+    (north, east), target, believed = (
+        (samples[f'{what}_north_m'] / 1e3, samples[f'{what}_east_m'] / 1e3)
+        for what in ('track', 'target', 'believed')
+    )
+    axis.plot(*target[::-1], color=ORANGE, label='desired path')
+    axis.plot(east, north, color=BLUE, label='track')
     if np.any(np.isfinite(believed[0])):
-        axis.plot(*believed[::-1], color=_GREEN, linestyle='--', label='believed track')
+        axis.plot(*believed[::-1], color=GREEN, linestyle='--', label='believed track')
     if len(east):
-        axis.plot(east[0], north[0], 'o', color=_BLUE, label='start')
+        axis.plot(east[0], north[0], 'o', color=BLUE, label='start')
         pick = np.linspace(0, len(east) - 1, ARROWS).astype(int)
-        axis.quiver(
-            east[pick],
-            north[pick],
-            samples['water_east_kn'][pick],
-            samples['water_north_kn'][pick],
-            color=_GREY,
-            width=0.004,
-            label='current',
-        )
+        water = (samples[f'water_{name}_kn'][pick] for name in ('east', 'north'))
+        axis.quiver(east[pick], north[pick], *water, color=GREY, width=0.004, label='current')
     axis.set_aspect('equal', adjustable='datalim')
-    axis.set(title='Track', xlabel='east (km)', ylabel='north (km)')
-    axis.grid(alpha=0.3)
-    axis.legend(loc='upper right', fontsize='small')
-
-
-def _draw_curves(axis, hours, title: str, label: str, curves) -> None:
-    """Curves over time with a title and a labelled axis."""
-    for name, values, colour in curves:
-        axis.plot(hours, values, color=colour, linewidth=1.2, label=name)
-    axis.set(title=title, xlabel='time (h)', ylabel=label)
-    axis.grid(alpha=0.3)
-    if len(curves) > 1:
-        axis.legend(loc='upper right', fontsize='small')
+    dress(axis, 'Track', 'east (km)', 'north (km)')

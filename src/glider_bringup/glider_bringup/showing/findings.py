@@ -9,9 +9,10 @@ import numpy as np
 
 from glider_bringup.mission.rules import STEADY_DEPTH_M
 from glider_bringup.scoring.card import STOPPED
+from glider_bringup.scoring.scores import reckoned
 from glider_bringup.scoring.traces import Traces
 from glider_bringup.showing.panels import actuators_of
-from glider_bringup.showing.scorecard import fault_texts, guard_texts, reckoned
+from glider_bringup.showing.scorecard import fault_texts, guard_texts
 from glider_bringup.showing.web_page import FlownRun
 from glider_bringup.showing.words import count, small, span, way
 from glider_model.base.signals import TICK_S

@@ -91,15 +91,7 @@ def flown_run(
     """A run with its name and vehicle."""
     vehicle = load_vehicle(scenario.vehicle)
     rules = scenario.score_rules(card['sim_time_s'])
-    return FlownRun(
-        label=run.resolve().name,
-        scenario=scenario,
-        as_flown=as_flown,
-        vehicle=vehicle,
-        card=card,
-        traces=traces,
-        rules=rules,
-    )
+    return FlownRun(run.resolve().name, scenario, as_flown, vehicle, card, traces, rules)
 
 
 def keep_traces(scenario: Scenario, folder: Path, card: dict, tracer: Tracer) -> FlownRun:

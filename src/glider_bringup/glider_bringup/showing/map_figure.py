@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from glider_bringup.mission.disk import save_figure
+from glider_bringup.showing.figure import new_figure
 from glider_bringup.showing.stability_map import (
     CLASSES,
     CRITICAL,
@@ -101,25 +102,13 @@ def draw_map(stability: StabilityMap, file: Path) -> None:
     ConfigurationError
         If the file cannot be written.
     """
-    import matplotlib
-
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
-
     count, extent = len(stability.panels), _extent(stability)
     columns = min(3, count)
     rows = math.ceil(count / columns)
     slope = np.diff(extent.along_kn)[0] / np.diff(extent.across_kn)[0]
     height = min(max(_WIDTH * slope, _HEIGHTS[0]), _HEIGHTS[1])
-    figure, axes = pyplot.subplots(
-        rows,
-        columns,
-        figsize=(max(1.5 + _WIDTH * columns, 7.0), 2.8 + (0.6 + height) * rows),
-        squeeze=False,
-        sharex=True,
-        sharey=True,
-        layout='constrained',
-    )
+    figure = new_figure(max(1.5 + _WIDTH * columns, 7.0), 2.8 + (0.6 + height) * rows)
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     panels = zip(axes.flat, stability.panels, stability.classes, shares(stability), strict=False)
     for axis, name, classes, share in panels:
         _draw_panel(axis, stability, classes, extent)
@@ -149,6 +138,7 @@ def _title(name: str, share: dict[str, Any]) -> str:
 
 
 def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray, extent: Extent) -> None:
+    """Cells, rays and circles, limits and the points of the paper."""
     from matplotlib.colors import ListedColormap
 
     coarse = np.radians(extent.angle_deg)
@@ -200,23 +190,15 @@ def _draw_rose(axis, extent: Extent) -> None:
         across, along = _tip(rim, degrees)
         axis.plot([0.0, across], [0.0, along], **thin)
         is_aside = abs(across) > 0.01 * rim
-        axis.annotate(
-            f'{degrees:.0f}°',
-            (1.06 * across, 1.06 * along) if is_aside else (0.03 * rim, 1.06 * along),
-            ha='center' if is_aside else 'left',
-            va='center',
-            fontsize='small',
-        )
+        place = (1.06 * across if is_aside else 0.03 * rim, 1.06 * along)
+        to = 'center' if is_aside else 'left'
+        axis.annotate(f'{degrees:.0f}°', place, ha=to, va='center', fontsize='small')
     arc = np.radians(np.linspace(first, last, _ARC))
     for speed in _round_values(1e-6, rim, _CIRCLES):
         axis.plot(speed * np.sin(arc), speed * np.cos(arc), **thin)
         axis.annotate(f' {speed:g} kn', _tip(speed, last), fontsize='x-small', va='center')
-    axis.annotate(
-        '',
-        xy=(0.0, 0.42 * rim),
-        xytext=(0.0, 0.0),
-        arrowprops={'arrowstyle': '-|>', 'linewidth': 2.0, 'color': 'black'},
-    )
+    look = {'arrowstyle': '-|>', 'linewidth': 2.0, 'color': 'black'}
+    axis.annotate('', xy=(0.0, 0.42 * rim), xytext=(0.0, 0.0), arrowprops=look)
     axis.annotate('path', (0.02 * rim, 0.36 * rim), fontsize='small')
 
 
@@ -235,30 +217,19 @@ def _legend(stability: StabilityMap) -> list:
     from matplotlib.patches import Patch
 
     failed = np.any(stability.classes == CLASSES.index(FAILED))
-    handles = [
-        Patch(
-            facecolor=_COLOURS[name],
-            edgecolor='black',
-            linewidth=0.5,
-            label=_MEANING[name].format(stability.measure),
-        )
-        for name in (CLASSES if failed else CLASSES[:-1])
-    ]
-    speed = f'{stability.horizontal_kn:.2f} kn'
-    for style, what in (
-        ('-', f'limit: cross current = speed of the glide U_h = {speed}'),
-        ('--', 'limit: no progress along the path is left'),
-    ):
-        handles.append(Line2D([], [], color='black', linewidth=2.0, linestyle=style, label=what))
-    handles += [
-        Line2D(
-            *([], []),
-            marker=marker,
-            color='none',
-            markerfacecolor='white',
-            markeredgecolor='black',
-            label=f'the paper: {PAPER_KN:.1f} kn at {degrees:.0f} deg, {what}',
-        )
-        for degrees, what, marker in PAPER_POINTS
-    ]
+    handles = []
+    for name in CLASSES if failed else CLASSES[:-1]:
+        text, look = _MEANING[name].format(stability.measure), {'edgecolor': 'black'}
+        handles.append(Patch(facecolor=_COLOURS[name], linewidth=0.5, label=text, **look))
+    limits = {
+        '-': f'cross current = speed of the glide U_h = {stability.horizontal_kn:.2f} kn',
+        '--': 'no progress along the path is left',
+    }
+    for style, what in limits.items():
+        look = {'color': 'black', 'linewidth': 2.0, 'linestyle': style}
+        handles.append(Line2D([], [], label=f'limit: {what}', **look))
+    white = {'color': 'none', 'markerfacecolor': 'white', 'markeredgecolor': 'black'}
+    for degrees, what, marker in PAPER_POINTS:
+        text = f'the paper: {PAPER_KN:.1f} kn at {degrees:.0f} deg, {what}'
+        handles.append(Line2D([], [], marker=marker, label=text, **white))
     return handles

@@ -5,7 +5,7 @@
 import math
 from typing import NamedTuple
 
-from glider_bringup.showing.scorecard import reckoned
+from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, Steps
 from glider_guard.rows import REACTIONS, ROWS
 from glider_guard.rows import SURFACE as AT_LEAST
@@ -34,6 +34,11 @@ class Actuator(NamedTuple):
     def flag(self) -> str:
         """Name of the curve that says when it is commanded to its limit."""
         return f'{self.joint}_at_limit'
+
+    def panel(self, more: str, curves: tuple[Curve, ...], **look) -> Panel:
+        """Panel of it, with more in its caption."""
+        axis = f'{self.title.lower()} ({self.unit})'
+        return Panel(self.joint, self.title, f'{self.caption}.{more}', axis, curves, **look)
 
 
 ACTUATORS = (
@@ -89,8 +94,13 @@ _BATTERY = Panel(
     'battery (%)',
     (Curve('battery_percent', 'left', 'measured'),),
 )
-#: Heading over what is known of each surfacing.
-SURFACINGS = 'Each surfacing'
+_TRACK = Panel(
+    'track',
+    'Track',
+    'From above, to scale. Arrows: where the current flows to. What is zoomed into below is drawn '
+    'bold.',
+    kind='track',
+)
 _ROLES = ('measured', 'reference', 'third', 'fourth')
 
 
@@ -105,79 +115,70 @@ def actuators_of(run: FlownRun) -> list[tuple[Actuator, float]]:
     return [(one, limit) for one, limit in found if limit > 0.0]
 
 
-def _maps() -> list[Panel]:
-    """Plan view and three-dimensional view."""
-    return [
-        Panel(
-            'track',
-            'Track',
-            'From above, to scale. Arrows: where the current flows to. What is zoomed into below '
-            'is drawn bold.',
-            kind='track',
-        ),
-        Panel(
-            'space',
-            'In three dimensions',
-            'Drag to turn. Depth is stretched.',
-            kind='space',
-        ),
-    ]
+#: Panels of one run and of several: title and axis.
+_FLOWN = {
+    'depth': ('Depth', 'depth (m)'),
+    'cross_track': ('Cross-track error', 'off the path (m)'),
+    'place_error': ('Error of the believed place', 'error (m)'),
+    'pitch': ('Pitch', 'pitch (deg)'),
+    'heading': ('Heading', 'heading (deg)'),
+    'roll': ('Roll', 'roll (deg)'),
+}
+SPACE = Panel('space', 'In three dimensions', 'Drag to turn. Depth is stretched.', kind='space')
+
+
+def flown_panel(name: str, caption: str, curves: tuple[Curve, ...], **look) -> Panel:
+    """Panel of `_FLOWN`."""
+    title, axis = _FLOWN[name]
+    return Panel(name, title, caption, axis, curves, inverted=name == 'depth', **look)
+
+
+def _desired(name: str, label: str = 'desired') -> Curve:
+    """Curve of what was asked for, or believed."""
+    return Curve(name, label, 'reference', dashed=True)
 
 
 def _flight_panels(run: FlownRun) -> list[Panel]:
     """How it flew: depth, errors, attitude."""
-    traces = run.traces
-    noisy = traces.has('measured_depth_m')
+    noisy = run.traces.has('measured_depth_m')
     told = 'believed' if reckoned(run.card) else 'measured, with noise'
 
     def curves(name: str, *others: Curve) -> tuple[Curve, ...]:
-        label = 'true' if noisy else 'flown'
         measured = (Curve(f'measured_{name}', told, 'faint'),) if noisy else ()
-        return (*measured, Curve(name, label, 'measured'), *others)
+        return (*measured, Curve(name, 'true' if noisy else 'flown', 'measured'), *others)
 
     follows_path = run.scenario.profile.mode == 'path'
     target = 'virtual target' if follows_path else 'turn flown to'
     below = Curve('vertical_error_m', 'normal to the path, + below it', 'third')
     lost = Curve('cross_track_m', 'course cannot be held', 'alert', flag='infeasible')
     return [
-        Panel(
+        flown_panel(
             'depth',
-            'Depth',
             'How deep it was, and the depth it was flying to.',
-            'depth (m)',
-            curves('depth_m', Curve('depth_ref_m', target, 'reference', dashed=True)),
-            inverted=True,
+            curves('depth_m', _desired('depth_ref_m', target)),
         ),
-        Panel(
+        flown_panel(
             'cross_track',
-            'Cross-track error',
             'Distance from the path, + to starboard of it. A vehicle can hardly steer while it '
             'turns over between dive and climb: at the inflections.',
-            'off the path (m)',
             curves('cross_track_m', *((below,) if follows_path else ()), lost),
             inflections=0,
         ),
-        Panel(
+        flown_panel(
             'pitch',
-            'Pitch',
             'Nose up is positive: a dive has about minus, a climb plus the glide pitch.',
-            'pitch (deg)',
-            curves('pitch_deg', Curve('pitch_ref_deg', 'desired', 'reference', dashed=True)),
+            curves('pitch_deg', _desired('pitch_ref_deg')),
         ),
-        Panel(
+        flown_panel(
             'heading',
-            'Heading',
             'Clockwise from north, counted on through 180 deg. It differs from the course of the '
             'path by the crab angle against the current.',
-            'heading (deg)',
-            curves('heading_deg', Curve('heading_ref_deg', 'desired', 'reference', dashed=True)),
+            curves('heading_deg', _desired('heading_ref_deg')),
         ),
-        Panel(
+        flown_panel(
             'roll',
-            'Roll',
             'Starboard side down is positive. Control banks to turn; the roll it asks for is its '
             'own, so there is no reference.',
-            'roll (deg)',
             curves('roll_deg'),
         ),
     ]
@@ -203,7 +204,7 @@ def _navigation_panels(run: FlownRun) -> list[Panel]:
     told = reckoned(run.card)
     if told is None:
         return []
-    believed = Curve('measured_cross_track_m', 'believed', 'reference', dashed=True)
+    believed = _desired('measured_cross_track_m', 'believed')
     return [
         Panel(
             'plan',
@@ -220,15 +221,13 @@ def _navigation_panels(run: FlownRun) -> list[Panel]:
             (Curve('cross_track_m', 'true', 'measured'), believed),
             surfacings=0,
         ),
-        Panel(
+        flown_panel(
             'place_error',
-            'Error of the believed place',
             'Horizontal distance between the true and the believed place, and the bound that it '
             'should keep to 95 % of the time: the longer half axis of the ellipse.',
-            'error (m)',
             (
                 Curve('place_error_m', 'error', 'measured'),
-                Curve('place_bound_m', '95 % bound, as believed', 'reference', dashed=True),
+                _desired('place_bound_m', '95 % bound, as believed'),
             ),
             surfacings=0,
             log=True,
@@ -241,11 +240,9 @@ def _mean_current_panel(reports: list[dict], axis: int) -> Panel:
     """Mean current to the north (0) or east (1) of every way under water."""
     name = ('north', 'east')[axis]
 
-    def steps(label: str, role: str, key: str, dashed: bool) -> Steps:
-        spans = tuple(
-            (one['dive_t_s'], one['t_s'], one[key][axis] / KNOT_MPS) for one in reports if one[key]
-        )
-        return Steps(label, role, spans, dashed)
+    def spans(key: str) -> tuple[tuple[float, float, float], ...]:
+        known = [one for one in reports if one[key]]
+        return tuple((one['dive_t_s'], one['t_s'], one[key][axis] / KNOT_MPS) for one in known)
 
     return Panel(
         f'mean_current_{name}',
@@ -255,8 +252,8 @@ def _mean_current_panel(reports: list[dict], axis: int) -> Panel:
         'current (kn)',
         (Curve(f'current_{name}_kn', 'true, where it is', 'faint'),),
         steps=(
-            steps('true mean of the way', 'measured', 'dac_true_mps', False),
-            steps('believed of it, after fixes', 'reference', 'dac_believed_mps', True),
+            Steps('true mean of the way', 'measured', spans('dac_true_mps')),
+            Steps('believed of it, after fixes', 'reference', spans('dac_believed_mps'), True),
         ),
         surfacings=0,
     )
@@ -267,21 +264,16 @@ def _actuator_panels(run: FlownRun) -> list[Panel]:
     panels = []
     for one, limit in actuators_of(run):
         used = run.traces.largest(one.position) / limit
-        panels.append(
-            Panel(
-                one.joint,
-                one.title,
-                f'{one.caption}. Its limits of ±{limit:g} {one.unit} are drawn where it comes '
-                f'near them; the largest use of its range was {100.0 * used:.0f} %.',
-                f'{one.title.lower()} ({one.unit})',
-                (
-                    Curve(one.position, 'position', 'measured'),
-                    Curve(one.command, 'commanded', 'reference', dashed=True),
-                    Curve(one.command, 'at its limit', 'alert', flag=one.flag),
-                ),
-                limits=(-limit, limit),
-            )
+        more = (
+            f' Its limits of ±{limit:g} {one.unit} are drawn where it comes near them; '
+            f'the largest use of its range was {100.0 * used:.0f} %.'
         )
+        curves = (
+            Curve(one.position, 'position', 'measured'),
+            _desired(one.command, 'commanded'),
+            Curve(one.command, 'at its limit', 'alert', flag=one.flag),
+        )
+        panels.append(one.panel(more, curves, limits=(-limit, limit)))
     return panels
 
 
@@ -296,7 +288,7 @@ def _current_panels(run: FlownRun) -> list[Panel]:
             'current (kn)',
             (
                 Curve(f'current_{axis}_kn', 'true', 'measured'),
-                Curve(f'estimate_{axis}_kn', 'estimated', 'reference', dashed=True),
+                _desired(f'estimate_{axis}_kn', 'estimated'),
             ),
         )
         for axis in ('north', 'east')
@@ -336,22 +328,15 @@ def _guard_panels(run: FlownRun) -> list[Panel]:
 def _learnt_panels(run: FlownRun) -> list[Panel]:
     """What the adaptive law has learnt; nothing of what stayed zero."""
     panels = []
-    for panel, title, caption, axis, names in _LEARNT:
-        names = [name for name in names if run.traces.largest(name) > 0.0]
-        curves = tuple(
-            Curve(name, _label(name), role) for name, role in zip(names, _ROLES, strict=False)
-        )
+    for *told, names in _LEARNT:
+        curves = []
+        for name in names:
+            if run.traces.largest(name) > 0.0:
+                label = name.removesuffix('_nm').removesuffix('_radps').replace('_', ' ')
+                curves.append(Curve(name, label, _ROLES[len(curves)]))
         if curves:
-            log = panel == 'learnt_lyapunov'
-            panels.append(Panel(panel, title, caption, axis, curves, log=log))
+            panels.append(Panel(*told, tuple(curves), log='lyapunov_1' in names))
     return panels
-
-
-def _label(name: str) -> str:
-    """Name of something learnt, without its unit."""
-    for unit in ('_nm', '_radps'):
-        name = name.removesuffix(unit)
-    return name.replace('_', ' ')
 
 
 def _is_there(curve: Curve, run: FlownRun) -> bool:
@@ -364,8 +349,8 @@ def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
     if not run.traces.ticks:
         return {}
     groups = {
-        SURFACINGS: _surfacing_panels(run),
-        'Where it went': _maps(),
+        'Each surfacing': _surfacing_panels(run),
+        'Where it went': [_TRACK, SPACE],
         'How it knew where it was': _navigation_panels(run),
         'How it flew': _flight_panels(run),
         'What the actuators did, and the battery': [*_actuator_panels(run), _BATTERY],
@@ -375,10 +360,10 @@ def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
     }
     found = {}
     for heading, panels in groups.items():
-        drawn = (
+        drawn = [
             panel._replace(curves=tuple(curve for curve in panel.curves if _is_there(curve, run)))
             for panel in panels
-        )
+        ]
         found[heading] = [
             panel for panel in drawn if panel.curves or panel.steps or panel.kind != 'time'
         ]

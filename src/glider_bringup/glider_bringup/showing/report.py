@@ -3,14 +3,16 @@
 """The report of a run: one web page that says what happened, to someone who was not there."""
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from glider_bringup.mission.scenario import told_fields
-from glider_bringup.scoring.dives import dives_of
+from glider_bringup.scoring.dives import Dive, dives_of
+from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.findings import findings, verdict
-from glider_bringup.showing.panels import SURFACINGS, report_panels
-from glider_bringup.showing.scorecard import card_rows, reckoned
-from glider_bringup.showing.web_page import FlownRun, make_page, page_data
+from glider_bringup.showing.panels import report_panels
+from glider_bringup.showing.scorecard import card_rows
+from glider_bringup.showing.web_page import FlownRun, make_page
 from glider_bringup.showing.words import count, span, way
 from glider_model.base.files import yaml_text
 from glider_model.base.signals import TICK_S
@@ -40,42 +42,24 @@ def _number(value: float | None, digits: int, unit: str) -> str:
 def _tiles(run: FlownRun) -> list[tuple[str, str, str]]:
     """The figures that a person asks for first: name, value, and more about it."""
     card, depth_m = run.card, run.scenario.profile.depth_m
-    track, pitch = card['cross_track_m'], card['pitch_error_deg']
-    heading, depth = card['heading_fluctuation_deg'], card['depth_m']
-    speed = card['distance_along_path_m'] / max(TICK_S, card['sim_time_s'])
+    time_s, way_m, dives = card['sim_time_s'], card['distance_along_path_m'], card['dives']
+    track, depth = card['cross_track_m'], card['depth_m']
+    rms, whole = _number(track['rms_steady'], 3, 'm'), _number(track.get('max_run'), 2, 'm')
     beyond = f'{_number(depth["overshoot"], 1, "m")} beyond {_number(depth_m, 0, "m")}'
+    speed = f'{way_m / max(TICK_S, time_s):.2f} m/s on average'
+    (pitch, most_pitch), (heading, most_heading) = (
+        [_number(card[of][name], digits, 'deg') for name in ('rms_steady', 'max_steady')]
+        for of, digits in (('pitch_error_deg', 2), ('heading_fluctuation_deg', 3))
+    )
+    is_profile = run.scenario.profile.mode == 'profile'
+    steady = f'largest; rms {rms}; whole run {whole}'
     return [
-        (
-            'simulated time',
-            span(card['sim_time_s']),
-            count(card['dives'], 'dive') if card['dives'] else '',
-        ),
-        (
-            'along the path',
-            way(card['distance_along_path_m']),
-            f'{speed:.2f} m/s on average',
-        ),
-        (
-            'cross-track, steady',
-            _number(track['max_steady'], 2, 'm'),
-            f'largest; rms {_number(track["rms_steady"], 3, "m")}; '
-            f'whole run {_number(track.get("max_run"), 2, "m")}',
-        ),
-        (
-            'deepest point',
-            _number(depth['max'], 1, 'm'),
-            beyond if run.scenario.profile.mode == 'profile' else '',
-        ),
-        (
-            'pitch error, steady',
-            _number(pitch['rms_steady'], 2, 'deg'),
-            f'rms; largest {_number(pitch["max_steady"], 2, "deg")}',
-        ),
-        (
-            'heading, steady',
-            _number(heading['rms_steady'], 3, 'deg'),
-            f'fluctuation, rms; largest {_number(heading["max_steady"], 3, "deg")}',
-        ),
+        ('simulated time', span(time_s), count(dives, 'dive') if dives else ''),
+        ('along the path', way(way_m), speed),
+        ('cross-track, steady', _number(track['max_steady'], 2, 'm'), steady),
+        ('deepest point', _number(depth['max'], 1, 'm'), beyond if is_profile else ''),
+        ('pitch error, steady', pitch, f'rms; largest {most_pitch}'),
+        ('heading, steady', heading, f'fluctuation, rms; largest {most_heading}'),
     ]
 
 
@@ -98,77 +82,48 @@ def _pair(values: list[float] | None, digits: int) -> str:
     return ' / '.join(f'{round(value, digits) + 0.0:,.{digits}f}' for value in values)
 
 
-#: Head of the table of surfacings.
-_SURFACING = (
-    *('', 'time', 'believed place, N / E (m)', 'true place, N / E (m)', 'error (m)'),
-    *('in the 95 % ellipse', 'off the path (m)'),
-    *('mean current, N / E (kn)', 'believed of it, N / E (kn)'),
-)
+def _knots(values: list[float] | None) -> list[float] | None:
+    return values and [value / KNOT_MPS for value in values]
 
 
-def _surfacings(card: dict[str, Any]) -> list[list[str]]:
-    """Head and lines of the table of surfacings; empty of a vehicle that knows its place."""
-    reports = (reckoned(card) or {}).get('reports', [])
-    inside = {True: 'yes', False: 'no', None: '-'}
-    lines = []
-    for number, one in enumerate(reports, 1):
-        currents = (
-            one[name] and [value / KNOT_MPS for value in one[name]]
-            for name in ('dac_true_mps', 'dac_believed_mps')
-        )
-        lines.append(
-            [
-                str(number),
-                span(one['t_s']),
-                _pair(one['believed_ned_m'], 0),
-                _pair(one['true_ned_m'], 0),
-                f'{one["error_m"]:,.1f}',
-                inside[one['inside_95']],
-                f'{one["cross_track_m"]:+,.1f}',
-                *(_pair(current, 3) for current in currents),
-            ]
-        )
-    return [list(_SURFACING), *lines] if lines else []
+#: Columns of the tables of surfacings and of dives: head, and text of a line.
+_SURFACING: dict[str, Callable[[dict], str]] = {
+    'time': lambda one: span(one['t_s']),
+    'believed place, N / E (m)': lambda one: _pair(one['believed_ned_m'], 0),
+    'true place, N / E (m)': lambda one: _pair(one['true_ned_m'], 0),
+    'error (m)': lambda one: f'{one["error_m"]:,.1f}',
+    'in the 95 % ellipse': lambda one: {True: 'yes', False: 'no', None: '-'}[one['inside_95']],
+    'off the path (m)': lambda one: f'{one["cross_track_m"]:+,.1f}',
+    'mean current, N / E (kn)': lambda one: _pair(_knots(one['dac_true_mps']), 3),
+    'believed of it, N / E (kn)': lambda one: _pair(_knots(one['dac_believed_mps']), 3),
+}
+_DIVE: dict[str, Callable[[Dive], str]] = {
+    'from': lambda one: span(one.from_s),
+    'lasted': lambda one: span(one.to_s - one.from_s),
+    'deepest (m)': lambda one: f'{one.deepest_m:,.1f}',
+    'way made good (m)': lambda one: f'{one.way_m:,.0f}',
+    'over ground (m/s)': lambda one: f'{one.way_m / (one.to_s - one.from_s):.3f}',
+    'largest off the path (m)': lambda one: f'{one.off_path_m:,.1f}',
+    'battery left (%)': lambda one: (
+        '-' if math.isnan(one.battery_percent) else f'{one.battery_percent:.1f}'
+    ),
+}
 
 
-#: Head of the table of dives.
-_DIVE = (
-    *('', 'from', 'lasted', 'deepest (m)', 'way made good (m)', 'over ground (m/s)'),
-    *('largest off the path (m)', 'battery left (%)'),
-)
-
-
-def _dives(run: FlownRun) -> list[list[str]]:
-    """Head and lines of the table of dives; empty without one."""
-    if not run.traces.ticks:
-        return []
-    lines = []
-    for number, one in enumerate(dives_of(run.traces), 1):
-        lasted_s = one.to_s - one.from_s
-        left = '-' if math.isnan(one.battery_percent) else f'{one.battery_percent:.1f}'
-        lines.append(
-            [
-                str(number),
-                span(one.from_s),
-                span(lasted_s),
-                f'{one.deepest_m:,.1f}',
-                f'{one.way_m:,.0f}',
-                f'{one.way_m / lasted_s:.3f}',
-                f'{one.off_path_m:,.1f}',
-                left,
-            ]
-        )
-    return [list(_DIVE), *lines] if lines else []
+def _table(columns: dict[str, Callable[[Any], str]], things: Sequence) -> list[list[str]]:
+    """Head and numbered lines of a table; empty without a line."""
+    lines = ([text(one) for text in columns.values()] for one in things)
+    numbered = [[str(number), *line] for number, line in enumerate(lines, 1)]
+    return [['', *columns], *numbered] if numbered else []
 
 
 def report_page(run: FlownRun) -> str:
     """Text of the report of a run."""
     card, rules = run.card, run.rules
-    sections = report_panels(run)
-    data = page_data([run], [panel for group in sections.values() for panel in group])
     return make_page(
         'report.html',
-        data,
+        [run],
+        report_panels(run),
         title=f'{_title(run)}: {card["status"]}',
         scenario=run.scenario,
         status=card['status'],
@@ -176,10 +131,8 @@ def report_page(run: FlownRun) -> str:
         verdict=verdict(card, rules.settle_s),
         tiles=_tiles(run),
         findings=findings(run),
-        first={SURFACINGS: sections.pop(SURFACINGS)} if SURFACINGS in sections else {},
-        sections=sections,
-        surfacings=_surfacings(card),
-        dives=_dives(run),
+        surfacings=_table(_SURFACING, (reckoned(card) or {}).get('reports', [])),
+        dives=_table(_DIVE, dives_of(run.traces) if run.traces.ticks else []),
         card=card_rows(card),
         settle=span(rules.settle_s),
         margin=span(rules.margin_s),

@@ -3,6 +3,9 @@
 """The scorecard of a run, as a person reads it."""
 
 from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 
 from rich.console import Console
@@ -10,7 +13,7 @@ from rich.table import Table
 
 from glider_bringup.console import output
 from glider_bringup.mission.scenario import told_fields
-from glider_bringup.scoring.card import CARD_GROUPS
+from glider_bringup.scoring.scores import SCORES, Score, reckoned
 from glider_model.ocean.current_settings import KNOT_MPS
 
 #: Colours of what became of a run.
@@ -29,14 +32,11 @@ def show(value: float | None, unit: str, digits: int = 2) -> str:
     return '-' if value is None else f'{value:,.{digits}f} {unit}'.rstrip()
 
 
-def reckoned(card: dict) -> dict | None:
-    """What a card tells of navigation, where the vehicle had to reckon its place; else None."""
-    told = card.get('navigation') or {'method': 'known'}
-    return None if told['method'] == 'known' else told
-
-
-def _navigation_rows(told: dict) -> list[tuple[str, str]]:
+def _navigation_rows(card: dict) -> list[tuple[str, str]]:
     """Lines of how well a vehicle that reckons its place knew it."""
+    told = reckoned(card)
+    if told is None:
+        return []
     error, dac = told['error_m'], told['dac_error_mps']
     off, believed = told['surfacing_cross_track_m'], told['believed_cross_track_m']
     within, surfacings = told['ellipse_95_share'], told['surfacings']
@@ -63,48 +63,57 @@ def status_text(card: dict) -> str:
 
 def card_rows(card: dict) -> list[tuple[str, str]]:
     """Name and text of every line of a scorecard."""
-    track, pitch = card['cross_track_m'], card['pitch_error_deg']
-    heading, depth = card['heading_fluctuation_deg'], card['depth_m']
-    travel, settle_s = card['actuator_travel'], card.get('settle_s')
-    settling = 'after settling' + ('' if settle_s is None else f', the first {settle_s:,.0f} s')
-    end_m, navigation = card.get('end_of_path_m'), reckoned(card)
-    energy = card.get('energy') or {'wh': None}
-    return [
+    rows = [
         ('status', status_text(card)),
-        ('flown', f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}'),
-        ('engine', f'{card["engine"] or "not known"}, seed {card["seed"]}'),
-        ('simulated time', show(card['sim_time_s'], 's', 1)),
-        ('real-time factor', show(card['real_time_factor'], '', 0)),
-        (
-            'messages',
-            f'{card["messages_recorded"]:,} recorded, {card["messages_lost"]} lost',
-        ),
-        ('dives', str(card['dives'])),
-        ('along path', show(card['distance_along_path_m'], 'm', 0)),
-        *(('fault', text) for text in fault_texts(card)),
-        *(('guard', text) for text in guard_texts(card)),
-        *([('end of path', f'came up {show(end_m, "m", 1)} from its last point')]
-          if end_m is not None else []),
-        ('cross-track, steady', f'rms {show(track["rms_steady"], "m", 3)}, max '
-         f'{show(track["max_steady"], "m", 3)}'),
-        ('cross-track, all', f'max {show(track["max_all"], "m")} ({settling})'),
-        ('cross-track, whole run', f'max {show(track.get("max_run"), "m")}'),
-        *(_navigation_rows(navigation) if navigation else []),
-        ('pitch error, steady', f'rms {show(pitch["rms_steady"], "deg", 3)}, max '
-         f'{show(pitch["max_steady"], "deg", 3)}'),
-        ('heading fluctuation', f'rms {show(heading["rms_steady"], "deg", 3)}, max '
-         f'{show(heading["max_steady"], "deg", 3)}'),
-        ('depth', f'max {show(depth["max"], "m", 1)}, overshoot '
-         f'{show(depth["overshoot"], "m", 1)}'),
-        ('actuator travel', f'pump {show(travel["buoyancy_engine_kg"], "kg", 1)}, pitch mass '
-         f'{show(travel["pitch_mass_m"], "m")}, roll mass '
-         f'{show(travel["roll_mass_deg"], "deg", 0)}' + _surface_travel(travel)),
-        *(_energy_rows(energy) if energy['wh'] else []),
-    ]  # fmt: skip
+        ('flown', flown_text(card)),
+        ('engine', engine_text(card)),
+    ]
+    for group, scores in groupby(SCORES, key=attrgetter('group')):
+        told = _IN_WORDS.get(group)
+        rows += told(card) if told else _score_rows(card, scores)
+    return rows
 
 
-def _energy_rows(told: dict) -> list[tuple[str, str]]:
+def _score_rows(card: dict, scores: Iterable[Score]) -> Iterator[tuple[str, str]]:
+    """Lines of scores; those of which only the end of the label differs stand in one."""
+    for name, some in groupby(scores, key=attrgetter('line')):
+        text = ', '.join(f'{one.part} {_text(card, one)}'.lstrip() for one in some)
+        if name == 'cross-track, after settling':
+            settle_s = card.get('settle_s')
+            first = '' if settle_s is None else f', the first {settle_s:,.0f} s'
+            name, text = 'cross-track, all', f'{text} (after settling{first})'
+        yield name, text
+
+
+def _text(card: dict, score: Score) -> str:
+    """Value and unit of a score."""
+    return show(score.in_card(card), score.unit, score.digits)
+
+
+def flown_text(card: dict) -> str:
+    """What flew, and by what laws."""
+    return f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}'
+
+
+def engine_text(card: dict) -> str:
+    """How a run was computed."""
+    return f'{card["engine"] or "not known"}, seed {card["seed"]}'
+
+
+def _end_rows(card: dict) -> list[tuple[str, str]]:
+    """Lines of what broke, what the guard told, and where it came up if it flew to its end."""
+    rows = [('fault', text) for text in fault_texts(card)]
+    rows += [('guard', text) for text in guard_texts(card)]
+    end_m = card.get('end_of_path_m')
+    came_up = f'came up {show(end_m, "m", 1)} from its last point'
+    return rows if end_m is None else [*rows, ('end of path', came_up)]
+
+
+def _energy_rows(card: dict) -> list[tuple[str, str]]:
     """Lines of what was taken out of the battery."""
+    told = card.get('energy') or {'wh': None}
+    if not told['wh']:
+        return []
     by = ', '.join(f'{name} {show(told["by"][name], "", 1)}' for name in told['by'])
     a_dive = f'; {show(told["wh_per_dive"], "Wh", 1)} a dive' if told['wh_per_dive'] else ''
     rows = [('energy', f'{show(told["wh"], "Wh", 1)}: {by}{a_dive}')]
@@ -114,12 +123,27 @@ def _energy_rows(told: dict) -> list[tuple[str, str]]:
     return rows
 
 
-def _surface_travel(travel: dict) -> str:
-    """Travel of a steering surface, whatever its name, in words; empty without."""
-    others = sorted(set(travel) - CARD_GROUPS['actuator_travel'])
-    return ''.join(
-        f', {name.removesuffix("_deg")} {show(travel[name], "deg", 0)}' for name in others
-    )
+def _travel_rows(card: dict) -> list[tuple[str, str]]:
+    """Line of the ways of the actuators; a steering surface may have any name."""
+    travel = card['actuator_travel']
+    known = [one for one in SCORES if one.group == 'actuator_travel']
+    texts = [f'{one.label.removesuffix(" travel")} {_text(card, one)}' for one in known]
+    others = sorted(set(travel) - {one.key.rpartition('.')[2] for one in known})
+    texts += [f'{name.removesuffix("_deg")} {show(travel[name], "deg", 0)}' for name in others]
+    return [('actuator travel', ', '.join(texts))]
+
+
+#: Parts of a card that are told in words of their own, where the first of their scores stands.
+_IN_WORDS: dict[str, Callable[[dict], list[tuple[str, str]]]] = {
+    'messages_recorded': lambda card: [
+        ('messages', f'{card["messages_recorded"]:,} recorded, {card["messages_lost"]} lost')
+    ],
+    'messages_lost': lambda card: [],
+    'end_of_path_m': _end_rows,
+    'navigation': _navigation_rows,
+    'actuator_travel': _travel_rows,
+    'energy': _energy_rows,
+}
 
 
 def fault_texts(card: dict) -> list[str]:

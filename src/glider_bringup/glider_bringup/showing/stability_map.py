@@ -24,13 +24,8 @@ from glider_model.vehicle.file import Vehicle
 
 #: Largest steady cross-track error of a stable and of a critical flight (m).
 STABLE_M, CRITICAL_M = 10.0, 50.0
-CLASSES = STABLE, CRITICAL, LOST, INFEASIBLE, FAILED = (
-    'stable',
-    'critical',
-    'lost',
-    'infeasible',
-    'failed',
-)
+CLASSES = ('stable', 'critical', 'lost', 'infeasible', 'failed')
+STABLE, CRITICAL, LOST, INFEASIBLE, FAILED = CLASSES
 SPEED, ANGLE = 'current.speed_kn', 'current.angle_deg'
 
 
@@ -156,12 +151,13 @@ def _classify(data: xarray.Dataset, measure: Measure) -> np.ndarray:
 
 def _feasible(speed_mps: float, current_kn: np.ndarray, angle_deg: np.ndarray) -> np.ndarray:
     """Whether the path can be held in each current by any controller."""
-    feasible = np.empty((len(current_kn), len(angle_deg)), dtype=bool)
-    for i, current in enumerate(current_kn * KNOT_MPS):
-        for j, angle in enumerate(np.radians(angle_deg)):
-            along, across = current * math.cos(angle), current * math.sin(angle)
-            feasible[i, j] = crab_heading(0.0, speed_mps, along, across)[2]
-    return feasible
+
+    def is_held(current: float, angle: float) -> bool:
+        along, across = current * math.cos(angle), current * math.sin(angle)
+        return crab_heading(0.0, speed_mps, along, across)[2]
+
+    angles = np.radians(angle_deg)
+    return np.array([[is_held(one, angle) for angle in angles] for one in current_kn * KNOT_MPS])
 
 
 def shares(stability: StabilityMap) -> list[dict[str, Any]]:
@@ -173,18 +169,16 @@ def shares(stability: StabilityMap) -> list[dict[str, Any]]:
         ``panel``, ``cells``, a share for each of `CLASSES`, ``feasible`` (share of the cells in
         which physics allows to hold the path), and ``stable_of_feasible``, None if no cell is.
     """
-    rows = []
+    rows, feasible = [], stability.feasible
     for name, classes in zip(stability.panels, stability.classes, strict=True):
-        stable = classes == CLASSES.index(STABLE)
+        held = classes[feasible] == CLASSES.index(STABLE)
         rows.append(
             {
                 'panel': name,
                 'cells': classes.size,
                 **{one: float(np.mean(classes == i)) for i, one in enumerate(CLASSES)},
-                'feasible': float(np.mean(stability.feasible)),
-                'stable_of_feasible': float(np.mean(stable[stability.feasible]))
-                if np.any(stability.feasible)
-                else None,
+                'feasible': float(np.mean(feasible)),
+                'stable_of_feasible': float(np.mean(held)) if len(held) else None,
             }
         )
     return rows

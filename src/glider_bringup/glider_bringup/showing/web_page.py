@@ -12,8 +12,8 @@ import numpy as np
 
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
+from glider_bringup.scoring.scores import reckoned
 from glider_bringup.scoring.traces import SAMPLES, Traces
-from glider_bringup.showing.scorecard import reckoned
 from glider_guidance.path.curve import path_length, path_point, path_tangent
 from glider_model.vehicle.file import Vehicle
 
@@ -82,11 +82,8 @@ def pack(data: bytes) -> str:
 def pack_arrays(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     """Arrays as text: float32, all first bytes of them first, which packs tighter."""
     numbers = np.concatenate([np.asarray(values, '<f4') for values in arrays.values()])
-    data = numbers.view(np.uint8).reshape(-1, 4).T.tobytes()
-    return {
-        'lengths': {name: len(values) for name, values in arrays.items()},
-        'data': pack(data),
-    }
+    data = pack(numbers.view(np.uint8).reshape(-1, 4).T.tobytes())
+    return {'lengths': {name: len(values) for name, values in arrays.items()}, 'data': data}
 
 
 class FlownRun(NamedTuple):
@@ -106,15 +103,14 @@ class FlownRun(NamedTuple):
         points = path.points(_PATH_POINTS)
         if path.at_end == 'continue':
             params = path.params()
-            end, ahead = np.array(
-                [f(path_length(params), params) for f in (path_point, path_tangent)]
-            )
+            length = path_length(params)
+            end, ahead = np.array([f(length, params) for f in (path_point, path_tangent)])
             north, east = (samples[f'track_{name}_m'] for name in ('north', 'east'))
             along = (north - end[0]) * ahead[0] + (east - end[1]) * ahead[1]
             beyond = float(np.max(along, initial=0.0, where=np.isfinite(along)))
             beyond /= float(np.dot(ahead[:2], ahead[:2]))
             if beyond > 0.0:
-                points = np.vstack((points, path_point(path_length(params) + beyond, params)))
+                points = np.vstack((points, path_point(length + beyond, params)))
         return np.round(points, 2).tolist()
 
     def data(self, names: set[str]) -> dict[str, Any]:
@@ -157,8 +153,8 @@ def page_data(runs: list[FlownRun], panels: list[Panel]) -> dict[str, Any]:
         'panels': [
             panel._asdict()
             | {
-                'curves': [curve._asdict() for curve in panel.curves],
-                'steps': [steps._asdict() for steps in panel.steps],
+                name: [one._asdict() for one in getattr(panel, name)]
+                for name in ('curves', 'steps')
             }
             for panel in panels
         ],
@@ -171,31 +167,22 @@ def _templates() -> 'Environment':
     """Templates of the pages: what is put in is text, and an unknown name an error."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+    strict = {'autoescape': True, 'undefined': StrictUndefined}
     found = Environment(
-        loader=FileSystemLoader(_WEB),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+        loader=FileSystemLoader(_WEB), trim_blocks=True, lstrip_blocks=True, **strict
     )
     found.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
     found.globals['source'] = lambda name: (_WEB / name).read_text(encoding='utf-8')
     return found
 
 
-def make_page(template: str, data: dict[str, Any], **content) -> str:
-    """Whole text of a page.
-
-    Parameters
-    ----------
-    template : str
-        File in ``web``.
-    data : dict
-        From `page_data`.
-    **content
-        What the template names.
-    """
+def make_page(
+    template: str, runs: list[FlownRun], sections: dict[str, list[Panel]], **content
+) -> str:
+    """Whole text of a page with panels by heading, and what else its template in ``web`` names."""
+    data = page_data(runs, [panel for group in sections.values() for panel in group])
     from plotly.offline import get_plotlyjs
 
     library = pack(get_plotlyjs().encode()) if data['panels'] else ''
-    return _templates().get_template(template).render(data=data, library=library, **content)
+    content |= {'data': data, 'library': library, 'sections': sections}
+    return _templates().get_template(template).render(content)

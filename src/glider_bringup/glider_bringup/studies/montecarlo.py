@@ -18,6 +18,7 @@ import numpy as np
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.navigation import FOURTH
+from glider_bringup.scoring.scores import SCORES, studied
 from glider_bringup.studies.random_faults import outcome, sample_faults, validated
 from glider_bringup.studies.workers import Pool, Progress
 from glider_model.plant.sensors import SensorSettings
@@ -67,15 +68,6 @@ WEAK_STEERING = 0.25
 #: Glide that stability and steering are judged in, with half of the pump's range at most.
 _GLIDE_KG, _GLIDE_PITCH_DEG, _ROLL_MASS_DEG = 0.4, 30.0, 10.0
 
-#: What is told of the flights of a controller, and where a scorecard has it.
-FIGURES = {
-    'max_steady_m': ('cross_track_m', 'max_steady'),
-    'max_all_m': ('cross_track_m', 'max_all'),
-    'max_run_m': ('cross_track_m', 'max_run'),
-    'heading_fluctuation_deg': ('heading_fluctuation_deg', 'rms_steady'),
-    'pitch_error_deg': ('pitch_error_deg', 'rms_steady'),
-    'energy_wh': ('energy', 'wh'),
-}
 #: What is told of the navigation of each flight.
 NAVIGATION = (
     'surfacings',
@@ -239,7 +231,7 @@ def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
     A flight that failed, was lost, or could not hold its course has diverged, whatever it was
     like before.
     """
-    figures = {name: scores[group][field] for name, (group, field) in FIGURES.items()}
+    figures = {one.study[1]: one.in_card(scores) for one in SCORES if one.study}
     numbers = [number for number in figures.values() if number is not None]
     final = scores['final_state'] or {}
     numbers += [number for vector in final.values() for number in vector]
@@ -332,7 +324,7 @@ def summarise(
             {
                 'controller': controller,
                 'diverged': sum(flight['diverged'] for flight in of.values()),
-                **{name: spread([flight[name] for flight in of.values()]) for name in FIGURES},
+                **{key: spread([flight[key] for flight in of.values()]) for key, _ in studied()},
                 'statically_unstable': sum(one['unstable'] for one in airframes.values()),
                 'weak_steering': sum(one['weak_steering'] for one in airframes.values()),
                 'navigation': _navigation([flight['navigation'] for flight in of.values()]),

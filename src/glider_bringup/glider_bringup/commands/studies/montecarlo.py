@@ -108,6 +108,7 @@ _RECKONED = (
 
 def _print_study(study: dict) -> None:
     """Print the result of a Monte Carlo study for a person."""
+    from glider_bringup.scoring.scores import studied
 
     def show(figure: dict) -> str:
         return ' / '.join('-' if x is None else f'{x:,.3f}' for x in figure.values())
@@ -122,12 +123,7 @@ def _print_study(study: dict) -> None:
         table.add_column(row['controller'])
     lines = (
         ('diverged', lambda row: str(row['diverged'])),
-        ('max steady (m)', lambda row: show(row['max_steady_m'])),
-        ('max all (m)', lambda row: show(row['max_all_m'])),
-        ('max whole run (m)', lambda row: show(row['max_run_m'])),
-        ('heading rms (deg)', lambda row: show(row['heading_fluctuation_deg'])),
-        ('pitch rms (deg)', lambda row: show(row['pitch_error_deg'])),
-        ('energy (Wh)', lambda row: show(row['energy_wh'])),
+        *((label, lambda row, key=key: show(row[key])) for key, label in studied()),
         ('surfacings', lambda row: f'{row["navigation"]["surfacings"]:,}'),
         ('error of place, from the 4th (m)', lambda row: show(row['navigation']['error_m'])),
         ('came up beside, from the 4th (m)', lambda row: show(row['navigation']['cross_track_m'])),

@@ -2,12 +2,11 @@
 'use strict';
 
 const page = JSON.parse(document.getElementById('data').textContent);
+const inUnit = (seconds) => seconds / page.unit.seconds;
 
 /** Bytes that were deflated and written in base64. */
 async function unpack(text) {
-  const packed = atob(text);
-  const bytes = new Uint8Array(packed.length);
-  for (let i = 0; i < packed.length; i += 1) bytes[i] = packed.charCodeAt(i);
+  const bytes = Uint8Array.from(atob(text), (one) => one.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
@@ -34,7 +33,8 @@ async function unpackArrays(packed) {
  * in the order in which they come; everything where there is less than that.
  * With a flag, only the spans in which it is set.
  */
-function thin(run, name, flag, from, to, most) {
+function thin({ run: number, name, flag }, from, to, most) {
+  const run = page.runs[number];
   const curve = run.arrays[name];
   const marks = flag ? run.arrays[flag] : null;
   const begin = Math.max(0, Math.floor(from / run.spacing) - 2);
@@ -42,7 +42,7 @@ function thin(run, name, flag, from, to, most) {
   const group = Math.max(1, Math.ceil((end - begin) / most));
   const x = [];
   const y = [];
-  const put = (i, value) => { x.push((i * run.spacing) / page.unit.seconds); y.push(value); };
+  const put = (i, value) => { x.push(inUnit(i * run.spacing)); y.push(value); };
   for (let start = begin - (begin % group); start < end; start += group) {
     const stop = Math.min(curve.length, start + group);
     let low = -1;
@@ -53,16 +53,10 @@ function thin(run, name, flag, from, to, most) {
       if (curve[i] > curve[high] || (high < 0 && !Number.isNaN(curve[i]))) high = i;
       if (marks && marks[i] > 0) marked = true;
     }
-    if (low < 0 || !marked) {
-      put(start, null);
-    } else if (marks) {
-      put(start, curve[Math.min(low, high)]);
-      put(start + group, curve[Math.max(low, high)]);
-    } else if (low === high) {
-      put(start, curve[low]);
-    } else {
-      put(start, curve[Math.min(low, high)]);
-      put(start + group / 2, curve[Math.max(low, high)]);
+    const isDrawn = low >= 0 && marked;
+    put(start, isDrawn ? curve[Math.min(low, high)] : null);
+    if (isDrawn && (marks || low !== high)) {
+      put(start + group / (marks ? 1 : 2), curve[Math.max(low, high)]);
     }
   }
   return { x, y };

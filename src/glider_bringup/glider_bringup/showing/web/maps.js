@@ -7,6 +7,20 @@ function visible(run, from, to) {
   return [begin, Math.max(begin, Math.min(last, Math.ceil(to / run.spacing / 2)))];
 }
 
+/** Scale and unit of a length (m). */
+const unitOf = (length) => (length > 2000 ? [1e-3, 'km'] : [1, 'm']);
+
+const marker = (role, symbol) => ({
+  color: values(role), size: 9, symbol, line: { color: values('--card'), width: 1.5 },
+});
+
+/** Draw a view from above or from the side, with its legend at the top left. */
+const reactMap = (element, traces, layout) => react(element, traces, {
+  margin: { l: 60, r: 10, t: 46, b: 40 },
+  legend: legendOf(element, { x: 0, xanchor: 'left', y: 1.01 }),
+  ...layout,
+});
+
 const spread = ([low, high], span) => [(low + high - span) / 2, (low + high + span) / 2];
 
 /** What both maps show: scale, unit, and the extent of what was flown. */
@@ -15,7 +29,7 @@ function mapFrame() {
   const north = extent(page.runs.map((run) => run.arrays.track_north_m));
   const depth = extent(page.runs.map((run) => run.arrays.track_depth_m));
   const span = Math.max(east[1] - east[0], north[1] - north[0], 20);
-  const [scale, unit] = span > 2000 ? [1e-3, 'km'] : [1, 'm'];
+  const [scale, unit] = unitOf(span);
   return { east, north, depth, span, scale, unit };
 }
 
@@ -23,7 +37,7 @@ function pathTrace(run, scale, more) {
   return {
     x: run.path.map((p) => p[1] * scale), y: run.path.map((p) => p[0] * scale), mode: 'lines',
     line: { color: values(page.runs.length > 1 ? '--limit' : '--reference'), width: 2, dash: 'dash' },
-    name: 'desired path', ...more,
+    name: 'desired path', hoverinfo: 'skip', ...more,
   };
 }
 
@@ -56,9 +70,7 @@ function drawTrack(panel, element, from, to) {
   const frame = mapFrame();
   const traces = [];
   page.runs.forEach((run, i) => {
-    if (run.own_path) {
-      traces.push(pathTrace(run, frame.scale, { showlegend: i === 0, hoverinfo: 'skip' }));
-    }
+    if (run.own_path) traces.push(pathTrace(run, frame.scale, { showlegend: i === 0 }));
   });
   if (page.runs.length === 1) traces.push(currentTrace(page.runs[0], frame));
   page.runs.forEach((run, i) => {
@@ -76,25 +88,19 @@ function drawTrack(panel, element, from, to) {
       line: { color: trackColour(i), width: 7 }, opacity: 0.5,
     });
     traces.push({
-      x: pick(e.slice(0, 1), 1, frame.scale), y: pick(n.slice(0, 1), 1, frame.scale),
+      x: pick(e, 1, frame.scale, 0, 0), y: pick(n, 1, frame.scale, 0, 0),
       mode: 'markers', name: 'start', showlegend: i === 0, hoverinfo: 'name',
       marker: { color: trackColour(i), size: 10, line: { color: values('--card'), width: 2 } },
     });
   });
-  const padded = 1.2 * frame.span * frame.scale;
-  const centre = ([low, high]) => [low * frame.scale, high * frame.scale];
-  return Plotly.react(element, traces, {
-    ...look(element),
-    margin: { l: 60, r: 10, t: 46, b: 40 },
-    showlegend: true,
-    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1.01 },
-    hovermode: 'closest',
+  const range = (ends) => spread(ends, 1.2 * frame.span).map((one) => one * frame.scale);
+  return reactMap(element, traces, {
     dragmode: 'pan',
     xaxis: axis(`east (${frame.unit})`, {
-      range: spread(centre(frame.east), padded), nticks: 6, scaleanchor: 'y', constrain: 'range',
+      range: range(frame.east), nticks: 6, scaleanchor: 'y', constrain: 'range',
     }),
-    yaxis: axis(`north (${frame.unit})`, { range: spread(centre(frame.north), padded), nticks: 8 }),
-  }, { displayModeBar: false, scrollZoom: false });
+    yaxis: axis(`north (${frame.unit})`, { range: range(frame.north), nticks: 8 }),
+  });
 }
 
 /** How far away the eye starts: everything with its labels is in view. */
@@ -111,7 +117,7 @@ function spaceFigure(panel, element) {
     const path = run.path.filter(clip);
     traces.push({
       ...pathTrace({ path }, frame.scale), type: 'scatter3d', z: path.map((p) => p[2]),
-      hoverinfo: 'skip', showlegend: i === 0, visible: run.own_path,
+      showlegend: i === 0, visible: run.own_path,
     });
     traces.push({
       type: 'scatter3d', mode: 'lines', name: trackName(run), line: { color: trackColour(i), width: 4 },
@@ -136,8 +142,7 @@ function spaceFigure(panel, element) {
   const layout = {
     ...look(element),
     margin: { l: 0, r: 0, t: 0, b: 0 },
-    showlegend: true,
-    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1, yanchor: 'top' },
+    legend: legendOf(element, { x: 0, xanchor: 'left', y: 1, yanchor: 'top' }),
     scene: {
       aspectmode: 'manual',
       aspectratio: { x: width * side, y: height * side, z: 0.75 },
@@ -154,7 +159,7 @@ function spaceFigure(panel, element) {
 
 function drawSpace(panel, element) {
   const { data, layout } = spaceFigure(panel, element);
-  return Plotly.react(element, data, layout, { displayModeBar: false });
+  return react(element, data, layout);
 }
 
 // ------------------------------------------------------------------------------- from the side
@@ -188,20 +193,15 @@ function distances(run) {
 
 function drawSide(panel, element) {
   const flown = page.runs.map(distances);
-  const [scale, unit] = extent(flown)[1] > 2000 ? [1e-3, 'km'] : [1, 'm'];
+  const [scale, unit] = unitOf(extent(flown)[1]);
   const traces = page.runs.map((run, i) => ({
     x: pick(flown[i], 4000, scale), y: pick(run.arrays.track_depth_m, 4000, 1),
     mode: 'lines', name: trackName(run), line: { color: trackColour(i), width: lineWidth(i) + 0.4 },
     hovertemplate: `%{x:.3~f} ${unit}, depth %{y:.1f} m`,
   }));
-  return Plotly.react(element, traces, {
-    ...look(element),
-    margin: { l: 60, r: 10, t: 46, b: 40 },
-    showlegend: true,
-    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1.01 },
-    hovermode: 'closest',
+  return reactMap(element, traces, {
     dragmode: false,
     xaxis: axis(`distance flown (${unit})`, { fixedrange: true, nticks: 6 }),
     yaxis: axis('depth (m)', { fixedrange: true, nticks: 8, autorange: 'reversed' }),
-  }, { displayModeBar: false });
+  });
 }

@@ -17,12 +17,7 @@ let waiting;
 const place = (panel) => document.getElementById(panel.id);
 
 /** Number without useless digits, with its unit of time. */
-const clock = (seconds) => `${Number((seconds / page.unit.seconds).toFixed(4))} ${page.unit.name}`;
-
-function tell(from, to) {
-  document.getElementById('shown').textContent = `${clock(from)} to ${clock(to)}`;
-  document.getElementById('whole').disabled = !isZoomed(from, to);
-}
+const clock = (seconds) => `${Number(inUnit(seconds).toFixed(4))} ${page.unit.name}`;
 
 function draw(panel) {
   widths.set(panel.id, place(panel).clientWidth);
@@ -38,7 +33,8 @@ async function show(from, to, everything = false) {
   const mine = turn;
   shown = [from, to];
   root.dataset.state = 'busy';
-  tell(from, to);
+  document.getElementById('shown').textContent = `${clock(from)} to ${clock(to)}`;
+  document.getElementById('whole').disabled = !isZoomed(from, to);
   const inView = (panel) => {
     const box = place(panel).getBoundingClientRect();
     return box.bottom > 0 && box.top < window.innerHeight;
@@ -89,22 +85,14 @@ async function takePicture(panel) {
   layout.scene.camera = {
     ...camera, eye: { x: farther * eye.x, y: farther * eye.y, z: farther * eye.z },
   };
-  const image = new Image();
-  image.alt = panel.title;
-  layout.width *= FINER_ON_PAPER;
-  layout.height *= FINER_ON_PAPER;
-  const { width, height } = layout;
+  const image = Object.assign(new Image(), { alt: panel.title });
+  const [width, height] = [layout.width, layout.height].map((size) => size * FINER_ON_PAPER);
+  Object.assign(layout, { width, height });
   image.src = await Plotly.toImage({ data, layout }, { format: 'png', width, height, scale: 2 });
   await image.decode();
   figure.querySelector('img')?.remove();
   figure.append(image);
   figure.classList.add('pictured');
-}
-
-/** Take it when the view has come to rest: a wheel turns it in many steps. */
-function takePictureSoon(panel) {
-  clearTimeout(waiting);
-  waiting = setTimeout(() => takePicture(panel), 400);
 }
 
 /** Draw for a page of paper: its width, dark on white. It has to be done when this returns. */
@@ -130,7 +118,12 @@ function listen() {
       place(panel).on('plotly_relayout', onZoom);
       place(panel).on('plotly_doubleclick', whole);
     }
-    if (panel.kind === 'space') place(panel).on('plotly_relayout', () => takePictureSoon(panel));
+    if (panel.kind === 'space') {
+      place(panel).on('plotly_relayout', () => { // when it has come to rest: a wheel turns often
+        clearTimeout(waiting);
+        waiting = setTimeout(() => takePicture(panel), 400);
+      });
+    }
   }
   document.getElementById('whole').addEventListener('click', whole);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {

@@ -19,10 +19,9 @@ function ellipse({ covariance_m2: [nn, ne, ee] }) {
   return points;
 }
 
-/** A trace of lines between points, east and north (m); null makes a gap. */
-const lineOf = (points, scale, more) => ({
-  x: points.map((p) => p && p[0] * scale), y: points.map((p) => p && p[1] * scale), mode: 'lines',
-  hoverinfo: 'skip', ...more,
+/** A trace through points, east and north (m); null makes a gap. */
+const through = (points, scale, more) => ({
+  x: points.map((p) => p && p[0] * scale), y: points.map((p) => p && p[1] * scale), ...more,
 });
 
 const eastNorth = ([north, east]) => [east, north];
@@ -35,19 +34,12 @@ function planTraces(run, scale, unit) {
     x: pick(run.arrays[`${name}_east_m`], 6000, scale), y: pick(run.arrays[`${name}_north_m`], 6000, scale),
     mode: 'lines', name: label, hovertemplate: at, line: { color: values(role), width: 1.8, dash },
   });
-  const places = (key, name, role, symbol, more) => {
-    const points = surfacings.map((one) => (one[key] ? eastNorth(one[key]) : null));
-    return {
-      ...lineOf(points, scale, {}), mode: 'markers', name, hoverinfo: 'all', hovertemplate: at,
-      marker: { color: values(role), size: 9, symbol, line: { color: values('--card'), width: 1.5 } },
-      ...more,
-    };
-  };
+  const places = (key, name, role, symbol, more) => through(
+    surfacings.map((one) => one[key] && eastNorth(one[key])), scale,
+    { mode: 'markers', name, hovertemplate: at, marker: marker(role, symbol), ...more });
   const every = Math.ceil(surfacings.length / NUMBERED);
   return [
-    pathTrace(run, scale, {
-      hoverinfo: 'skip', line: { color: values('--limit'), width: 1.5, dash: 'dash' },
-    }),
+    pathTrace(run, scale, { line: { color: values('--limit'), width: 1.5, dash: 'dash' } }),
     track('track', 'true track', '--measured', 'solid'),
     track('believed', 'believed track', '--reference', 'dash'),
     places('true_ned_m', 'true place at surfacing', '--measured', 'circle', {
@@ -72,19 +64,14 @@ function planRange(run, name, from, to) {
 function drawPlan(panel, element, from, to) {
   const run = page.runs[0];
   const [east, north] = ['east', 'north'].map((name) => planRange(run, name, from, to));
-  const isLong = Math.max(east[1] - east[0], north[1] - north[0]) > 2000;
-  const [scale, unit] = isLong ? [1e-3, 'km'] : [1, 'm'];
+  const longest = Math.max(east[1] - east[0], north[1] - north[0]);
+  const [scale, unit] = unitOf(longest);
   const scaled = (range) => range.map((value) => value * scale);
-  return Plotly.react(element, planTraces(run, scale, unit), {
-    ...look(element),
-    margin: { l: 60, r: 10, t: 46, b: 40 },
-    showlegend: true,
-    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1.01 },
-    hovermode: 'closest',
+  return reactMap(element, planTraces(run, scale, unit), {
     dragmode: 'zoom',
     xaxis: axis(`east (${unit})`, { range: scaled(east), nticks: 8 }),
     yaxis: axis(`north (${unit})`, { range: scaled(north), nticks: 8 }),
-  }, { displayModeBar: false, scrollZoom: false });
+  });
 }
 
 // ------------------------------------------------------------------------------- surfacings
@@ -125,13 +112,12 @@ function drawPlaces(panel, element) {
     const y = [top + room.high - room.bottom, top + room.top].map((px) => 1 - px / height);
     const common = { xaxis: `x${id}`, yaxis: `y${id}`, showlegend: i === 0 };
     const at = 'east %{x:,.1f} m, north %{y:,.1f} m';
-    const place = (name, point, role, symbol) => ({
-      ...common, ...lineOf([point], 1, {}), mode: 'markers', name, hoverinfo: 'all', hovertemplate: at,
-      marker: { color: values(role), size: 9, symbol, line: { color: values('--card'), width: 1.5 } },
+    const place = (name, point, role, symbol) => through([point], 1, {
+      ...common, mode: 'markers', name, hovertemplate: at, marker: marker(role, symbol),
     });
     traces.push(
-      lineOf(ring, 1, {
-        ...common, name: '95 % ellipse', fill: 'toself', fillcolor: `${values('--reference')}22`,
+      through(ring, 1, {
+        ...common, mode: 'lines', hoverinfo: 'skip', name: '95 % ellipse', fill: 'toself', fillcolor: `${values('--reference')}22`,
         line: { color: values('--reference'), width: 1.2 },
       }),
       place('believed place', [0, 0], '--reference', 'diamond'),
@@ -147,14 +133,11 @@ function drawPlaces(panel, element) {
       showarrow: false, font: { size: room.font },
     });
   });
-  return Plotly.react(element, traces, {
-    ...look(element),
+  return react(element, traces, {
     ...layout,
     annotations,
     margin: { l: 0, r: 0, t: 0, b: 0 },
-    showlegend: true,
-    legend: { ...legendOf(element), x: 0, xanchor: 'left', y: 1, yanchor: 'top' },
-    hovermode: 'closest',
+    legend: legendOf(element, { x: 0, xanchor: 'left', y: 1, yanchor: 'top' }),
     dragmode: false,
-  }, { displayModeBar: false });
+  });
 }

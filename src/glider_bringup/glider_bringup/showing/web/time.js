@@ -4,12 +4,13 @@ const values = (tag) => getComputedStyle(document.documentElement).getPropertyVa
 
 const isNarrow = (element) => element.clientWidth < 480;
 
-const legendOf = (element) => ({
+/** Legend at the top right, or where more says. */
+const legendOf = (element, more) => ({
   orientation: 'h', x: 1, xanchor: 'right', y: 1.02, yanchor: 'bottom',
-  font: { size: isNarrow(element) ? 10 : 13 },
+  font: { size: isNarrow(element) ? 10 : 13 }, ...more,
 });
 
-/** Colours, fonts and size that panels have in common; the size is that of their place. */
+/** What panels have in common: colours, fonts, and the size, which is that of their place. */
 function look(element) {
   const ink = values('--ink');
   const size = isNarrow(element) ? 11 : 13;
@@ -20,9 +21,14 @@ function look(element) {
     plot_bgcolor: 'rgba(0,0,0,0)',
     font: { family: getComputedStyle(document.body).fontFamily, size, color: ink },
     hoverlabel: { bgcolor: values('--card'), bordercolor: values('--line'), font: { color: ink } },
+    showlegend: true,
     legend: legendOf(element),
+    hovermode: 'closest',
   };
 }
+
+const react = (element, traces, layout) => Plotly.react(
+  element, traces, { ...look(element), ...layout }, { displayModeBar: false });
 
 const axis = (title, more) => ({
   title: { text: title, standoff: 6, font: { size: 12 } },
@@ -55,29 +61,24 @@ function evenTicks(reach) {
   return [-step, 0, step];
 }
 
-function curveData(panel, curve, from, to, width) {
-  return thin(page.runs[curve.run], curve.name, curve.flag, from, to, width);
-}
+/** Straight lines, each from a time until another (s) and from a value to another. */
+const lines = (ends) => ({
+  x: ends.flatMap(([from, until]) => [inUnit(from), inUnit(until), null]),
+  y: ends.flatMap(([, , low, high]) => [low, high, null]),
+  mode: 'lines',
+});
 
 /** Dotted vertical lines at some times (s), over the whole height. */
-function markTrace(times, name) {
-  const x = [];
-  const y = [];
-  for (const time of times) {
-    x.push(time / page.unit.seconds, time / page.unit.seconds, null);
-    y.push(0, 1, null);
-  }
-  return {
-    x, y, yaxis: 'y2', mode: 'lines', name, hoverinfo: 'skip',
-    line: { color: values('--limit'), width: 1, dash: 'dot' },
-  };
-}
+const markTrace = (times, name) => ({
+  ...lines(times.map((time) => [time, time, 0, 1])), yaxis: 'y2', name, hoverinfo: 'skip',
+  line: { color: values('--limit'), width: 1, dash: 'dot' },
+});
 
 /** A line and words for each fault of a run, where it began; nothing where runs are compared. */
 function faultMarks() {
   const { faults } = page.runs[0];
   if (page.runs.length > 1 || !faults) return { shapes: [], annotations: [] };
-  const at = (one) => one.t_s / page.unit.seconds;
+  const at = (one) => inUnit(one.t_s);
   return {
     shapes: faults.map((one) => ({
       type: 'line', xref: 'x', x0: at(one), x1: at(one), yref: 'paper', y0: 0, y1: 1,
@@ -92,25 +93,18 @@ function faultMarks() {
 }
 
 /** Level lines, with gaps between them. */
-function stepTrace(steps) {
-  const x = [];
-  const y = [];
-  for (const [from, to, value] of steps.spans) {
-    x.push(from / page.unit.seconds, to / page.unit.seconds, null);
-    y.push(value, value, null);
-  }
-  return {
-    x, y, mode: 'lines', name: steps.label,
-    line: { color: values(`--${steps.role}`), width: 2.4, dash: steps.dashed ? 'dash' : 'solid' },
-  };
-}
+const stepTrace = (steps) => ({
+  ...lines(steps.spans.map(([from, until, value]) => [from, until, value, value])),
+  name: steps.label,
+  line: { color: values(`--${steps.role}`), width: 2.4, dash: steps.dashed ? 'dash' : 'solid' },
+});
 
 /** Of runs that lie over each other, the first is broadest, so that all can be seen. */
 const lineWidth = (run) => (page.runs.length > 1 ? Math.max(1.4, 3.2 - 0.9 * run) : 1.6);
 
 function drawTime(panel, element, from, to) {
   const traces = panel.curves.map((curve) => ({
-    ...curveData(panel, curve, from, to, element.clientWidth),
+    ...thin(curve, from, to, element.clientWidth),
     mode: 'lines',
     name: curve.label,
     connectgaps: false,
@@ -138,16 +132,14 @@ function drawTime(panel, element, from, to) {
     traces.push(markTrace(times, 'surfacing'));
   }
   const broken = faultMarks();
-  return Plotly.react(element, traces, {
-    ...look(element),
+  return react(element, traces, {
     margin: { l: isNarrow(element) ? 64 : 76, r: 14, t: 24, b: 38 },
-    showlegend: true,
     hovermode: 'x unified',
     dragmode: 'zoom',
     shapes: [...limits, ...broken.shapes],
     annotations: broken.annotations,
     xaxis: axis(`time (${page.unit.name})`, {
-      range: [from / page.unit.seconds, to / page.unit.seconds], hoverformat: '.4~f',
+      range: [from, to].map(inUnit), hoverformat: '.4~f',
     }),
     yaxis: axis(panel.axis, {
       fixedrange: true, automargin: false, nticks: 6, type: panel.log ? 'log' : 'linear',
@@ -155,5 +147,5 @@ function drawTime(panel, element, from, to) {
       ...(panel.log ? { dtick: decades, exponentformat: low < 1e-4 ? 'power' : 'none' } : {}),
     }),
     yaxis2: { overlaying: 'y', range: [0, 1], visible: false, fixedrange: true },
-  }, { displayModeBar: false });
+  });
 }

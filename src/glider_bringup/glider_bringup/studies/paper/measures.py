@@ -10,7 +10,8 @@ import numpy as np
 
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.one_hertz import Record
-from glider_bringup.scoring.score import largest, rms, windows
+from glider_bringup.scoring.score import windows
+from glider_bringup.scoring.scores import largest, rms
 from glider_guidance.los import crab_heading
 from glider_model.onboard.glide_polar import make_polar, steady_horizontal_speed
 from glider_model.vehicle.file import load_vehicle
