@@ -7,15 +7,13 @@ of S + i alone, so that it is the same plant in every study, under every control
 number of plants and of worker processes.
 """
 
-import json
 import math
-import shlex
 from collections import Counter
 from typing import Any
 
 import numpy as np
 
-from glider_bringup.mission.scenario import Scenario, load_scenario
+from glider_bringup.mission.scenario import Scenario, load_scenario, run_command
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.navigation import FOURTH
 from glider_bringup.studies.random_faults import outcome, sample_faults, validated
@@ -372,9 +370,7 @@ def _badness(flight: dict) -> tuple[bool, float]:
 def command(name: str, changes: dict[str, Any], controller: str, sampled: dict[str, Any]) -> str:
     """Shell command that flies one plant again; ``changes`` are those of `make_scenarios`."""
     fields = {**changes, 'dives': 0, **sampled}
-    settings = (shlex.quote(f'{field}={json.dumps(value)}') for field, value in fields.items())
-    options = ' '.join(f'--set {setting}' for setting in settings)
-    return f'./glider run {shlex.quote(name)} --engine direct --controller {controller} {options}'
+    return run_command(name, fields, f'--controller {controller}')
 
 
 def report(

@@ -2,17 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Flies missions with their faults and without, and shrinks what goes wrong."""
 
-import json
-import shlex
 from typing import Any, NamedTuple
 
 from glider_bringup.engines.flight import fly
 from glider_bringup.mission.choices import Combination, combination_of
-from glider_bringup.mission.scenario import Scenario
+from glider_bringup.mission.scenario import Scenario, run_command
 from glider_bringup.scoring.card import fly_scored, scorecard
 from glider_bringup.studies.hunt.missions import Mission, draw_mission
 from glider_bringup.studies.hunt.oracle import Truth, Verdict, judge, unfounded
-from glider_bringup.studies.paper.limits import Check
+from glider_bringup.studies.paper.experiments import verdict
+from glider_bringup.studies.paper.judges import Check
 from glider_bringup.studies.workers import Pool, Progress
 from glider_guard.rows import LATCHED, ROWS
 
@@ -78,10 +77,7 @@ def combinations(seed: int, flights: int) -> set[Combination]:
 def command(mission: Mission, faults: list[dict[str, Any]]) -> str:
     """Shell command that flies a mission with some faults again."""
     fields = {**mission.changes, 'faults': [*mission.aging, *faults]}
-    sets = ' '.join(
-        f'--set {shlex.quote(f"{field}={json.dumps(value)}")}' for field, value in fields.items()
-    )
-    return f'./glider run {mission.scenario} --engine direct --duration full {sets}'
+    return run_command(mission.scenario, fields, '--duration full')
 
 
 def search(seed: int, flights: int, pool: Pool, progress: Progress) -> dict[str, Any]:
@@ -119,7 +115,6 @@ def search(seed: int, flights: int, pool: Pool, progress: Progress) -> dict[str,
         'paper': '-',
         'rows': rows,
         'pid_better': [],
-        'checks': [check._asdict() for check in checks],
         'counts': counts,
-        'verdict': 'passed' if all(check.passed for check in checks) else 'failed',
+        **verdict(checks),
     }

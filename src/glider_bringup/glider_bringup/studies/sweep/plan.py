@@ -10,7 +10,6 @@ is a mission that ``./glider run`` can fly by itself.
 import hashlib
 import json
 import math
-import shlex
 from collections.abc import Iterable
 from decimal import Decimal
 from functools import cached_property, partial
@@ -28,6 +27,7 @@ from glider_bringup.mission.scenario import (
     make_scenario,
     overlap,
     read_scenario,
+    run_command,
     scenario_names,
 )
 from glider_model.base.files import is_file, read_text, read_yaml, yaml_line
@@ -364,10 +364,7 @@ class Plan:
 
     def command(self, cell: int) -> str:
         """Shell command that flies a cell by itself, where the sweep was started."""
-        changes = self.changes(cell).items()
-        sets = [f'--set {shlex.quote(f"{field}={json.dumps(value)}")}' for field, value in changes]
-        name = shlex.quote(self._scenario_name())
-        return ' '.join(['./glider run', name, '--engine direct', *sets])
+        return run_command(self._scenario_name(), self.changes(cell))
 
     @cached_property
     def first(self) -> Scenario:
