@@ -23,18 +23,11 @@ from glider_bringup.mission.disk import write_whole
 from glider_model.base.errors import EXIT_FAILED
 
 app = typer.Typer()
-Group = Literal[
-    'current',
-    'yaw',
-    'profile',
-    'robustness',
-    'vehicles',
-    'paths',
-    'envelope',
-    'navigation',
-    'faults',
-    'random_faults',
-]
+GROUPS = (
+    *('current', 'yaw', 'profile', 'robustness', 'vehicles', 'paths', 'envelope', 'navigation'),
+    *('faults', 'random_faults'),
+)
+Group = Literal[GROUPS]
 
 
 @app.command(epilog='Example: ./glider experiments --only robustness --only paths')
@@ -89,8 +82,7 @@ def experiments(
     if out:
         with messages.status('drawing'):
             drawn = paper_figures.draw(planned, rows, records, out)
-        text = json.dumps(result, indent=2) + '\n'
-        write_whole(out / paper.RESULT_FILE, text)
+        write_whole(out / paper.RESULT_FILE, json.dumps(result, indent=2) + '\n')
         for file in drawn:
             messages.print(f'drawn: {file}', soft_wrap=True)
     if as_json:

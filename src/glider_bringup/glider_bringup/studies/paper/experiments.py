@@ -126,8 +126,7 @@ def make_experiments(groups: list[str]) -> list[Experiment]:
 
 def _experiment(group: str, name: str, one: dict[str, Any]) -> Experiment:
     limits = judge_limits(_merged(one.get('limits', {})), one.get('limited', 'adaptive'))
-    judge = JUDGES[one['judge']] if 'judge' in one else limits
-    title, cases = one['title'], _cases(one)
+    title, cases = one['title'], _cases(name, one)
     if name == 'robustness':
         cases = [case._replace(facts=_changed(case)) for case in cases]
     elif name == 'envelope':
@@ -135,6 +134,7 @@ def _experiment(group: str, name: str, one: dict[str, Any]) -> Experiment:
         title = title.format(speed=speed)
         cases = [case._replace(facts=_in_current(case, speed)) for case in cases]
     paper = one.get('paper', 'not flown')
+    judge = JUDGES.get(name, limits)
     return Experiment(group, name, one.get('section', ''), title, paper, cases, judge)
 
 
@@ -154,7 +154,7 @@ def _entries(axis: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     return [(name, _merged(fields)) for name, fields in axis.items()]
 
 
-def _cases(one: dict[str, Any]) -> list[Case]:
+def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
     """Flights of an experiment."""
     cases = []
     for entries in product(*map(_entries, one.get('cases', []))):
@@ -163,7 +163,8 @@ def _cases(one: dict[str, Any]) -> list[Case]:
         facts = {name: fields.pop(name) for name in _FACTS if name in fields}
         if 'labelled' in one:
             facts[one['labelled']] = names[0]
-        scenario, told = fields.pop('scenario', one['scenario']), fields.pop('told', '')
+        scenario = fields.pop('scenario', one.get('scenario', experiment))
+        told = fields.pop('told', '')
         laws = fields.pop('laws', one.get('laws', ['adaptive', 'pid']))
         if 'fault' in fields:
             fields['faults'] = [fields.pop('fault')]
@@ -304,42 +305,41 @@ def is_better(one: float | None, other: float | None) -> bool:
     return one is not None and (other is None or one <= other - 0.01)
 
 
+def by_case(rows: list[dict], law: str) -> dict[tuple[str, str], dict]:
+    """Rows of a law by case and guidance."""
+    return {(row['case'], row['guidance']): row for row in rows if row.get('controller') == law}
+
+
 def pid_better(rows: list[dict]) -> list[dict[str, Any]]:
     """Figures in which the tuned PID beats the adaptive law."""
-    better = []
-    adaptive = {(row['case'], row['guidance']): row for row in rows if row['controller'] != 'pid'}
-    for pid in rows:
-        ours = adaptive.get((pid['case'], pid['guidance']))
-        if pid['controller'] != 'pid' or not ours:
-            continue
-        same = {name: pid[name] for name in ('case', 'guidance')}
-        for name in compared(rows):
-            one, other = figure_of(pid, name), figure_of(ours, name)
-            if is_better(one, other):
-                better.append({**same, 'figure': name, 'pid': one, 'adaptive': other})
-    return better
+    ours, theirs = by_case(rows, 'adaptive'), by_case(rows, 'pid')
+    pairs = (
+        (case, guidance, name, figure_of(theirs[case, guidance], name), figure_of(row, name))
+        for (case, guidance), row in ours.items()
+        if (case, guidance) in theirs
+        for name in compared(rows)
+    )
+    fields = ('case', 'guidance', 'figure', 'pid', 'adaptive')
+    return [dict(zip(fields, pair, strict=True)) for pair in pairs if is_better(*pair[3:])]
 
 
-def verdict(checks: list[Check]) -> dict[str, Any]:
-    """Checks and verdict of an experiment, as they are told."""
+def told(one: Experiment, rows: list[dict]) -> dict[str, Any]:
+    """What the paper says, what was flown, and the verdict, of one experiment."""
+    checks = one.judge(rows)
     passed = bool(checks) and all(check.passed for check in checks)
-    told = [check._asdict() for check in checks]
-    return {'checks': told, 'verdict': PASSED if passed else FAILED}
+    return {
+        'name': one.name,
+        'group': one.group,
+        'section': one.section,
+        'title': one.title,
+        'paper': one.paper,
+        'rows': rows,
+        'pid_better': pid_better(rows),
+        'checks': [check._asdict() for check in checks],
+        'verdict': PASSED if passed else FAILED,
+    }
 
 
 def report(experiments: list[Experiment], rows: list[list[dict]]) -> dict[str, Any]:
-    """Result of the command: what the paper says, what was flown, verdicts."""
-    told = [
-        {
-            'name': one.name,
-            'group': one.group,
-            'section': one.section,
-            'title': one.title,
-            'paper': one.paper,
-            'rows': flown,
-            'pid_better': pid_better(flown),
-            **verdict(one.judge(flown)),
-        }
-        for one, flown in zip(experiments, rows, strict=True)
-    ]
-    return {'experiments': told}
+    """Result of the command, over all experiments."""
+    return {'experiments': list(map(told, experiments, rows))}

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from glider_bringup.studies.montecarlo import pooled
 from glider_model.vehicle.file import load_vehicle
 
 WAYPOINT_LIMIT_M = 10.0
@@ -65,9 +66,10 @@ def within(row: dict, limits: dict[str, float]) -> list[Check]:
     ]
 
 
-def _flown(rows: list[dict], controller: str, guidance: str = 'observer') -> list[dict]:
-    """Rows of one controller and guidance."""
-    return [row for row in rows if row['controller'] == controller and row['guidance'] == guidance]
+def _flown(rows: list[dict], controller: str = 'adaptive') -> list[dict]:
+    """Rows of one controller, with our guidance."""
+    flown = (controller, 'observer')
+    return [row for row in rows if (row['controller'], row['guidance']) == flown]
 
 
 def judge_limits(
@@ -85,7 +87,7 @@ def judge_reckoned(rows: list[dict]) -> list[Check]:
     """The default way to reckon keeps near its path once the current has been met."""
     return [
         check
-        for row in _flown(rows, 'adaptive')
+        for row in _flown(rows)
         if row['case'] in RECKONED_LIMITS
         for check in within(row, RECKONED_LIMITS[row['case']])
     ]
@@ -94,7 +96,7 @@ def judge_reckoned(rows: list[dict]) -> list[Check]:
 def judge_survey(rows: list[dict]) -> list[Check]:
     """Every waypoint is passed closely, and no leg has a loop or a dithering heading in it."""
     checks = []
-    for row in _flown(rows, 'adaptive'):
+    for row in _flown(rows):
         checks += within(row, {})
         for i, distance in enumerate(row['waypoints_closest_m']):
             checks.append(_at_most(f'adaptive: waypoint {i} (m)', distance, WAYPOINT_LIMIT_M))
@@ -123,15 +125,6 @@ def judge_envelope(rows: list[dict]) -> list[Check]:
     return checks
 
 
-def _pooled(rows: list[dict]) -> tuple[float, float, int]:
-    """Share inside, mean squared innovation and number of surfacings over all flights."""
-    known = [row['navigation'] for row in rows]
-    count = sum(one['surfacings'] for one in known)
-    fixed = sum(one['fixed'] for one in known)
-    inside = sum(one['ellipse_95_share'] * one['surfacings'] for one in known) / count
-    return inside, sum(one['innovation_squared'] * one['fixed'] for one in known) / fixed, count
-
-
 def _later(row: dict) -> float:
     """Median error (m) at the surfacings that a stay came before, without the first of all."""
     return float(np.median(row['navigation']['surfacing_error_m'][1:]))
@@ -139,20 +132,27 @@ def _later(row: dict) -> float:
 
 def judge_hard(rows: list[dict]) -> list[Check]:
     """Over all of them the ellipse is as large as it has to be."""
-    inside, innovation, count = _pooled(rows)
-    figures = {'inside 95 %': (inside, INSIDE), 'innovation squared': (innovation, INNOVATION)}
+    known = pooled([row['navigation'] for row in rows])
     return [
-        Check(f'{what} of {count} surfacings', value, f'{low} to {high}', low <= value <= high)
-        for what, (value, (low, high)) in figures.items()
+        Check(
+            f'{what} of {known["surfacings"]} surfacings',
+            known[name],
+            f'{low} to {high}',
+            low <= known[name] <= high,
+        )
+        for what, name, (low, high) in (
+            ('inside 95 %', 'ellipse_95_share', INSIDE),
+            ('innovation squared', 'innovation_squared', INNOVATION),
+        )
     ]
 
 
 def judge_stays(rows: list[dict]) -> list[Check]:
     """Hours at the surface do not make the next surfacings worse than minutes do."""
     long = [row for row in rows if row['hours'] >= LONG_H]
-    inside, _, count = _pooled(long)
-    passed = inside >= STAY_INSIDE
-    checks = [Check(f'inside 95 % of {count} surfacings', inside, STAY_INSIDE, passed)]
+    known = pooled([row['navigation'] for row in long])
+    what, inside = f'inside 95 % of {known["surfacings"]} surfacings', known['ellipse_95_share']
+    checks = [Check(what, inside, STAY_INSIDE, inside >= STAY_INSIDE)]
     short = {row['dive_m']: _later(row) for row in rows if row['hours'] < LONG_H}
     for row in long:
         dac, error = row['navigation']['dac_error_mps']['worst'], _later(row)
@@ -209,12 +209,12 @@ def judge_faults(rows: list[dict]) -> list[Check]:
     return checks
 
 
-#: Judgements by their name in the file of experiments.
+#: Judgements of experiments, where they are not by limits alone.
 JUDGES = {
-    'reckoned': judge_reckoned,
+    'reckoned_12deg': judge_reckoned,
     'survey': judge_survey,
     'envelope': judge_envelope,
-    'stays': judge_stays,
+    'long_stays': judge_stays,
     'hard_seas': judge_hard,
     'fault_matrix': judge_faults,
     'false_reactions': judge_clean,

@@ -8,7 +8,13 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from glider_bringup.studies.paper.experiments import PASSED, compared, described, is_better
+from glider_bringup.studies.paper.experiments import (
+    PASSED,
+    by_case,
+    compared,
+    described,
+    is_better,
+)
 from glider_bringup.studies.paper.judges import figure_of
 
 #: Failed checks that are listed; of more only the number is told.
@@ -28,17 +34,12 @@ def _number(value: float | str | None, digits: int = 2) -> str:
 
 def _table(names: list[str], figures: list[str]) -> Table:
     """Empty table with columns of text and columns of figures."""
-    table = Table(title_justify='left')
+    table = Table()
     for name in names:
         table.add_column(name)
     for name in figures:
         table.add_column(name, justify='right')
     return table
-
-
-def _flown_by(row: dict) -> str:
-    """Who flew a row."""
-    return _LAW_NAMES[row['controller']]
 
 
 def _by_flight(figures: dict[str, str]) -> Callable[[list[dict]], Table]:
@@ -50,12 +51,10 @@ def _by_flight(figures: dict[str, str]) -> Callable[[list[dict]], Table]:
         ways = len({row['guidance'] for row in rows}) > 1
         names = ['case'] * cases + ['flown by'] + ['LOS'] * ways + ['status'] * flagged
         table = _table(names, list(figures.values()))
-        adaptive = {
-            (row['case'], row['guidance']): row for row in rows if row['controller'] == 'adaptive'
-        }
+        adaptive = by_case(rows, 'adaptive')
         for row in rows:
             rival = adaptive.get((row['case'], row['guidance']))
-            texts = [row['case']] * cases + [_flown_by(row)]
+            texts = [row['case']] * cases + [_LAW_NAMES[row['controller']]]
             texts += [row['guidance']] * ways + [row['status']] * flagged
             table.add_row(*texts, *(_marked(row, rival, name) for name in figures))
         return table
@@ -81,15 +80,11 @@ def _side_by_side(rows: list[dict]) -> Table:
     """One line for each case; in every column adaptive | tuned PID."""
     figures = dict(list(compared(rows).items())[:5])
     table = _table(['adaptive | tuned PID'], list(figures.values()))
-    for case in dict.fromkeys(row['case'] for row in rows):
-        adaptive, pid = (
-            next((row for row in rows if (row['case'], row['controller']) == (case, law)), None)
-            for law in _LAW_NAMES
-        )
-        cells = (
-            f'{_marked(adaptive, None, name)} | {_marked(pid, adaptive, name)}' for name in figures
-        )
-        table.add_row(case, *cells)
+    ours, theirs = (by_case(rows, law) for law in _LAW_NAMES)
+    for case in dict.fromkeys((row['case'], row['guidance']) for row in rows):
+        one, other = ours.get(case), theirs.get(case)
+        cells = (f'{_marked(one, None, name)} | {_marked(other, one, name)}' for name in figures)
+        table.add_row(case[0], *cells)
     return table
 
 
@@ -106,7 +101,7 @@ def _steering(rows: list[dict]) -> list[str]:
 def _survey(rows: list[dict]) -> Table:
     """Closest pass of each waypoint, and the heading in each leg."""
     legs = rows[0]['legs']
-    table = _table(['', *map(_flown_by, rows)], [])
+    table = _table(['', *(_LAW_NAMES[row['controller']] for row in rows)], [])
     for i in range(len(rows[0]['waypoints_closest_m'])):
         passes = (f'{row["waypoints_closest_m"][i]:.2f} m' for row in rows)
         table.add_row(f'waypoint {i}, closest pass', *passes)
@@ -122,14 +117,12 @@ def _envelope(rows: list[dict]) -> Table:
     table = _table(['angle'], [f'{speed:g} kn' for speed in speeds])
     at = {(row['speed_kn'], row['angle_deg']): row for row in rows}
     for angle in sorted({row['angle_deg'] for row in rows}):
-        table.add_row(f'{angle:g} deg', *(_envelope_cell(at[speed, angle]) for speed in speeds))
+        cells = (
+            'x' if row['status'] == 'infeasible' else _number(row['cross_track_m']['max_all'], 1)
+            for row in (at[speed, angle] for speed in speeds)
+        )
+        table.add_row(f'{angle:g} deg', *cells)
     return table
-
-
-def _envelope_cell(row: dict) -> str:
-    if row['status'] == 'infeasible':
-        return 'x'
-    return _number(row['cross_track_m']['max_all'], 1)
 
 
 _TABLES: dict[str, Callable[[list[dict]], Table]] = {
@@ -216,10 +209,9 @@ def _show_search(one: dict[str, Any], output: Console) -> None:
 def _show_verdict(one: dict[str, Any], output: Console) -> None:
     """Print the verdict, and the checks that failed."""
     failed = [check for check in one['checks'] if not check['passed']]
-    count = len(one['checks'])
+    count, style = len(one['checks']), 'green' if one['verdict'] == PASSED else 'red'
     output.print(
-        f'verdict: {one["verdict"]} ({count - len(failed)} of {count} checks)',
-        style='green' if one['verdict'] == PASSED else 'red',
+        f'verdict: {one["verdict"]} ({count - len(failed)} of {count} checks)', style=style
     )
     for check in failed[:LISTED]:
         value, limit = _number(check['value'], 3), _number(check['limit'], 3)
