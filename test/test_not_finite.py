@@ -19,8 +19,7 @@ from glider_bringup.mission.scenario import load_scenario, read_scenario
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import fly_scored, scorecard
 from glider_bringup.studies import montecarlo
-from glider_bringup.studies.paper import flying
-from glider_bringup.studies.paper.cases import Case
+from glider_bringup.studies.paper.experiments import Case, _fly_case
 from glider_bringup.studies.sweep import fly
 from glider_bringup.studies.sweep.fly import Chunk, Inputs
 from glider_model.vehicle.file import vehicle_path
@@ -113,7 +112,7 @@ def test_studies_count_it_as_failed(driven):
     changes = {'vehicle': str(driven), 'dives': 0, 'duration_s': DURATION_S}
     scenario = load_scenario(changes=changes)
     assert montecarlo._fly_plant(scenario)['diverged']
-    row, _ = flying._fly_case(Case('', 'adaptive', 'observer', 'current_8deg', changes))
+    row, _ = _fly_case(Case('', 'adaptive', 'observer', 'current_8deg', changes))
     assert (row['status'], row['finite']) == ('failed', False)
     vehicles = {fly.digest(fly.vehicle_text(scenario.vehicle))}
     inputs = Inputs(source=read_scenario(), vehicles=vehicles)

@@ -16,6 +16,7 @@ setup(
             'mission/scenarios/*',
             'nodes/*.xml',
             'showing/web/*',
+            'studies/paper/*.yaml',
             'studies/sweep/sweeps/*',
         ]
     },

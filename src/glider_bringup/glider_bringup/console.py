@@ -22,6 +22,7 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.table import Table
 from rich.text import Text
 
 from glider_bringup.mission.scenario import parse_assignment
@@ -64,7 +65,11 @@ def picked(chosen: list[Enum] | None, choice: Any) -> list[str]:
     return list(dict.fromkeys(one.value for one in chosen or repeatable(choice)))
 
 
+Named = Annotated[
+    str, typer.Argument(help='Scenario by name (./glider list) or path of its YAML file.')
+]
 Controller = choices(ControlLawSettings, 'law')
+Law = Annotated[Controller | None, typer.Option(help="Attitude law, instead of the scenario's.")]
 Workers = Annotated[
     int | None, typer.Option(min=1, max=1024, help='Processes. Default: one per processor.')
 ]
@@ -134,6 +139,23 @@ def number(option: str, text: str, word: str, low: float, high: float) -> float:
 def tell(line: str) -> None:
     """Put a line on standard error."""
     messages.print(line, soft_wrap=True)
+
+
+def print_table(
+    title: str, headings: Iterable[str], rows: Iterable[Iterable[str]], numbers_from=99, **options
+) -> None:
+    """Print a table for a person on standard output; without headings it has none.
+
+    Columns from ``numbers_from`` on are set to the right; ``options`` are those of all columns.
+    """
+    headings = list(headings)
+    table = Table(title=title or None, title_justify='left', show_header=bool(headings))
+    for place, heading in enumerate(headings):
+        side = 'right' if place >= numbers_from else 'left'
+        table.add_column(heading, justify=side, **options)
+    for row in rows:
+        table.add_row(*row)
+    output.print(table)
 
 
 def print_written(word: str, run: Path, file: Path, as_json: bool) -> None:
@@ -219,6 +241,16 @@ def shares():
     """Progress bar of several pieces of work; yields its update (what, share that is done)."""
     with progress_bar('opening', 1.0, PERCENT, ELAPSED) as update:
         yield lambda what, share: update(description=what, completed=share)
+
+
+@contextmanager
+def interrupted_told():
+    """Ctrl-C ends what is done in the block, is told, and is the exit code."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        messages.print('stopped by SIGINT', style='red')
+        raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
 @contextmanager

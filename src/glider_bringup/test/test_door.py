@@ -111,8 +111,7 @@ STUDIES = """
 import sys
 
 import glider_bringup.cli
-from glider_bringup.studies.paper.cases import Case
-from glider_bringup.studies.paper.flying import _fly_case
+from glider_bringup.studies.paper.experiments import Case, _fly_case
 from glider_bringup.studies.montecarlo import _fly_plant, make_scenarios
 from glider_bringup.studies.workers import worker_pool
 from glider_bringup.studies.sweep.fly import fly_chunk, make_chunks

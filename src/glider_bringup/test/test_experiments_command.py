@@ -22,19 +22,22 @@ from glider_bringup.mission.run_folder import make_result_folder
 from glider_bringup.mission.scenario import load_scenario, parse_assignment
 from glider_bringup.scoring.one_hertz import Recorder
 from glider_bringup.studies.hunt import search
-from glider_bringup.studies.paper import catalogue, flying, measures, verdicts
-from glider_bringup.studies.paper.cases import Case, Experiment
-from glider_bringup.studies.paper.catalogue import (
-    GROUPS,
-    K_MY_FACTORS,
+from glider_bringup.studies.paper import experiments, measures
+from glider_bringup.studies.paper.experiments import (
+    FAILED,
+    PASSED,
+    RESULT_FILE,
+    Case,
+    Experiment,
+    catalogue,
     expectation,
+    fly,
     make_experiments,
-    steering_share,
+    pid_better,
+    report,
 )
-from glider_bringup.studies.paper.flying import fly
-from glider_bringup.studies.paper.limits import judge_envelope, judge_limits, judge_survey
+from glider_bringup.studies.paper.judges import judge_envelope, judge_limits, judge_survey
 from glider_bringup.studies.paper.measures import horizontal_speed
-from glider_bringup.studies.paper.verdicts import FAILED, PASSED, RESULT_FILE, pid_better, report
 from glider_bringup.studies.workers import worker_pool
 from glider_model.base.settings import ConfigurationError
 from glider_model.plant.trim import solve_trim
@@ -59,15 +62,15 @@ def glider(*arguments):
 
 @pytest.fixture(scope='module')
 def planned():
-    return {one.name: one for one in make_experiments(list(GROUPS))}
+    return {one.name: one for one in make_experiments(list(catalogue()))}
 
 
 def test_command_line_knows_every_group():
-    assert get_args(Group) == (*GROUPS, search.NAME)
+    assert get_args(Group) == (*catalogue(), search.NAME)
 
 
 def test_every_experiment_can_be_flown(planned):
-    assert {one.group for one in planned.values()} == set(GROUPS)
+    assert {one.group for one in planned.values()} == set(catalogue())
     for one in planned.values():
         for case in one.cases:
             scenario = case.load()
@@ -99,11 +102,12 @@ def test_command_of_a_row_flies_the_same_scenario(planned):
         assert load_scenario(words[2], fields) == case.load()
 
 
-def test_steering_is_changed_as_the_case_says():
+def test_steering_is_changed_as_the_case_says(planned):
     """x0.4 and x2 in the dive; reversed: in the dive only."""
     shares = {
-        what: steering_share(load_scenario('current_8deg', {'perturb.K_MY': factor}))
-        for what, factor in K_MY_FACTORS.items()
+        case.case.removeprefix('steering '): case.facts['steering']
+        for case in planned['robustness'].cases
+        if 'steering' in case.facts
     }
     assert shares['x0.4']['dive'] == pytest.approx(0.4, abs=0.01)
     assert shares['x2']['dive'] == pytest.approx(2.0, abs=0.01)
@@ -273,10 +277,10 @@ def test_numbers_that_json_does_not_have_are_told_as_none():
         'cross_track_m': {'max_all': math.nan},
         'final_state': {'a': [1]},
     }
-    row = flying._row(scores)
+    row = experiments._row(scores)
     assert (row['finite'], row['cross_track_m']['max_all']) == (False, None)
     scores['cross_track_m']['max_all'] = 1.0
-    assert flying._row(scores)['finite'] is True
+    assert experiments._row(scores)['finite'] is True
 
 
 # --------------------------------------------------------------------------- measures
@@ -407,16 +411,16 @@ def test_wrong_options_are_refused(options, message):
 def test_a_result_is_never_written_over(tmp_path):
     (tmp_path / RESULT_FILE).write_text('{}')
     with pytest.raises(ConfigurationError, match='never written over'):
-        make_result_folder(tmp_path, verdicts.RESULT_FILE)
+        make_result_folder(tmp_path, RESULT_FILE)
 
 
 def test_a_failed_verdict_is_exit_code_one(tmp_path, monkeypatch):
     from typer.testing import CliRunner
 
     one = Experiment('paths', 'helix', '', 'made up', 'not flown', [], judge_limits({}))
-    monkeypatch.setattr(catalogue, 'make_experiments', lambda groups: [one])
+    monkeypatch.setattr(experiments, 'make_experiments', lambda groups: [one])
     for rows, code in (([made_up()], 0), ([made_up(status='infeasible')], 1)):
-        monkeypatch.setattr(flying, 'fly', lambda *a, rows=rows: ([rows], [[]]))
+        monkeypatch.setattr(experiments, 'fly', lambda *a, rows=rows: ([rows], [[]]))
         out = tmp_path / str(code)
         options = ['--only', 'paths', '--json', '--out', str(out)]
         assert CliRunner().invoke(cli.app, ['experiments', *options]).exit_code == code

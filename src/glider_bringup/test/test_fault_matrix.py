@@ -4,15 +4,16 @@
 
 import pytest
 
-from glider_bringup.studies.paper import broken
-from glider_bringup.studies.paper.cases import Experiment
-from glider_bringup.studies.paper.flying import fly
+from glider_bringup.studies.paper.experiments import Experiment, described, fly, make_experiments
+from glider_bringup.studies.paper.judges import judge_clean, judge_faults
 
+FAULTS, PHASES = (list(entries) for entries in described('fault_matrix')['cases'])
+(MATRIX,) = (one for one in make_experiments(['faults']) if one.name == 'fault_matrix')
 #: Every fault flies in the phase after that of the fault before it.
 CASES = [
     case
-    for number, case in enumerate(broken.cases(('adaptive',)))
-    if number % len(broken.PHASES) == number // len(broken.PHASES) % len(broken.PHASES)
+    for number, case in enumerate(one for one in MATRIX.cases if one.controller == 'adaptive')
+    if number % len(PHASES) == number // len(PHASES) % len(PHASES)
 ]
 
 
@@ -27,19 +28,19 @@ class Here:
 @pytest.fixture(scope='module')
 def rows() -> list[dict]:
     """A row for each flight."""
-    diagonal = Experiment('faults', 'diagonal', '', '', '', CASES, broken.judge)
+    diagonal = Experiment('faults', 'diagonal', '', '', '', CASES, judge_faults)
     return fly([diagonal], Here(), lambda done: None)[0][0]
 
 
 def test_every_fault_is_flown_and_every_phase():
-    assert [case.facts['fault'] for case in CASES] == [fault.name for fault in broken.FAULTS]
+    assert [case.facts['fault'] for case in CASES] == FAULTS
     assert len(CASES) >= 20
     phases = [case.changes['faults'][0]['phase'] for case in CASES]
-    assert {phases.count(phase) for phase in broken.PHASES} == {6, 7}
+    assert {phases.count(phase) for phase in PHASES} == {6, 7}
 
 
 def test_each_ends_as_it_has_to(rows):
-    assert [check for check in broken.judge(rows) if not check.passed] == []
+    assert [check for check in judge_faults(rows) if not check.passed] == []
 
 
 def test_some_fly_on_some_surface_and_some_drop_their_weight(rows):
@@ -57,14 +58,14 @@ def test_some_fly_on_some_surface_and_some_drop_their_weight(rows):
     ],
 )
 def test_what_is_wrong_is_seen(rows, change, said):
-    (check,) = broken.judge([{**rows[0], **change}])
+    (check,) = judge_faults([{**rows[0], **change}])
     assert (check.value, check.passed) == (said, False)
 
 
 def test_a_clean_mission_that_is_told_of_is_seen():
     told = {'case': 'a', 'controller': 'pid', 'hours': 999.0, 'status': 'completed'}
-    checks = broken.judge_clean([{**told, 'guard': {'events': [{'row': 'leak'}]}}])
+    checks = judge_clean([{**told, 'guard': {'events': [{'row': 'leak'}]}}])
     assert [check.passed for check in checks] == [False, False, False]
     assert all(
-        one.passed for one in broken.judge_clean([{**told, 'hours': 1e3, 'guard': {'events': []}}])
+        one.passed for one in judge_clean([{**told, 'hours': 1e3, 'guard': {'events': []}}])
     )

@@ -463,3 +463,10 @@ def test_navigation_is_told_of_vehicle_launch_and_sensors():
     told = load_scenario('current_8deg', changes).navigation_settings()
     assert (told.vehicle, told.north_m, told.east_m) == ('seawing', 12.0, -7.0)
     assert (told.imu_period_s, told.gyro, told.origin.latitude_deg) == (4.0, False, -10.0)
+
+
+def test_fields_that_are_given_stay_as_they_are():
+    """A field inside a section that is given too changes the scenario, not what was given."""
+    fields = {'sensors': {}, 'sensors.gps_std_m': 7.0}
+    assert load_scenario('current_8deg', fields).sensors.gps_std_m == 7.0
+    assert fields == {'sensors': {}, 'sensors.gps_std_m': 7.0}

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from glider_bringup.console import Changes, Controller, changed_fields, messages
+from glider_bringup.console import Changes, Law, Named, changed_fields, messages
 from glider_bringup.mission.choices import chosen_fields
 from glider_bringup.mission.scenario import load_scenario
 from glider_model.base.settings import ConfigurationError
@@ -23,12 +23,8 @@ app = typer.Typer()
 )
 def autopilot(
     called: typer.Context,
-    scenario: Annotated[
-        str, typer.Argument(help='Scenario by name (./glider list) or path of its YAML file.')
-    ],
-    controller: Annotated[
-        Controller | None, typer.Option(help="Attitude law, instead of the scenario's.")
-    ] = None,
+    scenario: Named,
+    controller: Law = None,
     navigation: Annotated[
         bool | None,
         typer.Option(

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
-from glider_bringup.console import Json, counter, messages, output
+from glider_bringup.console import Json, counter, messages, output, print_table
 from glider_bringup.mission.disk import write_whole
 from glider_model.base.settings import ConfigurationError
 
@@ -49,14 +48,16 @@ def compare(
         scores = [{'run': name, 'folder': str(one), 'score': card} for name, one, card in each]
         print(json.dumps({'runs': scores, 'differences': found}))
         return
-    _print_rows('', names, _marked(compared.score_rows(cards)))
+    headings = ['', *names]
+    print_table('', headings, _marked(compared.score_rows(cards)), overflow='fold')
     output.print(compared.HOW_TO_READ.format(mark='*'), soft_wrap=True)
     for text in compared.caveats(cards):
         output.print(text, soft_wrap=True)
     if compared.are_equal(cards):
         output.print(compared.EQUAL)
     if found:
-        _print_rows('what the scenarios differ in', names, compared.difference_rows(found))
+        rows = compared.difference_rows(found)
+        print_table('what the scenarios differ in', headings, rows, overflow='fold')
     else:
         output.print('scenarios and vehicles are the same')
 
@@ -69,14 +70,3 @@ def _marked(rows: list) -> list[list[str]]:
         return f'{cell.text}{change}{" *" if cell.better else ""}'
 
     return [[name, *map(text, cells)] for name, cells in rows]
-
-
-def _print_rows(title: str, names: list[str], rows: list[list[str]]) -> None:
-    """Print a table with a column for each run."""
-    table = Table(title=title or None, title_justify='left')
-    table.add_column('')
-    for name in names:
-        table.add_column(name, overflow='fold')
-    for row in rows:
-        table.add_row(*row)
-    output.print(table)

@@ -5,9 +5,8 @@
 import json
 
 import typer
-from rich.table import Table
 
-from glider_bringup.console import Json, output
+from glider_bringup.console import Json, print_table
 from glider_bringup.door.studies import scenarios, vehicles
 from glider_bringup.studies.sweep.plan import read_sweep, sweep_names
 
@@ -26,7 +25,4 @@ def list_all(as_json: Json = False) -> None:
         print(json.dumps(listed))
         return
     for title, entries in listed.items():
-        table = Table(title=title.capitalize(), show_header=False, title_justify='left')
-        for name, description in entries.items():
-            table.add_row(name, description)
-        output.print(table)
+        print_table(title.capitalize(), (), entries.items())

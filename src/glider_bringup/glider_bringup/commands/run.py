@@ -6,14 +6,15 @@ import json
 from collections.abc import Callable
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
 from glider_bringup.console import (
     Changes,
-    Controller,
     Json,
+    Law,
+    Named,
     changed_fields,
     choices,
     compiling,
@@ -24,11 +25,7 @@ from glider_bringup.console import (
 )
 from glider_bringup.mission.choices import ENGINES, chosen_fields, combination_of
 from glider_bringup.mission.disk import DiskError
-from glider_bringup.mission.scenario import (
-    DEFAULT_SCENARIO,
-    Scenario,
-    load_scenario,
-)
+from glider_bringup.mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.showing.scorecard import STYLES, print_card, print_places
 from glider_guidance.settings import LosSettings
@@ -46,18 +43,14 @@ Guidance = choices(LosSettings, 'method')
 # long: its options stand where it begins, each with its help.
 @app.command(epilog='Example: ./glider run current_8deg --engine direct --duration full --json')
 def run(
-    scenario: Annotated[
-        str, typer.Argument(help='Scenario by name (./glider list) or path of its YAML file.')
-    ] = DEFAULT_SCENARIO,
+    scenario: Named = DEFAULT_SCENARIO,
     engine: Annotated[
         Engine,
         typer.Option(
             help='nodes: six ROS 2 nodes over topics; direct: one compiled loop. Same results.'
         ),
     ] = 'nodes',
-    controller: Annotated[
-        Controller | None, typer.Option(help="Attitude law, instead of the scenario's.")
-    ] = None,
+    controller: Law = None,
     guidance: Annotated[
         Guidance | None, typer.Option(help="Line of sight, instead of the scenario's.")
     ] = None,
@@ -125,10 +118,10 @@ def run(
     fields = chosen_fields(changed_fields(changes), controller, guidance, seed, duration)
     rate, place = _checked(engine, speed, namespace, view, processes)
     flown = load_scenario(scenario, fields)
+    nodes = {'speed': rate, 'namespace': place}
+    nodes['layout'] = 'processes' if processes else 'together'
     with _view(view_port, place) if view else nullcontext() as begin_view:
-        card, folder, has_room = _fly(
-            flown, engine, rate, place, out, bag, sync, report, begin_view, processes
-        )
+        card, folder, has_room = _fly(flown, engine, out, bag, sync, report, begin_view, nodes)
     page = folder / REPORT_FILE
     if as_json:
         print(json.dumps(card, allow_nan=False))
@@ -179,10 +172,9 @@ def _view(port: int, namespace: str | None):
     from glider_bringup.engines.live_view import live_view
 
     with live_view(port, namespace) as (address, begin):
-        messages.print(
-            f'live view: in Foxglove choose Open connection, Foxglove WebSocket, '
-            f'ws://localhost:{port}, or open {address}',
-            soft_wrap=True,
+        tell(
+            'live view: in Foxglove choose Open connection, Foxglove WebSocket, '
+            f'ws://localhost:{port}, or open {address}'
         )
         yield begin
 
@@ -190,16 +182,14 @@ def _view(port: int, namespace: str | None):
 def _fly(
     scenario: Scenario,
     engine: Engine,
-    rate: float,
-    namespace: str | None,
     out: Path | None,
     bag: bool,
     sync: str,
     report: bool,
     begin_view: Callable[[], None] | None,
-    processes: bool,
+    nodes: dict[str, Any],
 ) -> tuple[dict, Path, bool]:
-    """Fly and score a scenario with a progress bar.
+    """Fly and score a scenario with a progress bar; ``nodes`` are options of that engine.
 
     Returns the scorecard, the run folder, and whether the disk had room for score and report.
     """
@@ -225,18 +215,8 @@ def _fly(
         if engine == 'nodes':
             if begin_view:
                 flying = _after_first(begin_view, flying)
-            flight = fly_nodes(
-                scenario,
-                folder,
-                takers,
-                flying,
-                speed=rate,
-                namespace=namespace,
-                on_log=tell,
-                on_read=reading,
-                sync=sync,
-                layout='processes' if processes else 'together',
-            )
+            nodes |= {'on_log': tell, 'on_read': reading, 'sync': sync}
+            flight = fly_nodes(scenario, folder, takers, flying, **nodes)
         elif bag:
             flight = fly_recorded(scenario, folder, takers, flying, sync)
         else:

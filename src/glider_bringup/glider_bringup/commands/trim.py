@@ -8,9 +8,8 @@ from dataclasses import asdict
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
-from glider_bringup.console import Json, changed_fields, messages, output
+from glider_bringup.console import Json, changed_fields, messages, print_table
 from glider_bringup.mission.scenario import split_changes
 from glider_model.base.errors import EXIT_FAILED
 from glider_model.base.settings import ConfigurationError
@@ -86,9 +85,8 @@ def _print_trim(vehicle: str, solution: Trim, of_vehicle: dict[str, dict[str, fl
         rows['fin_turn_rate'] = turn / (sine * solution.speed_mps**2)
     for group, numbers in of_vehicle.items():
         rows |= {f'{group} {name}': number for name, number in numbers.items()}
-    table = Table(title=vehicle, show_header=False, title_justify='left')
-    for name, value in rows.items():
-        if value is None:
-            value = 'straight'
-        table.add_row(name, f'{value:.5g}' if isinstance(value, float) else str(value))
-    output.print(table)
+    texts = (
+        'straight' if value is None else f'{value:.5g}' if isinstance(value, float) else str(value)
+        for value in rows.values()
+    )
+    print_table(vehicle, (), zip(rows, texts, strict=True))

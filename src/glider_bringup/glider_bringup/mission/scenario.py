@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenarios: one validated YAML file that says everything about a mission."""
 
+import json
 import math
+import shlex
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -508,7 +510,7 @@ def _set_field(values: dict, field: str, value) -> None:
     holder, last = holder_of(values, field), field.rpartition('.')[2]
     for other in _alternatives(last):
         holder.pop(other, None)
-    holder[last] = value
+    holder[last] = deepcopy(value)  # which may be changed by a field inside it
 
 
 def told_fields(changed: dict[str, str]) -> str:
@@ -529,3 +531,11 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     if not sign or not all(field.split('.')):
         raise ConfigurationError(f'--set {clipped(text)}: expected path.to.field=value')
     return field, parse_yaml(value, f'--set {clipped(text)}')
+
+
+def run_command(name: str, changes: dict[str, Any], options: str = '') -> str:
+    """Shell command that flies a scenario with some fields changed, by the direct engine."""
+    fields = (f'{field}={json.dumps(value)}' for field, value in changes.items())
+    sets = [f'--set {shlex.quote(field)}' for field in fields]
+    words = ['./glider run', shlex.quote(name), '--engine direct', options, *sets]
+    return ' '.join(word for word in words if word)

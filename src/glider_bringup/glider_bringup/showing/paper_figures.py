@@ -16,7 +16,7 @@ import numpy as np
 from glider_bringup.mission.disk import save_figure
 from glider_bringup.scoring.one_hertz import Record
 from glider_bringup.showing.figure import BLUE, GREEN, GREY, ORANGE, dress, new_figure
-from glider_bringup.studies.paper.cases import Experiment
+from glider_bringup.studies.paper.experiments import Experiment
 
 #: Flights by experiment, case, controller and guidance.
 Flights = dict[tuple[str, str, str, str], Record]

@@ -7,19 +7,17 @@ of S + i alone, so that it is the same plant in every study, under every control
 number of plants and of worker processes.
 """
 
-import json
 import math
-import shlex
 from collections import Counter
 from typing import Any
 
 import numpy as np
 
-from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_bringup.scoring.card import fly_scored
+from glider_bringup.mission.scenario import Scenario, load_scenario, run_command
+from glider_bringup.scoring.card import finite, fly_scored
 from glider_bringup.scoring.navigation import FOURTH
 from glider_bringup.scoring.scores import SCORES, studied
-from glider_bringup.studies.random_faults import outcome, sample_faults, validated
+from glider_bringup.studies.random_faults import sample_faults, validated
 from glider_bringup.studies.workers import Pool, Progress
 from glider_model.plant.sensors import SensorSettings
 from glider_model.plant.trim import solve_trim
@@ -85,23 +83,11 @@ RESULT_FILE = 'montecarlo.json'
 
 
 def sample_plant(seed: int, vehicle: VehicleParams, reckons: bool = False) -> dict[str, Any]:
-    """Draw a plant.
+    """Draw a plant by the seed of its study plus its number: fields of a scenario.
 
-    Numbers are rounded, so that they can be typed. Factors on numbers that are zero in this
-    vehicle are drawn, but left out.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of the study plus number of the plant.
-    vehicle : VehicleParams
-    reckons : bool
-        It does not measure where it is: its sensors have `ERRORS` too.
-
-    Returns
-    -------
-    dict
-        Fields of a scenario, whole sections: seed, perturb, water, sensors.
+    They are whole sections, seed, perturb, water and sensors, rounded so that they can be typed.
+    Factors on numbers that are zero in this vehicle are drawn, but left out. The sensors of one
+    that ``reckons``, as it does not measure where it is, have `ERRORS` too.
     """
     draw = np.random.Generator(np.random.PCG64(seed)).uniform
     spreads = dict.fromkeys((*VISCOUS, *STATIC, *DAMPING), COEFFICIENT_SPREAD)
@@ -132,20 +118,12 @@ def sample_plant(seed: int, vehicle: VehicleParams, reckons: bool = False) -> di
 
 
 def airframe(vehicle: VehicleParams, plant: VehicleParams) -> dict[str, Any]:
-    """Whether a plant can be flown at all: its static stability and its steering.
+    """Whether a plant can be flown at all, beside the ``vehicle`` as its file says.
 
-    Parameters
-    ----------
-    vehicle, plant : VehicleParams
-        As its file says, and as it is.
-
-    Returns
-    -------
-    dict
-        ``pitch_moment_kg`` and ``yaw_moment_kg``, static moment per angle and V^2 with the Munk
-        moment (stable: < 0 and > 0); ``steering_dive`` and ``steering_climb``, turn rate over
-        sin(roll) relative to that of the file (None: no steady glide, or no roll); what follows:
-        ``unstable``, ``weak_steering``.
+    ``pitch_moment_kg`` and ``yaw_moment_kg``: static moment per angle and V^2 with the Munk moment
+    (stable: < 0 and > 0). ``steering_dive`` and ``steering_climb``: turn rate over sin(roll)
+    relative to that of the file (None: no steady glide, or no roll). What follows: ``unstable``,
+    ``weak_steering``.
     """
     pitch = plant.K_M + plant.a_33 - plant.a_11
     yaw = plant.K_MY - plant.a_22 + plant.a_11
@@ -161,6 +139,14 @@ def airframe(vehicle: VehicleParams, plant: VehicleParams) -> dict[str, Any]:
         'weak_steering': vehicle.mu_max > 0.0
         and any(share is None or share < WEAK_STEERING for share in steering.values()),
     }
+
+
+def _sample(base: Scenario, seed: int, faults: int) -> dict[str, Any]:
+    """A plant of a scenario by its seed, with as many faults: fields of a scenario."""
+    vehicle = load_vehicle(base.vehicle).params()
+    plant = sample_plant(seed, vehicle, base.navigation.jumps)
+    drawn = sample_faults(seed, faults, base.duration_s)
+    return {**plant, 'faults': drawn} if faults else plant
 
 
 def _turn_rate_over_roll(vehicle: VehicleParams, sign: float) -> float | None:
@@ -191,25 +177,14 @@ def make_scenarios(
 ) -> dict[tuple[int, str], Scenario]:
     """Scenario of every flight, by plant and controller.
 
-    Parameters
-    ----------
-    name : str
-        Scenario by name or path. Its seed, perturb, density and sensors give way to the plant's.
-    changes : dict
-        Further fields, by dotted name.
-    faults : int
-        Faults drawn for each plant, instead of those of the scenario; 0: none are drawn.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming field, value and allowed range.
+    Of a scenario by name or path and ``changes``, fields by dotted name; its seed, perturb, water
+    and sensors give way to the plant's, its faults to those drawn, if any are. Raises
+    ConfigurationError, naming field, value and allowed range.
     """
     base = load_scenario(name, {**changes, 'dives': 0})
-    vehicle = load_vehicle(base.vehicle).params()
     scenarios = {}
     for plant in range(plants):
-        sampled = sample_plant(seed + plant, vehicle, base.navigation.jumps)
+        sampled = _sample(base, seed + plant, faults)
         sections = {
             'seed': sampled['seed'],
             'perturb': PerturbSettings(**sampled['perturb']),
@@ -217,8 +192,7 @@ def make_scenarios(
             'sensors': SensorSettings(**sampled['sensors']),
         }
         if faults:
-            drawn = sample_faults(seed + plant, faults, base.duration_s)
-            sections['faults'] = validated(drawn)
+            sections['faults'] = validated(sampled['faults'])
         for controller in controllers:
             law = base.control.model_copy(update={'law': controller})
             scenarios[plant, controller] = base.model_copy(update={**sections, 'control': law})
@@ -232,24 +206,25 @@ def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
     like before.
     """
     figures = {one.study[1]: one.in_card(scores) for one in SCORES if one.study}
-    numbers = [number for number in figures.values() if number is not None]
-    final = scores['final_state'] or {}
-    numbers += [number for vector in final.values() for number in vector]
-    finite = all(math.isfinite(number) for number in numbers)
+    clean, final = finite(figures), scores['final_state'] or {}
+    failed = status == 'failed' or clean != figures or finite(final) != final
     far = _farthest_m(scores) > DIVERGED_M
-    figures = {
-        name: number if number is not None and math.isfinite(number) else None
-        for name, number in figures.items()
-    }
-    failed = status == 'failed' or not finite
-    told = scores['navigation']
     diverged = failed or far or scores['status'] in ('infeasible', 'lost')
     return {
         'diverged': diverged,
         'outcome': outcome(scores, failed, diverged),
-        **figures,
-        'navigation': {name: told[name] for name in NAVIGATION},
+        **clean,
+        'navigation': {name: scores['navigation'][name] for name in NAVIGATION},
     }
+
+
+def outcome(scores: dict, failed: bool, diverged: bool) -> str:
+    """What became of a flight, in a word or two: its status, or that it was off its path."""
+    if failed:
+        return 'failed'
+    if scores['status'] != 'completed':
+        return scores['status']
+    return 'off its path' if diverged else 'completed'
 
 
 def _farthest_m(scores: dict) -> float:
@@ -280,12 +255,7 @@ def fly_plants(
 ) -> tuple[dict[tuple[int, str], dict], dict[int, dict]]:
     """Fly every scenario, in worker processes.
 
-    Returns
-    -------
-    flights : dict
-        What `judge` says, by plant and controller.
-    airframes : dict
-        What `airframe` says, by plant.
+    Returns what `judge` says by plant and controller, and what `airframe` says by plant.
     """
     plants = {plant: scenario for (plant, _), scenario in scenarios.items()}
     airframes = pool.results(_check_plant, plants, lambda done: None)
@@ -310,48 +280,48 @@ def spread(numbers: list[float | None]) -> dict[str, float | None]:
     return {'p50': at(0.50), 'p95': at(0.95), 'worst': at(1.0)}
 
 
-def summarise(
-    scenario: str,
-    seed: int,
-    flights: dict[tuple[int, str], dict],
-    airframes: dict[int, dict],
-) -> dict[str, Any]:
-    """Result of a study: one row for each controller."""
+def _rows(
+    flights: dict[tuple[int, str], dict], airframes: dict[int, dict]
+) -> list[dict[str, Any]]:
+    """What all plants came to, by controller."""
+    weak = {
+        'statically_unstable': sum(one['unstable'] for one in airframes.values()),
+        'weak_steering': sum(one['weak_steering'] for one in airframes.values()),
+    }
     rows = []
     for controller in dict.fromkeys(controller for _, controller in flights):
-        of = {plant: flights[plant, controller] for plant in airframes}
+        of = [flights[plant, controller] for plant in airframes]
         rows.append(
             {
                 'controller': controller,
-                'diverged': sum(flight['diverged'] for flight in of.values()),
-                **{key: spread([flight[key] for flight in of.values()]) for key, _ in studied()},
-                'statically_unstable': sum(one['unstable'] for one in airframes.values()),
-                'weak_steering': sum(one['weak_steering'] for one in airframes.values()),
-                'navigation': _navigation([flight['navigation'] for flight in of.values()]),
-                'outcomes': dict(Counter(flight['outcome'] for flight in of.values())),
-                'worst_plant': max(of, key=lambda plant: _badness(of[plant])),
+                'diverged': sum(flight['diverged'] for flight in of),
+                **{key: spread([flight[key] for flight in of]) for key, _ in studied()},
+                **weak,
+                'navigation': pooled([flight['navigation'] for flight in of]),
+                'outcomes': dict(Counter(flight['outcome'] for flight in of)),
+                'worst_plant': max(airframes, key=lambda plant: _badness(of[plant])),
             }
         )
-    return {'scenario': scenario, 'plants': len(airframes), 'seed': seed, 'rows': rows}
+    return rows
 
 
-def _navigation(flights: list[dict]) -> dict[str, Any]:
-    """How well the vehicles of a controller knew where they were, over all surfacings."""
+def pooled(flights: list[dict]) -> dict[str, Any]:
+    """How well vehicles knew where they were, over all surfacings of what is told of them."""
+
+    def mean(name: str, weight: str, some: list[dict]) -> float:
+        weights = sum(one[weight] for one in some)
+        return weights and sum(one[name] * one[weight] for one in some) / weights
+
+    later = [error for one in flights for error in one['surfacing_error_m'][FOURTH:]]
+    beside = [abs(m) for one in flights for m in one['surfacing_cross_track_m'][FOURTH:]]
     known = [one for one in flights if one['ellipse_95_share'] is not None]
     fixed = [one for one in flights if one['fixed']]
-    surfacings, fixes = (
-        sum(one[name] for one in some) for some, name in ((known, 'surfacings'), (fixed, 'fixed'))
-    )
-    later = [one['surfacing_error_m'][FOURTH:] for one in flights]
-    beside = [one['surfacing_cross_track_m'][FOURTH:] for one in flights]
     return {
         'surfacings': sum(one['surfacings'] for one in flights),
-        'error_m': spread([error for one in later for error in one]) if any(later) else None,
-        'cross_track_m': spread([abs(e) for one in beside for e in one]) if any(beside) else None,
-        'ellipse_95_share': surfacings
-        and sum(one['ellipse_95_share'] * one['surfacings'] for one in known) / surfacings,
-        'innovation_squared': fixes
-        and sum(one['innovation_squared'] * one['fixed'] for one in fixed) / fixes,
+        'error_m': spread(later) if later else None,
+        'cross_track_m': spread(beside) if beside else None,
+        'ellipse_95_share': mean('ellipse_95_share', 'surfacings', known),
+        'innovation_squared': mean('innovation_squared', 'fixed', fixed),
     }
 
 
@@ -361,39 +331,28 @@ def _badness(flight: dict) -> tuple[bool, float]:
     return flight['diverged'], math.inf if worst is None else worst
 
 
-def command(name: str, changes: dict[str, Any], controller: str, sampled: dict[str, Any]) -> str:
-    """Shell command that flies one plant again; ``changes`` are those of `make_scenarios`."""
-    fields = {**changes, 'dives': 0, **sampled}
-    settings = (shlex.quote(f'{field}={json.dumps(value)}') for field, value in fields.items())
-    options = ' '.join(f'--set {setting}' for setting in settings)
-    return f'./glider run {shlex.quote(name)} --engine direct --controller {controller} {options}'
-
-
 def report(
     name: str,
     changes: dict[str, Any],
-    summary: dict[str, Any],
+    seed: int,
+    faults: int,
     flights: dict[tuple[int, str], dict],
     airframes: dict[int, dict],
-    faults: int = 0,
 ) -> dict[str, Any]:
-    """Result of a study with every plant in it: what it is, how it flew, how to fly it again."""
+    """Result of a study: a row for each controller, and of every plant what it is, how it flew.
+
+    The first arguments are those of `make_scenarios`.
+    """
     base = load_scenario(name, changes)
-    vehicle, reckons = load_vehicle(base.vehicle).params(), base.navigation.jumps
     plants = []
     for plant, frame in airframes.items():
-        sampled = sample_plant(summary['seed'] + plant, vehicle, reckons)
-        if faults:
-            drawn = sample_faults(summary['seed'] + plant, faults, base.duration_s)
-            sampled = {**sampled, 'faults': drawn}
+        sampled = _sample(base, seed + plant, faults)
+        fields = {**changes, 'dives': 0, **sampled}
         runs = {controller: flight for (i, controller), flight in flights.items() if i == plant}
+        again = {law: run_command(name, fields, f'--controller {law}') for law in runs}
         plants.append(
-            {
-                'plant': plant,
-                **sampled,
-                'airframe': frame,
-                'flights': runs,
-                'commands': {law: command(name, changes, law, sampled) for law in runs},
-            }
+            {'plant': plant, **sampled, 'airframe': frame, 'flights': runs, 'commands': again}
         )
-    return {**summary, 'flown': plants}
+    rows = _rows(flights, airframes)
+    told = {'scenario': base.name, 'plants': len(airframes), 'seed': seed, 'rows': rows}
+    return {**told, 'flown': plants}

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Faults drawn at random, and what became of flights with them."""
+"""Faults drawn at random."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
@@ -80,18 +80,10 @@ _FAULT = pydantic.TypeAdapter(Fault)
 def sample_faults(
     seed: int, count: int, duration_s: float, steered: bool = False, depth_m: float = 0.0
 ) -> list[dict[str, Any]]:
-    """Draw faults: fields of a scenario, rounded so as to be typed.
+    """Draw faults that begin within ``duration_s``: fields of a scenario, as one would type them.
 
-    Parameters
-    ----------
-    seed : int
-    count : int
-    duration_s : float
-        Time within which they begin (s).
-    steered : bool
-        The vehicle has a steering surface, which may break too.
-    depth_m : float
-        Depth of its dives (m), in which some of them begin; 0.0: by time alone.
+    Where the vehicle is ``steered`` by a surface, that may break too. Some begin somewhere in its
+    dives to ``depth_m``; 0.0: by time alone.
     """
     draw = np.random.Generator(np.random.PCG64([seed, _STREAM]))
     return [_sample(draw, duration_s, steered, depth_m) for _ in range(count)]
@@ -138,12 +130,3 @@ def _sample(
 def validated(fields: Iterable[dict[str, Any]]) -> list[FaultSettings]:
     """Faults of drawn fields."""
     return [_FAULT.validate_python(one) for one in fields]
-
-
-def outcome(scores: dict, failed: bool, diverged: bool) -> str:
-    """What became of a flight, in a word or two: its status, or that it was off its path."""
-    if failed:
-        return 'failed'
-    if scores['status'] != 'completed':
-        return scores['status']
-    return 'off its path' if diverged else 'completed'

@@ -73,12 +73,7 @@ def _keyed(task: tuple[Callable, Hashable, Any]) -> tuple[Hashable, Any]:
 
 
 class Pool:
-    """Workers that are connected.
-
-    Parameters
-    ----------
-    client : distributed.Client
-    """
+    """Workers that are connected to a client of Dask."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
@@ -94,23 +89,12 @@ class Pool:
         apart: Callable[[Any], list] = lambda task: [task],
         on_wait: Callable[[], None] = lambda: None,
     ) -> Iterator[Outcome]:
-        """Do tasks; yields each as it is done, in any order.
+        """Do tasks by a function that workers call; yields each as it is done, in any order.
 
-        Parameters
-        ----------
-        function : callable
-            Called in a worker with the task.
-        tasks : iterable
-            Taken as workers become free, so that there may be many.
-        apart : callable
-            Splits a task that may kill workers into smaller ones.
-        on_wait : callable
-            Called every few seconds while no worker is connected.
-
-        Raises
-        ------
-        WorkError
-            If the scheduler is gone, or a worker has another version of the program.
+        They are taken as workers become free, so that there may be many. ``apart`` splits one
+        that may kill workers into smaller ones; ``on_wait`` is called every few seconds while no
+        worker is connected. Raises WorkError if the scheduler is gone, or a worker has another
+        version of the program.
         """
         suspects = []
         for outcome in self._together(function, iter(tasks), TASKS_AHEAD, on_wait):
@@ -127,10 +111,7 @@ class Pool:
     ) -> dict[Hashable, Any]:
         """What a function returns for each task, by its key, in the order of the keys.
 
-        Raises
-        ------
-        WorkError
-            If a task killed its workers, and as `outcomes`.
+        Raises WorkError if a task killed its workers, and as `outcomes`.
         """
         results = {}
         for outcome in self.outcomes(_keyed, ((function, *task) for task in tasks.items())):
@@ -175,12 +156,11 @@ def _outcome(future: Future, task: Any) -> Outcome:
     """Outcome of a task that has ended; what its function raised is raised here."""
     with _scheduler_answers():
         error = future.exception()
-        result = future.result() if error is None else None
+        if error is None:
+            return Outcome(task, died=False, result=future.result())
     if isinstance(error, KilledWorker):
         return Outcome(task, died=True)
-    if error is not None:
-        raise error
-    return Outcome(task, died=False, result=result)
+    raise error
 
 
 @contextmanager
@@ -229,26 +209,12 @@ def worker_pool(
     combinations: Iterable[Combination] = (),
     tell: Tell = lambda line: None,
 ) -> Iterator[Pool]:
-    """Start worker processes, or connect to those of a cluster.
+    """Start worker processes, by default one per processor, or connect to those of a cluster.
 
-    Whatever ends the block ends the workers that were started for it, at once.
-
-    Parameters
-    ----------
-    workers : int, optional
-        Processes on this machine; by default one per processor.
-    scheduler : str, optional
-        Address of the scheduler of a cluster, such as ``tcp://10.0.0.1:8786``, instead.
-    combinations : iterable of Combination
-        What they will fly. Loops for it are compiled here, so that workers of this machine do not
-        all compile the same.
-    tell : callable
-        Gets a line if a loop has to be compiled.
-
-    Raises
-    ------
-    ConfigurationError
-        If no scheduler answers at the address.
+    Whatever ends the block ends the workers that were started for it, at once. ``scheduler`` is
+    the address of that of a cluster, such as ``tcp://10.0.0.1:8786``. Loops for ``combinations``,
+    which they will fly, are compiled here, so that workers of this machine do not all compile the
+    same; ``tell`` gets a line then. Raises ConfigurationError if no scheduler answers.
     """
     for name in ('distributed', 'distributed.client', 'tornado.application'):
         logging.getLogger(name).setLevel(logging.CRITICAL)

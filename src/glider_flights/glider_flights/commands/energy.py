@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
-from glider_bringup.console import Cache, Json, Recording, counter, output
+from glider_bringup.console import Cache, Json, Recording, counter, print_table
 
 app = typer.Typer()
 #: What the parts of a flight are.
@@ -47,22 +46,14 @@ def energy(
         print(json.dumps({'flight': str(flight), 'fitted_on': on, **report}))
         return
     parts = PARTS[report['vehicle']]
-    table = Table(
-        title=f'{report["vehicle"].capitalize()}, {report["files"]} files',
-        title_justify='left',
-        show_header=False,
-    )
-    for name, value in report['fitted'].items():
-        table.add_row(f'{name}, fitted', f'{value:.4g} {UNITS[name]}')
-    for name, value in report['measured'].items():
-        table.add_row(f'{name}, measured', f'{value:.4g} {UNITS[name]}')
-    table.add_row(
-        'fitted on', f'{report["fitted_parts"]} {parts}, the first half of {fit_on or flight}'
-    )
-    table.add_row(
-        'recorded', f'{report["recorded_wh"]:,.2f} Wh in {report["predicted_parts"]} {parts}'
-    )
-    table.add_row(
-        'predicted', f'{report["predicted_wh"]:,.2f} Wh, {report["error_percent"]:+.1f} %'
-    )
-    output.print(table)
+    rows = {
+        f'{name}, {how}': f'{value:.4g} {UNITS[name]}'
+        for how in ('fitted', 'measured')
+        for name, value in report[how].items()
+    }
+    rows |= {
+        'fitted on': f'{report["fitted_parts"]} {parts}, the first half of {fit_on or flight}',
+        'recorded': f'{report["recorded_wh"]:,.2f} Wh in {report["predicted_parts"]} {parts}',
+        'predicted': f'{report["predicted_wh"]:,.2f} Wh, {report["error_percent"]:+.1f} %',
+    }
+    print_table(f'{report["vehicle"].capitalize()}, {report["files"]} files', (), rows.items())

@@ -12,7 +12,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from glider_bringup.console import Cache, Json, Recording, counter, output
+from glider_bringup.console import Cache, Json, Recording, counter, output, print_table
 
 app = typer.Typer()
 #: Characters of the name of a file in the table: its end tells files of a flight apart.
@@ -49,7 +49,7 @@ def navigate(
         print(json.dumps({'flight': str(flight), **report}))
         return
     output.print(_segments_table(found, rows))
-    output.print(_figures_table(report))
+    _print_figures(report)
     for note in report['notes']:
         output.print(note, soft_wrap=True)
 
@@ -99,12 +99,8 @@ def _number(value: float | None, digits: int) -> str:
     return f'{value:,.{digits}f}' if known else '-'
 
 
-def _figures_table(report: dict) -> Table:
+def _print_figures(report: dict) -> None:
     title = f'{report["segments"]} dives, {report["under_water_s"] / 3600.0:.1f} h under water'
-    table = Table(title=title, title_justify='left')
-    table.add_column('')
-    for name in ('median', '9 of 10', 'dives'):
-        table.add_column(name, justify='right')
     over = report['on_board_current_is_mean']
     lines = [
         (f'current off that on board (cm/s; {over})', report['dac_difference_mps'], 100.0, 2),
@@ -112,10 +108,11 @@ def _figures_table(report: dict) -> Table:
     ]
     for name, spread in report['prediction_m'].items():
         lines.append((f'surfaced off (m): {MEANING[name]}', spread, 1.0, 0))
+    rows = []
     for text, spread, scale, digits in lines:
         numbers = [
             _number(None if spread[key] is None else scale * spread[key], digits)
             for key in ('median', 'p90')
         ]
-        table.add_row(text, *numbers, str(spread['segments']))
-    return table
+        rows.append([text, *numbers, str(spread['segments'])])
+    print_table(title, ('', 'median', '9 of 10', 'dives'), rows, numbers_from=1)

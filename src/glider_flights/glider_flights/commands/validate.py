@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
-from glider_bringup.console import Cache, Json, counter, output
+from glider_bringup.console import Cache, Json, counter, output, print_table
 from glider_flights.validation.flying import Imposed
 
 app = typer.Typer()
@@ -77,19 +76,18 @@ def validate(
     if as_json:
         print(json.dumps({'flight': str(flight), **result.report}))
         return
-    output.print(_table(result.report))
+    _print(result.report)
     for note in result.report['notes']:
         output.print(note, soft_wrap=True)
     if out is not None:
         output.print(f'drawn: {out}', soft_wrap=True)
 
 
-def _table(report: dict) -> Table:
+def _print(report: dict) -> None:
     title = (
         f'{report["vehicle"]} along {report["files"]} files of a {report["kind"]}, '
         f'{report["imposed"]} imposed'
     )
-    table = Table(title=title, show_header=False, title_justify='left')
     turns, other = report['turn_rate_per_sin_roll'], report['peer']
     rows = {
         'stretches under water': report['segments'],
@@ -110,6 +108,5 @@ def _table(report: dict) -> Table:
         else f'{other["w_rmse_cmps"]} ({other["name"]})',
         'fitted': ', '.join(f'{name} {value:g}' for name, value in report['fitted'].items()),
     }
-    for name, value in rows.items():
-        table.add_row(name, '-' if value in (None, '') else str(value))
-    return table
+    texts = ('-' if value in (None, '') else str(value) for value in rows.values())
+    print_table(title, (), zip(rows, texts, strict=True))

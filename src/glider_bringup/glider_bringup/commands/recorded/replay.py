@@ -12,12 +12,12 @@ from glider_bringup.console import (
     STATE,
     Json,
     Run,
-    messages,
+    interrupted_told,
     number,
     output,
     progress_bar,
+    tell,
 )
-from glider_model.base.errors import EXIT_INTERRUPTED
 
 app = typer.Typer()
 
@@ -63,22 +63,18 @@ def replay(
     plan = work.plan_replay(bag, names, start, duration, namespace)
     work.check_not_empty(plan)
     if bag.cut:
-        messages.print(bag.cut, soft_wrap=True)
+        tell(bag.cut)
     span_s = (plan.end_ns - plan.start_ns) / 1e9
     bar = progress_bar('replaying', max(span_s, 1e-9), STATE, REMAINING)
-    try:
-        with work.Replay(plan, factor) as player, bar as show:
+    with interrupted_told(), work.Replay(plan, factor) as player, bar as show:
 
-            def update(passed_s: float) -> None:
-                show(completed=passed_s, state=f'{passed_s:,.1f} of {span_s:,.1f} s')
+        def update(passed_s: float) -> None:
+            show(completed=passed_s, state=f'{passed_s:,.1f} of {span_s:,.1f} s')
 
-            player.wait_for(wait_for, lambda text: messages.print(text, soft_wrap=True))
+        player.wait_for(wait_for, tell)
+        played = player.run(update)
+        while loop:
             played = player.run(update)
-            while loop:
-                played = player.run(update)
-    except KeyboardInterrupt:
-        messages.print('stopped by SIGINT', style='red')
-        raise typer.Exit(EXIT_INTERRUPTED) from None
     if as_json:
         print(json.dumps({'run': str(run), 'recorded_s': span_s, **played._asdict()}))
     else:

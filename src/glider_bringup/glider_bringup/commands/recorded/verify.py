@@ -9,19 +9,19 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.table import Table
 
 from glider_bringup.console import (
     Json,
     Run,
     compiling,
-    messages,
+    interrupted_told,
     output,
     picked,
+    print_table,
     repeatable,
     shares,
 )
-from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_model.base.errors import EXIT_FAILED
 from glider_model.base.wiring import WIRING
 
 app = typer.Typer()
@@ -60,18 +60,14 @@ def verify(
     told_compiling = partial(
         compiling, 'compiling the mathematics of a block for these settings, once'
     )
-    try:
-        with tempfile.TemporaryDirectory() as scratch, shares() as update:
-            bag = Bag(run)
-            told = read_told(bag, run, settings, Path(scratch))
-            recording = Recording(
-                bag, namespace, lambda share: update('reading', share), told.steers_by
-            )
-            with interrupts_at(update) as update, compiling_told(told_compiling):
-                verdicts = list(verify_blocks(recording, told, wanted, update))
-    except KeyboardInterrupt:
-        messages.print('stopped by SIGINT', style='red')
-        raise typer.Exit(EXIT_INTERRUPTED) from None
+    with interrupted_told(), tempfile.TemporaryDirectory() as scratch, shares() as update:
+        bag = Bag(run)
+        told = read_told(bag, run, settings, Path(scratch))
+        recording = Recording(
+            bag, namespace, lambda share: update('reading', share), told.steers_by
+        )
+        with interrupts_at(update) as update, compiling_told(told_compiling):
+            verdicts = list(verify_blocks(recording, told, wanted, update))
     report = report_of(bag, recording, told, verdicts)
     if as_json:
         print(json.dumps({'run': str(run), **report}))
@@ -83,14 +79,13 @@ def verify(
 
 def _print(report: dict) -> None:
     """Print what came out for a person."""
-    table = Table(title=f'settings: {report["settings"]}', title_justify='left')
-    for name in ('block', 'result', 'ticks', 'messages', 'differ'):
-        table.add_column(name, justify='left' if name in ('block', 'result') else 'right')
+    rows = []
     for one in report['blocks']:
         compared, differing = (sum(one[key].values()) for key in ('compared', 'differing'))
         numbers = [f'{n:,}' for n in (one['ticks'], compared, differing)]
-        table.add_row(one['block'], one['result'], *numbers)
-    output.print(table)
+        rows.append([one['block'], one['result'], *numbers])
+    headings = ('block', 'result', 'ticks', 'messages', 'differ')
+    print_table(f'settings: {report["settings"]}', headings, rows, numbers_from=2)
     for one in report['blocks']:
         for line in _lines(one, report['lockstep']):
             output.print(f'{one["block"]}: {line}', soft_wrap=True)

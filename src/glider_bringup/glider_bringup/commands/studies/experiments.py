@@ -23,18 +23,11 @@ from glider_bringup.mission.disk import write_whole
 from glider_model.base.errors import EXIT_FAILED
 
 app = typer.Typer()
-Group = Literal[
-    'current',
-    'yaw',
-    'profile',
-    'robustness',
-    'vehicles',
-    'paths',
-    'envelope',
-    'navigation',
-    'faults',
-    'random_faults',
-]
+GROUPS = (
+    *('current', 'yaw', 'profile', 'robustness', 'vehicles', 'paths', 'envelope', 'navigation'),
+    *('faults', 'random_faults'),
+)
+Group = Literal[GROUPS]
 
 
 @app.command(epilog='Example: ./glider experiments --only robustness --only paths')
@@ -65,21 +58,22 @@ def experiments(
     from glider_bringup.mission.run_folder import make_result_folder
     from glider_bringup.showing import paper_figures
     from glider_bringup.studies.hunt import search
-    from glider_bringup.studies.paper import catalogue, flying, tables, verdicts
+    from glider_bringup.studies.paper import experiments as paper
+    from glider_bringup.studies.paper import tables
 
     groups = picked(only, Group)
-    planned = catalogue.make_experiments(groups)
+    planned = paper.make_experiments(groups)
     hunts = search.NAME in groups
-    total = flying.count_flights(planned) + hunts * flights
+    total = paper.count_flights(planned) + hunts * flights
     if out:
-        make_result_folder(out, verdicts.RESULT_FILE)
+        make_result_folder(out, paper.RESULT_FILE)
     messages.print(f'{len(planned) + hunts} experiments, {total} flights')
-    loops = flying.combinations(planned)
+    loops = paper.combinations(planned)
     if hunts:
         loops |= search.combinations(seed, flights)
     with workers_at_work(workers, scheduler, loops) as pool, counter('flying', total) as update:
-        rows, records = flying.fly(planned, pool, update)
-        result = verdicts.report(planned, rows)
+        rows, records = paper.fly(planned, pool, update)
+        result = paper.report(planned, rows)
         if hunts:
             before = total - flights
             found = search.search(seed, flights, pool, lambda done: update(before + done))
@@ -88,13 +82,12 @@ def experiments(
     if out:
         with messages.status('drawing'):
             drawn = paper_figures.draw(planned, rows, records, out)
-        text = json.dumps(result, indent=2) + '\n'
-        write_whole(out / verdicts.RESULT_FILE, text)
+        write_whole(out / paper.RESULT_FILE, json.dumps(result, indent=2) + '\n')
         for file in drawn:
             messages.print(f'drawn: {file}', soft_wrap=True)
     if as_json:
         print(json.dumps(result))
     else:
         tables.show(result, output)
-    if any(one['verdict'] == verdicts.FAILED for one in result['experiments']):
+    if any(one['verdict'] == paper.FAILED for one in result['experiments']):
         raise typer.Exit(EXIT_FAILED)

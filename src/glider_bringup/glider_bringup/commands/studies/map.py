@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.table import Table
 
-from glider_bringup.console import Json, messages, output
+from glider_bringup.console import Json, messages, output, print_table
 
 app = typer.Typer()
 
@@ -45,18 +44,16 @@ def draw(
         draw_map(stability, image)
     rows = study.shares(stability)
     if as_json:
-        print(
-            json.dumps(
-                {'image': str(image), 'horizontal_kn': stability.horizontal_kn, 'panels': rows}
-            )
-        )
+        found = {'image': str(image), 'horizontal_kn': stability.horizontal_kn, 'panels': rows}
+        print(json.dumps(found))
         return
-    table = Table(title=stability.title, title_justify='left')
-    for heading in ('share of the cells', *(row['panel'] or 'flights' for row in rows)):
-        table.add_column(heading)
-    for name in [name for name in rows[0] if name != 'panel']:
-        table.add_row(name.replace('_', ' '), *(_share(name, row[name]) for row in rows))
-    output.print(table)
+    headings = ['share of the cells', *(row['panel'] or 'flights' for row in rows)]
+    lines = (
+        [name.replace('_', ' '), *(_share(name, row[name]) for row in rows)]
+        for name in rows[0]
+        if name != 'panel'
+    )
+    print_table(stability.title, headings, lines)
     output.print(f'drawn: {image}', soft_wrap=True)
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from glider_bringup.console import (
     Changes,
     Controller,
     Json,
+    Named,
     Scheduler,
     Workers,
     changed_fields,
@@ -21,6 +21,7 @@ from glider_bringup.console import (
     number,
     output,
     picked,
+    print_table,
     repeatable,
     workers_at_work,
 )
@@ -33,9 +34,7 @@ app = typer.Typer()
 
 @app.command(epilog='Example: ./glider montecarlo current_12deg --plants 200 --seed 1000')
 def montecarlo(
-    scenario: Annotated[
-        str, typer.Argument(help='Scenario by name (./glider list) or path of its YAML file.')
-    ] = DEFAULT_SCENARIO,
+    scenario: Named = DEFAULT_SCENARIO,
     plants: Annotated[int, typer.Option(min=1, max=1_000_000, help='Number of plants.')] = 100,
     seed: Annotated[
         int, typer.Option(min=0, max=2**62, help='Plant i is drawn from seed + i.')
@@ -84,26 +83,13 @@ def montecarlo(
         counter('flying', len(scenarios)) as update,
     ):
         flights, airframes = study.fly_plants(scenarios, pool, update)
-    name = next(iter(scenarios.values())).name
-    summary = study.summarise(name, seed, flights, airframes)
-    whole = study.report(scenario, fields, summary, flights, airframes, faults)
+    whole = study.report(scenario, fields, seed, faults, flights, airframes)
     if out:
-        text = json.dumps(whole, indent=2) + '\n'
-        write_whole(out / study.RESULT_FILE, text)
+        write_whole(out / study.RESULT_FILE, json.dumps(whole, indent=2) + '\n')
     if as_json:
-        print(json.dumps(summary))
+        print(json.dumps({name: told for name, told in whole.items() if name != 'flown'}))
     else:
         _print_study(whole)
-
-
-#: Lines about vehicles that do not measure where they are.
-_RECKONED = (
-    'surfacings',
-    'error of place, from the 4th (m)',
-    'came up beside, from the 4th (m)',
-    'inside the 95 % ellipse',
-    'innovation squared',
-)
 
 
 def _print_study(study: dict) -> None:
@@ -114,32 +100,31 @@ def _print_study(study: dict) -> None:
         return ' / '.join('-' if x is None else f'{x:,.3f}' for x in figure.values())
 
     rows = study['rows']
-    table = Table(
-        title=f'{study["scenario"]}, {study["plants"]} plants from seed {study["seed"]}',
-        title_justify='left',
-    )
-    table.add_column('p50 / p95 / worst')
-    for row in rows:
-        table.add_column(row['controller'])
-    lines = (
-        ('diverged', lambda row: str(row['diverged'])),
-        *((label, lambda row, key=key: show(row[key])) for key, label in studied()),
-        ('surfacings', lambda row: f'{row["navigation"]["surfacings"]:,}'),
-        ('error of place, from the 4th (m)', lambda row: show(row['navigation']['error_m'])),
-        ('came up beside, from the 4th (m)', lambda row: show(row['navigation']['cross_track_m'])),
-        ('inside the 95 % ellipse', lambda row: f'{row["navigation"]["ellipse_95_share"]:.3f}'),
-        ('innovation squared', lambda row: f'{row["navigation"]["innovation_squared"]:.2f}'),
-        ('plants statically unstable', lambda row: str(row['statically_unstable'])),
-        ('plants that steer weakly', lambda row: str(row['weak_steering'])),
-        ('worst', lambda row: f'plant {row["worst_plant"]}'),
-    )
-    reckoned = any(row['navigation']['ellipse_95_share'] for row in rows)
-    for name, text in lines:
-        if reckoned or name not in _RECKONED:
-            table.add_row(name, *map(text, rows))
+    told = [row['navigation'] for row in rows]
+    lines = {
+        'diverged': [str(row['diverged']) for row in rows],
+        **{label: [show(row[key]) for row in rows] for key, label in studied()},
+    }
+    if any(one['ellipse_95_share'] for one in told):
+        lines |= {
+            'surfacings': [f'{one["surfacings"]:,}' for one in told],
+            'error of place, from the 4th (m)': [show(one['error_m']) for one in told],
+            'came up beside, from the 4th (m)': [show(one['cross_track_m']) for one in told],
+            'inside the 95 % ellipse': [f'{one["ellipse_95_share"]:.3f}' for one in told],
+            'innovation squared': [f'{one["innovation_squared"]:.2f}' for one in told],
+        }
+    lines |= {
+        'plants statically unstable': [str(row['statically_unstable']) for row in rows],
+        'plants that steer weakly': [str(row['weak_steering']) for row in rows],
+        'worst': [f'plant {row["worst_plant"]}' for row in rows],
+    }
     for name in sorted({name for row in rows for name in row['outcomes']}):
-        table.add_row(name, *(str(row['outcomes'].get(name, 0)) for row in rows))
-    output.print(table)
-    for row in study['rows']:
+        lines[name] = [str(row['outcomes'].get(name, 0)) for row in rows]
+    print_table(
+        f'{study["scenario"]}, {study["plants"]} plants from seed {study["seed"]}',
+        ['p50 / p95 / worst', *(row['controller'] for row in rows)],
+        [[name, *texts] for name, texts in lines.items()],
+    )
+    for row in rows:
         worst = study['flown'][row['worst_plant']]['commands'][row['controller']]
         output.print(f'worst of {row["controller"]}:', worst, soft_wrap=True)

@@ -4,11 +4,11 @@
 
 import json
 import shlex
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from glider_bringup.console import (
     Changes,
@@ -19,6 +19,7 @@ from glider_bringup.console import (
     counter,
     messages,
     output,
+    print_table,
     workers_at_work,
 )
 from glider_model.base.errors import EXIT_FAILED
@@ -65,18 +66,29 @@ def sweep(
     words = ['./glider', 'sweep', name, '--out', str(folder), '--resume']
     words += [word for text in changes or () for word in ('--set', text)]
     words += ['--scheduler', scheduler] if scheduler else []
-    again = shlex.join(words)
+
+    def advice() -> str:
+        flown = sum(study.flown_cells(plan, journal))
+        return f'; {flown} of {plan.cells} cells are kept, go on with\n  {shlex.join(words)}'
+
     with study.open_journal(plan, folder, resume) as journal:
         known = study.flown_cells(plan, journal)
         if not all(known):
-            _fly(plan, journal, known, workers, scheduler, again)
+            waits = partial(messages.print, 'no worker is connected: waiting for one')
+            with (
+                workers_at_work(workers, scheduler, plan.combinations, advice) as pool,
+                counter('flying', plan.cells) as update,
+            ):
+                study.fly_sweep(plan, journal, known, pool, update, waits)
         with messages.status('writing the result'):
             summary = study.write_result(plan, journal, folder / study.RESULT_FILE)
             failures = study.failures(plan, journal)
     if as_json:
         print(json.dumps({**summary, 'failures': failures}))
     else:
-        _print_summary(summary)
+        counts = {name: f'{n:,}' for name, n in summary.items() if name not in ('sweep', 'file')}
+        print_table(summary['sweep'], (), counts.items())
+        output.print(f'result: {summary["file"]}', soft_wrap=True)
         if MAPPED <= {axis.field for axis in plan.axes}:
             messages.print(f'draw it: {shlex.join(["./glider", "map", summary["file"]])}')
     for failure in failures[:FAILURES_TOLD]:
@@ -85,32 +97,3 @@ def sweep(
         messages.print(f'and {len(failures) - FAILURES_TOLD} more, see "reason" in the result')
     if failures:
         raise typer.Exit(EXIT_FAILED)
-
-
-def _fly(plan, journal, known, workers, scheduler, again: str) -> None:
-    """Fly what is missing, with a progress bar; say how to go on if something ends it early."""
-    from glider_bringup.studies.sweep import fly as study
-
-    def advice() -> str:
-        flown = sum(study.flown_cells(plan, journal))
-        return f'; {flown} of {plan.cells} cells are kept, go on with\n  {again}'
-
-    with (
-        workers_at_work(workers, scheduler, plan.combinations, advice) as pool,
-        counter('flying', plan.cells) as update,
-    ):
-        study.fly_sweep(plan, journal, known, pool, update, _tell_waiting)
-
-
-def _tell_waiting() -> None:
-    messages.print('no worker is connected: waiting for one')
-
-
-def _print_summary(summary: dict) -> None:
-    """Print the result of a sweep for a person."""
-    table = Table(title=summary['sweep'], show_header=False, title_justify='left')
-    for field, value in summary.items():
-        if field not in ('sweep', 'file'):
-            table.add_row(field, f'{value:,}')
-    output.print(table)
-    output.print(f'result: {summary["file"]}', soft_wrap=True)

@@ -187,18 +187,7 @@ def unfounded(truth: Truth, rows: int) -> int:
 def judge(
     scenario: Scenario, truth: Truth, status: str, reason: str, begun_s: list[float]
 ) -> Verdict:
-    """What is wrong with a flight.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    truth : Truth
-        Of the flight.
-    status, reason : str
-        What its scorecard says.
-    begun_s : list of float
-        When faults began (s).
-    """
+    """What is wrong with a flight, by what its scorecard says and when faults began (s)."""
     if status == 'failed':
         return Verdict('not_finite', reason)
     for kind, why in (

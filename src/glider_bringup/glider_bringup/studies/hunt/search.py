@@ -2,23 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Flies missions with their faults and without, and shrinks what goes wrong."""
 
-import json
-import shlex
+from collections import Counter
 from typing import Any, NamedTuple
 
 from glider_bringup.engines.flight import fly
 from glider_bringup.mission.choices import Combination, combination_of
-from glider_bringup.mission.scenario import Scenario
+from glider_bringup.mission.scenario import Scenario, run_command
 from glider_bringup.scoring.card import fly_scored, scorecard
 from glider_bringup.studies.hunt.missions import Mission, draw_mission
 from glider_bringup.studies.hunt.oracle import Truth, Verdict, judge, unfounded
-from glider_bringup.studies.paper.limits import Check
+from glider_bringup.studies.paper.experiments import Experiment, told
+from glider_bringup.studies.paper.judges import Check
 from glider_bringup.studies.workers import Pool, Progress
 from glider_guard.rows import LATCHED, ROWS
 
 NAME = 'random_faults'
 #: What may go wrong with a flight with faults.
 KINDS = ('lost', 'untold', 'late', 'not_finite')
+#: What may with one without.
+FALSE = 'false_reaction'
 _TITLE = 'two or three random faults in random missions, and the same missions without'
 
 
@@ -78,48 +80,31 @@ def combinations(seed: int, flights: int) -> set[Combination]:
 def command(mission: Mission, faults: list[dict[str, Any]]) -> str:
     """Shell command that flies a mission with some faults again."""
     fields = {**mission.changes, 'faults': [*mission.aging, *faults]}
-    sets = ' '.join(
-        f'--set {shlex.quote(f"{field}={json.dumps(value)}")}' for field, value in fields.items()
-    )
-    return f'./glider run {mission.scenario} --engine direct --duration full {sets}'
+    return run_command(mission.scenario, fields, '--duration full')
 
 
 def search(seed: int, flights: int, pool: Pool, progress: Progress) -> dict[str, Any]:
     """Fly missions 0 to ``flights`` of a seed.
 
-    Returns
-    -------
-    dict
-        An entry of ``experiments.json``, and in it ``counts``: flights, lost, untold, late,
-        not_finite, false_reactions, hours.
+    Returns an entry of ``experiments.json``, and in it ``counts``: flights, lost, untold, late,
+    not_finite, false_reactions, hours.
     """
     places = {number: (seed, number) for number in range(flights)}
     flown = pool.results(_fly_mission, places, progress)
     rows = []
     for number, one in flown.items():
         mission = draw_mission(seed, number)
-        if one.verdict.kind:
-            said = one.verdict._asdict()
-            rows.append({'flight': number, **said, 'command': command(mission, one.faults)})
-        if one.latched:
-            said = {'kind': 'false_reaction', 'why': one.latched}
-            rows.append({'flight': number, **said, 'command': command(mission, [])})
-    counts: dict[str, Any] = {'flights': flights}
-    counts |= {kind: sum(row['kind'] == kind for row in rows) for kind in KINDS}
-    counts['false_reactions'] = sum(row['kind'] == 'false_reaction' for row in rows)
-    counts['hours'] = round(sum(one.hours for one in flown.values()), 1)
-    checks = [
-        Check(kind, counts[kind], 0, counts[kind] == 0) for kind in (*KINDS, 'false_reactions')
-    ]
-    return {
-        'name': NAME,
-        'group': NAME,
-        'section': '',
-        'title': f'{_TITLE}, seed {seed}',
-        'paper': '-',
-        'rows': rows,
-        'pid_better': [],
-        'checks': [check._asdict() for check in checks],
-        'counts': counts,
-        'verdict': 'passed' if all(check.passed for check in checks) else 'failed',
+        harms = [(one.verdict, one.faults)] if one.verdict.kind else []
+        harms += [(Verdict(FALSE, one.latched), [])] if one.latched else []
+        rows += [
+            {'flight': number, **said._asdict(), 'command': command(mission, faults)}
+            for said, faults in harms
+        ]
+    found = Counter(row['kind'] for row in rows)
+    wrong = {kind: found[kind] for kind in KINDS} | {'false_reactions': found[FALSE]}
+    hours = round(sum(one.hours for one in flown.values()), 1)
+    checks = [Check(kind, count, 0, count == 0) for kind, count in wrong.items()]
+    title = f'{_TITLE}, seed {seed}'
+    return told(Experiment(NAME, NAME, '', title, '-', [], lambda rows: checks), rows) | {
+        'counts': {'flights': flights, **wrong, 'hours': hours}
     }

@@ -123,3 +123,12 @@ def horizontal_speed(scenario: Scenario) -> float:
     polar = make_polar(load_vehicle(scenario.vehicle).params())
     pitch = -math.radians(scenario.profile.pitch_deg)
     return steady_horizontal_speed(pitch, scenario.profile.net_heaviness_kg, polar)
+
+
+#: Measurements by their name in the file of experiments.
+MEASURES = {
+    'attitude': measure_attitude,
+    'path': measure_path,
+    'survey': measure_survey,
+    'crab': measure_crab,
+}

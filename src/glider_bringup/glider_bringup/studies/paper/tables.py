@@ -8,8 +8,14 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from glider_bringup.studies.paper.limits import figure_of
-from glider_bringup.studies.paper.verdicts import PASSED, compared, is_better
+from glider_bringup.studies.paper.experiments import (
+    PASSED,
+    by_case,
+    compared,
+    described,
+    is_better,
+)
+from glider_bringup.studies.paper.judges import figure_of
 
 #: Failed checks that are listed; of more only the number is told.
 LISTED = 12
@@ -28,17 +34,12 @@ def _number(value: float | str | None, digits: int = 2) -> str:
 
 def _table(names: list[str], figures: list[str]) -> Table:
     """Empty table with columns of text and columns of figures."""
-    table = Table(title_justify='left')
+    table = Table()
     for name in names:
         table.add_column(name)
     for name in figures:
         table.add_column(name, justify='right')
     return table
-
-
-def _flown_by(row: dict) -> str:
-    """Who flew a row."""
-    return _LAW_NAMES[row['controller']]
 
 
 def _by_flight(figures: dict[str, str]) -> Callable[[list[dict]], Table]:
@@ -50,12 +51,10 @@ def _by_flight(figures: dict[str, str]) -> Callable[[list[dict]], Table]:
         ways = len({row['guidance'] for row in rows}) > 1
         names = ['case'] * cases + ['flown by'] + ['LOS'] * ways + ['status'] * flagged
         table = _table(names, list(figures.values()))
-        adaptive = {
-            (row['case'], row['guidance']): row for row in rows if row['controller'] == 'adaptive'
-        }
+        adaptive = by_case(rows, 'adaptive')
         for row in rows:
             rival = adaptive.get((row['case'], row['guidance']))
-            texts = [row['case']] * cases + [_flown_by(row)]
+            texts = [row['case']] * cases + [_LAW_NAMES[row['controller']]]
             texts += [row['guidance']] * ways + [row['status']] * flagged
             table.add_row(*texts, *(_marked(row, rival, name) for name in figures))
         return table
@@ -81,15 +80,11 @@ def _side_by_side(rows: list[dict]) -> Table:
     """One line for each case; in every column adaptive | tuned PID."""
     figures = dict(list(compared(rows).items())[:5])
     table = _table(['adaptive | tuned PID'], list(figures.values()))
-    for case in dict.fromkeys(row['case'] for row in rows):
-        adaptive, pid = (
-            next((row for row in rows if (row['case'], row['controller']) == (case, law)), None)
-            for law in _LAW_NAMES
-        )
-        cells = (
-            f'{_marked(adaptive, None, name)} | {_marked(pid, adaptive, name)}' for name in figures
-        )
-        table.add_row(case, *cells)
+    ours, theirs = (by_case(rows, law) for law in _LAW_NAMES)
+    for case in dict.fromkeys((row['case'], row['guidance']) for row in rows):
+        one, other = ours.get(case), theirs.get(case)
+        cells = (f'{_marked(one, None, name)} | {_marked(other, one, name)}' for name in figures)
+        table.add_row(case[0], *cells)
     return table
 
 
@@ -106,10 +101,7 @@ def _steering(rows: list[dict]) -> list[str]:
 def _survey(rows: list[dict]) -> Table:
     """Closest pass of each waypoint, and the heading in each leg."""
     legs = rows[0]['legs']
-    table = _table(
-        ['', *map(_flown_by, rows)],
-        [],
-    )
+    table = _table(['', *(_LAW_NAMES[row['controller']] for row in rows)], [])
     for i in range(len(rows[0]['waypoints_closest_m'])):
         passes = (f'{row["waypoints_closest_m"][i]:.2f} m' for row in rows)
         table.add_row(f'waypoint {i}, closest pass', *passes)
@@ -125,91 +117,55 @@ def _envelope(rows: list[dict]) -> Table:
     table = _table(['angle'], [f'{speed:g} kn' for speed in speeds])
     at = {(row['speed_kn'], row['angle_deg']): row for row in rows}
     for angle in sorted({row['angle_deg'] for row in rows}):
-        table.add_row(f'{angle:g} deg', *(_envelope_cell(at[speed, angle]) for speed in speeds))
+        cells = (
+            'x' if row['status'] == 'infeasible' else _number(row['cross_track_m']['max_all'], 1)
+            for row in (at[speed, angle] for speed in speeds)
+        )
+        table.add_row(f'{angle:g} deg', *cells)
     return table
 
 
-def _envelope_cell(row: dict) -> str:
-    if row['status'] == 'infeasible':
-        return 'x'
-    return _number(row['cross_track_m']['max_all'], 1)
-
-
-_YAW = _by_flight(
-    {
-        'heading_error_deg.rms_steady': 'error\nrms (deg)',
-        'heading_fluctuation_deg.rms_steady': 'fluct.\nrms (deg)',
-        'cross_track_m.max_steady': 'max\nsteady (m)',
-        'cross_track_m.max_all': 'max\nall (m)',
-        'cross_track_m.max_run': 'max\nrun (m)',
-    }
-)
-_PROFILE = _by_flight(
-    {
-        'depth_m.max': 'deepest\n(m)',
-        'trim.pitch_dive_deg': 'dive\n(deg)',
-        'trim.pitch_climb_deg': 'climb\n(deg)',
-        'pitch_error_deg.rms_steady': 'error\nrms',
-        'pitch_error_deg.max_steady': 'max\n(deg)',
-        'roll_deg.rms_steady': 'roll\nrms',
-        'roll_deg.max_steady': 'max\n(deg)',
-    }
-)
-_RECKONED = _by_flight(
-    {
-        'navigation.error_m.p50': 'error\np50 (m)',
-        'navigation.error_m.worst': 'error\nworst',
-        'navigation.from_fourth.surfacing_cross_track_m': 'beside\nfrom 4th',
-        'navigation.from_fourth.under_water_rms_m': 'under\nwater rms',
-        'navigation.dac_error_mps.rms': 'DAC rms\n(m/s)',
-        'navigation.ellipse_95_share': 'inside\n95 %',
-    }
-)
 _TABLES: dict[str, Callable[[list[dict]], Table]] = {
-    'yaw_10deg_pid': _YAW,
-    'yaw_10deg_adaptive': _YAW,
-    'profile': _PROFILE,
-    'robustness': _side_by_side,
-    'vehicles': _side_by_side,
-    'helix': _side_by_side,
-    'spline': _side_by_side,
+    'side_by_side': _side_by_side,
     'survey': _survey,
     'envelope': _envelope,
-    'vehicles_reckoned': _RECKONED,
-    'reckoned_12deg': _RECKONED,
-    'reckoned_rough': _RECKONED,
-    'reckoned_beliefs': _RECKONED,
-    'missed_fixes': _RECKONED,
-    'long_stays': _RECKONED,
-    'hard_seas': _RECKONED,
+    'yaw': _by_flight(
+        {
+            'heading_error_deg.rms_steady': 'error\nrms (deg)',
+            'heading_fluctuation_deg.rms_steady': 'fluct.\nrms (deg)',
+            'cross_track_m.max_steady': 'max\nsteady (m)',
+            'cross_track_m.max_all': 'max\nall (m)',
+            'cross_track_m.max_run': 'max\nrun (m)',
+        }
+    ),
+    'profile': _by_flight(
+        {
+            'depth_m.max': 'deepest\n(m)',
+            'trim.pitch_dive_deg': 'dive\n(deg)',
+            'trim.pitch_climb_deg': 'climb\n(deg)',
+            'pitch_error_deg.rms_steady': 'error\nrms',
+            'pitch_error_deg.max_steady': 'max\n(deg)',
+            'roll_deg.rms_steady': 'roll\nrms',
+            'roll_deg.max_steady': 'max\n(deg)',
+        }
+    ),
+    'reckoned': _by_flight(
+        {
+            'navigation.error_m.p50': 'error\np50 (m)',
+            'navigation.error_m.worst': 'error\nworst',
+            'navigation.from_fourth.surfacing_cross_track_m': 'beside\nfrom 4th',
+            'navigation.from_fourth.under_water_rms_m': 'under\nwater rms',
+            'navigation.dac_error_mps.rms': 'DAC rms\n(m/s)',
+            'navigation.ellipse_95_share': 'inside\n95 %',
+        }
+    ),
 }
-_RECKONED_REMARK = (
-    'Error: of the believed place when it comes up. Beside: largest true distance from the path '
-    'where it comes up, from the fourth surfacing on; under water from then on. DAC: how far the '
-    'mean current of a way, as it is believed after its fixes, is off the true one.'
-)
 _REMARKS = {
-    'vehicles_reckoned': _RECKONED_REMARK,
-    'reckoned_12deg': _RECKONED_REMARK,
-    'reckoned_rough': _RECKONED_REMARK,
-    'reckoned_beliefs': _RECKONED_REMARK,
-    'missed_fixes': _RECKONED_REMARK,
-    'long_stays': _RECKONED_REMARK,
-    'hard_seas': _RECKONED_REMARK,
-    'robustness': (
-        'The PID is told the steering of the vehicle file, also where the plant differs from it; '
-        'PID of zhang2021: that of another vehicle. '
-        'A roll mass that is stuck altogether leaves a glider without steering: it keeps a third '
-        'of its travel.'
-    ),
-    'vehicles': (
-        'zhang2021, seawing and seaglider dive to 1000 m and are steered by roll, slocum_g2 to '
-        '200 m by its fin; the PID is told how each steers.'
-    ),
-    'envelope': (
-        'Largest cross-track error with turns (m). x: no heading can hold the course; the run was '
-        'flagged infeasible, and held the best crab.'
-    ),
+    'reckoned': (
+        'Error: of the believed place when it comes up. Beside: largest true distance from the '
+        'path where it comes up, from the fourth surfacing on; under water from then on. DAC: how '
+        'far the mean current of a way, as it is believed after its fixes, is off the true one.'
+    )
 }
 
 
@@ -222,15 +178,17 @@ def show(result: dict[str, Any], output: Console) -> None:
             _show_search(one, output)
             _show_verdict(one, output)
             continue
-        make = _TABLES.get(one['name']) or _by_flight(compared(one['rows']))
+        said = described(one['name'])
+        make = _TABLES.get(said.get('table')) or _by_flight(compared(one['rows']))
         output.print(f'\n{head}\npaper: {one["paper"]}', soft_wrap=True)
         output.print(make(one['rows']))
         if one['pid_better'] and make is not _survey:
             output.print(f'{BETTER} the tuned PID is better than the adaptive law')
         for line in _steering(one['rows']):
             output.print(line)
-        if one['name'] in _REMARKS:
-            output.print(_REMARKS[one['name']])
+        remark = said.get('remark') or _REMARKS.get(said.get('table'))
+        if remark:
+            output.print(remark)
         _show_verdict(one, output)
     verdicts = [one['verdict'] for one in result['experiments']]
     output.print(f'\n{verdicts.count(PASSED)} of {len(verdicts)} experiments passed')
@@ -251,10 +209,9 @@ def _show_search(one: dict[str, Any], output: Console) -> None:
 def _show_verdict(one: dict[str, Any], output: Console) -> None:
     """Print the verdict, and the checks that failed."""
     failed = [check for check in one['checks'] if not check['passed']]
-    count = len(one['checks'])
+    count, style = len(one['checks']), 'green' if one['verdict'] == PASSED else 'red'
     output.print(
-        f'verdict: {one["verdict"]} ({count - len(failed)} of {count} checks)',
-        style='green' if one['verdict'] == PASSED else 'red',
+        f'verdict: {one["verdict"]} ({count - len(failed)} of {count} checks)', style=style
     )
     for check in failed[:LISTED]:
         value, limit = _number(check['value'], 3), _number(check['limit'], 3)

@@ -7,8 +7,8 @@ depends on the inputs alone: not on the workers, their order, or interruptions.
 """
 
 import hashlib
-import math
 from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
 from socket import gethostname
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ from glider_bringup.mission.disk import whole_file
 from glider_bringup.mission.planned import planned_ticks
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario, ScenarioSource, make_scenario
-from glider_bringup.scoring.card import fly_scored, scorecard
+from glider_bringup.scoring.card import finite, fly_scored, scorecard
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.studies.sweep.journal import Journal
 from glider_bringup.studies.sweep.netcdf import (
@@ -82,17 +82,9 @@ class Chunk(NamedTuple):
 
 
 def fly_chunk(chunk: Chunk) -> list[dict[str, Any]]:
-    """Fly cells.
+    """Fly cells: for each its number ``cell``, ``status``, ``reason``, and ``figures`` by name.
 
-    Returns
-    -------
-    list of dict
-        For each its number ``cell``, ``status``, ``reason``, and ``figures`` by name.
-
-    Raises
-    ------
-    WorkError
-        If this worker would fly another vehicle.
+    Raises WorkError if this worker would fly another vehicle.
     """
     return [{'cell': cell, **_fly_cell(chunk.inputs, changes)} for cell, changes in chunk.cells]
 
@@ -128,7 +120,7 @@ def failure(reason: str) -> dict[str, Any]:
 def judge(card: dict[str, Any]) -> dict[str, Any]:
     """Record of a cell from its scorecard; figures that are not finite make it a failure."""
     figures = dict(_figures(card))
-    wrong = [name for name, figure in figures.items() if not _is_finite(figure)]
+    wrong = [name for name, figure in figures.items() if finite(figure) != figure]
     status, reason = card['status'], card['reason']
     if wrong:
         status, reason = FAILED, f'not finite: {", ".join(wrong)}'
@@ -150,11 +142,6 @@ def _figures(card: dict[str, Any], before: str = '') -> Iterator[tuple[str, Any]
             yield before + name, value
 
 
-def _is_finite(figure: Any) -> bool:
-    numbers = figure if isinstance(figure, list) else [figure]
-    return all(number is None or math.isfinite(number) for number in numbers)
-
-
 # ---------------------------------------------------------------------------------- here
 
 
@@ -168,11 +155,8 @@ def result_names(scenario: Scenario) -> set[str]:
 def open_journal(plan: Plan, folder: Path, resume: bool) -> Journal:
     """Journal of a sweep in its folder, which is made.
 
-    Raises
-    ------
-    ConfigurationError
-        If the folder cannot be used or holds something else, or a dimension is called like what a
-        result has.
+    Raises ConfigurationError if the folder cannot be used or holds something else, or a dimension
+    is called like what a result has.
     """
     taken = result_names(plan.first)
     for axis in plan.axes:
@@ -212,14 +196,8 @@ def make_chunks(plan: Plan, known: bytearray, threads: int) -> Iterator[Chunk]:
     cell_s = planned_ticks(plan.first) * TICK_S
     share = known.count(0) // (CHUNKS_EACH * max(1, threads))
     size = max(1, min(CHUNK_CELLS, share, int(CHUNK_S / cell_s)))
-    cells: list[tuple[int, dict[str, Any]]] = []
-    for cell in range(plan.cells):
-        if not known[cell]:
-            cells.append((cell, plan.changes(cell)))
-        if len(cells) == size:
-            yield Chunk(inputs, cells)
-            cells = []
-    if cells:
+    unknown = (cell for cell in range(plan.cells) if not known[cell])
+    while cells := [(cell, plan.changes(cell)) for cell in islice(unknown, size)]:
         yield Chunk(inputs, cells)
 
 
@@ -231,24 +209,11 @@ def fly_sweep(
     progress: Progress,
     on_wait: Callable[[], None],
 ) -> None:
-    """Fly all cells that the journal does not know yet, into the journal.
+    """Fly all cells that the journal does not know yet (`flown_cells`), into the journal.
 
-    Parameters
-    ----------
-    plan : Plan
-    journal : Journal
-    known : bytearray
-        What `flown_cells` says.
-    pool : Pool
-    progress : callable
-        Called with the number of cells that are known.
-    on_wait : callable
-        Called every few seconds while there is no worker.
-
-    Raises
-    ------
-    WorkError
-        If the scheduler is gone, or a worker has another program or other files.
+    ``progress`` is called with the number of cells that are known, ``on_wait`` every few seconds
+    while there is no worker. Raises WorkError if the scheduler is gone, or a worker has another
+    program or other files.
     """
     done = sum(known)
     progress(done)
@@ -264,17 +229,9 @@ def fly_sweep(
 
 
 def write_result(plan: Plan, journal: Journal, file: Path) -> dict[str, Any]:
-    """Write the NetCDF file of a sweep whose cells are all known.
+    """Write the NetCDF file of a sweep whose cells are all known, if it can be written.
 
-    Returns
-    -------
-    dict
-        Summary: ``sweep``, ``file``, ``cells``, and how many of each status.
-
-    Raises
-    ------
-    ConfigurationError
-        If the file cannot be written.
+    Returns its summary: ``sweep``, ``file``, ``cells``, and how many of each status.
     """
     dataset = make_dataset(plan, journal.records(), STATUSES)
     with whole_file(file) as stream:
@@ -290,16 +247,9 @@ def write_result(plan: Plan, journal: Journal, file: Path) -> dict[str, Any]:
 
 def failures(plan: Plan, journal: Journal) -> list[dict[str, Any]]:
     """Coordinates of every cell that failed, why, and the command that flies it again."""
-    failed = {
-        record['cell']: record['reason']
-        for record in journal.records()
-        if record['status'] == FAILED
-    }
+    records = (one for one in journal.records() if one['status'] == FAILED)
+    failed = {one['cell']: one['reason'] for one in records}
     return [
-        {
-            'coordinates': plan.coordinates(cell),
-            'reason': failed[cell],
-            'command': plan.command(cell),
-        }
-        for cell in sorted(failed)
+        {'coordinates': plan.coordinates(cell), 'reason': reason, 'command': plan.command(cell)}
+        for cell, reason in sorted(failed.items())
     ]

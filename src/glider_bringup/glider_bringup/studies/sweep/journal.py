@@ -10,6 +10,7 @@ import fcntl
 import json
 import os
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -21,19 +22,8 @@ from glider_model.base.settings import ConfigurationError
 class Journal:
     """A journal that is open; no second process can open it.
 
-    Parameters
-    ----------
-    path : Path
-        Its file.
-    head : dict
-        What the sweep is: a journal of another one is refused.
-    resume : bool
-        Whether the file is there already, and is continued.
-
-    Raises
-    ------
-    ConfigurationError
-        If the file cannot be used.
+    ``head`` is what the sweep is: a journal of another one is refused. With ``resume`` the file is
+    there already, and is continued. Raises ConfigurationError if it cannot be used.
     """
 
     def __init__(self, path: Path, head: dict[str, Any], resume: bool) -> None:
@@ -61,7 +51,7 @@ class Journal:
             if self._end:
                 self._check(head)
             else:
-                self._write([head])
+                self.append([head])
         except BaseException:
             self.close()
             raise
@@ -79,10 +69,7 @@ class Journal:
     def _whole_lines(self) -> int:
         """Length of the file up to the last line that was written to its end.
 
-        Raises
-        ------
-        ConfigurationError
-            If a line before the last is damaged: something else than this program has written.
+        If a line before it is damaged, something else than this program has written.
         """
         end, bad = 0, 0
         self._file.seek(0)
@@ -111,26 +98,17 @@ class Journal:
 
     def _lines(self) -> Iterator[dict[str, Any]]:
         with self.path.open('rb') as file:
-            for line in file:
-                yield json.loads(line)
+            yield from map(json.loads, file)
 
     def records(self) -> Iterator[dict[str, Any]]:
         """Records in the order in which they came."""
-        lines = self._lines()
-        next(lines)
-        yield from lines
+        return islice(self._lines(), 1, None)
 
     def append(self, records: list[dict[str, Any]]) -> None:
         """Write records, so that they outlive the machine.
 
-        Raises
-        ------
-        DiskError
-            If they cannot be written, as on a full disk; what was there before is.
+        Raises DiskError if they cannot be written, as on a full disk; what was there before is.
         """
-        self._write(records)
-
-    def _write(self, records: list[dict[str, Any]]) -> None:
         text = b''.join(json.dumps(record).encode() + b'\n' for record in records)
         try:
             written = self._file.write(text)

@@ -91,13 +91,8 @@ def make_dataset(
 ) -> xarray.Dataset:
     """Dataset of a sweep.
 
-    Parameters
-    ----------
-    plan : Plan
-    records : iterable of dict
-        What `glider_bringup.studies.sweep.fly.fly_chunk` says of every cell, in any order.
-    statuses : tuple of str
-        Names of the values of the variable ``status``.
+    Of what `glider_bringup.studies.sweep.fly.fly_chunk` says of every cell, in any order;
+    ``statuses`` are names of the values of the variable ``status``.
     """
     status = np.full(plan.cells, -1, dtype=np.int8)
     reasons = np.full(plan.cells, '', dtype=object)
@@ -113,22 +108,16 @@ def make_dataset(
             if figure is not None:
                 figures[name][cell] = figure
     dimensions = [axis.name for axis in plan.axes]
+    flags = {
+        'long_name': 'how the flight ended',
+        'flag_values': np.arange(len(statuses), dtype=np.int8),
+        'flag_meanings': ' '.join(statuses),
+    }
+    why = {'long_name': 'why the cell failed; empty if it did not'}
     dataset = xarray.Dataset(
         {
-            'status': (
-                dimensions,
-                status.reshape(plan.shape),
-                {
-                    'long_name': 'how the flight ended',
-                    'flag_values': np.arange(len(statuses), dtype=np.int8),
-                    'flag_meanings': ' '.join(statuses),
-                },
-            ),
-            'reason': (
-                dimensions,
-                reasons.reshape(plan.shape),
-                {'long_name': 'why the cell failed; empty if it did not'},
-            ),
+            'status': (dimensions, status.reshape(plan.shape), flags),
+            'reason': (dimensions, reasons.reshape(plan.shape), why),
         },
         coords={axis.name: _coordinate(axis) for axis in plan.axes},
         attrs=_attributes(plan),
@@ -170,12 +159,6 @@ def write_dataset(dataset: xarray.Dataset, file: Path) -> None:
 
 
 def read_dataset(file: Path) -> xarray.Dataset:
-    """Read the result of a sweep into memory.
-
-    Raises
-    ------
-    OSError, ValueError
-        If the file cannot be read.
-    """
+    """Read the result of a sweep into memory; OSError or ValueError if it cannot be read."""
     with xarray.open_dataset(file, engine='scipy') as dataset:
         return dataset.load()

@@ -8,9 +8,9 @@ is a mission that ``./glider run`` can fly by itself.
 """
 
 import hashlib
+import itertools
 import json
 import math
-import shlex
 from collections.abc import Iterable
 from decimal import Decimal
 from functools import cached_property, partial
@@ -28,6 +28,7 @@ from glider_bringup.mission.scenario import (
     make_scenario,
     overlap,
     read_scenario,
+    run_command,
     scenario_names,
 )
 from glider_model.base.files import is_file, read_text, read_yaml, yaml_line
@@ -55,12 +56,9 @@ Value = bool | int | float | str
 
 
 class _FieldDimension(Settings):
-    """A dimension over one field of the scenario."""
+    """A dimension over one field of the scenario, whose values `_numbers` gives."""
 
     field: str = Field(description='scenario field by its dotted name, such as current.speed_kn')
-
-    def _numbers(self) -> list[Value]:
-        raise NotImplementedError
 
     def steps(self) -> list[tuple[Value, dict[str, Any]]]:
         """Coordinate and fields of each step."""
@@ -78,7 +76,8 @@ class ValuesDimension(_FieldDimension):
     @pydantic.field_validator('values')
     @classmethod
     def _alike(cls, values: list[Value]) -> list[Value]:
-        kinds = {_coordinate_kind(value) for value in values}
+        names = {bool: 'true or false', str: 'text'}
+        kinds = {names.get(type(value), 'numbers') for value in values}
         if len(kinds) > 1:
             raise ValueError(f'values must be of one kind, found {" and ".join(sorted(kinds))}')
         twice = sorted({str(value) for value in values if values.count(value) > 1})
@@ -116,22 +115,20 @@ class GridDimension(_FieldDimension):
 
 
 class _DrawnDimension(_FieldDimension):
-    """Values drawn at random, in increasing order."""
+    """Values drawn at random by `_draw`, in increasing order."""
 
     samples: int = Field(ge=1, le=MAX_VALUES, description='number of values')
     seed: int = Field(ge=0, le=2**62, description='seed of the draw')
-
-    def _draw(self, draw: np.random.Generator) -> np.ndarray:
-        raise NotImplementedError
 
     def _numbers(self) -> list[Value]:
         draw = np.random.Generator(np.random.PCG64(self.seed))
         return [float(value) for value in np.sort(self._draw(draw))]
 
 
-class _IntervalDimension(_DrawnDimension):
-    """Values drawn from an interval."""
+class UniformDimension(_DrawnDimension):
+    """Values drawn uniformly."""
 
+    kind: Literal['uniform']
     low: float = Field(description='least value')
     high: float = Field(description='largest value')
 
@@ -145,13 +142,7 @@ class _IntervalDimension(_DrawnDimension):
         return draw.uniform(self.low, self.high, self.samples)
 
 
-class UniformDimension(_IntervalDimension):
-    """Values drawn uniformly."""
-
-    kind: Literal['uniform']
-
-
-class LogUniformDimension(_IntervalDimension):
+class LogUniformDimension(UniformDimension):
     """Values whose logarithm is drawn uniformly."""
 
     kind: Literal['log_uniform']
@@ -214,12 +205,6 @@ class Sweep(Settings):
     )
 
 
-def _coordinate_kind(value: Value) -> str:
-    if isinstance(value, bool):
-        return 'true or false'
-    return 'text' if isinstance(value, str) else 'numbers'
-
-
 # ---------------------------------------------------------------------------------- what it means
 
 
@@ -233,19 +218,11 @@ class Axis(NamedTuple):
 
 
 class Plan:
-    """The cells of a sweep.
+    """The cells of a sweep, by its file.
 
-    Parameters
-    ----------
-    path : Path
-        Its file.
-    changes : dict, optional
-        Scenario fields of every cell by dotted name, before those that the file sets.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming file, field, value and what is allowed, for every value of every dimension.
+    ``changes`` are scenario fields of every cell by dotted name, before those that the file sets.
+    Raises ConfigurationError, naming file, field, value and what is allowed, for every value of
+    every dimension.
     """
 
     def __init__(self, path: Path, changes: dict[str, Any] | None = None) -> None:
@@ -274,15 +251,11 @@ class Plan:
             raise ConfigurationError(f'{path}: {error}') from None
         checked = self._check_values()
         #: laws and methods that cells may have
+        found = [combination_of(one) for one in checked]
+        steered = {steers_by(one): its.steered for one, its in zip(checked, found, strict=True)}
+        parts = [dict.fromkeys(part) for part in zip(*(its[:-1] for its in found), strict=True)]
         self.combinations = [
-            Combination(law, method, navigation, breaks, steered)
-            for law in dict.fromkeys(one.control.law for one in checked)
-            for method in dict.fromkeys(one.guidance.los.method for one in checked)
-            for navigation in dict.fromkeys(one.navigation.method for one in checked)
-            for breaks in dict.fromkeys(bool(one.vehicle_faults) for one in checked)
-            for steered in {
-                steers_by(one): combination_of(one).steered for one in checked
-            }.values()
+            Combination(*them) for them in itertools.product(*parts, steered.values())
         ]
         vehicles: dict[Path, str] = {}  # one of every vehicle file
         for one in checked:
@@ -323,10 +296,7 @@ class Plan:
     def _check_values(self) -> list[Scenario]:
         """Check every value of every dimension, beside the first of all others.
 
-        Returns
-        -------
-        list of Scenario
-            One for each value of each dimension, the first cell's first.
+        Returns a scenario for each, the first cell's first.
         """
         checked = []
         for number, axis in enumerate(self.axes):
@@ -337,17 +307,13 @@ class Plan:
                     checked.append(make_scenario(self.source, self._changes(places)))
                 except ConfigurationError as error:
                     where = f'{self.path}: dimensions.{axis.name}: {value}'
-                    lines = str(error).splitlines()
-                    raise ConfigurationError(
-                        '\n'.join(f'{where}: {line}' for line in lines)
-                    ) from None
+                    lines = (f'{where}: {line}' for line in str(error).splitlines())
+                    raise ConfigurationError('\n'.join(lines)) from None
         return checked
 
     def _changes(self, places: Iterable[int]) -> dict[str, Any]:
-        changes = dict(self.common)
-        for axis, place in zip(self.axes, places, strict=True):
-            changes.update(axis.changes[place])
-        return changes
+        steps = (axis.changes[place] for axis, place in zip(self.axes, places, strict=True))
+        return {field: value for one in (self.common, *steps) for field, value in one.items()}
 
     def _places(self, cell: int) -> list[int]:
         """Place of a cell along each dimension."""
@@ -364,10 +330,7 @@ class Plan:
 
     def command(self, cell: int) -> str:
         """Shell command that flies a cell by itself, where the sweep was started."""
-        changes = self.changes(cell).items()
-        sets = [f'--set {shlex.quote(f"{field}={json.dumps(value)}")}' for field, value in changes]
-        name = shlex.quote(self._scenario_name())
-        return ' '.join(['./glider run', name, '--engine direct', *sets])
+        return run_command(self._scenario_name(), self.changes(cell))
 
     @cached_property
     def first(self) -> Scenario:
@@ -418,22 +381,10 @@ def _validate(path: Path) -> Sweep:
 
 
 def read_sweep(name: str) -> Sweep:
-    """Sweep given by name or by path, as its file says it.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming file, field, value and what is allowed.
-    """
+    """Sweep given by name or by path, as its file says it; errors are those of `Plan`."""
     return _validate(find_file('sweep', name, SWEEP_FOLDER))
 
 
 def load_sweep(name: str, changes: dict[str, Any] | None = None) -> Plan:
-    """Plan of a sweep given by name or by path, with some fields changed; see `Plan`.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming file, field, value and what is allowed.
-    """
+    """Plan of a sweep given by name or by path, with some fields changed; see `Plan`."""
     return Plan(find_file('sweep', name, SWEEP_FOLDER), changes)
