@@ -22,8 +22,8 @@ from typing import Annotated, Literal
 import typer
 from rich.table import Table
 
+from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED
 from glider_bringup.console import Json, messages, output, picked, repeatable
-from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED
 
 #: Modules of this folder, in the order in which they are measured.
 SECTIONS = ('compute', 'memory', 'nodes', 'nodes_memory', 'sweep', 'against')

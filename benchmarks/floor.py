@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from glider_model.base import signals
+from glider_base import signals
 from glider_model.plant import exponential, motion, plant
 from glider_model.vehicle import hydrodynamics, rigid_body
 

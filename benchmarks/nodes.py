@@ -16,13 +16,13 @@ from pathlib import Path
 from statistics import mean, median
 from tempfile import TemporaryDirectory
 
+from glider_base.ros.places import domain_id
 from glider_bringup.engines.flight import Outcome, Progress
 from glider_bringup.engines.memory import memory_mb
 from glider_bringup.engines.processes import Layout, node_environment
 from glider_bringup.engines.recorded import fly_nodes
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_model.ros.places import domain_id
 
 SCENARIO, DURATION_S = 'current_8deg', 2000.0
 REPEATS = 3

@@ -11,9 +11,9 @@ from collections.abc import Callable
 
 from nodes import fly_over_topics
 
+from glider_base.signals import TICK_S
 from glider_bringup.engines.memory import growth_mb_per_h, memory_mb
 from glider_bringup.engines.processes import process_modules
-from glider_model.base.signals import TICK_S
 
 HOURS, MISSION_HOURS = 1.0, 30.0
 PROCESSES = tuple(process_modules('together'))

@@ -24,8 +24,8 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
-from glider_model.base.signals import Joints, Water
-from glider_model.base.wiring import PLANT, SENSORS
+from glider_base.signals import Joints, Water
+from glider_base.wiring import PLANT, SENSORS
 from glider_model.plant.block import plant_outputs
 from glider_model.plant.plant import PlantSettings, plant_step
 

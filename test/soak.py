@@ -12,10 +12,10 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED
+from glider_base.signals import TICK_S
 from glider_bringup.console import Json, messages, number, output, progress, tell
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED
-from glider_model.base.signals import TICK_S
 
 app = typer.Typer(pretty_exceptions_enable=False)
 #: Memory is looked at so often (s of wall time).

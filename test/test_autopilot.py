@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import pytest
 
+from glider_base.ros.places import domain_id
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import (
     AUTOPILOT,
@@ -25,7 +26,6 @@ from glider_bringup.engines.recorded import fly_nodes, fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.scoring.score import make_scorer, scores_of
-from glider_model.ros.places import domain_id
 
 CHANGES = {'dives': 0, 'duration_s': 200.0, 'navigation.method': 'dead_reckoned'}
 DEADLINE_S = 120.0

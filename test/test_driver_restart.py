@@ -19,6 +19,9 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 
+from glider_base.ros.lockstep import health
+from glider_base.ros.places import domain_id
+from glider_base.ros.wire import qos
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import (
     AUTOPILOT,
@@ -27,9 +30,6 @@ from glider_bringup.engines.processes import (
     node_environment,
 )
 from glider_bringup.mission.scenario import load_scenario
-from glider_model.ros.lockstep import health
-from glider_model.ros.places import domain_id
-from glider_model.ros.wire import qos
 
 EXAMPLES = Path(__file__).resolve().parents[1] / 'examples'
 #: A vehicle that glides down whatever happens, by the clock of the machine, and whose actuators

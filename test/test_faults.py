@@ -18,12 +18,12 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 
+from glider_base.ros.wire.topics import recorded_topics
+from glider_base.signals import TICK_NS
 from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive
 from glider_bringup.engines.processes import MODULES, PLANT, STACK, process_modules
 from glider_bringup.mission.scenario import SCENARIO_FOLDER
-from glider_model.base.signals import TICK_NS
-from glider_model.ros.wire.topics import recorded_topics
 from glider_model.vehicle.file import vehicle_path
 
 PER_TICK = [

@@ -17,6 +17,17 @@ import rclpy
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
+from glider_base import files
+from glider_base.errors import MAX_LINE, MAX_LINES, MAX_SHOWN
+from glider_base.plugins import registered
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.clock import ClockSettings
+from glider_base.ros.lockstep.node import TickSettings
+from glider_base.ros.places import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
+from glider_base.ros.wire import qos
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.settings import Settings
+from glider_base.wiring import JOINTS, present
 from glider_bringup.cli import MAX_WORD
 from glider_bringup.engines.launch_plan import ARGUMENTS
 from glider_bringup.mission.scenario import Scenario
@@ -30,11 +41,6 @@ from glider_guidance.nodes.guidance_node import GuidanceNode
 from glider_guidance.path.settings import PathSettings, WaypointPath
 from glider_guidance.settings import GuidanceSettings
 from glider_guidance.yo.stage import STAGE_NAMES
-from glider_model.base import files
-from glider_model.base.errors import MAX_LINE, MAX_LINES, MAX_SHOWN
-from glider_model.base.plugins import registered
-from glider_model.base.settings import Settings
-from glider_model.base.wiring import JOINTS, present
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
 from glider_model.nodes.tf_node import TfSettings
@@ -42,12 +48,6 @@ from glider_model.ocean.columns import MAX_ROWS
 from glider_model.ocean.current_settings import CurrentComponent, CurrentField, CurrentSettings
 from glider_model.plant.faults.settings import Fault, FaultSettings
 from glider_model.plant.plant import PlantSettings
-from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.clock import ClockSettings
-from glider_model.ros.lockstep.node import TickSettings
-from glider_model.ros.places import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
-from glider_model.ros.wire import qos
-from glider_model.ros.wire.topics import TOPICS
 from glider_navigation.nodes.navigation_node import NavigationNode
 from glider_navigation.phase import PHASE_NAMES
 from glider_navigation.settings import NavigationSettings

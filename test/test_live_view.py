@@ -20,7 +20,7 @@ from rosbags.typesys import Stores, get_typestore
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from glider_model.ros.wire.topics import TOPICS, recorded_topics
+from glider_base.ros.wire.topics import TOPICS, recorded_topics
 
 DEADLINE_S = 200.0
 RECORDED = {topic.full_name('/glider'): topic for topic in recorded_topics(['measured_odom'])}

@@ -20,9 +20,9 @@ import pytest
 import xarray
 import yaml
 
+from glider_base import kernel_cache
+from glider_base.ros.wire.topics import recorded_topics
 from glider_bringup.recording.mcap_reader import Bag
-from glider_model.base import kernel_cache
-from glider_model.ros.wire.topics import recorded_topics
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES, DOCUMENT = ROOT / 'examples', ROOT / 'docs' / 'your_law.md'

@@ -13,14 +13,14 @@ import pytest
 import yaml
 from mcap.reader import make_reader
 
+from glider_base.ros.wire.topics import TOPICS, recorded_topics
+from glider_base.signals import TICK_S
+from glider_base.wiring import BELIEFS
 from glider_bringup.blocks import COLUMNS
 from glider_bringup.engines.processes import MODULES, RECORDER, node_commands, run_nodes
 from glider_bringup.mission.run_folder import PARAMETERS_FILE
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros.recorded_log import RecordedLog
-from glider_model.base.signals import TICK_S
-from glider_model.base.wiring import BELIEFS
-from glider_model.ros.wire.topics import TOPICS, recorded_topics
 
 #: Topics of a flight with position known.
 PER_TICK = [
@@ -53,7 +53,7 @@ import runpy, sys
 import rclpy.executors, rclpy.node
 name = 'rclpy.impl.implementation_singleton'
 internals, sys.modules[name] = sys.modules[name], None
-from glider_model.ros.lockstep import executor
+from glider_base.ros.lockstep import executor
 sys.modules[name] = internals
 assert not executor.can_take() and not executor.can_wait()
 runpy.run_module(sys.argv.pop(1), run_name='__main__', alter_sys=True)
@@ -63,7 +63,7 @@ runpy.run_module(sys.argv.pop(1), run_name='__main__', alter_sys=True)
 SLOW_RECORDER = """
 import sys, time
 from glider_bringup.nodes import recorder_node
-from glider_model.ros.lockstep.health import READY
+from glider_base.ros.lockstep.health import READY
 
 class SlowRecorder(recorder_node.RecorderNode):
     def report(self, phase, *args, **fields):

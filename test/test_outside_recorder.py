@@ -14,15 +14,8 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import SetBool
 
-from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.engines.processes import PLANT, RECORDER, node_commands
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.recording.ros.rosbag2 import message_definition
-from glider_bringup.scoring.again import score_again
-from glider_model.base.wiring import readers
-from glider_model.ros.places import domain_id
-from glider_model.ros.wire.topics import (
+from glider_base.ros.places import domain_id
+from glider_base.ros.wire.topics import (
     CONTROL,
     CURRENT,
     GUARD,
@@ -31,6 +24,13 @@ from glider_model.ros.wire.topics import (
     TOPICS,
     recorded_topics,
 )
+from glider_base.wiring import readers
+from glider_bringup.engines.node_parameters import node_parameters, write_parameters
+from glider_bringup.engines.processes import PLANT, RECORDER, node_commands
+from glider_bringup.mission.run_folder import make_run_folder
+from glider_bringup.mission.scenario import load_scenario
+from glider_bringup.recording.ros.rosbag2 import message_definition
+from glider_bringup.scoring.again import score_again
 
 TICKS = 400
 DEADLINE_S = 200.0  #: at worst with every kernel to compile

@@ -21,8 +21,8 @@ import yaml
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
+from glider_base.ros.wire.topics import TOPICS
 from glider_bringup.recording.mcap_reader import Bag
-from glider_model.ros.wire.topics import TOPICS
 from glider_model.vehicle.file import vehicle_path
 
 DEADLINE_S = 300.0
@@ -52,7 +52,7 @@ PLANT = '''
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 from glider_model.vehicle.quantity import quantity
 from glider_model.vehicle.surface import SurfaceSettings, surface_loads
 
@@ -84,8 +84,8 @@ from typing import NamedTuple
 from pydantic import Field
 
 from glider_control.surface import SurfaceLawSettings, steer
-from glider_model.base.frames import wrap_angle
-from glider_model.base.kernel import kernel
+from glider_base.frames import wrap_angle
+from glider_base.kernel import kernel
 
 
 class RudderLawSettings(SurfaceLawSettings):

@@ -16,20 +16,20 @@ from rclpy.context import Context
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
+from glider_base.ros.lockstep.executor import make_executor
+from glider_base.ros.places import domain_id
+from glider_base.ros.wire import qos
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.signals import TICK_NS, TICK_S
+from glider_base.wiring import PLANT
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.mission.scenario import load_scenario
 from glider_control.nodes.control_node import ControlNode
 from glider_guard.nodes.guard_node import GuardNode
 from glider_guidance.nodes.guidance_node import GuidanceNode
-from glider_model.base.signals import TICK_NS, TICK_S
-from glider_model.base.wiring import PLANT
 from glider_model.plant.block import plant_move, plant_outputs
-from glider_model.ros.lockstep.executor import make_executor
-from glider_model.ros.places import domain_id
-from glider_model.ros.wire import qos
-from glider_model.ros.wire.codec import to_cdr
-from glider_model.ros.wire.topics import TOPICS
 
 FLIGHT = {'profile.prepare_s': 0.0, 'profile.depth_m': 60.0}
 DURATION_S = 600.0

@@ -13,9 +13,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 
+from glider_base.ros.places import domain_id
+from glider_base.ros.wire.topics import recorded_topics
 from glider_bringup.engines.processes import node_environment
-from glider_model.ros.places import domain_id
-from glider_model.ros.wire.topics import recorded_topics
 
 GLIDER = [sys.executable, '-m', 'glider_bringup.cli']
 DEADLINE_S = 300.0

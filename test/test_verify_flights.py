@@ -19,6 +19,22 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
+from glider_base.errors import EXIT_SURFACED
+from glider_base.frames import (
+    odometry_from_wire,
+    odometry_to_wire,
+    reference_from_wire,
+    reference_to_wire,
+    water_to_wire,
+    wrench_to_wire,
+)
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.orders import ABORT, PARAMETERS_SET
+from glider_base.ros.places import NAMESPACE, domain_id
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.qos import EVENTS
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.signals import TICK_S, Joints, Water
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.ros.rosbag2 import BagWriter
@@ -27,23 +43,7 @@ from glider_control.control import control_step
 from glider_guidance import block as guidance
 from glider_guidance.guidance import guidance_abort, guidance_step
 from glider_guidance.nodes.guidance_node import path_message
-from glider_model.base.errors import EXIT_SURFACED
-from glider_model.base.frames import (
-    odometry_from_wire,
-    odometry_to_wire,
-    reference_from_wire,
-    reference_to_wire,
-    water_to_wire,
-    wrench_to_wire,
-)
-from glider_model.base.signals import TICK_S, Joints, Water
 from glider_model.plant.plant import plant_odometry, plant_step
-from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.orders import ABORT, PARAMETERS_SET
-from glider_model.ros.places import NAMESPACE, domain_id
-from glider_model.ros.wire.codec import to_cdr
-from glider_model.ros.wire.qos import EVENTS
-from glider_model.ros.wire.topics import TOPICS
 
 DEADLINE_S = 200.0
 

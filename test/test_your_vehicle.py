@@ -28,6 +28,13 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
+from glider_base.ros.lockstep import health
+from glider_base.ros.places import domain_id
+from glider_base.ros.wire import qos
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.signals import TICK_S
+from glider_base.wiring import NAVIGATION
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
@@ -38,13 +45,6 @@ from glider_bringup.engines.processes import (
     node_environment,
 )
 from glider_bringup.mission.scenario import load_scenario
-from glider_model.base.signals import TICK_S
-from glider_model.base.wiring import NAVIGATION
-from glider_model.ros.lockstep import health
-from glider_model.ros.places import domain_id
-from glider_model.ros.wire import qos
-from glider_model.ros.wire.codec import to_cdr
-from glider_model.ros.wire.topics import TOPICS
 
 STAND_IN = Path(__file__).resolve().parents[1] / 'examples' / 'stand_in.py'
 SPEED, LOSS = 4.0, 0.05

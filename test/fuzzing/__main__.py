@@ -10,8 +10,8 @@ import typer
 from rich.table import Table
 
 from fuzzing.counts import Counter
+from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED
 from glider_bringup.console import Json, counter, messages, output, picked, repeatable
-from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED
 
 app = typer.Typer(pretty_exceptions_enable=False)
 #: Doors, each a module beside this one, with the cases tried by default.

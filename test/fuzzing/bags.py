@@ -20,6 +20,7 @@ from mcap.opcode import Opcode
 
 from fuzzing.counts import Counter
 from fuzzing.watch import outcome_of
+from glider_base.settings import ConfigurationError
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import Scenario, load_scenario
@@ -41,7 +42,6 @@ from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.scoring.traces import make_tracer
 from glider_bringup.showing.flown_run import keep_traces, read_run
 from glider_bringup.showing.report import report_page
-from glider_model.base.settings import ConfigurationError
 
 #: Two minutes in which everything happens, in ten chunks.
 FLIGHT = {

@@ -25,6 +25,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fuzzing.counts import HANG_S, Counter
+from glider_base.ros.places import NAMESPACE, domain_id
+from glider_base.signals import TICK_NS, TICK_S
 from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive, left_over, mapped
 from glider_bringup.engines.processes import MODULES
@@ -34,8 +36,6 @@ from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.read_back import read_back
 from glider_bringup.recording.recover import recover
 from glider_bringup.recording.ros.recorded_log import RecordedLog
-from glider_model.base.signals import TICK_NS, TICK_S
-from glider_model.ros.places import NAMESPACE, domain_id
 
 SCENARIO = 'current_8deg'
 #: Ticks of a flight; the last of them are spared, so that it is not over before the kill.

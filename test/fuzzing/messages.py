@@ -14,6 +14,12 @@ import numpy as np
 
 from fuzzing.counts import Counter
 from fuzzing.watch import outcome_of, time_limit_after
+from glider_base.frames import odometry_from_wire, reference_from_wire
+from glider_base.ros.hearing.inputs import Input
+from glider_base.ros.wire.codec import MessageError, to_cdr
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.signals import TICK_NS, TICK_S, Battery, Joints, Water
+from glider_base.wiring import GUARD, NAVIGATION, SENSORS
 from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import MissionParams, MissionState, fly
 from glider_bringup.engines.flight import mission_of
@@ -21,14 +27,8 @@ from glider_bringup.mission.scenario import load_scenario
 from glider_control.control import control_step
 from glider_guard.block import guard_tick
 from glider_guidance.guidance import guidance_step
-from glider_model.base.frames import odometry_from_wire, reference_from_wire
-from glider_model.base.signals import TICK_NS, TICK_S, Battery, Joints, Water
-from glider_model.base.wiring import GUARD, NAVIGATION, SENSORS
 from glider_model.ocean.current import current_step
 from glider_model.plant.plant import plant_step
-from glider_model.ros.hearing.inputs import Input
-from glider_model.ros.wire.codec import MessageError, to_cdr
-from glider_model.ros.wire.topics import TOPICS
 from glider_navigation.block import navigation_tick
 
 #: Topics that a block reads. What the plant makes of a wild current it says itself: it fails.

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 from pydantic import Field
 
+from glider_base.frames import wrap_angle
+from glider_base.kernel import kernel
 from glider_control.law import Bank, LawSettings, law_step
-from glider_model.base.frames import wrap_angle
-from glider_model.base.kernel import kernel
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
 from glider_model.onboard.learnt_steering import speed_ratio
 

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from pydantic import Field
 
+from glider_base.kernel import kernel
 from glider_guidance.los import crab_heading
 from glider_guidance.method import Asked, LosGains, MethodSettings, method_step
-from glider_model.base.kernel import kernel
 
 
 class VectorFieldSettings(MethodSettings):

@@ -11,7 +11,7 @@ from typing import Any
 
 #: Public names: the module of each, and its name there.
 _PUBLIC = {
-    'ConfigurationError': ('glider_model.base.settings', 'ConfigurationError'),
+    'ConfigurationError': ('glider_base.settings', 'ConfigurationError'),
     'Flight': ('glider_bringup.door.flight', 'Flight'),
     'Run': ('glider_bringup.door.run', 'Run'),
     'Scenario': ('glider_bringup.mission.scenario', 'Scenario'),

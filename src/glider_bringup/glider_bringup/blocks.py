@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """All blocks of the tick, in the order in which they act, and the row of a log that they fill."""
 
+from glider_base.wiring import FIELDS, WIRING
 from glider_control.block import CONTROL
 from glider_guard.block import GUARD
 from glider_guidance.block import GUIDANCE
-from glider_model.base.wiring import FIELDS, WIRING
 from glider_model.ocean.current_block import CURRENT
 from glider_model.plant.block import PLANT
 from glider_navigation.block import NAVIGATION

@@ -16,10 +16,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     import typer
 
-    from glider_bringup import commands
-    from glider_bringup.console import messages
-    from glider_bringup.mission.disk import DiskError
-    from glider_model.base.errors import (
+    from glider_base.errors import (
         EXIT_FAILED,
         EXIT_USAGE,
         MAX_LINE,
@@ -27,7 +24,10 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
         printable,
         shown,
     )
-    from glider_model.base.plugins import COMMANDS, loaded
+    from glider_base.plugins import COMMANDS, loaded
+    from glider_bringup import commands
+    from glider_bringup.console import messages
+    from glider_bringup.mission.disk import DiskError
 except KeyboardInterrupt:
     sys.exit(130)  # EXIT_INTERRUPTED, which may not be there yet
 except (OSError, ImportError) as error:

@@ -25,10 +25,10 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
+from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED, ConfigurationError, printable
+from glider_base.signals import TICK_S
 from glider_bringup.mission.scenario import parse_assignment
 from glider_control.settings import ControlLawSettings
-from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED, ConfigurationError, printable
-from glider_model.base.signals import TICK_S
 
 
 class _PlainConsole(Console):

@@ -14,6 +14,9 @@ from pathlib import Path
 import numpy as np
 
 import glider_bringup
+from glider_base.kernel_cache import forget_old
+from glider_base.signals import TICK_S
+from glider_base.wiring import at_rest
 from glider_bringup.blocks import BLOCKS, ROW
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
@@ -27,9 +30,6 @@ from glider_bringup.recording.ros.told import read_told
 from glider_bringup.recording.ros.verify.every_block import verify
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import halve, make_tracer
-from glider_model.base.kernel_cache import forget_old
-from glider_model.base.signals import TICK_S
-from glider_model.base.wiring import at_rest
 from glider_model.plant.block import PLANT, plant_move, plant_outputs
 from glider_model.plant.sensors import SensorSettings
 from glider_model.plant.trim import solve_trim

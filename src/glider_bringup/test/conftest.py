@@ -2,20 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags for tests, read and written with the mcap package."""
 
-import signal
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-import rclpy
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
-from rclpy.context import Context
 
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_model.ros.places import domain_id
 
 
 class Recorded(NamedTuple):
@@ -65,21 +61,6 @@ def _write_bag(
         for message in messages:
             writer.add_message(ids[message.topic], message.log_ns, message.data, message.log_ns)
         writer.finish()
-
-
-@pytest.fixture
-def context(monkeypatch):
-    """Context of rclpy in a ROS domain of its own; handlers of signals stay as they were."""
-    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    context = Context()
-    with domain_id() as domain:
-        rclpy.init(context=context, domain_id=domain)
-        yield context
-        rclpy.try_shutdown(context=context)
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 @pytest.fixture(scope='session')

@@ -5,10 +5,10 @@
 import numpy as np
 import pytest
 
+from glider_base.frames import poses_from_wire
 from glider_bringup.blocks import COLUMNS
 from glider_bringup.engines.flight import fly
 from glider_bringup.mission.scenario import load_scenario
-from glider_model.base.frames import poses_from_wire
 
 #: Shallow dives, up after each for ten minutes.
 DIVES = {

@@ -18,6 +18,9 @@ from nav_msgs.msg import Path as PathMessage
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.signals import TICK_NS
 from glider_bringup.blocks import BLOCK_TICKS, COLUMNS
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros import recorded_log
@@ -30,9 +33,6 @@ from glider_bringup.recording.ros.rosbag2 import (
 )
 from glider_bringup.recording.tick_sorter import TickSorter
 from glider_bringup.scoring.traces import TRACED
-from glider_model.base.signals import TICK_NS
-from glider_model.ros.wire.codec import to_cdr
-from glider_model.ros.wire.topics import TOPICS
 
 PER_TICK = {topic.name: topic for topic in TOPICS.values() if topic.per_tick}
 TICKS = 2 * CHUNK_TICKS + 40

@@ -12,10 +12,10 @@ import pytest
 import typer
 import yaml
 
+from glider_base.settings import ConfigurationError
 from glider_bringup import cli, commands
 from glider_bringup.mission.scenario import scenario_names
 from glider_bringup.studies.sweep.plan import sweep_names
-from glider_model.base.settings import ConfigurationError
 from glider_model.vehicle.file import vehicle_names, vehicle_path
 
 SHORT = ('--engine', 'direct', '--controller', 'pid', '--duration', '300')

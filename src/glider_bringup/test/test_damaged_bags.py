@@ -16,6 +16,11 @@ from mcap.reader import make_reader
 
 from fuzzing import bags, watch
 from fuzzing.counts import Counter
+from glider_base.ros.lockstep import health
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.topics import PLANT, TOPICS
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_NS, TICK_S
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.mcap_reader import Bag
@@ -24,11 +29,6 @@ from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.traces import load_traces
 from glider_bringup.showing.flown_run import draw, read_run, write_report
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_NS, TICK_S
-from glider_model.ros.lockstep import health
-from glider_model.ros.wire.codec import to_cdr
-from glider_model.ros.wire.topics import PLANT, TOPICS
 
 TICKS = 600
 #: The end of a data section, up to its checksum: what ros2 bag writes has none.

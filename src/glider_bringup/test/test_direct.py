@@ -11,11 +11,11 @@ import sys
 import numpy as np
 import pytest
 
+from glider_base.signals import TICK_S
 from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.engines.direct import fly, fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import load_scenario
-from glider_model.base.signals import TICK_S
 
 #: A dive of 60 m and back within half an hour, so that a flight has everything in it.
 SHALLOW = {

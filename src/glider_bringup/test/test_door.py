@@ -26,10 +26,10 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 import glider_bringup as glider
+from glider_base.kernel import compiling_told
+from glider_base.settings import ConfigurationError
 from glider_bringup import console
 from glider_bringup.cli import OF_THE_SCRIPT, app
-from glider_model.base.kernel import compiling_told
-from glider_model.base.settings import ConfigurationError
 
 #: Half of what is named north, east and down in the world of topics: x east, y north, z up.
 ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -436,7 +436,7 @@ CELL = """
 from typing import NamedTuple
 
 from glider_control.law import LawSettings, law_step
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 
 
 class Level(NamedTuple):

@@ -16,6 +16,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from glider_base.settings import ConfigurationError
 from glider_bringup import cli
 from glider_bringup.commands.studies.experiments import Group
 from glider_bringup.mission.run_folder import make_result_folder
@@ -39,7 +40,6 @@ from glider_bringup.studies.paper.experiments import (
 from glider_bringup.studies.paper.judges import judge_envelope, judge_limits, judge_survey
 from glider_bringup.studies.paper.measures import horizontal_speed
 from glider_bringup.studies.workers import worker_pool
-from glider_model.base.settings import ConfigurationError
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle
 

@@ -7,6 +7,16 @@ from functools import cache
 import numpy as np
 import pytest
 
+from glider_base import wiring
+from glider_base.frames import (
+    odometry_from_wire,
+    reference_from_wire,
+    reference_to_wire,
+    water_from_wire,
+    water_to_wire,
+)
+from glider_base.signals import TICK_S
+from glider_base.wiring import NO_ECHO
 from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import MissionState, fly
 from glider_bringup.engines.flight import mission_of
@@ -29,16 +39,6 @@ from glider_guidance.yo.stage import (
     INFLECTING_UP,
     WAITING_ON_SURFACE,
 )
-from glider_model.base import wiring
-from glider_model.base.frames import (
-    odometry_from_wire,
-    reference_from_wire,
-    reference_to_wire,
-    water_from_wire,
-    water_to_wire,
-)
-from glider_model.base.signals import TICK_S
-from glider_model.base.wiring import NO_ECHO
 from glider_model.ocean.current import current_step
 from glider_model.ocean.density import depth_at
 from glider_model.plant.block import plant_outputs

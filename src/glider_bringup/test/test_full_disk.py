@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_NS
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.disk import DiskError, whole_file, write_whole
 from glider_bringup.mission.run_folder import make_run_folder
@@ -21,9 +24,6 @@ from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_NS
-from glider_model.ros.wire.topics import TOPICS
 
 #: The largest file (B) that a disk which is full allows.
 MOST = 500_000

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from fuzzing import files, lines, watch
 from fuzzing.__main__ import app
 from fuzzing.counts import Counter, Counts
-from glider_model.base.errors import ConfigurationError
+from glider_base.errors import ConfigurationError
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ import sys
 
 import pytest
 
+from glider_base.settings import ConfigurationError
 from glider_bringup.studies.sweep.journal import Journal
-from glider_model.base.settings import ConfigurationError
 
 HEAD = {'sweep': 'one', 'cells': 3, 'code': 'c0de', 'inputs': 'd1ge57'}
 RECORDS = [
@@ -103,7 +103,7 @@ def test_two_sweeps_do_not_write_into_one_journal(tmp_path):
 FULL_DISK = """
 import resource, sys
 from glider_bringup.studies.sweep.journal import Journal
-from glider_model.base.settings import ConfigurationError
+from glider_base.settings import ConfigurationError
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 with Journal(__import__('pathlib').Path(sys.argv[1]), {'sweep': 'one'}, False) as journal:
     try:

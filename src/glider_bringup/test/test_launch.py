@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from glider_base.settings import ConfigurationError
 from glider_bringup.engines import launch_plan
 from glider_bringup.engines.launch_plan import (
     ARGUMENTS,
@@ -21,7 +22,6 @@ from glider_bringup.engines.processes import MODULES, ON_BOARD, PLANT, RECORDER
 from glider_bringup.mission.scenario import scenario_names
 from glider_control.settings import ControlLawSettings
 from glider_guidance.settings import LosSettings
-from glider_model.base.settings import ConfigurationError
 
 LAUNCH_FILE = Path(__file__).parents[1] / 'launch' / 'glider.launch.py'
 

@@ -12,11 +12,11 @@ from types import SimpleNamespace
 import pytest
 from rosbags.highlevel import AnyReader
 
+from glider_base.frames import euler_from_quaternion, odometry_to_wire, quaternion_from_euler
+from glider_base.signals import Odometry
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
-from glider_model.base.frames import euler_from_quaternion, odometry_to_wire, quaternion_from_euler
-from glider_model.base.signals import Odometry
 
 LAYOUTS = Path(__file__).parents[1] / 'layouts'
 FOXGLOVE = json.loads((LAYOUTS / 'foxglove.json').read_text(encoding='utf-8'))

@@ -13,14 +13,14 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
+from glider_base.ros.wire import qos
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.signals import TICK_NS
 from glider_control.nodes.control_node import ControlNode
 from glider_guard.nodes.guard_node import GuardNode
 from glider_guard.rows import LOST, ORDERED
 from glider_guard.settings import GuardSettings
-from glider_model.base.signals import TICK_NS
-from glider_model.ros.wire import qos
-from glider_model.ros.wire.codec import to_cdr
-from glider_model.ros.wire.topics import TOPICS
 
 LEVEL = (0.0, 0.0, -50.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 #: Covariance of the place that navigation believes (m^2).

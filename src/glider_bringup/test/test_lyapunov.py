@@ -19,6 +19,7 @@ import numba
 import numpy as np
 import pytest
 
+from glider_base.signals import TICK_S, Adaptation
 from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
@@ -31,7 +32,6 @@ from glider_control.laws.adaptive import (
     SCALE_SIDE,
     SCALE_V2,
 )
-from glider_model.base.signals import TICK_S, Adaptation
 from glider_model.onboard.glide_polar import glide_speed
 from glider_model.vehicle.rigid_body import GRAVITY
 

@@ -14,6 +14,10 @@ import time
 import numpy as np
 import pytest
 
+from glider_base.frames import euler_from_quaternion
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_S
 from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
@@ -34,11 +38,7 @@ from glider_bringup.studies.montecarlo import (
     sample_plant,
     spread,
 )
-from glider_model.base.frames import euler_from_quaternion
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_S
 from glider_model.plant.sensors import SensorSettings
-from glider_model.ros.wire.topics import TOPICS
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.perturb import (
     ADDED_MASS,

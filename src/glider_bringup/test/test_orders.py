@@ -12,8 +12,8 @@ from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
 import glider_bringup as glider
+from glider_base.settings import ConfigurationError
 from glider_bringup.cli import app
-from glider_model.base.settings import ConfigurationError
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 SHALLOW = {'profile.depth_m': 200.0, 'dives': 0}

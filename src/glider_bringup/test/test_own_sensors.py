@@ -13,10 +13,10 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure, Imu, JointState, NavSatFix
 
-from glider_model.base.frames import OriginSettings
+from glider_base.frames import OriginSettings
+from glider_base.ros.lockstep.step_node import OLD_AFTER
+from glider_base.ros.wire import qos
 from glider_model.ocean.density import pressure_at
-from glider_model.ros.lockstep.step_node import OLD_AFTER
-from glider_model.ros.wire import qos
 from glider_navigation.nodes.navigation_node import NavigationNode
 
 JOINTS = ['buoyancy_engine', 'pitch_mass', 'roll_mass']

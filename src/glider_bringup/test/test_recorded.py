@@ -9,6 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from glider_base.ros.lockstep import health
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.topics import PLANT, TOPICS
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_NS
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.mission.scenario import load_scenario
@@ -17,11 +22,6 @@ from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.showing.flown_run import draw, read_run
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_NS
-from glider_model.ros.lockstep import health
-from glider_model.ros.wire.codec import to_cdr
-from glider_model.ros.wire.topics import PLANT, TOPICS
 
 #: What a score file knows and a bag does not.
 ONLY_IN_THE_FILE = {'engine', 'wall_time_s', 'real_time_factor'}

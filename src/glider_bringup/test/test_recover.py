@@ -17,6 +17,8 @@ from mcap.writer import CompressionType
 from rosbags.highlevel import AnyReader
 from typer.testing import CliRunner
 
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_NS
 from glider_bringup.cli import app
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
@@ -25,8 +27,6 @@ from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.recover import recover
 from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS
 from glider_bringup.scoring.again import score_again
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_NS
 
 
 def file_of(folder: Path) -> Path:

@@ -22,6 +22,11 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from typer.testing import CliRunner
 
+from glider_base.ros.lockstep import health
+from glider_base.ros.places import domain_id
+from glider_base.ros.wire.topics import REPLAY, TOPICS, recorded_topics
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_NS
 from glider_bringup.cli import app
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import RECORDER, node_commands
@@ -29,11 +34,6 @@ from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.recording.mcap_reader import Bag, BagTopic
 from glider_bringup.recording.ros.recorded_log import RecordedLog
 from glider_bringup.recording.ros.republish import plan_replay, qos_of
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_NS
-from glider_model.ros.lockstep import health
-from glider_model.ros.places import domain_id
-from glider_model.ros.wire.topics import REPLAY, TOPICS, recorded_topics
 
 DEADLINE_S = 120.0
 RECORDED = {topic.full_name('/glider'): topic for topic in recorded_topics(['measured_odom'])}

@@ -12,9 +12,9 @@ import time
 
 import pytest
 
+from glider_base.ros.places import domain_id
 from glider_bringup.engines import processes
 from glider_bringup.engines.processes import PLANT, RECORDER, node_commands, run_nodes
-from glider_model.ros.places import domain_id
 
 #: A node that says it is there, and then waits for a signal.
 WAIT = """

@@ -9,6 +9,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_base.settings import ConfigurationError
 from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
@@ -16,7 +17,6 @@ from glider_bringup.mission.scenario import (
     parse_assignment,
     scenario_names,
 )
-from glider_model.base.settings import ConfigurationError
 from glider_model.onboard.gate import GateSettings
 from glider_model.vehicle.file import vehicle_path
 

@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from glider_base.settings import ConfigurationError, find_field, unit_of
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros.recorded_run import Recording
@@ -15,7 +16,6 @@ from glider_bringup.recording.ros.told import read_told
 from glider_bringup.recording.ros.verify.every_block import verify
 from glider_bringup.studies.montecarlo import make_scenarios, outcome
 from glider_bringup.studies.random_faults import DRAWN, sample_faults, validated
-from glider_model.base.settings import ConfigurationError, find_field, unit_of
 from glider_model.vehicle.file import load_vehicle
 
 SCENARIO = """

@@ -13,16 +13,16 @@ import rclpy
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
+from glider_base.ros.places import domain_id
+from glider_base.ros.wire.topics import GUARD, GUIDANCE, PLANT, RECORDER, TOPICS
+from glider_base.wiring import BELIEFS, SENSORS, WIRING
 from glider_bringup.engines.processes import AUTOPILOT, ON_BOARD
 from glider_bringup.nodes.recorder_node import RecorderNode
 from glider_control.nodes.control_node import ControlNode
 from glider_guard.nodes.guard_node import GuardNode
 from glider_guidance.nodes.guidance_node import GuidanceNode
-from glider_model.base.wiring import BELIEFS, SENSORS, WIRING
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
-from glider_model.ros.places import domain_id
-from glider_model.ros.wire.topics import GUARD, GUIDANCE, PLANT, RECORDER, TOPICS
 from glider_navigation.nodes.navigation_node import NavigationNode
 
 POLICY = Path(__file__).resolve().parents[1] / 'security' / 'policy.xml'

@@ -11,6 +11,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from glider_base.settings import find_field, unit_of
 from glider_bringup import cli
 from glider_bringup.mission.scenario import Scenario, load_scenario, overlap
 from glider_bringup.studies.sweep.plan import (
@@ -21,7 +22,6 @@ from glider_bringup.studies.sweep.plan import (
     load_sweep,
     sweep_names,
 )
-from glider_model.base.settings import find_field, unit_of
 
 SPEED = {'kind': 'values', 'field': 'current.speed_kn', 'values': [0.5, 1.0]}
 

@@ -12,12 +12,12 @@ import pytest
 import xarray
 import yaml
 
+from glider_base.settings import ConfigurationError
 from glider_bringup.mission.scenario import load_scenario, parse_assignment
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.studies.montecarlo import make_scenarios
 from glider_bringup.studies.sweep.plan import load_sweep
-from glider_model.base.settings import ConfigurationError
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle, vehicle_path
 

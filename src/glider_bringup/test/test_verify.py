@@ -18,6 +18,9 @@ from mcap.writer import CompressionType
 from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
+from glider_base.ros.wire.topics import TOPICS, recorded_topics
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_NS
 from glider_bringup.cli import app
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.mission.run_folder import make_run_folder
@@ -29,9 +32,6 @@ from glider_bringup.recording.ros.verify.every_block import verify
 from glider_bringup.recording.ros.verify.report import report
 from glider_bringup.recording.ros.verify.ticks import place_ticks
 from glider_bringup.recording.ros.verify.verdict import IDENTICAL
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_NS
-from glider_model.ros.wire.topics import TOPICS, recorded_topics
 
 PER_TICK = {t.full_name('/glider'): t for t in recorded_topics(['measured_odom']) if t.per_tick}
 BLOCK_OF = {

@@ -5,13 +5,13 @@
 import numpy as np
 import pytest
 
+from glider_base.signals import TICK_S
 from glider_bringup.blocks import ROW
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.studies.montecarlo import airframe, judge, make_scenarios, sample_plant
 from glider_guidance.methods.observer import lookahead_stretch
-from glider_model.base.signals import TICK_S
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.perturb import PerturbSettings, perturbed
 

@@ -13,7 +13,7 @@ with (g_x, g_y, g_z) the direction of gravity in body axes. Both are solved exac
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 from glider_model.onboard.moving_mass import (
     MovingMass,
     first_moments,

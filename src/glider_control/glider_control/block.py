@@ -2,6 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Control as a block."""
 
+from glider_base.block import Block, Said, block_tick
+from glider_base.frames import odometry_from_wire, reference_from_wire, wrench_to_wire
+from glider_base.kernel import kernel
+from glider_base.signals import Joints
+from glider_base.wiring import CONTROL as WIRED
 from glider_control.control import (
     SATURATED_BUOYANCY,
     SATURATED_PITCH,
@@ -12,11 +17,6 @@ from glider_control.control import (
 )
 from glider_control.intake import REFUSED, TELL_EVERY_NS
 from glider_control.settings import ControlSettings
-from glider_model.base.block import Block, Said, block_tick
-from glider_model.base.frames import odometry_from_wire, reference_from_wire, wrench_to_wire
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Joints
-from glider_model.base.wiring import CONTROL as WIRED
 from glider_model.vehicle.file import steers_by
 
 #: Actuators by the bits of the saturation mask that say that they are at their limits.

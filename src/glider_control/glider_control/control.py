@@ -9,6 +9,8 @@ pitch, the mass turned to a side sets roll and so heading, unless a steering sur
 import math
 from typing import NamedTuple
 
+from glider_base.kernel import kernel
+from glider_base.signals import Adaptation, Joints, Wrench
 from glider_control.allocation import (
     AllocationParams,
     allocate_pitch,
@@ -27,8 +29,6 @@ from glider_control.intake import (
 from glider_control.law import Seen, law_learnt, law_step
 from glider_control.surface import steer, surface_learnt
 from glider_control.vertical_rate import Trim, vertical_rate_law
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Adaptation, Joints, Wrench
 from glider_model.onboard.attitude_filter import Measured, measure
 from glider_model.onboard.glide_polar import Polar, glide_speed
 from glider_model.vehicle.rigid_body import GRAVITY

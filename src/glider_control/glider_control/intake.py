@@ -9,8 +9,8 @@ control (`glider_guard`).
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Joints, Reference
+from glider_base.kernel import kernel
+from glider_base.signals import Joints, Reference
 from glider_model.onboard.gate import (
     INITIAL_GATE,
     GateParams,

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.settings import Settings
-from glider_model.base.signals import Adaptation, Reference
-from glider_model.base.slot import default, slot
+from glider_base.settings import Settings
+from glider_base.signals import Adaptation, Reference
+from glider_base.slot import default, slot
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
 from glider_model.vehicle.file import Vehicle

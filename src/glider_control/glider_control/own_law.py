@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numba
 
+from glider_base.errors import ConfigurationError
 from glider_control.law import LawSettings, law_step
-from glider_model.base.errors import ConfigurationError
 
 
 def own_law(law: type[LawSettings] | Callable) -> type[LawSettings]:

@@ -8,6 +8,9 @@ from typing import Literal
 import pydantic
 from pydantic import Field
 
+from glider_base import plugins
+from glider_base.settings import TUNABLE, ConfigurationError, Settings
+from glider_base.signals import Joints
 from glider_control import laws, surfaces
 from glider_control.allocation import make_allocation
 from glider_control.control import ControlParams, ControlState
@@ -15,9 +18,6 @@ from glider_control.intake import INITIAL_INTAKE, make_intake
 from glider_control.law import HeadingSettings, LawSettings
 from glider_control.surface import NoSteering, SurfaceLawSettings
 from glider_control.vertical_rate import Trim
-from glider_model.base import plugins
-from glider_model.base.settings import TUNABLE, ConfigurationError, Settings
-from glider_model.base.signals import Joints
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.gate import GateSettings
 from glider_model.onboard.glide_polar import make_polar

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.kernel import kernel
-from glider_model.base.settings import Settings
-from glider_model.base.slot import default, slot
+from glider_base.kernel import kernel
+from glider_base.settings import Settings
+from glider_base.slot import default, slot
 from glider_model.vehicle.file import Vehicle
 
 

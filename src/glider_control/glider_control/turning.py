@@ -4,7 +4,7 @@
 
 import math
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 
 #: A vehicle that steers less is not steered at all (rad/s).
 SMALLEST_STEERING = 1e-6

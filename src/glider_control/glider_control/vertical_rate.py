@@ -4,7 +4,7 @@
 
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 from glider_model.onboard.glide_polar import glide_net_heaviness
 
 #: The integrals of the vertical-rate law wait until the pump is this near to where it goes (kg).

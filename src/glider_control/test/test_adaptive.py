@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_base.signals import Reference
 from glider_control.law import Bank, Seen
 from glider_control.laws.adaptive import (
     DISTURBANCE_MAX,
@@ -18,7 +19,6 @@ from glider_control.laws.adaptive import (
     AdaptiveSettings,
     adaptive_step,
 )
-from glider_model.base.signals import Reference
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
 from glider_model.vehicle.file import load_vehicle

@@ -10,6 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_base.frames import euler_from_quaternion, quaternion_from_euler, rotate_to_ned
+from glider_base.signals import TICK_S, Joints, Odometry, Reference, Water
 from glider_control.control import (
     SATURATED_BUOYANCY,
     SATURATED_PITCH,
@@ -17,8 +19,6 @@ from glider_control.control import (
     control_step,
 )
 from glider_control.settings import ControlSettings
-from glider_model.base.frames import euler_from_quaternion, quaternion_from_euler, rotate_to_ned
-from glider_model.base.signals import TICK_S, Joints, Odometry, Reference, Water
 from glider_model.onboard.glide_polar import glide_vertical_rate
 from glider_model.plant.plant import PlantSettings, plant_odometry, plant_step
 from glider_model.plant.trim import solve_trim

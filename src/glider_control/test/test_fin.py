@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_base.frames import quaternion_from_euler
+from glider_base.signals import TICK_S, Joints, Odometry, Reference
 from glider_control.control import SATURATED_SURFACE, control_step
 from glider_control.intake import REFUSED
 from glider_control.law import Seen
@@ -18,8 +20,6 @@ from glider_control.surfaces.fin import (
     FinLawSettings,
     steer_by_fin,
 )
-from glider_model.base.frames import quaternion_from_euler
-from glider_model.base.signals import TICK_S, Joints, Odometry, Reference
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.vehicle.file import changed_vehicle
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_base.signals import TICK_S, Reference
 from glider_control.law import Seen
 from glider_control.laws.pid import (
     HEADING_INTEGRAL_MAX,
@@ -18,7 +19,6 @@ from glider_control.laws.pid import (
     pid_step,
 )
 from glider_control.settings import ControlSettings
-from glider_model.base.signals import TICK_S, Reference
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import Filtered
 from glider_model.vehicle.file import SLOWEST_GLIDE_MPS

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from glider_model.base.errors import ConfigurationError
+from glider_base.errors import ConfigurationError
 
 
 def files_in(place: Path, wanted: Callable[[Path], bool]) -> list[Path]:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError
 from glider_flights.folders import installed
-from glider_model.base.errors import ConfigurationError
 
 SUFFIXES = ('.nc', '.ncdf', '.nc4')
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from glider_base.errors import ConfigurationError
 from glider_flights.energy.seaglider import seaglider_uses
 from glider_flights.energy.slocum import slocum_uses
 from glider_flights.energy.uses import Uses
@@ -13,7 +14,6 @@ from glider_flights.og1 import og1_files, read_og1
 from glider_flights.record import Flight
 from glider_flights.seaglider import read_seaglider, seaglider_files
 from glider_flights.slocum import read_slocum, slocum_files
-from glider_model.base.errors import ConfigurationError
 
 Progress = Callable[[int, int], None]
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError
 from glider_flights.folders import files_in
 from glider_flights.netcdf import SUFFIXES, refuse_missing, variables
 from glider_flights.record import (
@@ -33,7 +34,6 @@ from glider_flights.record import (
     usual,
 )
 from glider_flights.segments import cut
-from glider_model.base.errors import ConfigurationError
 
 #: Files of dives: the number of the vehicle, three digits, and of the dive, four.
 DIVE_FILE = re.compile(r'p(\d{3})(\d{4}).*\.nc.*', re.IGNORECASE)

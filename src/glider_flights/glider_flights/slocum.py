@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError
 from glider_flights.folders import files_in, installed
 from glider_flights.record import (
     NOT_KNOWN,
@@ -31,7 +32,6 @@ from glider_flights.record import (
 )
 from glider_flights.seawater import depth_of, pressure_of, salinity_of
 from glider_flights.segments import DIVE_DEPTH_M, Cut, cut
-from glider_model.base.errors import ConfigurationError
 
 #: Kinds of files of the flight computer, fullest first: all that is measured, then what is sent.
 KINDS = (('.dbd', '.dcd'), ('.mbd', '.mcd'), ('.sbd', '.scd'))

@@ -9,8 +9,8 @@ import pytest
 import xarray
 from typer.testing import CliRunner
 
+from glider_base.errors import ConfigurationError
 from glider_bringup.cli import app
-from glider_model.base.errors import ConfigurationError
 
 START_S = 1.6e9
 #: What a pump takes (J/cc, J/cc/m); what is drawn in dive, climb, at the surface, in a call (W).

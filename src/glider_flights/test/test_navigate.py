@@ -12,11 +12,11 @@ import xarray
 from scipy.optimize import brentq
 from typer.testing import CliRunner
 
+from glider_base.errors import ConfigurationError
 from glider_bringup.cli import app
 from glider_flights.comparison import navigate, summary
 from glider_flights.reading import read_flight, read_whole
 from glider_flights.slocum import slocum_files
-from glider_model.base.errors import ConfigurationError
 
 START_S = 1.6e9
 #: Of the flights made up here: current below and at the surface (m/s north, east), pitch (rad).

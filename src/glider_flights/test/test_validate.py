@@ -11,9 +11,9 @@ import xarray
 from scipy.optimize import brentq
 from typer.testing import CliRunner
 
+from glider_base.errors import ConfigurationError
 from glider_bringup.cli import app
 from glider_flights.reading import read_whole
-from glider_model.base.errors import ConfigurationError
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle
 

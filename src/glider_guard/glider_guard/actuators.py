@@ -4,9 +4,9 @@
 
 from typing import NamedTuple
 
+from glider_base.kernel import kernel
+from glider_base.signals import Joints
 from glider_guard.rows import STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, STUCK_SURFACE
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Joints
 from glider_model.vehicle.actuators import MOST_NOISE, doubt
 
 #: Of the way that its rate allows an actuator, the share that it goes at least if it follows.

@@ -9,8 +9,8 @@ is where it balances the rest as long as the vehicle sinks, and at its stop once
 
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Joints
+from glider_base.kernel import kernel
+from glider_base.signals import Joints
 from glider_model.onboard.moving_mass import MovingMass, mass_place
 
 #: A vehicle that rises faster than this (m/s) turns its nose up; one that sinks faster lies level.

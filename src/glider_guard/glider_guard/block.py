@@ -2,6 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The guard as a block."""
 
+from glider_base.block import Block, Said, block_tick
+from glider_base.frames import covariance_from_wire, odometry_from_wire
+from glider_base.kernel import kernel, replace
+from glider_base.signals import Battery, Health, Joints
+from glider_base.wiring import GUARD as WIRED
 from glider_guard.actuators import INITIAL_FOLLOWERS
 from glider_guard.ascent import INITIAL_ASCENT
 from glider_guard.depth import INITIAL_DEPTHS
@@ -12,11 +17,6 @@ from glider_guard.rows import say as said_of
 from glider_guard.settings import GuardSettings
 from glider_guard.weight import INITIAL_WEIGHT
 from glider_guard.witness import INITIAL_WITNESS
-from glider_model.base.block import Block, Said, block_tick
-from glider_model.base.frames import covariance_from_wire, odometry_from_wire
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.signals import Battery, Health, Joints
-from glider_model.base.wiring import GUARD as WIRED
 from glider_model.ocean.density import depth_at
 from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH
 from glider_model.vehicle.file import steers_by

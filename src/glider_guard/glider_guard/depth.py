@@ -4,6 +4,7 @@
 
 from typing import NamedTuple
 
+from glider_base.kernel import kernel
 from glider_guard.rows import (
     CRUSHING,
     DISAGREES,
@@ -17,7 +18,6 @@ from glider_guard.rows import (
     UNDER_LONG,
 )
 from glider_guard.witness import SURFACE_M
-from glider_model.base.kernel import kernel
 
 #: Longer than this (s) a vehicle may not be too deep.
 TOO_DEEP_S = 1.0

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fixes that contradict navigation."""
 
+from glider_base.kernel import kernel
 from glider_guard.rows import ASTRAY, CONTRADICTED
-from glider_model.base.kernel import kernel
 from glider_model.onboard.fix_watch import contradictions
 
 #: So many of the last six surfacings end the mission.

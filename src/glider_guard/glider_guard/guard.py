@@ -9,6 +9,9 @@ block that fails is met with a reaction (`glider_guard.rows`) that needs none of
 import math
 from typing import NamedTuple
 
+from glider_base.frames import euler_from_quaternion, rotate_to_ned
+from glider_base.kernel import kernel
+from glider_base.signals import SURFACE_TARGET, Battery, Covariance, Health, Joints, Odometry
 from glider_guard.actuators import ActuatorLimits, Followers, follow
 from glider_guard.ascent import INITIAL_ASCENT, Ascent, AscentLimits, come_up
 from glider_guard.depth import (
@@ -53,9 +56,6 @@ from glider_guard.witness import (
     is_out,
     watch,
 )
-from glider_model.base.frames import euler_from_quaternion, rotate_to_ned
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import SURFACE_TARGET, Battery, Covariance, Health, Joints, Odometry
 from glider_model.onboard.fix_watch import FixWatch, watch_fixes
 from glider_model.onboard.gate import GateParams, GateState, are_believed, gate_step, is_lost
 

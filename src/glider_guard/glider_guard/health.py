@@ -4,8 +4,8 @@
 
 from typing import NamedTuple
 
+from glider_base.kernel import kernel
 from glider_guard.rows import BATTERY, LEAK, NO_CONTACT, VACUUM
-from glider_model.base.kernel import kernel
 
 
 class HealthLimits(NamedTuple):

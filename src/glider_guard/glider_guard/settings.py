@@ -6,6 +6,8 @@ import math
 
 from pydantic import Field
 
+from glider_base.settings import Settings
+from glider_base.signals import Joints
 from glider_guard.actuators import INITIAL_FOLLOWERS, make_limits
 from glider_guard.ascent import INITIAL_ASCENT, AscentLimits
 from glider_guard.depth import INITIAL_DEPTHS, DepthLimits
@@ -13,8 +15,6 @@ from glider_guard.guard import GuardParams, GuardState, Taken
 from glider_guard.health import INITIAL_HEALTH, HealthLimits
 from glider_guard.weight import INITIAL_WEIGHT, PUMP_ARRIVED, WeightLimits
 from glider_guard.witness import INITIAL_WITNESS, WitnessLimits
-from glider_model.base.settings import Settings
-from glider_model.base.signals import Joints
 from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH
 from glider_model.onboard.gate import INITIAL_GATE, GateSettings
 from glider_model.onboard.glide_polar import make_polar

@@ -9,8 +9,8 @@ more than pump and ballast make is what nobody knows of: water in the hull, grow
 import math
 from typing import NamedTuple
 
+from glider_base.kernel import kernel
 from glider_guard.rows import TOO_HEAVY
-from glider_model.base.kernel import kernel
 from glider_model.onboard.glide_polar import Polar, glide_net_heaviness, glide_vertical_rate
 
 #: Shallower (rad) or slower (m/s) than this it is no steady glide, nor so near (share) to the

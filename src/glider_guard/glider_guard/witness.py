@@ -11,8 +11,8 @@ it is reckoned by pump, pitch and polar from the last one that was.
 
 from typing import NamedTuple
 
+from glider_base.kernel import kernel
 from glider_guard.rows import DEPTH_OFFSET, DEPTH_WRONG, FROZEN
-from glider_model.base.kernel import kernel
 
 #: Above this the vehicle is at the surface, and nothing of its depth is watched (m).
 SURFACE_M = 5.0

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_base.frames import quaternion_from_euler, rotate_to_body
+from glider_base.settings import ConfigurationError
+from glider_base.signals import SURFACE_TARGET, TICK_S, Battery, Health, Joints, Odometry
+from glider_base.wiring import NO_ECHO
 from glider_guard import rows
 from glider_guard.block import GUARD, guard_surface, say
 from glider_guard.guard import GuardOutput, GuardParams, GuardState, Heard, guard_step
 from glider_guard.settings import GuardSettings
-from glider_model.base.frames import quaternion_from_euler, rotate_to_body
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import SURFACE_TARGET, TICK_S, Battery, Health, Joints, Odometry
-from glider_model.base.wiring import NO_ECHO
 from glider_model.onboard.glide_polar import glide_vertical_rate
 from glider_model.vehicle.file import changed_vehicle, load_vehicle
 

@@ -2,18 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Guidance as a block."""
 
-from glider_guidance.guidance import GuidanceParams, guidance_abort, guidance_step, hear_fixes
-from glider_guidance.settings import GuidanceSettings
-from glider_guidance.yo.stage import STAGE_NAMES
-from glider_model.base.block import Block, Said, block_tick
-from glider_model.base.frames import (
+from glider_base.block import Block, Said, block_tick
+from glider_base.frames import (
     covariance_from_wire,
     odometry_from_wire,
     reference_to_wire,
     water_to_wire,
 )
-from glider_model.base.kernel import kernel
-from glider_model.base.wiring import GUIDANCE as WIRED
+from glider_base.kernel import kernel
+from glider_base.wiring import GUIDANCE as WIRED
+from glider_guidance.guidance import GuidanceParams, guidance_abort, guidance_step, hear_fixes
+from glider_guidance.settings import GuidanceSettings
+from glider_guidance.yo.stage import STAGE_NAMES
 
 
 @block_tick.body(GuidanceParams)

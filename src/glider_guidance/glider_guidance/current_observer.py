@@ -13,7 +13,7 @@ the velocity over ground instead, so that the innovation decays and the estimate
 
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 
 
 class ObserverState(NamedTuple):

@@ -9,6 +9,9 @@ does, in which direction the method would fly, and what control is asked for.
 import math
 from typing import NamedTuple
 
+from glider_base.frames import euler_from_quaternion, rotate_to_ned
+from glider_base.kernel import kernel, replace
+from glider_base.signals import SURFACE_TARGET, TICK_S, Reference, TrackingError, Water
 from glider_guidance.current_observer import ObserverParams, ObserverState, observer_step
 from glider_guidance.los import target_rate
 from glider_guidance.method import Leg, Situation, method_step
@@ -43,9 +46,6 @@ from glider_guidance.yo.stage import (
     is_gliding,
 )
 from glider_guidance.yo.turns import time_to_turn, turn_lead_s
-from glider_model.base.frames import euler_from_quaternion, rotate_to_ned
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.signals import SURFACE_TARGET, TICK_S, Reference, TrackingError, Water
 from glider_model.onboard.attitude_filter import Measured, measure
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_angle
 from glider_model.onboard.fix_watch import FixWatch, contradictions, watch_fixes

@@ -7,8 +7,8 @@ Equation numbers are those of Zhang et al. (2021); docs/paper.md says where they
 
 import math
 
-from glider_model.base.frames import wrap_angle
-from glider_model.base.kernel import kernel
+from glider_base.frames import wrap_angle
+from glider_base.kernel import kernel
 
 
 @kernel

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.settings import TUNABLE, Settings
-from glider_model.base.signals import TrackingError, Water
-from glider_model.base.slot import slot
+from glider_base.settings import TUNABLE, Settings
+from glider_base.signals import TrackingError, Water
+from glider_base.slot import slot
 from glider_model.onboard.learnt_steering import Steering
 from glider_model.vehicle.file import Vehicle
 

@@ -7,9 +7,9 @@ from typing import Any, Literal
 import pydantic
 from pydantic import Field
 
+from glider_base.settings import Settings
+from glider_base.signals import TICK_S
 from glider_guidance.path.settings import PathSettings
-from glider_model.base.settings import Settings
-from glider_model.base.signals import TICK_S
 
 #: Orders that are given alone, and those that may be given together.
 ALONE, TOGETHER = ('hold', 'resume', 'abort'), ('path', 'depth_m', 'pitch_deg')

@@ -11,10 +11,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from glider_base.settings import ConfigurationError
 from glider_guidance.order import Order
 from glider_guidance.settings import GuidanceSettings
 from glider_guidance.yo.stage import AT_END_OF_PATH, SURFACE_PREPARATION, WAITING_ON_SURFACE
-from glider_model.base.settings import ConfigurationError
 
 
 def changed(settings: GuidanceSettings, order: Order) -> GuidanceSettings:

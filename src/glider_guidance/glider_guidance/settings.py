@@ -9,6 +9,8 @@ from typing import Literal
 import pydantic
 from pydantic import Field
 
+from glider_base import plugins
+from glider_base.settings import TUNABLE, ConfigurationError, Settings
 from glider_guidance import methods
 from glider_guidance.current_observer import ObserverParams, ObserverState
 from glider_guidance.guidance import Commanded, Followed, GuidanceParams, GuidanceState, WaterState
@@ -16,8 +18,6 @@ from glider_guidance.method import LosGains, MethodSettings
 from glider_guidance.order import Order
 from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.yo.machine import INITIAL_PROFILE, ProfileSettings
-from glider_model.base import plugins
-from glider_model.base.settings import TUNABLE, ConfigurationError, Settings
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import Filtered, FilterParams
 from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH

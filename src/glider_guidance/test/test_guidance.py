@@ -11,6 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_base.frames import quaternion_from_euler, rotate_to_body
+from glider_base.signals import TICK_S, Odometry
 from glider_guidance.current_observer import ObserverState
 from glider_guidance.guidance import INFEASIBLE_S, WaterState, guidance_abort, guidance_step
 from glider_guidance.methods.observer import LOOKAHEAD_STRETCH_MAX, lookahead_stretch
@@ -23,8 +25,6 @@ from glider_guidance.yo.stage import (
     INFLECTING_UP,
     SURFACING,
 )
-from glider_model.base.frames import quaternion_from_euler, rotate_to_body
-from glider_model.base.signals import TICK_S, Odometry
 from glider_model.onboard.glide_polar import glide_horizontal_speed
 from glider_model.onboard.learnt_steering import SteeringLearningSettings
 

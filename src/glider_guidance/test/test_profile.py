@@ -9,6 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from glider_base.signals import TICK_S
 from glider_guidance.yo.end_of_path import WayLeft
 from glider_guidance.yo.machine import (
     INITIAL_PROFILE,
@@ -32,7 +33,6 @@ from glider_guidance.yo.stage import (
     is_descending,
     is_gliding,
 )
-from glider_model.base.signals import TICK_S
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 

@@ -1,20 +1,13 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Flights of the plant: the tick loop compiled, rows as arrays. A ROS domain of a test's own."""
-
-import fcntl
-import os
-import tempfile
-from pathlib import Path
+"""Flights of the plant: the tick loop compiled, rows as arrays."""
 
 import numba
 import numpy as np
 import pytest
-import rclpy
-from rclpy.context import Context
 
-from glider_model.base.frames import quaternion_from_euler
-from glider_model.base.signals import TICK_S, Joints, Water
+from glider_base.frames import quaternion_from_euler
+from glider_base.signals import TICK_S, Joints, Water
 from glider_model.ocean.water import WaterSettings
 from glider_model.plant.energy import FULL
 from glider_model.plant.faults.kinds import NoFaults, NoFaultState
@@ -147,22 +140,3 @@ def fly():
     Commands (default: actuators stay) and waters are one row, or one row per tick.
     """
     return _flight
-
-
-@pytest.fixture
-def context():
-    """A context in a ROS domain that no other test or run on this machine uses."""
-    for offset in range(101):
-        domain = 1 + (os.getpid() + offset) % 101
-        path = Path(tempfile.gettempdir()) / f'glider-ros-domain-{domain}.lock'
-        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            break
-        except OSError:
-            os.close(lock)
-    context = Context()
-    rclpy.init(context=context, domain_id=domain)
-    yield context
-    rclpy.try_shutdown(context=context)
-    os.close(lock)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_S, Joints, Water
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_S, Joints, Water
 from glider_model.plant.plant import PlantSettings, plant_step, tell
 from glider_model.plant.readings import make_readings, noise_of_readings, read
 from glider_model.vehicle.actuators import actuators_step, toward

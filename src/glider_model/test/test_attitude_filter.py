@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from glider_model.base.signals import TICK_S, Odometry
+from glider_base.signals import TICK_S, Odometry
 from glider_model.onboard.attitude_filter import Measured, measure
 
 quick = settings(max_examples=60)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
-from glider_model.base.errors import ConfigurationError
-from glider_model.base.files import read_yaml
+from glider_base.errors import ConfigurationError
+from glider_base.files import read_yaml
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import VEHICLE_FOLDER, load_vehicle
 from glider_model.vehicle.hydrodynamics import hydrodynamics

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_model.base.frames import wrap_angle
+from glider_base.frames import wrap_angle
 from glider_model.onboard.command_filter import (
     Filtered,
     FilterParams,

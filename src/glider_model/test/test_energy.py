@@ -4,8 +4,8 @@
 
 import pytest
 
-from glider_model.base.signals import TICK_S, Battery, Joints
-from glider_model.base.wiring import PLANT
+from glider_base.signals import TICK_S, Battery, Joints
+from glider_base.wiring import PLANT
 from glider_model.plant.block import plant_move, plant_outputs
 from glider_model.plant.energy import FULL, battery_of, spend, spent
 from glider_model.plant.plant import LAUNCHED, PlantSettings

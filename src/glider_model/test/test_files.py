@@ -11,8 +11,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_model.base import files
-from glider_model.base.errors import (
+from glider_base import files
+from glider_base.errors import (
     MAX_LINE,
     MAX_LINES,
     MAX_SHOWN,
@@ -20,7 +20,7 @@ from glider_model.base.errors import (
     printable,
     shown,
 )
-from glider_model.base.files import (
+from glider_base.files import (
     is_file,
     parse_json,
     parse_yaml,

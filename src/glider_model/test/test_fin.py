@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import SEA_WATER_DENSITY, TICK_S, Joints
+from glider_base.settings import ConfigurationError
+from glider_base.signals import SEA_WATER_DENSITY, TICK_S, Joints
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.actuators import actuators_step
 from glider_model.vehicle.file import changed_vehicle, load_vehicle

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_model.base.frames import quaternion_from_euler
-from glider_model.base.signals import TICK_S, Odometry
+from glider_base.frames import quaternion_from_euler
+from glider_base.signals import TICK_S, Odometry
 from glider_model.onboard.gate import INITIAL_GATE, GateSettings, gate_step, is_lost
 
 quick = settings(max_examples=100)

@@ -8,7 +8,7 @@ import numpy as np
 import pydantic
 import pytest
 
-from glider_model.base.settings import ConfigurationError
+from glider_base.settings import ConfigurationError
 from glider_model.plant.plant import PlantSettings
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle, vehicle_names

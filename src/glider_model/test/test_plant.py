@@ -10,8 +10,8 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from glider_model.base.frames import euler_from_quaternion
-from glider_model.base.signals import TICK_S, Joints, Water
+from glider_base.frames import euler_from_quaternion
+from glider_base.signals import TICK_S, Joints, Water
 from glider_model.plant.motion import acceleration, integrate
 from glider_model.plant.plant import (
     PlantSettings,

@@ -8,9 +8,9 @@ import numpy as np
 import pydantic
 import pytest
 
-from glider_model.base.frames import euler_from_quaternion, odometry_from_wire
-from glider_model.base.signals import TICK_S, Battery, Health, Joints
-from glider_model.base.wiring import PLANT
+from glider_base.frames import euler_from_quaternion, odometry_from_wire
+from glider_base.signals import TICK_S, Battery, Health, Joints
+from glider_base.wiring import PLANT
 from glider_model.ocean.density import depth_at
 from glider_model.plant.block import plant_move, plant_outputs
 from glider_model.plant.faults.kinds import NoFaults, NoFaultState

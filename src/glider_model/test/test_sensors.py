@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from glider_model.base.frames import (
+from glider_base.frames import (
     NO_RATES,
     OriginSettings,
     euler_from_quaternion,
@@ -21,8 +21,8 @@ from glider_model.base.frames import (
     odometry_to_wire,
     quaternion_from_euler,
 )
-from glider_model.base.signals import TICK_S, Joints, Odometry
-from glider_model.base.wiring import PLANT
+from glider_base.signals import TICK_S, Joints, Odometry
+from glider_base.wiring import PLANT
 from glider_model.ocean.density import depth_at
 from glider_model.plant.block import plant_move, plant_outputs
 from glider_model.plant.plant import PlantSettings, plant_odometry

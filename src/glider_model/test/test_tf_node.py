@@ -14,9 +14,9 @@ from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
-from glider_model.base.settings import ConfigurationError
+from glider_base.ros.wire import qos
+from glider_base.settings import ConfigurationError
 from glider_model.nodes.tf_node import TF_QOS, TfNode, transform_of
-from glider_model.ros.wire import qos
 
 ANGLE = 0.7
 

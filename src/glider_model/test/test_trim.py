@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from glider_model.base.frames import quaternion_from_euler
-from glider_model.base.settings import ConfigurationError
+from glider_base.frames import quaternion_from_euler
+from glider_base.settings import ConfigurationError
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle
 

@@ -9,8 +9,8 @@ import re
 import pytest
 import yaml
 
-from glider_model.base.errors import ConfigurationError
-from glider_model.base.files import read_yaml
+from glider_base.errors import ConfigurationError
+from glider_base.files import read_yaml
 from glider_model.vehicle.file import VEHICLE_FOLDER, load_vehicle, vehicle_names, vehicle_path
 
 MISSING = object()

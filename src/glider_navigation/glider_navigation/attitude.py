@@ -19,8 +19,8 @@ rate is used.
 import math
 from typing import NamedTuple
 
-from glider_model.base.frames import body_rates, euler_from_quaternion, euler_rates, wrap_angle
-from glider_model.base.kernel import kernel
+from glider_base.frames import body_rates, euler_from_quaternion, euler_rates, wrap_angle
+from glider_base.kernel import kernel
 from glider_model.onboard.moving_mass import first_moments
 from glider_model.vehicle.file import Vehicle
 

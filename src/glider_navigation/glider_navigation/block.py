@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Navigation as a block."""
 
-from glider_model.base.block import Block, Said, block_tick
-from glider_model.base.frames import (
+from glider_base.block import Block, Said, block_tick
+from glider_base.frames import (
     covariance_to_wire,
     from_geodetic,
     horizontal_to_wire,
     imu_from_wire,
     odometry_from_wire,
 )
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Joints
-from glider_model.base.wiring import NAVIGATION as WIRED
+from glider_base.kernel import kernel
+from glider_base.signals import Joints
+from glider_base.wiring import NAVIGATION as WIRED
 from glider_model.ocean.density import depth_at
 from glider_model.vehicle.file import steers_by
 from glider_navigation.intake import is_blind, is_refusing, take_in

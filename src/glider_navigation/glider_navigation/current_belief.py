@@ -16,8 +16,8 @@ difference between the sea and the forecast.
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.signals import Vector
+from glider_base.kernel import kernel, replace
+from glider_base.signals import Vector
 from glider_model.ocean.current_profile import MAX_SPEED_MPS
 
 #: Principal lunar tide M2 (rad/s).

@@ -9,7 +9,7 @@ where pitch and vertical rate do not belong together, the last speed is held, an
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 from glider_model.onboard.glide_polar import glide_horizontal_speed
 
 #: Shallower pitch (rad), or a slower vertical rate (m/s), is no glide.

@@ -11,8 +11,8 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import TICK_S, Vector
+from glider_base.kernel import kernel
+from glider_base.signals import TICK_S, Vector
 from glider_model.ocean.current import (
     CurrentParams,
     CurrentState,

@@ -11,8 +11,8 @@ vehicle up. Whether a fix lies where the vehicle can be is for the method to say
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.signals import Imu, Joints
+from glider_base.kernel import kernel, replace
+from glider_base.signals import Imu, Joints
 from glider_model.onboard.gate import (
     INITIAL_GATE,
     NORM_REFUSED,

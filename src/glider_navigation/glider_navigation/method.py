@@ -7,10 +7,10 @@ A method makes the odometry that guidance and control act on, of what the sensor
 
 from typing import ClassVar, NamedTuple
 
-from glider_model.base.frames import Origin
-from glider_model.base.settings import Settings
-from glider_model.base.signals import Covariance, Imu, Joints, Odometry, Vector
-from glider_model.base.slot import slot
+from glider_base.frames import Origin
+from glider_base.settings import Settings
+from glider_base.signals import Covariance, Imu, Joints, Odometry, Vector
+from glider_base.slot import slot
 from glider_model.vehicle.file import Vehicle
 from glider_navigation.forecast import ForecastSettings
 
@@ -36,9 +36,9 @@ class NavigationMethodSettings(Settings):
     ``navigation.NAME``; the first line of its docstring says what it does.
     """
 
-    #: Topics of sensors that it needs, of `glider_model.base.wiring.SENSORS`.
+    #: Topics of sensors that it needs, of `glider_base.wiring.SENSORS`.
     reads: ClassVar[tuple[str, ...]] = ()
-    #: Topics that it fills beside odom, of `glider_model.base.wiring.BELIEFS`.
+    #: Topics that it fills beside odom, of `glider_base.wiring.BELIEFS`.
     tells: ClassVar[tuple[str, ...]] = ()
 
     def params(self, start: Start) -> NamedTuple:

@@ -7,11 +7,11 @@ from typing import Literal, NamedTuple
 import pydantic
 from pydantic import Field
 
-from glider_model.base import plugins
-from glider_model.base.frames import Origin, OriginSettings
-from glider_model.base.settings import Settings
-from glider_model.base.signals import Joints
-from glider_model.base.wiring import SENSORS
+from glider_base import plugins
+from glider_base.frames import Origin, OriginSettings
+from glider_base.settings import Settings
+from glider_base.signals import Joints
+from glider_base.wiring import SENSORS
 from glider_model.onboard.gate import GateSettings
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation import methods

@@ -8,7 +8,7 @@ is left to the guard, which brings the vehicle up.
 
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 
 #: What is shown with a fix counts after this time (s), and so many samples.
 FIXED_S, LEAST_SAMPLES = 10.0, 5

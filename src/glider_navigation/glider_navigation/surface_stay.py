@@ -11,8 +11,8 @@ the vehicle is there after all, and what was believed of the place is forgotten.
 
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.signals import Vector
+from glider_base.kernel import kernel, replace
+from glider_base.signals import Vector
 
 #: Time from a fix that counts to the next (s).
 FIX_EVERY_S = 60.0

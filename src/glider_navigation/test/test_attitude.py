@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from glider_model.base.signals import TICK_S, Imu, Joints
+from glider_base.signals import TICK_S, Imu, Joints
 from glider_model.onboard.moving_mass import make_moving_mass
 from glider_model.vehicle.file import SteeringSettings, load_vehicle
 from glider_navigation.attitude import attitude_step, initial_attitude

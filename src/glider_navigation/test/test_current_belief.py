@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from glider_model.base.signals import Vector
+from glider_base.signals import Vector
 from glider_navigation.current_belief import (
     Regressors,
     carry,

@@ -8,8 +8,8 @@ import numba
 import numpy as np
 import pytest
 
-from glider_model.base.frames import odometry_from_wire
-from glider_model.base.signals import TICK_S, Imu, Joints, Vector
+from glider_base.frames import odometry_from_wire
+from glider_base.signals import TICK_S, Imu, Joints, Vector
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation.current_belief import Uncertainty, initial_belief

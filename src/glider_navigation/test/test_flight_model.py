@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from glider_model.base.signals import TICK_S
+from glider_base.signals import TICK_S
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation.flight_model import INITIAL_FLIGHT, Flight, follow_depth, reckon_speed

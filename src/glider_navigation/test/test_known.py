@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from glider_model.base.frames import odometry_from_wire, odometry_to_wire
-from glider_model.base.signals import TICK_S, Imu, Joints, Odometry
+from glider_base.frames import odometry_from_wire, odometry_to_wire
+from glider_base.signals import TICK_S, Imu, Joints, Odometry
 from glider_navigation.method import Fix, Heard, method_step
 from glider_navigation.phase import KNOWN
 from glider_navigation.settings import NavigationSettings

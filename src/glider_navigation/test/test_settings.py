@@ -4,8 +4,8 @@
 
 import pytest
 
-from glider_model.base.errors import ConfigurationError
-from glider_model.base.settings import validate
+from glider_base.errors import ConfigurationError
+from glider_base.settings import validate
 from glider_navigation.settings import METHODS, NavigationLawSettings, NavigationSettings
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_model.base.signals import Vector
+from glider_base.signals import Vector
 from glider_navigation.method import Fix
 from glider_navigation.surface_stay import begin, counts, drifted_variance, take_fix, wait
 

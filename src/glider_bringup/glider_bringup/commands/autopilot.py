@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
+from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace
+from glider_base.settings import ConfigurationError
 from glider_bringup.console import Changes, Law, Named, changed_fields, messages
 from glider_bringup.mission.choices import chosen_fields
 from glider_bringup.mission.scenario import load_scenario
-from glider_model.base.settings import ConfigurationError
-from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace
 
 app = typer.Typer()
 

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
+from glider_base.settings import ConfigurationError
 from glider_bringup.console import Json, counter, messages, output, print_table
 from glider_bringup.mission.disk import write_whole
-from glider_model.base.settings import ConfigurationError
 
 app = typer.Typer()
 

@@ -10,6 +10,10 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_SURFACED
+from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_S
 from glider_bringup.console import (
     Changes,
     Json,
@@ -29,10 +33,6 @@ from glider_bringup.mission.scenario import DEFAULT_SCENARIO, Scenario, load_sce
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.showing.scorecard import STYLES, print_card, print_places
 from glider_guidance.settings import LosSettings
-from glider_model.base.errors import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_SURFACED
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_S
-from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 
 app = typer.Typer()
 Engine = Literal[ENGINES]

@@ -3,7 +3,7 @@
 """A run as an xarray Dataset: every number of every topic over time, by name.
 
 Topics are ENU and FLU; here everything is NED (world) and FRD (body), as in the scorecard and in
-books on marine craft, SI and radians. `glider_model.base.frames` turns one into the other.
+books on marine craft, SI and radians. `glider_base.frames` turns one into the other.
 """
 
 from typing import Any, NamedTuple
@@ -12,6 +12,19 @@ import numpy as np
 import xarray
 from xarray.plot.accessor import DataArrayPlotAccessor
 
+from glider_base.block import Block, Telling
+from glider_base.frames import (
+    euler_from_quaternion,
+    from_geodetic,
+    odometry_from_wire,
+    poses_from_wire,
+    reference_from_wire,
+    water_from_wire,
+    wrench_from_wire,
+)
+from glider_base.kernel import kernel, source_digest
+from glider_base.signals import TICK_NS, Adaptation
+from glider_base.wiring import NO_ECHO
 from glider_bringup.blocks import COLUMNS
 from glider_bringup.mission.scenario import Scenario
 from glider_control.block import CONTROL
@@ -25,19 +38,6 @@ from glider_control.intake import REFUSED
 from glider_guard.block import GUARD
 from glider_guard.rows import ROWS
 from glider_guidance.yo.stage import STAGE_NAMES
-from glider_model.base.block import Block, Telling
-from glider_model.base.frames import (
-    euler_from_quaternion,
-    from_geodetic,
-    odometry_from_wire,
-    poses_from_wire,
-    reference_from_wire,
-    water_from_wire,
-    wrench_from_wire,
-)
-from glider_model.base.kernel import kernel, source_digest
-from glider_model.base.signals import TICK_NS, Adaptation
-from glider_model.base.wiring import NO_ECHO
 from glider_model.vehicle.file import steers_by
 
 NED, FRD, PATH = 'NED', 'FRD', 'path'

@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from glider_base.settings import ConfigurationError, validate
+from glider_base.signals import TICK_S
 from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.console import compiling
 from glider_bringup.door.run import chosen_scenario
@@ -25,8 +27,6 @@ from glider_control.law import LawSettings
 from glider_guard.rows import LATCHED
 from glider_guidance.order import Order
 from glider_guidance.yo.stage import AT_END_OF_PATH
-from glider_model.base.settings import ConfigurationError, validate
-from glider_model.base.signals import TICK_S
 
 #: A vehicle that has been below the first depth and is above the second has surfaced (m).
 UNDER_M, SURFACED_M = 2.0, 1.0

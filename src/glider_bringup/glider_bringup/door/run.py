@@ -13,6 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from glider_base.files import parse_yaml
+from glider_base.ros.places import given_domain
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_S
 from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.compiling import told
 from glider_bringup.engines.flight import Outcome
@@ -40,10 +44,6 @@ from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.scoring.traces import make_tracer
 from glider_control.law import LawSettings
 from glider_control.own_law import own_law
-from glider_model.base.files import parse_yaml
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_S
-from glider_model.ros.places import given_domain
 
 if TYPE_CHECKING:
     import xarray

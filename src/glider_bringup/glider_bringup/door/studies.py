@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from glider_base.files import yaml_text
+from glider_base.settings import ConfigurationError
 from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
     load_scenario,
     scenario_names,
     scenario_path,
 )
-from glider_model.base.files import yaml_text
-from glider_model.base.settings import ConfigurationError
 from glider_model.plant.trim import Trim, solve_trim
 from glider_model.vehicle.file import load_vehicle, vehicle_names
 

@@ -8,6 +8,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from glider_base.settings import ConfigurationError
+from glider_base.signals import NOT_FINITE, TICK_S
 from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import (
     MissionParams,
@@ -34,8 +36,6 @@ from glider_guidance.orders import (
     wait_for_surface,
 )
 from glider_guidance.settings import GuidanceSettings
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import NOT_FINITE, TICK_S
 
 _STAGE = COLUMNS['stage']
 

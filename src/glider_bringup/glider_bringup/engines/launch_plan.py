@@ -12,6 +12,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
+from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace
+from glider_base.ros.wire.topics import CURRENT, GUARD, NAVIGATION
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_S
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import (
     AUTOPILOT,
@@ -37,10 +41,6 @@ from glider_bringup.mission.scenario import (
 )
 from glider_control.settings import LAWS
 from glider_guidance.settings import METHODS
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_S
-from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace
-from glider_model.ros.wire.topics import CURRENT, GUARD, NAVIGATION
 
 #: The node that `ros2 launch` starts and `./glider run`, which nobody can watch, does not.
 TF, TF_MODULE = 'tf_node', 'glider_model.nodes.tf_node'

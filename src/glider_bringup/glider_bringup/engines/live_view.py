@@ -8,10 +8,10 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from glider_base.errors import FATAL
+from glider_base.ros.places import NAMESPACE, domain_id
+from glider_base.settings import ConfigurationError
 from glider_bringup.engines.processes import OWN_CLOCK
-from glider_model.base.errors import FATAL
-from glider_model.base.settings import ConfigurationError
-from glider_model.ros.places import NAMESPACE, domain_id
 
 #: The view has this long (s) to leave.
 _LEAVE_S = 3.0

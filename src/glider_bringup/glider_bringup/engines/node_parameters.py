@@ -6,13 +6,13 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
+from glider_base.ros.message_fault import MessageFault
+from glider_base.ros.parameters import parameters_yaml, to_parameters
+from glider_base.ros.wire import topics
+from glider_base.wiring import publisher
 from glider_bringup.blocks import BLOCKS
 from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.scenario import Scenario
-from glider_model.base.wiring import publisher
-from glider_model.ros.message_fault import MessageFault
-from glider_model.ros.parameters import parameters_yaml, to_parameters
-from glider_model.ros.wire import topics
 
 
 def node_parameters(

@@ -16,12 +16,12 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Any, Literal, NamedTuple
 
+from glider_base import wiring
+from glider_base.errors import FATAL
+from glider_base.ros.places import NAMESPACE, domain_id
+from glider_base.wiring import WIRING
 from glider_bringup.engines.fork_server import FORK_SERVER, tie_to
 from glider_bringup.engines.janitor import is_alive
-from glider_model.base import wiring
-from glider_model.base.errors import FATAL
-from glider_model.base.wiring import WIRING
-from glider_model.ros.places import NAMESPACE, domain_id
 
 PLANT, RECORDER = wiring.PLANT.node, 'recorder_node'
 

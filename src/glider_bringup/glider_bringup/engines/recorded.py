@@ -5,6 +5,10 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from glider_base.errors import EXIT_USAGE
+from glider_base.ros.places import NAMESPACE
+from glider_base.ros.wire.topics import recorded_topics
+from glider_base.settings import ConfigurationError
 from glider_bringup.engines.flight import Outcome, Progress, Taker, ended, fly
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import Layout, node_commands, run_nodes
@@ -21,10 +25,6 @@ from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.read_back import Reader, read_back
 from glider_bringup.recording.ros.log_writer import LogWriter
 from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
-from glider_model.base.errors import EXIT_USAGE
-from glider_model.base.settings import ConfigurationError
-from glider_model.ros.places import NAMESPACE
-from glider_model.ros.wire.topics import recorded_topics
 from glider_model.vehicle.file import steers_by
 
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from glider_model.base.settings import ConfigurationError
+from glider_base.settings import ConfigurationError
 
 #: What the disk says where the name of the file is not to blame.
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """How long a mission takes, as far as that is known before it is flown."""
 
+from glider_base.signals import TICK_S
 from glider_bringup.mission.scenario import Scenario
 from glider_guidance.guidance import path_time_s
 from glider_guidance.yo.machine import mission_time_s
-from glider_model.base.signals import TICK_S
 
 
 def planned_ticks(scenario: Scenario) -> int:

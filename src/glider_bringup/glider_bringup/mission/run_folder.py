@@ -9,9 +9,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from glider_base.settings import ConfigurationError
 from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_model.base.settings import ConfigurationError
 from glider_model.vehicle.file import vehicle_file
 
 SCENARIO_FILE, VEHICLE_FILE, SCORE_FILE = 'scenario.yaml', 'vehicle.yaml', 'score.json'

@@ -12,6 +12,18 @@ from typing import Any, ClassVar, NamedTuple
 import pydantic
 from pydantic import Field
 
+from glider_base.errors import clipped, shown, told_changes
+from glider_base.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
+from glider_base.frames import OriginSettings
+from glider_base.settings import (
+    ConfigurationError,
+    Settings,
+    file_names,
+    find_file,
+    holder_of,
+    validate,
+)
+from glider_base.wiring import SENSORS
 from glider_bringup.mission.rules import Rules
 from glider_control.law import LawSettings
 from glider_control.settings import ControlLawSettings, ControlSettings, check_law, with_law
@@ -22,18 +34,6 @@ from glider_guidance.path.curve import path_length, path_point
 from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
-from glider_model.base.errors import clipped, shown, told_changes
-from glider_model.base.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
-from glider_model.base.frames import OriginSettings
-from glider_model.base.settings import (
-    ConfigurationError,
-    Settings,
-    file_names,
-    find_file,
-    holder_of,
-    validate,
-)
-from glider_model.base.wiring import SENSORS
 from glider_model.ocean.current_settings import CurrentSettings
 from glider_model.ocean.water import WaterSettings
 from glider_model.onboard.gate import GateSettings

@@ -11,11 +11,11 @@ import sys
 
 from rclpy.utilities import remove_ros_args
 
+from glider_base.errors import EXIT_USAGE, say_fatal
+from glider_base.ros.lockstep.process import run_together
 from glider_control.nodes.control_node import ControlNode
 from glider_guard.nodes.guard_node import GuardNode
 from glider_guidance.nodes.guidance_node import GuidanceNode
-from glider_model.base.errors import EXIT_USAGE, say_fatal
-from glider_model.ros.lockstep.process import run_together
 from glider_navigation.nodes.navigation_node import NavigationNode
 
 #: Nodes by the names of their blocks, in the order in which they act in a tick.

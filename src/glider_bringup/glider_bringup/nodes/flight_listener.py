@@ -11,11 +11,11 @@ import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 
-from glider_model.base.signals import TICK_NS
-from glider_model.ros.lockstep.executor import Gate, take
-from glider_model.ros.places import NAMESPACE
-from glider_model.ros.wire import qos
-from glider_model.ros.wire.topics import TOPICS, Topic
+from glider_base.ros.lockstep.executor import Gate, take
+from glider_base.ros.places import NAMESPACE
+from glider_base.ros.wire import qos
+from glider_base.ros.wire.topics import TOPICS, Topic
+from glider_base.signals import TICK_NS
 
 #: What keeps a listener out of shared memory, in which it would have a part of what is left there;
 #: on this machine's own network all the same.

@@ -15,25 +15,25 @@ from typing import Literal
 from pydantic import Field
 from std_msgs.msg import Header
 
+from glider_base.errors import EXIT_FAILED
+from glider_base.ros.hearing.gids import gid_of
+from glider_base.ros.hearing.inputs import Input
+from glider_base.ros.lockstep import health, peers
+from glider_base.ros.lockstep.executor import take, take_with_info
+from glider_base.ros.lockstep.node import TickNode
+from glider_base.ros.lockstep.process import Stop, run
+from glider_base.ros.lockstep.pulse import Condition
+from glider_base.ros.lockstep.watch import FAREWELL_S
+from glider_base.ros.parameters import declare_settings
+from glider_base.ros.wire import qos, topics
+from glider_base.ros.wire.codec import MessageError, to_cdr
+from glider_base.ros.wire.topics import TOPICS, recorded_topics
+from glider_base.settings import ConfigurationError, Settings
+from glider_base.signals import TICK_NS
+from glider_base.wiring import BELIEFS, SENSORS, WIRING
 from glider_bringup.mission.disk import DiskError
 from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
 from glider_bringup.recording.tick_sorter import TickSorter
-from glider_model.base.errors import EXIT_FAILED
-from glider_model.base.settings import ConfigurationError, Settings
-from glider_model.base.signals import TICK_NS
-from glider_model.base.wiring import BELIEFS, SENSORS, WIRING
-from glider_model.ros.hearing.gids import gid_of
-from glider_model.ros.hearing.inputs import Input
-from glider_model.ros.lockstep import health, peers
-from glider_model.ros.lockstep.executor import take, take_with_info
-from glider_model.ros.lockstep.node import TickNode
-from glider_model.ros.lockstep.process import Stop, run
-from glider_model.ros.lockstep.pulse import Condition
-from glider_model.ros.lockstep.watch import FAREWELL_S
-from glider_model.ros.parameters import declare_settings
-from glider_model.ros.wire import qos, topics
-from glider_model.ros.wire.codec import MessageError, to_cdr
-from glider_model.ros.wire.topics import TOPICS, recorded_topics
 
 _DRAIN_S = 0.01
 _PROGRESS_S = 0.25

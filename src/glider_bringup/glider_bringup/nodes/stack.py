@@ -8,10 +8,10 @@ launched one by one. The recorder, which writes while others work, is a process 
 
 import sys
 
+from glider_base.ros.lockstep.process import run_together
 from glider_bringup.nodes.autopilot import PARTS
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
-from glider_model.ros.lockstep.process import run_together
 
 
 def main(args=None) -> int:

@@ -20,13 +20,13 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
 
+from glider_base.errors import EXIT_USAGE, say_fatal
+from glider_base.ros.lockstep.executor import take
+from glider_base.ros.parameters import declare_settings, refuse_unknown
+from glider_base.ros.wire import qos
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.settings import ConfigurationError, Settings
 from glider_bringup.recording.ros.rosbag2 import message_definition
-from glider_model.base.errors import EXIT_USAGE, say_fatal
-from glider_model.base.settings import ConfigurationError, Settings
-from glider_model.ros.lockstep.executor import take
-from glider_model.ros.parameters import declare_settings, refuse_unknown
-from glider_model.ros.wire import qos
-from glider_model.ros.wire.topics import TOPICS
 
 NAME = 'viewer_node'
 _PERIOD_S = 0.02

@@ -4,9 +4,9 @@
 
 from pathlib import Path
 
+from glider_base.files import read_yaml
+from glider_base.settings import ConfigurationError
 from glider_bringup.recording.metadata import METADATA_FILE
-from glider_model.base.files import read_yaml
-from glider_model.base.settings import ConfigurationError
 
 
 def bag_files(path: Path) -> list[Path]:

@@ -23,6 +23,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema
 from mcap.summary import Summary
 
+from glider_base.settings import ConfigurationError
 from glider_bringup.recording.bag_files import bag_files
 from glider_bringup.recording.mcap_records import (
     CHUNK_TIMES,
@@ -36,7 +37,6 @@ from glider_bringup.recording.mcap_records import (
     whole_records,
 )
 from glider_bringup.recording.mcap_scan import Places, find, gather
-from glider_model.base.settings import ConfigurationError
 
 _DATA_END = HEAD.pack(Opcode.DATA_END, 4)
 _LOG_TIME_AT = 6  # in a message record: channel (2), sequence (4), log time (8), publish time (8)

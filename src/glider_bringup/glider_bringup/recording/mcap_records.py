@@ -16,7 +16,7 @@ from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.summary import Summary
 
-from glider_model.base.signals import TICK_NS
+from glider_base.signals import TICK_NS
 
 MAGIC = b'\x89MCAP0\r\n'
 #: What every record begins with: its opcode and its length.

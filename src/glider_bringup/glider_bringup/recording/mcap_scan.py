@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 
 
 @kernel

@@ -8,11 +8,11 @@ computes from them what its node would have published.
 
 import numpy as np
 
-from glider_model.base.block import Block, block_tick, optional_topics, put, rows_at
-from glider_model.base.kernel import kernel
-from glider_model.base.settings import Settings
-from glider_model.base.signals import TICK_NS, TICK_S
-from glider_model.base.wiring import FIELDS, at_rest, present
+from glider_base.block import Block, block_tick, optional_topics, put, rows_at
+from glider_base.kernel import kernel
+from glider_base.settings import Settings
+from glider_base.signals import TICK_NS, TICK_S
+from glider_base.wiring import FIELDS, at_rest, present
 from glider_model.plant.block import PLANT, plant_move, plant_outputs
 
 

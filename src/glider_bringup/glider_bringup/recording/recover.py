@@ -17,6 +17,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 from mcap.summary import Summary
 
+from glider_base.settings import ConfigurationError
 from glider_bringup.mission.disk import not_written
 from glider_bringup.recording.bag_files import bag_files
 from glider_bringup.recording.mcap_reader import Bag
@@ -40,7 +41,6 @@ from glider_bringup.recording.metadata import (
     topic_counts,
     write_metadata,
 )
-from glider_model.base.settings import ConfigurationError
 
 #: Messages that are in no chunk are put into chunks of about this size (B).
 _LOOSE_BYTES = 1 << 20

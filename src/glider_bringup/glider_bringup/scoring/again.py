@@ -5,6 +5,8 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from glider_base.ros.lockstep.health import FINISHED
+from glider_base.settings import ConfigurationError
 from glider_bringup.engines.flight import Outcome, ended
 from glider_bringup.mission.planned import planned_ticks
 from glider_bringup.mission.run_folder import PARAMETERS_FILE, scenario_of
@@ -15,8 +17,6 @@ from glider_bringup.recording.read_back import Reader, read_back
 from glider_bringup.recording.ros.recorded_log import RecordedLog
 from glider_bringup.scoring.card import STOPPED, read_score, scorecard
 from glider_bringup.scoring.score import make_scorer, scores_of
-from glider_model.base.settings import ConfigurationError
-from glider_model.ros.lockstep.health import FINISHED
 
 #: Gets the ticks read from a bag, and about how many there are.
 Reading = Callable[[int, int], None]

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from glider_base.block import changes_to_tell
+from glider_base.signals import TICK_NS, TICK_S
 from glider_guard.block import TELL_EVERY_NS
 from glider_guard.depth import SURFACE_M
 from glider_guard.rows import ALL, DROPS, ROWS, SURFACES
-from glider_model.base.block import changes_to_tell
-from glider_model.base.signals import TICK_NS, TICK_S
 
 COMPLETED, SURFACED, LOST, INFEASIBLE = 'completed', 'surfaced', 'lost', 'infeasible'
 #: All has been done for so long (s), and the vehicle has not come up by this (m): nothing is left.

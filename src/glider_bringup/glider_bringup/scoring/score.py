@@ -17,6 +17,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from glider_base.block import changes_to_tell
+from glider_base.frames import (
+    Origin,
+    OriginSettings,
+    euler_from_quaternion,
+    odometry_from_wire,
+    poses_from_wire,
+)
+from glider_base.kernel import kernel
+from glider_base.signals import TICK_NS, TICK_S, Odometry
 from glider_bringup.blocks import COLUMNS
 from glider_bringup.mission.rules import Rules
 from glider_bringup.mission.scenario import Scenario
@@ -36,16 +46,6 @@ from glider_control.intake import REFUSED
 from glider_guard.block import TELL_EVERY_NS
 from glider_guard.rows import ALL, DROP, LATCHED, NOTE, REACTIONS, ROWS, SURFACE, reaction_of
 from glider_guidance.yo.stage import AT_END_OF_PATH
-from glider_model.base.block import changes_to_tell
-from glider_model.base.frames import (
-    Origin,
-    OriginSettings,
-    euler_from_quaternion,
-    odometry_from_wire,
-    poses_from_wire,
-)
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import TICK_NS, TICK_S, Odometry
 from glider_model.plant.faults.settings import FaultSettings
 from glider_model.plant.plant import dive_depths
 from glider_model.plant.readings import Readings, make_readings, noise_of_readings

@@ -8,9 +8,9 @@ their odometry, which follows from seed and tick.
 
 import numpy as np
 
+from glider_base.frames import odometry_from_wire, odometry_to_wire
+from glider_base.kernel import kernel
 from glider_bringup.blocks import COLUMNS
-from glider_model.base.frames import odometry_from_wire, odometry_to_wire
-from glider_model.base.kernel import kernel
 from glider_model.plant.sensors import SensorParams, is_noisy, remove_noise
 
 _TRUTH, _ODOM_START = COLUMNS['ground_truth/odom'], COLUMNS['odom'].start

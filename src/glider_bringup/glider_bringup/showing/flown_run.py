@@ -4,6 +4,8 @@
 
 from pathlib import Path
 
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_NS
 from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.run_folder import (
     SCENARIO_FILE,
@@ -20,8 +22,6 @@ from glider_bringup.scoring.traces import Tracer, Traces, load_traces, make_trac
 from glider_bringup.showing.figure import draw_run
 from glider_bringup.showing.report import report_page
 from glider_bringup.showing.web_page import FlownRun
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_NS
 from glider_model.vehicle.file import load_vehicle
 
 

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
+from glider_base.files import parse_yaml
+from glider_base.settings import ConfigurationError, validate
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.studies.sweep.netcdf import read_dataset
 from glider_guidance.los import crab_heading
-from glider_model.base.files import parse_yaml
-from glider_model.base.settings import ConfigurationError, validate
 from glider_model.ocean.current_settings import KNOT_MPS
 from glider_model.onboard.glide_polar import make_polar, steady_horizontal_speed
 from glider_model.vehicle.file import Vehicle

@@ -23,11 +23,11 @@ from distributed import Client, Future, LocalCluster, TimeoutError, wait
 from distributed.client import ClosedClientError
 from distributed.scheduler import KilledWorker
 
+from glider_base.kernel import source_digest
+from glider_base.settings import ConfigurationError
 from glider_bringup.engines.compiling import Tell, compile_loops
 from glider_bringup.engines.interrupts import interrupts_noted
 from glider_bringup.mission.choices import Combination
-from glider_model.base.kernel import source_digest
-from glider_model.base.settings import ConfigurationError
 
 #: Tasks that are handed out ahead, for each thread of the workers.
 TASKS_AHEAD = 2

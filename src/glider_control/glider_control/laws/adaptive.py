@@ -20,12 +20,12 @@ from typing import NamedTuple
 
 from pydantic import Field
 
+from glider_base.frames import wrap_angle
+from glider_base.kernel import kernel
+from glider_base.settings import TUNABLE, Settings
+from glider_base.signals import Adaptation
 from glider_control.law import Bank, LawSettings, law_learnt, law_step
 from glider_control.turning import roll_to_kick, roll_to_turn, sure_disturbance
-from glider_model.base.frames import wrap_angle
-from glider_model.base.kernel import kernel
-from glider_model.base.settings import TUNABLE, Settings
-from glider_model.base.signals import Adaptation
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
 from glider_model.onboard.learnt_steering import (
     SMALLEST_KICK,

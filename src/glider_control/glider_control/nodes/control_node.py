@@ -4,10 +4,10 @@
 
 import sys
 
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.block_node import BlockNode
+from glider_base.ros.lockstep.process import run
 from glider_control.block import CONTROL
-from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.block_node import BlockNode
-from glider_model.ros.lockstep.process import run
 
 
 class ControlNode(BlockNode):

@@ -21,11 +21,11 @@ from typing import NamedTuple
 
 from pydantic import Field
 
+from glider_base.frames import wrap_angle
+from glider_base.kernel import kernel, replace
+from glider_base.settings import TUNABLE
+from glider_base.signals import Adaptation
 from glider_control.surface import SurfaceLawSettings, steer, surface_learnt
-from glider_model.base.frames import wrap_angle
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.settings import TUNABLE
-from glider_model.base.signals import Adaptation
 from glider_model.onboard.learnt_steering import LEARN_SPEED, STEERING_SPEED
 from glider_model.vehicle.file import Vehicle
 

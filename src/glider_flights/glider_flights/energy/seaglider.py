@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError
 from glider_flights.energy.uses import PUMP, Uses
 from glider_flights.netcdf import refuse_missing
 from glider_flights.seaglider import read_variables, seaglider_files
-from glider_model.base.errors import ConfigurationError
 
 #: Less than this is no pumping of a Seaglider: oil let in, or the valve (cc, A).
 PUMPED_CC, PUMPING_A = 2.0, 0.05

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
-from glider_model.base.errors import ConfigurationError
+from glider_base.errors import ConfigurationError
 
 #: Fields of a vehicle file that are fitted, and their units.
 PUMP = {'pump_out': 'J/cc', 'pump_out_per_m': 'J/cc/m'}

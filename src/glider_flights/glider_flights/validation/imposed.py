@@ -9,14 +9,14 @@ vertical rate would add up. Forcing is a table, a row for each sample, even in b
 import math
 from typing import NamedTuple
 
-from glider_model.base.frames import (
+from glider_base.frames import (
     euler_from_quaternion,
     quaternion_from_euler,
     rotate_to_ned,
     wrap_angle,
 )
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.signals import Joints, Water
+from glider_base.kernel import kernel, replace
+from glider_base.signals import Joints, Water
 from glider_model.ocean.density import displacing, immersed
 from glider_model.plant.motion import Motion, acceleration, integrate
 from glider_model.plant.plant import LARGEST_ERROR_J, MOST_STEPS
@@ -39,7 +39,7 @@ class Forcing(NamedTuple):
     depth: float  #: (m)
     phi: float  #: roll, pitch (rad)
     theta: float
-    m_b: float  #: actuators, see `glider_model.base.signals.Joints`
+    m_b: float  #: actuators, see `glider_base.signals.Joints`
     x_p: float
     mu: float
     delta: float

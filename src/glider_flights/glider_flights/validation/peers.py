@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError
 from glider_flights.folders import installed
 from glider_flights.reckoning import vertical_rate
 from glider_flights.record import Flight
 from glider_flights.validation.flying import Model
 from glider_flights.validation.score import rms
 from glider_flights.validation.track import RATE_S, Track
-from glider_model.base.errors import ConfigurationError
 
 #: As the documentation of gliderflight has it: lift slope of the hull (1/rad), induced drag
 #: (1/rad^2), and the parasitic drag that its fit begins with.

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError
 from glider_flights.record import Flight
 from glider_flights.validation.fit import BY_ADCP, CONSTANTS, chosen, fitted
 from glider_flights.validation.flying import (
@@ -22,7 +23,6 @@ from glider_flights.validation.flying import (
 from glider_flights.validation.peers import peer
 from glider_flights.validation.score import Adcp, score, speed_off
 from glider_flights.validation.track import Track, tracks
-from glider_model.base.errors import ConfigurationError
 
 #: Speeds of an ADCP that come with a flight, in its folder or the one above it.
 ADCP_FILES = 'U_*.npy'

@@ -6,14 +6,14 @@ import sys
 
 from std_srvs.srv import Trigger
 
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.block_node import BlockNode
+from glider_base.ros.lockstep.orders import SURFACE
+from glider_base.ros.lockstep.process import run
+from glider_base.signals import TICK_S, Joints
 from glider_guard.ascent import INITIAL_ASCENT, come_up
 from glider_guard.block import GUARD
 from glider_guard.depth import SURFACE_M
-from glider_model.base.signals import TICK_S, Joints
-from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.block_node import BlockNode
-from glider_model.ros.lockstep.orders import SURFACE
-from glider_model.ros.lockstep.process import run
 
 
 class GuardNode(BlockNode):

@@ -9,6 +9,8 @@ beforehand: the desired track moves aside, so that half of it comes before the t
 import math
 from typing import NamedTuple
 
+from glider_base.frames import wrap_angle
+from glider_base.kernel import kernel
 from glider_guidance.los import (
     approach_angles,
     approach_heading,
@@ -18,8 +20,6 @@ from glider_guidance.los import (
 from glider_guidance.method import Asked, LosGains, MethodSettings, method_step
 from glider_guidance.yo.stage import INFLECTING_UP
 from glider_guidance.yo.turns import turn_offset
-from glider_model.base.frames import wrap_angle
-from glider_model.base.kernel import kernel
 from glider_model.onboard.learnt_steering import followed_frequency
 from glider_model.vehicle.file import Vehicle
 

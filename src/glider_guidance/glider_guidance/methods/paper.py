@@ -4,9 +4,9 @@
 
 from typing import NamedTuple
 
+from glider_base.kernel import kernel
 from glider_guidance.los import approach_angles, crab_heading, desired_direction
 from glider_guidance.method import Asked, LosGains, MethodSettings, method_step
-from glider_model.base.kernel import kernel
 from glider_model.vehicle.file import Vehicle
 
 

@@ -9,17 +9,17 @@ from nav_msgs.msg import Path
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from glider_base.frames import water_to_wire
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.block_node import BlockNode
+from glider_base.ros.lockstep.orders import ABORT
+from glider_base.ros.lockstep.process import run
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_NS, Water
+from glider_base.wiring import MAP
 from glider_guidance.block import GUIDANCE
 from glider_guidance.order import Order
 from glider_guidance.orders import changed, due
-from glider_model.base.frames import water_to_wire
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_NS, Water
-from glider_model.base.wiring import MAP
-from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.block_node import BlockNode
-from glider_model.ros.lockstep.orders import ABORT
-from glider_model.ros.lockstep.process import run
 
 #: Number of points of the published path.
 PATH_POINTS = 500

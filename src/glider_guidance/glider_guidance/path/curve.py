@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import TrackingError
+from glider_base.kernel import kernel
+from glider_base.signals import TrackingError
 
 #: Kinds of paths.
 CUBIC, HELIX = 0, 1

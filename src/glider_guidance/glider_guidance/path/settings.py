@@ -10,8 +10,8 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
+from glider_base.settings import Settings
 from glider_guidance.path.curve import CUBIC, HELIX, SAMPLES_PER_PIECE, PathParams, path_point
-from glider_model.base.settings import Settings
 
 #: Paths stay this close to the origin (m, horizontally) and above this depth (m).
 MAX_DISTANCE_M = 1e6

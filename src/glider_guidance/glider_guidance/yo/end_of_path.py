@@ -10,9 +10,9 @@ that is led into it, but it takes ``lead_s`` longer than its way does, and the c
 import math
 from typing import NamedTuple
 
+from glider_base.kernel import kernel
 from glider_guidance.los import crab_heading
 from glider_guidance.path.curve import path_piece, path_tangent
-from glider_model.base.kernel import kernel
 
 #: A leg on which less is made good than this is never done (m/s).
 LEAST_PROGRESS = 0.01

@@ -7,6 +7,9 @@ from typing import Literal, NamedTuple
 
 from pydantic import Field
 
+from glider_base.kernel import kernel, replace
+from glider_base.settings import TUNABLE, Settings
+from glider_base.signals import TICK_S
 from glider_guidance.yo.end_of_path import WayLeft, lower_turn, next_dive
 from glider_guidance.yo.stage import (
     AT_END_OF_PATH,
@@ -21,9 +24,6 @@ from glider_guidance.yo.stage import (
     is_descending,
 )
 from glider_guidance.yo.turns import SLOW, turn_lead_m, turn_lead_s
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.settings import TUNABLE, Settings
-from glider_model.base.signals import TICK_S
 from glider_model.onboard.glide_polar import Polar, glide_vertical_rate
 
 #: Share of the glide's vertical rate at which the pitch goes over in a turn.

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The stages of a yo: the paper's four, the inflections between them, and the ends."""
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 
 SURFACE_PREPARATION = 0
 GLIDING_DOWN = 1

@@ -4,8 +4,8 @@
 
 import math
 
+from glider_base.kernel import kernel
 from glider_guidance.yo.stage import GLIDING_DOWN, GLIDING_UP, is_descending
-from glider_model.base.kernel import kernel
 
 #: The desired track is led between these times before a turn, and comes back in this time (s).
 LEAD_FROM_S, LEAD_TO_S, RETURN_S = 400.0, 150.0, 240.0

@@ -4,9 +4,9 @@
 
 import sys
 
+from glider_base.ros.lockstep.block_node import BlockNode
+from glider_base.ros.lockstep.process import run
 from glider_model.ocean.current_block import CURRENT
-from glider_model.ros.lockstep.block_node import BlockNode
-from glider_model.ros.lockstep.process import run
 
 
 class CurrentNode(BlockNode):

@@ -5,13 +5,13 @@
 import math
 import sys
 
-from glider_model.base.signals import TICK_S
-from glider_model.base.wiring import at_rest, present
+from glider_base.ros.lockstep.clock import ClockNode
+from glider_base.ros.lockstep.process import run
+from glider_base.ros.parameters import declare_settings
+from glider_base.signals import TICK_S
+from glider_base.wiring import at_rest, present
 from glider_model.plant.block import PLANT, plant_move, plant_outputs
 from glider_model.plant.plant import plant_odometry, state_fault
-from glider_model.ros.lockstep.clock import ClockNode
-from glider_model.ros.lockstep.process import run
-from glider_model.ros.parameters import declare_settings
 
 
 class PlantNode(ClockNode):

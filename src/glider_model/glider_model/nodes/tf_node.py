@@ -16,11 +16,11 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 
-from glider_model.base.settings import ConfigurationError, Settings
-from glider_model.ros.lockstep.executor import Gate, take
-from glider_model.ros.lockstep.process import run
-from glider_model.ros.parameters import declare_settings
-from glider_model.ros.wire import qos
+from glider_base.ros.lockstep.executor import Gate, take
+from glider_base.ros.lockstep.process import run
+from glider_base.ros.parameters import declare_settings
+from glider_base.ros.wire import qos
+from glider_base.settings import ConfigurationError, Settings
 
 #: What tf2's own broadcasters offer.
 TF_QOS = QoSProfile(depth=100)

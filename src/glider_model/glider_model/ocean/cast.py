@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import SEA_WATER_DENSITY
+from glider_base.kernel import kernel
+from glider_base.signals import SEA_WATER_DENSITY
 from glider_model.ocean.columns import MAX_ROWS, check_depths, read_columns
 from glider_model.ocean.density import SPECIFIC_WEIGHT, displacing, immersed
 

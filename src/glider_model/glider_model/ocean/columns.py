@@ -7,8 +7,8 @@ import io
 import math
 from pathlib import Path
 
-from glider_model.base.errors import ConfigurationError, shown
-from glider_model.base.files import read_text
+from glider_base.errors import ConfigurationError, shown
+from glider_base.files import read_text
 
 #: Rows of a table: some are looked at in every tick.
 MAX_ROWS = 10_000

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_model.base.kernel import kernel
-from glider_model.base.noise import normal_pair
-from glider_model.base.signals import Water
+from glider_base.kernel import kernel
+from glider_base.noise import normal_pair
+from glider_base.signals import Water
 from glider_model.ocean.field import field_velocity
 
 #: Kinds of components.

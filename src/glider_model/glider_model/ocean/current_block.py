@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The current field as a block: the velocity of the water where the vehicle is."""
 
-from glider_model.base.block import Block, block_tick
-from glider_model.base.frames import odometry_from_wire, water_to_wire
-from glider_model.base.kernel import kernel
-from glider_model.base.wiring import CURRENT as WIRED
+from glider_base.block import Block, block_tick
+from glider_base.frames import odometry_from_wire, water_to_wire
+from glider_base.kernel import kernel
+from glider_base.wiring import CURRENT as WIRED
 from glider_model.ocean.current import CurrentParams, current_step
 from glider_model.ocean.current_settings import CurrentSettings
 

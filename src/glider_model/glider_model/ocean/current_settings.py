@@ -14,9 +14,9 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_model.base import plugins
-from glider_model.base.noise import random_stream
-from glider_model.base.settings import Settings
+from glider_base import plugins
+from glider_base.noise import random_stream
+from glider_base.settings import Settings
 from glider_model.ocean import fields
 from glider_model.ocean.columns import MAX_DEPTH_M, MAX_ROWS
 from glider_model.ocean.current import (

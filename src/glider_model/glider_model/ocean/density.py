@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.kernel import kernel
-from glider_model.base.settings import Settings
-from glider_model.base.signals import SEA_WATER_DENSITY
-from glider_model.base.slot import slot
+from glider_base.kernel import kernel
+from glider_base.settings import Settings
+from glider_base.signals import SEA_WATER_DENSITY
+from glider_base.slot import slot
 
 #: Pressure of the air (Pa), and weight of sea water under 9.81 m/s^2 (N/m^3).
 SURFACE_PRESSURE, SPECIFIC_WEIGHT = 101325.0, SEA_WATER_DENSITY * 9.81

@@ -9,9 +9,9 @@ only. docs/your_law.md builds one from nothing.
 
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
-from glider_model.base.settings import Settings
-from glider_model.base.slot import slot
+from glider_base.kernel import kernel
+from glider_base.settings import Settings
+from glider_base.slot import slot
 
 
 class FieldSettings(Settings):

@@ -13,9 +13,9 @@ from typing import Any
 import pydantic
 from pydantic import Field
 
-from glider_model.base.errors import ConfigurationError
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Vector, Water
+from glider_base.errors import ConfigurationError
+from glider_base.kernel import kernel
+from glider_base.signals import Vector, Water
 from glider_model.ocean.cast import CastParams, cast_params, check_cast, read_cast
 from glider_model.ocean.columns import MAX_ROWS
 from glider_model.ocean.density import DensityParams, DensitySettings

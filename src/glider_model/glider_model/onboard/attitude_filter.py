@@ -4,8 +4,8 @@
 
 from typing import NamedTuple
 
-from glider_model.base.frames import euler_from_quaternion, euler_rates, rotate_to_ned, wrap_angle
-from glider_model.base.kernel import kernel
+from glider_base.frames import euler_from_quaternion, euler_rates, rotate_to_ned, wrap_angle
+from glider_base.kernel import kernel
 
 
 class Measured(NamedTuple):

@@ -8,8 +8,8 @@ differentiating.
 
 from typing import NamedTuple
 
-from glider_model.base.frames import wrap_angle
-from glider_model.base.kernel import kernel
+from glider_base.frames import wrap_angle
+from glider_base.kernel import kernel
 
 
 class Filtered(NamedTuple):

@@ -13,9 +13,9 @@ wrong. A position that is known has a covariance of 0, and nothing of this is wa
 import math
 from typing import NamedTuple
 
-from glider_model.base.frames import rotate_to_ned
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.signals import Covariance, Vector
+from glider_base.frames import rotate_to_ned
+from glider_base.kernel import kernel, replace
+from glider_base.signals import Covariance, Vector
 
 #: A vehicle that has been below the first depth dives, above the second it has come up (m).
 DIVES_M, SURFACES_M = 3.0, 1.5

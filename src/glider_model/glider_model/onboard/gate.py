@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.frames import rotate_to_ned
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.settings import Settings
-from glider_model.base.signals import Odometry
+from glider_base.frames import rotate_to_ned
+from glider_base.kernel import kernel, replace
+from glider_base.settings import Settings
+from glider_base.signals import Odometry
 
 #: Actuators that say they are farther out than this many ranges are not believed (-).
 JOINT_RANGES = 1.5

@@ -9,7 +9,7 @@ rate, both measured, it gives the speed through the water.
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel, replace
+from glider_base.kernel import kernel, replace
 from glider_model.vehicle.file import VehicleParams
 from glider_model.vehicle.rigid_body import GRAVITY
 

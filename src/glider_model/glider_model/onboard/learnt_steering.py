@@ -24,8 +24,8 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.settings import Settings
+from glider_base.kernel import kernel, replace
+from glider_base.settings import Settings
 from glider_model.vehicle.file import SLOWEST_GLIDE_MPS
 
 #: Speed through the water at which steering effectiveness is given (m/s).

@@ -8,7 +8,7 @@ The oil of a buoyancy engine that is not at the centre of buoyancy makes one too
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 from glider_model.vehicle.file import VehicleParams
 
 

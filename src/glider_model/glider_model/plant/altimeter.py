@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_model.base.kernel import kernel
-from glider_model.base.noise import normal_pair
-from glider_model.base.wiring import ALTIMETER_REACH_M, NO_ECHO
+from glider_base.kernel import kernel
+from glider_base.noise import normal_pair
+from glider_base.wiring import ALTIMETER_REACH_M, NO_ECHO
 
 
 class AltimeterParams(NamedTuple):

@@ -4,11 +4,11 @@
 
 from collections import namedtuple
 
-from glider_model.base.block import Block
-from glider_model.base.frames import water_from_wire
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Joints
-from glider_model.base.wiring import PLANT as WIRED
+from glider_base.block import Block
+from glider_base.frames import water_from_wire
+from glider_base.kernel import kernel
+from glider_base.signals import Joints
+from glider_base.wiring import PLANT as WIRED
 from glider_model.plant.plant import PlantSettings, plant_finished, plant_step, tell
 from glider_model.vehicle.file import steers_by
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Battery
+from glider_base.kernel import kernel
+from glider_base.signals import Battery
 
 
 class Ledger(NamedTuple):

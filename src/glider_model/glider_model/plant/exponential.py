@@ -20,7 +20,7 @@ this is the classical RK4.
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 
 #: Below this |z| phi_3 is summed up as a series: the closed form loses digits to cancellation.
 SERIES_BELOW = 0.5

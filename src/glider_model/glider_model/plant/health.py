@@ -5,8 +5,8 @@
 The hull has no model of its own: without faults it is as it was at the start.
 """
 
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import TICK_S, Health
+from glider_base.kernel import kernel
+from glider_base.signals import TICK_S, Health
 
 #: Pressure in a closed hull below that of the air (Pa): 7 inches of mercury, in the middle of what
 #: a Slocum accepts (4 to 12).

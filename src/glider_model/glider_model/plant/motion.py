@@ -13,9 +13,9 @@ way through a shear included; it is the change over the last tick.
 import math
 from typing import NamedTuple
 
-from glider_model.base.frames import rotate_to_body, rotate_to_ned
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.signals import Joints
+from glider_base.frames import rotate_to_body, rotate_to_ned
+from glider_base.kernel import kernel, replace
+from glider_base.signals import Joints
 from glider_model.ocean.density import emerged_fraction, immersed
 from glider_model.plant.exponential import decay_weights
 from glider_model.vehicle.hydrodynamics import hydrodynamics, rate_damping

@@ -7,12 +7,12 @@ from typing import Literal, NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.frames import OriginSettings, quaternion_from_euler, rotate_to_body
-from glider_model.base.kernel import kernel
-from glider_model.base.settings import Settings
-from glider_model.base.signals import TICK_S, Joints, Odometry, Vector, Water, not_finite
-from glider_model.base.slot import default, slot
-from glider_model.base.wiring import SENSORS
+from glider_base.frames import OriginSettings, quaternion_from_euler, rotate_to_body
+from glider_base.kernel import kernel
+from glider_base.settings import Settings
+from glider_base.signals import TICK_S, Joints, Odometry, Vector, Water, not_finite
+from glider_base.slot import default, slot
+from glider_base.wiring import SENSORS
 from glider_model.ocean.water import WaterSettings, with_wind
 from glider_model.plant.energy import FULL, Ledger, battery_of, spend
 from glider_model.plant.faults.body import acting, blown, felt, moved

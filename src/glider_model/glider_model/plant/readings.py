@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_model.base.kernel import kernel
-from glider_model.base.noise import normal_pair, random_stream
-from glider_model.base.signals import Joints
+from glider_base.kernel import kernel
+from glider_base.noise import normal_pair, random_stream
+from glider_base.signals import Joints
 
 #: Sets this stream apart from those of the sensors and of the current.
 _STREAM_OFFSET, _STREAM = 2**32, 3

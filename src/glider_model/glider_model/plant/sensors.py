@@ -27,7 +27,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from glider_model.base.frames import (
+from glider_base.frames import (
     Origin,
     OriginSettings,
     euler_from_quaternion,
@@ -36,11 +36,11 @@ from glider_model.base.frames import (
     quaternion_from_euler,
     to_geodetic,
 )
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.noise import normal_pair, random_stream, uniform
-from glider_model.base.settings import Settings
-from glider_model.base.signals import TICK_S, Imu
-from glider_model.base.wiring import NO_ECHO, SENSORS
+from glider_base.kernel import kernel, replace
+from glider_base.noise import normal_pair, random_stream, uniform
+from glider_base.settings import Settings
+from glider_base.signals import TICK_S, Imu
+from glider_base.wiring import NO_ECHO, SENSORS
 from glider_model.ocean.density import pressure_at
 from glider_model.plant.altimeter import AltimeterParams, echo
 
@@ -459,7 +459,7 @@ def sense(odometry, joints, sample, out_ticks, surfacings, tick, params):
     Returns
     -------
     tuple of tuple of float
-        Numbers on the wire, in the order of the plant's outputs in `glider_model.base.wiring`, but
+        Numbers on the wire, in the order of the plant's outputs in `glider_base.wiring`, but
         for health and battery; zeros for what is not fitted.
     """
     truth = odometry_to_wire(odometry)

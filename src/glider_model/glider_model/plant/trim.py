@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_model.base.frames import quaternion_from_euler, rotate_to_ned
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import Joints, Water
+from glider_base.frames import quaternion_from_euler, rotate_to_ned
+from glider_base.settings import ConfigurationError
+from glider_base.signals import Joints, Water
 from glider_model.ocean.density import DensityParams
 from glider_model.plant.motion import Motion, acceleration
 from glider_model.vehicle.file import VehicleParams

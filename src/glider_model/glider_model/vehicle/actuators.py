@@ -8,8 +8,8 @@ deeper it pumps out. What is 0 in `ActuatorErrors` leaves every number as it is 
 
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Joints
+from glider_base.kernel import kernel
+from glider_base.signals import Joints
 
 
 class ActuatorErrors(NamedTuple):

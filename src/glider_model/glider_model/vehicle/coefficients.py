@@ -4,8 +4,8 @@
 
 import math
 
-from glider_model.base.settings import Settings
-from glider_model.base.signals import SEA_WATER_DENSITY
+from glider_base.settings import Settings
+from glider_base.signals import SEA_WATER_DENSITY
 from glider_model.vehicle.quantity import meaning, quantity
 
 #: Coefficients of lift and drag, with their units: what a set stands for.

@@ -5,8 +5,8 @@
 import math
 from typing import NamedTuple
 
-from glider_model.base.settings import Settings
-from glider_model.base.signals import SEA_WATER_DENSITY
+from glider_base.settings import Settings
+from glider_base.signals import SEA_WATER_DENSITY
 from glider_model.vehicle.quantity import meaning, quantity
 
 #: Oil (cc) that makes as much net heaviness (kg).

@@ -12,10 +12,10 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_model.base import plugins
-from glider_model.base.errors import told_changes
-from glider_model.base.files import read_bytes, read_yaml, yaml_line, yaml_text
-from glider_model.base.settings import (
+from glider_base import plugins
+from glider_base.errors import told_changes
+from glider_base.files import read_bytes, read_yaml, yaml_line, yaml_text
+from glider_base.settings import (
     Settings,
     file_names,
     find_field,
@@ -23,8 +23,8 @@ from glider_model.base.settings import (
     holder_of,
     validate,
 )
-from glider_model.base.signals import Joints
-from glider_model.base.wiring import JOINTS
+from glider_base.signals import Joints
+from glider_base.wiring import JOINTS
 from glider_model.vehicle import surfaces
 from glider_model.vehicle.actuators import ActuatorErrors
 from glider_model.vehicle.energy import EnergySettings

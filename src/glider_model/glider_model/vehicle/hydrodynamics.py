@@ -14,7 +14,7 @@ cos(alpha)^4, 17 deg at most: it takes energy in any attitude and is slow enough
 
 import math
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 
 #: Faster than this no coefficient is known, and the water brakes any hull (m/s, rad/s): a force of
 #: m v per metre per second and a moment of m omega per rad/s beyond it.

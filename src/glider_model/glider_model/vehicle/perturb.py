@@ -11,7 +11,7 @@ import math
 import pydantic
 from pydantic import Field
 
-from glider_model.base.settings import ConfigurationError, Settings
+from glider_base.settings import ConfigurationError, Settings
 from glider_model.vehicle.file import VehicleParams, mass_fault
 
 #: What may be scaled, by the names of `VehicleParams`. A static moment may change its sign; drag,

@@ -8,8 +8,8 @@ from typing import Annotated, Literal, NamedTuple
 import pydantic
 from pydantic import Field
 
-from glider_model.base.settings import Settings
-from glider_model.base.signals import SEA_WATER_DENSITY
+from glider_base.settings import Settings
+from glider_base.signals import SEA_WATER_DENSITY
 
 
 class Other(NamedTuple):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 
 GRAVITY = 9.81  #: (m/s^2)
 

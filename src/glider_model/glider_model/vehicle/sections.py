@@ -4,7 +4,7 @@
 
 import pydantic
 
-from glider_model.base.settings import Settings
+from glider_base.settings import Settings
 from glider_model.vehicle.coefficients import (
     EriksenSettings,
     MerckelbachSettings,

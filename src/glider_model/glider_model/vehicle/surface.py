@@ -10,9 +10,9 @@ its kind in `glider_model.vehicle.surfaces`, or like its entry point in the grou
 
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
-from glider_model.base.settings import Settings
-from glider_model.base.slot import slot
+from glider_base.kernel import kernel
+from glider_base.settings import Settings
+from glider_base.slot import slot
 from glider_model.vehicle.quantity import meaning, quantity
 
 

@@ -13,9 +13,9 @@ from typing import ClassVar, NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.frames import odometry_to_wire, quaternion_from_euler, rotate_to_body
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.signals import Covariance, Odometry, Vector
+from glider_base.frames import odometry_to_wire, quaternion_from_euler, rotate_to_body
+from glider_base.kernel import kernel, replace
+from glider_base.signals import Covariance, Odometry, Vector
 from glider_model.onboard.glide_polar import Polar, make_polar
 from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
 from glider_navigation.attitude import AttitudeState, attitude_step, initial_attitude

@@ -10,12 +10,12 @@ the samples; see `glider_navigation.attitude`.
 
 from typing import ClassVar, NamedTuple
 
-from glider_model.base.frames import (
+from glider_base.frames import (
     odometry_to_wire,
     quaternion_from_euler,
 )
-from glider_model.base.kernel import kernel, replace
-from glider_model.base.signals import TICK_S, Imu, Vector
+from glider_base.kernel import kernel, replace
+from glider_base.signals import TICK_S, Imu, Vector
 from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
 from glider_navigation.attitude import AttitudeState, attitude_step, initial_attitude
 from glider_navigation.method import (

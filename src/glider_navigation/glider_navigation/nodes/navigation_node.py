@@ -4,8 +4,8 @@
 
 import sys
 
-from glider_model.ros.lockstep.block_node import BlockNode
-from glider_model.ros.lockstep.process import run
+from glider_base.ros.lockstep.block_node import BlockNode
+from glider_base.ros.lockstep.process import run
 from glider_navigation.block import NAVIGATION
 
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import typer
 
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_S
 from glider_bringup.console import Json, Run, counter, messages, output
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_S
 
 app = typer.Typer()
 

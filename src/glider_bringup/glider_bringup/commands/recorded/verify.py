@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from glider_base.errors import EXIT_FAILED
+from glider_base.wiring import WIRING
 from glider_bringup.console import (
     Json,
     Run,
@@ -21,8 +23,6 @@ from glider_bringup.console import (
     repeatable,
     shares,
 )
-from glider_model.base.errors import EXIT_FAILED
-from glider_model.base.wiring import WIRING
 
 app = typer.Typer()
 BlockName = Literal[tuple(block.name for block in WIRING)]
@@ -48,13 +48,13 @@ def verify(
 
     Exit code 1, and the first tick, topic and field that differ, unless all of them are identical.
     """
+    from glider_base.kernel import compiling_told
     from glider_bringup.engines.interrupts import interrupts_at
     from glider_bringup.recording.mcap_reader import Bag
     from glider_bringup.recording.ros.recorded_run import Recording
     from glider_bringup.recording.ros.told import read_told
     from glider_bringup.recording.ros.verify.every_block import verify as verify_blocks
     from glider_bringup.recording.ros.verify.report import report as report_of
-    from glider_model.base.kernel import compiling_told
 
     wanted = picked(only, BlockName)
     told_compiling = partial(

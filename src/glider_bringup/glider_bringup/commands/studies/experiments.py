@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from glider_base.errors import EXIT_FAILED
 from glider_bringup.console import (
     Json,
     Scheduler,
@@ -20,7 +21,6 @@ from glider_bringup.console import (
     workers_at_work,
 )
 from glider_bringup.mission.disk import write_whole
-from glider_model.base.errors import EXIT_FAILED
 
 app = typer.Typer()
 GROUPS = (

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from glider_base.signals import TICK_S
 from glider_bringup.console import (
     Changes,
     Controller,
@@ -27,7 +28,6 @@ from glider_bringup.console import (
 )
 from glider_bringup.mission.disk import write_whole
 from glider_bringup.mission.scenario import DEFAULT_SCENARIO
-from glider_model.base.signals import TICK_S
 
 app = typer.Typer()
 

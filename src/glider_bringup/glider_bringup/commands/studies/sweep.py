@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from glider_base.errors import EXIT_FAILED
 from glider_bringup.console import (
     Changes,
     Json,
@@ -22,7 +23,6 @@ from glider_bringup.console import (
     print_table,
     workers_at_work,
 )
-from glider_model.base.errors import EXIT_FAILED
 
 app = typer.Typer()
 #: So many of the cells that failed are told one by one.

@@ -8,21 +8,21 @@ from operator import itemgetter
 
 import numpy as np
 
+from glider_base.block import Telling
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.orders import ABORT, PARAMETERS_SET
+from glider_base.ros.parameters import changed_parameters
+from glider_base.ros.wire import topics
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.topics import TOPICS, topic_of
+from glider_base.signals import TICK_NS
+from glider_base.wiring import GUIDANCE, present
 from glider_bringup.blocks import BLOCKS, COLUMNS
 from glider_bringup.recording.ros.rosbag2 import BagWriter
 from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
 from glider_guidance.order import Order
 from glider_guidance.orders import changed, first_ticks
 from glider_guidance.settings import GuidanceSettings
-from glider_model.base.block import Telling
-from glider_model.base.signals import TICK_NS
-from glider_model.base.wiring import GUIDANCE, present
-from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.orders import ABORT, PARAMETERS_SET
-from glider_model.ros.parameters import changed_parameters
-from glider_model.ros.wire import topics
-from glider_model.ros.wire.codec import to_cdr
-from glider_model.ros.wire.topics import TOPICS, topic_of
 
 _PLANT, _GUIDANCE = f'/glider/{topics.PLANT}', f'/glider/{GUIDANCE.node}'
 _PER_TICK = [topic.name for topic in TOPICS.values() if topic.per_tick]

@@ -10,14 +10,14 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
+from glider_base.ros.lockstep import health
+from glider_base.ros.wire.codec import Codec
+from glider_base.ros.wire.topics import TOPICS, topic_of
+from glider_base.signals import TICK_NS
+from glider_base.wiring import BELIEFS, LATER, SENSORS
 from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.recording.mcap_reader import Bag, Batch
 from glider_guidance.yo.stage import STAGE_NAMES
-from glider_model.base.signals import TICK_NS
-from glider_model.base.wiring import BELIEFS, LATER, SENSORS
-from glider_model.ros.lockstep import health
-from glider_model.ros.wire.codec import Codec
-from glider_model.ros.wire.topics import TOPICS, topic_of
 
 _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 

@@ -9,12 +9,12 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
+from glider_base.ros.lockstep import health
+from glider_base.ros.wire.codec import Codec
+from glider_base.ros.wire.topics import TOPICS, topic_of
+from glider_base.settings import ConfigurationError
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros.recorded_log import decode
-from glider_model.base.settings import ConfigurationError
-from glider_model.ros.lockstep import health
-from glider_model.ros.wire.codec import Codec
-from glider_model.ros.wire.topics import TOPICS, topic_of
 
 #: Messages of foreign layout whose bytes are kept, for each topic.
 _KEPT = 1000

@@ -16,20 +16,20 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 
+from glider_base.files import parse_yaml
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.clock import MAX_TICKS_AHEAD
+from glider_base.ros.lockstep.executor import take
+from glider_base.ros.lockstep.node import COUNT_TICKS
+from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
+from glider_base.ros.wire import topics
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_NS
+from glider_base.wiring import present
 from glider_bringup.recording.mcap_reader import Bag, BagTopic
 from glider_bringup.recording.ros.recorded_run import choose_namespace
-from glider_model.base.files import parse_yaml
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_NS
-from glider_model.base.wiring import present
-from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.clock import MAX_TICKS_AHEAD
-from glider_model.ros.lockstep.executor import take
-from glider_model.ros.lockstep.node import COUNT_TICKS
-from glider_model.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
-from glider_model.ros.wire import topics
-from glider_model.ros.wire.codec import to_cdr
-from glider_model.ros.wire.topics import TOPICS
 
 #: Name that rclpy gives to a node of which it knows the endpoints only.
 _NAME_UNKNOWN = '_NODE_NAME_UNKNOWN_'

@@ -14,6 +14,8 @@ from ament_index_python.packages import get_package_share_directory
 from mcap.records import Channel, Schema
 from rclpy.qos import QoSProfile
 
+from glider_base.ros.wire.topics import TOPICS, Topic
+from glider_base.signals import TICK_NS
 from glider_bringup.recording.mcap_writer import McapWriter
 from glider_bringup.recording.metadata import (
     METADATA_FILE,
@@ -22,8 +24,6 @@ from glider_bringup.recording.metadata import (
     topic_counts,
     write_metadata,
 )
-from glider_model.base.signals import TICK_NS
-from glider_model.ros.wire.topics import TOPICS, Topic
 
 #: Ticks per chunk of the file. A chunk is what can be lost when the recorder is killed.
 CHUNK_TICKS = 128

@@ -5,13 +5,13 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from glider_base.files import read_yaml
+from glider_base.ros.parameters import from_parameters
+from glider_base.settings import ConfigurationError, Settings
 from glider_bringup.blocks import BLOCKS
 from glider_bringup.mission.run_folder import PARAMETERS_FILE, SCENARIO_FILE, find_scenario
 from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.recording.mcap_reader import Bag
-from glider_model.base.files import read_yaml
-from glider_model.base.settings import ConfigurationError, Settings
-from glider_model.ros.parameters import from_parameters
 
 
 class Told(NamedTuple):

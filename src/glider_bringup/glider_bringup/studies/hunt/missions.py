@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from glider_base.settings import ConfigurationError
 from glider_bringup.mission.scenario import Scenario, load_scenario, scenario_names
 from glider_bringup.studies.montecarlo import ERRORS, SENSORS, sample_plant
 from glider_bringup.studies.random_faults import sample_faults
-from glider_model.base.settings import ConfigurationError
 from glider_model.vehicle.file import load_vehicle, steers_by, vehicle_names
 
 #: It does not glide, and says so.

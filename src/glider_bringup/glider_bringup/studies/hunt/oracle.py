@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from glider_base.kernel import kernel
+from glider_base.signals import TICK_S
 from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.scenario import Scenario
 from glider_bringup.studies.hunt.missions import due_s
 from glider_guard.rows import DROPS, SURFACES
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import TICK_S
 from glider_model.onboard.moving_mass import make_moving_mass, mass_place
 from glider_model.plant.block import plant_move
 from glider_model.vehicle.file import load_vehicle

@@ -15,6 +15,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from glider_base.files import read_yaml
 from glider_bringup.engines.flight import fly as fly_mission
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.mission.choices import Combination, combination_of
@@ -27,7 +28,6 @@ from glider_bringup.studies.paper.judges import JUDGES, Check, figure_of, judge_
 from glider_bringup.studies.paper.measures import MEASURES, horizontal_speed
 from glider_bringup.studies.workers import Pool, Progress
 from glider_guidance.los import crab_heading
-from glider_model.base.files import read_yaml
 from glider_model.ocean.current_settings import KNOT_MPS
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.perturb import perturbed

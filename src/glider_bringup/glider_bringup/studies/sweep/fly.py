@@ -13,6 +13,9 @@ from pathlib import Path
 from socket import gethostname
 from typing import Any, NamedTuple
 
+from glider_base.kernel import source_digest
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_S
 from glider_bringup.engines.flight import Outcome
 from glider_bringup.mission.disk import whole_file
 from glider_bringup.mission.planned import planned_ticks
@@ -30,9 +33,6 @@ from glider_bringup.studies.sweep.netcdf import (
 )
 from glider_bringup.studies.sweep.plan import Plan, vehicle_text
 from glider_bringup.studies.workers import WORKER_DIED, Pool, Progress, WorkError
-from glider_model.base.kernel import source_digest
-from glider_model.base.settings import ConfigurationError
-from glider_model.base.signals import TICK_S
 from glider_model.vehicle.file import vehicle_path
 
 JOURNAL_FILE, RESULT_FILE = 'journal.jsonl', 'sweep.nc'

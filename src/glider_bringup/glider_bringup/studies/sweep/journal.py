@@ -14,9 +14,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from glider_base.files import parse_json
+from glider_base.settings import ConfigurationError
 from glider_bringup.mission.disk import DiskError
-from glider_model.base.files import parse_json
-from glider_model.base.settings import ConfigurationError
 
 
 class Journal:

@@ -14,10 +14,10 @@ from typing import Any, get_args
 import numpy as np
 import xarray
 
+from glider_base.kernel import source_digest
+from glider_base.settings import find_field, unit_of
 from glider_bringup.mission.scenario import VEHICLE, Scenario
 from glider_bringup.studies.sweep.plan import Axis, Plan
-from glider_model.base.kernel import source_digest
-from glider_model.base.settings import find_field, unit_of
 from glider_model.vehicle.file import Vehicle
 
 #: Units by how names in a scorecard end, in the spelling of UDUNITS.

@@ -21,6 +21,15 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
+from glider_base.files import is_file, read_text, read_yaml, yaml_line
+from glider_base.kernel import source_digest
+from glider_base.settings import (
+    ConfigurationError,
+    Settings,
+    file_names,
+    find_file,
+    validate,
+)
 from glider_bringup.mission.choices import Combination, combination_of
 from glider_bringup.mission.scenario import (
     DEFAULT_SCENARIO,
@@ -30,15 +39,6 @@ from glider_bringup.mission.scenario import (
     read_scenario,
     run_command,
     scenario_names,
-)
-from glider_model.base.files import is_file, read_text, read_yaml, yaml_line
-from glider_model.base.kernel import source_digest
-from glider_model.base.settings import (
-    ConfigurationError,
-    Settings,
-    file_names,
-    find_file,
-    validate,
 )
 from glider_model.vehicle.file import steers_by, vehicle_file, vehicle_path
 

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 from pydantic import Field
 
-from glider_model.base.kernel import kernel
+from glider_base.kernel import kernel
 from glider_model.ocean.field import FieldSettings, field_velocity
 
 #: a, for which the largest speed is at the radius: exp(a) = 1 + 2 a.

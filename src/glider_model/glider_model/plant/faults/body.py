@@ -7,9 +7,9 @@ Each function is a slot, whose body without faults hands on what it is given.
 
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Joints, Water
-from glider_model.base.slot import default, slot
+from glider_base.kernel import kernel
+from glider_base.signals import Joints, Water
+from glider_base.slot import default, slot
 from glider_model.plant.faults import kinds
 from glider_model.plant.faults.kinds import FaultParams
 from glider_model.vehicle.actuators import actuators_step, pump_rate, toward

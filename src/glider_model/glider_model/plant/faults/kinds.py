@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_model.base.frames import rotate_to_ned
-from glider_model.base.kernel import kernel
-from glider_model.base.noise import normal_pair, uniform
-from glider_model.base.signals import TICK_S
-from glider_model.base.slot import default, slot
+from glider_base.frames import rotate_to_ned
+from glider_base.kernel import kernel
+from glider_base.noise import normal_pair, uniform
+from glider_base.signals import TICK_S
+from glider_base.slot import default, slot
 
 #: Kinds. A stuck actuator is a slow one, and a frozen sensor one that always drops out.
 LEAK, MASS, FOULING, LOOSE, GUST = range(5)

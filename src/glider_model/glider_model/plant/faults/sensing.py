@@ -9,14 +9,14 @@ import math
 
 import numpy as np
 
-from glider_model.base.frames import (
+from glider_base.frames import (
     euler_from_quaternion,
     quaternion_from_euler,
     swap_world,
 )
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import Battery, Health
-from glider_model.base.slot import default, slot
+from glider_base.kernel import kernel
+from glider_base.signals import Battery, Health
+from glider_base.slot import default, slot
 from glider_model.ocean.density import depth_at, pressure_at
 from glider_model.plant.faults import kinds
 from glider_model.plant.faults.kinds import (

@@ -10,12 +10,12 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_model.base.noise import random_stream
-from glider_model.base.settings import ConfigurationError, Settings
-from glider_model.base.signals import TICK_S
+from glider_base.noise import random_stream
+from glider_base.ros.message_fault import MessageFault
+from glider_base.settings import ConfigurationError, Settings
+from glider_base.signals import TICK_S
 from glider_model.plant.faults import kinds
 from glider_model.plant.faults.kinds import FaultParams, FaultState, NoFaults, NoFaultState
-from glider_model.ros.message_fault import MessageFault
 
 #: Faults of one scenario at most.
 MAX_FAULTS = 50
@@ -24,7 +24,7 @@ FOR_EVER = 2**62
 #: Sets the streams of faults apart from those of the currents and sensors.
 _STREAM_OFFSET = 2**33
 
-#: Actuators in the order of `glider_model.base.signals.Joints`.
+#: Actuators in the order of `glider_base.signals.Joints`.
 ACTUATORS = ('buoyancy_engine', 'pitch_mass', 'roll_mass', 'steering_surface')
 #: Phases of a dive, in the order of their numbers in `kinds`.
 PHASES = ('any', 'dive', 'turn', 'climb', 'surface')

@@ -16,8 +16,8 @@ and in any attitude. What the hull's coefficients say of sideslip is without the
 import math
 from typing import NamedTuple
 
-from glider_model.base.kernel import kernel
-from glider_model.base.signals import SEA_WATER_DENSITY
+from glider_base.kernel import kernel
+from glider_base.signals import SEA_WATER_DENSITY
 from glider_model.vehicle.quantity import meaning, quantity
 from glider_model.vehicle.surface import SurfaceSettings, surface_loads
 

@@ -8,6 +8,13 @@ from collections.abc import Callable
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 
+from glider_base import wiring
+from glider_base.block import Telling
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.orders import ABORT, CLEAR, PARAMETERS_SET, SURFACE
+from glider_base.ros.parameters import with_parameters
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.settings import ConfigurationError
 from glider_bringup.recording.recorded_inputs import RecordedBlock
 from glider_bringup.recording.ros.recorded_run import Event, Recording, Series
 from glider_bringup.recording.ros.verify.messages import field_difference, message_difference
@@ -22,14 +29,7 @@ from glider_bringup.recording.ros.verify.verdict import (
     time_text,
 )
 from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
-from glider_model.base import wiring
-from glider_model.base.block import Telling
-from glider_model.base.settings import ConfigurationError
 from glider_model.plant.block import PLANT
-from glider_model.ros.lockstep import health
-from glider_model.ros.lockstep.orders import ABORT, CLEAR, PARAMETERS_SET, SURFACE
-from glider_model.ros.parameters import with_parameters
-from glider_model.ros.wire.codec import to_cdr
 
 #: Orders that change what a block does.
 ORDERS = (ABORT, CLEAR, PARAMETERS_SET, SURFACE)

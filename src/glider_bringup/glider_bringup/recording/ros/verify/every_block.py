@@ -10,6 +10,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from glider_base import wiring
+from glider_base.block import optional_topics
+from glider_base.signals import TICK_NS
+from glider_base.wiring import WHEN_SILENT, Wired, present
 from glider_bringup.blocks import BLOCKS
 from glider_bringup.recording.recorded_inputs import RecordedBlock
 from glider_bringup.recording.ros.recorded_run import Recording
@@ -17,10 +21,6 @@ from glider_bringup.recording.ros.told import Told
 from glider_bringup.recording.ros.verify.free_running import free_running
 from glider_bringup.recording.ros.verify.lockstep import in_lockstep
 from glider_bringup.recording.ros.verify.verdict import SKIPPED, Verdict
-from glider_model.base import wiring
-from glider_model.base.block import optional_topics
-from glider_model.base.signals import TICK_NS
-from glider_model.base.wiring import WHEN_SILENT, Wired, present
 
 
 def is_lockstep(recording: Recording, told: Told) -> bool:

@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 
+from glider_base.signals import TICK_NS
 from glider_bringup.recording.recorded_inputs import RecordedBlock
 from glider_bringup.recording.ros.recorded_run import Recording
 from glider_bringup.recording.ros.verify.check import Check, finish_events
@@ -18,7 +19,6 @@ from glider_bringup.recording.ros.verify.verdict import (
     Verdict,
     time_text,
 )
-from glider_model.base.signals import TICK_NS
 from glider_model.plant.block import PLANT
 
 #: Ticks that a block works through at a time.

@@ -6,8 +6,8 @@ import struct
 
 from rclpy.serialization import deserialize_message
 
+from glider_base.ros.wire.codec import Codec, cdr_places, to_cdr
 from glider_bringup.recording.ros.verify.verdict import WHOLE, Difference
-from glider_model.ros.wire.codec import Codec, cdr_places, to_cdr
 
 
 def field_difference(expected, recorded: bytes) -> tuple[str, str, str]:

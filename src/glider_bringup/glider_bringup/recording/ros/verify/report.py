@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Verdicts as one JSON object, with hints for whoever looks for a cause."""
 
+from glider_base.wiring import WIRING
 from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.recording.ros.recorded_run import Recording
 from glider_bringup.recording.ros.told import Told
 from glider_bringup.recording.ros.verify.every_block import is_lockstep
 from glider_bringup.recording.ros.verify.verdict import IDENTICAL, SKIPPED, Verdict, time_text
-from glider_model.base.wiring import WIRING
 
 
 def report(bag: Bag, recording: Recording, told: Told, verdicts: list[Verdict]) -> dict:

@@ -4,8 +4,8 @@
 
 import numpy as np
 
+from glider_base.signals import TICK_NS
 from glider_bringup.recording.ros.recorded_run import Series
-from glider_model.base.signals import TICK_NS
 
 #: Ticks at the end that may lack in a topic: whoever recorded it left in the middle of one.
 TICKS_OF_THE_END = 10

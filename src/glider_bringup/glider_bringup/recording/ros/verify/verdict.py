@@ -5,7 +5,7 @@
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from glider_model.base.signals import TICK_NS
+from glider_base.signals import TICK_NS
 
 IDENTICAL, DIFFERENT, SKIPPED = 'identical', 'different', 'skipped'
 

@@ -1,0 +1,177 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a block declares of itself, and how it is called in loops over many ticks.
+
+A block answers a tick: from the numbers of its input topics it makes those of its outputs, and
+flags of which changes are told as events. Nodes, the direct engine, recordings and `verify` all
+call it through the same kernel.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numba.extending import overload
+
+from glider_base.kernel import kernel
+from glider_base.settings import Settings
+from glider_base.slot import slot
+from glider_base.wiring import Wired
+
+
+class Said(NamedTuple):
+    """What an event says."""
+
+    level: str  #: 'ok', 'warn' or 'error'
+    message: str
+    values: dict[str, object]
+
+
+class Block(NamedTuple):
+    """A block of the tick."""
+
+    wired: Wired
+    settings: type[Settings]  #: with ``params()`` and ``initial_state()``
+    tick: Callable  #: kernel that fills `block_tick` for its params
+    flags: tuple[str, ...] = ()  #: names of its flags
+    quiet: tuple[int, ...] = ()  #: flags of which nothing needs to be told at the beginning
+    every_ns: int = 0  #: a change of the flags is told at most once in this time
+    say: Callable[..., Said] | None = None  #: what flags say
+    surface: Callable | None = None  #: kernel: state of a block that asks for the surface
+    clear: Callable | None = None  #: kernel: state of a block that forgets what has latched
+    steers_by: Callable[[Settings], str] = lambda settings: ''
+    #: name of the steering surface among the joints on its topics, by its settings
+
+    @property
+    def orders(self) -> tuple[Callable, ...]:
+        """Those of its kernels that take an order in flight."""
+        return tuple(order for order in (self.surface, self.clear) if order)
+
+
+@slot
+def block_tick(state, t_s, inputs, params, dt):
+    """One tick of a block, by the type of its params.
+
+    Parameters
+    ----------
+    state : NamedTuple
+    t_s : float
+        Time since the start (s).
+    inputs : tuple of tuple of float
+        Numbers of its input topics, as on the wire.
+    params : NamedTuple
+    dt : float
+        Length of the tick (s).
+
+    Returns
+    -------
+    state : NamedTuple
+    outputs : tuple of tuple of float
+        Numbers of its output topics, as on the wire.
+    flags : tuple of int
+    """
+
+
+def optional_topics(settings: Settings) -> tuple[str, ...]:
+    """Those of the topics that not every run has with which a block of such settings works."""
+    return getattr(settings, 'topics', ())
+
+
+def rows_at(arrays, row):
+    """Rows of some arrays, as a tuple; in kernels only."""
+    return tuple(array[row] for array in arrays)
+
+
+@overload(rows_at)
+def _rows_at(arrays, row):
+    if len(arrays) == 0:
+        return lambda arrays, row: ()
+    return lambda arrays, row: (arrays[0][row], *rows_at(arrays[1:], row))
+
+
+def put(table, row, start, tuples):
+    """Write tuples of numbers into a row, one after the other from a column on; in kernels only.
+
+    Parameters
+    ----------
+    table : float64[n, m]
+    row, start : int
+    tuples : tuple of tuple
+    """
+    numbers = [number for values in tuples for number in values]
+    table[row, start : start + len(numbers)] = numbers
+
+
+@overload(put)
+def _put(table, row, start, tuples):
+    if len(tuples) == 0:
+        return lambda table, row, start, tuples: None
+    if len(tuples[0]) == 0:
+        return lambda table, row, start, tuples: put(table, row, start, tuples[1:])
+
+    def put_first(table, row, start, tuples):
+        for i, value in enumerate(tuples[0]):
+            table[row, start + i] = value
+        put(table, row, start + len(tuples[0]), tuples[1:])
+
+    return put_first
+
+
+@kernel
+def changes_to_tell(flags, stamps_ns, every_ns, told, told_ns):
+    """Where flags have changed, told at most once in ``every_ns``.
+
+    Parameters
+    ----------
+    flags : int64[n, m]
+    stamps_ns : int64[n]
+    every_ns : int
+    told : int64[m]
+        The flags that were told last; changed in place.
+    told_ns : int
+        When that was.
+
+    Returns
+    -------
+    int64[k]
+        Indices.
+    """
+    found = np.empty(len(flags), np.int64)
+    count = 0
+    for k in range(len(flags)):
+        if stamps_ns[k] - told_ns >= every_ns and np.any(flags[k] != told):
+            told[:], told_ns = flags[k], stamps_ns[k]
+            found[count] = k
+            count += 1
+    return found[:count]
+
+
+class Telling:
+    """Which changes of the flags of a block are told, and what was told last.
+
+    Parameters
+    ----------
+    block : Block
+    start_ns : int
+        When it begins.
+    """
+
+    def __init__(self, block: Block, start_ns: int = 0) -> None:
+        self.block = block
+        self._told, self._told_ns = tuple(block.quiet), start_ns - block.every_ns
+
+    def among(self, flags: np.ndarray, stamps_ns: np.ndarray) -> np.ndarray:
+        """Indices of the ticks at which something is told; flags int64[n, m], stamps int64[n]."""
+        every_ns = self.block.every_ns
+        told = np.array(self._told, np.int64)
+        found = changes_to_tell(flags, stamps_ns, every_ns, told, self._told_ns)
+        if len(found):
+            self._told, self._told_ns = tuple(told.tolist()), int(stamps_ns[found[-1]])
+        return found
+
+    def is_due(self, flags: tuple[int, ...], stamp_ns: int) -> bool:
+        """Whether flags of one tick are told."""
+        if flags == self._told or stamp_ns - self._told_ns < self.block.every_ns:
+            return False
+        self._told, self._told_ns = flags, stamp_ns
+        return True

@@ -1,0 +1,115 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The one decorator that compiles the mathematics, what tells that it does, and `replace`."""
+
+import hashlib
+import importlib.util
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple, TypeVar
+
+import numba
+from numba.core import event
+from numba.extending import overload
+
+from glider_base.kernel_cache import KernelCache, is_kept
+from glider_base.plugins import registered, sources
+
+#: Packages whose kernels call each other.
+PACKAGES = (
+    *('glider_base', 'glider_model', 'glider_navigation', 'glider_guidance', 'glider_control'),
+    'glider_guard',
+    *('glider_bringup', 'glider_flights'),
+)
+
+Values = TypeVar('Values', bound=NamedTuple)
+
+
+@cache
+def source_digest() -> str:
+    """Digest of the sources of our packages, and of those that registered something."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for name in PACKAGES:
+        spec = importlib.util.find_spec(name)
+        if spec is None or not spec.submodule_search_locations:
+            continue
+        folder = Path(spec.submodule_search_locations[0])
+        for path in sorted(folder.rglob('*.py')):
+            digest.update(str(path.relative_to(folder)).encode())
+            digest.update(path.read_bytes())
+    for point in registered():
+        digest.update(f'{point.group} {point.name} {point.value}'.encode())
+    for path in sources():
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def kernel(function: Callable) -> numba.core.dispatcher.Dispatcher:
+    """Compile a pure function, when it is called first.
+
+    No fastmath: IEEE arithmetic in source order is what makes a run over topics and a direct run
+    agree to the last bit. Inlined into its callers: a NamedTuple would otherwise be copied number
+    by number at every call.
+    """
+    compiled = numba.njit(error_model='numpy', forceinline=True)(function)
+    if is_kept(function):
+        compiled._cache = KernelCache(function)  # as its enable_caching() does
+    return compiled
+
+
+def replace(values: Values, **changes) -> Values:
+    """The same NamedTuple with other values of the fields that are named.
+
+    Examples
+    --------
+    >>> replace(state, tick=0, told=state.told | ORDERED)
+    """
+    return values._replace(**changes)
+
+
+@overload(replace, jit_options={'error_model': 'numpy', 'forceinline': True}, strict=False)
+def _compiled(values, **changes):
+    """Write the constructor out, as numba has it: all fields, in their order."""
+    made = values.instance_class
+    if unknown := set(changes) - set(made._fields):
+        raise TypeError(f'{made.__name__} has no field {", ".join(sorted(unknown))}')
+    fields = (name if name in changes else f'values.{name}' for name in made._fields)
+    names = {'made': made}
+    exec(f'def replaced(values, {", ".join(changes)}): return made({", ".join(fields)})', names)
+    return names['replaced']
+
+
+#: Tells that something is compiled; may return what is to be called when it is done.
+Tell = Callable[[], Callable[[], None] | None]
+
+
+class _Compiling(event.Listener):
+    """Tells when numba begins to compile, and ends what was told when it has."""
+
+    def __init__(self, tell: Tell) -> None:
+        self._tell, self._depth, self._is_told = tell, 0, False
+        self._end: Callable[[], None] | None = None
+
+    def on_start(self, event) -> None:
+        if not self._depth and (self._end or not self._is_told):
+            self._end, self._is_told = self._tell(), True
+        self._depth += 1
+
+    def on_end(self, event) -> None:
+        self._depth -= 1
+        if not self._depth and self._end:
+            self._end()
+
+
+@contextmanager
+def compiling_told(tell: Tell) -> Iterator[None]:
+    """Call ``tell`` if something in the block has to be compiled, before it is.
+
+    What is found in the cache is not compiled. If ``tell`` returns a function, this is called when
+    it is compiled, and ``tell`` again for what comes later; else it is called once.
+    """
+    with event.install_listener('numba:compile', _Compiling(tell)):
+        yield

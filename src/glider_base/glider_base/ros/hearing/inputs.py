@@ -1,0 +1,81 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a node hears: one subscription with what it brought last, and what of it is believed."""
+
+import math
+import time
+
+from glider_base.ros.hearing.owner import Owner
+from glider_base.ros.wire.codec import MessageError
+from glider_base.ros.wire.topics import Topic
+from glider_base.signals import TICK_NS
+
+#: The norm of a quaternion that is further from 1 is that of no attitude (-).
+NOT_UNIT = 0.1
+
+#: A topic whose messages are refused is told of at most so often (s of wall time).
+_REFUSED_EVERY_S = 1.0
+
+
+class Input:
+    """A subscription, and what it brought last."""
+
+    def __init__(self, topic: Topic, lockstep: bool, stand_in: str = '') -> None:
+        self.topic = topic
+        self.subscription = None
+        self.stamp_ns = -1
+        self.values: tuple[float, ...] = ()
+        self.arrived_s = -float('inf')  #: on the clock of the cycles
+        self.owner = Owner(topic, lockstep, stand_in)
+        self.refused = 0  #: messages of other publishers, and such as cannot be used
+        self.told_refused_s = -float('inf')  #: wall time at which a refusal was told of last
+        self.lost = 0  #: messages that lack between those that came
+        self.late = 0  #: cycles that had to do with the input of the one before
+        self.used_ns = -1
+
+    def accept(self, raw: bytes) -> None:
+        """Keep a message.
+
+        Raises
+        ------
+        MessageError
+            Naming topic and publisher, if it cannot be used.
+        """
+        try:
+            stamp_ns, values = self.topic.codec.decode(raw, check_frames=True)
+            if self.topic.name == 'imu' and abs(math.hypot(*values[:4]) - 1.0) > NOT_UNIT:
+                raise MessageError(f'orientation is {values[:4]} (allowed: unit quaternions)')
+        except MessageError as error:
+            said = f'{self.topic.name} of {self.topic.publisher}: {error}'
+            raise type(error)(said) from None
+        self.stamp_ns, self.values = stamp_ns, values
+
+    def accept_newest(self, raw: bytes, now_s: float, max_age_s: float) -> None:
+        """Keep a message in free-running mode, unless it was overtaken on its way.
+
+        A stamp that stands still does not refresh the input. One that is older than any input may
+        be means that the clock of the vehicle has been set back.
+
+        Raises
+        ------
+        MessageError
+            As `accept`, or if the message has no stamp.
+        """
+        before = self.stamp_ns
+        since_ns = self.topic.codec.decode_stamp(raw) - before
+        if before >= 0 and -max_age_s * 1e9 <= since_ns < 0:
+            return
+        self.accept(raw)
+        if since_ns:
+            self.arrived_s = now_s
+        if before >= 0 and since_ns <= max_age_s * 1e9:
+            self.lost += max(0, round(since_ns / TICK_NS) - 1)
+
+    def refuse(self) -> bool:
+        """Count a message that is refused; whether it is time to tell of it."""
+        self.refused += 1
+        now_s = time.monotonic()
+        if now_s - self.told_refused_s < _REFUSED_EVERY_S:
+            return False
+        self.told_refused_s = now_s
+        return True

@@ -1,0 +1,108 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The node of a block: everything that follows from what the block declares of itself."""
+
+from glider_base.block import Block, Telling, optional_topics
+from glider_base.kernel import compiling_told
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.orders import CLEAR, PARAMETERS_SET, Orders
+from glider_base.ros.lockstep.pulse import Condition
+from glider_base.ros.lockstep.step_node import StepNode
+from glider_base.ros.parameters import changed_parameters, declare_settings
+from glider_base.settings import Settings
+from glider_base.signals import TICK_NS, TICK_S
+from glider_base.wiring import at_rest, present
+
+
+class BlockNode(StepNode):
+    """A block that answers ticks. Subclasses call `start_up` at the end of their constructor."""
+
+    def __init__(self, block: Block, **kwargs) -> None:
+        super().__init__(block.wired.node, **kwargs)
+        self.block = block
+        self.settings = declare_settings(self, block.settings, self.on_settings)
+        self.steers_by = block.steers_by(self.settings)
+        topics = optional_topics(self.settings)
+        outputs = present(block.wired.outputs, topics)
+        #: senders, and the places of what they send among the outputs of the block
+        self.senders = [self.add_output(topic) for topic in outputs]
+        self.sent = [block.wired.outputs.index(topic) for topic in outputs]
+        #: what stands for inputs that there are not
+        self.absent = [
+            (i, at_rest(topic))
+            for i, topic in enumerate(block.wired.inputs)
+            if topic not in present(block.wired.inputs, topics)
+        ]
+        self.params = self.settings.params()
+        self.state = self.settings.initial_state()
+        self.orders = Orders(self)
+        self.telling = Telling(block)
+        self.said = (0, ())  #: stamp and numbers of the last answer
+        self.flags: tuple[int, ...] | None = None  #: and its flags
+        for topic in present(block.wired.inputs, topics):
+            self.add_input(topic)
+        self.compile_kernels()
+
+    def on_settings(self, settings: Settings) -> None:
+        """Fly on with tunable parameters that were set at run time."""
+        self.orders.add(PARAMETERS_SET, changed_parameters(self.settings, settings))
+        self.settings = settings
+        self.params = settings.params()
+
+    def compile_kernels(self) -> None:
+        """Call every kernel once, so that no tick waits for the compiler."""
+        inputs = tuple(at_rest(topic) for topic in self.block.wired.inputs)
+        said = f'compiling the mathematics of {self.block.wired.name} for its settings, once'
+
+        def tell() -> None:
+            self.get_logger().info(said)
+
+        with compiling_told(tell):
+            state, _, _ = self.block.tick(self.state, 0.0, inputs, self.params, TICK_S)
+            for order in self.block.orders:
+                order(state)
+
+    def surface(self, order: str) -> None:
+        """Ask for the surface, for good; ``order`` says on /diagnostics who wanted it."""
+        self.state = self.block.surface(self.state)
+        self.orders.add(order)
+
+    def clear(self) -> None:
+        """Forget what has latched."""
+        self.state = self.block.clear(self.state)
+        self.orders.add(CLEAR)
+
+    def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
+        """Answer one tick."""
+        self.orders.tell(stamp_ns)
+        for place, values in self.absent:
+            inputs = (*inputs[:place], values, *inputs[place:])
+        for tick in range(stamp_ns // TICK_NS + 1 - self.passed, stamp_ns // TICK_NS + 1):
+            self.state, outputs, flags = self.block.tick(
+                self.state, tick * TICK_S, inputs, self.params, TICK_S
+            )
+        if self.block.say and self.telling.is_due(flags, stamp_ns):
+            self.tell(stamp_ns, flags)
+        self.said, self.flags = (stamp_ns, outputs), flags
+        self.repeat()
+
+    def condition(self) -> Condition:
+        """How this node is: what its block says."""
+        condition = super().condition()
+        if self.flags is None or not self.block.say or condition.level != health.OK:
+            return condition
+        said = self.block.say(*self.flags)
+        return Condition(health.LEVELS[said.level], said.message, said.values)
+
+    def repeat(self) -> None:
+        """Send the last answer, once more if no time has passed since."""
+        stamp_ns, outputs = self.said
+        for send, place in zip(self.senders, self.sent, strict=True):
+            send(stamp_ns, outputs[place])
+
+    def tell(self, stamp_ns: int, flags: tuple[int, ...]) -> None:
+        """Put a change of the flags on /diagnostics."""
+        said = self.block.say(*flags)
+        if said.level == 'error':
+            self.get_logger().error(said.message)
+        self.publish_event(health.said_array(stamp_ns, self.get_fully_qualified_name(), said))

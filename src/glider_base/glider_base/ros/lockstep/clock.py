@@ -1,0 +1,290 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The node that makes time: it starts the ticks, paces them, and ends the run.
+
+One node of the graph publishes the inputs of each tick and completes it when the answers are
+there. That is the plant; a replay could do the same.
+"""
+
+import time
+from functools import partial
+
+from pydantic import Field
+from rclpy.subscription import Subscription
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool
+
+from glider_base.errors import EXIT_PEER
+from glider_base.ros.hearing.inputs import Input
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.executor import take
+from glider_base.ros.lockstep.health import Report, seconds
+from glider_base.ros.lockstep.node import TickNode, TickSettings
+from glider_base.ros.lockstep.peers import ALONE
+from glider_base.ros.lockstep.process import Stop
+from glider_base.ros.wire import topics
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.signals import TICK_NS, TICK_S
+from glider_base.wiring import WIRING
+
+#: The plant is never more than this many ticks ahead of what the recorder has on disk, or of what
+#: has come to it. What is on its way to a process waits in a queue of 512 messages (Fast DDS:
+#: port_queue_capacity), 22 of which are a tick at most. More would be dropped and sent again, but
+#: not by a node that is killed: what it had said would be lost with it.
+MAX_TICKS_AHEAD = {'recorded': 256, 'heard': 20}
+
+#: Nodes of a run that is just over are out of sight within this time (s).
+_RIVALS_LEAVE_S = 5.0
+
+
+class ClockSettings(TickSettings):
+    """How the node that makes time keeps step."""
+
+    speed: float = Field(
+        0.0, ge=0.0, le=1e6, description='times real time; 0.0: as fast as possible'
+    )
+
+
+class _Lead:
+    """How far the plant is ahead of what the recorder says on a topic."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.said_ns = name, -TICK_NS
+        self.subscription: Subscription | None = None
+
+    def is_too_long(self, tick: int) -> bool:
+        """Whether a tick has to wait for the recorder."""
+        return self.said_ns < (tick - MAX_TICKS_AHEAD[self.name]) * TICK_NS
+
+
+class _Pace:
+    """Wall time at which each tick is due, without drift."""
+
+    def __init__(self, speed: float) -> None:
+        self._tick_s = TICK_S / speed if speed > 0.0 else 0.0
+        self._start_s = 0.0
+
+    def restart(self, tick: int) -> None:
+        """Let ``tick`` be due now."""
+        self._start_s = time.monotonic() - tick * self._tick_s
+
+    def wait_s(self, tick: int) -> float:
+        """Wall time (s) until ``tick`` is due; not positive if it is."""
+        if not self._tick_s:
+            return 0.0
+        return self._start_s + tick * self._tick_s - time.monotonic()
+
+
+class ClockNode(TickNode):
+    """Starts, paces and ends the run.
+
+    Subclasses implement `publish_tick` and `complete_tick`, and add their inputs before
+    `start_up`.
+    """
+
+    tick_settings = ClockSettings
+
+    def __init__(self, name: str, **kwargs) -> None:
+        super().__init__(name, **kwargs)
+        self.tick = 0
+        self._published = -1
+        self._paused = False
+        self._pace = _Pace(self.ticks.speed)
+        self._pace_timer = self.wall_timer(1.0, self._on_pace)
+        self._pace_timer.cancel()
+        self._clock_started_s = time.monotonic()
+        self._leads: list[_Lead] = []
+        self._held_by: _Lead | None = None
+        for name in MAX_TICKS_AHEAD if self.ticks.record else ():
+            lead = _Lead(name)
+            hear = partial(self._on_recorder, lead)
+            lead.subscription = self._subscription(TOPICS[name], hear, raw=False)
+            self._leads.append(lead)
+        self.create_service(SetBool, 'pause', self._on_pause)
+
+    # ------------------------------------------------------------------ for subclasses
+
+    def publish_tick(self, stamp_ns: int) -> None:
+        """Publish what the peers need to work on this tick."""
+        raise NotImplementedError
+
+    def complete_tick(self, *inputs: tuple[float, ...]) -> bool:
+        """Integrate to the next tick; return False if this one was the last."""
+        raise NotImplementedError
+
+    # ------------------------------------------------------------------ start
+
+    def start_up(self) -> None:
+        """Start looking for the peers, for a limited time."""
+        self._clock_started_s = time.monotonic()
+        super().start_up()
+        if self.ticks.lockstep:
+            self.wall_timer(0.25, self._on_startup_watch)
+
+    def _peers(self) -> list[str]:
+        peers = [wired.node for wired in WIRING if wired.node != self.get_name()]
+        return [*peers, topics.RECORDER] if self.ticks.record else peers
+
+    def unmatched(self) -> list[str]:
+        """What is missing before time can start, in words."""
+        peers = self._peers()
+        absent = [peer for peer in peers if peer not in self.reports]
+        if absent:
+            return [f'{peer} has not appeared' for peer in absent]
+        starting = [peer for peer in peers if self.reports[peer].phase == health.STARTING]
+        return super().unmatched() or [
+            f'{peer} is not ready: {self.reports[peer].message}' for peer in starting
+        ]
+
+    def _on_startup_watch(self) -> None:
+        if self.running:
+            return
+        waited_s = time.monotonic() - self._clock_started_s
+        if waited_s > _RIVALS_LEAVE_S and (rivals := self.rivals()):
+            # No report: in one namespace it would end the other run too.
+            raise Stop(EXIT_PEER, f'{rivals[0]}; {ALONE}')
+        if waited_s > self.ticks.startup_timeout_s:
+            missing = '; '.join(self.unmatched())
+            self.fail(f'not ready after {self.ticks.startup_timeout_s:g} s: {missing}')
+
+    def on_ready(self) -> None:
+        """Start time."""
+        self._due_ns = 0
+        self._pace.restart(0)
+        if self.ticks.lockstep:
+            self._release()
+        else:
+            self.publish_tick(0)
+            self._published = 0
+            self.wall_timer(TICK_S / (self.ticks.speed or 1.0), self._on_cycle)
+
+    # ------------------------------------------------------------------ ticks
+
+    def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
+        """Complete the tick that is due, and go on to the next one or end the run."""
+        if self.complete_tick(*inputs):
+            self.tick += 1
+            self._release()
+        else:
+            self.over_since_s = time.monotonic()
+            report = Report(
+                self.get_fully_qualified_name(), health.FINISHED, health.COMPLETE, stamp_ns
+            )
+            self.publish_event(health.report_array(report))
+            self.count_events(stamp_ns)
+            self.report(health.FINISHED, health.COMPLETE, stamp_ns=stamp_ns)
+
+    def _on_cycle(self) -> None:
+        """One free-running tick, with whatever inputs came last."""
+        if not self._paused and self.over_since_s is None:
+            self._pulse.beat(self.tick * TICK_NS, self.tick * TICK_NS)
+            self.step(self.tick * TICK_NS, *[item.values for item in self.inputs])
+
+    def _release(self) -> None:
+        """Publish the tick that is due, unless something holds it back."""
+        if self._paused or self._published == self.tick:
+            return
+        if self.ticks.lockstep:
+            self._held_by = next((lead for lead in self._leads if self._is_ahead(lead)), None)
+            if self._held_by is not None:
+                self.gate.awaited.add(self._held_by.subscription)
+                return
+            wait_s = self._pace.wait_s(self.tick)
+            if wait_s > 0.0:
+                self._pace_timer.timer_period_ns = max(1, int(wait_s * 1e9))
+                self._pace_timer.reset()
+                return
+        self._published = self.tick
+        self.publish_tick(self.tick * TICK_NS)
+
+    def _on_pace(self) -> None:
+        self._pace_timer.cancel()
+        self._release()
+
+    def too_early(self, item: Input) -> str:
+        """What is wrong with the answer to a tick that this plant has not published, in words.
+
+        There may be another plant, which has not been discovered yet.
+        """
+        place = self.get_namespace().rstrip('/')
+        return (
+            f'{self.resolve_topic_name(item.topic.name)} is published by '
+            f'{place}/{item.topic.publisher} for {seconds(item.stamp_ns)} when '
+            f'{seconds(self._due_ns)} is due: it follows another plant, or is wrong; {ALONE}'
+        )
+
+    def _is_ahead(self, lead: _Lead) -> bool:
+        while lead.is_too_long(self.tick) and (message := take(lead.subscription)) is not None:
+            self._keep_said(lead, message)
+        return lead.is_too_long(self.tick)
+
+    def _keep_said(self, lead: _Lead, message: Header) -> None:
+        recorder = self.reports.get(topics.RECORDER)
+        if recorder is not None and message.frame_id == recorder.process:  # no second glider's
+            lead.said_ns = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
+
+    def _on_recorder(self, lead: _Lead, message: Header) -> None:
+        self._keep_said(lead, message)
+        self.gate.awaited.discard(lead.subscription)
+        self._held_by = None
+        self._release()
+
+    def _on_pause(self, request, response):
+        self._paused = request.data
+        if not self._paused:
+            self._pace.restart(self.tick)
+            if self.running:
+                self._release()
+        response.success = True
+        response.message = f'{"paused" if self._paused else "running"} at tick {self.tick}'
+        return response
+
+    # ------------------------------------------------------------------ watching, end
+
+    def on_report(self, report: Report) -> None:
+        """Leave once everybody has said goodbye."""
+        if self.over_since_s is not None and self.may_leave():
+            raise Stop(0)
+
+    def may_leave(self) -> bool:
+        """Whether all peers have said goodbye."""
+        peers = [self.reports.get(peer) for peer in self._peers()]
+        return all(peer is not None and peer.phase == health.FINISHED for peer in peers)
+
+    def watch_tick(self) -> None:
+        """End the run, and name the culprit, if a tick takes too long."""
+        waits_for_time = self._published != self.tick and self._held_by is None
+        if self._paused or waits_for_time:
+            self._wait.begin_at_next_look()
+        elif self._wait.stuck_s(self._due_ns) > self.ticks.tick_timeout_s:
+            self.fail(self._blame())
+
+    def _blame(self) -> str:
+        """Find the node at which the tick hangs, by following who waits for whom."""
+        if self._held_by is not None:
+            what = {'recorded': 'has nothing on disk', 'heard': 'has not heard everything'}
+            return (
+                f'{topics.RECORDER} {what[self._held_by.name]} after '
+                f'{seconds(self._held_by.said_ns)}; the run waits at {seconds(self._due_ns)}'
+            )
+        missing = [item for item in self.inputs if not self._has(item)]
+        if not missing:
+            return f'{self.get_name()} did not act on a complete tick'
+        topic, culprit = missing[0].topic.name, missing[0].topic.publisher
+        for _ in self._peers():
+            report = self.reports.get(culprit)
+            waits = report is not None and report.phase == health.WAITING
+            if not waits or report.stamp_ns != self._due_ns:
+                break
+            if report.peer == self.get_name():
+                return f'{culprit} {report.message}, which was published: it did not arrive'
+            culprit, topic = report.peer, report.topic
+        return (
+            f'{culprit} did not publish {topic} for {seconds(self._due_ns)} within '
+            f'{self.ticks.tick_timeout_s:g} s'
+        )
+
+    def fail(self, message: str) -> None:
+        """End the run, and tell everybody why."""
+        self.report(health.FAILED, message, stamp_ns=self._due_ns or 0, level=health.ERROR)
+        raise Stop(EXIT_PEER, message)

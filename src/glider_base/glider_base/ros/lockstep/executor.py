@@ -1,0 +1,178 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""An executor that spends little on a message, and what nodes need to go with it.
+
+The executors of rclpy make a new wait set of all entities for each message, which costs more than
+everything else in a tick. `TickExecutor` keeps its wait set, hands messages of `Gate`
+subscriptions straight to their callbacks, and leaves all that is rare (timers, services,
+parameters, shutdown) to rclpy. A node waits for one input only, the one that comes last in a tick,
+and takes the others by hand when that one is there.
+
+Parts of this are not public in rclpy. Where they are missing, `make_executor` gives the executor
+of rclpy, gates are open, and `take` finds nothing because everything comes by callback: the same
+messages, more slowly.
+"""
+
+from contextlib import ExitStack
+from functools import cache
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.subscription import Subscription
+
+from glider_base.ros.hearing import gids
+
+try:
+    from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+except ImportError:
+    _rclpy = None
+
+#: Kinds of entities that `TickExecutor` waits for and does not handle itself, by their collection
+#: in a node.
+_RARE = {'timers': 'timer', 'services': 'service', 'clients': 'client'}
+_GUARDS = ('_guard', '_sigint_gc')
+_MESSAGE_ONLY = Subscription.CallbackType.MessageOnly
+
+
+@cache
+def can_take() -> bool:
+    """Whether messages can be taken from a subscription without an executor."""
+    return hasattr(getattr(_rclpy, 'Subscription', None), 'take_message')
+
+
+@cache
+def can_wait() -> bool:
+    """Whether there are wait sets to be used without an executor of rclpy."""
+    kinds = ('subscription', 'guard_condition', *_RARE.values())
+    names = ('clear_entities', 'wait', 'get_ready_entities', *(f'add_{kind}' for kind in kinds))
+    return all(hasattr(getattr(_rclpy, 'WaitSet', None), name) for name in names)
+
+
+class Gate(CallbackGroup):
+    """Lets the executor wait for the subscriptions in ``awaited`` only."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.awaited: set[Subscription] = set()
+        self._is_open = not can_take()
+
+    def can_execute(self, entity) -> bool:
+        """Whether the executor shall wait for this subscription."""
+        return self._is_open or entity in self.awaited
+
+    def beginning_execution(self, entity) -> bool:
+        """Nothing to hold back: there is one thread."""
+        return True
+
+    def ending_execution(self, entity) -> None:
+        """Nothing to let go."""
+
+    def replace(self, old, new) -> None:
+        """Await ``new`` instead of ``old``."""
+        self.awaited.discard(old)
+        self.awaited.add(new)
+
+
+def take_with_info(subscription: Subscription) -> tuple | None:
+    """Oldest message of a `Gate` subscription that no callback has had, and what is known of it.
+
+    That is what a callback with two arguments gets: who published it (`gids.gid_of`), where the
+    bytes are what is taken.
+    """
+    if not can_take():
+        return None
+    with subscription.handle:
+        if subscription.raw and (taker := gids.taker()) is not None:
+            return taker.take(subscription.handle.pointer)
+        return subscription.handle.take_message(subscription.msg_type, subscription.raw)
+
+
+def take(subscription: Subscription):
+    """Oldest message of a `Gate` subscription that no callback has had, or None."""
+    taken = take_with_info(subscription)
+    return None if taken is None else taken[0]
+
+
+def make_executor(**kwargs) -> SingleThreadedExecutor:
+    """A `TickExecutor`, or what comes closest to it in this rclpy."""
+    if can_take() and can_wait():
+        executor = TickExecutor(**kwargs)
+        if all(hasattr(executor, name) for name in _GUARDS):
+            return executor
+    return SingleThreadedExecutor(**kwargs)
+
+
+class TickExecutor(SingleThreadedExecutor):
+    """A SingleThreadedExecutor with a short way for the messages that ticks are made of."""
+
+    def __init__(self, **kwargs) -> None:
+        super().__init__(**kwargs)
+        self._wait_set = None
+        self._in_use = ExitStack()
+        self._gated: list[Subscription] = []
+        self._others: list[tuple] = []
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Wait for something to do, and do it."""
+        if self._wait_set is None:
+            self._gather()
+        ready, is_other_ready = self._wait(timeout_sec)
+        for subscription in ready:
+            taken = take_with_info(subscription)
+            if taken is not None:
+                wants_info = subscription._callback_type is not _MESSAGE_ONLY
+                subscription.callback(*(taken if wants_info else taken[:1]))
+        if is_other_ready or not ready:
+            self._scatter()
+            super().spin_once(timeout_sec=0.0)
+
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        """Stop executing callbacks."""
+        self._scatter()
+        return super().shutdown(timeout_sec)
+
+    def _gather(self) -> None:
+        """Make the wait set.
+
+        It serves until something rare happens, because entities come and go only then. Events of
+        the middleware (warnings about quality of service) are not in it: they wait for that too.
+        """
+        rare = [('guard_condition', getattr(self, name).handle) for name in _GUARDS]
+        for node in self.get_nodes():
+            for subscription in node.subscriptions:
+                if isinstance(subscription.callback_group, Gate):
+                    self._gated.append(subscription)
+                else:
+                    rare.append(('subscription', subscription.handle))
+            for collection, kind in _RARE.items():
+                rare += [(kind, entity.handle) for entity in getattr(node, collection)]
+        kinds = [kind for kind, _ in rare] + ['subscription'] * len(self._gated)
+        handles = [handle for _, handle in rare] + [item.handle for item in self._gated]
+        for handle in [*handles, self.context.handle]:
+            self._in_use.enter_context(handle)
+        order = ('subscription', 'guard_condition', 'timer', 'client', 'service', 'event')
+        sizes = [kinds.count(kind) for kind in order]
+        self._wait_set = _rclpy.WaitSet(*sizes, self.context.handle)
+        self._others = [(getattr(self._wait_set, f'add_{kind}'), handle) for kind, handle in rare]
+
+    def _scatter(self) -> None:
+        """Forget the wait set, and let go of what was in it."""
+        self._wait_set, self._others, self._gated = None, [], []
+        self._in_use.close()
+
+    def _wait(self, timeout_sec: float | None) -> tuple[list[Subscription], bool]:
+        """Wait until something is ready: the gated subscriptions, and whether others are."""
+        wait_set = self._wait_set
+        wait_set.clear_entities()
+        gated = [item for item in self._gated if item.callback_group.can_execute(item)]
+        for item in gated:
+            wait_set.add_subscription(item.handle)
+        for add, handle in self._others:
+            add(handle)
+        wait_set.wait(-1 if timeout_sec is None else int(timeout_sec * 1e9))
+        pointers = set(wait_set.get_ready_entities('subscription'))
+        ready = [item for item in gated if item.handle.pointer in pointers]
+        is_other_ready = len(ready) < len(pointers) or any(
+            wait_set.get_ready_entities(kind) for kind in ('guard_condition', *_RARE.values())
+        )
+        return ready, is_other_ready

@@ -1,0 +1,80 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Who takes part: peers that are matched or missing, and rivals that should not be there."""
+
+from collections.abc import Iterable
+
+from rclpy.node import Node
+
+from glider_base.ros.hearing.gids import shown
+from glider_base.ros.hearing.inputs import Input
+from glider_base.ros.wire.topics import Topic
+
+#: What to do about a second glider.
+ALONE = 'each glider in a ROS domain needs a namespace and a clock of its own'
+
+
+#: What rclpy calls a node whose name has not been discovered yet.
+_UNKNOWN = '_NODE_NAME_UNKNOWN_'
+
+
+def publishers(node: Node, topic: Topic) -> dict[bytes, str]:
+    """Full names of the nodes that publish a topic, by gid; empty for one not known yet."""
+    return {
+        bytes(info.endpoint_gid): ''
+        if info.node_name == _UNKNOWN
+        else f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+        for info in node.get_publishers_info_by_topic(topic.name)
+    }
+
+
+def rivals(node: Node, topics: Iterable[Topic]) -> list[str]:
+    """Who else publishes those of the topics that only this node may publish, in words."""
+    found = []
+    for topic in topics:
+        if topic.publisher != node.get_name():
+            continue
+        names = list(publishers(node, topic).values())
+        if node.get_fully_qualified_name() in names:
+            names.remove(node.get_fully_qualified_name())
+        found += [
+            f'{node.resolve_topic_name(topic.name)} is published by {name} too' for name in names
+        ]
+    return found
+
+
+def stranger(node: Node, topic: Topic, gid: bytes) -> str:
+    """Who publishes a topic that is not its own, in words; by gid too if that is not the name."""
+    names = publishers(node, topic)
+    name = names.get(gid) or 'somebody without a name'
+    if list(names.values()).count(name) != 1:
+        name += f' ({shown(gid)})'
+    return f'{node.resolve_topic_name(topic.name)} is published by {name} too'
+
+
+def missing_readers(node: Node, topic: Topic, publisher, readers: list[str]) -> list[str]:
+    """Who of ``readers`` is not connected to an output yet, in words."""
+    if not readers:
+        return []
+    names = _peers_among(node, node.get_subscriptions_info_by_topic(topic.name))
+    absent = [reader for reader in readers if reader not in names]
+    missing = [f'{reader} does not subscribe to {topic.name}' for reader in absent]
+    if not absent and publisher.get_subscription_count() < len(readers):
+        missing.append(f'{topic.name} is not connected to {" and ".join(readers)}')
+    return missing
+
+
+def missing_publisher(node: Node, item: Input) -> list[str]:
+    """What an input lacks to be connected to its publisher, in words."""
+    topic = item.topic
+    if topic.publisher not in _peers_among(node, node.get_publishers_info_by_topic(topic.name)):
+        return [f'{topic.publisher} does not publish {topic.name}']
+    if item.subscription.get_publisher_count() < 1:
+        return [f'{topic.name} of {topic.publisher} is not connected']
+    return []
+
+
+def _peers_among(node: Node, endpoints) -> set[str]:
+    """Names of the nodes of this namespace that have some of these endpoints."""
+    own = node.get_namespace()
+    return {info.node_name for info in endpoints if info.node_namespace == own}

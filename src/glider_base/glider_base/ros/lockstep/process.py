@@ -1,0 +1,110 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The life of a node process: how it starts, spins, stops and leaves, and its exit codes."""
+
+import gc
+import os
+import signal
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+
+from glider_base.errors import EXIT_USAGE, say_fatal
+from glider_base.ros.lockstep.executor import make_executor
+from glider_base.ros.parameters import refuse_unknown
+from glider_base.settings import ConfigurationError
+
+#: Middleware forgets messages of a node that is gone: leave them this time (s) to arrive, and to
+#: be sent again if need be.
+_LINGER_S = 0.3
+#: Where Fast DDS looks for its settings, and ours.
+_FASTDDS, _PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE', Path(__file__).with_name('fastdds.xml')
+
+
+class Stop(Exception):  # noqa: N818
+    """Ends the node with an exit code; any code but 0 comes with a message for the person."""
+
+    def __init__(self, code: int, message: str = '') -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def run(node_type: Callable[[], Node], args=None) -> int:
+    """Life of the process of one node; see `run_together`."""
+    return run_together([node_type], args)
+
+
+def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
+    """Life of a process: init, nodes, spin, clean end. The first node to stop ends them all.
+
+    Parameters
+    ----------
+    node_types : sequence of callable
+        What makes the nodes, in the order in which they act in a tick.
+    args : list of str, optional
+        Command line; that of the process by default.
+
+    Returns
+    -------
+    int
+        Exit code: 0 at the end of the run and for SIGINT and SIGTERM, 1 for a full disk, 2 for a
+        bad parameter, 3 for a peer that is missing, late or wrong.
+    """
+    os.environ.setdefault(_FASTDDS, str(_PROFILES))
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _leave_to_rclpy)
+    try:
+        rclpy.init(args=args)
+    except Exception as error:
+        return _say(Stop(EXIT_USAGE, f'bad command line: {error}'))
+    nodes, stop = [], Stop(0)
+    try:
+        for node_type in node_types:
+            nodes.append(node_type())
+            refuse_unknown(nodes[-1])
+        gc.freeze()  # compilers and libraries, which stay: else every full collection visits them
+        with make_executor() as executor:
+            for node in nodes:
+                executor.add_node(node)
+            executor.spin()
+    except ExternalShutdownException:
+        pass
+    except Stop as reason:
+        stop = reason
+    except ConfigurationError as error:
+        stop = Stop(EXIT_USAGE, str(error))
+    except Exception:
+        if rclpy.ok():
+            raise
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        for node in nodes:
+            try:
+                node.close()
+            except Stop as reason:
+                stop = stop if stop.code else reason
+        if nodes:
+            time.sleep(_LINGER_S)
+        for node in nodes:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return _say(stop)
+
+
+def _leave_to_rclpy(number, frame) -> None:
+    """Let rclpy, which hears SIGINT too, end the node at its next turn, as it does for SIGTERM.
+
+    A KeyboardInterrupt may come while numba makes the tuples that a step returns, and numba goes
+    on without them: a segmentation fault.
+    """
+
+
+def _say(stop: Stop) -> int:
+    if stop.code:
+        say_fatal(stop)
+    return stop.code

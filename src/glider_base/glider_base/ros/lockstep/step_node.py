@@ -1,0 +1,171 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A node with a step per tick, in lockstep or at 10 Hz on the newest inputs."""
+
+from glider_base.ros.hearing.inputs import Input
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.node import TickNode
+from glider_base.ros.lockstep.pulse import Condition
+from glider_base.signals import TICK_NS, TICK_S
+from glider_base.wiring import SAMPLED, SLOW_S, WHEN_SILENT
+
+#: Samples of attitude and pressure are old after so many periods: two in a row may be missed.
+OLD_AFTER = 3.0
+_COUNTED = ('lost', 'late')
+_TELL_EVERY_S = 10.0
+#: So far (in ticks) the steps may be ahead of the stamps before one is left out.
+_AHEAD = 0.25
+
+
+class StepNode(TickNode):
+    """Guidance, control, current: a step per tick, and the free-running timer around it."""
+
+    #: What the node does while an input is stale.
+    when_stale = 'silent until then'
+
+    def __init__(self, name: str, **kwargs) -> None:
+        super().__init__(name, **kwargs)
+        self._stale: list[str] = []
+        self.cycles = 0  #: cycles of the free-running mode that there should have been
+        self.missed = 0  #: those of them that there were not: the machine was too slow
+        self.passed = 1  #: ticks that have passed since the last step, this one included
+        self._cycle_s: float | None = None
+        self._stamp_ns = -1  #: of the last cycle
+        self._passed_ns = 0  #: up to where time has passed in the steps
+        self._told = (0, 0, 0)
+        self._tell_s = -float('inf')
+
+    def on_ready(self) -> None:
+        """Start the timer of the free-running mode, on simulated time if that is used."""
+        if not self.ticks.lockstep:
+            self.create_timer(TICK_S, self._on_cycle, clock=self.cycle_clock)
+
+    @property
+    def sample_period_s(self) -> float:
+        """Time (s) between two samples of what is not measured in every tick."""
+        return TICK_S
+
+    def max_age_s(self, topic: str) -> float:
+        """Age (s) from which on an input is old in free-running mode."""
+        at_least_s = max(self.ticks.input_max_age_s, SLOW_S.get(topic, 0.0))
+        if topic not in SAMPLED:
+            return at_least_s
+        return max(at_least_s, OLD_AFTER * self.sample_period_s)
+
+    def _on_cycle(self) -> None:
+        now_s = self.now_s()
+        due = self._cycles_since(now_s)
+        self.cycles, self.missed = self.cycles + due, self.missed + due - 1
+        self._count()
+        old = {
+            item.topic.name
+            for item in self.inputs
+            if now_s - item.arrived_s > self.max_age_s(item.topic.name)
+        }
+        stale = [
+            item.topic.name for item in self.inputs if item.topic.name in old - {*WHEN_SILENT}
+        ]
+        stamp_ns = self._newest_ns()
+        if stale != self._stale:
+            self._stale = stale
+            if stale:
+                self.event(stamp_ns, health.ERROR, self._missing())
+            else:
+                self.event(stamp_ns, health.OK, 'inputs are fresh again')
+        if stale:
+            self.on_stale(stamp_ns, due)
+        elif not self._pass(stamp_ns):
+            self.repeat()
+        else:
+            silent = {name: WHEN_SILENT[name] for name in old}
+            self.step(
+                stamp_ns, *[silent.get(item.topic.name, item.values) for item in self.inputs]
+            )
+        self._pulse.beat(round(now_s * 1e9), self.get_clock().now().nanoseconds)
+
+    def _newest_ns(self) -> int:
+        """Stamp of the newest input; as long as there is none, the time."""
+        stamp_ns = max(item.stamp_ns for item in self._ticking)
+        return stamp_ns if stamp_ns >= 0 else self.get_clock().now().nanoseconds
+
+    def condition(self) -> Condition:
+        """How this node is: without its inputs it is not well."""
+        if self._stale:
+            return Condition(health.ERROR, self._missing())
+        return super().condition()
+
+    def _missing(self) -> str:
+        return f'missing or stale: {", ".join(self._stale)}; {self.when_stale}'
+
+    def _cycles_since(self, now_s: float) -> int:
+        """Cycles that there should have been since the last one, this one included."""
+        since_s = TICK_S if self._cycle_s is None else now_s - self._cycle_s
+        self._cycle_s = now_s
+        return max(1, round(since_s / TICK_S))
+
+    def _pass(self, stamp_ns: int) -> bool:
+        """Let the time of the stamps pass; whether it does.
+
+        A step stands for as many ticks as the stamps have gone on by: more than one if a message
+        was lost or a cycle missed, but no more than an input may be old. Over many steps no time
+        is lost and none is added; in between the steps may be ahead of the stamps, so that jitter
+        does not make one of two. The clock of a vehicle that was set back goes on with one tick.
+        """
+        before_ns, self._stamp_ns = self._stamp_ns, stamp_ns
+        if stamp_ns == before_ns:
+            return False
+        most = max(1, round(self.ticks.input_max_age_s / TICK_S))
+        behind = (stamp_ns - self._passed_ns) / TICK_NS
+        if not 0 < stamp_ns - before_ns <= most * TICK_NS or before_ns < 0:
+            self.passed = most if before_ns >= 0 and stamp_ns > before_ns else 1
+            self._passed_ns = stamp_ns
+            return True
+        self.passed = max(round(behind), int(behind > -_AHEAD))
+        self._passed_ns += self.passed * TICK_NS
+        return self.passed > 0
+
+    @property
+    def _ticking(self) -> list[Input]:
+        """Inputs of which a message is due in every tick."""
+        return [item for item in self.inputs if item.topic.name not in SAMPLED]
+
+    def _count(self) -> None:
+        """Count what came late, and tell now and then what was lost or late."""
+        ticking = self._ticking
+        for item in ticking:
+            item.late += item.stamp_ns == item.used_ns >= 0
+            item.used_ns = item.stamp_ns
+        lost, late = (sum(getattr(item, kind) for item in ticking) for kind in _COUNTED)
+        counted = lost, late, self.missed
+        if counted == self._told or self.now_s() < self._tell_s:
+            return
+        is_worse = lost > self._told[0] or self.missed > self._told[2]
+        level = health.WARN if is_worse else health.OK
+        self._told, self._tell_s = counted, self.now_s() + _TELL_EVERY_S
+        counts = {
+            f'{item.topic.name}_{kind}': getattr(item, kind)
+            for item in ticking
+            for kind in _COUNTED
+        }
+        said = f'inputs: {lost} lost, {late} late'
+        if self.missed:
+            said += f'; {self.missed} of {self.cycles} cycles missed: this machine is too slow'
+        self.event(self._newest_ns(), level, said, cycles_missed=self.missed, **counts)
+
+    def repeat(self) -> None:
+        """Act in a cycle in which no time has passed by the stamps; nothing by default."""
+
+    def on_stale(self, stamp_ns: int, cycles: int) -> None:
+        """Act in free-running mode while an input is stale; nothing by default.
+
+        Parameters
+        ----------
+        stamp_ns : int
+        cycles : int
+            Since the last cycle, this one included.
+        """
+
+    def close(self) -> None:
+        """Say goodbye if another node of this process has heard first that the run is over."""
+        if self.running and self.over_since_s is None and self.context.ok():
+            self.report(health.FINISHED)

@@ -1,0 +1,34 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What goes wrong with messages on purpose, as a person writes it and as a node is told it."""
+
+import math
+from typing import Literal
+
+from pydantic import Field
+
+from glider_base.settings import Settings
+from glider_base.wiring import PORTS
+
+#: Topics that are published in every tick, but that of time.
+TICK_TOPICS = tuple(name for name in PORTS if name != '/clock')
+
+
+class MessageFault(Settings):
+    """Messages of a topic go wrong as they leave their node."""
+
+    topic: Literal[TICK_TOPICS] = Field(description='topic that is published in every tick')
+    how: Literal['drop', 'duplicate', 'delay', 'reorder', 'corrupt'] = Field(
+        description='it is lost, comes twice, comes late, comes after the next one, or is cut in '
+        'two'
+    )
+    share: float = Field(gt=0.0, le=1.0, description='of so many of the messages (-)')
+    delay_s: float = Field(
+        0.02, ge=0.0, le=10.0, description='by which one comes late (s of wall time)'
+    )
+    at_s: float = Field(0.0, ge=0.0, le=1e8, description='not before this time (s)')
+    for_s: float = Field(0.0, ge=0.0, le=1e8, description='how long it lasts (s); 0: to the end')
+
+    def strikes_at(self, t_s: float) -> bool:
+        """Whether it is the time of the fault."""
+        return self.at_s <= t_s < (self.at_s + self.for_s if self.for_s else math.inf)

@@ -1,0 +1,292 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Base of everything a person configures, and how its errors read."""
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin
+
+import pydantic
+
+from glider_base.errors import MAX_LINES, ConfigurationError, clipped, shown
+
+SettingsT = TypeVar('SettingsT', bound='Settings')
+
+
+class Settings(pydantic.BaseModel):
+    """Validated configuration: unknown fields, NaN and infinities are refused."""
+
+    model_config = pydantic.ConfigDict(
+        extra='forbid', allow_inf_nan=False, frozen=True, validate_default=True
+    )
+
+    def check(self) -> None:
+        """Refuse what no field shows by itself, such as a depth that a vehicle is not rated for.
+
+        Raises
+        ------
+        ConfigurationError
+            Naming field, value and allowed range.
+        """
+
+
+#: ``json_schema_extra`` of a field that can be set on a node while it flies.
+TUNABLE = {'tunable': True}
+#: Numeric limits as pydantic calls them, and in a person's words.
+_BOUNDS = (('ge', '>='), ('gt', '>'), ('le', '<='), ('lt', '<'))
+_NOT_A_MAPPING = ('dict_type', 'model_type', 'model_attributes_type')
+
+
+def _models(annotation: Any) -> list[type[pydantic.BaseModel]]:
+    """Models that an annotation names, inside lists and unions too."""
+    if get_origin(annotation) is None and isinstance(annotation, type):
+        return [annotation] if issubclass(annotation, pydantic.BaseModel) else []
+    return [model for part in get_args(annotation) for model in _models(part)]
+
+
+def _field(models: list[type[pydantic.BaseModel]], name: str) -> pydantic.fields.FieldInfo | None:
+    """Field of the first of the models that has it; None if none has."""
+    return next((m.model_fields[name] for m in models if name in m.model_fields), None)
+
+
+def _has_tag(model: type[pydantic.BaseModel], tag: str) -> bool:
+    """Whether a model is the member of a union that ``tag`` stands for."""
+    return any(tag in get_args(field.annotation) for field in model.model_fields.values())
+
+
+def _follow(model: type[pydantic.BaseModel], location: tuple):
+    """Follow the location of an error.
+
+    Returns
+    -------
+    path : list of str
+        The location as the person wrote it: pydantic's adds the names of union members.
+    holders : list of type
+        Models that may hold the last part.
+    field : FieldInfo or None
+        The last part, if it is a field.
+    """
+    path, holders, inside, field = [], [model], [model], None
+    for part in location:
+        tagged = [one for one in inside if _has_tag(one, part)] if len(inside) > 1 else []
+        if tagged:
+            inside = tagged
+            continue
+        path.append(str(part))
+        holders = inside
+        field = _field(holders, part)
+        if field is not None:
+            inside = _models(field.annotation)
+    return path, holders, field
+
+
+def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None) -> str:
+    """Say in words what the field of an error would accept."""
+    context = error.get('ctx') or {}
+    if error['type'] == 'extra_forbidden':
+        names = ', '.join(name for m in holders for name in m.model_fields)
+        return f'allowed fields: {names}' + ''.join(_others(m.model_config) for m in holders)
+    if error['type'] in _NOT_A_MAPPING:
+        models = _models(field.annotation) if field is not None else holders
+        return f'allowed fields: {", ".join(name for m in models for name in m.model_fields)}'
+    for key in ('expected', 'expected_tags'):
+        if key in context:
+            extra = field.json_schema_extra if field is not None else None
+            return f'allowed: {context[key]}' + _others({'json_schema_extra': extra})
+    limits = [f'{word} {context[key]}' for key, word in _BOUNDS if key in context]
+    if field is not None:
+        limits = [
+            f'{word} {getattr(item, key)}'
+            for item in field.metadata
+            for key, word in _BOUNDS
+            if getattr(item, key, None) is not None
+        ] or limits
+    return f'allowed: {" and ".join(limits)}' if limits else ''
+
+
+def _others(about: dict[str, Any]) -> str:
+    """Where words come from that a field, or fields that a model, does not accept here."""
+    extra = about.get('json_schema_extra')
+    others = extra.get('others') if isinstance(extra, dict) else None
+    return f'; {others}' if others else ''
+
+
+def find_field(model: type[Settings], name: str) -> pydantic.fields.FieldInfo | None:
+    """Field by its dotted name; None if there is none."""
+    inside, field = [model], None
+    for part in name.split('.'):
+        if field is not None and get_origin(field.annotation) is list and part.isdecimal():
+            continue
+        field = _field(inside, part)
+        if field is None:
+            return None
+        inside = _models(field.annotation)
+    return field
+
+
+def holder_of(values: dict[str, Any], name: str) -> dict[str, Any]:
+    """Mapping in nested values that holds a field, given by its dotted name; made if need be.
+
+    A member of a list goes by its number, from 0 on: ``faults.0.at_s``.
+
+    Raises
+    ------
+    ConfigurationError
+        If something on the way is not a mapping, or a list has no such member.
+    """
+    inside: Any = values
+    for parent in name.split('.')[:-1]:
+        if isinstance(inside, list):
+            if not parent.isdecimal() or not len(parent) < 9 or int(parent) >= len(inside):
+                there = f'0 to {len(inside) - 1}' if inside else 'none, the list is empty'
+                raise ConfigurationError(
+                    f'--set {clipped(name)}: {clipped(parent)} is not in the list '
+                    f'(allowed: {there})'
+                )
+            inside = inside[int(parent)]
+        else:
+            inside = inside.setdefault(parent, {})
+        if not isinstance(inside, dict | list):
+            raise ConfigurationError(
+                f'--set {clipped(name)}: {clipped(parent)} is not a group of fields'
+            )
+    if not isinstance(inside, dict):
+        raise ConfigurationError(
+            f'--set {clipped(name)}: a member of a list is set field by field, or with the list'
+        )
+    return inside
+
+
+def unit_of(field: pydantic.fields.FieldInfo) -> str:
+    """Unit of a field, from the first brackets of its description; empty without."""
+    brackets = re.search(r'\(((?:[^()]|\([^()]*\))+)\)', field.description or '')
+    return brackets[1].partition(',')[0] if brackets else ''
+
+
+class Mistake(NamedTuple):
+    """One thing that is wrong with values."""
+
+    location: tuple[str, ...]  #: as the person wrote it
+    text: str  #: field, value, what is wrong, what is allowed
+
+
+def mistakes(error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> list[Mistake]:
+    """Mistakes that an error is about: the first of them, and how many more there are."""
+    found = error.errors(include_url=False)
+    told = [_mistake(item, model) for item in found[:MAX_LINES]]
+    if len(found) > MAX_LINES:
+        told[-1:] = [Mistake((), f'and {len(found) - MAX_LINES + 1} more')]
+    return told
+
+
+def _mistake(item: dict, model: type[pydantic.BaseModel]) -> Mistake:
+    kind, context, value = item['type'], item.get('ctx') or {}, item['input']
+    path, holders, field = _follow(model, item['loc'])
+    message = item['msg'].removeprefix('Value error, ').replace('Input should', 'should')
+    if kind == 'extra_forbidden':
+        message = 'unknown field'
+    elif kind == 'missing':
+        message = 'missing'
+    elif kind in _NOT_A_MAPPING:
+        message = 'expected a mapping of fields'
+    elif kind in ('union_tag_invalid', 'union_tag_not_found'):
+        path.append(context['discriminator'].strip("'"))
+        value = context.get('tag', value)
+        message = 'unknown' if 'tag' in context else 'missing'
+    given = '' if isinstance(value, dict) else f' = {shown(value)}'
+    allowed = _allowed(item, holders, field)
+    where = '.'.join(clipped(part) for part in path) or '(file)'
+    text = f'{where}{given}: {message}' + (f' ({allowed})' if allowed else '')
+    return Mistake(tuple(path), text)
+
+
+def validate(
+    model: type[SettingsT],
+    values: Any,
+    source: str,
+    folder: Path | None = None,
+    line_of: Callable[[tuple[str, ...]], int | None] = lambda location: None,
+    changed: str = '',
+) -> SettingsT:
+    """Validate ``values`` as ``model``.
+
+    Parameters
+    ----------
+    model : type of Settings
+    values
+    source : str
+        File or option that they come from.
+    folder : Path, optional
+        Where files that they name are looked for.
+    line_of : callable, optional
+        Line of the file in which a value stands, by its location; None if it has none.
+    changed : str
+        What was changed since the file was read, in words.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming ``source``, the line, the field, its value and the allowed range.
+    """
+    _refuse_flags_for_numbers(model, values, f'{source}{changed}')
+    try:
+        return model.model_validate(values, context={'folder': folder} if folder else None)
+    except pydantic.ValidationError as error:
+        told = []
+        for location, text in mistakes(error, model):
+            line = line_of(location)
+            told.append(
+                f'{source}:{line}{changed}: {text}' if line else f'{source}{changed}: {text}'
+            )
+        raise ConfigurationError('\n'.join(told)) from None
+
+
+def _flags(values: Any, name: str = '') -> Iterator[tuple[str, bool]]:
+    """Every true and false in nested values, with its dotted name."""
+    if isinstance(values, dict | list):
+        items = values.items() if isinstance(values, dict) else enumerate(values)
+        for key, inner in items:
+            yield from _flags(inner, f'{name}.{key}' if name else str(key))
+    elif isinstance(values, bool):
+        yield name, values
+
+
+def _refuse_flags_for_numbers(model: type[Settings], values: Any, source: str) -> None:
+    """Refuse true and false where a number stands: Python takes them for 1 and 0."""
+    for name, value in _flags(values):
+        field = find_field(model, name)
+        kinds = get_args(field.annotation) or (field.annotation,) if field is not None else ()
+        if bool not in kinds and (int in kinds or float in kinds):
+            told = str(value).lower()
+            raise ConfigurationError(f'{source}: {name} = {told}: no number (allowed: a number)')
+
+
+def file_names(folder: Path) -> list[str]:
+    """Names of the YAML files that come with a package in ``folder``."""
+    return sorted(path.stem for path in folder.glob('*.yaml'))
+
+
+def find_file(what: str, name: str, folder: Path) -> Path:
+    """File of a scenario, vehicle or the like, given by name or by path.
+
+    Raises
+    ------
+    ConfigurationError
+        If neither ``folder`` has a file of that name nor there is such a file.
+    """
+    path, names = Path(name), file_names(folder)
+    if name in names:
+        return folder / f'{name}.yaml'
+    if path.suffix not in ('.yaml', '.yml'):
+        raise ConfigurationError(
+            f'{what} = {shown(name)}: no such {what} '
+            f'(allowed: {", ".join(names)}, or a path to a .yaml file)'
+        )
+    try:
+        path.stat()
+    except FileNotFoundError:
+        raise ConfigurationError(f'{path}: no such {what} file') from None
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(f'{path}: {getattr(error, "strerror", None) or error}') from None
+    return path

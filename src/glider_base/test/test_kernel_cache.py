@@ -1,0 +1,194 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Compiled code that is kept: by several processes at a time, and until it is stale."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from glider_base import kernel_cache
+
+#: A kernel in a file of its own.
+KERNEL = """
+from glider_base.kernel import kernel
+
+@kernel
+def doubled(number):
+    return number + number
+"""
+#: Compiles it for a type, and takes its time between looking for a free name and taking it.
+COMPILE = """
+import sys, time
+from numba.core.caching import IndexDataCacheFile
+from doubling import doubled
+
+save = IndexDataCacheFile._save_index
+
+def save_late(self, overloads):
+    time.sleep(2.0)
+    save(self, overloads)
+
+IndexDataCacheFile._save_index = save_late
+doubled(eval(sys.argv[1]))
+"""
+#: What a later process finds.
+FIND = """
+from doubling import doubled
+
+print(doubled(3), doubled(0.25), sum(doubled.stats.cache_misses.values()))
+"""
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Start a program that has the kernel, with a cache of its own."""
+    (tmp_path / 'doubling.py').write_text(KERNEL)
+    env = dict(os.environ)
+    env['PYTHONPATH'] = os.pathsep.join([str(tmp_path), env.get('PYTHONPATH', '')])
+    env['GLIDER_CACHE'] = str(tmp_path / 'cache')
+
+    def run(program: str, *arguments: str) -> subprocess.Popen:
+        command = [sys.executable, '-c', program, *arguments]
+        return subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True)
+
+    return run
+
+
+def test_processes_that_compile_for_different_types_do_not_get_each_others_code(start):
+    both = [start(COMPILE, number) for number in ('3', '0.25')]
+    assert [one.wait(60.0) for one in both] == [0, 0]
+    found, _ = start(FIND).communicate(timeout=60.0)
+    assert found.split() == ['6', '0.5', '0']
+
+
+#: Modules of a package: one kernel calls another's, one a slot that is filled elsewhere.
+PARTS = {
+    'low': """
+from glider_base.kernel import kernel
+
+@kernel
+def low(x):
+    return x + 1.0
+""",
+    'high': """
+from glider_base.kernel import kernel
+from parts.low import low
+
+@kernel
+def high(x):
+    return 2.0 * low(x)
+""",
+    'other': """
+from glider_base.kernel import kernel
+
+@kernel
+def other(x):
+    return x - 1.0
+""",
+    'hole': """
+from glider_base.kernel import kernel
+from glider_base.slot import slot
+
+@slot
+def law(x, params):
+    \"\"\"What a law makes of x.\"\"\"
+
+@kernel
+def flown(x, params):
+    return law(x, params)
+""",
+    'laws': """
+from typing import NamedTuple
+from glider_base.kernel import kernel
+from parts.factor import FACTOR
+from parts.hole import law
+
+class Params(NamedTuple):
+    gain: float
+
+class Others(NamedTuple):
+    gain: float
+
+@law.body(Params)
+@kernel
+def scaled(x, params):
+    return FACTOR * params.gain * x
+""",
+    'factor': 'FACTOR = 3.0\n',
+    'unused': """
+from parts.hole import law
+from parts.laws import Others
+from glider_base.kernel import kernel
+
+@law.body(Others)
+@kernel
+def nothing(x, params):
+    return 0.0 * x
+""",
+}
+CALL = """
+from parts.high import high
+from parts.hole import flown
+from parts.laws import Params
+from parts.other import other
+
+for one, values in ((high, (1.0,)), (flown, (1.0, Params(2.0))), (other, (1.0,))):
+    print(one(*values), sum(one.stats.cache_misses.values()))
+"""
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A package in a folder of its own, and what its kernels answer and have compiled there."""
+
+    class Package:
+        def write(self, folder: str, **changed: str) -> None:
+            (tmp_path / folder / 'parts').mkdir(parents=True, exist_ok=True)
+            for name, text in {'__init__': '', **PARTS, **changed}.items():
+                (tmp_path / folder / 'parts' / f'{name}.py').write_text(text)
+
+        def call(self, folder: str) -> list[tuple[float, int]]:
+            env = dict(os.environ, GLIDER_CACHE=str(tmp_path / 'cache'))
+            path = [str(tmp_path / folder), env.get('PYTHONPATH', '')]
+            env['PYTHONPATH'] = os.pathsep.join(path)
+            command = [sys.executable, '-c', CALL]
+            done = subprocess.run(command, env=env, stdout=subprocess.PIPE, text=True, check=True)
+            words = [line.split() for line in done.stdout.splitlines()]
+            return [(float(answer), int(misses)) for answer, misses in words]
+
+    return Package()
+
+
+def test_a_change_compiles_what_it_reaches_and_nothing_else(package):
+    package.write('here')
+    assert package.call('here') == [(4.0, 1), (6.0, 1), (0.0, 1)]
+    assert package.call('here') == [(4.0, 0), (6.0, 0), (0.0, 0)]
+    package.write('here', low=PARTS['low'].replace('1.0', '5.0'))
+    assert package.call('here') == [(12.0, 1), (6.0, 0), (0.0, 0)]
+    package.write('here', factor='FACTOR = 4.0\n')
+    assert package.call('here') == [(4.0, 0), (8.0, 1), (0.0, 0)]
+    package.write('here', unused=PARTS['unused'].replace('0.0', '9.0'))
+    assert package.call('here') == [(4.0, 0), (6.0, 0), (0.0, 0)]
+
+
+def test_another_checkout_finds_what_is_there(package):
+    package.write('here')
+    package.write('there')
+    package.call('here')
+    assert package.call('there') == [(4.0, 0), (6.0, 0), (0.0, 0)]
+
+
+def test_what_was_not_used_for_longest_is_forgotten_first(monkeypatch, tmp_path):
+    monkeypatch.setenv('GLIDER_CACHE', str(tmp_path))
+    inside = kernel_cache.folder() / 'parts.low'
+    inside.mkdir(parents=True)
+    for age, name in enumerate(('new', 'old')):
+        for file in (f'{name}.py311.nbi', f'{name}.py311.1.nbc'):
+            (inside / file).write_bytes(bytes(100))
+        os.utime(inside / f'{name}.py311.nbi', (1e9 - age, 1e9 - age))
+    kernel_cache.forget_old(400)
+    assert len(list(inside.iterdir())) == 4
+    kernel_cache.forget_old(399)
+    assert {path.name for path in inside.iterdir()} == {'new.py311.nbi', 'new.py311.1.nbc'}

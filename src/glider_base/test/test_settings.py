@@ -1,0 +1,186 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a person reads who configured something wrong."""
+
+from typing import Annotated, Literal
+
+import pydantic
+import pytest
+from pydantic import Field
+
+from glider_base.errors import ConfigurationError
+from glider_base.files import read_yaml
+from glider_base.settings import Settings, validate
+
+
+class Cat(Settings):
+    kind: Literal['cat']
+    lives: int = Field(9, ge=1, le=9)
+
+
+class Dog(Settings):
+    kind: Literal['dog']
+    legs: int = Field(4, ge=0, le=4)
+
+
+class Inner(Settings):
+    depth_m: float = Field(1.0, ge=0.0, lt=10.0)
+    name: str = 'x'
+
+    @pydantic.model_validator(mode='after')
+    def _check(self):
+        if self.name == 'deep' and self.depth_m < 5.0:
+            raise ValueError(f'depth_m = {self.depth_m} is not deep (allowed: >= 5)')
+        return self
+
+
+class Outer(Settings):
+    inner: Inner = Inner()
+    rate: float = Field(0.5, gt=0.0)
+    mode: Literal['fast', 'slow'] = 'fast'
+    path: list[Inner] = []
+    pets: list[Annotated[Cat | Dog, Field(discriminator='kind')]] = []
+    maybe: Inner | None = None
+
+
+def message(values) -> str:
+    with pytest.raises(ConfigurationError) as caught:
+        validate(Outer, values, 'a.yaml')
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ('values', 'expected'),
+    [
+        (
+            {'inner': {'depth_m': -1.0}},
+            'a.yaml: inner.depth_m = -1.0: should be greater than or equal to 0 '
+            '(allowed: >= 0.0 and < 10.0)',
+        ),
+        (
+            {'inner': {'depth_m': float('nan')}},
+            'a.yaml: inner.depth_m = nan: should be a finite number (allowed: >= 0.0 and < 10.0)',
+        ),
+        (
+            {'rate': float('inf')},
+            'a.yaml: rate = inf: should be a finite number (allowed: > 0.0)',
+        ),
+        (
+            {'rate': 'quick'},
+            "a.yaml: rate = 'quick': should be a valid number, unable to parse string as a number "
+            '(allowed: > 0.0)',
+        ),
+        (
+            {'mode': 'idle'},
+            "a.yaml: mode = 'idle': should be 'fast' or 'slow' (allowed: 'fast' or 'slow')",
+        ),
+        (
+            {'inner': {'depht_m': 1.0}},
+            'a.yaml: inner.depht_m = 1.0: unknown field (allowed fields: depth_m, name)',
+        ),
+        (
+            {'inner': [1.0]},
+            'a.yaml: inner = [1.0]: expected a mapping of fields (allowed fields: depth_m, name)',
+        ),
+        (
+            {'path': [{}, {'depth_m': 11.0}]},
+            'a.yaml: path.1.depth_m = 11.0: should be less than 10 (allowed: >= 0.0 and < 10.0)',
+        ),
+        (
+            {'maybe': {'depth_m': 11.0}},
+            'a.yaml: maybe.depth_m = 11.0: should be less than 10 (allowed: >= 0.0 and < 10.0)',
+        ),
+        (
+            {'inner': {'name': 'deep'}},
+            'a.yaml: inner: depth_m = 1.0 is not deep (allowed: >= 5)',
+        ),
+        (
+            {'pets': [{'kind': 'cat', 'lives': 10}]},
+            'a.yaml: pets.0.lives = 10: should be less than or equal to 9 '
+            '(allowed: >= 1 and <= 9)',
+        ),
+        (
+            {'pets': [{'kind': 'dog', 'lives': 1}]},
+            'a.yaml: pets.0.lives = 1: unknown field (allowed fields: kind, legs)',
+        ),
+        (
+            {'pets': [{'kind': 'cow'}]},
+            "a.yaml: pets.0.kind = 'cow': unknown (allowed: 'cat', 'dog')",
+        ),
+        ({'pets': [{}]}, 'a.yaml: pets.0.kind: missing'),
+        (
+            [],
+            'a.yaml: (file) = []: expected a mapping of fields '
+            '(allowed fields: inner, rate, mode, path, pets, maybe)',
+        ),
+    ],
+)
+def test_message_names_file_field_value_and_range(values, expected):
+    assert message(values) == expected
+
+
+def test_every_mistake_has_its_line():
+    lines = message({'rate': -1.0, 'inner': {'x': 1}, 'mode': 3}).split('\n')
+    assert [line.split(' =')[0] for line in lines] == [
+        'a.yaml: inner.x',
+        'a.yaml: rate',
+        'a.yaml: mode',
+    ]
+
+
+def test_valid_values_are_taken():
+    settings = validate(Outer, {'rate': 2, 'pets': [{'kind': 'cat'}]}, 'a.yaml')
+    assert settings.rate == 2.0
+    assert settings.pets == [Cat(kind='cat')]
+
+
+def test_settings_do_not_change():
+    with pytest.raises(pydantic.ValidationError):
+        Outer().rate = 1.0
+
+
+# ---------------------------------------------------------------------------------------- YAML
+
+
+def read(tmp_path, text):
+    path = tmp_path / 'a.yaml'
+    path.write_text(text, encoding='utf-8')
+    return read_yaml(path)
+
+
+@pytest.mark.parametrize(
+    ('text', 'number'),
+    [('1e-3', 1e-3), ('1E3', 1e3), ('-2.5e+2', -250.0), ('.5e1', 5.0), ('1.5', 1.5), ('7', 7)],
+)
+def test_numbers_are_numbers(tmp_path, text, number):
+    assert read(tmp_path, f'x: {text}') == {'x': number}
+
+
+@pytest.mark.parametrize(
+    ('text', 'expected'),
+    [
+        ('a: 1\na: 2\n', r"a.yaml:2: not valid YAML: field 'a' is given twice"),
+        ('b:\n  c: 1\n  c: 1\n', r"a.yaml:3: .*field 'c' is given twice"),
+        ('[a, b]: 1\n', r'a.yaml:1: not valid YAML: the name of a field must be plain text'),
+        ('- 1\n- 2\n', r'a.yaml: expected a mapping of fields, found \[1, 2\]'),
+        ('', r'a.yaml: expected a mapping of fields, found None'),
+        ('a: [1,\n', r'a.yaml:2: not valid YAML'),
+        ('a: !!python/object:os.system {}\n', r'a.yaml:1: not valid YAML'),
+        ('a: 1\n---\nb: 2\n', r'a.yaml:3: not valid YAML'),
+    ],
+)
+def test_what_is_no_mapping_is_refused(tmp_path, text, expected):
+    with pytest.raises(ConfigurationError, match=r'(?s)' + expected):
+        read(tmp_path, text)
+
+
+def test_missing_file_is_named(tmp_path):
+    with pytest.raises(ConfigurationError, match=r'none.yaml: No such file or directory'):
+        read_yaml(tmp_path / 'none.yaml')
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path):
+    path = tmp_path / 'a.yaml'
+    path.write_bytes(b'\xff\xfe\x00')
+    with pytest.raises(ConfigurationError, match=r'a.yaml:1: not UTF-8 text, byte 0xff'):
+        read_yaml(path)
