@@ -12,7 +12,7 @@ from glider_bringup.scoring.card import fly_scored, scorecard, write_score
 from glider_bringup.scoring.scores import SCORES, Score
 from glider_bringup.showing.compare import score_rows
 from glider_bringup.showing.scorecard import card_rows
-from glider_bringup.studies.montecarlo import judge, summarise
+from glider_bringup.studies.montecarlo import judge, report
 
 SHALLOWEST = Score(
     *('depth, shallowest after settling', 'depth_m.shallowest', 'm', 2),
@@ -42,9 +42,8 @@ def test_a_score_added_in_one_place_is_in_card_comparison_and_study(stranger, tm
     rows = dict(score_rows([card, {**card, 'depth_m': {'max': 1.0, 'shallowest': value - 0.5}}]))
     first, second = rows['depth, shallowest after settling']
     assert (first.text, second.change, second.better) == (f'{value:,.2f} m', '-0.50', True)
-    study = summarise(
-        'x', 1, {(0, 'pid'): judge(scores)}, {0: {'unstable': 0, 'weak_steering': 0}}
-    )
+    flown, frames = {(0, 'pid'): judge(scores)}, {0: {'unstable': 0, 'weak_steering': 0}}
+    study = report('current_8deg', {}, 1, 0, flown, frames)
     assert study['rows'][0]['shallowest_m']['worst'] == value
 
 
