@@ -9,7 +9,7 @@ pitch, the mass turned to a side sets roll and so heading, unless a steering sur
 import math
 from typing import NamedTuple
 
-from glider_base.kernel import kernel
+from glider_base.kernel import kernel, replace
 from glider_base.signals import Adaptation, Joints, Wrench
 from glider_control.allocation import (
     AllocationParams,
@@ -27,6 +27,7 @@ from glider_control.intake import (
     take_in,
 )
 from glider_control.law import Seen, law_learnt, law_step
+from glider_control.stall import BEGINS_S, STEEP, watch_stall
 from glider_control.surface import steer, surface_learnt
 from glider_control.vertical_rate import Trim, vertical_rate_law
 from glider_model.onboard.attitude_filter import Measured, measure
@@ -69,6 +70,7 @@ class ControlState(NamedTuple):
     intake: IntakeState
     depth: float  #: filtered as the attitude is (m)
     is_afloat: bool
+    stall_s: float  #: for which it has stalled; less than 0: it is for so long that it rests
 
 
 class ControlOutput(NamedTuple):
@@ -89,14 +91,29 @@ def _hold(command, last, band, limit):
 
 
 @kernel
-def see(measured, taken, last, params):
-    """What a law sees of what was taken in, the `IntakeState` of this tick."""
-    limits, joints = params.allocation, taken.joints
+def _saturation(command, limits):
+    """Which actuators are sent to their limits: a sum of SATURATED_* bits."""
+    saturation = 0
+    if abs(command.m_b) >= limits.m_b_max:
+        saturation |= SATURATED_BUOYANCY
+    if abs(command.x_p) >= limits.x_p_max:
+        saturation |= SATURATED_PITCH
+    if 0.0 < limits.mu_max <= abs(command.mu):
+        saturation |= SATURATED_ROLL
+    if 0.0 < limits.delta_max <= abs(command.delta):
+        saturation |= SATURATED_SURFACE
+    return saturation
+
+
+@kernel
+def see(measured, reference, joints, last, params):
+    """What a law sees, at a reference, of what was taken in."""
+    limits = params.allocation
     speed, alpha = glide_speed(measured.theta, measured.vertical_rate, params.polar)
     tau_p, tau_q = moments(joints.m_b, joints.x_p, joints.mu, measured.phi, measured.theta, limits)
     return Seen(
         measured=measured,
-        reference=taken.reference,
+        reference=reference,
         speed=speed,
         alpha=alpha,
         m_b=joints.m_b,
@@ -149,19 +166,24 @@ def control_step(state, odometry, joints, reference, params, dt):
     depth += dt / (params.attitude_s + dt) * (odometry.p_d - depth)
     is_afloat = depth < (SUBMERGED_M if state.is_afloat else AFLOAT_M)
 
-    law, steering, trim = state.law, state.steering, state.trim
+    law, steering, trim, stall_s = state.law, state.steering, state.trim, state.stall_s
     command, tau_p, tau_q = last, 0.0, 0.0
     m_b = last.m_b
     if is_blind(taken, params.intake):
         command, m_b = params.safe_command, params.safe_command.m_b
     elif taken.gate.seen:
-        m_b, trim = vertical_rate_law(state.trim, measured, taken.reference, joints, params, dt)
+        reference = taken.reference
+        m_b, trim = vertical_rate_law(state.trim, measured, reference, joints, params, dt)
+        stall_s = watch_stall(stall_s, measured, reference, joints.m_b, params.polar, dt)
+        if stall_s < 0.0:
+            m_b, trim = (m_b if stall_s > -BEGINS_S else 0.0), Trim(0.0, 0.0)
+            reference = replace(reference, theta=STEEP, theta_dot=0.0)
         phi, theta = measured.phi, measured.theta
         if is_afloat:
             wanted = rest_afloat(m_b, limits)
             tau_p, tau_q = moments(m_b, wanted.x_p, wanted.mu, phi, theta, limits)
         else:
-            seen = see(measured, taken, last, params)
+            seen = see(measured, reference, joints, last, params)
             law, tau_p, tau_q = law_step(law, seen, params.law, dt)
             steering, delta = steer(steering, seen, params.steering, dt)
             mu = allocate_roll(tau_p, phi, theta, limits)
@@ -174,15 +196,7 @@ def control_step(state, odometry, joints, reference, params, dt):
             _hold(wanted.mu, last.mu, band.mu, limits.mu_max),
             _hold(wanted.delta, last.delta, band.delta, limits.delta_max),
         )
-    saturation = REFUSED if is_refusing(taken) else 0
-    if abs(command.m_b) >= limits.m_b_max:
-        saturation |= SATURATED_BUOYANCY
-    if abs(command.x_p) >= limits.x_p_max:
-        saturation |= SATURATED_PITCH
-    if 0.0 < limits.mu_max <= abs(command.mu):
-        saturation |= SATURATED_ROLL
-    if 0.0 < limits.delta_max <= abs(command.delta):
-        saturation |= SATURATED_SURFACE
+    saturation = _saturation(command, limits) | (REFUSED if is_refusing(taken) else 0)
     learnt = surface_learnt(law_learnt(law, params.law), steering, params.steering)
     output = ControlOutput(command, Wrench(m_b * GRAVITY, tau_p, tau_q), learnt, saturation)
     tick = state.tick + 1 if taken.gate.seen else 0
@@ -196,5 +210,6 @@ def control_step(state, odometry, joints, reference, params, dt):
         intake=taken,
         depth=depth,
         is_afloat=is_afloat,
+        stall_s=stall_s,
     )
     return state, output

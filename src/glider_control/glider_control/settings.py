@@ -187,6 +187,7 @@ class ControlSettings(ControlLawSettings):
             intake=INITIAL_INTAKE,
             depth=0.0,
             is_afloat=True,
+            stall_s=0.0,
         )
 
 

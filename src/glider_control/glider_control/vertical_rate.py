@@ -9,8 +9,8 @@ from glider_model.onboard.glide_polar import glide_net_heaviness
 
 #: The integrals of the vertical-rate law wait until the pump is this near to where it goes (kg).
 PUMP_ARRIVED_KG = 0.05
-#: No hull has less than this share of the drag in its file. What is learnt beyond is no drag but
-#: ballast, and must not change its sign when the vehicle turns over.
+#: A hull is taken to have this share at least of the drag in its file. What is learnt beyond is
+#: ballast, which must not change its sign when the vehicle turns over.
 LEAST_DRAG = 0.5
 
 

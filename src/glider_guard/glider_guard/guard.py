@@ -39,6 +39,7 @@ from glider_guard.rows import (
     TOO_HEAVY,
 )
 from glider_guard.weight import (
+    Glide,
     Weight,
     WeightLimits,
     led_rate,
@@ -201,29 +202,31 @@ def _react(state, taken, told, rate, under, limits, dt):
 
 
 @kernel
-def _sounding(taken, before, heard, witness, led, last, state, is_pumped, params):
+def _sounding(state, taken, before, heard, shown, witness, last, told, params):
     """What a tick tells of the depth: `Sounding`.
 
     Parameters
     ----------
+    state : GuardState
     taken : Taken
     before : Odometry
         That was believed a tick before.
     heard : Heard
+    shown : Shown
     witness : Witness
-    led : float
-        Vertical rate by pump and pitch, where they make a glide (m/s, + down).
     last : Joints
         Where the actuators were sent last.
-    state : GuardState
-    is_pumped : bool
-        The pump has done what it can.
+    told : int
+        Rows that hold by now.
     params : GuardParams
     """
     x, m_b, rate = taken.gate.odometry, taken.joints.m_b, witness.rate
     north, east, down = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
     sinks = sinking_weight(state.weight, m_b, params.weight)
     neutral = -params.weight.ballast - state.weight.off
+    is_stuck = ((told | state.told) & STUCK_BUOYANCY) != 0
+    is_pumped = is_stuck or m_b <= params.ascent.pumped
+    led = shown.led if shown.is_glide else 0.0
     ascends = last.m_b <= params.ascent.pumped or last.m_b < min(0.0, neutral)
     is_afloat = witness.depth <= SURFACE_M
     if heard.health.contact_age_s >= 0.0 and state.told & BLIND:
@@ -236,7 +239,7 @@ def _sounding(taken, before, heard, witness, led, last, state, is_pumped, params
         depth=witness.depth,
         rate=rate,
         apart_m=witness.apart_m,
-        is_same=_is_same(x, before),
+        is_same=shown.is_same,
         target=max(0.0, taken.target),
         stop=turning_m(rate, sinks, params.weight),
         drop_way=sinks_on_m(rate, sinks, m_b, is_pumped, params.weight),
@@ -277,30 +280,23 @@ def guard_step(state, heard, params, dt):
     x, m_b = taken.gate.odometry, taken.joints.m_b
     _, theta, _ = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
     _, _, rate = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
-    raw = heard.depth if params.has_pressure else heard.odometry.p_d
-    witness, depths = state.witness, state.depths
-    if first:
-        witness = begin_watch(raw, x.p_d)
-        depths = begin_at(witness.depth)
     sees = not state.told & BLIND
     led, is_glide = led_rate(state.weight, theta, m_b, params.weight)
-    is_same = _is_same(x, before)
     shown = Shown(
-        raw=raw,
+        raw=heard.depth if params.has_pressure else heard.odometry.p_d,
         odom=x.p_d,
         odom_before=before.p_d,
         contact_age_s=heard.health.contact_age_s,
         rate=rate,
         led=led,
         is_glide=is_glide,
-        is_same=is_same,
+        is_same=_is_same(x, before),
     )
+    witness, depths = state.witness, state.depths
+    if first:
+        witness, depths = begin_watch(shown.raw, x.p_d), begin_at(x.p_d)
     witness, wrong = watch(witness, shown, sees, params.witness, dt)
-    is_stuck = ((told | state.told) & STUCK_BUOYANCY) != 0
-    is_pumped = is_stuck or m_b <= params.ascent.pumped
-    at = _sounding(
-        taken, before, heard, witness, led if is_glide else 0.0, last, state, is_pumped, params
-    )
+    at = _sounding(state, taken, before, heard, shown, witness, last, told, params)
     depths = sound(depths, at, params.depth, dt)
     # without a depth, a leak alone is certain
     floods = (state.told & (LEAK | TOO_HEAVY if sees else LEAK)) != 0
@@ -308,9 +304,17 @@ def guard_step(state, heard, params, dt):
     health, unwell = check_health(state.health, heard.health, heard.battery, params.health, dt)
     sinking = sinking_rate(depths) if sees else rate
     under = witness.depth > SURFACE_M
-    weight, heavy = weigh(
-        state.weight, theta, rate, sinking, m_b, last.m_b, under, params.weight, dt
+    glide = Glide(
+        theta=theta,
+        rate=rate,
+        sinking=sinking,
+        m_b=m_b,
+        sent=last.m_b,
+        depth=witness.depth,
+        target=taken.target,
+        under=under,
     )
+    weight, heavy = weigh(state.weight, glide, params.weight, dt)
     fixes = watch_fixes(state.fixes, heard.odometry, heard.known, dt)
     told |= fix_rows(fixes) | unwell | heavy | _intake_rows(taken, params) | (state.told & LATCHED)
     ascent, command = _react(state.ascent, taken, told, sinking, under, params.ascent, dt)

@@ -142,7 +142,8 @@ ROWS = (
     Row(
         TOO_HEAVY,
         'too_heavy',
-        'sinks faster, or rises more slowly, than pump and ballast would have it',
+        'sinks faster, or rises more slowly, than pump and ballast would have it, or will by the '
+        'end of its dive',
         'weight_share, weight_s',
         SURFACE,
         True,

@@ -21,6 +21,10 @@ PUMP_ARRIVED = 0.05
 #: What a vehicle weighs now is averaged over this time (s), and so is its vertical rate: of the
 #: square of one that is measured badly there would be left what its errors make.
 SOON_S = 30.0
+#: Water that comes in, and a hull that shrinks with depth, make a vehicle heavier all the way
+#: down. What a dive shows of it is a line over time, from when the glide is steady (s); after so
+#: long (s) it is believed, as far ahead as it is long, and bent by what is newer than this (s).
+STEADY_S, LINE_S, NEWER_S = 90.0, 600.0, 1800.0
 #: A vehicle that is held level sinks on by no more than this (m), as it does broadside until its
 #: pump has made it light, and this (s) times the rate it had, until it lies level.
 LEVEL_M, LEVEL_S = 12.0, 45.0
@@ -49,9 +53,26 @@ class Weight(NamedTuple):
     sinking: float  #: that of the depth, averaged so too
     glides_s: float  #: for which it has been a steady glide
     least: float  #: as `off`, by the rate that is less, less what drag may feign (kg)
+    line: float  #: by the line through what this dive has shown so far (kg)
+    growth: float  #: slope of that line (kg/s)
+    begun: float  #: depth at which it begins (m)
 
 
-INITIAL_WEIGHT = Weight(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+class Glide(NamedTuple):
+    """What a tick shows of it."""
+
+    theta: float  #: pitch (rad)
+    #: vertical rate of odom (m/s, + down), which shows way over ground where an attitude is off
+    rate: float
+    sinking: float  #: that of the depth, which may be noise (m/s, + down)
+    m_b: float  #: where the pump is (kg)
+    sent: float  #: where it was sent (kg)
+    depth: float  #: that is believed (m)
+    target: float  #: that guidance asks for (m)
+    under: bool  #: under water
+
+
+INITIAL_WEIGHT = Weight(*(9 * (0.0,)))
 
 
 @kernel
@@ -107,24 +128,26 @@ def led_rate(state, theta, m_b, limits):
 
 
 @kernel
-def weigh(state, theta, rate, sinking, m_b, sent, under, limits, dt):
+def _least_squares(line, growth, more, since_s, dt):
+    """Value (kg) and slope (kg/s) of the line through all since some time (s), to ``more``."""
+    n = min(since_s, NEWER_S) / dt
+    error = more - (line + growth * dt)
+    line += growth * dt + 2.0 * (2.0 * n - 1.0) / (n * (n + 1.0)) * error
+    return line, growth + 6.0 / (n * (n + 1.0)) * error / dt
+
+
+@kernel
+def weigh(state, at, limits, dt):
     """Take in what a tick shows.
 
     At the surface nothing glides. Twice the drag, as growth makes it, takes half of the speed's
-    square from a climb: what the vehicle still rises by is taken off again.
+    square from a climb: what the vehicle still rises by is taken off again. In a dive its weight
+    is that at the end: a pump that is used up when it turns was used up too late.
 
     Parameters
     ----------
     state : Weight
-    theta : float
-        Pitch (rad).
-    rate, sinking : float
-        Vertical rate of odom, which shows way over ground where an attitude is off, and that of
-        the depth, which may be noise (m/s, + down).
-    m_b, sent : float
-        Where the pump is, and where it is sent (kg).
-    under : bool
-        Under water.
+    at : Glide
     limits : WeightLimits
     dt : float
 
@@ -134,18 +157,39 @@ def weigh(state, theta, rate, sinking, m_b, sent, under, limits, dt):
     int
         Rows that hold.
     """
-    off, soon, least = state.off, state.soon, state.least
+    off, soon, least, line, growth = state.off, state.soon, state.least, state.line, state.growth
+    begun, line_s = state.begun, 0.0
     steep = max(LEAST_PITCH, LEAST_SHARE * limits.polar.shallowest)
     glides_s = 0.0
-    if under and abs(theta) > steep and abs(m_b - sent) <= limits.arrived:
+    if at.under and abs(at.theta) > steep and abs(at.m_b - at.sent) <= limits.arrived:
         glides_s = state.glides_s + dt
-    mean = state.rate + dt / SOON_S * (rate - state.rate)
-    sinks = state.sinking + dt / SOON_S * (sinking - state.sinking)
+    mean = state.rate + dt / SOON_S * (at.rate - state.rate)
+    sinks = state.sinking + dt / SOON_S * (at.sinking - state.sinking)
     if glides_s > SOON_S and abs(mean) > LEAST_RATE:
-        known = m_b + limits.ballast
-        more = glide_net_heaviness(theta, mean, limits.polar) - known
-        shown = glide_net_heaviness(theta, min(mean, sinks), limits.polar)
-        off += (dt / limits.average_s) * (more - off)
+        known = at.m_b + limits.ballast
+        more = glide_net_heaviness(at.theta, mean, limits.polar) - known
+        shown = glide_net_heaviness(at.theta, min(mean, sinks), limits.polar)
         least += (dt / limits.average_s) * (shown + min(0.0, shown) - known - least)
+        off += (dt / limits.average_s) * (more - off)
         soon += (dt / SOON_S) * (more - soon)
-    return Weight(off, soon, mean, sinks, glides_s, least), TOO_HEAVY if least > limits.most else 0
+        line_s = max(0.0, glides_s - STEADY_S)
+        if line_s > 0.0:
+            line, growth = _least_squares(line, growth, shown - known, line_s, dt)
+    if line_s == 0.0:
+        begun = at.depth
+    weighs = least
+    if line_s > LINE_S and mean > LEAST_RATE and at.target > at.depth > begun:
+        ahead = min(1.0, (at.target - at.depth) / (at.depth - begun))
+        weighs = max(least, line + growth * line_s * ahead)
+    state = Weight(
+        off=off,
+        soon=soon,
+        rate=mean,
+        sinking=sinks,
+        glides_s=glides_s,
+        least=least,
+        line=line,
+        growth=growth,
+        begun=begun,
+    )
+    return state, TOO_HEAVY if weighs > limits.most else 0

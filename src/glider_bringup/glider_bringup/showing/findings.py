@@ -149,9 +149,9 @@ def _came_up(off: list[float], learns: bool) -> str:
     )
 
 
-def _how_bad(card: dict[str, Any], traces: Traces) -> tuple[list[str], list[str]]:
-    """How the run ended, if not as it was to, and its largest errors: problems, and notes."""
-    problems, notes = [], []
+def _how_bad(card: dict[str, Any], traces: Traces) -> list[str]:
+    """How the run ended, if not as it was to, and its largest errors if they are large."""
+    problems = []
     if card['status'] in STOPPED:
         ended = 'was aborted' if card['status'] == 'aborted' else 'failed'
         problems.append(f'The run {ended} at {span(card["sim_time_s"])}: {card["reason"]}.')
@@ -159,12 +159,12 @@ def _how_bad(card: dict[str, Any], traces: Traces) -> tuple[list[str], list[str]
         problems.append(_ended(card))
     place = ((reckoned(card) or {}).get('error_m') or {}).get('worst') or 0.0
     worst = max(card['cross_track_m'].get('max_run') or 0.0, place)
-    if worst > 0.0:
-        (problems if worst > LOST_M else notes).append(_worst(card))
+    if worst > LOST_M:
+        problems.append(_worst(card))
     roll_deg = traces.largest('roll_deg')
     if roll_deg > ROLLED_DEG:
         problems.append(f'It rolled by {roll_deg:.0f} deg.')
-    return problems, notes
+    return problems
 
 
 def findings(run: FlownRun) -> list[tuple[str, str]]:
@@ -178,7 +178,7 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
         return f'{span(ticks * TICK_S)} ({100.0 * ticks / traces.ticks:.2g} % of the time)'
 
     told = reckoned(card)
-    problems, notes = _how_bad(card, traces)
+    problems, notes = _how_bad(card, traces), []
     if told:
         notes += navigation_notes(told, run.scenario.navigation.current != 'none')
     notes += [f'Broken on purpose: {text}.' for text in fault_texts(card)]
