@@ -281,3 +281,14 @@ def test_a_shallow_yo_with_a_slow_pump_is_flown():
     flown = fly('current_8deg', 4000.0, **steep)
     assert 12.0 < flown.depth.max() < 25.0
     assert not flown.told.any()
+
+
+def test_a_slow_yo_that_begins_in_a_stall_is_flown():
+    """Nose too high for its balance, a Seaglider slides backward at 8 mm/s, whatever it weighs."""
+    yo = {'profile.depth_m': 20.0, 'profile.pitch_deg': 29.4, 'profile.net_heaviness_kg': 0.08}
+    drags = {'K_D0': 0.82, 'K_D': 0.78, 'K_L': 1.16, 'K_M': 0.86, 'pitch_trim_m': -0.0071}
+    flown = fly('rough_water', 3600.0, **SEAGLIDER, perturb=drags, **yo)
+    assert flown.told[-1] == 0
+    turns = np.flatnonzero(np.diff(flown.depth > 15.0))
+    assert len(turns) > 6
+    assert flown.depth.max() < 30.0
