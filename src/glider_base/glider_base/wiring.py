@@ -175,9 +175,7 @@ WHEN_SILENT = {
     'health': (0.0, -1.0, -1.0),
     'battery': (-1.0, 0.0, -1.0, -1.0, -1.0),
 }
-#: What bags do not have that were recorded before it was told.
-LATER = ('health', 'battery', 'demand', 'drop_weight')
-#: What ways to navigate may tell beside odom; the same holds for them.
+#: What ways to navigate may tell beside odom; the same holds for them as for `SENSORS`.
 BELIEFS = ('believed_current', 'believed_surface_current')
 
 PLANT = Wired(

@@ -31,7 +31,6 @@ from glider_bringup.recording.ros.verify.every_block import verify
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import halve, make_tracer
 from glider_model.plant.block import PLANT, plant_move, plant_outputs
-from glider_model.plant.sensors import SensorSettings
 from glider_model.plant.trim import solve_trim
 
 
@@ -68,7 +67,7 @@ def score_nothing() -> None:
     """Score a flight that has none, make its traces; and a trim."""
     scenario = load_scenario()
     log = np.zeros((1, ROW))
-    scorer = Scorer(SensorSettings(position_std_m=1.0).params(0))
+    scorer = Scorer()
     scorer.add(log)
     scorer.result(Rules())
     make_tracer(scenario).add(log)

@@ -49,7 +49,6 @@ from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_model.plant.faults.settings import FaultSettings
 from glider_model.plant.plant import dive_depths
 from glider_model.plant.readings import Readings, make_readings, noise_of_readings
-from glider_model.plant.sensors import SensorParams
 from glider_model.vehicle.file import Vehicle, load_vehicle
 
 #: Heading fluctuation is about the mean over this time (s).
@@ -102,9 +101,6 @@ class Scorer:
 
     Parameters
     ----------
-    sensors, readings : SensorParams, Readings, optional
-        Noise of the odometry, for runs that do not tell the truth, and of where the actuators say
-        that they are: no way that they go.
     origin : Origin, optional
         To which fixes are relative.
     topics : tuple of str
@@ -112,13 +108,14 @@ class Scorer:
     faults : sequence of FaultSettings
     vehicle : Vehicle, optional
         Its steering surface, battery, crush depth and drop weight; without it there are none.
+    readings : Readings, optional
+        Noise of where the actuators say that they are: no way that they go.
     course_rad : float
         Of the path at its start, for a vehicle whose target never moved along it.
     """
 
     def __init__(
         self,
-        sensors: SensorParams | None = None,
         origin: Origin | None = None,
         topics: tuple[str, ...] = (),
         faults: Sequence[FaultSettings] = (),
@@ -131,7 +128,7 @@ class Scorer:
         self._crush_depth_m = vehicle.crush_depth_m if vehicle else math.inf
         self._has_weight = bool(vehicle and vehicle.drop_weight)
         self._course_rad = course_rad
-        self._truth = TrueMotion(sensors)
+        self._truth = TrueMotion()
         origin = origin or OriginSettings().params()
         self._navigation = NavigationScorer(origin, reckons=bool(topics))
         self._faults = FaultTimes(faults)
@@ -274,10 +271,16 @@ def make_scorer(scenario: Scenario) -> Scorer:
     topics = ()
     if scenario.navigation.jumps:
         topics = ('fix', 'believed_current', 'current_velocity')
-    sensors, origin = scenario.sensors.params(scenario.seed), scenario.origin.params()
     vehicle, course_rad = load_vehicle(scenario.vehicle), scenario.path.course_rad()
     readings = make_readings(vehicle.params(), scenario.seed)
-    return Scorer(sensors, origin, topics, scenario.faults, vehicle, readings, course_rad)
+    return Scorer(
+        origin=scenario.origin.params(),
+        topics=topics,
+        faults=scenario.faults,
+        vehicle=vehicle,
+        readings=readings,
+        course_rad=course_rad,
+    )
 
 
 def scores_of(scenario: Scenario, scorer: Scorer) -> dict:

@@ -25,7 +25,6 @@ from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.navigation import ELLIPSE_95
 from glider_bringup.scoring.true_motion import TrueMotion
 from glider_model.ocean.current_settings import KNOT_MPS
-from glider_model.plant.sensors import SensorParams
 from glider_model.vehicle.file import VehicleParams, load_vehicle
 
 #: Most buckets that are kept of a run.
@@ -175,25 +174,22 @@ def load_traces(file: Path) -> Traces:
 class Tracer:
     """Takes log blocks as they come and keeps `Traces` of them.
 
+    What was measured, or believed, is kept beside the truth where it is another.
+
     Parameters
     ----------
     vehicle : VehicleParams
         Whose actuators have limits.
-    sensors : SensorParams, optional
-        Noise of the odometry, for runs that do not tell the truth. What was measured, or
-        believed, is kept beside the truth where it is another.
     reckons : bool
         Whether the vehicle has to reckon its place: how far off it is is kept, too.
     """
 
     topics = TRACED
 
-    def __init__(
-        self, vehicle: VehicleParams, sensors: SensorParams | None = None, reckons: bool = False
-    ) -> None:
+    def __init__(self, vehicle: VehicleParams, reckons: bool = False) -> None:
         limits = [vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max, vehicle.delta_max or np.nan]
         self._limits = np.array(limits)
-        self._truth, self._reckons = TrueMotion(sensors), reckons
+        self._truth, self._reckons = TrueMotion(), reckons
         self._ticks, self._size, self._heading = 0, 2, np.nan
         self._points = {name: np.full(2 * BUCKETS, np.nan, np.float32) for name in CURVES}
         self._samples = np.full((BUCKETS, len(SAMPLES)), np.nan, np.float32)
@@ -255,9 +251,7 @@ class Tracer:
 
 def make_tracer(scenario: Scenario) -> Tracer:
     """Tracer of a run of a scenario."""
-    vehicle = load_vehicle(scenario.vehicle).params()
-    sensors = scenario.sensors.params(scenario.seed)
-    return Tracer(vehicle, sensors, scenario.navigation.jumps)
+    return Tracer(load_vehicle(scenario.vehicle).params(), scenario.navigation.jumps)
 
 
 def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[str, np.ndarray]:

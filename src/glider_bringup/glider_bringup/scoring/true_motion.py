@@ -1,17 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The true motion, and what it says of the cross-track error.
-
-A run tells it on ground_truth/odom. Those of before there was this topic tell it by the noise of
-their odometry, which follows from seed and tick.
-"""
+"""The true motion, as ground_truth/odom tells it, and what it says of the cross-track error."""
 
 import numpy as np
 
-from glider_base.frames import odometry_from_wire, odometry_to_wire
-from glider_base.kernel import kernel
 from glider_bringup.blocks import COLUMNS
-from glider_model.plant.sensors import SensorParams, is_noisy, remove_noise
 
 _TRUTH, _ODOM_START = COLUMNS['ground_truth/odom'], COLUMNS['odom'].start
 _ODOM = slice(_ODOM_START, _ODOM_START + 13)
@@ -20,29 +13,13 @@ _E2 = COLUMNS['tracking_error'].start + 1
 _EAST, _NORTH = COLUMNS['reference'].start, COLUMNS['reference'].start + 1
 
 
-@kernel
-def _take_off(log, first_tick, sensors):
-    """Put the true odometry in the place of the measured one, in place."""
-    for row in range(log.shape[0]):
-        told = odometry_from_wire(log[row, _ODOM_START : _ODOM_START + 13])
-        true = remove_noise(told, first_tick + row, sensors)
-        for i, value in enumerate(odometry_to_wire(true)):
-            log[row, _ODOM_START + i] = value
-
-
 class TrueMotion:
     """Gives the log as it would be if the odometry were the truth, block by block.
 
-    Parameters
-    ----------
-    sensors : SensorParams, optional
-        Noise of the odometry, for runs that do not tell the truth; without it they are taken at
-        their word.
+    A run of a vehicle at sea, where nobody knows it, is taken at its word.
     """
 
-    def __init__(self, sensors: SensorParams | None = None) -> None:
-        self._sensors = sensors if sensors is not None and is_noisy(sensors) else None
-        self._tick = 0
+    def __init__(self) -> None:
         self._target: np.ndarray | None = None
         self._course = 0.0
 
@@ -59,20 +36,15 @@ class TrueMotion:
         float64[n, ROW]
             ``log`` itself if the odometry is the truth.
         """
-        is_told = len(log) and not np.isnan(log[0, _TRUTH.start])
-        if not is_told and self._sensors is None or not len(log):
+        if not len(log) or np.isnan(log[0, _TRUTH.start]):
             return log
-        if is_told and np.array_equal(log[:, _TRUTH], log[:, _ODOM]):
+        if np.array_equal(log[:, _TRUTH], log[:, _ODOM]):
             return log
         true = log.copy()
-        if is_told:
-            true[:, _ODOM] = log[:, _TRUTH]
-        else:
-            _take_off(true, self._tick, self._sensors)
+        true[:, _ODOM] = log[:, _TRUTH]
         course = self._course_of_target(log[:, [_EAST, _NORTH]])
         east, north = (true[:, i] - log[:, i] for i in (_ODOM_START, _ODOM_START + 1))
         true[:, _E2] += np.cos(course) * east - np.sin(course) * north
-        self._tick += len(log)
         return true
 
     def _course_of_target(self, target: np.ndarray) -> np.ndarray:

@@ -505,27 +505,3 @@ def sense(odometry, joints, sample, out_ticks, surfacings, tick, params):
         (sample.altitude,),
         (joints.m_b, joints.x_p, joints.mu, joints.delta),
     )
-
-
-@kernel
-def remove_noise(measured, tick, params):
-    """True odometry behind what was measured at a tick: `add_noise` undone, to rounding."""
-    if not is_noisy(params):
-        return measured
-    x, n = measured, noise_of_tick(tick, params)
-    heading = quaternion_from_euler(0.0, 0.0, -n.psi)
-    w, i, j, k = quaternion_from_euler(n.phi, n.theta, 0.0)
-    q = _product(_product(heading, (x.q_w, x.q_x, x.q_y, x.q_z)), (w, -i, -j, -k))
-    return replace(
-        x,
-        p_n=x.p_n - n.p_n,
-        p_e=x.p_e - n.p_e,
-        p_d=x.p_d - n.p_d,
-        q_w=q[0],
-        q_x=q[1],
-        q_y=q[2],
-        q_z=q[3],
-        p=x.p - n.p,
-        q=x.q - n.q,
-        r=x.r - n.r,
-    )

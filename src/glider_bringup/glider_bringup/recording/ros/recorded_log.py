@@ -14,7 +14,7 @@ from glider_base.ros.lockstep import health
 from glider_base.ros.wire.codec import Codec
 from glider_base.ros.wire.topics import TOPICS, topic_of
 from glider_base.signals import TICK_NS
-from glider_base.wiring import BELIEFS, LATER, SENSORS
+from glider_base.wiring import BELIEFS, SENSORS, WHEN_SILENT
 from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.recording.mcap_reader import Bag, Batch
 from glider_guidance.yo.stage import STAGE_NAMES
@@ -251,7 +251,7 @@ class RecordedLog:
 
     def _per_tick(self) -> tuple[int, dict[str, int]]:
         """Messages of the topic that has most, and of each that there ought to be."""
-        left_out = {*SENSORS, *BELIEFS, *LATER} - self._recorded
+        left_out = {*SENSORS, *BELIEFS, *WHEN_SILENT} - self._recorded
         if not self.counts['ground_truth/odom']:
             left_out |= {'ground_truth/odom'}
         names = (topic.name for topic in _PER_TICK if topic.name not in left_out)
