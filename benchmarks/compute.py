@@ -19,8 +19,8 @@ from plant_step import SCENARIO, SEA, SHALLOW, cost_s, flight_of, plant_steps
 from glider_bringup.door.flight import Flight
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import Scenario, load_scenario
 from glider_bringup.scoring.score import Scorer
+from glider_mission.scenario import Scenario, load_scenario
 
 #: The mission: straight path, constant current, no noise.
 DURATION_S = 108000.0

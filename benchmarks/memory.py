@@ -27,7 +27,7 @@ MEANING = {
 
 _IMPORT = 'from glider_bringup.scoring.card import fly_scored\n'
 _FLY = """
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.scenario import load_scenario
 from glider_bringup.scoring.card import fly_scored
 
 fly_scored(load_scenario('current_8deg', {'dives': 0, 'duration_s': 108000.0}))

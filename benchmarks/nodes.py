@@ -21,8 +21,8 @@ from glider_bringup.engines.flight import Outcome, Progress
 from glider_bringup.engines.memory import memory_mb
 from glider_bringup.engines.processes import Layout, node_environment
 from glider_bringup.engines.recorded import fly_nodes
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario
 
 SCENARIO, DURATION_S = 'current_8deg', 2000.0
 REPEATS = 3

@@ -10,10 +10,10 @@ import numpy as np
 from glider_base.frames import water_from_wire
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Joints, Water
-from glider_bringup.blocks import COLUMNS
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import Scenario
+from glider_mission.blocks import COLUMNS
+from glider_mission.scenario import Scenario
 from glider_model.plant.plant import plant_step
 
 #: Dives, turns, the surface: straight path, constant current, no noise.

@@ -8,9 +8,9 @@ from itertools import islice
 
 from distributed import Client, LocalCluster
 
-from glider_bringup.studies.sweep.fly import Chunk, fly_chunk, make_chunks
-from glider_bringup.studies.sweep.plan import load_sweep
-from glider_bringup.studies.workers import Pool, worker_pool
+from glider_studies.sweep.fly import Chunk, fly_chunk, make_chunks
+from glider_studies.sweep.plan import load_sweep
+from glider_studies.workers import Pool, worker_pool
 
 MEANING = {
     'sweep_cell_direct_s': 'one cell of 50,000 s in a plain loop, the floor (s)',

@@ -15,7 +15,7 @@ from rich.table import Table
 from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED
 from glider_base.signals import TICK_S
 from glider_bringup.console import Json, messages, number, output, progress, tell
-from glider_bringup.mission.scenario import Scenario, load_scenario
+from glider_mission.scenario import Scenario, load_scenario
 
 app = typer.Typer(pretty_exceptions_enable=False)
 #: Memory is looked at so often (s of wall time).
@@ -47,8 +47,8 @@ def soak(
     flight of an hour or more, or today's code does not make what is recorded.
     """
     from glider_bringup.engines.memory import growth_mb_per_h
-    from glider_bringup.mission.choices import chosen_fields
-    from glider_bringup.mission.run_folder import make_run_folder
+    from glider_mission.choices import chosen_fields
+    from glider_mission.run_folder import make_run_folder
 
     if duration != 'full':
         duration = number('--duration', duration, 'full', TICK_S, 1e8)
@@ -84,7 +84,7 @@ def _fly(scenario: Scenario, folder: Path) -> tuple[Any, int, int, Samples]:
     """The flight, ticks that its bag lacks and has, and memory."""
     from glider_bringup.engines.memory import memory_mb
     from glider_bringup.engines.recorded import fly_nodes
-    from glider_bringup.mission.planned import planned_ticks
+    from glider_mission.planned import planned_ticks
 
     samples: Samples = {}
     read, newest, looked_s = 0, -1, 0.0

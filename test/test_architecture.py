@@ -16,6 +16,11 @@ from glider_base.wiring import PORTS
 
 SOURCES = Path(__file__).resolve().parents[1] / 'src'
 
+#: What a vehicle flies with, and the world around it.
+ON_BOARD = {
+    *('glider_base', 'glider_model', 'glider_navigation', 'glider_guidance', 'glider_control'),
+    'glider_guard',
+}
 #: What each package may import from the others.
 MAY_IMPORT = {
     'glider_base': set(),
@@ -24,31 +29,36 @@ MAY_IMPORT = {
     'glider_guidance': {'glider_base', 'glider_model'},
     'glider_control': {'glider_base', 'glider_model'},
     'glider_guard': {'glider_base', 'glider_model'},
-    'glider_bringup': {
-        'glider_base',
-        'glider_model',
-        'glider_navigation',
-        'glider_guidance',
-        'glider_control',
-        'glider_guard',
-    },
-    'glider_flights': {'glider_base', 'glider_model', 'glider_bringup'},
+    'glider_mission': ON_BOARD,
+    'glider_bringup': {*ON_BOARD, 'glider_mission'},
+    'glider_studies': {*ON_BOARD, 'glider_mission', 'glider_bringup'},
+    'glider_flights': {'glider_base', 'glider_model', 'glider_mission', 'glider_bringup'},
 }
 
-#: Rooms of two packages by floors, from below: a room imports from the floors beneath it only.
+#: Rooms of some packages by floors, from below: a room imports from the floors beneath it only.
 FLOORS = {
     'glider_model': (('vehicle', 'ocean'), ('onboard', 'plant'), ('nodes',)),
-    'glider_bringup': (
-        ('blocks', 'mission'),
+    'glider_mission': (
+        ('blocks', 'disk', 'rules'),
+        ('scenario',),
+        ('choices', 'planned', 'run_folder'),
         ('recording',),
+    ),
+    'glider_bringup': (
         ('engines', 'nodes'),
         ('scoring',),
-        ('studies',),
         ('console', 'warm_up'),
         ('showing',),
         ('door',),
         ('commands',),
         ('cli',),
+    ),
+    'glider_studies': (
+        ('random_faults', 'workers'),
+        ('montecarlo', 'sweep'),
+        ('paper',),
+        ('hunt', 'showing', 'at_work'),
+        ('door', 'commands'),
     ),
 }
 

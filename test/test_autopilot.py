@@ -23,9 +23,9 @@ from glider_bringup.engines.processes import (
     node_environment,
 )
 from glider_bringup.engines.recorded import fly_nodes, fly_recorded
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario
 
 CHANGES = {'dives': 0, 'duration_s': 200.0, 'navigation.method': 'dead_reckoned'}
 DEADLINE_S = 120.0

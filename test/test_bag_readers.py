@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from glider_base.ros.wire.topics import recorded_topics
 from glider_base.signals import TICK_NS
 from glider_base.wiring import BASE_LINK, JOINTS, MAP
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.scenario import load_scenario
 
 RECORDED = {topic.full_name('/glider'): topic for topic in recorded_topics(['measured_odom'])}
 PER_TICK = [name for name, topic in RECORDED.items() if topic.per_tick]

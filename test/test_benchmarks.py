@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.scenario import load_scenario
 
 FOLDER = Path(__file__).resolve().parents[1] / 'benchmarks'
 

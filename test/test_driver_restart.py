@@ -29,7 +29,7 @@ from glider_bringup.engines.processes import (
     node_commands,
     node_environment,
 )
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.scenario import load_scenario
 
 EXAMPLES = Path(__file__).resolve().parents[1] / 'examples'
 #: A vehicle that glides down whatever happens, by the clock of the machine, and whose actuators

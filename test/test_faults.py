@@ -23,7 +23,7 @@ from glider_base.signals import TICK_NS
 from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive
 from glider_bringup.engines.processes import MODULES, PLANT, STACK, process_modules
-from glider_bringup.mission.scenario import SCENARIO_FOLDER
+from glider_mission.scenario import SCENARIO_FOLDER
 from glider_model.vehicle.file import vehicle_path
 
 PER_TICK = [

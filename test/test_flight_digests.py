@@ -22,10 +22,10 @@ import numpy as np
 import pytest
 
 from glider_base.kernel import kernel
-from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.scenario import load_scenario
 
 DURATION_S = 36000.0
 #: Scenario and changed fields of each mission.

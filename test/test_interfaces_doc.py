@@ -30,9 +30,7 @@ from glider_base.settings import Settings
 from glider_base.wiring import JOINTS, present
 from glider_bringup.cli import MAX_WORD
 from glider_bringup.engines.launch_plan import ARGUMENTS
-from glider_bringup.mission.scenario import Scenario
 from glider_bringup.nodes.recorder_node import RecorderNode, RecorderSettings
-from glider_bringup.studies.sweep.plan import MAX_CELLS, MAX_VALUES, Sweep
 from glider_control.nodes.control_node import ControlNode
 from glider_control.settings import ControlSettings
 from glider_guard.nodes.guard_node import GuardNode
@@ -41,6 +39,7 @@ from glider_guidance.nodes.guidance_node import GuidanceNode
 from glider_guidance.path.settings import PathSettings, WaypointPath
 from glider_guidance.settings import GuidanceSettings
 from glider_guidance.yo.stage import STAGE_NAMES
+from glider_mission.scenario import Scenario
 from glider_model.nodes.current_node import CurrentNode
 from glider_model.nodes.plant_node import PlantNode
 from glider_model.nodes.tf_node import TfSettings
@@ -51,6 +50,7 @@ from glider_model.plant.plant import PlantSettings
 from glider_navigation.nodes.navigation_node import NavigationNode
 from glider_navigation.phase import PHASE_NAMES
 from glider_navigation.settings import NavigationSettings
+from glider_studies.sweep.plan import MAX_CELLS, MAX_VALUES, Sweep
 
 DOCUMENT = Path(__file__).resolve().parents[1] / 'docs' / 'interfaces.md'
 

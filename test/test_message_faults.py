@@ -17,12 +17,12 @@ from mcap.reader import make_reader
 
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.wiring import publisher
-from glider_bringup.blocks import COLUMNS
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import node_commands, run_nodes
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.blocks import COLUMNS
+from glider_mission.scenario import load_scenario
 
 #: One topic of each node.
 STRUCK = ('measured_odom', 'current_velocity', 'odom', 'reference', 'demand', 'command')

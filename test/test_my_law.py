@@ -22,7 +22,7 @@ import yaml
 
 from glider_base import kernel_cache
 from glider_base.ros.wire.topics import recorded_topics
-from glider_bringup.recording.mcap_reader import Bag
+from glider_mission.recording.mcap_reader import Bag
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES, DOCUMENT = ROOT / 'examples', ROOT / 'docs' / 'your_law.md'
@@ -59,7 +59,7 @@ import json, sys
 from pathlib import Path
 from glider_bringup.console import Controller, picked
 from glider_bringup.engines.launch_plan import plan_launch
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.scenario import load_scenario
 folder = Path(sys.argv[1])
 plan = plan_launch({'controller': 'sliding', 'guidance': 'vector_field'}, folder)
 other = load_scenario('current_8deg', {'control.sliding.k': 5.0}).to_yaml()
@@ -301,7 +301,7 @@ def test_a_scenario_tells_of_it_if_it_flies_or_something_is_said_of_it(machine, 
     assert yaml.safe_load(known['other'])['control']['sliding']['k'] == 5.0
     assert 'vector_field' not in known['mine']
     program = (
-        'from glider_bringup.mission.scenario import load_scenario; print(load_scenario("helix").'
+        'from glider_mission.scenario import load_scenario; print(load_scenario("helix").'
         'to_yaml())'
     )
     text = machine.start('-c', program).stdout

@@ -16,11 +16,11 @@ from mcap.reader import make_reader
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
 from glider_base.signals import TICK_S
 from glider_base.wiring import BELIEFS
-from glider_bringup.blocks import COLUMNS
 from glider_bringup.engines.processes import MODULES, RECORDER, node_commands, run_nodes
-from glider_bringup.mission.run_folder import PARAMETERS_FILE
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.ros.recorded_log import RecordedLog
+from glider_mission.blocks import COLUMNS
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.ros.recorded_log import RecordedLog
+from glider_mission.run_folder import PARAMETERS_FILE
 
 #: Topics of a flight with position known.
 PER_TICK = [

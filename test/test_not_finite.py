@@ -15,14 +15,14 @@ from fuzzing import flights
 from fuzzing.counts import Counter
 from glider_bringup.engines.direct import NotFiniteError, fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import load_scenario, read_scenario
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import fly_scored, scorecard
-from glider_bringup.studies import montecarlo
-from glider_bringup.studies.paper.experiments import Case, _fly_case
-from glider_bringup.studies.sweep import fly
-from glider_bringup.studies.sweep.fly import Chunk, Inputs
+from glider_mission.scenario import load_scenario, read_scenario
 from glider_model.vehicle.file import vehicle_path
+from glider_studies import montecarlo
+from glider_studies.paper.experiments import Case, _fly_case
+from glider_studies.sweep import fly
+from glider_studies.sweep.fly import Chunk, Inputs
 
 DURATION_S = 600.0
 

@@ -27,10 +27,10 @@ from glider_base.ros.wire.topics import (
 from glider_base.wiring import readers
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import PLANT, RECORDER, node_commands
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.recording.ros.rosbag2 import message_definition
 from glider_bringup.scoring.again import score_again
+from glider_mission.recording.ros.rosbag2 import message_definition
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario
 
 TICKS = 400
 DEADLINE_S = 200.0  #: at worst with every kernel to compile

@@ -18,8 +18,8 @@ from matplotlib import pyplot
 
 import glider_bringup as glider
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import ROW
 from glider_bringup.door.dataset import make_dataset
+from glider_mission.blocks import ROW
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = ROOT / 'docs' / 'python.md'

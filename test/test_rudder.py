@@ -22,7 +22,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from glider_base.ros.wire.topics import TOPICS
-from glider_bringup.recording.mcap_reader import Bag
+from glider_mission.recording.mcap_reader import Bag
 from glider_model.vehicle.file import vehicle_path
 
 DEADLINE_S = 300.0

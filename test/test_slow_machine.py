@@ -25,10 +25,10 @@ from glider_base.signals import TICK_NS, TICK_S
 from glider_base.wiring import PLANT
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.mission.scenario import load_scenario
 from glider_control.nodes.control_node import ControlNode
 from glider_guard.nodes.guard_node import GuardNode
 from glider_guidance.nodes.guidance_node import GuidanceNode
+from glider_mission.scenario import load_scenario
 from glider_model.plant.block import plant_move, plant_outputs
 
 FLIGHT = {'profile.prepare_s': 0.0, 'profile.depth_m': 60.0}

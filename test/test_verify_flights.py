@@ -36,13 +36,13 @@ from glider_base.ros.wire.qos import EVENTS
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.signals import TICK_S, Joints, Water
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.recording.ros.rosbag2 import BagWriter
 from glider_control import block as control
 from glider_control.control import control_step
 from glider_guidance import block as guidance
 from glider_guidance.guidance import guidance_abort, guidance_step
 from glider_guidance.nodes.guidance_node import path_message
+from glider_mission.recording.ros.rosbag2 import BagWriter
+from glider_mission.scenario import load_scenario
 from glider_model.plant.plant import plant_odometry, plant_step
 
 DEADLINE_S = 200.0

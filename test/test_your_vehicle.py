@@ -44,7 +44,7 @@ from glider_bringup.engines.processes import (
     node_commands,
     node_environment,
 )
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.scenario import load_scenario
 
 STAND_IN = Path(__file__).resolve().parents[1] / 'examples' / 'stand_in.py'
 SPEED, LOSS = 4.0, 0.05

@@ -13,11 +13,8 @@ setup(
     packages=find_packages(exclude=['test']),
     package_data={
         package_name: [
-            'mission/scenarios/*',
             'nodes/*.xml',
             'showing/web/*',
-            'studies/paper/*.yaml',
-            'studies/sweep/sweeps/*',
         ]
     },
     data_files=[

@@ -22,26 +22,26 @@ from fuzzing.counts import Counter
 from fuzzing.watch import outcome_of
 from glider_base.settings import ConfigurationError
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import Scenario, load_scenario
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.recover import recover
-from glider_bringup.recording.ros.recorded_run import Recording
-from glider_bringup.recording.ros.republish import (
-    check_not_empty,
-    plan_replay,
-    qos_of,
-    recorded_messages,
-)
-from glider_bringup.recording.ros.told import read_told
-from glider_bringup.recording.ros.verify.every_block import verify
-from glider_bringup.recording.ros.verify.report import report
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.scoring.traces import make_tracer
 from glider_bringup.showing.flown_run import keep_traces, read_run
 from glider_bringup.showing.report import report_page
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.recover import recover
+from glider_mission.recording.ros.recorded_run import Recording
+from glider_mission.recording.ros.republish import (
+    check_not_empty,
+    plan_replay,
+    qos_of,
+    recorded_messages,
+)
+from glider_mission.recording.ros.told import read_told
+from glider_mission.recording.ros.verify.every_block import verify
+from glider_mission.recording.ros.verify.report import report
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import Scenario, load_scenario
 
 #: Two minutes in which everything happens, in ten chunks.
 FLIGHT = {

@@ -15,9 +15,9 @@ import numpy as np
 from fuzzing.counts import Counter
 from fuzzing.watch import badly_told, outcome_of
 from glider_base.errors import ConfigurationError
-from glider_bringup.mission.scenario import load_scenario, scenario_names, scenario_path
-from glider_bringup.studies.sweep.plan import SWEEP_FOLDER, load_sweep, sweep_names
+from glider_mission.scenario import load_scenario, scenario_names, scenario_path
 from glider_model.vehicle.file import load_vehicle, vehicle_names, vehicle_path
+from glider_studies.sweep.plan import SWEEP_FOLDER, load_sweep, sweep_names
 
 _TABLE = b"""depth_m,north_mps,east_mps
 0.0,0.30,-0.10

@@ -30,12 +30,12 @@ from glider_base.signals import TICK_NS, TICK_S
 from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive, left_over, mapped
 from glider_bringup.engines.processes import MODULES
-from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.nodes.flight_listener import Heard, flight_heard
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.read_back import read_back
-from glider_bringup.recording.recover import recover
-from glider_bringup.recording.ros.recorded_log import RecordedLog
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.read_back import read_back
+from glider_mission.recording.recover import recover
+from glider_mission.recording.ros.recorded_log import RecordedLog
+from glider_mission.scenario import load_scenario
 
 SCENARIO = 'current_8deg'
 #: Ticks of a flight; the last of them are spared, so that it is not over before the kill.

@@ -20,13 +20,13 @@ from glider_base.ros.wire.codec import MessageError, to_cdr
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.signals import TICK_NS, TICK_S, Battery, Joints, Water
 from glider_base.wiring import GUARD, NAVIGATION, SENSORS
-from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import MissionParams, MissionState, fly
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import load_scenario
 from glider_control.control import control_step
 from glider_guard.block import guard_tick
 from glider_guidance.guidance import guidance_step
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.scenario import load_scenario
 from glider_model.ocean.current import current_step
 from glider_model.plant.plant import plant_step
 from glider_navigation.block import navigation_tick

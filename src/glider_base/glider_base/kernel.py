@@ -20,8 +20,7 @@ from glider_base.plugins import registered, sources
 #: Packages whose kernels call each other.
 PACKAGES = (
     *('glider_base', 'glider_model', 'glider_navigation', 'glider_guidance', 'glider_control'),
-    'glider_guard',
-    *('glider_bringup', 'glider_flights'),
+    *('glider_guard', 'glider_mission', 'glider_bringup', 'glider_studies', 'glider_flights'),
 )
 
 Values = TypeVar('Values', bound=NamedTuple)

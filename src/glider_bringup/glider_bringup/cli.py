@@ -27,7 +27,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
     from glider_base.plugins import COMMANDS, loaded
     from glider_bringup import commands
     from glider_bringup.console import messages
-    from glider_bringup.mission.disk import DiskError
+    from glider_mission.disk import DiskError
 except KeyboardInterrupt:
     sys.exit(130)  # EXIT_INTERRUPTED, which may not be there yet
 except (OSError, ImportError) as error:

@@ -25,10 +25,10 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
-from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED, ConfigurationError, printable
+from glider_base.errors import EXIT_INTERRUPTED, ConfigurationError, printable
 from glider_base.signals import TICK_S
-from glider_bringup.mission.scenario import parse_assignment
 from glider_control.settings import ControlLawSettings
+from glider_mission.scenario import parse_assignment
 
 
 class _PlainConsole(Console):
@@ -251,32 +251,3 @@ def interrupted_told():
     except KeyboardInterrupt:
         messages.print('stopped by SIGINT', style='red')
         raise typer.Exit(EXIT_INTERRUPTED) from None
-
-
-@contextmanager
-def workers_at_work(
-    workers: int | None,
-    scheduler: str | None,
-    combinations: Iterable[tuple[str, str]],
-    advice: Callable[[], str] = lambda: '',
-):
-    """Workers that fly laws with methods; yields their pool.
-
-    What ends their work early is told, with what ``advice`` adds, and is the exit code.
-    """
-    from glider_bringup.studies.workers import WorkError, worker_pool
-
-    if workers and scheduler:
-        raise ConfigurationError(
-            f'--workers {workers}: not with --scheduler, whose cluster has workers of its own'
-        )
-    try:
-        with worker_pool(workers, scheduler, combinations, compiling) as pool:
-            yield pool
-        return
-    except KeyboardInterrupt:
-        reason, code = 'stopped by SIGINT', EXIT_INTERRUPTED
-    except WorkError as error:
-        reason, code = str(error), EXIT_FAILED
-    messages.print(reason + advice(), style='red', soft_wrap=True)
-    raise typer.Exit(code)

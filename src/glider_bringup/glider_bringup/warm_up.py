@@ -17,19 +17,19 @@ import glider_bringup
 from glider_base.kernel_cache import forget_old
 from glider_base.signals import TICK_S
 from glider_base.wiring import at_rest
-from glider_bringup.blocks import BLOCKS, ROW
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mission.rules import Rules
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.ros.recorded_run import Recording
-from glider_bringup.recording.ros.told import read_told
-from glider_bringup.recording.ros.verify.every_block import verify
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import halve, make_tracer
+from glider_mission.blocks import BLOCKS, ROW
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.ros.recorded_run import Recording
+from glider_mission.recording.ros.told import read_told
+from glider_mission.recording.ros.verify.every_block import verify
+from glider_mission.rules import Rules
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario
 from glider_model.plant.block import PLANT, plant_move, plant_outputs
 from glider_model.plant.trim import solve_trim
 

@@ -10,8 +10,8 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario
 
 
 class Recorded(NamedTuple):

@@ -5,7 +5,7 @@
 import pytest
 
 from glider_bringup.door.run import fly
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.scenario import load_scenario
 
 #: Dead bands far beyond what the guard allows by itself, 2 % of the range.
 BANDS = {'buoyancy_engine.dead_band': 0.02, 'moving_mass.dead_band': 0.001}

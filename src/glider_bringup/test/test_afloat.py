@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from glider_base.frames import poses_from_wire
-from glider_bringup.blocks import COLUMNS
 from glider_bringup.engines.flight import fly
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.blocks import COLUMNS
+from glider_mission.scenario import load_scenario
 
 #: Shallow dives, up after each for ten minutes.
 DIVES = {

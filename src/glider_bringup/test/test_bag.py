@@ -21,18 +21,18 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.signals import TICK_NS
-from glider_bringup.blocks import BLOCK_TICKS, COLUMNS
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.ros import recorded_log
-from glider_bringup.recording.ros.recorded_log import SCORED, RecordedLog
-from glider_bringup.recording.ros.rosbag2 import (
+from glider_bringup.scoring.traces import TRACED
+from glider_mission.blocks import BLOCK_TICKS, COLUMNS
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.ros import recorded_log
+from glider_mission.recording.ros.recorded_log import SCORED, RecordedLog
+from glider_mission.recording.ros.rosbag2 import (
     CHUNK_TICKS,
     BagWriter,
     message_definition,
     type_hash,
 )
-from glider_bringup.recording.tick_sorter import TickSorter
-from glider_bringup.scoring.traces import TRACED
+from glider_mission.recording.tick_sorter import TickSorter
 
 PER_TICK = {topic.name: topic for topic in TOPICS.values() if topic.per_tick}
 TICKS = 2 * CHUNK_TICKS + 40

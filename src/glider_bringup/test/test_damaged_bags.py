@@ -21,14 +21,14 @@ from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import PLANT, TOPICS
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS, TICK_S
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.ros.recorded_run import Recording
-from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.traces import load_traces
 from glider_bringup.showing.flown_run import draw, read_run, write_report
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.ros.recorded_run import Recording
+from glider_mission.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario
 
 TICKS = 600
 #: The end of a data section, up to its checksum: what ros2 bag writes has none.

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_bringup.engines.direct import fly, fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.blocks import BLOCK_TICKS, COLUMNS, ROW
+from glider_mission.scenario import load_scenario
 
 #: A dive of 60 m and back within half an hour, so that a flight has everything in it.
 SHALLOW = {
@@ -88,7 +88,7 @@ BATCH = """
 import hashlib, json, sys
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.scenario import load_scenario
 digests = {}
 for name in sys.argv[2:]:
     log = hashlib.sha256()
@@ -237,7 +237,7 @@ INTERRUPTED = """
 import signal
 
 from glider_bringup.engines.flight import fly
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.scenario import load_scenario
 
 scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 36000.0})
 flown = []

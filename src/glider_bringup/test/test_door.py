@@ -111,11 +111,11 @@ STUDIES = """
 import sys
 
 import glider_bringup.cli
-from glider_bringup.studies.paper.experiments import Case, _fly_case
-from glider_bringup.studies.montecarlo import _fly_plant, make_scenarios
-from glider_bringup.studies.workers import worker_pool
-from glider_bringup.studies.sweep.fly import fly_chunk, make_chunks
-from glider_bringup.studies.sweep.plan import load_sweep
+from glider_studies.paper.experiments import Case, _fly_case
+from glider_studies.montecarlo import _fly_plant, make_scenarios
+from glider_studies.workers import worker_pool
+from glider_studies.sweep.fly import fly_chunk, make_chunks
+from glider_studies.sweep.plan import load_sweep
 
 
 def fly(study):

@@ -10,13 +10,13 @@ from mcap_ros2.reader import read_ros2_messages
 
 from glider_bringup.engines.flight import fly as fly_flight
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mission.planned import planned_ticks
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario, scenario_names
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.showing.scorecard import card_rows
+from glider_mission.planned import planned_ticks
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario, scenario_names
 
 
 def fly(folder, name, with_bag=False, **changes):

@@ -7,10 +7,10 @@ import pytest
 
 from glider_base.files import read_yaml, yaml_text
 from glider_base.signals import TICK_S, Battery
-from glider_bringup.blocks import COLUMNS
-from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.scoring.card import fly_scored, scorecard
 from glider_bringup.showing.scorecard import card_rows
+from glider_mission.blocks import COLUMNS
+from glider_mission.scenario import load_scenario
 from glider_model.vehicle.file import load_vehicle, vehicle_path
 
 SHALLOW = {'profile.depth_m': 60.0, 'dives': 2, 'sensors.attitude_std_deg': 0.2}

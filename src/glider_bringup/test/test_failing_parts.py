@@ -17,10 +17,8 @@ from glider_base.frames import (
 )
 from glider_base.signals import TICK_S
 from glider_base.wiring import NO_ECHO
-from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import MissionState, fly
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import load_scenario
 from glider_control.control import control_step
 from glider_control.intake import REFUSED
 from glider_guard.guard import Heard, guard_step
@@ -39,6 +37,8 @@ from glider_guidance.yo.stage import (
     INFLECTING_UP,
     WAITING_ON_SURFACE,
 )
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.scenario import load_scenario
 from glider_model.ocean.current import current_step
 from glider_model.ocean.density import depth_at
 from glider_model.plant.block import plant_outputs

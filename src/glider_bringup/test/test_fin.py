@@ -8,12 +8,12 @@ import yaml
 
 from glider_base.signals import Joints
 from glider_bringup import load_scenario
-from glider_bringup.blocks import COLUMNS
 from glider_bringup.door.run import fly, open_run
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mission.run_folder import make_run_folder
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.one_hertz import Recorder
+from glider_mission.blocks import COLUMNS
+from glider_mission.run_folder import make_run_folder
 
 FIN = {'range': 26.0, 'rate': 1.2, 'area': 0.05, 'lift_slope': 3.0, 'x': -1.2, 'turn_rate': 0.5}
 FIELDS = {f'vehicle.fin.{name}': value for name, value in FIN.items()} | {'dives': 0}

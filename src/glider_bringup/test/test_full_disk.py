@@ -16,14 +16,14 @@ from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mission.disk import DiskError, whole_file, write_whole
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_mission.disk import DiskError, whole_file, write_whole
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario
 
 #: The largest file (B) that a disk which is full allows.
 MOST = 500_000

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import COLUMNS
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import load_scenario
 from glider_guard import rows
 from glider_guard.weight import LEVEL_M, LEVEL_S
+from glider_mission.blocks import COLUMNS
+from glider_mission.scenario import load_scenario
 from glider_model.vehicle.file import load_vehicle
 
 #: Shallower than this is at the surface (m).

@@ -19,9 +19,9 @@ from glider_bringup.engines.launch_plan import (
     plan_launch,
 )
 from glider_bringup.engines.processes import MODULES, ON_BOARD, PLANT, RECORDER
-from glider_bringup.mission.scenario import scenario_names
 from glider_control.settings import ControlLawSettings
 from glider_guidance.settings import LosSettings
+from glider_mission.scenario import scenario_names
 
 LAUNCH_FILE = Path(__file__).parents[1] / 'launch' / 'glider.launch.py'
 

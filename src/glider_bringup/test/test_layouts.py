@@ -15,8 +15,8 @@ from rosbags.highlevel import AnyReader
 from glider_base.frames import euler_from_quaternion, odometry_to_wire, quaternion_from_euler
 from glider_base.signals import Odometry
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario
 
 LAYOUTS = Path(__file__).parents[1] / 'layouts'
 FOXGLOVE = json.loads((LAYOUTS / 'foxglove.json').read_text(encoding='utf-8'))

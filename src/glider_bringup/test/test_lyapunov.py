@@ -20,10 +20,8 @@ import numpy as np
 import pytest
 
 from glider_base.signals import TICK_S, Adaptation
-from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import load_scenario
 from glider_control.allocation import moments
 from glider_control.laws.adaptive import (
     SCALE_ALPHA,
@@ -32,6 +30,8 @@ from glider_control.laws.adaptive import (
     SCALE_SIDE,
     SCALE_V2,
 )
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.scenario import load_scenario
 from glider_model.onboard.glide_polar import glide_speed
 from glider_model.vehicle.rigid_body import GRAVITY
 

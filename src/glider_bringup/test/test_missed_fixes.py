@@ -13,11 +13,11 @@ import pytest
 
 from glider_base.frames import poses_from_wire
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import COLUMNS
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.scenario import load_scenario
 from glider_guidance.yo.stage import WAITING_ON_SURFACE
+from glider_mission.blocks import COLUMNS
+from glider_mission.scenario import load_scenario
 from glider_navigation.phase import FIXED
 
 WEEK_S = 604800.0

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import COLUMNS, ROW
-from glider_bringup.mission.rules import Rules
-from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.score import Scorer
 from glider_guard.rows import CRUSHING, LEAK, NOT_RISING, STUCK_ROLL
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.rules import Rules
+from glider_mission.scenario import load_scenario
 from glider_model.vehicle.file import load_vehicle
 
 TRUTH, BELIEF = COLUMNS['ground_truth/odom'], slice(*[COLUMNS['odom'].start + i for i in (0, 13)])

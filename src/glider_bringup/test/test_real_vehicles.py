@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from glider_base.settings import ConfigurationError
-from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.one_hertz import Recorder
+from glider_mission.scenario import load_scenario
 from glider_model.ocean.density import immersed
 
 #: Rows of depth (m), density (kg/m^3), temperature (degC).

@@ -15,13 +15,13 @@ from glider_base.ros.wire.topics import PLANT, TOPICS
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.recording.ros.rosbag2 import BagWriter
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.showing.flown_run import draw, read_run
+from glider_mission.recording.ros.rosbag2 import BagWriter
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario
 
 #: What a score file knows and a bag does not.
 ONLY_IN_THE_FILE = {'engine', 'wall_time_s', 'real_time_factor'}
@@ -172,8 +172,8 @@ def test_what_holds_no_run_is_refused(tmp_path, name, words):
 PEAK = """
 import sys
 from pathlib import Path
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.ros.recorded_log import RecordedLog
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.ros.recorded_log import RecordedLog
 
 def peak_mb():
     lines = Path('/proc/self/status').read_text().splitlines()

@@ -21,12 +21,12 @@ from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_bringup.cli import app
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.recover import recover
-from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS
 from glider_bringup.scoring.again import score_again
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.recover import recover
+from glider_mission.recording.ros.rosbag2 import CHUNK_TICKS
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario
 
 
 def file_of(folder: Path) -> Path:

@@ -30,10 +30,10 @@ from glider_base.signals import TICK_NS
 from glider_bringup.cli import app
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import RECORDER, node_commands
-from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.recording.mcap_reader import Bag, BagTopic
-from glider_bringup.recording.ros.recorded_log import RecordedLog
-from glider_bringup.recording.ros.republish import plan_replay, qos_of
+from glider_mission.recording.mcap_reader import Bag, BagTopic
+from glider_mission.recording.ros.recorded_log import RecordedLog
+from glider_mission.recording.ros.republish import plan_replay, qos_of
+from glider_mission.scenario import load_scenario
 
 DEADLINE_S = 120.0
 RECORDED = {topic.full_name('/glider'): topic for topic in recorded_topics(['measured_odom'])}

@@ -19,13 +19,9 @@ import numpy as np
 import pytest
 
 from glider_bringup import cli, console
-from glider_bringup.blocks import COLUMNS
 from glider_bringup.door.run import Rows
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import Outcome, mission_of
-from glider_bringup.mission.rules import Rules
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario, scenario_names
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.dives import dives_of
 from glider_bringup.scoring.score import Scorer
@@ -33,6 +29,10 @@ from glider_bringup.scoring.traces import make_tracer
 from glider_bringup.showing.findings import LOST_M, findings, lost_since_s, verdict
 from glider_bringup.showing.flown_run import keep_traces, read_run, write_report
 from glider_bringup.showing.words import span
+from glider_mission.blocks import COLUMNS
+from glider_mission.rules import Rules
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario, scenario_names
 
 E2 = COLUMNS['tracking_error'].start + 1
 SHORT = {'dives': 0, 'duration_s': 300.0, 'settle_s': 0.0}

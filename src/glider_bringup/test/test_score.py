@@ -13,10 +13,10 @@ from scipy.ndimage import uniform_filter1d
 from scipy.spatial.transform import Rotation
 
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import COLUMNS, ROW
-from glider_bringup.mission.rules import Rules
 from glider_bringup.scoring.score import Scorer
 from glider_guidance.yo.stage import AT_END_OF_PATH
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.rules import Rules
 
 quick = settings(max_examples=20)
 

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
-from glider_bringup.mission.rules import Rules
-from glider_bringup.mission.scenario import load_scenario
 from glider_bringup.scoring import traces
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import CURVES, Tracer, load_traces, make_tracer
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.rules import Rules
+from glider_mission.scenario import load_scenario
 from glider_model.vehicle.file import load_vehicle
 
 quick = settings(max_examples=40)

@@ -23,15 +23,15 @@ from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_bringup.cli import app
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.mission.run_folder import make_run_folder
-from glider_bringup.mission.scenario import load_scenario
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.ros.recorded_run import Recording
-from glider_bringup.recording.ros.told import read_told
-from glider_bringup.recording.ros.verify.every_block import verify
-from glider_bringup.recording.ros.verify.report import report
-from glider_bringup.recording.ros.verify.ticks import place_ticks
-from glider_bringup.recording.ros.verify.verdict import IDENTICAL
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.ros.recorded_run import Recording
+from glider_mission.recording.ros.told import read_told
+from glider_mission.recording.ros.verify.every_block import verify
+from glider_mission.recording.ros.verify.report import report
+from glider_mission.recording.ros.verify.ticks import place_ticks
+from glider_mission.recording.ros.verify.verdict import IDENTICAL
+from glider_mission.run_folder import make_run_folder
+from glider_mission.scenario import load_scenario
 
 PER_TICK = {t.full_name('/glider'): t for t in recorded_topics(['measured_odom']) if t.per_tick}
 BLOCK_OF = {
@@ -468,7 +468,7 @@ def test_command_names_a_difference(altered, recorded):
 INTERRUPTED = """
 import signal, sys
 from glider_bringup.cli import app
-from glider_bringup.recording.recorded_inputs import RecordedBlock
+from glider_mission.recording.recorded_inputs import RecordedBlock
 
 
 def shoot(compute):

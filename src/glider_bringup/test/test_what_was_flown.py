@@ -12,7 +12,7 @@ import pytest
 
 from glider_base.settings import ConfigurationError
 from glider_bringup.door.run import fly, open_run
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.scenario import load_scenario
 
 CHANGED = {'current.speed_kn': 0.6, 'profile.depth_m': 300}
 SHORT = ('--engine', 'direct', '--duration', '30')

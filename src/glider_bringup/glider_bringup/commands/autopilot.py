@@ -11,8 +11,8 @@ import typer
 from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace
 from glider_base.settings import ConfigurationError
 from glider_bringup.console import Changes, Law, Named, changed_fields, messages
-from glider_bringup.mission.choices import chosen_fields
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.choices import chosen_fields
+from glider_mission.scenario import load_scenario
 
 app = typer.Typer()
 

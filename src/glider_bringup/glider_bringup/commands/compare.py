@@ -10,7 +10,7 @@ import typer
 
 from glider_base.settings import ConfigurationError
 from glider_bringup.console import Json, counter, messages, output, print_table
-from glider_bringup.mission.disk import write_whole
+from glider_mission.disk import write_whole
 
 app = typer.Typer()
 

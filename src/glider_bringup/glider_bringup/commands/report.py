@@ -24,8 +24,8 @@ def report(
     as_json: Json = False,
 ) -> None:
     """Write the report of a run again: one HTML file that needs no network."""
-    from glider_bringup.mission.run_folder import REPORT_FILE
     from glider_bringup.showing.flown_run import read_run, write_report
+    from glider_mission.run_folder import REPORT_FILE
 
     file = out or beside(run, REPORT_FILE)
     with counter('reading the bag', None) as update:

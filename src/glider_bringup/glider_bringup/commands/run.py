@@ -27,12 +27,12 @@ from glider_bringup.console import (
     progress,
     tell,
 )
-from glider_bringup.mission.choices import ENGINES, chosen_fields, combination_of
-from glider_bringup.mission.disk import DiskError
-from glider_bringup.mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.showing.scorecard import STYLES, print_card, print_places
 from glider_guidance.settings import LosSettings
+from glider_mission.choices import ENGINES, chosen_fields, combination_of
+from glider_mission.disk import DiskError
+from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
 
 app = typer.Typer()
 Engine = Literal[ENGINES]
@@ -111,7 +111,7 @@ def run(
     Exit code 0: completed or infeasible. 3: surfaced, the guard ended the mission. 1: the vehicle
     is lost, or the run failed. 2: what was asked for cannot be done. 130: interrupted.
     """
-    from glider_bringup.mission.run_folder import REPORT_FILE
+    from glider_mission.run_folder import REPORT_FILE
 
     if duration not in (None, 'full'):
         duration = number('--duration', duration, 'full', TICK_S, 1e8)
@@ -195,11 +195,11 @@ def _fly(
     """
     from glider_bringup.engines.compiling import told
     from glider_bringup.engines.flight import fly
-    from glider_bringup.mission.planned import planned_ticks
-    from glider_bringup.mission.run_folder import make_run_folder
     from glider_bringup.scoring.card import scorecard, write_score
     from glider_bringup.scoring.score import make_scorer, scores_of
     from glider_bringup.scoring.traces import make_tracer
+    from glider_mission.planned import planned_ticks
+    from glider_mission.run_folder import make_run_folder
 
     if bag or engine == 'nodes':  # else nothing of ROS is needed
         from glider_bringup.engines.recorded import fly_nodes, fly_recorded
@@ -241,8 +241,8 @@ def _write_report(scenario: Scenario, folder: Path, card: dict, tracer) -> bool:
 
     Returns whether the disk had room for it.
     """
-    from glider_bringup.mission.run_folder import REPORT_FILE
     from glider_bringup.showing.flown_run import keep_traces, write_report
+    from glider_mission.run_folder import REPORT_FILE
 
     file = folder / REPORT_FILE
     try:

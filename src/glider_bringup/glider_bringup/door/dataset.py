@@ -25,8 +25,6 @@ from glider_base.frames import (
 from glider_base.kernel import kernel, source_digest
 from glider_base.signals import TICK_NS, Adaptation
 from glider_base.wiring import NO_ECHO
-from glider_bringup.blocks import COLUMNS
-from glider_bringup.mission.scenario import Scenario
 from glider_control.block import CONTROL
 from glider_control.control import (
     SATURATED_BUOYANCY,
@@ -38,6 +36,8 @@ from glider_control.intake import REFUSED
 from glider_guard.block import GUARD
 from glider_guard.rows import ROWS
 from glider_guidance.yo.stage import STAGE_NAMES
+from glider_mission.blocks import COLUMNS
+from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import steers_by
 
 NED, FRD, PATH = 'NED', 'FRD', 'path'

@@ -9,10 +9,10 @@ from pathlib import Path
 import xarray
 from scipy.io import savemat
 
+from glider_bringup.door.netcdf import write_dataset
 from glider_bringup.door.run import Run
-from glider_bringup.mission.disk import whole_file
-from glider_bringup.mission.run_folder import VEHICLE_FILE
-from glider_bringup.studies.sweep.netcdf import write_dataset
+from glider_mission.disk import whole_file
+from glider_mission.run_folder import VEHICLE_FILE
 from glider_model.vehicle.file import vehicle_file
 
 #: Rows of a CSV file that are written at once: an hour.

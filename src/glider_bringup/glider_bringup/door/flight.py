@@ -11,7 +11,6 @@ import numpy as np
 
 from glider_base.settings import ConfigurationError, validate
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.console import compiling
 from glider_bringup.door.run import chosen_scenario
 from glider_bringup.engines.compiling import told
@@ -21,12 +20,13 @@ from glider_bringup.engines.direct import (
     finite_rows,
 )
 from glider_bringup.engines.flight import Held, Kept, refuse_message_faults
-from glider_bringup.mission.choices import combination_of
-from glider_bringup.mission.scenario import DEFAULT_SCENARIO, Scenario
 from glider_control.law import LawSettings
 from glider_guard.rows import LATCHED
 from glider_guidance.order import Order
 from glider_guidance.yo.stage import AT_END_OF_PATH
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.choices import combination_of
+from glider_mission.scenario import DEFAULT_SCENARIO, Scenario
 
 #: A vehicle that has been below the first depth and is above the second has surfaced (m).
 UNDER_M, SURFACED_M = 2.0, 1.0

@@ -17,19 +17,26 @@ from glider_base.files import parse_yaml
 from glider_base.ros.places import given_domain
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.compiling import told
 from glider_bringup.engines.flight import Outcome
 from glider_bringup.engines.flight import fly as fly_direct
-from glider_bringup.mission.choices import ENGINES, chosen_fields, combination_of
-from glider_bringup.mission.planned import planned_ticks
-from glider_bringup.mission.run_folder import (
+from glider_bringup.scoring.card import scorecard, write_score
+from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.traces import make_tracer
+from glider_control.law import LawSettings
+from glider_control.own_law import own_law
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.choices import ENGINES, chosen_fields, combination_of
+from glider_mission.planned import planned_ticks
+from glider_mission.recording.bag_files import has_bag
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.run_folder import (
     REPORT_FILE,
     TRACES_FILE,
     make_run_folder,
     scenario_of,
 )
-from glider_bringup.mission.scenario import (
+from glider_mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
     ScenarioSource,
@@ -37,13 +44,6 @@ from glider_bringup.mission.scenario import (
     load_scenario,
     make_scenario,
 )
-from glider_bringup.recording.bag_files import has_bag
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.scoring.card import scorecard, write_score
-from glider_bringup.scoring.score import make_scorer, scores_of
-from glider_bringup.scoring.traces import make_tracer
-from glider_control.law import LawSettings
-from glider_control.own_law import own_law
 
 if TYPE_CHECKING:
     import xarray
@@ -318,7 +318,7 @@ def open_run(path: str | Path) -> Run:
 
 def _rows_of(path: Path, vehicle: str) -> np.ndarray:
     """Rows of the bag of a run, float64[ticks, ROW]."""
-    from glider_bringup.recording.read_back import read_back
+    from glider_mission.recording.read_back import read_back
 
     rows = Rows()
     read_back(Bag(path), vehicle, [rows])

@@ -10,12 +10,12 @@ import numpy as np
 
 from glider_base.kernel import compiling_told
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import ROW
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.interrupts import interrupts_noted
-from glider_bringup.mission.choices import Combination
-from glider_bringup.mission.scenario import load_scenario
+from glider_mission.blocks import ROW
+from glider_mission.choices import Combination
+from glider_mission.scenario import load_scenario
 from glider_model.vehicle.file import load_vehicle, vehicle_path
 
 #: Depth of a profile that is compiled and not flown, if the vehicle is rated for it (m).

@@ -17,13 +17,13 @@ from glider_base.frames import odometry_from_wire, water_to_wire
 from glider_base.kernel import kernel, replace
 from glider_base.signals import TICK_S, Joints
 from glider_base.wiring import FIELDS, publisher
-from glider_bringup.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_control.block import control_tick
 from glider_control.control import ControlParams, ControlState
 from glider_guard.block import guard_tick
 from glider_guard.guard import GuardParams, GuardState
 from glider_guidance.block import guidance_tick
 from glider_guidance.guidance import GuidanceParams, GuidanceState
+from glider_mission.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
 from glider_model.plant.block import Measured, plant_move, plant_outputs
 from glider_model.plant.plant import PlantParams, PlantState, not_finite, state_fault

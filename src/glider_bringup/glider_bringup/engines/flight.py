@@ -10,7 +10,6 @@ import numpy as np
 
 from glider_base.settings import ConfigurationError
 from glider_base.signals import NOT_FINITE, TICK_S
-from glider_bringup.blocks import COLUMNS, ROW
 from glider_bringup.engines.direct import (
     MissionParams,
     MissionState,
@@ -23,8 +22,6 @@ from glider_bringup.engines.direct import (
     set_held,
 )
 from glider_bringup.engines.interrupts import interrupts_noted
-from glider_bringup.mission.disk import VANISHED, DiskError
-from glider_bringup.mission.scenario import Scenario
 from glider_guidance.guidance import guidance_abort
 from glider_guidance.order import Order
 from glider_guidance.orders import (
@@ -36,6 +33,9 @@ from glider_guidance.orders import (
     wait_for_surface,
 )
 from glider_guidance.settings import GuidanceSettings
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.disk import VANISHED, DiskError
+from glider_mission.scenario import Scenario
 
 _STAGE = COLUMNS['stage']
 

@@ -25,7 +25,7 @@ from contextlib import suppress
 from pathlib import Path
 
 #: What the nodes share; it must not start threads, rclpy does.
-SHARED = 'glider_bringup.blocks'
+SHARED = 'glider_mission.blocks'
 #: What it is called in messages.
 FORK_SERVER = 'fork_server'
 #: The kernel keeps this much of the name of a process.

@@ -27,20 +27,20 @@ from glider_bringup.engines.processes import (
     RECORDER,
     process_modules,
 )
-from glider_bringup.mission.run_folder import (
+from glider_control.settings import LAWS
+from glider_guidance.settings import METHODS
+from glider_mission.run_folder import (
     PARAMETERS_FILE,
     SCENARIO_FILE,
     VEHICLE_FILE,
     make_run_folder,
 )
-from glider_bringup.mission.scenario import (
+from glider_mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
     load_scenario,
     scenario_names,
 )
-from glider_control.settings import LAWS
-from glider_guidance.settings import METHODS
 
 #: The node that `ros2 launch` starts and `./glider run`, which nobody can watch, does not.
 TF, TF_MODULE = 'tf_node', 'glider_model.nodes.tf_node'

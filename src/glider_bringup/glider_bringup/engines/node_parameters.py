@@ -10,9 +10,9 @@ from glider_base.ros.message_fault import MessageFault
 from glider_base.ros.parameters import parameters_yaml, to_parameters
 from glider_base.ros.wire import topics
 from glider_base.wiring import publisher
-from glider_bringup.blocks import BLOCKS
-from glider_bringup.mission.disk import write_whole
-from glider_bringup.mission.scenario import Scenario
+from glider_mission.blocks import BLOCKS
+from glider_mission.disk import write_whole
+from glider_mission.scenario import Scenario
 
 
 def node_parameters(

@@ -12,19 +12,19 @@ from glider_base.settings import ConfigurationError
 from glider_bringup.engines.flight import Outcome, Progress, Taker, ended, fly
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import Layout, node_commands, run_nodes
-from glider_bringup.mission.disk import DiskError, vanished
-from glider_bringup.mission.run_folder import (
+from glider_mission.disk import DiskError, vanished
+from glider_mission.recording.bag_files import has_bag
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.read_back import Reader, read_back
+from glider_mission.recording.ros.log_writer import LogWriter
+from glider_mission.recording.ros.rosbag2 import BagWriter, Sync
+from glider_mission.run_folder import (
     LOG_FILE,
     PARAMETERS_FILE,
     SCENARIO_FILE,
     VEHICLE_FILE,
 )
-from glider_bringup.mission.scenario import Scenario
-from glider_bringup.recording.bag_files import has_bag
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.read_back import Reader, read_back
-from glider_bringup.recording.ros.log_writer import LogWriter
-from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
+from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import steers_by
 
 

@@ -31,9 +31,9 @@ from glider_base.ros.wire.topics import TOPICS, recorded_topics
 from glider_base.settings import ConfigurationError, Settings
 from glider_base.signals import TICK_NS
 from glider_base.wiring import BELIEFS, SENSORS, WIRING
-from glider_bringup.mission.disk import DiskError
-from glider_bringup.recording.ros.rosbag2 import BagWriter, Sync
-from glider_bringup.recording.tick_sorter import TickSorter
+from glider_mission.disk import DiskError
+from glider_mission.recording.ros.rosbag2 import BagWriter, Sync
+from glider_mission.recording.tick_sorter import TickSorter
 
 _DRAIN_S = 0.01
 _PROGRESS_S = 0.25

@@ -26,7 +26,7 @@ from glider_base.ros.parameters import declare_settings, refuse_unknown
 from glider_base.ros.wire import qos
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError, Settings
-from glider_bringup.recording.ros.rosbag2 import message_definition
+from glider_mission.recording.ros.rosbag2 import message_definition
 
 NAME = 'viewer_node'
 _PERIOD_S = 0.02

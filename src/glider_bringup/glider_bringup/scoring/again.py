@@ -8,15 +8,15 @@ from pathlib import Path
 from glider_base.ros.lockstep.health import FINISHED
 from glider_base.settings import ConfigurationError
 from glider_bringup.engines.flight import Outcome, ended
-from glider_bringup.mission.planned import planned_ticks
-from glider_bringup.mission.run_folder import PARAMETERS_FILE, scenario_of
-from glider_bringup.mission.scenario import Scenario
-from glider_bringup.recording.bag_files import has_bag
-from glider_bringup.recording.mcap_reader import Bag
-from glider_bringup.recording.read_back import Reader, read_back
-from glider_bringup.recording.ros.recorded_log import RecordedLog
 from glider_bringup.scoring.card import STOPPED, read_score, scorecard
 from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_mission.planned import planned_ticks
+from glider_mission.recording.bag_files import has_bag
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.read_back import Reader, read_back
+from glider_mission.recording.ros.recorded_log import RecordedLog
+from glider_mission.run_folder import PARAMETERS_FILE, scenario_of
+from glider_mission.scenario import Scenario
 
 #: Gets the ticks read from a bag, and about how many there are.
 Reading = Callable[[int, int], None]

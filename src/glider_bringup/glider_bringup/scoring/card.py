@@ -20,11 +20,11 @@ from pydantic import (
 from glider_base.files import is_file, read_json
 from glider_base.settings import ConfigurationError
 from glider_bringup.engines.flight import Outcome, Progress, Taker, fly
-from glider_bringup.mission.disk import write_whole
-from glider_bringup.mission.run_folder import SCORE_FILE
-from glider_bringup.mission.scenario import Scenario
-from glider_bringup.recording.bag_files import has_bag
 from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_mission.disk import write_whole
+from glider_mission.recording.bag_files import has_bag
+from glider_mission.run_folder import SCORE_FILE
+from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import load_vehicle
 
 STATUSES = ('completed', 'surfaced', 'lost', 'infeasible', 'aborted', 'failed')

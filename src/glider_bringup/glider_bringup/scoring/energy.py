@@ -10,7 +10,7 @@ import numpy as np
 
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Joints
-from glider_bringup.blocks import COLUMNS
+from glider_mission.blocks import COLUMNS
 from glider_model.plant.energy import FULL, spend, spent
 from glider_model.plant.plant import LAUNCHED, surface_after
 from glider_model.vehicle.energy import NO_ENERGY, EnergySettings

@@ -9,7 +9,7 @@ import numpy as np
 from glider_base.frames import odometry_from_wire, rotate_to_ned
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import COLUMNS
+from glider_mission.blocks import COLUMNS
 from glider_model.plant.faults.kinds import is_due, phase_of
 from glider_model.plant.faults.settings import FaultSettings, fault_params
 from glider_model.plant.plant import LAUNCHED, Surfacing, surface_after

@@ -10,8 +10,8 @@ import numpy as np
 
 from glider_base.frames import Origin, from_geodetic
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import COLUMNS
 from glider_bringup.scoring.scores import largest, rms
+from glider_mission.blocks import COLUMNS
 from glider_navigation.phase import DIVES_M, SURFACES_M
 
 _ODOM, _FIX = (COLUMNS[name].start for name in ('odom', 'fix'))

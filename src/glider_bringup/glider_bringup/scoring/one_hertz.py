@@ -8,7 +8,7 @@ import numpy as np
 
 from glider_base.frames import poses_from_wire
 from glider_base.signals import TICK_S
-from glider_bringup.blocks import COLUMNS, ROW
+from glider_mission.blocks import COLUMNS, ROW
 
 #: Of so many ticks one is kept.
 _EVERY = round(1.0 / TICK_S)

@@ -27,9 +27,6 @@ from glider_base.frames import (
 )
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_NS, TICK_S, Odometry
-from glider_bringup.blocks import COLUMNS
-from glider_bringup.mission.rules import Rules
-from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.energy import EnergyScorer
 from glider_bringup.scoring.faults import FaultTimes
 from glider_bringup.scoring.navigation import NavigationScorer
@@ -46,6 +43,9 @@ from glider_control.intake import REFUSED
 from glider_guard.block import TELL_EVERY_NS
 from glider_guard.rows import ALL, DROP, LATCHED, NOTE, REACTIONS, ROWS, SURFACE, reaction_of
 from glider_guidance.yo.stage import AT_END_OF_PATH
+from glider_mission.blocks import COLUMNS
+from glider_mission.rules import Rules
+from glider_mission.scenario import Scenario
 from glider_model.plant.faults.settings import FaultSettings
 from glider_model.plant.plant import dive_depths
 from glider_model.plant.readings import Readings, make_readings, noise_of_readings

@@ -19,11 +19,11 @@ from glider_base.frames import poses_from_wire, wrap_angle
 from glider_base.kernel import kernel
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S, Adaptation
-from glider_bringup.blocks import COLUMNS
-from glider_bringup.mission.disk import whole_file
-from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.navigation import ELLIPSE_95
 from glider_bringup.scoring.true_motion import TrueMotion
+from glider_mission.blocks import COLUMNS
+from glider_mission.disk import whole_file
+from glider_mission.scenario import Scenario
 from glider_model.ocean.current_settings import KNOT_MPS
 from glider_model.vehicle.file import VehicleParams, load_vehicle
 

@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from glider_bringup.blocks import COLUMNS
+from glider_mission.blocks import COLUMNS
 
 _TRUTH, _ODOM_START = COLUMNS['ground_truth/odom'], COLUMNS['odom'].start
 _ODOM = slice(_ODOM_START, _ODOM_START + 13)

@@ -1,3 +1,3 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a person is shown of runs and studies: reports, comparisons, pictures, scorecards."""
+"""What a person is shown of runs: reports, comparisons, pictures, scorecards."""

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from glider_base.settings import ConfigurationError
-from glider_bringup.mission.scenario import told_fields
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.scoring.scores import SCORES, Score, reckoned
 from glider_bringup.showing.panels import ACTUATORS, SPACE, SURFACE, flown_panel
 from glider_bringup.showing.scorecard import engine_text, flown_text, guard_texts, show
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page
 from glider_bringup.showing.words import small, span
+from glider_mission.scenario import told_fields
 
 #: Curves that are laid over each other: caption and curve, by panel.
 _OVERLAID = {

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from glider_bringup.mission.disk import save_figure
 from glider_bringup.scoring.traces import Traces
+from glider_mission.disk import save_figure
 
 #: A picture shows at most this many values of each curve.
 POINTS = 8192

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from glider_base.signals import TICK_S
-from glider_bringup.mission.rules import STEADY_DEPTH_M
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.scoring.traces import Traces
@@ -16,6 +15,7 @@ from glider_bringup.showing.panels import actuators_of
 from glider_bringup.showing.scorecard import fault_texts, guard_texts
 from glider_bringup.showing.web_page import FlownRun
 from glider_bringup.showing.words import count, small, span, way
+from glider_mission.rules import STEADY_DEPTH_M
 from glider_model.ocean.current_settings import KNOT_MPS
 
 #: Farther off than this (m) something went wrong, and a track that is until the end is lost.

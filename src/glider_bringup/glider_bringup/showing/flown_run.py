@@ -6,22 +6,22 @@ from pathlib import Path
 
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
-from glider_bringup.mission.disk import write_whole
-from glider_bringup.mission.run_folder import (
-    SCENARIO_FILE,
-    SCORE_FILE,
-    TRACES_FILE,
-    scenario_of,
-)
-from glider_bringup.mission.scenario import Scenario
-from glider_bringup.recording.bag_files import has_bag
-from glider_bringup.recording.mcap_reader import Bag
 from glider_bringup.scoring.again import Reading, score_bag
 from glider_bringup.scoring.card import read_score
 from glider_bringup.scoring.traces import Tracer, Traces, load_traces, make_tracer
 from glider_bringup.showing.figure import draw_run
 from glider_bringup.showing.report import report_page
 from glider_bringup.showing.web_page import FlownRun
+from glider_mission.disk import write_whole
+from glider_mission.recording.bag_files import has_bag
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.run_folder import (
+    SCENARIO_FILE,
+    SCORE_FILE,
+    TRACES_FILE,
+    scenario_of,
+)
+from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import load_vehicle
 
 

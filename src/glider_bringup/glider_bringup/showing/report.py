@@ -8,7 +8,6 @@ from typing import Any
 
 from glider_base.files import yaml_text
 from glider_base.signals import TICK_S
-from glider_bringup.mission.scenario import told_fields
 from glider_bringup.scoring.dives import Dive, dives_of
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.findings import findings, verdict
@@ -16,6 +15,7 @@ from glider_bringup.showing.panels import report_panels
 from glider_bringup.showing.scorecard import card_rows
 from glider_bringup.showing.web_page import FlownRun, make_page
 from glider_bringup.showing.words import count, span, way
+from glider_mission.scenario import told_fields
 from glider_model.ocean.current_settings import KNOT_MPS
 
 _BADGES = {

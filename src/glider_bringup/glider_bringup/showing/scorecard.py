@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.table import Table
 
 from glider_bringup.console import output
-from glider_bringup.mission.scenario import told_fields
 from glider_bringup.scoring.scores import SCORES, Score, reckoned
+from glider_mission.scenario import told_fields
 from glider_model.ocean.current_settings import KNOT_MPS
 
 #: Colours of what became of a run.

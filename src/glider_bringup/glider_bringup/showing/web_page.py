@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from glider_bringup.mission.rules import Rules
-from glider_bringup.mission.scenario import Scenario
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.scoring.traces import SAMPLES, Traces
 from glider_guidance.path.curve import path_length, path_point, path_tangent
+from glider_mission.rules import Rules
+from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import Vehicle
 
 if TYPE_CHECKING:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.mission.disk import save_figure
 from glider_bringup.showing.figure import (
     BLUE,
     GREEN,
@@ -18,6 +17,7 @@ from glider_bringup.showing.figure import (
     new_figure,
 )
 from glider_flights.validation.result import Validation
+from glider_mission.disk import save_figure
 
 #: The curves are those of one stretch: its first so many seconds.
 LONGEST_S = 4 * 3600.0

@@ -27,7 +27,7 @@ def recover(
     metadata.yaml. Both are made from what is there; a recording that is whole is left as it is.
     Exit code 0 in both cases, 2 where there is nothing to recover.
     """
-    from glider_bringup.recording import recover as work
+    from glider_mission.recording import recover as work
 
     with counter('reading', None) as update:
         done = work.recover(run, update)
@@ -51,12 +51,12 @@ def recover(
 
 def _ticks(run: Path) -> dict[str, Any]:
     """What there is tick by tick, and what lacks; None where nobody can know."""
-    from glider_bringup.mission.planned import planned_ticks
-    from glider_bringup.mission.run_folder import scenario_of
-    from glider_bringup.recording.mcap_reader import Bag
-    from glider_bringup.recording.read_back import read_back
-    from glider_bringup.recording.ros.rosbag2 import CHUNK_TICKS
     from glider_bringup.scoring.card import read_score
+    from glider_mission.planned import planned_ticks
+    from glider_mission.recording.mcap_reader import Bag
+    from glider_mission.recording.read_back import read_back
+    from glider_mission.recording.ros.rosbag2 import CHUNK_TICKS
+    from glider_mission.run_folder import scenario_of
 
     found = dict.fromkeys(('ticks', 'ticks_flown', 'ticks_planned', 'acknowledged_tick'))
     found['lacking'] = {}

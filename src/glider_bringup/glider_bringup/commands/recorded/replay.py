@@ -54,8 +54,8 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Publish a recording: the same bytes and stamps, with their quality of service and /clock."""
-    from glider_bringup.recording.mcap_reader import Bag
-    from glider_bringup.recording.ros import republish as work
+    from glider_mission.recording.mcap_reader import Bag
+    from glider_mission.recording.ros import republish as work
 
     factor = float('inf') if rate == 'max' else number('--rate', rate, 'max', 0.001, 1e6)
     names = [name for text in topics or () for name in text.split(',') if name]

@@ -1,0 +1,64 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a person chooses for a flight beside its scenario, as fields of the scenario."""
+
+from typing import Any, Literal, NamedTuple
+
+from glider_mission.scenario import Scenario
+from glider_model.vehicle.file import steers_by
+
+#: The engines: nodes over topics, or one compiled loop. Same results.
+ENGINES = ('nodes', 'direct')
+
+
+class Combination(NamedTuple):
+    """What the loop of a flight is compiled for: all else about a scenario is numbers."""
+
+    law: str
+    method: str
+    navigation: str = 'known'
+    breaks: bool = False  #: faults are part of it
+    steered: str = ''  #: the vehicle, if a surface steers it
+
+
+def combination_of(scenario: Scenario) -> Combination:
+    """What the loop that flies a scenario is compiled for."""
+    return Combination(
+        scenario.control.law,
+        scenario.guidance.los.method,
+        scenario.navigation.method,
+        bool(scenario.vehicle_faults),
+        scenario.vehicle if steers_by(scenario) else '',
+    )
+
+
+def chosen_fields(
+    changes: dict[str, Any],
+    controller: str | None = None,
+    guidance: str | None = None,
+    seed: int | None = None,
+    duration: float | Literal['full'] | None = None,
+) -> dict[str, Any]:
+    """Values by dotted name, for `load_scenario`.
+
+    Parameters
+    ----------
+    changes : dict
+        Values by dotted name.
+    controller, guidance, seed : optional
+        Instead of those of the scenario.
+    duration : float or 'full', optional
+        Simulated time (s), or that of the whole scenario; by default its dives.
+    """
+    fields = dict(changes)
+    if controller is not None:
+        fields['control.law'] = controller
+    if guidance is not None:
+        fields['guidance.los.method'] = guidance
+    if seed is not None:
+        fields['seed'] = seed
+    if duration is not None:
+        fields['dives'] = 0
+        if duration != 'full':
+            fields['duration_s'] = duration
+    return fields

@@ -1,0 +1,242 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A bag whose end is missing, made whole: what is there gets its index and its metadata.yaml.
+
+A file is written anew beside the old one, and takes its place once it is on disk: whoever pulls
+the plug meanwhile finds the one or the other. Its chunks are those of the old file. A recording of
+ours is then, byte by byte, what its recorder would have left had it been stopped there.
+"""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, NamedTuple
+
+import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Header, Metadata, Schema
+from mcap.summary import Summary
+
+from glider_base.settings import ConfigurationError
+from glider_mission.disk import not_written
+from glider_mission.recording.bag_files import bag_files
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.mcap_records import (
+    CHUNK_TIMES,
+    HEAD,
+    MAGIC,
+    UNREADABLE,
+    parse,
+    read_summary,
+    span,
+    unpack,
+    whole_records,
+)
+from glider_mission.recording.mcap_scan import find
+from glider_mission.recording.mcap_writer import McapWriter
+from glider_mission.recording.metadata import (
+    METADATA_FILE,
+    ROSBAG2,
+    metadata_text,
+    topic_counts,
+    write_metadata,
+)
+
+#: Messages that are in no chunk are put into chunks of about this size (B).
+_LOOSE_BYTES = 1 << 20
+
+#: Called with the bytes read of a file, and how many it has.
+Progress = Callable[[int, int], None]
+
+
+class Recovered(NamedTuple):
+    """What is in a bag that is whole now."""
+
+    rebuilt: tuple[str, ...]  #: names of the files that were made anew; none if all were whole
+    dropped_bytes: int  #: of what was no whole chunk
+    dropped: tuple[str, ...]  #: the same in words
+    counts: dict[str, int]  #: messages by topic
+    start_ns: int  #: log time of the first message; 0 without one
+    end_ns: int  #: and of the last
+
+
+def recover(path: Path, progress: Progress = lambda done, total: None) -> Recovered:
+    """Make a bag whole. What is whole is left as it is.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of a run or a bag, or a single MCAP file.
+    progress : callable, optional
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no bag, or it is damaged and not just cut; a `DiskError` if the disk has no
+        room for the new file. All files are as they were, then.
+    """
+    files, is_listed = _files(path)
+    rebuilt, dropped_bytes, dropped, summaries = [], 0, [], {}
+    for file in files:
+        summary = _summary(file)
+        if summary is None:
+            size, words = _rebuild(file, progress)
+            rebuilt.append(file.name)
+            dropped_bytes += size
+            dropped += words
+            summary = _summary(file)
+        summaries[file.name] = summary
+    if path.is_dir() and (rebuilt or not is_listed):
+        write_metadata(path, metadata_text(summaries))
+        rebuilt.append(METADATA_FILE)
+    bag = Bag(path)  # which tests all checksums
+    return Recovered(
+        rebuilt=tuple(rebuilt),
+        dropped_bytes=dropped_bytes,
+        dropped=tuple(dropped),
+        counts=dict(topic_counts(summaries.values())),
+        start_ns=bag.start_ns,
+        end_ns=bag.end_ns,
+    )
+
+
+def _files(path: Path) -> tuple[list[Path], bool]:
+    """Files of a bag, and whether its metadata.yaml lists them."""
+    try:
+        return bag_files(path), path.is_file() or (path / METADATA_FILE).is_file()
+    except ConfigurationError:
+        files = sorted(path.glob('*.mcap')) if path.is_dir() else []
+        if not files:
+            raise
+        return files, False
+
+
+def _summary(file: Path) -> Summary | None:
+    """What the end of a file says is in it; None if it does not count its messages."""
+    try:
+        with file.open('rb') as stream:
+            summary = read_summary(stream, is_checked=False)  # the bag is, in the end
+    except OSError as error:
+        raise ConfigurationError(f'{file}: {error.strerror or error}') from None
+    except ValueError as error:
+        raise ConfigurationError(f'{file}: damaged: {error}') from None
+    return summary if summary and summary.statistics else None
+
+
+def _rebuild(file: Path, progress: Progress) -> tuple[int, list[str]]:
+    """Give a file its index; the bytes of it that were dropped, and what they were, in words."""
+    draft = file.with_name(f'.part-{file.stem}')
+    try:
+        with file.open('rb') as stream:
+            if stream.read(len(MAGIC)) != MAGIC:
+                raise ConfigurationError(f'{file}: not an MCAP file, or nothing is left of it')
+            rebuilt = _Rebuilt(file, draft)
+            for opcode, at, data in whole_records(stream):
+                rebuilt.take(opcode, at, data)
+                progress(stream.tell(), stream.seek(0, 2))
+            dropped = rebuilt.close(stream)
+        os.replace(draft, file)
+    except OSError as error:
+        raise not_written(file, error) from None
+    finally:
+        draft.unlink(missing_ok=True)
+    return sum(size for size, _ in dropped), [f'{file.name}: {what}' for _, what in dropped]
+
+
+class _Rebuilt:
+    """The new file that what is left of an old one goes into."""
+
+    def __init__(self, file: Path, draft: Path) -> None:
+        self._file, self._draft = file, draft
+        self._writer: McapWriter | None = None
+        self._loose = bytearray()  #: messages that are in no chunk
+        self._known: set[tuple[type, int]] = set()  #: definitions, by their kinds and ids
+        self._end = len(MAGIC)  #: of what was taken, in the old file
+        self._dropped: list[tuple[int, str]] = []  #: size, and what it is
+
+    def take(self, opcode: int, at: int, data: bytes) -> None:
+        """Take a record."""
+        if self._writer is None and opcode != Opcode.HEADER:
+            raise self._damaged(at, 'no header')
+        try:
+            self._take(opcode, at, data)
+        except UNREADABLE as error:
+            raise self._damaged(at, str(error)) from None
+        self._end = at + HEAD.size + len(data)
+
+    def _take(self, opcode: int, at: int, data: bytes) -> None:
+        if opcode == Opcode.HEADER:
+            self._writer = McapWriter(self._draft, parse(Header, data).profile)
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            self._define(opcode, data)
+        elif opcode == Opcode.ATTACHMENT:
+            one = parse(Attachment, data)
+            self._writer.add_attachment(one.name, one.media_type, one.data)
+        elif opcode == Opcode.METADATA:
+            one = parse(Metadata, data)
+            if one.name != ROSBAG2:
+                self._writer.add_metadata(one.name, one.metadata)
+        elif opcode == Opcode.MESSAGE:
+            self._loose += HEAD.pack(opcode, len(data)) + data
+            if len(self._loose) > _LOOSE_BYTES:
+                self._write_loose()
+        elif opcode == Opcode.CHUNK:
+            self._write_loose()
+            try:
+                self._write(unpack(data))
+            except ValueError as error:
+                times = span(*CHUNK_TIMES.unpack_from(data))
+                what = f'the chunk ({times}) at byte {at:,}: {error}'
+                self._dropped.append((len(data), what))
+
+    def _define(self, opcode: int, data: bytes) -> None:
+        """Take a definition; those that come again are not needed."""
+        record = parse(Schema if opcode == Opcode.SCHEMA else Channel, data)
+        if (type(record), record.id) not in self._known:
+            self._known.add((type(record), record.id))
+            self._writer.define(record)
+
+    def _write_loose(self) -> None:
+        content, self._loose = bytes(self._loose), bytearray()
+        self._write(content)
+
+    def _write(self, content: bytes) -> None:
+        """Write the records of a chunk; raise ValueError if they are none."""
+        found = find(np.frombuffer(content, np.uint8))
+        for at in map(int, found.others):
+            opcode, length = HEAD.unpack_from(content, at)
+            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._define(opcode, content[at + HEAD.size : at + HEAD.size + length])
+        strange = {one for one in found.channel.tolist() if (Channel, one) not in self._known}
+        if strange:
+            raise ValueError(f'messages of channel {min(strange)}, which is not defined')
+        if len(found.channel):
+            self._writer.write_chunk(content)
+
+    def close(self, stream: IO[bytes]) -> list[tuple[int, str]]:
+        """Complete the new file, on disk; sizes of what was dropped, and what it is."""
+        if self._writer is None:
+            raise self._damaged(len(MAGIC), 'nothing is left of it')
+        self._write_loose()
+        self._drop_rest(stream)
+        text = metadata_text({self._file.name: self._writer.summary()})
+        self._writer.add_metadata(ROSBAG2, {'serialized_metadata': text})
+        self._writer.close(sync=True)
+        return self._dropped
+
+    def _drop_rest(self, stream: IO[bytes]) -> None:
+        """Note what is behind the last whole record, if it is more than an index."""
+        size = stream.seek(0, 2)
+        stream.seek(self._end)
+        rest = stream.read(HEAD.size + CHUNK_TIMES.size)
+        if not rest or rest[0] in (Opcode.DATA_END, Opcode.FOOTER):
+            return
+        what = 'what begins'
+        if rest[0] == Opcode.CHUNK and len(rest) == HEAD.size + CHUNK_TIMES.size:
+            what = f'the chunk ({span(*CHUNK_TIMES.unpack_from(rest, HEAD.size))})'
+        self._dropped.append(
+            (size - self._end, f'{what} at byte {self._end:,}: its end is missing')
+        )
+
+    def _damaged(self, at: int, what: str) -> ConfigurationError:
+        return ConfigurationError(f'{self._file}: cannot be recovered: {what} (byte {at:,})')

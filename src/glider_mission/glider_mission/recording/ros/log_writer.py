@@ -1,0 +1,128 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Log rows of the direct engine to the bag that the nodes would have left."""
+
+from collections.abc import Iterable
+from itertools import groupby
+from operator import itemgetter
+
+import numpy as np
+
+from glider_base.block import Telling
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.orders import ABORT, PARAMETERS_SET
+from glider_base.ros.parameters import changed_parameters
+from glider_base.ros.wire import topics
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.topics import TOPICS, topic_of
+from glider_base.signals import TICK_NS
+from glider_base.wiring import GUIDANCE, present
+from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
+from glider_guidance.order import Order
+from glider_guidance.orders import changed, first_ticks
+from glider_guidance.settings import GuidanceSettings
+from glider_mission.blocks import BLOCKS, COLUMNS
+from glider_mission.recording.ros.rosbag2 import BagWriter
+
+_PLANT, _GUIDANCE = f'/glider/{topics.PLANT}', f'/glider/{GUIDANCE.node}'
+_PER_TICK = [topic.name for topic in TOPICS.values() if topic.per_tick]
+
+
+class LogWriter:
+    """Writes the log rows of a direct run as the messages that the nodes would have published.
+
+    Parameters
+    ----------
+    bag : BagWriter
+    settings : GuidanceSettings
+        What guidance is told before the first tick, and its orders.
+    topics : iterable of str
+        Those of the topics that not every run has that there are in this one.
+    steers_by : str
+        Name of the vehicle's steering surface; empty without.
+    """
+
+    def __init__(
+        self,
+        bag: BagWriter,
+        settings: GuidanceSettings,
+        topics: Iterable[str],
+        steers_by: str = '',
+    ) -> None:
+        self._bag = bag
+        self._topics = [topic_of(name, steers_by) for name in present(_PER_TICK, topics)]
+        self._tick = 0
+        self._tellings = [Telling(block) for block in BLOCKS if block.say]
+        self._settings, self._waiting, self._stage = settings, [*settings.orders], -1
+        self._tell_path(0)
+
+    def add(self, log: np.ndarray) -> None:
+        """Add a block of rows, float64[n, ROW]."""
+        stamps = (np.arange(len(log)) + self._tick) * TICK_NS
+        self._tell_orders(stamps, log)
+        self._tell(stamps, log)
+        payloads = {}
+        for topic in self._topics:
+            values = log[:, COLUMNS[topic.name]] if topic.name in COLUMNS else log[:, :0]
+            payloads[topic.name] = topic.codec.encode_many(stamps, values)
+        self._bag.write_ticks(stamps, payloads)
+        self._tick += len(log)
+
+    def _tell(self, stamps: np.ndarray, log: np.ndarray) -> None:
+        """Write the events of each block."""
+        for telling in self._tellings:
+            block = telling.block
+            flags = log[:, [COLUMNS[flag] for flag in block.flags]].astype(np.int64)
+            node = f'/glider/{block.wired.node}'
+            for row in telling.among(flags, stamps):
+                stamp_ns = int(stamps[row])
+                event = health.said_array(stamp_ns, node, block.say(*flags[row].tolist()))
+                self._bag.write('/diagnostics', stamp_ns, to_cdr(event))
+
+    def _tell_path(self, stamp_ns: int) -> None:
+        """Write the path that is followed from now on."""
+        points = self._settings.path.points(PATH_POINTS)
+        self._bag.write('path', stamp_ns, to_cdr(path_message(points, stamp_ns)))
+
+    def _tell_orders(self, stamps: np.ndarray, log: np.ndarray) -> None:
+        """Write the orders that hold from one of the ticks on, as the guidance node tells them."""
+        if not self._waiting:
+            return
+        stages = np.concatenate([[self._stage], log[:, COLUMNS['stage']]]).astype(np.int64)
+        self._stage = int(stages[-1])
+        found = first_ticks(self._waiting, self._tick, stages[:-1])
+        for row, group in groupby(found, key=itemgetter(0)):
+            self._follow(int(stamps[row]), [order for _, order in group])
+
+    def _follow(self, stamp_ns: int, orders: list[Order]) -> None:
+        """Write the orders that hold from a tick on: one event of a kind, and one path."""
+        path, told = self._settings.path, {}
+        for order in orders:
+            before, message = self._settings, ABORT if order.abort else PARAMETERS_SET
+            self._settings = changed(before, order)
+            values = told.setdefault(message, {})
+            values.update(changed_parameters(before, self._settings))
+            rest = [one for one in self._waiting if one is not order]
+            self._waiting = [] if order.abort else rest
+        if self._settings.path != path:
+            self._tell_path(stamp_ns)
+        for message, values in told.items():
+            event = health.status_array(stamp_ns, _GUIDANCE, health.OK, message, values)
+            self._bag.write('/diagnostics', stamp_ns, to_cdr(event))
+
+    def finish(self, failure: str = '') -> None:
+        """Write that the run is complete or why it failed, as the plant says it at its end."""
+        stamp_ns = max(0, self._tick - 1) * TICK_NS
+        report = health.Report(_PLANT, health.FINISHED, health.COMPLETE, stamp_ns)
+        if failure:
+            report = health.Report(_PLANT, health.FAILED, failure, stamp_ns, level=health.ERROR)
+        self._bag.write('/diagnostics', stamp_ns, to_cdr(health.report_array(report)))
+
+    def close(self) -> None:
+        """Complete the bag."""
+        self._bag.close()
+
+    @property
+    def messages(self) -> int:
+        """Number of messages in the bag."""
+        return sum(self._bag.counts.values())

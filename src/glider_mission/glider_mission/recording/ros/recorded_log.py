@@ -1,0 +1,259 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Bags to log rows: what lets one function score and draw every kind of run."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
+
+from glider_base.ros.lockstep import health
+from glider_base.ros.wire.codec import Codec
+from glider_base.ros.wire.topics import TOPICS, topic_of
+from glider_base.signals import TICK_NS
+from glider_base.wiring import BELIEFS, SENSORS, WHEN_SILENT
+from glider_guidance.yo.stage import STAGE_NAMES
+from glider_mission.blocks import BLOCK_TICKS, COLUMNS, ROW
+from glider_mission.recording.mcap_reader import Bag, Batch
+
+_PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
+
+#: Topics that the score is computed from. Bags from the sea lack the first, as nobody knows it.
+SCORED = ('ground_truth/odom', 'odom', 'joint_states', 'reference', 'tracking_error')
+
+
+def _known_name(topic: str) -> str:
+    """Our name of a recorded topic, whatever its namespace; its own if it is none of ours."""
+    for name in TOPICS:
+        if topic == name or topic.endswith('/' + name.lstrip('/')):
+            return name
+    return topic
+
+
+def _stage_number(name: str) -> float:
+    """Number of a stage; NaN for one that this version does not know."""
+    return float(STAGE_NAMES.index(name)) if name in STAGE_NAMES else np.nan
+
+
+def _mask(text: str) -> float:
+    """Sum of bits; 0 for what is none."""
+    return float(int(text)) if text.isdecimal() and len(text) < 10 else 0.0
+
+
+#: Columns of a row that events on /diagnostics tell, by their keys, and how they are read.
+_FLAGS = {
+    'infeasible': lambda text: float(text == 'true'),
+    'stage': _stage_number,
+    'saturation': _mask,
+    'guard': _mask,
+}
+
+
+class Decoded(NamedTuple):
+    """Messages of one per-tick topic as numbers."""
+
+    stamps_ns: np.ndarray  #: int64[n], -1 where there is none
+    values: np.ndarray  #: float64[n, m], NaN where there is none
+    own: np.ndarray  #: bool[n]: stamp and numbers are the whole message, byte by byte
+    unusable: dict[int, str]  #: why a node would refuse a message, by row
+
+
+def decode(codec: Codec, batch: Batch, chosen: np.ndarray) -> Decoded:
+    """Messages of a batch, given by their indices, as a node would take them."""
+    count = len(chosen)
+    stamps, own = np.full(count, -1), np.zeros(count, bool)
+    values, unusable = np.full((count, codec.width), np.nan), {}
+    regular = np.flatnonzero(batch.size[chosen] == codec.size)
+    if len(regular):
+        stamps[regular], values[regular], own[regular] = codec.decode_many(
+            batch.rows(chosen[regular])
+        )
+    for row in np.flatnonzero(~own):
+        try:
+            stamps[row], values[row] = codec.decode(batch.payload(chosen[row]))
+        except Exception as error:  # the middleware has no class for bytes that are no message
+            unusable[int(row)] = str(error).partition('\n')[0]
+    for row in np.flatnonzero(own & ~np.all(np.isfinite(values), axis=1)):
+        field = codec.fields[int(np.flatnonzero(~np.isfinite(values[row]))[0])]
+        unusable[int(row)] = f'{field} is not finite'
+    return Decoded(stamps, values, own, unusable)
+
+
+class RecordedLog:
+    """A bag as the log rows that the direct engine would have given, and what else it tells.
+
+    Parameters
+    ----------
+    bag : Bag
+    also : iterable of str
+        Topics to read beside `SCORED`, NaN in ticks that lack them. The columns of all other
+        topics are NaN.
+    steers_by : str
+        Name of the vehicle's steering surface; empty without.
+
+    Attributes
+    ----------
+    ticks : int
+        Rows given so far.
+    counts : Counter
+        Messages by topic, known when all `blocks` are taken, as is what follows.
+    end : health.Report or None
+        What the plant said about the end of the run.
+    """
+
+    def __init__(self, bag: Bag, also: Iterable[str] = (), steers_by: str = '') -> None:
+        self._bag = bag
+        self.ticks = 0
+        self.counts: Counter[str] = Counter()
+        self.end: health.Report | None = None
+        self._recorded = {_known_name(topic.name) for topic in bag.topics}
+        self._names = (*SCORED, *also)
+        self._codecs = {name: topic_of(name, steers_by).codec for name in self._names}
+        #: Tick, column and new value, in the order in which they were told.
+        self._flags: list[tuple[int, str, float]] = []
+        self._unusable: dict[tuple[str, int], str] = {}
+        self._lacks = ''
+        self._log = np.full((2 * BLOCK_TICKS, ROW), np.nan)
+        #: Which of `SCORED` a tick has, bit by bit.
+        self._has = np.zeros(2 * BLOCK_TICKS, np.int64)
+        self._start, self._over = 0, False
+
+    def blocks(self) -> Iterator[np.ndarray]:
+        """Rows of consecutive ticks, until the first tick that lacks one of `SCORED`.
+
+        Yields
+        ------
+        float64[n, ROW]
+            Valid until the next are asked for.
+
+        Raises
+        ------
+        ConfigurationError
+            If the bag is damaged.
+        """
+        names = {i: _known_name(topic.name) for i, topic in enumerate(self._bag.topics)}
+        for batch in self._bag.batches():
+            found = {}
+            for index in np.unique(batch.topic):
+                name, chosen = names[int(index)], np.flatnonzero(batch.topic == index)
+                self.counts[name] += len(chosen)
+                if name == '/diagnostics':
+                    self._hear(batch, chosen)
+                elif name in self._codecs and not self._over:
+                    found[name] = decode(self._codecs[name], batch, chosen)
+            yield from self._put(found)
+        while not self._over:
+            yield self._shift()
+
+    @property
+    def _needed(self) -> tuple[str, ...]:
+        """Of `SCORED`, those that every tick has to have."""
+        return SCORED if self.counts['ground_truth/odom'] else SCORED[1:]
+
+    def _hear(self, batch: Batch, chosen: np.ndarray) -> None:
+        """Note what events say about the flags of a row, and about the end of the run."""
+        for index in chosen:
+            try:
+                array = deserialize_message(batch.payload(index), DiagnosticArray)
+            except Exception:  # the middleware has no class for bytes that are no message
+                continue
+            self.end = self.end or health.end_of_run(array)
+            self._flags += [
+                (health.stamp_of(array) // TICK_NS, pair.key, _FLAGS[pair.key](pair.value))
+                for status in array.status
+                for pair in status.values
+                if pair.key in _FLAGS
+            ]
+
+    def _put(self, found: dict[str, Decoded]) -> Iterator[np.ndarray]:
+        """Put messages into their rows; gives the rows that are far behind."""
+        while found and not self._over:
+            later = {}
+            for name, (stamps_ns, values, own, unusable) in found.items():
+                ticks = stamps_ns // TICK_NS - self._start
+                usable = ticks >= 0
+                for row, why in unusable.items():
+                    self._unusable.setdefault((name, int(stamps_ns[row]) // TICK_NS), why)
+                    usable[row] = False
+                now = usable & (ticks < len(self._log))
+                self._log[ticks[now], COLUMNS[name]] = values[now]
+                if name in SCORED:
+                    self._has[ticks[now]] |= 1 << SCORED.index(name)
+                if len(rest := np.flatnonzero(usable & ~now)):
+                    later[name] = Decoded(stamps_ns[rest], values[rest], own[rest], {})
+            found = later
+            if found:  # a recorder from outside keeps no strict order
+                yield self._shift()
+
+    def _shift(self) -> np.ndarray:
+        """The first block up to a tick that lacks something; then the second takes its place."""
+        whole = sum(1 << SCORED.index(name) for name in self._needed)
+        missing = np.flatnonzero(self._has[:BLOCK_TICKS] != whole)
+        rows = int(missing[0]) if len(missing) else BLOCK_TICKS
+        block = self._log[:rows].copy()
+        block[:, [COLUMNS['infeasible'], COLUMNS['saturation'], COLUMNS['guard']]] = 0.0
+        for tick, column, value in self._flags:
+            block[max(0, tick - self._start) :, COLUMNS[column]] = value
+        if len(missing):
+            self._over, self._lacks = True, self._what_lacks(rows)
+        self._log[:BLOCK_TICKS], self._log[BLOCK_TICKS:] = self._log[BLOCK_TICKS:], np.nan
+        self._has[:BLOCK_TICKS], self._has[BLOCK_TICKS:] = self._has[BLOCK_TICKS:], 0
+        self._start += BLOCK_TICKS
+        self.ticks += rows
+        return block
+
+    def _what_lacks(self, row: int) -> str:
+        """Why a tick is not whole, in words."""
+        tick = self._start + row
+        has = self._has[row]
+        names = [name for name in self._needed if not has >> SCORED.index(name) & 1]
+        why = self._unusable.get((names[0], tick), 'not recorded')
+        return f'tick {tick:,} (t = {tick * TICK_NS / 1e9:.1f} s) lacks {names[0]}: {why}'
+
+    def missing(self, ticks: int | None) -> str:
+        """What lacks of a run, in words; empty if nothing does.
+
+        Parameters
+        ----------
+        ticks : int, optional
+            How many were flown, if anybody knows: else what the plant said in the bag counts.
+        """
+        if ticks is None and self.end and self.end.phase == health.FINISHED:
+            ticks = self.end.stamp_ns // TICK_NS + 1
+        told = [self._bag.cut] if self._bag.cut else []
+        if ticks is not None and self.ticks < ticks:
+            told.append(f'{self.ticks:,} of {ticks:,} ticks are there')
+            told += [] if self._bag.cut else [self._lacks]
+        return '; '.join(told)
+
+    def lost(self, complete: bool) -> int:
+        """Number of per-tick messages that ought to be recorded but are not.
+
+        A run that was cut short (``complete`` is false) may lack messages of its last two ticks,
+        which is not a loss: a node that ended within a tick may have let the others begin the
+        next one.
+        """
+        ticks, per_tick = self._per_tick()
+        expected = ticks if complete else ticks - 2
+        return sum(max(0, expected - count) for count in per_tick.values())
+
+    def lacking(self) -> dict[str, int]:
+        """Messages that per-tick topics have less than the one that has most, by topic."""
+        ticks, per_tick = self._per_tick()
+        return {name: ticks - count for name, count in per_tick.items() if count < ticks}
+
+    def recorded(self) -> dict[str, int]:
+        """Messages of every topic that ought to have one per tick, by topic."""
+        return self._per_tick()[1]
+
+    def _per_tick(self) -> tuple[int, dict[str, int]]:
+        """Messages of the topic that has most, and of each that there ought to be."""
+        left_out = {*SENSORS, *BELIEFS, *WHEN_SILENT} - self._recorded
+        if not self.counts['ground_truth/odom']:
+            left_out |= {'ground_truth/odom'}
+        names = (topic.name for topic in _PER_TICK if topic.name not in left_out)
+        counts = {name: self.counts[name] for name in names}
+        return max(counts.values()), counts

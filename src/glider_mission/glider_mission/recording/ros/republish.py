@@ -1,0 +1,477 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Publishes a recording again: the same bytes, on the same topics, in the same order."""
+
+import importlib
+import math
+import time
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+import rclpy
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
+
+from glider_base.files import parse_yaml
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.clock import MAX_TICKS_AHEAD
+from glider_base.ros.lockstep.executor import take
+from glider_base.ros.lockstep.node import COUNT_TICKS
+from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
+from glider_base.ros.wire import topics
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_NS
+from glider_base.wiring import present
+from glider_mission.recording.mcap_reader import Bag, BagTopic
+from glider_mission.recording.ros.recorded_run import choose_namespace
+
+#: Name that rclpy gives to a node of which it knows the endpoints only.
+_NAME_UNKNOWN = '_NODE_NAME_UNKNOWN_'
+#: Sleeps and waits are cut into pieces of this length (s), so that Ctrl-C is heard.
+_PATIENCE_S = 0.1
+#: Nothing longer is replayed (s).
+MAX_DURATION_S = 1e8
+#: Depth of a publisher where the recording does not say.
+_DEPTH = 1024
+
+#: Called now and then with the recorded time that has passed since the start (s).
+Progress = Callable[[float], None]
+
+
+class Plan(NamedTuple):
+    """What is to be replayed."""
+
+    bag: Bag
+    names: dict[int, str]  #: names to publish under, by index into the topics of the bag
+    namespace: str  #: of the nodes, as published
+    start_ns: int  #: log times (ns) from and to which messages are published
+    end_ns: int
+    asked: frozenset[str]  #: names of the topics that were asked for; /clock may come unasked
+
+
+class Played(NamedTuple):
+    """What was replayed."""
+
+    counts: dict[str, int]  #: messages by topic
+    wall_s: float
+
+
+# ---------------------------------------------------------------------- what to replay
+
+
+def plan_replay(
+    bag: Bag,
+    topics: list[str],
+    start_s: float,
+    duration_s: float | None,
+    namespace: str | None,
+) -> Plan:
+    """Check what is asked for.
+
+    Parameters
+    ----------
+    bag : Bag
+    topics : list of str
+        Recorded names, or names in the namespace of the nodes; empty: all of them.
+    start_s, duration_s : float
+        Part of the recording, from its beginning (s).
+    namespace : str, optional
+        Namespace to publish the topics of the nodes in, instead of the recorded one.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the option, and what is recorded.
+    """
+    recorded = _recorded_namespace(bag, namespace)
+    names = [topic.name for topic in bag.topics]
+    wanted = [_find_topic(bag, name, recorded) for name in topics] or names
+    asked = frozenset(wanted)
+    if '/clock' in names:
+        wanted = [*wanted, '/clock']
+    length_s = (bag.end_ns - bag.start_ns) / 1e9
+    if start_s > length_s:
+        raise ConfigurationError(
+            f'--start {start_s:g}: beyond the end (allowed: 0 to {length_s:.1f}, the length of '
+            f'the recording in s)'
+        )
+    if duration_s is not None and duration_s > MAX_DURATION_S:
+        raise ConfigurationError(
+            f'--duration {duration_s:g}: not usable (allowed: 0 to {MAX_DURATION_S:g} s)'
+        )
+    start_ns = bag.start_ns + round(start_s * 1e9)
+    end_ns = bag.end_ns if duration_s is None else start_ns + round(duration_s * 1e9)
+    published = recorded if namespace is None else absolute_namespace(namespace)
+    if published is None:
+        raise ConfigurationError(
+            f'--namespace {namespace}: not usable (allowed: {NAMESPACE_ALLOWED})'
+        )
+    renamed = {name: _rename(name, recorded, published) for name in wanted}
+    return Plan(
+        bag=bag,
+        names={index: renamed[name] for index, name in enumerate(names) if name in wanted},
+        namespace=published,
+        start_ns=start_ns,
+        end_ns=end_ns,
+        asked=frozenset(renamed[name] for name in asked),
+    )
+
+
+def _recorded_namespace(bag: Bag, namespace: str | None) -> str:
+    """Namespace of the nodes in a bag; a bag of others needs none to be replayed as it is."""
+    try:
+        return choose_namespace(bag, None)
+    except ConfigurationError as error:
+        if namespace is not None:
+            raise ConfigurationError(f'--namespace {namespace}: {error}') from None
+        return '/'
+
+
+def _find_topic(bag: Bag, name: str, namespace: str) -> str:
+    names = [topic.name for topic in bag.topics]
+    for candidate in (name, _join(namespace, name)):
+        if candidate in names:
+            return candidate
+    raise ConfigurationError(
+        f'--topics {name}: not recorded (recorded: {", ".join(sorted(names)) or "nothing"})'
+    )
+
+
+def _join(namespace: str, name: str) -> str:
+    return f'{namespace.rstrip("/")}/{name}'
+
+
+def _rename(name: str, recorded: str, published: str) -> str:
+    prefix = recorded.rstrip('/') + '/'
+    ours = [topic.name for topic in TOPICS.values() if not topic.name.startswith('/')]
+    if name.startswith(prefix) and name.removeprefix(prefix) in ours:
+        return _join(published, name.removeprefix(prefix))
+    return name
+
+
+def qos_of(topic: BagTopic) -> QoSProfile:
+    """Quality of service to publish a topic with: the strongest that was recorded.
+
+    Version 9 of rosbag2 writes policies as words, older ones as numbers.
+    """
+    try:
+        profiles = parse_yaml(topic.qos, topic.name) or [{}]
+        found = [_profile(profile) for profile in profiles]
+    except (TypeError, AttributeError, ValueError, KeyError) as error:
+        raise ConfigurationError(
+            f'{topic.name}: quality of service not readable: {error!r}'
+        ) from None
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=max(depth for depth, _, _ in found),
+        reliability=min(reliability for _, reliability, _ in found),
+        durability=min(durability for _, _, durability in found),
+    )
+
+
+def _profile(profile: dict) -> tuple[int, ReliabilityPolicy, DurabilityPolicy]:
+    keeps_all = _policy(profile, 'history', HistoryPolicy.KEEP_LAST) is HistoryPolicy.KEEP_ALL
+    return (
+        _DEPTH if keeps_all else int(profile.get('depth') or _DEPTH),
+        _policy(profile, 'reliability', ReliabilityPolicy.RELIABLE),
+        _policy(profile, 'durability', DurabilityPolicy.VOLATILE),
+    )
+
+
+def _policy(profile: dict, name: str, unknown):
+    """Policy of a profile, of the kind of that which is taken where none is known."""
+    kind, told = type(unknown), profile.get(name, 0)
+    if isinstance(told, int):
+        return kind(told) if told in (1, 2) else unknown
+    return kind.__members__.get(told.upper(), unknown)
+
+
+def message_class(topic: BagTopic) -> type:
+    """Message type of a recorded topic.
+
+    Raises
+    ------
+    ConfigurationError
+        If its package is not installed.
+    """
+    package, _, name = topic.type_name.partition('/')
+    try:
+        module = importlib.import_module(f'{package}.msg')
+        return getattr(module, name.rpartition('/')[2])
+    except (ImportError, AttributeError, ValueError):
+        raise ConfigurationError(
+            f'{topic.name}: its type {topic.type_name!r} is not installed here; choose others '
+            f'with --topics'
+        ) from None
+
+
+# ---------------------------------------------------------------------- replaying
+
+
+class _Output:
+    """A publisher that never has more on the way than it keeps."""
+
+    def __init__(self, node: Node, name: str, topic: BagTopic) -> None:
+        self.name, self.qos = name, qos_of(topic)
+        self.publisher = node.create_publisher(message_class(topic), name, self.qos)
+        self.count = 0
+        self._on_the_way = 0
+        self._reliable = self.qos.reliability is ReliabilityPolicy.RELIABLE
+
+    def publish(self, raw: bytes) -> None:
+        """Publish a message, once there is room for it."""
+        if self._on_the_way >= max(1, self.qos.depth // 2):
+            self.wait()
+        self.publisher.publish(raw)
+        self.count += 1
+        self._on_the_way += 1
+
+    def wait(self) -> None:
+        """Wait until every subscriber has what was published."""
+        if self._reliable:
+            _wait_for_acks(self.publisher)
+        self._on_the_way = 0
+
+
+def _wait_for_acks(publisher) -> None:
+    """Wait until every subscriber has what was published; Ctrl-C is heard."""
+    while not publisher.wait_for_all_acked(Duration(seconds=_PATIENCE_S)):
+        pass
+
+
+class _Brake:
+    """Keeps a replay from running away from a recorder in lockstep, as a plant does."""
+
+    def __init__(self, node: Node, plan: Plan) -> None:
+        topic = TOPICS['recorded']
+        needed = present((topic.name for topic in TOPICS.values() if topic.per_tick), ())
+        names = {TOPICS[name].full_name(plan.namespace) for name in needed}
+        self._whole = names <= set(plan.names.values())
+        self._node, self._odom = node, TOPICS['odom'].full_name(plan.namespace)
+        self._subscription = node.create_subscription(
+            topic.message_type,
+            topic.full_name(plan.namespace),
+            lambda message: None,
+            topic.qos,
+        )
+        self._recorded_ns: int | None = None
+
+    def wait(self, log_ns: int) -> None:
+        """Wait until the recorder is not too far behind."""
+        if self._recorded_ns is None:
+            self._recorded_ns = log_ns
+        while self._whole and log_ns - self._recorded_ns > MAX_TICKS_AHEAD['recorded'] * TICK_NS:
+            message = take(self._subscription)
+            if message is not None:
+                self._recorded_ns = Time.from_msg(message.stamp).nanoseconds
+            elif self._is_recorded():
+                time.sleep(0.001)
+            else:
+                self._recorded_ns = log_ns
+
+    def _is_recorded(self) -> bool:
+        """Whether a recorder in lockstep listens: it alone says what it has on disk.
+
+        The name of a node can come later than its subscriptions.
+        """
+        return any(
+            info.node_name in (topics.RECORDER, _NAME_UNKNOWN)
+            and info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+            for info in self._node.get_subscriptions_info_by_topic(self._odom)
+        )
+
+
+class _Count:
+    """Tells a recorder in lockstep how many events there were, as the nodes do by themselves."""
+
+    def __init__(self, node: Node, plan: Plan) -> None:
+        topic, self._name = TOPICS['told'], _join(plan.namespace, topics.REPLAY)
+        self._events_on = {i for i, name in plan.names.items() if name == '/diagnostics'}
+        self.publisher = node.create_publisher(
+            topic.message_type, topic.full_name(plan.namespace), topic.qos
+        )
+        self._events, self._newest_ns, self._told_ns = 0, -TICK_NS, -TICK_NS
+
+    def add(self, index: int) -> None:
+        """Count a message of a topic, given by its index in the bag."""
+        self._events += index in self._events_on
+
+    def tell_before(self, log_ns: int) -> None:
+        """Tell now and then, when a tick is over."""
+        if (
+            log_ns != self._newest_ns
+            and abs(self._newest_ns - self._told_ns) >= COUNT_TICKS * TICK_NS
+        ):
+            self.tell()
+        self._newest_ns = log_ns
+
+    def tell(self) -> None:
+        """Say how many events there were up to what was published last."""
+        self._told_ns = self._newest_ns
+        told = health.Told(self._name, self._events, self._newest_ns)
+        self.publisher.publish(to_cdr(health.told_array(told)))
+
+
+class Replay:
+    """Publishers for what is to be replayed. Use it as a context.
+
+    Parameters
+    ----------
+    plan : Plan
+    rate : float
+        Times real time; infinite: as fast as subscribers take it.
+    """
+
+    def __init__(self, plan: Plan, rate: float) -> None:
+        self._plan, self._rate = plan, rate
+        given_domain()
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            self._node = Node(
+                topics.REPLAY,
+                namespace=plan.namespace,
+                enable_rosout=False,
+                start_parameter_services=False,
+            )
+            self._outputs = {
+                index: _Output(self._node, name, plan.bag.topics[index])
+                for index, name in plan.names.items()
+            }
+            self._own_clock = None
+            if '/clock' not in plan.names.values():
+                clock = TOPICS['/clock']
+                self._own_clock = self._node.create_publisher(
+                    clock.message_type, clock.name, clock.qos
+                )
+            self._clock_ns = -TICK_NS
+            self._count = _Count(self._node, plan)
+            self._brake = _Brake(self._node, plan)
+        except BaseException:
+            rclpy.shutdown()
+            raise
+
+    def __enter__(self) -> 'Replay':
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._node.destroy_node()
+        rclpy.shutdown()
+
+    def missing_subscribers(self, count: int) -> list[str]:
+        """Topics asked for that fewer than ``count`` subscribers are connected to."""
+        return [
+            output.name
+            for output in self._outputs.values()
+            if output.name in self._plan.asked
+            and output.publisher.get_subscription_count() < count
+        ]
+
+    def wait_for(self, count: int, say: Callable[[str], None]) -> None:
+        """Wait until every topic that was asked for has that many subscribers."""
+        said = None
+        while missing := self.missing_subscribers(count):
+            if missing != said:
+                said = missing
+                say(f'waiting for {count} subscribers of {", ".join(missing)}')
+            time.sleep(0.02)
+
+    def run(self, progress: Progress) -> Played:
+        """Publish everything once."""
+        began_s = time.monotonic()
+        self._clock_ns = -TICK_NS
+        span_s = (self._plan.end_ns - self._plan.start_ns) / 1e9
+        shown_s = 0.0
+        profiles = {index: output.qos for index, output in self._outputs.items()}
+        for log_ns, index, raw in recorded_messages(self._plan, profiles):
+            passed_s = (log_ns - self._plan.start_ns) / 1e9
+            if math.isfinite(self._rate):
+                self._sleep_until(began_s + passed_s / self._rate, passed_s, progress)
+            self._brake.wait(log_ns)
+            self._count.tell_before(log_ns)
+            self._tell_time(log_ns)
+            self._outputs[index].publish(raw)
+            self._count.add(index)
+            now_s = time.monotonic()
+            if now_s - shown_s > _PATIENCE_S:
+                shown_s = now_s
+                progress(passed_s)
+        self._count.tell()
+        for output in self._outputs.values():
+            output.wait()
+        _wait_for_acks(self._count.publisher)
+        progress(span_s)
+        counts = {output.name: output.count for output in self._outputs.values()}
+        return Played(counts, time.monotonic() - began_s)
+
+    def _sleep_until(self, due_s: float, passed_s: float, progress: Progress) -> None:
+        while (left_s := due_s - time.monotonic()) > 0.0:
+            time.sleep(min(left_s, _PATIENCE_S))
+            progress(passed_s - max(0.0, due_s - time.monotonic()) * self._rate)
+
+    def _tell_time(self, log_ns: int) -> None:
+        """Publish /clock by the log times of a recording that has none."""
+        if self._own_clock is not None and log_ns - self._clock_ns >= TICK_NS:
+            self._clock_ns = log_ns
+            self._own_clock.publish(TOPICS['/clock'].codec.encode(log_ns, ()))
+
+
+def recorded_messages(
+    plan: Plan, profiles: dict[int, QoSProfile]
+) -> Iterator[tuple[int, int, bytes]]:
+    """Log time, topic and payload of the messages to publish.
+
+    Those that a latched topic held at the start come first, under the time of the start.
+
+    Parameters
+    ----------
+    plan : Plan
+    profiles : dict of QoSProfile
+        Of every topic that is published, by its index.
+    """
+    chosen = np.array(list(profiles))
+    held: dict[int, list[bytes]] = {}
+    latched = [
+        index
+        for index, profile in profiles.items()
+        if profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    ]
+    for batch in plan.bag.batches():
+        if batch.log_ns[0] > plan.end_ns:
+            break
+        for i in np.flatnonzero((batch.log_ns < plan.start_ns) & np.isin(batch.topic, latched)):
+            index = int(batch.topic[i])
+            kept = held.setdefault(index, [])
+            kept.append(batch.payload(i))
+            del kept[: -profiles[index].depth]
+        inside = (batch.log_ns >= plan.start_ns) & (batch.log_ns <= plan.end_ns)
+        for i in np.flatnonzero(inside & np.isin(batch.topic, chosen)):
+            for index, kept in held.items():
+                yield from ((plan.start_ns, index, raw) for raw in kept)
+            held = {}
+            yield int(batch.log_ns[i]), int(batch.topic[i]), batch.payload(i)
+
+
+def check_not_empty(plan: Plan) -> None:
+    """Refuse a plan by which nothing is published.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming the topics and the time.
+    """
+    for batch in plan.bag.batches():
+        inside = (batch.log_ns >= plan.start_ns) & (batch.log_ns <= plan.end_ns)
+        if np.any(inside & np.isin(batch.topic, list(plan.names))):
+            return
+    span = f'{(plan.start_ns - plan.bag.start_ns) / 1e9:.1f} s to '
+    span += f'{(plan.end_ns - plan.bag.start_ns) / 1e9:.1f} s'
+    raise ConfigurationError(
+        f'nothing to replay: no message on {", ".join(plan.names.values()) or "any topic"} '
+        f'from {span} of the recording'
+    )

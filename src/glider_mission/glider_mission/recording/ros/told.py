@@ -1,0 +1,104 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the nodes of a recorded run were told: their settings, from wherever they stand."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from glider_base.files import read_yaml
+from glider_base.ros.parameters import from_parameters
+from glider_base.settings import ConfigurationError, Settings
+from glider_mission.blocks import BLOCKS
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.run_folder import PARAMETERS_FILE, SCENARIO_FILE, find_scenario
+from glider_mission.scenario import Scenario, load_scenario
+
+
+class Told(NamedTuple):
+    """What the nodes of a recorded run were told."""
+
+    blocks: dict[str, Settings | None]  #: by name of the block; None: it is not known
+    source: str  #: where it stands
+    lockstep: bool | None  #: None: it does not say
+
+    @property
+    def steers_by(self) -> str:
+        """Name of the vehicle's steering surface; empty without, or if nobody knows."""
+        known = (block for block in BLOCKS if self.blocks[block.wired.name] is not None)
+        names = (block.steers_by(self.blocks[block.wired.name]) for block in known)
+        return next(filter(None, names), '')
+
+
+def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
+    """Settings of the blocks of a recorded run.
+
+    Parameters
+    ----------
+    bag : Bag
+    path : Path
+        Its folder or file. A scenario.yaml that lies there counts, else the one attached.
+    file : Path, optional
+        Scenario or parameter file that counts instead.
+    scratch : Path
+        Folder for attached files. It has to stay as long as the settings are used.
+
+    Raises
+    ------
+    ConfigurationError
+        If there are none, or they cannot be used.
+    """
+    folder = path if path.is_dir() else path.parent
+    parameters = folder / PARAMETERS_FILE
+    lockstep = _lockstep(read_yaml(parameters)) if parameters.is_file() else None
+    if file is not None:
+        values = read_yaml(file)
+        if _is_parameters(values):
+            return Told(_from_parameters(values, str(file)), str(file), _lockstep(values))
+        return Told(_from_scenario(load_scenario(str(file), recorded=True)), str(file), lockstep)
+    found = find_scenario(bag.files[0], folder, bag.attachments, scratch)
+    if found is not None:
+        return Told(_from_scenario(found.scenario), found.source, lockstep)
+    if parameters.is_file():
+        values = read_yaml(parameters)
+        return Told(_from_parameters(values, str(parameters)), str(parameters), lockstep)
+    raise ConfigurationError(
+        f'{path}: it does not say what the nodes were told, neither {SCENARIO_FILE} nor '
+        f'{PARAMETERS_FILE} is in it or attached: give --settings FILE'
+    )
+
+
+def _from_scenario(scenario: Scenario) -> dict[str, Settings | None]:
+    settings = zip(BLOCKS, scenario.block_settings(), strict=True)
+    return {block.wired.name: one for block, one in settings}
+
+
+def _sections(values: dict) -> dict[str, dict]:
+    """Parameters by node name; those under a wildcard under ``'**'``."""
+    return {
+        str(key).rstrip('/').rpartition('/')[2]: section['ros__parameters']
+        for key, section in values.items()
+        if isinstance(section, dict) and isinstance(section.get('ros__parameters'), dict)
+    }
+
+
+def _is_parameters(values: dict) -> bool:
+    return bool(_sections(values))
+
+
+def _lockstep(values: dict) -> bool | None:
+    """Whether the nodes of a parameter file keep step; None if it does not say."""
+    said = [section.get('lockstep') for section in _sections(values).values()]
+    said = [one for one in said if isinstance(one, bool)]
+    return all(said) if said else None
+
+
+def _from_parameters(values: dict, source: str) -> dict[str, Settings | None]:
+    sections = _sections(values)
+    found: dict[str, Settings | None] = {}
+    for block in BLOCKS:
+        node = block.wired.node
+        given = {**sections.get('**', {}), **sections.get(node, {})}
+        told = node in sections or '**' in sections
+        settings = from_parameters(block.settings, given, f'{source}: {node}') if told else None
+        found[block.wired.name] = settings
+    return found

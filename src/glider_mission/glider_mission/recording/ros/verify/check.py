@@ -1,0 +1,250 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""One block at work on recorded inputs, and what has been found so far."""
+
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+
+from glider_base import wiring
+from glider_base.block import Telling
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.orders import ABORT, CLEAR, PARAMETERS_SET, SURFACE
+from glider_base.ros.parameters import with_parameters
+from glider_base.ros.wire.codec import to_cdr
+from glider_base.settings import ConfigurationError
+from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
+from glider_mission.recording.recorded_inputs import RecordedBlock
+from glider_mission.recording.ros.recorded_run import Event, Recording, Series
+from glider_mission.recording.ros.verify.messages import field_difference, message_difference
+from glider_mission.recording.ros.verify.ticks import TICKS_OF_THE_END, Track
+from glider_mission.recording.ros.verify.verdict import (
+    DIFFERENT,
+    IDENTICAL,
+    NOT_RECORDED,
+    WHOLE,
+    Difference,
+    Verdict,
+    time_text,
+)
+from glider_model.plant.block import PLANT
+
+#: Orders that change what a block does.
+ORDERS = (ABORT, CLEAR, PARAMETERS_SET, SURFACE)
+#: Bytes in which an event may differ from what is expected, and still be taken for it.
+_BYTES_ALIKE = 16
+
+
+Tracks = dict[str, Track]
+#: The track of a topic, and the messages that have no place in it.
+Place = Callable[[Series], tuple[Track, list[int]]]
+
+
+class Check:
+    """One block at work, and what has been found so far."""
+
+    def __init__(self, block: RecordedBlock, recording: Recording, stamps_ns: np.ndarray) -> None:
+        self.block, self.recording, self.stamps_ns = block, recording, stamps_ns
+        self.found: list[Difference] = []
+        self.compared: Counter[str] = Counter()
+        self.differing: Counter[str] = Counter()
+        self.notes: list[str] = []
+        self.flags = np.zeros((len(stamps_ns), len(block.block.flags)), np.int64)
+        self.ticks = 0
+        #: paths that guidance followed, one after the other, and from when (ns)
+        self.paths = [(block.settings.path, 0)] if block.block.wired == wiring.GUIDANCE else []
+        self._orders = _orders(recording.events, recording.node(block.block.wired.node))
+
+    def add(self, difference: Difference) -> None:
+        """Keep a difference."""
+        self.differing[difference.topic] += 1
+        self.found.append(difference)
+
+    def tracks(self, place: Place, why: str) -> Tracks:
+        """Tracks of the outputs that are recorded.
+
+        Parameters
+        ----------
+        place : callable
+            Gives the track of a topic, and the messages that have no place in it.
+        why : str
+            What is wrong with those, in words.
+        """
+        tracks = {}
+        for name in self.block.outputs:
+            series = self.recording.series.get(name)
+            if series is None:
+                self.notes.append(f'{name} is not recorded')
+                continue
+            tracks[name], left = place(series)
+            for i in left:
+                text = f'message {i} of the topic, {why}'
+                stamp_ns = int(series.stamps_ns[i])
+                self.add(Difference(stamp_ns, name, WHOLE, text, 'not computed'))
+        return tracks
+
+    # .................................................................. steps
+
+    def cuts(self, count: int) -> list[int]:
+        """Steps before which an order changes the block."""
+        at = {int(np.searchsorted(self.stamps_ns, order.stamp_ns)) for order in self._orders}
+        return sorted(i for i in at if i < count)
+
+    def follow_orders(self, step: int) -> None:
+        """Do what was asked of the block before a step."""
+        stamp_ns = self.stamps_ns[step]
+        while self._orders and self._orders[0].stamp_ns <= stamp_ns:
+            order = self._orders.pop(0)
+            if order.message in (ABORT, SURFACE):
+                self.block.surface()
+                continue
+            if order.message == CLEAR:
+                self.block.clear()
+                continue
+            try:
+                settings = with_parameters(self.block.settings, order.values)
+                if self.paths and settings.path != self.paths[-1][0]:
+                    self.paths.append((settings.path, order.stamp_ns))
+                self.block.tune(settings)
+            except ConfigurationError as error:
+                self.notes.append(f'parameters set at {time_text(order.stamp_ns)}: {error}')
+
+    def run(self, start: int, end: int, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Outputs of the steps from start to end; rows are the messages of the inputs."""
+        series = self.recording.series
+        inputs = {name: series[name].values[index] for name, index in rows.items()}
+        computed, self.flags[start:end] = self.block.run(self.stamps_ns[start:end], inputs)
+        self.ticks = end
+        return computed
+
+    def differs(self, track: Track, start: int, values: np.ndarray) -> np.ndarray:
+        """Which of the steps from ``start`` on have another message than computed; bool[n]."""
+        index = track.index[start : start + len(values)]
+        series = track.series
+        recorded = series.values[index]
+        same = np.all(recorded.view(np.int64) == values.view(np.int64), axis=1)
+        stamps_ns = self.stamps_ns[start : start + len(values)]
+        same &= (series.stamps_ns[index] == stamps_ns) & series.own[index]
+        return ~same & (index >= 0)
+
+    def compare(self, name: str, track: Track, start: int, values: np.ndarray) -> None:
+        """Compare the outputs on one topic, for the steps from ``start`` on."""
+        index = track.index[start : start + len(values)]
+        self.compared[name] += int(np.count_nonzero(index >= 0))
+        found = np.flatnonzero(self.differs(track, start, values))
+        self.differing[name] += len(found)
+        if len(found):
+            row = int(found[0])
+            raw = track.series.payload(int(index[row]))
+            stamp_ns = int(self.stamps_ns[start + row])
+            self.found.append(
+                message_difference(name, track.series.codec, stamp_ns, values[row], raw)
+            )
+        for row in np.flatnonzero(index < 0):
+            if start + row < track.end or track.end + TICKS_OF_THE_END < len(track.index):
+                self.miss(name, start + int(row))
+
+    def miss(self, name: str, step: int) -> None:
+        """Keep that the message of a step is not there."""
+        self.differing[name] += 1
+        stamp_ns = int(self.stamps_ns[step])
+        self.found.append(Difference(stamp_ns, name, WHOLE, 'a message', NOT_RECORDED))
+
+    # .................................................................. events, path, verdict
+
+    def compare_paths(self) -> None:
+        """Compare the paths that guidance published: that of its settings, and those ordered."""
+        if 'path' not in self.recording.recorded:
+            self.notes.append('path is not recorded')
+            return
+        paths = [path_message(path.points(PATH_POINTS), at_ns) for path, at_ns in self.paths]
+        expected = [to_cdr(path) for path in paths]
+        stamp_ns = int(self.stamps_ns[0])
+        self.compared['path'] += len(self.recording.paths)
+        for recorded in self.recording.paths:
+            if recorded not in expected:
+                self.add(Difference(stamp_ns, 'path', *field_difference(paths[0], recorded)))
+        for raw in expected:
+            if raw not in self.recording.paths:
+                self.add(Difference(stamp_ns, 'path', WHOLE, 'a message', NOT_RECORDED))
+
+    def compare_events(self, expected: list[DiagnosticArray], is_ours) -> None:
+        """Compare the events that the block tells with those on record."""
+        if '/diagnostics' not in self.recording.recorded:
+            self.notes.append('/diagnostics is not recorded')
+            return
+        end_ns = int(self.stamps_ns[self.ticks - 1])
+        left = Counter(event.raw for event in self.recording.events)
+        missing = []
+        for array in expected:
+            raw = to_cdr(array)
+            if left[raw]:
+                left[raw] -= 1
+                self.compared['/diagnostics'] += 1
+            else:
+                missing.append((array, raw))
+        rest = []
+        for event in self.recording.events:
+            if left[event.raw]:
+                left[event.raw] -= 1
+                rest.append(event)
+        for array, raw in missing:
+            alike = [e for e in rest if len(e.raw) == len(raw) and _alike(e.raw, raw)]
+            if alike:
+                rest.remove(alike[0])
+                found = field_difference(array, alike[0].raw)
+                self.compared['/diagnostics'] += 1
+            else:
+                found = (WHOLE, repr(array.status[0].message), NOT_RECORDED)
+            self.add(Difference(health.stamp_of(array), '/diagnostics', *found))
+        for event in rest:
+            if is_ours(event) and event.stamp_ns <= end_ns:
+                found = WHOLE, repr(event.message), 'not computed'
+                self.add(Difference(event.stamp_ns, '/diagnostics', *found))
+
+    def verdict(self) -> Verdict:
+        """What came out."""
+        first = min(self.found, key=lambda one: one.stamp_ns, default=None)
+        return Verdict(
+            block=self.block.block.wired.name,
+            result=DIFFERENT if first else IDENTICAL,
+            ticks=self.ticks,
+            compared=dict(self.compared),
+            differing={name: n for name, n in self.differing.items() if n},
+            first=first,
+            notes=self.notes,
+        )
+
+
+def _alike(one: bytes, other: bytes) -> bool:
+    return sum(a != b for a, b in zip(one, other, strict=True)) <= _BYTES_ALIKE
+
+
+def _orders(events: list[Event], node: str) -> list[Event]:
+    """Orders that a node was given in flight, in the order in which it followed them."""
+    asked = [e for e in events if e.node == node and e.message in ORDERS]
+    return sorted(asked, key=lambda event: event.stamp_ns)
+
+
+def finish_events(check: Check) -> None:
+    """Compare what the block tells on /diagnostics, and the path."""
+    stamps_ns, flags = check.stamps_ns[: check.ticks], check.flags[: check.ticks]
+    block = check.block.block
+    node = check.recording.node(block.wired.node)
+    if block.wired == wiring.GUIDANCE:
+        check.compare_paths()
+    if block.say:
+        told = Telling(block, int(stamps_ns[0])).among(flags, stamps_ns)
+        arrays = [
+            health.said_array(int(stamps_ns[i]), node, block.say(*flags[i].tolist())) for i in told
+        ]
+        check.compare_events(arrays, lambda e: e.node == node and block.flags[0] in e.values)
+    elif block is PLANT:
+        ends = [int(stamp_ns) for stamp_ns in stamps_ns[flags[:, 0] > 0]]
+        arrays = [
+            health.report_array(health.Report(node, health.FINISHED, health.COMPLETE, stamp_ns))
+            for stamp_ns in ends
+        ]
+        check.compare_events(arrays, lambda e: e.node == node and e.message == health.COMPLETE)

@@ -1,0 +1,92 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Recorded inputs through today's code, and its outputs against the recorded ones, byte by byte.
+
+Every block gets the inputs that were recorded, not what the other blocks make of them today. A
+change in one block therefore shows in that block and in no other.
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from glider_base import wiring
+from glider_base.block import optional_topics
+from glider_base.signals import TICK_NS
+from glider_base.wiring import WHEN_SILENT, Wired, present
+from glider_mission.blocks import BLOCKS
+from glider_mission.recording.recorded_inputs import RecordedBlock
+from glider_mission.recording.ros.recorded_run import Recording
+from glider_mission.recording.ros.told import Told
+from glider_mission.recording.ros.verify.free_running import free_running
+from glider_mission.recording.ros.verify.lockstep import in_lockstep
+from glider_mission.recording.ros.verify.verdict import SKIPPED, Verdict
+
+
+def is_lockstep(recording: Recording, told: Told) -> bool:
+    """Whether the nodes kept step: as they were told or, if nobody says, by what it looks like."""
+    return _keeps_step(recording) if told.lockstep is None else told.lockstep
+
+
+def _keeps_step(recording: Recording) -> bool:
+    """Whether each output has every tick of its inputs once."""
+    odom = recording.series.get('odom')
+    if odom is None or np.mean(odom.stamps_ns % TICK_NS == 0) < 0.5:
+        return False
+    outputs = [recording.series[n] for n in ('tracking_error', 'wrench') if n in recording.series]
+    repeated = sum(int(np.count_nonzero(np.diff(one.stamps_ns) == 0)) for one in outputs)
+    return repeated <= 1
+
+
+def _reason_to_skip(wired: Wired, settings, recording: Recording, lockstep: bool) -> str:
+    if settings is None:
+        return 'the settings say nothing about it'
+    topics = optional_topics(settings)
+    missing = [name for name in present(wired.inputs, topics) if name not in recording.series]
+    if missing:
+        return f'its input {" and ".join(missing)} is not recorded'
+    outputs = present(wired.outputs, topics)
+    if not any(name in recording.series for name in outputs):
+        return f'none of {", ".join(outputs)} is recorded'
+    silent = [name for name in present(wired.inputs, topics) if name in WHEN_SILENT]
+    if not lockstep and (silent or wired in (wiring.PLANT, wiring.CURRENT)):
+        return 'free-running: which inputs it had at a tick is not on record'
+    return ''
+
+
+def verify(
+    recording: Recording,
+    told: Told,
+    only: list[str],
+    progress: Callable[[str, float], None],
+) -> Iterator[Verdict]:
+    """Compare every block of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+    told : Told
+        What the nodes were told.
+    only : list of str
+        Blocks to compare; empty: all of them.
+    progress : callable
+        Called now and then with the name of a block and the share that is done, 0 to 1.
+
+    Yields
+    ------
+    Verdict
+        For each block, in the order in which they act in a tick.
+    """
+    lockstep = is_lockstep(recording, told)
+    for block in BLOCKS:
+        name = block.wired.name
+        if only and name not in only:
+            continue
+        settings = told.blocks[name]
+        reason = _reason_to_skip(block.wired, settings, recording, lockstep)
+        if reason:
+            yield Verdict(name, SKIPPED, reason)
+            continue
+        work = in_lockstep if lockstep else free_running
+        recorded = RecordedBlock(block, settings)
+        yield work(recorded, recording, lambda share, name=name: progress(name, share))

@@ -1,0 +1,541 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Scenarios: one validated YAML file that says everything about a mission."""
+
+import json
+import math
+import shlex
+from copy import deepcopy
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+import pydantic
+from pydantic import Field
+
+from glider_base.errors import clipped, shown, told_changes
+from glider_base.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
+from glider_base.frames import OriginSettings
+from glider_base.settings import (
+    ConfigurationError,
+    Settings,
+    file_names,
+    find_file,
+    holder_of,
+    validate,
+)
+from glider_base.wiring import SENSORS
+from glider_control.law import LawSettings
+from glider_control.settings import ControlLawSettings, ControlSettings, check_law, with_law
+from glider_guard.settings import GuardLimitSettings, GuardSettings
+from glider_guidance.order import Order
+from glider_guidance.orders import check_orders
+from glider_guidance.path.curve import path_length, path_point
+from glider_guidance.path.settings import PathSettings, StraightPath
+from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
+from glider_guidance.yo.machine import ProfileSettings
+from glider_mission.rules import Rules
+from glider_model.ocean.current_settings import CurrentSettings
+from glider_model.ocean.water import WaterSettings
+from glider_model.onboard.gate import GateSettings
+from glider_model.plant.faults.settings import (
+    FAULTS,
+    Fault,
+    FaultSettings,
+    Message,
+    check_actuators,
+)
+from glider_model.plant.plant import SURFACE_S, InitialSettings, PlantSettings
+from glider_model.plant.sensors import SensorSettings
+from glider_model.vehicle.file import changed_vehicle, load_vehicle, vehicle_names, vehicle_path
+from glider_model.vehicle.perturb import PerturbSettings, perturbed
+from glider_navigation.settings import NavigationLawSettings, NavigationSettings
+
+SCENARIO_FOLDER = Path(__file__).parent / 'scenarios'
+DEFAULT_SCENARIO = 'current_8deg'
+#: Field that names the vehicle, and what the names of fields in its file begin with.
+VEHICLE = 'vehicle'
+
+#: The farthest that a belief may jump at a fix (m).
+JUMP_M = 1e8
+
+#: A run of this simulated time or more is a long one, with the longer settling time (s).
+LONG_RUN_S = 20000.0
+SETTLE_LONG_S, SETTLE_SHORT_S = 7200.0, 1800.0
+#: Of a short run this share is left out at most.
+SETTLE_SHARE = 0.5
+
+#: Fields of which only one can be given: setting one of them by hand replaces the other.
+_ALTERNATIVES = (
+    ('speed_kn', 'speed_mps'),
+    ('angle_deg', 'direction_deg'),
+    ('descent_per_turn_m', 'slope_deg'),
+)
+
+
+class Scenario(Settings):
+    """A mission: vehicle, water, path, profile, current, guidance, control, and its end."""
+
+    #: What the control node is told, as a type: it knows the same laws.
+    control_kind: ClassVar[type[ControlSettings]] = ControlSettings
+
+    name: str = Field(
+        pattern=r'^[A-Za-z0-9_][A-Za-z0-9_.-]*$',
+        max_length=100,
+        description='name, used for files',
+    )
+    description: str = Field('', max_length=2000, description='what the scenario shows')
+    changed: dict[str, str] = Field(
+        {}, description='fields that were changed since there was a file, by options and --set'
+    )
+    vehicle: str = Field(
+        'zhang2021', description='vehicle by name, or path of a file relative to this one'
+    )
+    seed: int = Field(0, ge=0, le=2**63 - 1, description='seed of everything random')
+    dives: int = Field(
+        1, ge=0, le=100000, description='dives of a run without --duration; 0: until duration_s'
+    )
+    duration_s: float = Field(
+        108000.0, ge=0.1, le=1e8, description='simulated time of --duration full (s)'
+    )
+    settle_s: float | None = Field(
+        None,
+        ge=0.0,
+        le=1e8,
+        description='time left out of the score (s); by default 7200 in long runs, else 1800, a '
+        'dive to depth_m or half of the run, whichever is shortest',
+    )
+    initial: InitialSettings = Field(
+        InitialSettings(depth_m=0.1), description='state at the start'
+    )
+    water: WaterSettings = Field(
+        WaterSettings(), description='density of the water, its bottom, and wind'
+    )
+    current: CurrentSettings = Field(CurrentSettings(), description='current')
+    sensors: SensorSettings = Field(SensorSettings(), description='errors of the sensors')
+    origin: OriginSettings = Field(
+        OriginSettings(), description='where the origin of the path lies on the Earth'
+    )
+    navigation: NavigationLawSettings = Field(
+        NavigationLawSettings(), description='where the vehicle believes it is'
+    )
+    perturb: PerturbSettings = Field(
+        PerturbSettings(), description='what the plant differs in from its vehicle file'
+    )
+    faults: list[Fault] = FAULTS
+    path: PathSettings = Field(
+        StraightPath(kind='straight', length_m=25000.0), description='path to follow'
+    )
+    profile: ProfileSettings = Field(ProfileSettings(), description='sawtooth')
+    orders: list[Order] = Field([], description='what the vehicle is told in flight, and when')
+    guidance: GuidanceLawSettings = Field(GuidanceLawSettings(), description='guidance')
+    control: ControlLawSettings = Field(ControlLawSettings(), description='control')
+    guard: GuardLimitSettings = Field(
+        GuardLimitSettings(), description='when the guard acts, which has the last word'
+    )
+
+    @pydantic.field_validator('current')
+    @classmethod
+    def _one_seed(cls, current: CurrentSettings) -> CurrentSettings:
+        if 'seed' in current.model_fields_set:
+            raise ValueError('seed belongs to the scenario, not to its current')
+        return current
+
+    @property
+    def described(self) -> str:
+        """Its description, and what is not as described."""
+        but = f'but with {told_fields(self.changed)}' if self.changed else ''
+        return ', '.join(filter(None, (self.description, but)))
+
+    @property
+    def vehicle_faults(self) -> list[FaultSettings]:
+        """Faults of the vehicle itself."""
+        return [fault for fault in self.faults if not isinstance(fault, Message)]
+
+    @property
+    def message_faults(self) -> list[Message]:
+        """What goes wrong with messages between nodes."""
+        return [fault for fault in self.faults if isinstance(fault, Message)]
+
+    def plant_settings(self) -> PlantSettings:
+        """What the plant node is told."""
+        return PlantSettings(
+            vehicle=self.vehicle,
+            water=self.water,
+            initial=self.initial,
+            duration_s=self.duration_s,
+            dives=0 if self._holds else self.dives,
+            dive_depth_m=self.profile.depth_m,
+            afloat_s=self._afloat_s(),
+            seed=self.seed,
+            sensors=self.sensors,
+            fitted=[name for name in SENSORS if name in self.topics],
+            origin=self.origin,
+            perturb=self.perturb,
+            faults=self.vehicle_faults,
+        )
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Those of the topics that not every run has that there are in a run of this."""
+        return tuple(dict.fromkeys((*self.navigation.topics, *self.sensors.also_fitted)))
+
+    @property
+    def _holds(self) -> bool:
+        """Whether the vehicle is told to hold: such a mission ends by its time alone."""
+        return any(order.hold for order in self.orders)
+
+    def _afloat_s(self) -> float:
+        """Time (s) afloat that ends a run: longer than any wait of its mission; 0: never."""
+        if self.path.at_end == 'continue' or self._holds:
+            return 0.0
+        profile = self.profile
+        waits_s = profile.wait_s + profile.prepare_s if profile.surface_every_dives else 0.0
+        return waits_s + SURFACE_S
+
+    def current_settings(self) -> CurrentSettings:
+        """What the current node is told: directions absolute, the scenario's seed."""
+        resolved = self.current.resolved(self.path.course_rad())
+        return resolved.model_copy(update={'seed': self.seed})
+
+    def constant_current(self) -> tuple[float, float]:
+        """Constant part of the current, north and east (m/s)."""
+        current = self.current_settings()
+        if current.speed_mps is None:
+            return 0.0, 0.0
+        direction = math.radians(current.direction_deg)
+        return (
+            current.speed_mps * math.cos(direction),
+            current.speed_mps * math.sin(direction),
+        )
+
+    def navigation_settings(self) -> NavigationSettings:
+        """What the navigation node is told."""
+        return NavigationSettings(
+            vehicle=self.vehicle,
+            origin=self.origin,
+            north_m=self.initial.north_m,
+            east_m=self.initial.east_m,
+            imu_period_s=self.sensors.imu_period_s,
+            gyro=self.sensors.gyro,
+            also_fitted=self.sensors.also_fitted,
+            **{
+                **dict(self.navigation),
+                'forecast': self.navigation.forecast.resolved(self.path.course_rad()),
+            },
+        )
+
+    def guidance_settings(self) -> GuidanceSettings:
+        """What the guidance node is told."""
+        return GuidanceSettings(
+            vehicle=self.vehicle,
+            path=self.path,
+            profile=self.profile,
+            dives=self.dives,
+            duration_s=self.duration_s,
+            orders=self.orders,
+            **self._believing(self.guidance),
+        )
+
+    def _believing(
+        self, law: GuidanceLawSettings | ControlLawSettings | GuardLimitSettings
+    ) -> dict[str, Any]:
+        """Fields of a law that is told where the vehicle believes it is.
+
+        A belief may jump at a fix as far as it was off: that is no fault, unless somebody said so.
+        """
+        fields = dict(law)
+        if not self.navigation.jumps or law.gate.position_jump_m != GateSettings().position_jump_m:
+            return fields
+        return {**fields, 'gate': law.gate.model_copy(update={'position_jump_m': JUMP_M})}
+
+    def control_settings(self) -> ControlSettings:
+        """What the control node is told."""
+        return self.control_kind(vehicle=self.vehicle, **self._believing(self.control))
+
+    def guard_settings(self) -> GuardSettings:
+        """What the guard node is told."""
+        return GuardSettings(
+            vehicle=self.vehicle,
+            pressure='pressure' in self.topics,
+            altitude='altitude' in self.topics,
+            imu_period_s=self.sensors.imu_period_s,
+            imu_missed_share=self.sensors.imu_missed_share,
+            depth_resolution_m=self.sensors.depth_resolution_m,
+            **self._believing(self.guard),
+        )
+
+    def block_settings(self) -> tuple[Settings, ...]:
+        """What the node of each block is told, in the order of `glider_mission.blocks`."""
+        return (
+            self.plant_settings(),
+            self.current_settings(),
+            self.navigation_settings(),
+            self.guidance_settings(),
+            self.control_settings(),
+            self.guard_settings(),
+        )
+
+    def settle_time_s(self, sim_time_s: float) -> float:
+        """Settling time (s) of a run that lasted ``sim_time_s``."""
+        if self.settle_s is not None:
+            return self.settle_s
+        if sim_time_s >= LONG_RUN_S:
+            return SETTLE_LONG_S
+        return min(SETTLE_SHORT_S, self._glide_s(), SETTLE_SHARE * sim_time_s)
+
+    def score_rules(self, sim_time_s: float) -> Rules:
+        """By what a run that lasted ``sim_time_s`` is scored."""
+        end = path_point(path_length(self.path.params()), self.path.params())
+        return Rules(
+            self.settle_time_s(sim_time_s),
+            self.profile.depth_m,
+            self._glide_s(),
+            self.navigation.method,
+            end[:2],
+        )
+
+    def _glide_s(self) -> float:
+        """Time of a glide to the depth of the lower turn (s); infinite along a path in 3-D."""
+        if self.profile.mode == 'path':
+            return math.inf
+        profile = self.guidance_settings().params().profile
+        return profile.depth / profile.glide_rate
+
+    def to_yaml(self, vehicle: str = '') -> str:
+        """The scenario as a file that loads to the same scenario.
+
+        It can be loaded where nobody has the laws and methods of others that do not fly in it, if
+        it says nothing of them.
+
+        Parameters
+        ----------
+        vehicle : str
+            What the file calls the vehicle, if something else than the scenario does.
+        """
+        left_out = {
+            **({} if self.changed else {'changed': True}),
+            'current': {'seed'},
+            'navigation': self.navigation.idle,
+            'guidance': self.guidance.idle,
+            'control': self.control.idle(load_vehicle(self.vehicle).steers_by),
+        }
+        values = self.model_dump(mode='json', exclude_none=True, exclude=left_out)
+        return yaml_text({**values, 'vehicle': vehicle or self.vehicle})
+
+
+#: Kinds of scenario that know one law more, which this program brought, by its name.
+_WITH_LAW: dict[str, type[Scenario]] = {}
+
+
+def know_law(law: type[LawSettings]) -> str:
+    """Let scenarios of this program fly a law that is not registered; returns its name.
+
+    A later class of the same name takes the place of an earlier one.
+
+    Raises
+    ------
+    ConfigurationError
+        If it cannot be called by its name, or one of its fields has no default.
+    """
+    name = law.__name__
+    check_law(name, law)
+    told, flown = with_law(name, law)
+    known = pydantic.create_model(
+        'Scenario', __base__=Scenario, control=(told, Field(told(), description='control'))
+    )
+    known.control_kind = flown
+    _WITH_LAW[name] = known
+    return name
+
+
+def _kind(values: dict[str, Any]) -> type[Scenario]:
+    """Type of the scenario of a file: that which knows its law."""
+    control = values.get('control')
+    law = control.get('law') if isinstance(control, dict) else None
+    return _WITH_LAW.get(law, Scenario) if isinstance(law, str) else Scenario
+
+
+def scenario_names() -> list[str]:
+    """Names of the scenarios that come with the package."""
+    return file_names(SCENARIO_FOLDER)
+
+
+def scenario_path(name: str) -> Path:
+    """File of a scenario given by name or by path.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is neither a scenario of that name nor such a file.
+    """
+    return find_file('scenario', name, SCENARIO_FOLDER)
+
+
+class ScenarioSource(NamedTuple):
+    """A scenario file as it was read."""
+
+    path: Path
+    values: dict[str, Any]
+
+
+def read_scenario(name: str = DEFAULT_SCENARIO) -> ScenarioSource:
+    """Read the file of a scenario given by name or by path; `make_scenario` validates it.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no such file, or it is not a YAML mapping.
+    """
+    path = scenario_path(name)
+    values = read_yaml(path)
+    values.setdefault('name', path.stem)
+    return ScenarioSource(path, values)
+
+
+def make_scenario(
+    source: ScenarioSource, changes: dict[str, Any] | None = None, recorded: bool = False
+) -> Scenario:
+    """Scenario of a file with some of its fields changed.
+
+    Parameters
+    ----------
+    source : ScenarioSource
+    changes : dict
+        Values by dotted field name, such as ``{'current.speed_kn': 0.5}``. Names that begin with
+        ``vehicle.`` are fields of the vehicle's file.
+    recorded : bool
+        It has been flown: nobody asks any more whether the vehicle is rated for its depth.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming file, field, value and allowed range.
+    """
+    path, values = source.path, deepcopy(source.values)
+    own, in_vehicle = split_changes(changes or {})
+    for field, value in own.items():
+        _set_field(values, field, value)
+    if changes:
+        before = values.get('changed')
+        before = before if isinstance(before, dict) else {}
+        values['changed'] = {**before, **{field: shown(value) for field, value in changes.items()}}
+    changed = told_changes(changes or {})
+
+    def line_of(location: tuple[str, ...]) -> int | None:
+        name = '.'.join(location)
+        here = any(overlap(field, name) for field in own)
+        return None if here else yaml_line(path, location)
+
+    scenario = validate(_kind(values), values, str(path), path.parent, line_of, changed)
+    scenario = _find_vehicle(scenario, path.parent, in_vehicle, f'{path}{changed}')
+    if not recorded:
+        try:
+            _check_glide(scenario)
+        except ConfigurationError as error:
+            raise ConfigurationError(f'{path}{changed}: {error}') from None
+    return scenario
+
+
+def split_changes(changes: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Fields of the scenario, and those of its vehicle by their names in the vehicle's file."""
+    inside = {field for field in changes if field.startswith(f'{VEHICLE}.')}
+    return (
+        {field: value for field, value in changes.items() if field not in inside},
+        {field.partition('.')[2]: changes[field] for field in changes if field in inside},
+    )
+
+
+def _check_glide(scenario: Scenario) -> None:
+    """Refuse a mission that its vehicle cannot fly, or water that there is not."""
+    scenario.guidance_settings().check()
+    check_orders(scenario.guidance_settings(), scenario.orders)
+    scenario.water.check_stable()
+    start_m, rated_m = scenario.initial.depth_m, load_vehicle(scenario.vehicle).rated_depth_m
+    if start_m > rated_m:
+        raise ConfigurationError(
+            f'initial.depth_m = {start_m:g}: deeper than the vehicle is rated for (allowed: <= '
+            f'{rated_m:g} m, its rated_depth)'
+        )
+
+
+def load_scenario(
+    name: str = DEFAULT_SCENARIO, changes: dict[str, Any] | None = None, recorded: bool = False
+) -> Scenario:
+    """Scenario by name or path, with some of its fields changed; see `make_scenario`."""
+    return make_scenario(read_scenario(name), changes, recorded)
+
+
+def _find_vehicle(
+    scenario: Scenario, folder: Path, changes: dict[str, Any], source: str
+) -> Scenario:
+    """Scenario whose vehicle is known to be good, wherever nodes are started from."""
+    beside = folder / scenario.vehicle
+    name = scenario.vehicle
+    if name not in vehicle_names() and beside.suffix and is_file(beside):
+        name = str(beside.resolve())
+    try:
+        path = vehicle_path(name)
+    except ConfigurationError as error:
+        raise ConfigurationError(f'{source}: {error}') from None
+    name = changed_vehicle(name if name in vehicle_names() else str(path.resolve()), changes)
+    vehicle = load_vehicle(name)
+    try:
+        perturbed(vehicle.params(), scenario.perturb)
+        scenario.control.steering(vehicle.steers_by)
+        check_actuators(scenario.faults, vehicle.steers_by)
+    except ConfigurationError as error:
+        raise ConfigurationError(f'{source}: {error}') from None
+    return scenario.model_copy(update={'vehicle': name})
+
+
+def _alternatives(name: str) -> tuple[str, ...]:
+    """Names of the fields of which only one can be given, this one among them."""
+    return next((pair for pair in _ALTERNATIVES if name in pair), (name,))
+
+
+def overlap(field: str, other: str) -> bool:
+    """Whether setting one field, given by its dotted name, undoes what set the other.
+
+    Which vehicle flies, and what is changed in it, are two things.
+    """
+    if VEHICLE in (field, other):
+        return field == other
+    *parents, last = field.split('.')
+    names = ['.'.join((*parents, name)) + '.' for name in _alternatives(last)]
+    return any(name.startswith(f'{other}.') or f'{other}.'.startswith(name) for name in names)
+
+
+def _set_field(values: dict, field: str, value) -> None:
+    """Set a field by its dotted name, making the mappings on the way."""
+    holder, last = holder_of(values, field), field.rpartition('.')[2]
+    for other in _alternatives(last):
+        holder.pop(other, None)
+    holder[last] = deepcopy(value)  # which may be changed by a field inside it
+
+
+def told_fields(changed: dict[str, str]) -> str:
+    """Fields that were changed, as a person set them."""
+    return ', '.join(f'{field}={value}' for field, value in changed.items())
+
+
+def parse_assignment(text: str) -> tuple[str, Any]:
+    """Field and value of a ``path.to.field=value`` option; the value is read as YAML.
+
+    Raises
+    ------
+    ConfigurationError
+        If the text has not this form.
+    """
+    field, sign, value = text.partition('=')
+    field = field.strip()
+    if not sign or not all(field.split('.')):
+        raise ConfigurationError(f'--set {clipped(text)}: expected path.to.field=value')
+    return field, parse_yaml(value, f'--set {clipped(text)}')
+
+
+def run_command(name: str, changes: dict[str, Any], options: str = '') -> str:
+    """Shell command that flies a scenario with some fields changed, by the direct engine."""
+    fields = (f'{field}={json.dumps(value)}' for field, value in changes.items())
+    sets = [f'--set {shlex.quote(field)}' for field in fields]
+    words = ['./glider run', shlex.quote(name), '--engine direct', options, *sets]
+    return ' '.join(word for word in words if word)

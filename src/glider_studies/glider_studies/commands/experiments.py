@@ -1,0 +1,93 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider experiments``: the paper's figures, and what goes beyond them."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from glider_base.errors import EXIT_FAILED
+from glider_bringup.console import (
+    Json,
+    Scheduler,
+    Workers,
+    counter,
+    messages,
+    output,
+    picked,
+    repeatable,
+)
+from glider_mission.disk import write_whole
+from glider_studies.at_work import workers_at_work
+
+app = typer.Typer()
+GROUPS = (
+    *('current', 'yaw', 'profile', 'robustness', 'vehicles', 'paths', 'envelope', 'navigation'),
+    *('faults', 'random_faults'),
+)
+Group = Literal[GROUPS]
+
+
+@app.command(epilog='Example: ./glider experiments --only robustness --only paths')
+def experiments(
+    only: Annotated[
+        list[repeatable(Group)] | None,
+        typer.Option(help='Group; can be repeated. Default: all of them.'),
+    ] = None,
+    flights: Annotated[
+        int, typer.Option(min=1, max=1_000_000, help='Missions of random_faults.')
+    ] = 200,
+    seed: Annotated[
+        int, typer.Option(min=0, max=2**31 - 1, help='Seed of the missions of random_faults.')
+    ] = 0,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    out: Annotated[
+        Path | None, typer.Option(help='Folder for experiments.json and the figures.')
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fly the experiments of the paper and what goes beyond them; exit code 1 if one fails.
+
+    By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
+    engine; the flights of the paper last 30 hours. random_faults breaks random missions in two or
+    three random ways, and judges them by their true motion alone.
+    """
+    from glider_mission.run_folder import make_result_folder
+    from glider_studies.hunt import search
+    from glider_studies.paper import experiments as paper
+    from glider_studies.paper import tables
+    from glider_studies.showing import paper_figures
+
+    groups = picked(only, Group)
+    planned = paper.make_experiments(groups)
+    hunts = search.NAME in groups
+    total = paper.count_flights(planned) + hunts * flights
+    if out:
+        make_result_folder(out, paper.RESULT_FILE)
+    messages.print(f'{len(planned) + hunts} experiments, {total} flights')
+    loops = paper.combinations(planned)
+    if hunts:
+        loops |= search.combinations(seed, flights)
+    with workers_at_work(workers, scheduler, loops) as pool, counter('flying', total) as update:
+        rows, records = paper.fly(planned, pool, update)
+        result = paper.report(planned, rows)
+        if hunts:
+            before = total - flights
+            found = search.search(seed, flights, pool, lambda done: update(before + done))
+            result['experiments'].append(found)
+            result |= found['counts']
+    if out:
+        with messages.status('drawing'):
+            drawn = paper_figures.draw(planned, rows, records, out)
+        write_whole(out / paper.RESULT_FILE, json.dumps(result, indent=2) + '\n')
+        for file in drawn:
+            messages.print(f'drawn: {file}', soft_wrap=True)
+    if as_json:
+        print(json.dumps(result))
+    else:
+        tables.show(result, output)
+    if any(one['verdict'] == paper.FAILED for one in result['experiments']):
+        raise typer.Exit(EXIT_FAILED)

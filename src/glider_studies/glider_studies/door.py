@@ -1,0 +1,114 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Sweeps from Python."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import xarray
+
+from glider_base.files import yaml_text
+from glider_base.settings import ConfigurationError
+from glider_bringup.console import compiling, counter
+from glider_bringup.door.netcdf import read_dataset
+from glider_mission.scenario import DEFAULT_SCENARIO, scenario_names, scenario_path
+from glider_studies.sweep import fly as study
+from glider_studies.sweep.plan import load_sweep
+from glider_studies.workers import worker_pool
+
+
+@contextmanager
+def _sweep_file(name: str | Path | Mapping, scenario: str | Path) -> Iterator[str]:
+    """Name or file of a sweep; of a mapping a file is made."""
+    if not isinstance(name, Mapping):
+        if scenario != DEFAULT_SCENARIO:
+            raise ConfigurationError(
+                f'scenario {scenario}: the sweep {name} has one of its own (allowed: with a '
+                'mapping of fields)'
+            )
+        yield str(name)
+        return
+    if not name:
+        raise ConfigurationError('sweep: no field to go through (allowed: one or more)')
+    dimensions = {
+        field.replace('.', '_'): {
+            'kind': 'values',
+            'field': field,
+            'values': np.asarray(list(values)).tolist(),
+        }
+        for field, values in name.items()
+    }
+    over = str(scenario)
+    if over not in scenario_names():
+        over = str(scenario_path(over).resolve())
+    with TemporaryDirectory() as place:
+        file = Path(place) / 'sweep.yaml'
+        file.write_text(yaml_text({'scenario': over, 'dimensions': dimensions}), encoding='utf-8')
+        yield str(file)
+
+
+def sweep(
+    name: str | Path | Mapping[str, Iterable[Any]],
+    *,
+    scenario: str | Path = DEFAULT_SCENARIO,
+    set: Mapping[str, Any] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    out: str | Path | None = None,
+    resume: bool = False,
+    progress: bool = False,
+) -> xarray.Dataset:
+    """Fly every combination of values of a sweep file or a mapping, as ``./glider sweep`` does.
+
+    Workers are processes that begin by importing your program: what is not to run in them too
+    stands under ``if __name__ == '__main__':``.
+
+    Parameters
+    ----------
+    name : str, Path or mapping
+        Sweep by name, path of its YAML file, or values by the dotted name of a scenario field,
+        such as ``{'current.speed_kn': [0.0, 0.5]}``. Its dimensions are then called like the
+        fields with ``_`` for ``.``: ``current_speed_kn``.
+    scenario : str or Path
+        What a mapping is flown over; a sweep file says it itself.
+    set : mapping, optional
+        Scenario fields of every flight, by dotted name.
+    workers : int, optional
+        Processes; by default one per processor.
+    scheduler : str, optional
+        Address of the scheduler of a Dask cluster, instead.
+    out : str or Path, optional
+        Folder of journal and result. Without one nothing is kept.
+    resume : bool
+        Go on where an interrupted sweep in this folder has stopped.
+    progress : bool
+        Whether a bar is shown on standard error.
+
+    Returns
+    -------
+    xarray.Dataset
+        Every figure of the scorecard over the dimensions of the sweep. ``status`` says how each
+        flight ended, ``reason`` why one failed.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming file, field, value and allowed range.
+    """
+    with _sweep_file(name, scenario) as file:
+        plan = load_sweep(file, dict(set or {}))
+    bar = counter('flying', plan.cells) if progress else nullcontext(lambda done: None)
+    with nullcontext(out) if out is not None else TemporaryDirectory() as place:
+        folder = Path(place)
+        with study.open_journal(plan, folder, resume) as journal:
+            known = study.flown_cells(plan, journal)
+            if not all(known):
+                loops = plan.combinations
+                with worker_pool(workers, scheduler, loops, compiling) as pool, bar as update:
+                    study.fly_sweep(plan, journal, known, pool, update, lambda: None)
+            study.write_result(plan, journal, folder / study.RESULT_FILE)
+        return read_dataset(folder / study.RESULT_FILE)

@@ -1,0 +1,200 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What became of a flight, by its true motion, and whether the vehicle had the means.
+
+Nothing here knows what the guard watches for. Whether pump and weight would have sufficed is
+flown: from some tick on, the plant alone, with the whole pump out, the weight let go and the mass
+where it balances, at the climb stop, or there once the vehicle rises.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from glider_base.kernel import kernel
+from glider_base.signals import TICK_S
+from glider_bringup.engines.direct import fly
+from glider_bringup.engines.flight import mission_of
+from glider_guard.rows import DROPS, SURFACES
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.scenario import Scenario
+from glider_model.onboard.moving_mass import make_moving_mass, mass_place
+from glider_model.plant.block import plant_move
+from glider_model.vehicle.file import load_vehicle
+from glider_studies.hunt.missions import due_s
+
+#: At the surface is shallower than this (m).
+AT_SURFACE_M = 5.0
+#: Deeper than rated by this share nobody goes untold.
+BELOW_RATED = 0.06
+#: Nor hangs within so many metres for so long (s) under water. One that has for the second time
+#: does not fly its mission, whatever its settings ask for: it is rightly sent up.
+HANGS_M, HANGS_S, STANDS_S = 5.0, 7200.0, 600.0
+#: A vehicle is saved if all is done for it this long (s) after the last fault.
+GRACE_S = 300.0
+#: Ticks from one sample of the depth that is kept to the next.
+_EVERY = 10
+_DEPTH = COLUMNS['ground_truth/odom'].start + 2
+_GUARD = COLUMNS['guard']
+
+
+class Truth:
+    """Takes log rows: true depth, what the guard told, and whether every number is finite."""
+
+    def __init__(self) -> None:
+        self._depth: list[np.ndarray] = []
+        self._rows: list[np.ndarray] = []
+        self._ticks = 0
+        self.deepest = 0.0
+
+    def add(self, log: np.ndarray) -> None:
+        """Take in a block of log rows, float64[n, ROW]."""
+        first = -self._ticks % _EVERY
+        self.deepest = max(self.deepest, float(-log[:, _DEPTH].min()))
+        self._depth.append(-log[first::_EVERY, _DEPTH])
+        self._rows.append(log[first::_EVERY, _GUARD].astype(np.int64))
+        self._ticks += len(log)
+
+    @property
+    def depth(self) -> np.ndarray:
+        """True depth (m) once a second."""
+        return np.concatenate(self._depth)
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Rows that the guard told, once a second."""
+        return np.concatenate(self._rows)
+
+
+class Verdict(NamedTuple):
+    """What is wrong with a flight; empty: nothing."""
+
+    kind: str  #: lost, late, untold, not_finite
+    why: str
+
+
+@kernel
+def _rise(plant, params, water, command, mass, mode, depths, dt):
+    """Fill ``depths`` (float64[n]) with what the plant alone does under a command, weight let go.
+
+    ``mode`` says where the pitch mass is: 0 in balance, 1 at its climb stop, 2 there once the
+    vehicle rises by 0.05 m/s.
+    """
+    before = plant.motion.p_d
+    rising = mode == 1
+    for i in range(len(depths)):
+        level = mass_place(0.0, plant.joints.m_b, -command[1], mass)
+        target = (command[0], command[1] if rising else level, 0.0, 0.0)
+        plant = plant_move(plant, (target, water, (1.0,)), params, dt)
+        depths[i] = plant.motion.p_d
+        rising = rising or (mode == 2 and before - plant.motion.p_d > 0.05 * dt)
+        before = plant.motion.p_d
+
+
+def _all_done(scenario: Scenario, from_s: float, for_s: float) -> list[np.ndarray]:
+    """Depths (m), float64[ticks] from a time on, if all is done then; one for each mode."""
+    state, params = mission_of(scenario)
+    log = np.empty((max(1, round(from_s / TICK_S)), ROW))
+    state, rows, _ = fly(state, params, log, TICK_S)
+    water = tuple(log[rows - 1, COLUMNS['current_velocity']])
+    vehicle = params.plant.vehicle
+    command, mass = (-vehicle.m_b_max, -vehicle.x_p_max), make_moving_mass(vehicle)
+    flown = []
+    for mode in range(3):
+        depths = np.empty(round(for_s / TICK_S))
+        _rise(state.plant, params.plant, water, command, mass, mode, depths, TICK_S)
+        flown.append(depths)
+    return flown
+
+
+def _comes_up(depths: np.ndarray) -> bool:
+    """Whether depths (m), float64[ticks], end at the surface, or on the way there."""
+    then = depths[-min(len(depths), round(STANDS_S / TICK_S))]
+    return bool(depths[-1] < AT_SURFACE_M or depths[-1] < then - HANGS_M)
+
+
+def _lost(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
+    """Why a vehicle is lost that could have been saved; empty if it is not, or could not."""
+    vehicle = load_vehicle(scenario.vehicle)
+    crush = vehicle.crush_depth_m
+    if truth.deepest <= crush:
+        return ''
+    depth = truth.depth
+    crossed_s = float(np.argmax(depth > crush)) if (depth > crush).any() else len(depth) - 1.0
+    before = [one for one in begun_s if one + GRACE_S < crossed_s]
+    moments = [max(before) + GRACE_S] if before else []
+    too_deep = depth > (1.0 + BELOW_RATED) * vehicle.rated_depth_m
+    if too_deep.any():
+        moments.append(float(np.argmax(too_deep)))
+    for moment in moments:
+        done = _all_done(scenario, moment, due_s(crush))
+        if any(depths.max() <= crush and _comes_up(depths) for depths in done):
+            return f'{truth.deepest:.0f} m deep (crush depth {crush:g}), saved at {moment:.0f} s'
+    return ''
+
+
+def _late(scenario: Scenario, truth: Truth) -> str:
+    """Why a vehicle is late that was told to surface for good and could have."""
+    surfaces = (truth.rows & (SURFACES | DROPS)) != 0
+    if not surfaces.any():
+        return ''
+    told = int(np.argmax(surfaces))
+    depth = truth.depth
+    limit_s = due_s(float(depth[told]))
+    due = told + round(limit_s)
+    if due >= len(depth) or not (depth[due:] > AT_SURFACE_M).any():
+        return ''
+    best = _all_done(scenario, told + 1.0, len(depth) - told - 1.0)
+    if any((depths[round(limit_s / TICK_S) :] < AT_SURFACE_M).all() for depths in best):
+        return f'{depth[due:].max():.0f} m deep {limit_s:.0f} s after it was sent up at {told} s'
+    return ''
+
+
+def _untold(scenario: Scenario, truth: Truth, status: str) -> str:
+    """What went wrong without a word, of the guard or of the status."""
+    vehicle, depth = load_vehicle(scenario.vehicle), truth.depth
+    wrecked = truth.deepest > vehicle.crush_depth_m
+    sent_up = bool(truth.rows[-1] & (SURFACES | DROPS))
+    if (wrecked and status != 'lost') or (sent_up and status not in ('lost', 'surfaced')):
+        return f'status {status}, {truth.deepest:.0f} m deep, {depth[-1]:.0f} m at the end'
+    if truth.rows.any():
+        return ''
+    if truth.deepest > (1.0 + BELOW_RATED) * vehicle.rated_depth_m:
+        return f'{truth.deepest:.0f} m deep (rated {vehicle.rated_depth_m:g})'
+    for start in range(0, len(depth) - round(HANGS_S), 600):
+        part = depth[start : start + round(HANGS_S)]
+        if _hangs(part):
+            return f'hangs at {part[-1]:.0f} m from {start} s on'
+    return ''
+
+
+def _hangs(depth: np.ndarray) -> bool:
+    """Whether depths (m), float64[s], are those of a vehicle that stays at one under water."""
+    return bool(depth.min() > AT_SURFACE_M and np.ptp(depth) < HANGS_M)
+
+
+def unfounded(truth: Truth, rows: int) -> int:
+    """Those of some rows that were told of a vehicle that truly went up or down."""
+    found, told, stands_s = 0, truth.rows, round(STANDS_S)
+    for bit in (1 << at for at in range(rows.bit_length()) if rows & 1 << at):
+        if (told & bit).any():
+            at = int(np.argmax((told & bit) != 0))
+            if at < stands_s or not _hangs(truth.depth[at - stands_s : at]):
+                found |= bit
+    return found
+
+
+def judge(
+    scenario: Scenario, truth: Truth, status: str, reason: str, begun_s: list[float]
+) -> Verdict:
+    """What is wrong with a flight, by what its scorecard says and when faults began (s)."""
+    if status == 'failed':
+        return Verdict('not_finite', reason)
+    for kind, why in (
+        ('lost', _lost(scenario, truth, begun_s)),
+        ('late', _late(scenario, truth)),
+        ('untold', _untold(scenario, truth, status)),
+    ):
+        if why:
+            return Verdict(kind, why)
+    return Verdict('', '')

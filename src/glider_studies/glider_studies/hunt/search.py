@@ -1,0 +1,110 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Flies missions with their faults and without, and shrinks what goes wrong."""
+
+from collections import Counter
+from typing import Any, NamedTuple
+
+from glider_bringup.engines.flight import fly
+from glider_bringup.scoring.card import fly_scored, scorecard
+from glider_guard.rows import LATCHED, ROWS
+from glider_mission.choices import Combination, combination_of
+from glider_mission.scenario import Scenario, run_command
+from glider_studies.hunt.missions import Mission, draw_mission
+from glider_studies.hunt.oracle import Truth, Verdict, judge, unfounded
+from glider_studies.paper.experiments import Experiment, told
+from glider_studies.paper.judges import Check
+from glider_studies.workers import Pool, Progress
+
+NAME = 'random_faults'
+#: What may go wrong with a flight with faults.
+KINDS = ('lost', 'untold', 'late', 'not_finite')
+#: What may with one without.
+FALSE = 'false_reaction'
+_TITLE = 'two or three random faults in random missions, and the same missions without'
+
+
+class Flown(NamedTuple):
+    """What became of a mission."""
+
+    verdict: Verdict  #: with its faults
+    faults: list[dict[str, Any]]  #: the smallest set that does the same harm
+    latched: str  #: what the guard told of the same mission without faults
+    hours: float  #: of that mission
+
+
+def _verdict(scenario: Scenario) -> Verdict:
+    """Fly, and judge."""
+    truth = Truth()
+    flight, scores = fly_scored(scenario, [truth])
+    card = scorecard(scenario, 'direct', flight, scores)
+    begun_s = [one['t_s'] for one in scores['faults'] if one['t_s'] is not None]
+    return judge(scenario, truth, card['status'], card['reason'], begun_s)
+
+
+def _shrunk(mission: Mission, verdict: Verdict) -> tuple[Verdict, list[dict[str, Any]]]:
+    """The same kind of harm by as few faults as possible."""
+    faults = mission.faults
+    for fault in mission.faults:
+        fewer = [one for one in faults if one is not fault]
+        smaller = _verdict(mission.load(fewer))
+        if smaller.kind == verdict.kind:
+            verdict, faults = smaller, fewer
+    return verdict, faults
+
+
+def _fly_mission(place: tuple[int, int]) -> Flown:
+    """Fly a mission, by seed and number, in a worker."""
+    mission = draw_mission(*place)
+    verdict, faults = _verdict(mission.load()), mission.faults
+    if verdict.kind:
+        verdict, faults = _shrunk(mission, verdict)
+    truth = Truth()
+    flight = fly(mission.load([]), [truth])
+    rows = unfounded(truth, LATCHED)
+    latched = ', '.join(row.name for row in ROWS if rows & row.bit)
+    if flight.status == 'failed':
+        latched = flight.reason
+    return Flown(verdict, faults, latched, len(truth.depth) / 3600.0)
+
+
+def combinations(seed: int, flights: int) -> set[Combination]:
+    """What loops the flights need."""
+    found = set()
+    for number in range(flights):
+        mission = draw_mission(seed, number)
+        found |= {combination_of(mission.load()), combination_of(mission.load([]))}
+    return found
+
+
+def command(mission: Mission, faults: list[dict[str, Any]]) -> str:
+    """Shell command that flies a mission with some faults again."""
+    fields = {**mission.changes, 'faults': [*mission.aging, *faults]}
+    return run_command(mission.scenario, fields, '--duration full')
+
+
+def search(seed: int, flights: int, pool: Pool, progress: Progress) -> dict[str, Any]:
+    """Fly missions 0 to ``flights`` of a seed.
+
+    Returns an entry of ``experiments.json``, and in it ``counts``: flights, lost, untold, late,
+    not_finite, false_reactions, hours.
+    """
+    places = {number: (seed, number) for number in range(flights)}
+    flown = pool.results(_fly_mission, places, progress)
+    rows = []
+    for number, one in flown.items():
+        mission = draw_mission(seed, number)
+        harms = [(one.verdict, one.faults)] if one.verdict.kind else []
+        harms += [(Verdict(FALSE, one.latched), [])] if one.latched else []
+        rows += [
+            {'flight': number, **said._asdict(), 'command': command(mission, faults)}
+            for said, faults in harms
+        ]
+    found = Counter(row['kind'] for row in rows)
+    wrong = {kind: found[kind] for kind in KINDS} | {'false_reactions': found[FALSE]}
+    hours = round(sum(one.hours for one in flown.values()), 1)
+    checks = [Check(kind, count, 0, count == 0) for kind, count in wrong.items()]
+    title = f'{_TITLE}, seed {seed}'
+    return told(Experiment(NAME, NAME, '', title, '-', [], lambda rows: checks), rows) | {
+        'counts': {'flights': flights, **wrong, 'hours': hours}
+    }

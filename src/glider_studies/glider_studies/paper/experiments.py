@@ -1,0 +1,345 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every experiment: the paper's own, and what goes beyond them; flown, and judged.
+
+They are those of `experiments.yaml`. The tuned PID and the paper's line of sight are flown beside
+the adaptive law, and are told as they are; limits apply to the adaptive law. A change that makes
+anything worse turns a verdict to ``failed``.
+"""
+
+import json
+import math
+from collections.abc import Callable
+from functools import cache
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from glider_base.files import read_yaml
+from glider_bringup.engines.flight import fly as fly_mission
+from glider_bringup.engines.flight import mission_of
+from glider_bringup.scoring.card import finite
+from glider_bringup.scoring.one_hertz import Record, Recorder
+from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_guidance.los import crab_heading
+from glider_mission.choices import Combination, combination_of
+from glider_mission.scenario import Scenario, load_scenario, run_command
+from glider_model.ocean.current_settings import KNOT_MPS
+from glider_model.vehicle.file import load_vehicle
+from glider_model.vehicle.perturb import perturbed
+from glider_studies.montecarlo import airframe
+from glider_studies.paper.judges import JUDGES, Check, figure_of, judge_limits
+from glider_studies.paper.measures import MEASURES, horizontal_speed
+from glider_studies.workers import Pool, Progress
+
+RESULT_FILE = 'experiments.json'
+PASSED, FAILED = 'passed', 'failed'
+#: Points of a record that is handed on.
+RECORD_POINTS = 12000
+#: Envelope: cross current over U_h up to which a course must be held; error allowed with turns.
+HELD_SHARE, TURN_S, TURN_MARGIN_M = 0.95, 111.0, 1.0
+
+#: Figures in which the two controllers are compared, and how a table names them.
+COMPARED = {
+    'cross_track_m.max_steady': 'max\nsteady (m)',
+    'cross_track_m.rms_steady': 'rms\nsteady (m)',
+    'cross_track_m.max_all': 'max\nall (m)',
+    'cross_track_m.max_run': 'max\nrun (m)',
+    'heading_fluctuation_deg.rms_steady': 'heading\nrms (deg)',
+    'pitch_error_deg.rms_steady': 'pitch\nrms (deg)',
+}
+#: On a curved path, these.
+COMPARED_ON_PATHS = {
+    'path_error_m.e2_rms': 'e2\nrms (m)',
+    'path_error_m.e2_max': 'e2\nmax (m)',
+    'path_error_m.e3_rms': 'e3\nrms (m)',
+    'path_error_m.e3_max': 'e3\nmax (m)',
+}
+
+#: What a case in the file has that is told in its row.
+_FACTS = ('reactions', 'beside_m', 'hours', 'dive_m')
+
+
+class Case(NamedTuple):
+    """One flight."""
+
+    case: str  #: what sets it apart from the others of its experiment
+    controller: str
+    guidance: str
+    scenario: str
+    changes: dict[str, Any] = {}
+    measures: tuple[str, ...] = ('attitude',)
+    told: str = ''  #: vehicle whose steering the PID is told, instead of that of the one it flies
+    facts: dict[str, Any] = {}  #: goes into the row as it is
+    drawn: bool = False  #: a record of it is kept for figures
+
+    def load(self) -> Scenario:
+        """Scenario that is flown."""
+        chosen = {'control.law': self.controller, 'guidance.los.method': self.guidance}
+        return load_scenario(self.scenario, {**self.changes, 'dives': 0, **chosen})
+
+    def command(self) -> str | None:
+        """Shell command that flies it again; None if a scenario cannot say it."""
+        options = f'--duration full --controller {self.controller} --guidance {self.guidance}'
+        return None if self.told else run_command(self.scenario, self.changes, options)
+
+    def key(self) -> str:
+        """The same for flights that are one and the same."""
+        return json.dumps([*self[1:5], self.measures, self.told])
+
+
+class Experiment(NamedTuple):
+    """Flights, and what is asked of them."""
+
+    group: str
+    name: str
+    section: str  #: of the paper; empty: goes beyond it
+    title: str
+    paper: str  #: the paper's figure
+    cases: list[Case]
+    judge: Callable[[list[dict]], list[Check]]
+
+
+# ---------------------------------------------------------------------------------- the file
+
+
+@cache
+def catalogue() -> dict[str, dict[str, dict[str, Any]]]:
+    """Experiments by group and name, as the file has them."""
+    return read_yaml(Path(__file__).with_name('experiments.yaml'))['experiments']
+
+
+def described(name: str) -> dict[str, Any]:
+    """What the file says of an experiment."""
+    return next((group[name] for group in catalogue().values() if name in group), {})
+
+
+def make_experiments(groups: list[str]) -> list[Experiment]:
+    """Experiments of some groups, in the order of the file."""
+    return [
+        _experiment(group, name, one)
+        for group, experiments in catalogue().items()
+        if group in groups
+        for name, one in experiments.items()
+    ]
+
+
+def _experiment(group: str, name: str, one: dict[str, Any]) -> Experiment:
+    limits = judge_limits(_merged(one.get('limits', {})), one.get('limited', 'adaptive'))
+    title, cases = one['title'], _cases(name, one)
+    if name == 'robustness':
+        cases = [case._replace(facts=_changed(case)) for case in cases]
+    elif name == 'envelope':
+        speed = horizontal_speed(load_scenario(one['scenario']))
+        title = title.format(speed=speed)
+        cases = [case._replace(facts=_in_current(case, speed)) for case in cases]
+    paper = one.get('paper', 'not flown')
+    judge = JUDGES.get(name, limits)
+    return Experiment(group, name, one.get('section', ''), title, paper, cases, judge)
+
+
+def _merged(mappings: dict[str, Any] | list[dict[str, Any]]) -> dict[str, Any]:
+    """Fields of some mappings; parts of a fault are put together."""
+    together: dict[str, Any] = {}
+    for one in mappings if isinstance(mappings, list) else [mappings]:
+        fault = {**together.pop('fault', {}), **one['fault']} if 'fault' in one else None
+        together.update(one if fault is None else {**one, 'fault': fault})
+    return together
+
+
+def _entries(axis: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Name and fields of each entry of a mapping of cases."""
+    if 'each' in axis:
+        return [(axis['name'].format(value), {axis['each']: value}) for value in axis['of']]
+    return [(name, _merged(fields)) for name, fields in axis.items()]
+
+
+def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
+    """Flights of an experiment."""
+    cases = []
+    for entries in product(*map(_entries, one.get('cases', []))):
+        names = [name for name, _ in entries if name]
+        fields = _merged([_merged(one.get('set', {})), *(fields for _, fields in entries)])
+        facts = {name: fields.pop(name) for name in _FACTS if name in fields}
+        if 'labelled' in one:
+            facts[one['labelled']] = names[0]
+        scenario = fields.pop('scenario', one.get('scenario', experiment))
+        told = fields.pop('told', '')
+        laws = fields.pop('laws', one.get('laws', ['adaptive', 'pid']))
+        if 'fault' in fields:
+            fields['faults'] = [fields.pop('fault')]
+        name = one['named'].format(*names) if 'named' in one else ', '.join(names)
+        measures = tuple(one.get('measures', ['attitude']))
+        cases += [
+            Case(name, law, method, scenario, fields, measures, told, facts, 'drawn' in one)
+            for method in one.get('guidance', ['observer'])
+            for law in laws
+        ]
+    return cases
+
+
+def _changed(case: Case) -> dict[str, Any]:
+    """What is wrong with the vehicle of a case, and how it steers if that is."""
+    facts = {'changes': case.changes}
+    if 'perturb.K_MY' in case.changes:
+        facts['steering'] = steering_share(load_scenario(case.scenario, case.changes))
+    return facts
+
+
+def steering_share(scenario: Scenario) -> dict[str, float]:
+    """Turn rate over sin(roll) of the plant over that of its file, in dive and climb."""
+    vehicle = load_vehicle(scenario.vehicle).params()
+    frame = airframe(vehicle, perturbed(vehicle, scenario.perturb))
+    return {'dive': frame['steering_dive'], 'climb': frame['steering_climb']}
+
+
+def _in_current(case: Case, speed: float) -> dict[str, Any]:
+    """The current of a case, and what is expected in it."""
+    knots, angle = case.changes['current.speed_kn'], case.changes['current.angle_deg']
+    facts = {'speed_kn': knots, 'angle_deg': angle}
+    return {**facts, **expectation(speed, knots * KNOT_MPS, angle)}
+
+
+def expectation(speed: float, current_mps: float, angle_deg: float) -> dict[str, Any]:
+    """What physics allows in a current so fast and at such an angle off the path.
+
+    Parameters
+    ----------
+    speed : float
+        Horizontal speed through the water U_h (m/s).
+    """
+    angle = math.radians(angle_deg)
+    across = abs(current_mps * math.sin(angle))
+    _, progress, feasible = crab_heading(
+        0.0, speed, current_mps * math.cos(angle), current_mps * math.sin(angle)
+    )
+    expected = 'marginal' if feasible else 'infeasible'
+    if feasible and across <= HELD_SHARE * speed:
+        expected = 'feasible'
+    return {
+        'expected': expected,
+        'cross_share': across / speed,
+        'progress_mps': progress,
+        'limit_m': TURN_S * across + TURN_MARGIN_M,
+    }
+
+
+# ---------------------------------------------------------------------------------- flights
+
+
+def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
+    """Fly one case in a worker: its row, and if it is drawn a record thin enough to hand on."""
+    scenario = case.load()
+    state, params = mission_of(scenario)
+    if case.told:
+        steering = load_vehicle(case.told).steering_rates
+        pid = params.control.law._replace(
+            steering_dive=steering.dive, steering_climb=steering.climb
+        )
+        params = params._replace(control=params.control._replace(law=pid))
+    scorer, recorder = make_scorer(scenario), Recorder()
+    flight = fly_mission(scenario, [scorer, recorder], mission=(state, params))
+    record, scores = recorder.result(), scores_of(scenario, scorer)
+    for measure in case.measures:
+        scores.update(MEASURES[measure](record, scenario))
+    row = _row(scores, flight.status == 'failed')
+    return row, record.thinned(RECORD_POINTS) if case.drawn else None
+
+
+def _row(scores: dict[str, Any], failed: bool = False) -> dict[str, Any]:
+    """Scores with status; a number that is not finite becomes None, and is told."""
+    clean = finite(scores)
+    whole = not failed and bool(scores['final_state']) and clean == scores
+    return {'finite': whole, **clean, **({'status': 'failed'} if failed else {})}
+
+
+def fly(
+    experiments: list[Experiment], pool: Pool, progress: Progress
+) -> tuple[list[list[dict]], list[list[Record | None]]]:
+    """Fly every case, in worker processes; what two experiments share is flown once.
+
+    Returns rows, and records (None for what is not drawn), by experiment and case.
+    """
+    cases: dict[str, Case] = {}
+    for case in (case for one in experiments for case in one.cases):
+        if case.drawn or case.key() not in cases:
+            cases[case.key()] = case
+    flown = pool.results(_fly_case, cases, progress)
+    rows = [
+        [
+            {
+                'case': case.case,
+                'controller': case.controller,
+                'guidance': case.guidance,
+                **case.facts,
+                **flown[case.key()][0],
+                'command': case.command(),
+            }
+            for case in one.cases
+        ]
+        for one in experiments
+    ]
+    return rows, [[flown[case.key()][1] for case in one.cases] for one in experiments]
+
+
+def combinations(experiments: list[Experiment]) -> set[Combination]:
+    """What `fly` needs loops for."""
+    return {combination_of(case.load()) for one in experiments for case in one.cases}
+
+
+def count_flights(experiments: list[Experiment]) -> int:
+    """Number of flights that `fly` makes."""
+    return len({case.key() for one in experiments for case in one.cases})
+
+
+# ---------------------------------------------------------------------------------- verdicts
+
+
+def compared(rows: list[dict]) -> dict[str, str]:
+    """Figures that the rows of an experiment are compared in, with the names of columns."""
+    return COMPARED_ON_PATHS if 'path_error_m' in rows[0] else COMPARED
+
+
+def is_better(one: float | None, other: float | None) -> bool:
+    """Whether a figure is smaller than another by 0.01 at least, as printed."""
+    return one is not None and (other is None or one <= other - 0.01)
+
+
+def by_case(rows: list[dict], law: str) -> dict[tuple[str, str], dict]:
+    """Rows of a law by case and guidance."""
+    return {(row['case'], row['guidance']): row for row in rows if row.get('controller') == law}
+
+
+def pid_better(rows: list[dict]) -> list[dict[str, Any]]:
+    """Figures in which the tuned PID beats the adaptive law."""
+    ours, theirs = by_case(rows, 'adaptive'), by_case(rows, 'pid')
+    pairs = (
+        (case, guidance, name, figure_of(theirs[case, guidance], name), figure_of(row, name))
+        for (case, guidance), row in ours.items()
+        if (case, guidance) in theirs
+        for name in compared(rows)
+    )
+    fields = ('case', 'guidance', 'figure', 'pid', 'adaptive')
+    return [dict(zip(fields, pair, strict=True)) for pair in pairs if is_better(*pair[3:])]
+
+
+def told(one: Experiment, rows: list[dict]) -> dict[str, Any]:
+    """What the paper says, what was flown, and the verdict, of one experiment."""
+    checks = one.judge(rows)
+    passed = bool(checks) and all(check.passed for check in checks)
+    return {
+        'name': one.name,
+        'group': one.group,
+        'section': one.section,
+        'title': one.title,
+        'paper': one.paper,
+        'rows': rows,
+        'pid_better': pid_better(rows),
+        'checks': [check._asdict() for check in checks],
+        'verdict': PASSED if passed else FAILED,
+    }
+
+
+def report(experiments: list[Experiment], rows: list[list[dict]]) -> dict[str, Any]:
+    """Result of the command, over all experiments."""
+    return {'experiments': list(map(told, experiments, rows))}

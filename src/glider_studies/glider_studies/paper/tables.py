@@ -1,0 +1,220 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The experiments' results as tables for a person."""
+
+from collections.abc import Callable
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from glider_studies.paper.experiments import (
+    PASSED,
+    by_case,
+    compared,
+    described,
+    is_better,
+)
+from glider_studies.paper.judges import figure_of
+
+#: Failed checks that are listed; of more only the number is told.
+LISTED = 12
+#: Marks a figure in which the tuned PID is better than the adaptive law.
+BETTER = '*'
+_LAW_NAMES = {'adaptive': 'adaptive', 'pid': 'tuned PID'}
+
+
+def _number(value: float | str | None, digits: int = 2) -> str:
+    if value is None:
+        return '-'
+    if isinstance(value, str):
+        return value
+    return f'{value:,.{digits if abs(value) < 100.0 else 0}f}'
+
+
+def _table(names: list[str], figures: list[str]) -> Table:
+    """Empty table with columns of text and columns of figures."""
+    table = Table()
+    for name in names:
+        table.add_column(name)
+    for name in figures:
+        table.add_column(name, justify='right')
+    return table
+
+
+def _by_flight(figures: dict[str, str]) -> Callable[[list[dict]], Table]:
+    """Tables with one line for each flight and these figures, by dotted name."""
+
+    def make(rows: list[dict]) -> Table:
+        cases = any(row['case'] for row in rows)
+        flagged = any(row['status'] != 'completed' for row in rows)
+        ways = len({row['guidance'] for row in rows}) > 1
+        names = ['case'] * cases + ['flown by'] + ['LOS'] * ways + ['status'] * flagged
+        table = _table(names, list(figures.values()))
+        adaptive = by_case(rows, 'adaptive')
+        for row in rows:
+            rival = adaptive.get((row['case'], row['guidance']))
+            texts = [row['case']] * cases + [_LAW_NAMES[row['controller']]]
+            texts += [row['guidance']] * ways + [row['status']] * flagged
+            table.add_row(*texts, *(_marked(row, rival, name) for name in figures))
+        return table
+
+    return make
+
+
+def _marked(row: dict | None, rival: dict | None, name: str) -> str:
+    """Figure of a row, marked if it is the PID's and better than that of its rival."""
+    if row is None:
+        return '-'
+    value = figure_of(row, name)
+    marked = (
+        row['controller'] == 'pid'
+        and rival is not None
+        and name in compared([row])
+        and is_better(value, figure_of(rival, name))
+    )
+    return _number(value) + (BETTER if marked else '')
+
+
+def _side_by_side(rows: list[dict]) -> Table:
+    """One line for each case; in every column adaptive | tuned PID."""
+    figures = dict(list(compared(rows).items())[:5])
+    table = _table(['adaptive | tuned PID'], list(figures.values()))
+    ours, theirs = (by_case(rows, law) for law in _LAW_NAMES)
+    for case in dict.fromkeys((row['case'], row['guidance']) for row in rows):
+        one, other = ours.get(case), theirs.get(case)
+        cells = (f'{_marked(one, None, name)} | {_marked(other, one, name)}' for name in figures)
+        table.add_row(case[0], *cells)
+    return table
+
+
+def _steering(rows: list[dict]) -> list[str]:
+    """How vehicles whose steering is changed steer, relative to what their file says."""
+    return [
+        f'{row["case"]}: turn rate per roll x{row["steering"]["dive"]:.2f} in the dive, '
+        f'x{row["steering"]["climb"]:.2f} in the climb (K_MY x{row["changes"]["perturb.K_MY"]:g})'
+        for row in rows
+        if 'steering' in row and row['controller'] == 'adaptive'
+    ]
+
+
+def _survey(rows: list[dict]) -> Table:
+    """Closest pass of each waypoint, and the heading in each leg."""
+    legs = rows[0]['legs']
+    table = _table(['', *(_LAW_NAMES[row['controller']] for row in rows)], [])
+    for i in range(len(rows[0]['waypoints_closest_m'])):
+        passes = (f'{row["waypoints_closest_m"][i]:.2f} m' for row in rows)
+        table.add_row(f'waypoint {i}, closest pass', *passes)
+    for i, leg in enumerate(legs):
+        spreads = (f'{row["legs"][i]["heading_spread_deg"]:.1f} deg' for row in rows)
+        table.add_row(f'leg on course {leg["course_deg"]:.0f} deg, spread of heading', *spreads)
+    return table
+
+
+def _envelope(rows: list[dict]) -> Table:
+    """Largest error by speed and angle of the current; beyond the limit what was flagged."""
+    speeds = sorted({row['speed_kn'] for row in rows})
+    table = _table(['angle'], [f'{speed:g} kn' for speed in speeds])
+    at = {(row['speed_kn'], row['angle_deg']): row for row in rows}
+    for angle in sorted({row['angle_deg'] for row in rows}):
+        cells = (
+            'x' if row['status'] == 'infeasible' else _number(row['cross_track_m']['max_all'], 1)
+            for row in (at[speed, angle] for speed in speeds)
+        )
+        table.add_row(f'{angle:g} deg', *cells)
+    return table
+
+
+_TABLES: dict[str, Callable[[list[dict]], Table]] = {
+    'side_by_side': _side_by_side,
+    'survey': _survey,
+    'envelope': _envelope,
+    'yaw': _by_flight(
+        {
+            'heading_error_deg.rms_steady': 'error\nrms (deg)',
+            'heading_fluctuation_deg.rms_steady': 'fluct.\nrms (deg)',
+            'cross_track_m.max_steady': 'max\nsteady (m)',
+            'cross_track_m.max_all': 'max\nall (m)',
+            'cross_track_m.max_run': 'max\nrun (m)',
+        }
+    ),
+    'profile': _by_flight(
+        {
+            'depth_m.max': 'deepest\n(m)',
+            'trim.pitch_dive_deg': 'dive\n(deg)',
+            'trim.pitch_climb_deg': 'climb\n(deg)',
+            'pitch_error_deg.rms_steady': 'error\nrms',
+            'pitch_error_deg.max_steady': 'max\n(deg)',
+            'roll_deg.rms_steady': 'roll\nrms',
+            'roll_deg.max_steady': 'max\n(deg)',
+        }
+    ),
+    'reckoned': _by_flight(
+        {
+            'navigation.error_m.p50': 'error\np50 (m)',
+            'navigation.error_m.worst': 'error\nworst',
+            'navigation.from_fourth.surfacing_cross_track_m': 'beside\nfrom 4th',
+            'navigation.from_fourth.under_water_rms_m': 'under\nwater rms',
+            'navigation.dac_error_mps.rms': 'DAC rms\n(m/s)',
+            'navigation.ellipse_95_share': 'inside\n95 %',
+        }
+    ),
+}
+_REMARKS = {
+    'reckoned': (
+        'Error: of the believed place when it comes up. Beside: largest true distance from the '
+        'path where it comes up, from the fourth surfacing on; under water from then on. DAC: how '
+        'far the mean current of a way, as it is believed after its fixes, is off the true one.'
+    )
+}
+
+
+def show(result: dict[str, Any], output: Console) -> None:
+    """Print experiment by experiment: the paper's figure, ours, verdict."""
+    for one in result['experiments']:
+        head = f'{one["section"]}: {one["title"]}' if one['section'] else one['title']
+        if 'counts' in one:
+            output.print(f'\n{head}', soft_wrap=True)
+            _show_search(one, output)
+            _show_verdict(one, output)
+            continue
+        said = described(one['name'])
+        make = _TABLES.get(said.get('table')) or _by_flight(compared(one['rows']))
+        output.print(f'\n{head}\npaper: {one["paper"]}', soft_wrap=True)
+        output.print(make(one['rows']))
+        if one['pid_better'] and make is not _survey:
+            output.print(f'{BETTER} the tuned PID is better than the adaptive law')
+        for line in _steering(one['rows']):
+            output.print(line)
+        remark = said.get('remark') or _REMARKS.get(said.get('table'))
+        if remark:
+            output.print(remark)
+        _show_verdict(one, output)
+    verdicts = [one['verdict'] for one in result['experiments']]
+    output.print(f'\n{verdicts.count(PASSED)} of {len(verdicts)} experiments passed')
+
+
+def _show_search(one: dict[str, Any], output: Console) -> None:
+    """Print what random faults did, and the lines that fly it again."""
+    counts = one['counts']
+    told = ', '.join(f'{name.replace("_", " ")} {number:,}' for name, number in counts.items())
+    output.print(told, soft_wrap=True)
+    for row in one['rows'][:LISTED]:
+        output.print(f'flight {row["flight"]}: {row["kind"]}: {row["why"]}', soft_wrap=True)
+        output.print(f'  {row["command"]}', soft_wrap=True)
+    if len(one['rows']) > LISTED:
+        output.print(f'and {len(one["rows"]) - LISTED} more')
+
+
+def _show_verdict(one: dict[str, Any], output: Console) -> None:
+    """Print the verdict, and the checks that failed."""
+    failed = [check for check in one['checks'] if not check['passed']]
+    count, style = len(one['checks']), 'green' if one['verdict'] == PASSED else 'red'
+    output.print(
+        f'verdict: {one["verdict"]} ({count - len(failed)} of {count} checks)', style=style
+    )
+    for check in failed[:LISTED]:
+        value, limit = _number(check['value'], 3), _number(check['limit'], 3)
+        output.print(f'  {check["what"]} = {value}, allowed {limit}', soft_wrap=True)
+    if len(failed) > LISTED:
+        output.print(f'  and {len(failed) - LISTED} more')

@@ -1,0 +1,77 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Loops of a law, a method and a way to navigate: what they are compiled for, and when."""
+
+import numba
+import pytest
+
+from glider_bringup.engines import direct
+from glider_bringup.engines.compiling import compile_loops, told
+from glider_bringup.engines.flight import mission_of
+from glider_mission.choices import Combination, combination_of
+from glider_mission.scenario import load_scenario, scenario_names
+from glider_studies import workers
+
+
+def types_of(scenario):
+    return tuple(numba.typeof(one) for one in mission_of(scenario))
+
+
+def test_loop_depends_on_law_and_methods_alone():
+    """Else something is compiled of which nobody is told."""
+    chosen = [
+        ('adaptive', 'observer', 'known'),
+        ('pid', 'observer', 'dead_reckoned'),
+        ('pid', 'paper', 'known'),
+        ('pid', 'paper', 'dead_reckoned'),
+    ]
+    found = {}
+    for law, method, navigation in chosen:
+        changes = {
+            'control.law': law,
+            'guidance.los.method': method,
+            'navigation.method': navigation,
+        }
+        scenarios = [load_scenario(name, changes) for name in scenario_names()]
+        for one in scenarios:
+            found.setdefault(combination_of(one), set()).add(types_of(one))
+        assert {one[:4] for one in found} >= {(law, method, navigation, False)}
+    assert {one.steered for one in found} == {'', 'slocum_g2'}
+    assert len(found) == 2 * len(chosen)
+    assert [len(types) for types in found.values()] == [1] * len(found)
+    assert len(set.union(*found.values())) == len(found)
+
+
+def test_line_names_law_and_method():
+    lines = []
+    with told(Combination('pid', 'paper'), lines.append):
+        numba.njit(lambda x: x + 1.0)(1.0)
+    (line,) = lines
+    assert 'law pid with method paper' in line
+    with told(Combination('pid', 'paper', steered='slocum_g2'), lines.append):
+        numba.njit(lambda x: x + 2.0)(1.0)
+    assert 'vehicle slocum_g2' in lines[-1]
+
+
+def test_loops_are_there_before_workers_start(monkeypatch):
+    class StartedError(Exception):
+        """Workers would be started now."""
+
+    def start(*_):
+        raise StartedError
+
+    monkeypatch.setattr(workers, '_local_cluster', start)
+    scenario = load_scenario(changes={'control.law': 'pid'})
+    with (
+        pytest.raises(StartedError),
+        workers.worker_pool(1, None, [combination_of(scenario)] * 2),
+    ):
+        pass
+    assert types_of(scenario) in {signature[:2] for signature in direct.fly.signatures}
+
+
+def test_the_loop_of_a_vehicle_for_shallow_water_is_compiled_too():
+    """It is not rated for the dives of the scenario that others are compiled with."""
+    scenario = load_scenario('slocum_shelf')
+    compile_loops([combination_of(scenario)], lambda line: None)
+    assert types_of(scenario) in {signature[:2] for signature in direct.fly.signatures}

@@ -1,0 +1,71 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A diagonal of `./glider experiments --only faults`: every fault once, in one of its phases."""
+
+import pytest
+
+from glider_studies.paper.experiments import Experiment, described, fly, make_experiments
+from glider_studies.paper.judges import judge_clean, judge_faults
+
+FAULTS, PHASES = (list(entries) for entries in described('fault_matrix')['cases'])
+(MATRIX,) = (one for one in make_experiments(['faults']) if one.name == 'fault_matrix')
+#: Every fault flies in the phase after that of the fault before it.
+CASES = [
+    case
+    for number, case in enumerate(one for one in MATRIX.cases if one.controller == 'adaptive')
+    if number % len(PHASES) == number // len(PHASES) % len(PHASES)
+]
+
+
+class Here:
+    """Flies in this process."""
+
+    def results(self, function, cases, progress) -> dict:
+        """What a function makes of each case."""
+        return {key: function(case) for key, case in cases.items()}
+
+
+@pytest.fixture(scope='module')
+def rows() -> list[dict]:
+    """A row for each flight."""
+    diagonal = Experiment('faults', 'diagonal', '', '', '', CASES, judge_faults)
+    return fly([diagonal], Here(), lambda done: None)[0][0]
+
+
+def test_every_fault_is_flown_and_every_phase():
+    assert [case.facts['fault'] for case in CASES] == FAULTS
+    assert len(CASES) >= 20
+    phases = [case.changes['faults'][0]['phase'] for case in CASES]
+    assert {phases.count(phase) for phase in PHASES} == {6, 7}
+
+
+def test_each_ends_as_it_has_to(rows):
+    assert [check for check in judge_faults(rows) if not check.passed] == []
+
+
+def test_some_fly_on_some_surface_and_some_drop_their_weight(rows):
+    ended = {row['guard']['reaction'] for row in rows}
+    assert {'none', 'surface', 'drop'} <= ended
+
+
+@pytest.mark.parametrize(
+    ('change', 'said'),
+    [
+        ({'finite': False}, 'a number is not finite'),
+        ({'guard': {'reaction': 'hold'}}, 'reaction hold'),
+        ({'depth_m': {'max': 1100.0}}, '1100 m deep'),
+        ({'faults': [{'t_s': None}]}, 'it did not begin'),
+    ],
+)
+def test_what_is_wrong_is_seen(rows, change, said):
+    (check,) = judge_faults([{**rows[0], **change}])
+    assert (check.value, check.passed) == (said, False)
+
+
+def test_a_clean_mission_that_is_told_of_is_seen():
+    told = {'case': 'a', 'controller': 'pid', 'hours': 999.0, 'status': 'completed'}
+    checks = judge_clean([{**told, 'guard': {'events': [{'row': 'leak'}]}}])
+    assert [check.passed for check in checks] == [False, False, False]
+    assert all(
+        one.passed for one in judge_clean([{**told, 'hours': 1e3, 'guard': {'events': []}}])
+    )

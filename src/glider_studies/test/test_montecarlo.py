@@ -1,0 +1,428 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Monte Carlo: plants that are what their seed says, results that are the same however flown."""
+
+import json
+import math
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from glider_base.frames import euler_from_quaternion
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_S
+from glider_bringup.engines.direct import fly
+from glider_bringup.engines.flight import mission_of
+from glider_bringup.scoring.again import score_again
+from glider_bringup.scoring.score import Scorer
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.ros.recorded_log import RecordedLog
+from glider_mission.rules import Rules
+from glider_mission.run_folder import make_result_folder
+from glider_mission.scenario import load_scenario, parse_assignment
+from glider_model.vehicle.file import load_vehicle
+from glider_model.vehicle.perturb import (
+    ADDED_MASS,
+    DAMPING,
+    STATIC,
+    VISCOUS,
+    PerturbSettings,
+    perturbed,
+)
+from glider_studies import montecarlo
+from glider_studies.montecarlo import (
+    NAVIGATION,
+    RESULT_FILE,
+    airframe,
+    judge,
+    make_scenarios,
+    sample_plant,
+    spread,
+)
+
+#: A dive to 600 m and back, scored from its first minute on.
+SHORT = {'profile.depth_m': 600.0, 'settle_s': 60.0, 'duration_s': 5400.0}
+OPTIONS = [f'--set={field}={value}' for field, value in SHORT.items()]
+LAWS = ['adaptive', 'pid']
+#: Topics whose numbers are compared.
+RECORDED = [name for name in COLUMNS if name in TOPICS]
+SPREADS = (
+    *('max_steady_m', 'max_all_m', 'max_run_m'),
+    *('heading_fluctuation_deg', 'pitch_error_deg', 'energy_wh'),
+)
+
+
+def glider(*arguments, timeout=300):
+    return subprocess.run(
+        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        env={**os.environ, 'COLUMNS': '100', 'PYTHONUTF8': '1'},
+        timeout=timeout,
+        check=False,
+    )
+
+
+@pytest.fixture(scope='module')
+def vehicle():
+    return load_vehicle('zhang2021').params()
+
+
+@pytest.fixture(scope='module')
+def study(tmp_path_factory):
+    """Finished process of a short study by two workers, and what it wrote."""
+    folder = tmp_path_factory.mktemp('study')
+    process = glider(
+        *('montecarlo', 'current_8deg', '--plants', 3, '--seed', 40, '--workers', 2, '--json'),
+        *(*OPTIONS, '--out', folder),
+    )
+    assert process.returncode == 0, process.stderr
+    return process, json.loads((folder / RESULT_FILE).read_text())
+
+
+# ---------------------------------------------------------------------- plants
+
+
+def test_a_plant_belongs_to_its_seed(vehicle):
+    assert sample_plant(7, vehicle) == sample_plant(7, vehicle) != sample_plant(8, vehicle)
+
+
+def test_plants_do_not_depend_on_how_many_there_are_or_where_a_study_begins():
+    many = make_scenarios('current_8deg', {}, LAWS, plants=3, seed=10)
+    one = make_scenarios('current_8deg', {}, ['pid'], plants=1, seed=12)
+    assert many[2, 'pid'] == one[0, 'pid']
+    assert many[2, 'adaptive'].perturb == many[2, 'pid'].perturb
+    assert {scenario.control.law for (_, law), scenario in many.items() if law == 'pid'} == {'pid'}
+
+
+def test_plants_fill_the_ranges_they_are_drawn_from(vehicle):
+    plants = [sample_plant(seed, vehicle) for seed in range(400)]
+
+    def column(section, field):
+        return np.array([plant[section].get(field, math.nan) for plant in plants])
+
+    def fills(numbers, low, high):
+        margin = 0.02 * (high - low)
+        assert low <= numbers.min() < low + margin
+        assert high - margin < numbers.max() <= high
+        assert numbers.mean() == pytest.approx(0.5 * (low + high), abs=3.0 * (high - low) / 60.0)
+
+    for name in (*VISCOUS, *STATIC, *DAMPING, *ADDED_MASS):
+        if getattr(vehicle, name) == 0.0:
+            assert np.isnan(column('perturb', name)).all()
+        else:
+            half = 0.15 if name in ADDED_MASS else 0.3
+            fills(column('perturb', name), 1.0 - half, 1.0 + half)
+    fills(column('perturb', 'pitch_trim_m'), -0.010, 0.010)
+    fills(column('perturb', 'roll_bias_deg'), -10.0, 10.0)
+    fills(column('perturb', 'net_heaviness_kg'), -0.050, 0.050)
+    fills(column('water', 'pycnocline_rise'), 0.0, 0.004)
+    fills(column('water', 'pycnocline_depth_m'), 30.0, 300.0)
+    net = column('water', 'compression_per_m') - column('water', 'hull_compression_per_m')
+    fills(net, -1e-6 - 1e-9, 1e-6 + 1e-9)
+    assert plants[3]['sensors'] == {
+        'attitude_std_deg': 0.2,
+        'heading_std_deg': 0.5,
+        'rate_std_dps': 0.1,
+        'position_std_m': 1.0,
+    }
+
+
+def test_control_and_guidance_know_the_file_only():
+    (scenario,) = make_scenarios('current_8deg', {}, ['pid'], plants=1, seed=3).values()
+    nominal = load_scenario('current_8deg', {'dives': 0, 'control.law': 'pid'})
+    assert scenario.control_settings() == nominal.control_settings()
+    assert scenario.guidance_settings() == nominal.guidance_settings()
+    assert scenario.plant_settings() != nominal.plant_settings()
+
+
+def test_nominal_airframe_is_stable_and_steers(vehicle):
+    frame = airframe(vehicle, vehicle)
+    assert frame['pitch_moment_kg'] == pytest.approx(-40.0, abs=0.1)
+    assert frame['yaw_moment_kg'] == pytest.approx(80.0, abs=0.1)
+    assert frame['steering_dive'] == frame['steering_climb'] == 1.0
+    assert not frame['unstable'] and not frame['weak_steering']
+
+
+@pytest.mark.parametrize(
+    ('change', 'flag'),
+    [({'K_M': 0.5}, 'unstable'), ({'K_MY': 0.45}, 'unstable'), ({'K_MY': 0.65}, 'weak_steering')],
+)
+def test_airframe_that_cannot_be_flown_is_flagged(vehicle, change, flag):
+    assert airframe(vehicle, perturbed(vehicle, PerturbSettings(**change)))[flag]
+
+
+# ---------------------------------------------------------------------- results
+
+
+def test_percentiles_are_figures_that_so_many_plants_do_not_exceed():
+    assert spread(list(range(1, 101))) == {'p50': 50, 'p95': 95, 'worst': 100}
+    assert spread([3.0, 1.0]) == {'p50': 1.0, 'p95': 3.0, 'worst': 3.0}
+    assert spread([1.0, None]) == {'p50': 1.0, 'p95': None, 'worst': None}
+
+
+def scores(**changes):
+    """Scores of a good run, with other values for some fields."""
+    good = {
+        'cross_track_m': {'rms_steady': 0.1, 'max_steady': 0.5, 'max_all': 5.0, 'max_run': 9.0},
+        'pitch_error_deg': {'rms_steady': 0.1, 'max_steady': 0.2},
+        'heading_fluctuation_deg': {'rms_steady': 0.1, 'max_steady': 0.2},
+        'final_state': {'position_ned_m': [1.0, 2.0, 3.0], 'attitude_rpy_rad': [0.0, 0.0, 0.0]},
+        'status': 'completed',
+        'navigation': dict.fromkeys(NAVIGATION),
+        'energy': {'wh': 7.0},
+    }
+    return {**good, **changes}
+
+
+def test_a_good_run_has_not_diverged():
+    assert judge(scores()) == {
+        'diverged': False,
+        'outcome': 'completed',
+        'max_steady_m': 0.5,
+        'max_all_m': 5.0,
+        'max_run_m': 9.0,
+        'heading_fluctuation_deg': 0.1,
+        'pitch_error_deg': 0.1,
+        'energy_wh': 7.0,
+        'navigation': dict.fromkeys(NAVIGATION),
+    }
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        {'status': 'infeasible'},
+        {'status': 'lost'},
+        {'cross_track_m': {'max_steady': 900.0, 'max_all': 1000.1, 'max_run': 1000.1}},
+        {'pitch_error_deg': {'rms_steady': math.nan}},
+        {'final_state': {'position_ned_m': [1.0, math.inf, 3.0]}},
+    ],
+)
+def test_a_lost_run_has_diverged(change):
+    judged = judge(scores(**change))
+    assert judged['diverged']
+    json.dumps(judged, allow_nan=False)
+
+
+def test_result_is_one_json_object_of_the_promised_shape(study):
+    process, _ = study
+    assert process.stdout.count('\n') == 1
+    result = json.loads(process.stdout)
+    assert (result['scenario'], result['plants'], result['seed']) == ('current_8deg', 3, 40)
+    assert [row['controller'] for row in result['rows']] == LAWS
+    for row in result['rows']:
+        assert list(row)[:8] == ['controller', 'diverged', *SPREADS]
+        assert row['diverged'] == 0
+        for name in SPREADS:
+            assert list(row[name]) == ['p50', 'p95', 'worst']
+            assert 0.0 <= row[name]['p50'] <= row[name]['p95'] <= row[name]['worst'] < 60.0
+
+
+def test_number_of_workers_changes_nothing(study):
+    process = glider(
+        *('montecarlo', 'current_8deg', '--plants', 3, '--seed', 40, '--workers', 1, '--json'),
+        *OPTIONS,
+    )
+    assert process.stdout == study[0].stdout
+
+
+def test_folder_tells_of_every_plant(study, vehicle):
+    _, result = study
+    assert [one['plant'] for one in result['flown']] == [0, 1, 2]
+    for one in result['flown']:
+        sampled = sample_plant(40 + one['plant'], vehicle)
+        assert {name: one[name] for name in sampled} == sampled
+        assert list(one['flights']) == LAWS
+    for row in result['rows']:
+        figures = [one['flights'][row['controller']]['max_all_m'] for one in result['flown']]
+        assert row['max_all_m']['worst'] == max(figures)
+
+
+def test_command_of_a_plant_flies_it_again(study, tmp_path):
+    """By its own command over ``./glider run``, to the same figures."""
+    one = study[1]['flown'][1]
+    words = shlex.split(one['commands']['pid'])
+    assert words[:2] == ['./glider', 'run']
+    assert dict(map(parse_assignment, words[words.index('--set') + 1 :: 2]))['seed'] == 41
+    process = glider(*words[1:], '--json', '--out', tmp_path / 'again')
+    assert process.returncode == 0, process.stderr
+    flown = judge({'infeasible': False, **json.loads(process.stdout)})
+    assert flown == one['flights']['pid']
+
+
+def test_table_names_the_worst_plant_and_its_command():
+    process = glider('montecarlo', 'current_8deg', '--plants', 1, '--controller', 'pid', *OPTIONS)
+    assert process.returncode == 0, process.stderr
+    for words in ('p50 / p95 / worst', 'statically unstable', 'steer weakly', 'plant 0'):
+        assert words in process.stdout
+    assert './glider run current_8deg --engine direct --controller pid' in process.stdout
+
+
+@pytest.mark.parametrize(
+    ('options', 'message'),
+    [
+        (['--plants', '0'], '--plants'),
+        (['--seed', '-1'], '--seed'),
+        (['--workers', '0'], '--workers'),
+        (['--controller', 'lqr'], '--controller'),
+        (['--duration', 'long'], '--duration long: not usable (allowed: 0.1 to 1e+08, or full)'),
+        (['--set', 'profile.depth_m=1'], 'profile.depth_m = 1: should be greater than'),
+        (['no_such_scenario'], "scenario = 'no_such_scenario': no such scenario"),
+    ],
+)
+def test_wrong_options_are_refused(options, message):
+    process = glider('montecarlo', *options)
+    assert process.returncode == 2
+    assert message in process.stderr
+    assert 'Traceback' not in process.stderr
+    assert process.stdout == ''
+
+
+def test_a_result_is_never_written_over(tmp_path):
+    (tmp_path / RESULT_FILE).write_text('{}')
+    with pytest.raises(ConfigurationError, match='never written over'):
+        make_result_folder(tmp_path, montecarlo.RESULT_FILE)
+
+
+def _descendants(pid):
+    """Processes that a process has started, by /proc."""
+    found = []
+    for entry in os.listdir('/proc'):
+        if entry.isdigit():
+            try:
+                with open(f'/proc/{entry}/stat') as file:
+                    parent = int(file.read().rsplit(')', 1)[1].split()[1])
+            except OSError:
+                continue
+            if parent == pid:
+                found += [int(entry), *_descendants(int(entry))]
+    return found
+
+
+@pytest.mark.skipif(not os.path.isdir('/proc/self'), reason='needs /proc')
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
+def test_no_worker_outlives_the_command(number):
+    """Ctrl-C goes to the whole group, as from a terminal; SIGKILL to the command alone."""
+    command = [sys.executable, '-m', 'glider_bringup.cli', 'montecarlo', '--plants', '50']
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    try:
+        end = time.monotonic() + 120.0
+        while len(children := _descendants(process.pid)) < 2 + 1:  # workers, resource tracker
+            assert time.monotonic() < end and process.poll() is None
+            time.sleep(0.05)
+        if number == signal.SIGINT:
+            os.killpg(process.pid, number)
+            out, error = process.communicate(timeout=120.0)
+            assert (process.returncode, out) == (130, '')
+            assert 'stopped by SIGINT' in error
+            assert 'Traceback' not in error
+        else:
+            process.kill()
+            process.wait()
+        end = time.monotonic() + 60.0
+        while any(os.path.exists(f'/proc/{child}') for child in children):
+            assert time.monotonic() < end
+            time.sleep(0.05)
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        process.stdout.close()
+        process.stderr.close()
+
+
+# ---------------------------------------------------------------------- noise in a mission
+
+
+NOISE = {f'sensors.{field}': value for field, value in montecarlo.SENSORS.items()}
+
+
+@pytest.fixture(scope='module')
+def noisy_flight():
+    """Scenario, log, and for every tick the position (NED) and quaternion that the plant had."""
+    fields = {
+        **SHORT,
+        **NOISE,
+        'profile.depth_m': 60.0,
+        'duration_s': 1500.0,
+        'dives': 0,
+        'seed': 5,
+        'path.course_deg': 30.0,
+        'initial.heading_deg': 30.0,
+        'initial.east_m': 3.0,
+    }
+    scenario = load_scenario('current_8deg', fields)
+    state, params = mission_of(scenario)
+    log, truth, finished = np.empty((15000, ROW)), [], False
+    for tick in range(len(log)):
+        truth.append(state.plant.motion[:7])
+        state, _, finished = fly(state, params, log[tick : tick + 1], TICK_S)
+    assert finished
+    return scenario, log, np.array(truth)
+
+
+def test_score_with_noise_is_that_of_the_true_motion(noisy_flight):
+    scenario, log, truth = noisy_flight
+    scorer = Scorer()
+    for block in (log[:7000], log[7000:7001], log[7001:]):
+        scorer.add(block)
+    result = scorer.result(Rules(60.0, 60.0))
+    course = math.radians(30.0)
+    across = math.cos(course) * truth[:, 1] - math.sin(course) * truth[:, 0]
+    expected = np.max(np.abs(across[601:]))
+    assert result['cross_track_m']['max_all'] == pytest.approx(expected, abs=1e-6)
+    assert result['depth_m']['max'] == pytest.approx(np.max(truth[:, 2]), abs=1e-9)
+    final = result['final_state']
+    assert final['position_ned_m'] == pytest.approx(list(truth[-1, :3]), abs=1e-9)
+    attitude = euler_from_quaternion(*truth[-1, 3:])
+    assert final['attitude_rpy_rad'] == pytest.approx(list(attitude), abs=1e-12)
+
+
+def of_the_sea(log):
+    """The log of a vehicle whose true motion nobody knows."""
+    told = log.copy()
+    told[:, COLUMNS['ground_truth/odom']] = np.nan
+    return told
+
+
+def test_what_is_recorded_is_what_was_measured(noisy_flight):
+    scenario, log, truth = noisy_flight
+    east = COLUMNS['odom'].start
+    noise = log[:, [east + 1, east]] - truth[:, :2]
+    assert np.std(noise) == pytest.approx(1.0, rel=0.02)
+    apparent = Scorer()
+    apparent.add(of_the_sea(log))
+    assert apparent.result(Rules(60.0, 60.0))['depth_m']['max'] > np.max(truth[:, 2]) + 0.5
+
+
+def test_nodes_and_direct_engine_agree_with_noise_on_a_perturbed_plant(vehicle, tmp_path):
+    sampled = sample_plant(11, vehicle)
+    options = [f'--set={field}={json.dumps(value)}' for field, value in sampled.items()]
+    cards, digests = [], []
+    for engine in ('nodes', 'direct'):
+        folder = tmp_path / engine
+        process = glider(
+            *('run', 'current_8deg', '--engine', engine, '--bag', '--duration', 300, '--json'),
+            *('--set', 'settle_s=10', '--out', folder, *options),
+        )
+        assert process.returncode == 0, process.stderr
+        cards.append(json.loads(process.stdout))
+        rows = np.concatenate(
+            [block.copy() for block in RecordedLog(Bag(folder), RECORDED).blocks()]
+        )
+        digests.append(rows.tobytes())
+    assert digests[0] == digests[1]
+    for name in ('ticks', 'cross_track_m', 'depth_m', 'final_state'):
+        assert cards[0][name] == cards[1][name]
+    assert score_again(tmp_path / 'nodes') == cards[0]

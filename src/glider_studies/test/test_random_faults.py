@@ -1,0 +1,121 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The search for what random faults do: its oracles, its shrinking, and a small share of it."""
+
+import json
+import shlex
+
+import numpy as np
+from typer.testing import CliRunner
+
+from glider_guard.rows import ORDERED
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.scenario import load_scenario, parse_assignment
+from glider_studies.commands.experiments import app
+from glider_studies.hunt import search
+from glider_studies.hunt.missions import draw_mission, due_s
+from glider_studies.hunt.oracle import Truth, Verdict, judge
+
+#: zhang2021 is rated for 1000 m, its hull bears 1250 m.
+SCENARIO = ('current_8deg', {'dives': 0, 'duration_s': 20000.0})
+PUMP_STUCK = {'kind': 'stuck', 'actuator': 'buoyancy_engine', 'at_s': 2500.0}
+
+
+def flight(depth_at, told_s: float = np.inf) -> Truth:
+    """Truth of a flight by its depth (m) over time (s), and when the guard told to surface."""
+    time_s = np.arange(200000) * 0.1
+    log = np.zeros((len(time_s), ROW))
+    log[:, COLUMNS['ground_truth/odom'].start + 2] = -np.interp(
+        time_s, *zip(*depth_at, strict=True)
+    )
+    log[time_s >= told_s, COLUMNS['guard']] = ORDERED
+    truth = Truth()
+    truth.add(log)
+    return truth
+
+
+def kind_of(truth: Truth, faults=(), status='completed') -> str:
+    name, changes = SCENARIO
+    loaded = load_scenario(name, {**changes, 'faults': list(faults)})
+    begun = [fault['at_s'] for fault in faults]
+    return judge(loaded, truth, status, '', begun).kind
+
+
+SINKS = [(0.0, 0.0), (2500.0, 700.0), (5000.0, 1400.0), (20000.0, 1400.0)]
+
+
+def test_who_sinks_beyond_the_hull_with_a_weight_on_board_is_lost():
+    assert kind_of(flight(SINKS, told_s=3000.0), [PUMP_STUCK]) == 'lost'
+
+
+def test_who_has_no_means_left_is_not_lost_but_has_to_be_told():
+    flood = {'kind': 'leak', 'rate_kgps': 1.0, 'limit_kg': 50.0, 'at_s': 2500.0}
+    assert kind_of(flight(SINKS), [flood]) == 'untold'
+    assert kind_of(flight(SINKS, told_s=3000.0), [flood], 'lost') == ''
+    assert kind_of(flight(SINKS, told_s=3000.0), [flood], 'surfaced') == 'untold'
+
+
+def test_who_stays_down_after_it_was_sent_up_is_late():
+    hangs = [(0.0, 0.0), (1000.0, 300.0), (20000.0, 300.0)]
+    assert kind_of(flight(hangs, told_s=1500.0)) == 'late'
+    up = [(0.0, 0.0), (1500.0, 300.0), (1500.0 + due_s(300.0) - 60.0, 0.0), (20000.0, 0.0)]
+    assert kind_of(flight(up, told_s=1500.0), status='surfaced') == ''
+    assert kind_of(flight(up, told_s=1500.0), status='completed') == 'untold'
+    sinks_again = [*up[:3], (19000.0, 0.0), (20000.0, 50.0)]
+    assert kind_of(flight(sinks_again, told_s=1500.0)) == 'late'
+
+
+def test_who_would_have_sunk_again_whatever_was_done_is_not_late():
+    flood = {'kind': 'leak', 'rate_kgps': 0.001, 'limit_kg': 50.0, 'at_s': 1500.0}
+    up = [(0.0, 0.0), (1500.0, 300.0), (3000.0, 0.0), (12000.0, 0.0), (20000.0, 900.0)]
+    assert kind_of(flight(up, told_s=1500.0), [flood], 'surfaced') == ''
+    assert kind_of(flight(up, told_s=1500.0), [], 'surfaced') == 'late'
+
+
+def test_who_hangs_or_goes_too_deep_untold_is_found():
+    assert kind_of(flight([(0.0, 0.0), (1000.0, 300.0), (20000.0, 300.0)])) == 'untold'
+    deep = [(0.0, 0.0), (5000.0, 1100.0), (10000.0, 0.0), (20000.0, 500.0)]
+    assert kind_of(flight(deep)) == 'untold'
+    yo = [(2000.0 * i, 900.0 * (i % 2)) for i in range(11)]
+    assert kind_of(flight(yo)) == ''
+    assert kind_of(flight(yo), status='failed') == 'not_finite'
+
+
+def test_harm_is_shrunk_to_the_fault_that_does_it(monkeypatch):
+    mission = next(
+        one for one in (draw_mission(3, number) for number in range(50)) if len(one.faults) == 3
+    )
+
+    def verdict(scenario):
+        harms = any(fault.kind == mission.faults[1]['kind'] for fault in scenario.faults)
+        return Verdict('lost' if harms else '', 'by the second')
+
+    monkeypatch.setattr(search, '_verdict', verdict)
+    found, faults = search._shrunk(mission, Verdict('lost', ''))
+    assert (found.kind, faults) == ('lost', [mission.faults[1]])
+    words = shlex.split(search.command(mission, faults))
+    fields = dict(
+        parse_assignment(value)
+        for option, value in zip(words, words[1:], strict=False)
+        if option == '--set'
+    )
+    assert load_scenario(words[2], fields) == mission.load(faults)
+
+
+def test_missions_follow_from_seed_and_number_and_half_of_them_are_awkward():
+    missions = [draw_mission(11, number) for number in range(60)]
+    assert missions[7] == draw_mission(11, 7) != draw_mission(12, 7)
+    assert {one.load().vehicle for one in missions} >= {'zhang2021', 'seaglider', 'slocum_g2'}
+    assert {one.load().navigation.method for one in missions} == {'known', 'dead_reckoned'}
+    assert len({one.scenario for one in missions}) >= 10
+    assert all(2 <= len(one.faults) <= 3 for one in missions)
+
+
+def test_a_small_share_of_the_search_finds_nothing():
+    words = ['--only', 'random_faults', '--flights', '24', '--seed', '3', '--json']
+    done = CliRunner().invoke(app, words)
+    counts = json.loads(done.stdout)
+    names = ('flights', 'lost', 'untold', 'late', 'not_finite', 'false_reactions')
+    assert [counts[name] for name in names] == [24, 0, 0, 0, 0, 0], counts['experiments']
+    assert counts['hours'] > 50.0
+    assert done.exit_code == 0
