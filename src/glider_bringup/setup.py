@@ -29,7 +29,7 @@ setup(
     zip_safe=False,
     maintainer='The glider stack authors',
     maintainer_email='maintainers@example.com',
-    description='Missions of an underwater glider: scenarios, runner, recorder, command line.',
+    description='Flying an underwater glider: runner, recorder, score, report, command line.',
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
