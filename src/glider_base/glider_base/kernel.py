@@ -53,9 +53,14 @@ def kernel(function: Callable) -> numba.core.dispatcher.Dispatcher:
     agree to the last bit. Inlined into its callers: a NamedTuple would otherwise be copied number
     by number at every call.
     """
-    compiled = numba.njit(error_model='numpy', forceinline=True)(function)
+    options = {'error_model': 'numpy', 'forceinline': True, 'no_cfunc_wrapper': True}
+    compiled = numba.njit(**options)(function)
+    inlined = numba.njit(no_cpython_wrapper=True, **options)(function)
+    compiled.get_call_template = inlined.get_call_template
+    compiled.get_overload = inlined.get_overload
     if is_kept(function):
         compiled._cache = KernelCache(function)  # as its enable_caching() does
+        inlined._cache = KernelCache(function, '.inlined')
     return compiled
 
 

@@ -208,8 +208,9 @@ class KernelCache(FunctionCache):
 
     _impl_class = _Impl
 
-    def __init__(self, function) -> None:
+    def __init__(self, function, ending: str = '') -> None:
         super().__init__(function)
+        self._ending = ending  #: of the names of its files
         HOLDERS.add(function.__module__.partition('.')[0])
 
     def _select(self, sig) -> None:
@@ -217,7 +218,7 @@ class KernelCache(FunctionCache):
         arguments = getattr(sig, 'args', sig)
         modules = {one.__module__ for one in _classes(arguments)} | {self._py_func.__module__}
         digest = closure(frozenset(modules), len(BODIES), len(HOLDERS))
-        name = f'{self._impl.filename_base}.{digest}'
+        name = f'{self._impl.filename_base}{self._ending}.{digest}'
         self._cache_file = IndexDataCacheFile(self._cache_path, name, digest)
 
     def load_overload(self, sig, target_context):
