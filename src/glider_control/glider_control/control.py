@@ -29,7 +29,7 @@ from glider_control.intake import (
 from glider_control.law import Seen, law_learnt, law_step
 from glider_control.stall import BEGINS_S, STEEP, watch_stall
 from glider_control.surface import steer, surface_learnt
-from glider_control.vertical_rate import Trim, vertical_rate_law
+from glider_control.vertical_rate import Trim, rate_error, vertical_rate_law
 from glider_model.onboard.attitude_filter import Measured, measure
 from glider_model.onboard.glide_polar import Polar, glide_speed
 from glider_model.vehicle.rigid_body import GRAVITY
@@ -69,6 +69,7 @@ class ControlState(NamedTuple):
     command: Joints  #: last command
     intake: IntakeState
     depth: float  #: filtered as the attitude is (m)
+    rate_error: float  #: of the vertical rate, by the depth (m/s)
     is_afloat: bool
     stall_s: float  #: for which it has stalled; less than 0: it is for so long that it rests
 
@@ -161,9 +162,11 @@ def control_step(state, odometry, joints, reference, params, dt):
     odometry, joints = taken.gate.odometry, taken.joints
     last = joints if first else state.command
     limits = params.allocation
-    measured = measure(state.measured, odometry, first, params.attitude_s, dt)
-    depth = odometry.p_d if first else state.depth
-    depth += dt / (params.attitude_s + dt) * (odometry.p_d - depth)
+    attitude = measure(state.measured, odometry, first, params.attitude_s, dt)
+    before = odometry.p_d if first else state.depth
+    depth = before + dt / (params.attitude_s + dt) * (odometry.p_d - before)
+    error, off = rate_error(state.rate_error, attitude.vertical_rate, depth - before, dt)
+    measured = replace(attitude, vertical_rate=attitude.vertical_rate - off)
     is_afloat = depth < (SUBMERGED_M if state.is_afloat else AFLOAT_M)
 
     law, steering, trim, stall_s = state.law, state.steering, state.trim, state.stall_s
@@ -202,13 +205,14 @@ def control_step(state, odometry, joints, reference, params, dt):
     tick = state.tick + 1 if taken.gate.seen else 0
     state = ControlState(
         tick=tick,
-        measured=measured,
+        measured=attitude,
         law=law,
         steering=steering,
         trim=trim,
         command=command,
         intake=taken,
         depth=depth,
+        rate_error=error,
         is_afloat=is_afloat,
         stall_s=stall_s,
     )

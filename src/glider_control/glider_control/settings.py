@@ -186,6 +186,7 @@ class ControlSettings(ControlLawSettings):
             command=Joints(0.0, 0.0, 0.0, 0.0),
             intake=INITIAL_INTAKE,
             depth=0.0,
+            rate_error=0.0,
             is_afloat=True,
             stall_s=0.0,
         )

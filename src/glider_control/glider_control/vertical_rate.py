@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The vertical-rate law: from the rate that is asked for to the buoyancy engine."""
 
+import math
 from typing import NamedTuple
 
 from glider_base.kernel import kernel
@@ -12,6 +13,24 @@ PUMP_ARRIVED_KG = 0.05
 #: A hull is taken to have this share at least of the drag in its file. What is learnt beyond is
 #: ballast, which must not change its sign when the vehicle turns over.
 LEAST_DRAG = 0.5
+
+
+#: A vertical rate that the depth does not follow, on an average over this time (s), by more than
+#: this (m/s), is way over ground that an attitude shows as way up or down.
+ERROR_S, ERROR_MPS = 600.0, 0.01
+#: A depth that changes by more from tick to tick was set anew (m).
+ANEW_M = 5.0
+
+
+@kernel
+def rate_error(error, rate, fallen, dt):
+    """Error (m/s) of a vertical rate (m/s, + down), averaged, and the part that is taken off.
+
+    ``fallen`` is by how much the depth has changed in this tick (m).
+    """
+    if abs(fallen) < ANEW_M:
+        error += (dt * (rate - error) - fallen) / ERROR_S
+    return error, math.copysign(max(0.0, abs(error) - ERROR_MPS), error)
 
 
 class Trim(NamedTuple):

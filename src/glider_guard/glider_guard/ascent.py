@@ -78,8 +78,9 @@ def come_up(state, rate, sees, under, m_b, limits, dt):
     slow_s = min(0.0, state.slow_s + dt) if state.slow_s < 0.0 else 0.0
     if slow_s < 0.0:
         turned = False
-    elif turned and sees and under and average > -SLOW_MPS:
-        slow_s = state.slow_s + dt if state.slow_s < SLOW_S else -SLOW_S
+    elif turned and sees and under:
+        slower = dt if average > -SLOW_MPS else -dt  # a rate that errs is now this, now that
+        slow_s = max(0.0, state.slow_s + slower) if state.slow_s < SLOW_S else -SLOW_S
     safe = limits.safe
     x_p = safe.x_p if turned else mass_place(0.0, m_b, -safe.x_p, limits.mass)
     return Ascent(waits_s, average, turned, slow_s), Joints(safe.m_b, x_p, 0.0, 0.0)

@@ -90,12 +90,13 @@ class Depths(NamedTuple):
     under_s: float  #: time under water
     lag_m: float  #: of the measured depth behind the vertical rate
     gone_m: float  #: by the vertical rate, up or down, of late, and by what an attitude may be off
-    lag_s: float  #: for which that has been too much
+    astray_m: float  #: of the measured depth beside the way by pump and pitch
+    lag_s: float  #: for which it has lagged too much
     still_s: float  #: for which nothing measured has changed
     apart_s: float  #: for which two measured depths have differed
 
 
-INITIAL_DEPTHS = Depths(*(23 * (0.0,)))
+INITIAL_DEPTHS = Depths(*(24 * (0.0,)))
 
 
 class Sounding(NamedTuple):
@@ -129,12 +130,12 @@ def _count(holds, time_s, dt):
 
 
 @kernel
-def _lag(lag_m, at, jump_m, dt):
-    """Lag (m) of the depth behind the vertical rate; one that is set anew has none."""
+def _lag(lag_m, rate, at, jump_m, dt):
+    """Lag (m) of the depth behind a vertical rate (m/s); one that is set anew has none."""
     fallen = at.odom - at.before
     if abs(fallen) > jump_m or at.is_out:
         return 0.0
-    return lag_m + dt * (at.odom_rate - lag_m / LAG_FADES_S) - fallen
+    return lag_m + dt * (rate - lag_m / LAG_FADES_S) - fallen
 
 
 @kernel
@@ -171,6 +172,7 @@ def begin_at(depth):
         under_s=none,
         lag_m=none,
         gone_m=none,
+        astray_m=none,
         lag_s=none,
         still_s=none,
         apart_s=none,
@@ -201,10 +203,13 @@ def sound(state, at, limits, dt):
     if at.surfaces and at.rate > RISES_MPS:
         crushed = crushed or depth + at.drop_way > limits.crush - limits.drop_margin
     over = max(limits.over_m, limits.over_share * target)
-    lag_m = _lag(state.lag_m, at, limits.jump_m, dt)
+    lag_m = _lag(state.lag_m, at.odom_rate, at, limits.jump_m, dt)
+    astray_m = _lag(state.astray_m, at.led, at, limits.jump_m, dt)
     going = abs(at.odom_rate) + TILT * at.odom_speed
     gone_m = state.gone_m + dt * (going - state.gone_m / LAG_FADES_S)
     lags = abs(lag_m) > max(limits.lag_m, limits.lag_share * gone_m)
+    if at.led != 0.0 and abs(astray_m) < 0.5 * abs(astray_m - lag_m):
+        lags = False  # it is the vertical rate that is wrong
     climbs = at.ascends or at.surfaces
     mark = max(state.mark, depth) if climbs and under else depth
     progress = mark - depth >= limits.progress_m
@@ -247,6 +252,7 @@ def sound(state, at, limits, dt):
         under_s=_count(under, state.under_s, dt),
         lag_m=lag_m,
         gone_m=gone_m,
+        astray_m=astray_m,
         lag_s=_count(lags, state.lag_s, dt),
         still_s=_count(is_still, state.still_s, dt),
         apart_s=_count(at.apart_m > limits.disagree_m, state.apart_s, dt),

@@ -55,6 +55,7 @@ class Weight(NamedTuple):
     least: float  #: as `off`, by the rate that is less, less what drag may feign (kg)
     line: float  #: by the line through what this dive has shown so far (kg)
     growth: float  #: slope of that line (kg/s)
+    line_s: float  #: length of that line (s)
     begun: float  #: depth at which it begins (m)
 
 
@@ -72,7 +73,7 @@ class Glide(NamedTuple):
     under: bool  #: under water
 
 
-INITIAL_WEIGHT = Weight(*(9 * (0.0,)))
+INITIAL_WEIGHT = Weight(*(10 * (0.0,)))
 
 
 @kernel
@@ -172,8 +173,8 @@ def weigh(state, at, limits, dt):
         least += (dt / limits.average_s) * (shown + min(0.0, shown) - known - least)
         off += (dt / limits.average_s) * (more - off)
         soon += (dt / SOON_S) * (more - soon)
-        line_s = max(0.0, glides_s - STEADY_S)
-        if line_s > 0.0:
+        if glides_s > STEADY_S:
+            line_s = state.line_s + dt
             line, growth = _least_squares(line, growth, shown - known, line_s, dt)
     if line_s == 0.0:
         begun = at.depth
@@ -190,6 +191,7 @@ def weigh(state, at, limits, dt):
         least=least,
         line=line,
         growth=growth,
+        line_s=line_s,
         begun=begun,
     )
     return state, TOO_HEAVY if weighs > limits.most else 0
