@@ -292,3 +292,33 @@ def test_a_slow_yo_that_begins_in_a_stall_is_flown():
     turns = np.flatnonzero(np.diff(flown.depth > 15.0))
     assert len(turns) > 6
     assert flown.depth.max() < 30.0
+
+
+#: Errors of attitude sensors that are glued in, and how fast the water goes under them.
+TILTED = {'pitch_offset_deg': 0.4, 'roll_bias_deg': 1.5}
+FAST = {'current.speed_mps': 2.5, 'current.direction_deg': 319.0}
+
+
+def test_a_pitch_that_freezes_over_fast_ground_does_not_freeze_the_depth():
+    """With its pump stuck it sinks at 0.04 m/s; by its pitch it rises at 0.7 m/s, which is way."""
+    faults = [
+        broken('frozen', sensor='pitch', at_s=1050.0),
+        broken('stuck', actuator='buoyancy_engine', at_s=1270.0),
+    ]
+    dive = {'profile.depth_m': 270.0, 'profile.pitch_deg': 28.8, 'profile.net_heaviness_kg': 0.27}
+    water = {'current.speed_mps': 2.5, 'current.direction_deg': 51.3}
+    flown = fly('yaw_10deg', 9000.0, faults, **dive, **water)
+    assert flown.depth.max() < 500.0
+    assert flown.depth[-1] < AT_SURFACE_M
+
+
+def test_way_over_ground_that_a_tilt_shows_as_way_up_is_none():
+    """It was satisfied with 0.05 m/s upward, and sank out of its yo at 0.015 m/s."""
+    yo = {'profile.depth_m': 20.0, 'profile.top_depth_m': 3.0, 'profile.pitch_deg': 16.9}
+    slow = {'profile.net_heaviness_kg': 0.05, 'profile.surface_every_dives': 2, 'dives': 0}
+    tilted = {f'sensors.{name}': value for name, value in {**NOISE, **TILTED}.items()}
+    aging = [broken('fouling', drag=1.5, over_s=14400.0)]
+    flown = fly('yaw_10deg', 9000.0, aging, vehicle='slocum_g2', **yo, **slow, **tilted, **FAST)
+    assert not flown.told.any()
+    assert flown.depth.max() < 40.0
+    assert np.count_nonzero(np.diff(flown.depth > 15.0)) > 6

@@ -19,6 +19,7 @@ from glider_control.control import (
     control_step,
 )
 from glider_control.settings import ControlSettings
+from glider_control.vertical_rate import rate_error
 from glider_model.onboard.glide_polar import glide_vertical_rate
 from glider_model.plant.plant import PlantSettings, plant_odometry, plant_step
 from glider_model.plant.trim import solve_trim
@@ -209,6 +210,20 @@ def test_a_slow_glide_that_turns_over_is_pumped_the_right_way_at_once(sign, ball
     before = flight.c_m_b[-1]
     flight.fly(20.0, theta=pitch, rate=-rate)
     assert np.all(sign * flight.c_m_b[-200:] < sign * before)
+
+
+@pytest.mark.parametrize(('shows', 'taken'), [(0.0, 0.0), (0.06, 0.05), (-0.06, -0.05)])
+def test_a_vertical_rate_that_the_depth_does_not_follow_is_put_right(shows, taken):
+    """But for 0.01 m/s: 0.3 m of noise in the depth are no error of the rate."""
+    noise = np.random.default_rng(1).normal(0.0, 0.3, 60000)
+    depth, error, off, offs = 100.0, 0.0, 0.0, []
+    for tick, wrong in enumerate(noise):
+        true = 100.0 + 0.02 * tick * TICK_S + wrong
+        error, off = rate_error(error, 0.02 + shows, true - depth, TICK_S)
+        depth = true
+        offs.append(off)
+    assert np.mean(offs[40000:]) == pytest.approx(taken, abs=0.002)
+    assert abs(off - taken) < 0.005
 
 
 def travel(column):

@@ -15,6 +15,7 @@ from glider_base.settings import ConfigurationError
 from glider_base.signals import SURFACE_TARGET, TICK_S, Battery, Health, Joints, Odometry
 from glider_base.wiring import NO_ECHO
 from glider_guard import rows
+from glider_guard.ascent import INITIAL_ASCENT, come_up
 from glider_guard.block import GUARD, guard_surface, say
 from glider_guard.guard import GuardOutput, GuardParams, GuardState, Heard, guard_step
 from glider_guard.settings import GuardSettings
@@ -409,3 +410,16 @@ def test_an_order_is_followed_and_told():
 def test_a_hull_that_crushes_above_its_rating_is_refused():
     with pytest.raises(ConfigurationError, match=r'crush_depth: 900 m \(allowed: > 1000 m'):
         load_vehicle(changed_vehicle('zhang2021', {'crush_depth': 900.0}))
+
+
+def test_a_slow_way_up_is_seen_through_what_the_rate_errs_by():
+    """In a stall it rises at 0.012 m/s: held level it comes out of it, but not at 0.08 m/s."""
+    draw = np.random.default_rng(2)
+    limits = Vehicle().params.ascent
+    for rate, levels in ((-0.012, True), (-0.08, False)):
+        state, held = INITIAL_ASCENT, 0
+        for error in draw.normal(0.0, 0.4, 20000):
+            state, _ = come_up(state, rate + error, True, True, -1.0, limits, TICK_S)
+            held += state.slow_s < 0.0
+        assert (held > 2000) == levels
+        assert levels or not held
