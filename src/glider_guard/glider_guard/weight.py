@@ -24,7 +24,10 @@ SOON_S = 30.0
 #: Water that comes in, and a hull that shrinks with depth, make a vehicle heavier all the way
 #: down. What a dive shows of it is a line over time, from when the glide is steady (s); after so
 #: long (s) it is believed, as far ahead as it is long, and bent by what is newer than this (s).
-STEADY_S, LINE_S, NEWER_S = 90.0, 600.0, 1800.0
+STEADY_S, LINE_S, NEWER_S = 300.0, 600.0, 1800.0
+#: What is more than this share of the range of the pump it cannot take off, though the polar errs:
+#: by 0.08 of it in the dive of a Seaglider at 45 deg, with the whole pump and a pitch that errs.
+SURELY = 1.1
 #: A vehicle that is held level sinks on by no more than this (m), as it does broadside until its
 #: pump has made it light, and this (s) times the rate it had, until it lies level.
 LEVEL_M, LEVEL_S = 12.0, 45.0
@@ -142,8 +145,8 @@ def weigh(state, at, limits, dt):
     """Take in what a tick shows.
 
     At the surface nothing glides. Twice the drag, as growth makes it, takes half of the speed's
-    square from a climb: what the vehicle still rises by is taken off again. In a dive its weight
-    is that at the end: a pump that is used up when it turns was used up too late.
+    square from a climb: what the vehicle still rises by is taken off again. In a dive it is
+    told, too, where at the end of it the pump could not take off what it weighs.
 
     Parameters
     ----------
@@ -178,10 +181,10 @@ def weigh(state, at, limits, dt):
             line, growth = _least_squares(line, growth, shown - known, line_s, dt)
     if line_s == 0.0:
         begun = at.depth
-    weighs = least
+    is_heavy = least > limits.most
     if line_s > LINE_S and mean > LEAST_RATE and at.target > at.depth > begun:
         ahead = min(1.0, (at.target - at.depth) / (at.depth - begun))
-        weighs = max(least, line + growth * line_s * ahead)
+        is_heavy = is_heavy or line + growth * line_s * ahead > SURELY * limits.range
     state = Weight(
         off=off,
         soon=soon,
@@ -194,4 +197,4 @@ def weigh(state, at, limits, dt):
         line_s=line_s,
         begun=begun,
     )
-    return state, TOO_HEAVY if weighs > limits.most else 0
+    return state, TOO_HEAVY if is_heavy else 0
