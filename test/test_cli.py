@@ -3,15 +3,15 @@
 """The command line as a person or a script meets it: a process, its output, its exit code."""
 
 import json
-import os
-import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 import typer
 import yaml
 
+import command_line
 import glider_flights.commands
 import glider_studies.commands
 from glider_base.settings import ConfigurationError
@@ -32,16 +32,7 @@ TRIM = (
 ).split()
 
 
-def glider(*arguments):
-    """Finished process of a command, with its output as text."""
-    return subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        env={**os.environ, 'COLUMNS': '120', 'PYTHONUTF8': '1'},
-        timeout=300,
-        check=False,
-    )
+glider = partial(command_line.glider, columns=120)
 
 
 def refused(*arguments):

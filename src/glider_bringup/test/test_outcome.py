@@ -3,13 +3,12 @@
 """What became of a vehicle: the same word wherever it is told, by its true depth."""
 
 import json
-import os
-import subprocess
-import sys
+from functools import partial
 
 import numpy as np
 import pytest
 
+import command_line
 from glider_base.signals import TICK_S
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.score import Scorer
@@ -154,15 +153,7 @@ def test_way_along_the_path_is_that_of_the_vehicle(speed):
 # ------------------------------------------------------------------------------------ told
 
 
-def glider(*arguments):
-    return subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        env={**os.environ, 'COLUMNS': '160', 'PYTHONUTF8': '1', 'FORCE_COLOR': '1'},
-        timeout=300,
-        check=False,
-    )
+glider = partial(command_line.glider, FORCE_COLOR='1')
 
 
 DEEP = ('--set', 'profile.depth_m=800', '--set', 'initial.depth_m=600')

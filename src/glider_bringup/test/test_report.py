@@ -5,11 +5,9 @@
 import base64
 import json
 import math
-import os
 import re
 import resource
 import shutil
-import subprocess
 import sys
 import zlib
 from html.parser import HTMLParser
@@ -18,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from command_line import glider
 from glider_bringup import cli, console
 from glider_bringup.door.run import Rows
 from glider_bringup.engines.direct import fly_blocks
@@ -96,18 +95,6 @@ def report_of(folder):
     file = folder / 'report.html'
     write_report(read_run(folder), file)
     return read_page(file)
-
-
-def glider(*arguments, preexec_fn=None, **variables):
-    return subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        env={**os.environ, 'COLUMNS': '160', 'PYTHONUTF8': '1', **variables},
-        timeout=300,
-        check=False,
-        preexec_fn=preexec_fn,
-    )
 
 
 @pytest.fixture

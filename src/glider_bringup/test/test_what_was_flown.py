@@ -3,13 +3,12 @@
 """What was flown is told as it was flown: what was changed in a scenario, and no other one."""
 
 import json
-import os
 import shutil
-import subprocess
-import sys
+from functools import partial
 
 import pytest
 
+import command_line
 from glider_base.settings import ConfigurationError
 from glider_bringup.door.run import fly, open_run
 from glider_mission.scenario import load_scenario
@@ -19,15 +18,7 @@ SHORT = ('--engine', 'direct', '--duration', '30')
 TOLD = 'with current.speed_kn=0.6, profile.depth_m=300'
 
 
-def glider(*arguments):
-    return subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        env={**os.environ, 'COLUMNS': '200', 'PYTHONUTF8': '1'},
-        timeout=300,
-        check=False,
-    )
+glider = partial(command_line.glider, columns=200)
 
 
 def refused(*arguments):

@@ -11,11 +11,13 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from typing import get_args
 
 import numpy as np
 import pytest
 
+import command_line
 from glider_base.settings import ConfigurationError
 from glider_bringup import cli
 from glider_bringup.scoring.one_hertz import Recorder
@@ -46,15 +48,7 @@ from glider_studies.workers import worker_pool
 ROW_FIELDS = {'case', 'controller', 'guidance', 'status', 'finite', 'cross_track_m', 'command'}
 
 
-def glider(*arguments):
-    return subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        env={**os.environ, 'COLUMNS': '80', 'PYTHONUTF8': '1'},
-        timeout=300,
-        check=False,
-    )
+glider = partial(command_line.glider, columns=80)
 
 
 # --------------------------------------------------------------------------- what is flown

@@ -10,10 +10,12 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import numpy as np
 import pytest
 
+import command_line
 from glider_base.frames import euler_from_quaternion
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
@@ -60,15 +62,7 @@ SPREADS = (
 )
 
 
-def glider(*arguments, timeout=300):
-    return subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        env={**os.environ, 'COLUMNS': '100', 'PYTHONUTF8': '1'},
-        timeout=timeout,
-        check=False,
-    )
+glider = partial(command_line.glider, columns=100)
 
 
 @pytest.fixture(scope='module')

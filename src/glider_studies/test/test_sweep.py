@@ -13,6 +13,7 @@ import sys
 import time
 import tracemalloc
 from contextlib import contextmanager
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,6 +22,7 @@ import xarray
 import yaml
 from scipy.io import netcdf_file
 
+import command_line
 from glider_bringup import cli
 from glider_bringup.door.netcdf import write_dataset
 from glider_mission.scenario import load_scenario
@@ -71,15 +73,7 @@ def command(*arguments):
     return [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)]
 
 
-def glider(*arguments):
-    return subprocess.run(
-        command(*arguments),
-        capture_output=True,
-        text=True,
-        env={**os.environ, 'COLUMNS': '200', 'PYTHONUTF8': '1'},
-        timeout=DEADLINE_S,
-        check=False,
-    )
+glider = partial(command_line.glider, columns=200, timeout=DEADLINE_S)
 
 
 @contextmanager

@@ -3,15 +3,14 @@
 """Fields of a vehicle by ``--set``: what flies, what is kept of it, and what is refused."""
 
 import json
-import os
 import shlex
-import subprocess
-import sys
+from functools import partial
 
 import pytest
 import xarray
 import yaml
 
+import command_line
 from glider_base.settings import ConfigurationError
 from glider_bringup.scoring.card import fly_scored
 from glider_mission.recording.mcap_reader import Bag
@@ -25,16 +24,7 @@ FIELD, DRAG = 'vehicle.hydrodynamics.K_D0', 'vehicle.hydrodynamics.K_D0=8.0'
 SHORT = ('--duration', '60', '--no-report', '--json')
 
 
-def glider(*arguments):
-    """Finished process of a command, with its output as text."""
-    return subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        env={**os.environ, 'COLUMNS': '120', 'PYTHONUTF8': '1'},
-        timeout=300,
-        check=False,
-    )
+glider = partial(command_line.glider, columns=120)
 
 
 def result(*arguments):
