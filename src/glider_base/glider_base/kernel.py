@@ -53,8 +53,8 @@ def kernel(function: Callable) -> numba.core.dispatcher.Dispatcher:
     agree to the last bit. Inlined into its callers: a NamedTuple would otherwise be copied number
     by number at every call.
 
-    What unpacks the arguments of a call from Python takes a third of the time to compile. So a
-    kernel that calls this one gets a twin without it: two dispatchers, that of Python in front.
+    What unpacks the arguments of a call from Python is long to compile, and kernels do not need
+    it of each other: they get a twin without, by a dispatcher of its own behind that of Python.
     """
     options = {'error_model': 'numpy', 'forceinline': True, 'no_cfunc_wrapper': True}
     compiled = numba.njit(**options)(function)

@@ -284,7 +284,7 @@ def test_a_shallow_yo_with_a_slow_pump_is_flown():
 
 
 def test_a_slow_yo_that_begins_in_a_stall_is_flown():
-    """Nose too high for its balance, a Seaglider slides backward at 8 mm/s, whatever it weighs."""
+    """Nose too high for its balance, a Seaglider slid backward, the faster the heavier it was."""
     yo = {'profile.depth_m': 20.0, 'profile.pitch_deg': 29.4, 'profile.net_heaviness_kg': 0.08}
     drags = {'K_D0': 0.82, 'K_D': 0.78, 'K_L': 1.16, 'K_M': 0.86, 'pitch_trim_m': -0.0071}
     flown = fly('rough_water', 3600.0, **SEAGLIDER, perturb=drags, **yo)
@@ -300,7 +300,7 @@ FAST = {'current.speed_mps': 2.5, 'current.direction_deg': 319.0}
 
 
 def test_a_pitch_that_freezes_over_fast_ground_does_not_freeze_the_depth():
-    """With its pump stuck it sinks at 0.04 m/s; by its pitch it rises at 0.7 m/s, which is way."""
+    """With its pump stuck it sinks slowly; by its pitch it rises fast: that is way."""
     faults = [
         broken('frozen', sensor='pitch', at_s=1050.0),
         broken('stuck', actuator='buoyancy_engine', at_s=1270.0),
@@ -313,7 +313,7 @@ def test_a_pitch_that_freezes_over_fast_ground_does_not_freeze_the_depth():
 
 
 def test_way_over_ground_that_a_tilt_shows_as_way_up_is_none():
-    """It was satisfied with 0.05 m/s upward, and sank out of its yo at 0.015 m/s."""
+    """It believed to rise as it was asked to, and sank out of its yo."""
     yo = {'profile.depth_m': 20.0, 'profile.top_depth_m': 3.0, 'profile.pitch_deg': 16.9}
     slow = {'profile.net_heaviness_kg': 0.05, 'profile.surface_every_dives': 2, 'dives': 0}
     tilted = {f'sensors.{name}': value for name, value in {**NOISE, **TILTED}.items()}

@@ -25,8 +25,8 @@ SOON_S = 30.0
 #: down. What a dive shows of it is a line over time, from when the glide is steady (s); after so
 #: long (s) it is believed, as far ahead as it is long, and bent by what is newer than this (s).
 STEADY_S, LINE_S, NEWER_S = 300.0, 600.0, 1800.0
-#: What is more than this share of the range of the pump it cannot take off, though the polar errs:
-#: by 0.08 of it in the dive of a Seaglider at 45 deg, with the whole pump and a pitch that errs.
+#: What is more than this share of the range of the pump it cannot take off, though the polar errs,
+#: as it does most in a steep dive with the whole pump and a pitch that errs.
 SURELY = 1.1
 #: A vehicle that is held level sinks on by no more than this (m), as it does broadside until its
 #: pump has made it light, and this (s) times the rate it had, until it lies level.
