@@ -283,6 +283,11 @@ def test_a_shallow_yo_with_a_slow_pump_is_flown():
     assert not flown.told.any()
 
 
+#: Errors of attitude sensors that are glued in, and how fast the water goes under them.
+TILTED = {'pitch_offset_deg': 0.4, 'roll_bias_deg': 1.5}
+FAST = {'current.speed_mps': 2.5, 'current.direction_deg': 319.0}
+
+
 def test_a_slow_yo_that_begins_in_a_stall_is_flown():
     """Nose too high for its balance, a Seaglider slid backward, the faster the heavier it was."""
     yo = {'profile.depth_m': 20.0, 'profile.pitch_deg': 29.4, 'profile.net_heaviness_kg': 0.08}
@@ -294,9 +299,23 @@ def test_a_slow_yo_that_begins_in_a_stall_is_flown():
     assert flown.depth.max() < 30.0
 
 
-#: Errors of attitude sensors that are glued in, and how fast the water goes under them.
-TILTED = {'pitch_offset_deg': 0.4, 'roll_bias_deg': 1.5}
-FAST = {'current.speed_mps': 2.5, 'current.direction_deg': 319.0}
+def test_a_turn_with_the_whole_pump_that_ends_in_a_stall_is_flown():
+    """It slid tail first below the surface, and hung there until its depth was disbelieved."""
+    steep = {'profile.depth_m': 200.0, 'profile.pitch_deg': 45.0, 'profile.top_depth_m': 5.0}
+    most = {'profile.net_heaviness_kg': 0.341, 'profile.surface_every_dives': 3}
+    drags = {'K_D0': 0.84, 'K_D': 0.86, 'K_L': 1.15, 'K_M': 0.72, 'pitch_trim_m': -0.0083}
+    drags['net_heaviness_kg'] = -0.049
+    flown = fly('slocum_shelf', 6000.0, **SEAGLIDER, perturb=drags, **steep, **most)
+    assert not flown.told.any()
+    assert np.count_nonzero(np.diff(flown.depth > 100.0)) > 6
+
+
+def test_a_slow_climb_that_begins_in_a_stall_is_flown():
+    """Light before its nose was up it slid tail first: its depth was disbelieved."""
+    slow = {'profile.depth_m': 900.0, 'profile.pitch_deg': 40.0, 'profile.net_heaviness_kg': 0.02}
+    flown = fly('slocum_shelf', 16000.0, **SEAGLIDER, **slow, **FAST)
+    assert not flown.told.any()
+    assert flown.depth[-1] < 700.0
 
 
 def test_a_pitch_that_freezes_over_fast_ground_does_not_freeze_the_depth():

@@ -27,7 +27,7 @@ from glider_control.intake import (
     take_in,
 )
 from glider_control.law import Seen, law_learnt, law_step
-from glider_control.stall import BEGINS_S, STEEP, watch_stall
+from glider_control.stall import leave_stall, watch_stall
 from glider_control.surface import steer, surface_learnt
 from glider_control.vertical_rate import Trim, rate_error, vertical_rate_law
 from glider_model.onboard.attitude_filter import Measured, measure
@@ -71,7 +71,7 @@ class ControlState(NamedTuple):
     depth: float  #: filtered as the attitude is (m)
     rate_error: float  #: of the vertical rate, by the depth (m/s)
     is_afloat: bool
-    stall_s: float  #: for which it has stalled; less than 0: it is for so long that it rests
+    stall_s: float  #: for which it has stalled; less than 0: for so long it is led out of it
 
 
 class ControlOutput(NamedTuple):
@@ -177,10 +177,9 @@ def control_step(state, odometry, joints, reference, params, dt):
     elif taken.gate.seen:
         reference = taken.reference
         m_b, trim = vertical_rate_law(state.trim, measured, reference, joints, params, dt)
-        stall_s = watch_stall(stall_s, measured, reference, joints.m_b, params.polar, dt)
+        stall_s = watch_stall(stall_s, measured, reference, joints.m_b, params, dt)
         if stall_s < 0.0:
-            m_b, trim = (m_b if stall_s > -BEGINS_S else 0.0), Trim(0.0, 0.0)
-            reference = replace(reference, theta=STEEP, theta_dot=0.0)
+            m_b, trim, reference = leave_stall(stall_s, m_b, trim, reference)
         phi, theta = measured.phi, measured.theta
         if is_afloat:
             wanted = rest_afloat(m_b, limits)

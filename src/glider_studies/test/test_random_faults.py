@@ -63,6 +63,11 @@ def test_who_stays_down_after_it_was_sent_up_is_late():
     assert kind_of(flight(up, told_s=1500.0), status='completed') == 'untold'
     sinks_again = [*up[:3], (19000.0, 0.0), (20000.0, 50.0)]
     assert kind_of(flight(sinks_again, told_s=1500.0)) == 'late'
+    struck = [{**PUMP_STUCK, 'at_s': 19000.0}]
+    assert kind_of(flight(sinks_again, told_s=1500.0), struck, 'surfaced') == ''
+    hangs_again = [*up[:3], (11000.0, 0.0), (12000.0, 50.0), (20000.0, 50.0)]
+    struck = [{**PUMP_STUCK, 'at_s': 11000.0}]
+    assert kind_of(flight(hangs_again, told_s=1500.0), struck, 'surfaced') == 'late'
 
 
 def test_who_would_have_sunk_again_whatever_was_done_is_not_late():

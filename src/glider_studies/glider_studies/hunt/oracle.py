@@ -7,6 +7,7 @@ flown: from some tick on, the plant alone, with the whole pump out, the weight l
 where it balances, at the climb stop, or there once the vehicle rises.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -133,20 +134,25 @@ def _lost(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
     return ''
 
 
-def _late(scenario: Scenario, truth: Truth) -> str:
-    """Why a vehicle is late that was told to surface for good and could have."""
+def _late(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
+    """Why a vehicle is late that was told to surface for good and could have.
+
+    A fault that strikes one that is up, and sinks it again, gives it its time anew.
+    """
     surfaces = (truth.rows & (SURFACES | DROPS)) != 0
     if not surfaces.any():
         return ''
-    told = int(np.argmax(surfaces))
-    depth = truth.depth
-    limit_s = due_s(float(depth[told]))
-    due = told + round(limit_s)
-    if due >= len(depth) or not (depth[due:] > AT_SURFACE_M).any():
-        return ''
-    best = _all_done(scenario, told + 1.0, len(depth) - told - 1.0)
-    if any((depths[round(limit_s / TICK_S) :] < AT_SURFACE_M).all() for depths in best):
-        return f'{depth[due:].max():.0f} m deep {limit_s:.0f} s after it was sent up at {told} s'
+    told, depth = int(np.argmax(surfaces)), truth.depth
+    struck = [round(one) for one in sorted(begun_s) if told < one < len(depth) - 1.0]
+    struck = [one for one in struck if depth[one] < AT_SURFACE_M]
+    for start, end in pairwise([told, *struck, len(depth)]):
+        limit_s = due_s(float(depth[start]))
+        late = depth[start + round(limit_s) : end]
+        if not (late > AT_SURFACE_M).any():
+            continue
+        best = _all_done(scenario, start + 1.0, end - start - 1.0)
+        if any((depths[round(limit_s / TICK_S) :] < AT_SURFACE_M).all() for depths in best):
+            return f'{late.max():.0f} m deep {limit_s:.0f} s after it was sent up at {start} s'
     return ''
 
 
@@ -192,7 +198,7 @@ def judge(
         return Verdict('not_finite', reason)
     for kind, why in (
         ('lost', _lost(scenario, truth, begun_s)),
-        ('late', _late(scenario, truth)),
+        ('late', _late(scenario, truth, begun_s)),
         ('untold', _untold(scenario, truth, status)),
     ):
         if why:
