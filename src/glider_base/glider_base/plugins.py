@@ -103,15 +103,18 @@ def classes(
     return found
 
 
-def loaded(group: str) -> dict[str, Any]:
-    """Whatever is registered in a group, by name; what cannot be loaded is told, and not there."""
-    found = {}
-    for point in sorted(entry_points(group=group), key=lambda point: point.name):
-        try:
-            found[point.name] = point.load()
-        except (Exception, SystemExit) as error:  # it may not be our code
-            _tell(point, f'{type(error).__name__}: {error}'.partition('\n')[0])
-    return found
+def offered(group: str) -> dict[str, EntryPoint]:
+    """What is registered in a group, by name, not loaded."""
+    return {point.name: point for point in entry_points(group=group)}
+
+
+def used(point: EntryPoint, use: Callable[[Any], Any]) -> Any:
+    """What ``use`` makes of what is registered; None, and told, if it cannot be used."""
+    try:
+        return use(point.load())
+    except (Exception, SystemExit) as error:  # it may not be our code
+        _tell(point, f'{type(error).__name__}: {error}'.partition('\n')[0])
+        return None
 
 
 def of_others(found: dict[str, ClassT], package: ModuleType) -> set[str]:

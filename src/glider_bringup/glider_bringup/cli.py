@@ -7,6 +7,7 @@ import os
 import pkgutil
 import signal
 import sys
+from functools import partial
 from importlib import import_module
 
 try:  # imports take a second, in which Ctrl-C may come, and many files
@@ -24,7 +25,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
         printable,
         shown,
     )
-    from glider_base.plugins import COMMANDS, loaded
+    from glider_base.plugins import COMMANDS, offered, used
     from glider_bringup import commands
     from glider_bringup.console import messages
     from glider_mission.disk import DiskError
@@ -43,15 +44,6 @@ _USAGE = {
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP, errno.EINVAL),
 }
 
-app = typer.Typer(
-    name='glider',
-    help='Underwater gliders: simulate, guide, control, record.',
-    epilog='Example: ./glider run current_8deg --controller pid',
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    context_settings={'help_option_names': ['-h', '--help']},
-)
 #: Commands in the order in which --help lists them; those that are not named here follow.
 ORDER = (
     *('run', 'montecarlo', 'experiments', 'sweep', 'map', 'score', 'figure', 'report', 'compare'),
@@ -76,31 +68,55 @@ OF_THE_SCRIPT = {
 }
 
 
-def found_commands() -> dict[str, typer.Typer]:
-    """Commands by name, in their order: modules in commands/, and what packages register."""
+class Commands(typer.core.TyperGroup):
+    """Modules in commands/ and what packages register: each is imported when it is asked for."""
+
+    def list_commands(self, ctx: typer.Context) -> list[str]:
+        """Names in their order, those of the script last."""
+        names = set(_modules()) | set(offered(COMMANDS))
+        order = [name for name in ORDER if name in names]
+        return order + sorted(names - set(ORDER)) + list(OF_THE_SCRIPT)
+
+    def get_command(self, ctx: typer.Context, cmd_name: str) -> typer.core.TyperCommand | None:
+        """What a name stands for; None: nothing that can be used."""
+        module, point = _modules().get(cmd_name), offered(COMMANDS).get(cmd_name)
+        if module:
+            return _command(cmd_name, import_module(module).app)
+        if point:
+            return used(point, partial(_command, cmd_name))
+        return super().get_command(ctx, cmd_name)
+
+
+def _modules() -> dict[str, str]:
+    """Modules in commands/ by the name of their command."""
     modules = pkgutil.walk_packages(commands.__path__, f'{commands.__name__}.')
-    names = (one.name for one in modules if not one.ispkg)
-    apps = loaded(COMMANDS) | {name.rpartition('.')[2]: import_module(name).app for name in names}
-    order = [name for name in ORDER if name in apps]
-    return {name: apps[name] for name in order + sorted(set(apps) - set(ORDER))}
+    return {one.name.rpartition('.')[2]: one.name for one in modules if not one.ispkg}
 
 
-def _script() -> typer.Typer:
-    """Commands that --help tells of, and that are refused here."""
-    told = typer.Typer()
-
-    def refuse(called: typer.Context) -> None:
-        raise ConfigurationError(
-            f'{called.info_name}: run it through the ./glider script of the workspace'
-        )
-
-    for name, (text, example) in OF_THE_SCRIPT.items():
-        told.command(name, help=text, epilog=f'Example: ./glider {example}')(refuse)
-    return told
+def _command(name: str, found: typer.Typer) -> typer.core.TyperCommand:
+    """Command of an application, or all of them under its name."""
+    group = typer.main.get_group(found)
+    return group.commands.get(name, group)
 
 
-for _command in (*found_commands().values(), _script()):
-    app.add_typer(_command)
+def _refuse(called: typer.Context) -> None:
+    raise ConfigurationError(
+        f'{called.info_name}: run it through the ./glider script of the workspace'
+    )
+
+
+app = typer.Typer(
+    name='glider',
+    cls=Commands,
+    help='Underwater gliders: simulate, guide, control, record.',
+    epilog='Example: ./glider run current_8deg --controller pid',
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={'help_option_names': ['-h', '--help']},
+)
+for _name, (_text, _example) in OF_THE_SCRIPT.items():
+    app.command(_name, help=_text, epilog=f'Example: ./glider {_example}')(_refuse)
 
 
 def check_words(words: list[str]) -> None:

@@ -572,9 +572,9 @@ def test_sweep_of_a_mapping_is_that_of_its_file(tmp_path):
         glider.sweep({})
 
 
-@pytest.mark.parametrize('name', sorted(typer.main.get_command(app).commands))
+@pytest.mark.parametrize('name', sorted(typer.main.get_command(app).list_commands(None)))
 def test_every_command_prints_json_or_says_that_it_does_not(name):
-    command = typer.main.get_command(app).commands[name]
+    command = typer.main.get_command(app).get_command(None, name)
     options = [option for one in command.params for option in one.opts]
     assert '--json' in options or 'no JSON' in command.help or name in OF_THE_SCRIPT
 
