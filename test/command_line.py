@@ -2,9 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """A command as a person gives it, for the tests of all packages."""
 
+import atexit
+import multiprocessing
 import os
+import runpy
 import subprocess
 import sys
+import tempfile
+from functools import cache
+from multiprocessing import forkserver
+from pathlib import Path
+
+#: A command whose process needs nothing of its own is forked from one that has loaded what takes
+#: longest: Python, the stack, and the loops of a flight.
+LOADED = 'loaded_stack'
 
 
 def glider(*arguments, columns=160, timeout=300.0, preexec_fn=None, **variables):
@@ -23,12 +34,63 @@ def glider(*arguments, columns=160, timeout=300.0, preexec_fn=None, **variables)
     variables : str
         Of its environment, beside those of this process.
     """
+    words = list(map(str, arguments))
+    env = {name: value for name, value in os.environ.items() if name != 'ROS_DOMAIN_ID'}
+    env |= {'COLUMNS': str(columns), 'PYTHONUTF8': '1', **variables}
+    if preexec_fn is None and not variables:
+        return _forked(words, env, timeout)
     return subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
+        [sys.executable, '-m', 'glider_bringup.cli', *words],
+        stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        env={**os.environ, 'COLUMNS': str(columns), 'PYTHONUTF8': '1', **variables},
+        env=env,
         timeout=timeout,
         check=False,
         preexec_fn=preexec_fn,
     )
+
+
+@cache
+def _forks():
+    """Context of processes that are forked, its server running."""
+    context = multiprocessing.get_context('forkserver')
+    context.set_forkserver_preload([LOADED])
+    before = os.environ.get('PYTHONPATH', '')
+    os.environ['PYTHONPATH'] = os.pathsep.join([str(Path(__file__).parent), before])
+    forkserver.ensure_running()
+    os.environ['PYTHONPATH'] = before
+    return context
+
+
+def _forked(words, env, timeout):
+    """Finished process of a command, forked."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = [f'{folder}/{name}' for name in ('out', 'err')]
+        process = _forks().Process(target=_become, args=(words, env, os.getcwd(), files))
+        process.start()
+        process.join(timeout)
+        if process.is_alive():
+            process.kill()
+            process.join()
+            raise subprocess.TimeoutExpired(words, timeout)
+        out, err = (Path(file).read_text(encoding='utf-8') for file in files)
+    return subprocess.CompletedProcess(words, process.exitcode, out, err)
+
+
+def _become(words, env, folder, files):
+    """Turn this process into a command that writes to two files."""
+    os.environ.clear()
+    os.environ.update(env)
+    os.chdir(folder)
+    for number, file in enumerate([os.devnull, *files]):
+        opened = os.open(file, os.O_RDWR | os.O_CREAT)
+        os.dup2(opened, number)
+        os.close(opened)
+    sys.stdin, sys.stdout = open(0), open(1, 'w', encoding='utf-8')
+    sys.stderr = open(2, 'w', encoding='utf-8', errors='backslashreplace', buffering=1)
+    sys.argv = ['glider', *words]
+    try:
+        runpy.run_module('glider_bringup.cli', run_name='__main__', alter_sys=True)
+    finally:
+        atexit._run_exitfuncs()

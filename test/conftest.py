@@ -6,10 +6,13 @@ import json
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+
+import command_line
 
 GLIDER = [sys.executable, '-m', 'glider_bringup.cli']
 #: Longer than any command here takes (s), the compilation of all kernels included.
@@ -33,18 +36,7 @@ def _environment() -> dict[str, str]:
 @pytest.fixture(scope='session')
 def glider():
     """Run a command to its end; gives the completed process."""
-
-    def run(*arguments) -> subprocess.CompletedProcess:
-        return subprocess.run(
-            [*GLIDER, *map(str, arguments)],
-            env=_environment(),
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=DEADLINE_S,
-        )
-
-    return run
+    return partial(command_line.glider, columns=80)
 
 
 @pytest.fixture

@@ -3,24 +3,18 @@
 """Experiment 5.1.1 of Zhang et al. (2021): 30 hours in a current of 1.0 kn, 8 deg off the path."""
 
 import json
-import subprocess
-import sys
 
 import pytest
+
+from command_line import glider
 
 
 def fly(folder, *options, duration='full'):
     """Scorecard of a run with the direct engine."""
-    process = subprocess.run(
-        [
-            *(sys.executable, '-m', 'glider_bringup.cli', 'run', 'current_8deg'),
-            *('--engine', 'direct', '--no-report', '--controller', 'pid', '--duration', duration),
-            *('--out', str(folder), '--json', *options),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
+    process = glider(
+        *('run', 'current_8deg', '--engine', 'direct', '--no-report', '--controller', 'pid'),
+        *('--duration', duration, '--out', folder, '--json', *options),
+        timeout=600.0,
     )
     assert process.returncode == 0, process.stderr
     return json.loads(process.stdout)

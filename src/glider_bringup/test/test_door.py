@@ -25,6 +25,7 @@ from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+import command_line
 import glider_bringup as glider
 from glider_base.kernel import compiling_told
 from glider_base.settings import ConfigurationError
@@ -508,11 +509,7 @@ def test_law_of_a_program_is_flown_as_a_class_and_as_a_function(level_law, tmp_p
     again = glider.fly(one.scenario)
     xarray.testing.assert_equal(again.to_xarray(), one.to_xarray())
     # a program that has not the law is told so
-    line = subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', 'verify', str(one.folder)],
-        capture_output=True,
-        text=True,
-    )
+    line = command_line.glider('verify', one.folder)
     assert line.returncode == 2
     assert 'LevelLaw' in line.stderr and 'Traceback' not in line.stderr
 

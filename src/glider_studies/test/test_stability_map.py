@@ -4,7 +4,6 @@
 
 import json
 import math
-import subprocess
 import sys
 
 import matplotlib.image
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
+from command_line import glider
 from glider_bringup import cli
 from glider_bringup.door.netcdf import read_dataset, write_dataset
 from glider_studies.showing.stability_map import CLASSES, CRITICAL_M, STABLE_M, load_map, shares
@@ -96,13 +96,7 @@ def test_dimensions_are_sorted_out_whatever_their_order(tmp_path):
 def test_limit_of_physics_is_that_of_the_formula(tmp_path):
     """|V sin d| <= U_h and sqrt(U_h^2 - V^2 sin^2 d) + V cos d > 0, with U_h of the glide."""
     stability = load_map(write(tmp_path, [1.0]))
-    done = subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', 'trim', 'zhang2021', '--json']
-        + ['--net-heaviness-kg', '0.4', '--pitch-deg', '-30'],
-        capture_output=True,
-        check=True,
-        timeout=300.0,
-    )
+    done = glider('trim', 'zhang2021', '--json', '--net-heaviness-kg', 0.4, '--pitch-deg', -30)
     glide = json.loads(done.stdout)
     horizontal = glide['speed_mps'] * math.cos(math.radians(glide['glide_deg'])) / KNOT_MPS
     assert stability.horizontal_kn == pytest.approx(horizontal, rel=1e-3)

@@ -1,0 +1,8 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Imported where commands are forked (`command_line`): they need not load it again."""
+
+from glider_bringup.warm_up import fly_one_tick, score_nothing
+
+fly_one_tick()
+score_nothing()
