@@ -91,7 +91,7 @@ def options(command: str) -> list[str]:
     """Options of a command."""
     from glider_bringup.cli import app
 
-    found = typer.main.get_command(app).commands[command].params
+    found = typer.main.get_command(app).get_command(None, command).params
     names = [name for one in found for name in one.opts if name.startswith('--')]
     return [name for name in names if name not in _NEVER]
 
