@@ -15,8 +15,6 @@ import pytest
 import command_line
 
 GLIDER = [sys.executable, '-m', 'glider_bringup.cli']
-#: Longer than any command here takes (s), the compilation of all kernels included.
-DEADLINE_S = 300.0
 #: The flight that tests share: every kind of current, and long enough for a descent to 200 m.
 SCENARIO, DURATION_S = 'rough_water', 1200
 

@@ -348,6 +348,17 @@ def test_a_changed_line_is_what_flies_next(machine, direct, nodes, sweep):
     assert done.returncode == 1 and 'messages that differ: reference' in done.stdout
 
 
+#: The help of a command loads the classes, that of all the commands.
+TWO_HELPS = """
+from glider_bringup.cli import app
+for words in (['run', '--help'], ['--help']):
+    try:
+        app(words, prog_name='./glider')
+    except SystemExit as end:
+        assert not end.code
+"""
+
+
 def test_a_package_that_cannot_be_used_is_told_and_all_else_works(tmp_path):
     """One line each on standard error: what, from where, and why; once, whatever it starts."""
     broken = Machine(tmp_path)
@@ -361,7 +372,8 @@ def test_a_package_that_cannot_be_used_is_told_and_all_else_works(tmp_path):
     (info / 'entry_points.txt').write_text('\n'.join(groups))
     (broken.site / 'broken.py').write_text(BROKEN_PY)
     (broken.site / 'broken_failing.py').write_text('1 / 0\n')
-    command = [sys.executable, '-m', 'glider_bringup.cli', 'run', '--help']
+    (broken.site / 'two_helps.py').write_text(TWO_HELPS)
+    command = [sys.executable, '-m', 'two_helps']
     program = f'import glider_control.settings, subprocess; subprocess.run({command}, check=True)'
     done = broken.start('-c', program)
     assert done.returncode == 0 and '<adaptive|pid' in done.stdout
