@@ -45,7 +45,7 @@ INITIAL_ASCENT = Ascent(0.0, 0.0, False, 0.0)
 
 
 @kernel
-def come_up(state, rate, sees, under, m_b, limits, dt):
+def come_up(state, rate, sees, moves, under, m_b, limits, dt):
     """Command of a tick on the way up.
 
     Parameters
@@ -55,6 +55,8 @@ def come_up(state, rate, sees, under, m_b, limits, dt):
         Measured vertical rate (m/s, + down).
     sees : bool
         Whether that is to be believed.
+    moves : bool
+        Whether it is shown at all: what is not believed tells of a stall still.
     under : bool
         Whether it is under water.
     m_b : float
@@ -78,7 +80,7 @@ def come_up(state, rate, sees, under, m_b, limits, dt):
     slow_s = min(0.0, state.slow_s + dt) if state.slow_s < 0.0 else 0.0
     if slow_s < 0.0:
         turned = False
-    elif turned and sees and under:
+    elif turned and moves and under:
         slower = dt if average > -SLOW_MPS else -dt  # a rate that errs is now this, now that
         slow_s = max(0.0, state.slow_s + slower) if state.slow_s < SLOW_S else -SLOW_S
     safe = limits.safe

@@ -116,7 +116,7 @@ class Sounding(NamedTuple):
     led: float  #: vertical rate by pump and pitch, where they make a glide (m/s, + down)
     altitude: float  #: height over the bottom (m); 0.0: no echo
     is_sent_up: bool  #: the last command makes it lighter than its file says it is, or than it is
-    ascends: bool  #: and than both, or as light as can be
+    ascends: bool  #: and than both where it is asked up, or as light as can be
     surfaces: bool  #: for good
     is_pumped: bool  #: the pump has done what it can
     is_out: bool  #: the antenna, of the water

@@ -191,11 +191,15 @@ def _sent(last, demand, told):
 
 
 @kernel
-def _react(state, taken, told, rate, under, limits, dt):
+def _react(state, taken, told, sinking, witness, params, dt):
     """Ascent a tick later, and the command of this one: what is demanded, held level, or up."""
     demand = taken.demand
     if told & (SURFACES | DROPS):
-        return come_up(state, rate, not told & BLIND, under, taken.joints.m_b, limits, dt)
+        sees, under = not told & BLIND, witness.depth > SURFACE_M
+        moves = witness.same_s < params.witness.same_s
+        rate = sinking if not state.told & BLIND else (witness.raw - state.witness.raw) / dt
+        m_b, limits = taken.joints.m_b, params.ascent
+        return come_up(state.ascent, rate, sees, moves, under, m_b, limits, dt)
     if told & HOLDS:
         return INITIAL_ASCENT, Joints(demand.m_b, demand.x_p, 0.0, 0.0)
     return INITIAL_ASCENT, demand
@@ -227,7 +231,10 @@ def _sounding(state, taken, before, heard, shown, witness, last, told, params):
     is_stuck = ((told | state.told) & STUCK_BUOYANCY) != 0
     is_pumped = is_stuck or m_b <= params.ascent.pumped
     led = shown.led if shown.is_glide else 0.0
-    ascends = last.m_b <= params.ascent.pumped or last.m_b < min(0.0, neutral)
+    # in a slow dive of a light vehicle the pump is on its light side
+    is_asked_up = taken.target < witness.depth
+    ascends = last.m_b <= params.ascent.pumped
+    ascends = ascends or (is_asked_up and last.m_b < min(0.0, neutral))
     is_afloat = witness.depth <= SURFACE_M
     if heard.health.contact_age_s >= 0.0 and state.told & BLIND:
         is_afloat = is_out(witness)
@@ -317,7 +324,7 @@ def guard_step(state, heard, params, dt):
     weight, heavy = weigh(state.weight, glide, params.weight, dt)
     fixes = watch_fixes(state.fixes, heard.odometry, heard.known, dt)
     told |= fix_rows(fixes) | unwell | heavy | _intake_rows(taken, params) | (state.told & LATCHED)
-    ascent, command = _react(state.ascent, taken, told, sinking, under, params.ascent, dt)
+    ascent, command = _react(state, taken, told, sinking, witness, params, dt)
     tick = state.tick + 1 if taken.gate.seen else 0
     output = GuardOutput(command, (told & DROPS) != 0, told)
     state = GuardState(

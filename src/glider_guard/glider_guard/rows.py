@@ -122,7 +122,7 @@ ROWS = (
     Row(
         NOT_CLIMBING,
         'not_climbing',
-        'commanded to rise, and no progress upward',
+        'asked up and sent up, or with the whole pump out, and no progress upward',
         'climb_progress_m, no_climb_s',
         SURFACE,
         True,

@@ -82,7 +82,9 @@ CASES = {
     'crush_depth': Case({'depth_m': 1150.0}, {'rate': 0.2}, 220.0),
     'near_bottom': Case({'altitude': True}, {'altitude': 2.5}, 1.5),
     'overdepth': Case({'depth_m': 300.0}, {'rate': 0.2}, 525.0),
-    'not_climbing': Case({'depth_m': 200.0}, {'demand': RISES, 'rate': 0.02}, 895.0),
+    'not_climbing': Case(
+        {'depth_m': 200.0}, {'demand': RISES, 'rate': 0.02, 'target': 5.0}, 895.0
+    ),
     'stalled': Case({}, {'rate': 0.002}, 1795.0),
     'under_too_long': Case({'under_water_s': 500.0}, {'rate': 0.2}, 495.0),
     'measurement_frozen': Case({}, {'rate': 0.0}, 25.0),
@@ -412,14 +414,24 @@ def test_a_hull_that_crushes_above_its_rating_is_refused():
         load_vehicle(changed_vehicle('zhang2021', {'crush_depth': 900.0}))
 
 
+def test_a_slow_dive_with_the_pump_on_its_light_side_is_no_climb():
+    vehicle = Vehicle(depth_m=20.0)
+    assert not vehicle.go(1800.0, demand=DIVES._replace(m_b=-0.05), rate=0.04)
+
+
 def test_a_slow_way_up_is_seen_through_what_the_rate_errs_by():
     """In a stall it rises at 0.012 m/s: held level it comes out of it, but not at 0.08 m/s."""
     draw = np.random.default_rng(2)
     limits = Vehicle().params.ascent
-    for rate, levels in ((-0.012, True), (-0.08, False)):
+    for rate, sees, levels in (
+        (-0.012, True, True),
+        (-0.08, True, False),
+        (-0.012, False, True),  # a rate that is not believed may show one still
+        (-0.08, False, False),
+    ):
         state, sent = INITIAL_ASCENT, []
         for error in draw.normal(0.0, 0.4, 20000):
-            state, command = come_up(state, rate + error, True, True, -1.0, limits, TICK_S)
+            state, command = come_up(state, rate + error, sees, True, True, -1.0, limits, TICK_S)
             sent.append(command.x_p != limits.safe.x_p)
         held = np.count_nonzero(sent[1000:])  # at first it lies level until it rises
         assert (held > 2000) == levels

@@ -58,7 +58,9 @@ class GuardNode(BlockNode):
         """Command of a cycle, or of some at once, in which nothing is seen."""
         m_b, limits = self.state.taken.joints.m_b, self.params.ascent
         for _ in range(cycles):
-            self.ascent, command = come_up(self.ascent, 0.0, False, True, m_b, limits, TICK_S)
+            self.ascent, command = come_up(
+                self.ascent, 0.0, False, False, True, m_b, limits, TICK_S
+            )
         return command
 
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
