@@ -39,7 +39,7 @@ MAY_IMPORT = {
 FLOORS = {
     'glider_model': (('vehicle', 'ocean'), ('onboard', 'plant'), ('nodes',)),
     'glider_mission': (
-        ('blocks', 'disk', 'rules'),
+        ('blocks', 'chart', 'disk', 'rules'),
         ('scenario',),
         ('choices', 'planned', 'run_folder'),
         ('recording',),

@@ -11,10 +11,11 @@ World vectors swap x and y and negate z. Body vectors negate y and z.
 """
 
 import math
+from datetime import datetime, timezone
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from glider_base.kernel import kernel
 from glider_base.settings import Settings
@@ -23,6 +24,7 @@ from glider_base.signals import Covariance, Imu, Odometry, Reference, Water, Wre
 _HALF_SQRT2 = math.sqrt(0.5)
 #: WGS 84: semi-major axis (m), and the first eccentricity squared (-).
 _AXIS, _ECCENTRICITY2 = 6378137.0, 6.69437999014e-3
+UTC = timezone.utc  # noqa: UP017, which Python 3.10 does not have
 #: What a sensor_msgs/Imu says where there are no rates.
 NO_RATES = -1.0
 
@@ -244,6 +246,22 @@ class OriginSettings(Settings):
 
     latitude_deg: float = Field(36.0, ge=-85.0, le=85.0, description='latitude (deg, + north)')
     longitude_deg: float = Field(122.0, ge=-180.0, le=180.0, description='longitude (deg, + east)')
+    time: str = Field(
+        '', description='time of the start (UTC, as 2026-03-01T06:00); where nothing asks: none'
+    )
+
+    @field_validator('time')
+    @classmethod
+    def _in_utc(cls, text: str) -> str:
+        try:
+            moment = datetime.fromisoformat(text.replace('Z', '+00:00')) if text else None
+        except ValueError:
+            raise ValueError('not a time (allowed: as 2026-03-01 or 2026-03-01T06:00Z)') from None
+        if moment is None:
+            return ''
+        if moment.tzinfo is not None:
+            moment = moment.astimezone(UTC).replace(tzinfo=None)
+        return f'{moment.isoformat()}Z'
 
     def params(self) -> 'Origin':
         """Kernel parameters."""

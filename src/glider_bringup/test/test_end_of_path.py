@@ -122,8 +122,8 @@ def test_the_end_of_the_path_is_recorded_and_scored_alike_from_the_bag(tmp_path)
     ]
     assert told[-1] == 'at the end of the path'
     assert score_again(folder)['end_of_path_m'] == card['end_of_path_m']
-    text = dict(card_rows(card))['end of path']
-    assert text == f'came up {card["end_of_path_m"]:.1f} m from its last point'
+    text = dict(card_rows(card))['arrival']
+    assert text.startswith(f'came up {card["end_of_path_m"]:.1f} m from its last point after ')
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from glider_base.signals import TICK_S
 from glider_bringup.scoring.score import Scorer
+from glider_guidance.path.settings import WaypointPath
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.rules import Rules
@@ -265,9 +266,24 @@ def test_end_of_the_path_is_told_from_where_the_vehicle_came_up():
     """By the first tick of the stage; what it drifts after that does not count."""
     t = ticks(100.0)
     log = make_log(t, north=np.where(t < 60.0, 3.0 + 0.0 * t, t), east=4.0, depth=0.5)
-    assert score(log, path_end=(0.0, 0.0))['end_of_path_m'] is None
+    path = WaypointPath(kind='waypoints', waypoints=[(-400.0, 0.0), (0.0, 0.0)]).params()
+    log[:, COLUMNS['reference'].start + 1] = -100.0  # north of the target
+    told = score(log, path=path, ends=True, duration_s=70.0)
+    assert told['end_of_path_m'] is None
+    on_the_way = told['arrival']
+    assert not on_the_way['arrived']
+    assert on_the_way['t_s'] is None
+    assert on_the_way['left_m'] == pytest.approx(100.0, abs=1e-6)
+    assert on_the_way['eta_s'] == pytest.approx(len(log) * TICK_S / 0.75, rel=1e-6)
+    assert on_the_way['overrun_s'] == pytest.approx(on_the_way['eta_s'] - 70.0, rel=1e-6)
     log[t > 50.0, COLUMNS['stage']] = AT_END_OF_PATH
-    assert score(log, path_end=(0.0, 0.0))['end_of_path_m'] == pytest.approx(5.0, abs=1e-9)
+    assert score(log, path=path, ends=False)['arrival'] is None
+    told = score(log, path=path, ends=True)
+    assert told['end_of_path_m'] == pytest.approx(5.0, abs=1e-9)
+    arrival = told['arrival']
+    assert arrival['arrived']
+    assert arrival['t_s'] == pytest.approx(50.1, abs=1e-6)
+    assert (arrival['left_m'], arrival['overrun_s'], arrival['place_latlon_deg']) == (0, 0, None)
 
 
 def test_overshoot_is_what_is_beyond_the_target():

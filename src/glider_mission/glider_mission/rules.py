@@ -5,6 +5,9 @@
 import math
 from typing import NamedTuple
 
+from glider_base.frames import Origin
+from glider_guidance.path.curve import PathParams
+
 #: Around an inflection (s) and shallower than this (m) nothing counts as steady,
 INFLECTION_MARGIN_S = 600.0
 STEADY_DEPTH_M = 30.0
@@ -19,7 +22,10 @@ class Rules(NamedTuple):
     depth_m: float = 1000.0  #: depth of the lower turn (m)
     glide_s: float = math.inf  #: time of one dive or climb (s)
     navigation: str = 'known'  #: method by which the vehicle navigates
-    path_end: tuple[float, float] | None = None  #: last point of the path, north and east (m)
+    path: PathParams | None = None  #: that was to be flown
+    ends: bool = False  #: at the end of the path
+    duration_s: float = math.inf  #: time that the mission has (s)
+    origin: Origin | None = None  #: of its chart, if people read its places in degrees
 
     @property
     def margin_s(self) -> float:

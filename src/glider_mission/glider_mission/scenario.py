@@ -29,10 +29,10 @@ from glider_control.settings import ControlLawSettings, ControlSettings, check_l
 from glider_guard.settings import GuardLimitSettings, GuardSettings
 from glider_guidance.order import Order
 from glider_guidance.orders import check_orders
-from glider_guidance.path.curve import path_length, path_point
 from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
+from glider_mission.chart import charted, in_metres
 from glider_mission.rules import Rules
 from glider_model.ocean.current_settings import CurrentSettings
 from glider_model.ocean.water import WaterSettings
@@ -69,6 +69,7 @@ _ALTERNATIVES = (
     ('speed_kn', 'speed_mps'),
     ('angle_deg', 'direction_deg'),
     ('descent_per_turn_m', 'slope_deg'),
+    ('waypoints', 'waypoints_latlon'),
 )
 
 
@@ -133,6 +134,31 @@ class Scenario(Settings):
         GuardLimitSettings(), description='when the guard acts, which has the last word'
     )
 
+    @pydantic.model_validator(mode='before')
+    @classmethod
+    def _charted(cls, values: Any) -> Any:
+        return charted(values) if isinstance(values, dict) else values
+
+    @pydantic.field_validator('path', mode='before')
+    @classmethod
+    def _path_in_metres(cls, path: Any, info: pydantic.ValidationInfo) -> Any:
+        return in_metres(path, info.data.get('origin', OriginSettings()))
+
+    @pydantic.field_validator('orders', mode='before')
+    @classmethod
+    def _orders_in_metres(cls, orders: Any, info: pydantic.ValidationInfo) -> Any:
+        origin = info.data.get('origin', OriginSettings())
+        return (
+            [
+                {**one, 'path': in_metres(one.get('path'), origin)}
+                if isinstance(one, dict)
+                else one
+                for one in orders
+            ]
+            if isinstance(orders, list)
+            else orders
+        )
+
     @pydantic.field_validator('current')
     @classmethod
     def _one_seed(cls, current: CurrentSettings) -> CurrentSettings:
@@ -145,6 +171,12 @@ class Scenario(Settings):
         """Its description, and what is not as described."""
         but = f'but with {told_fields(self.changed)}' if self.changed else ''
         return ', '.join(filter(None, (self.description, but)))
+
+    @property
+    def is_charted(self) -> bool:
+        """Whether it says where on the Earth it is: then people read its places in degrees."""
+        in_degrees = getattr(self.path, 'waypoints_latlon', None) is not None
+        return in_degrees or self.origin != OriginSettings()
 
     @property
     def vehicle_faults(self) -> list[FaultSettings]:
@@ -285,13 +317,15 @@ class Scenario(Settings):
 
     def score_rules(self, sim_time_s: float) -> Rules:
         """By what a run that lasted ``sim_time_s`` is scored."""
-        end = path_point(path_length(self.path.params()), self.path.params())
         return Rules(
             self.settle_time_s(sim_time_s),
             self.profile.depth_m,
             self._glide_s(),
             self.navigation.method,
-            end[:2],
+            self.path.params(),
+            self.path.at_end == 'stop',
+            self.duration_s,
+            self.origin.params() if self.is_charted else None,
         )
 
     def _glide_s(self) -> float:

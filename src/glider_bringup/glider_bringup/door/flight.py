@@ -25,6 +25,7 @@ from glider_guard.rows import LATCHED
 from glider_guidance.order import Order
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.chart import in_metres
 from glider_mission.choices import combination_of
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario
 
@@ -225,7 +226,12 @@ class Flight:
             raise ConfigurationError(
                 'order: at_s: it holds from the next tick on, or as when says'
             )
-        order = validate(Order, {**asked, 'at_s': round(self.t_s, 1)}, 'order')
+        try:
+            path = in_metres(asked.get('path'), self.scenario.origin)
+        except ValueError as error:
+            raise ConfigurationError(f'order: path: {error}') from None
+        asked = {**asked, 'path': path, 'at_s': round(self.t_s, 1)}
+        order = validate(Order, asked, 'order')
         if self._past.is_over:
             raise ConfigurationError('order: the mission is over (allowed: before its end)')
         try:

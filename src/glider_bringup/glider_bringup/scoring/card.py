@@ -171,6 +171,18 @@ class _Energy(_Checked):
     range_km: _Figure
 
 
+class _Arrival(_Checked):
+    """When the end of the path was come to, or would be."""
+
+    arrived: bool
+    t_s: _Figure
+    missed_m: _Figure
+    left_m: _Figure
+    eta_s: _Figure
+    overrun_s: _Figure
+    place_latlon_deg: _Pair | None
+
+
 class _Report(_Checked):
     """One surfacing."""
 
@@ -240,6 +252,7 @@ class _Card(_Checked):
     faults: list[_Fault] = []
     navigation: _Navigation | None = None
     energy: _Energy | None = None
+    arrival: _Arrival | None = None
 
     @model_validator(mode='after')
     def _flown_or_never_flown(self) -> '_Card':

@@ -6,17 +6,22 @@ By the true depth, whatever the vehicle measured, and by what the guard told.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from glider_base.block import changes_to_tell
+from glider_base.frames import to_geodetic
 from glider_base.signals import TICK_NS, TICK_S
 from glider_guard.block import TELL_EVERY_NS
 from glider_guard.depth import SURFACE_M
 from glider_guard.rows import ALL, DROPS, ROWS, SURFACES
+from glider_guidance.path.curve import path_closest, path_length, path_point
+from glider_mission.rules import Rules
 
 COMPLETED, SURFACED, LOST, INFEASIBLE = 'completed', 'surfaced', 'lost', 'infeasible'
+#: The pace is known once so much of the path has been made good (-).
+LEAST_SHARE = 0.02
 #: All has been done for so long (s), and the vehicle has not come up by this (m): nothing is left.
 TRIES_S, CLIMBS_M = 600.0, 5.0
 
@@ -82,6 +87,53 @@ def outcome_of(
         if _nothing_is_left(depth, told):
             return Outcome(LOST, f'{reason}, and nothing left to try')
     return Outcome(SURFACED, reason)
+
+
+def arrival_of(
+    place: tuple[float, float],
+    target: tuple[float, float],
+    tick: int,
+    has_arrived: bool,
+    rules: Rules,
+) -> dict[str, Any] | None:
+    """Whether and when a vehicle came to the end of its path; None where that is not its end.
+
+    Parameters
+    ----------
+    place : tuple of 2 float
+        True one at the arrival, else at the end of the run, north and east (m).
+    target : tuple of 2 float
+        The point of the path that guidance had come to by then (m).
+    tick : int
+        Of the arrival, else ticks of the run.
+    has_arrived : bool
+    rules : Rules
+
+    Returns
+    -------
+    dict
+        arrived, t_s, missed_m (distance from the last point), left_m (way along the path), eta_s
+        (when it arrives, or would at its pace so far), overrun_s (by what that is beyond the time
+        of the mission), place_latlon_deg (if there is a chart). What nobody knows is None.
+    """
+    if rules.path is None or not rules.ends:
+        return None
+    t_s, length = round(tick * TICK_S, 6), path_length(rules.path)
+    end = path_point(length, rules.path)
+    left_m, eta_s = 0.0, t_s
+    if not has_arrived:
+        left_m = length - path_closest(*target, 0.0, True, rules.path)
+        made_m = length - left_m
+        eta_s = t_s * length / made_m if made_m >= LEAST_SHARE * length else None
+    return {
+        'arrived': has_arrived,
+        't_s': t_s if has_arrived else None,
+        'missed_m': math.dist(place, end[:2]),
+        'left_m': left_m,
+        'eta_s': eta_s,
+        'overrun_s': None if eta_s is None else max(0.0, eta_s - rules.duration_s),
+        'place_latlon_deg': list(to_geodetic(*place, rules.origin)) if rules.origin else None,
+    }
 
 
 def _ended(told: np.ndarray) -> str:

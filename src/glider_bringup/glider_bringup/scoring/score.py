@@ -33,6 +33,7 @@ from glider_bringup.scoring.navigation import NavigationScorer
 from glider_bringup.scoring.outcome import (
     COMPLETED,
     INFEASIBLE,
+    arrival_of,
     ends_mission,
     outcome_of,
     told_by_guard,
@@ -137,7 +138,7 @@ class Scorer:
         self._blocks: list[np.ndarray] = []
         self._first: np.ndarray | None = None
         self._last: np.ndarray | None = None
-        self._end: np.ndarray | None = None
+        self._end: tuple[int, np.ndarray] | None = None
 
     def add(self, log: np.ndarray) -> None:
         """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
@@ -156,7 +157,7 @@ class Scorer:
         self._last = log[-1].copy()
         at_end = np.flatnonzero(log[:, COLUMNS['stage']] == AT_END_OF_PATH)
         if self._end is None and len(at_end):
-            self._end = log[at_end[0]].copy()
+            self._end = self.ticks - len(log) + int(at_end[0]), log[at_end[0]].copy()
 
     @property
     def ticks(self) -> int:
@@ -175,9 +176,9 @@ class Scorer:
         -------
         dict
             The run's part of ``score.json``: ticks, settle_s, dives, distance_along_path_m,
-            end_of_path_m, what is `measured`, actuator_travel, energy, guard, faults, navigation,
-            final_state, and ``status`` and ``reason`` of a run that was flown to its end. A figure
-            without data is None.
+            end_of_path_m, arrival, what is `measured`, actuator_travel, energy, guard, faults,
+            navigation, final_state, and ``status`` and ``reason`` of a run that was flown to its
+            end. A figure without data is None.
         """
         series, ticks = self._series, self.ticks
         depth, told = series('depth'), told_by_guard(series('guard'))
@@ -208,7 +209,7 @@ class Scorer:
             'settle_s': rules.settle_s,
             'dives': dives,
             'distance_along_path_m': way_m,
-            'end_of_path_m': self._end_of_path_m(rules.path_end),
+            **self._arrival(rules),
             **measured(flown),
             'actuator_travel': self._actuator_travel(),
             'energy': self._energy.result(time_s, dives, pace_m),
@@ -241,12 +242,21 @@ class Scorer:
             travel[f'{self._steers_by}_deg'] = math.degrees(_travel(self._series('fin')))
         return travel
 
-    def _end_of_path_m(self, path_end: tuple[float, float] | None) -> float | None:
-        """Horizontal distance from the path's end when the mission ended there, at the surface."""
-        if self._end is None or path_end is None:
-            return None
-        odometry = _odometry_of(self._end)
-        return math.hypot(odometry.p_n - path_end[0], odometry.p_e - path_end[1])
+    def _arrival(self, rules: Rules) -> dict:
+        """How far from the path's end it came up there, None if it did not; see `arrival_of`."""
+        if self._last is None:
+            return {'end_of_path_m': None, 'arrival': None}
+        tick, row = self._end or (self.ticks, self._last)
+        odometry, target = _odometry_of(row), self._last[_REFERENCE.start : _REFERENCE.start + 2]
+        arrival = arrival_of(
+            place=(odometry.p_n, odometry.p_e),
+            target=(float(target[1]), float(target[0])),
+            tick=tick,
+            has_arrived=self._end is not None,
+            rules=rules,
+        )
+        end_m = arrival['missed_m'] if arrival and arrival['arrived'] else None
+        return {'end_of_path_m': end_m, 'arrival': arrival}
 
     def _final_state(self) -> dict | None:
         """Position, attitude and velocity over ground (body axes FRD) of the last tick."""

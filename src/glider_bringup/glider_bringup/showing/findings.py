@@ -12,7 +12,7 @@ from glider_bringup.scoring.card import STOPPED
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.scoring.traces import Traces
 from glider_bringup.showing.panels import actuators_of
-from glider_bringup.showing.scorecard import fault_texts, guard_texts
+from glider_bringup.showing.scorecard import arrival_text, fault_texts, guard_texts
 from glider_bringup.showing.web_page import FlownRun
 from glider_bringup.showing.words import count, small, span, way
 from glider_mission.rules import STEADY_DEPTH_M
@@ -35,8 +35,8 @@ def verdict(card: dict[str, Any], settle_s: float) -> str:
     if not card['ticks']:
         return f'It ended before the first tick: {card["reason"] or "no reason is known"}.'
     texts = [_ended(card), _worst(card), _flown(card), _steady(card, settle_s)]
-    if card.get('end_of_path_m') is not None:
-        texts.append(f'It came up {small(card["end_of_path_m"])} from the end of the path.')
+    if arrival := arrival_text(card):
+        texts.append(f'Arrival {arrival}.')
     return ' '.join(filter(None, texts))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from glider_base.files import yaml_text
+from glider_base.frames import to_geodetic
 from glider_base.signals import TICK_S
 from glider_bringup.scoring.dives import Dive, dives_of
 from glider_bringup.scoring.scores import reckoned
@@ -15,6 +16,7 @@ from glider_bringup.showing.panels import report_panels
 from glider_bringup.showing.scorecard import card_rows
 from glider_bringup.showing.web_page import FlownRun, make_page
 from glider_bringup.showing.words import count, span, way
+from glider_mission.chart import place_told
 from glider_mission.scenario import told_fields
 from glider_model.ocean.current_settings import KNOT_MPS
 
@@ -89,8 +91,10 @@ def _knots(values: list[float] | None) -> list[float] | None:
 #: Columns of the tables of surfacings and of dives: head, and text of a line.
 _SURFACING: dict[str, Callable[[dict], str]] = {
     'time': lambda one: span(one['t_s']),
-    'believed place, N / E (m)': lambda one: _pair(one['believed_ned_m'], 0),
-    'true place, N / E (m)': lambda one: _pair(one['true_ned_m'], 0),
+    **{
+        f'{name} place, N / E (m)': lambda one, name=name: _pair(one[f'{name}_ned_m'], 0)
+        for name in ('believed', 'true')
+    },
     'error (m)': lambda one: f'{one["error_m"]:,.1f}',
     'in the 95 % ellipse': lambda one: {True: 'yes', False: 'no', None: '-'}[one['inside_95']],
     'off the path (m)': lambda one: f'{one["cross_track_m"]:+,.1f}',
@@ -108,6 +112,20 @@ _DIVE: dict[str, Callable[[Dive], str]] = {
         '-' if math.isnan(one.battery_percent) else f'{one.battery_percent:.1f}'
     ),
 }
+
+
+def _surfacing(run: FlownRun) -> dict[str, Callable[[dict], str]]:
+    """Columns of the table of surfacings, with places in degrees if there is a chart."""
+    origin = run.rules.origin
+    if origin is None:
+        return _SURFACING
+
+    def in_degrees(name: str) -> Callable[[dict], str]:
+        return lambda one: place_told(*to_geodetic(*one[f'{name}_ned_m'], origin))
+
+    places = {f'{name} place': in_degrees(name) for name in ('believed', 'true')}
+    rest = {name: text for name, text in _SURFACING.items() if ' place, ' not in name}
+    return {'time': rest.pop('time'), **places, **rest}
 
 
 def _table(columns: dict[str, Callable[[Any], str]], things: Sequence) -> list[list[str]]:
@@ -131,7 +149,7 @@ def report_page(run: FlownRun) -> str:
         verdict=verdict(card, rules.settle_s),
         tiles=_tiles(run),
         findings=findings(run),
-        surfacings=_table(_SURFACING, (reckoned(card) or {}).get('reports', [])),
+        surfacings=_table(_surfacing(run), (reckoned(card) or {}).get('reports', [])),
         dives=_table(_DIVE, dives_of(run.traces) if run.traces.ticks else []),
         card=card_rows(card),
         settle=span(rules.settle_s),

@@ -13,6 +13,8 @@ from rich.table import Table
 
 from glider_bringup.console import output
 from glider_bringup.scoring.scores import SCORES, Score, reckoned
+from glider_bringup.showing.words import span, way
+from glider_mission.chart import place_told
 from glider_mission.scenario import told_fields
 from glider_model.ocean.current_settings import KNOT_MPS
 
@@ -104,9 +106,23 @@ def _end_rows(card: dict) -> list[tuple[str, str]]:
     """Lines of what broke, what the guard told, and where it came up if it flew to its end."""
     rows = [('fault', text) for text in fault_texts(card)]
     rows += [('guard', text) for text in guard_texts(card)]
-    end_m = card.get('end_of_path_m')
-    came_up = f'came up {show(end_m, "m", 1)} from its last point'
-    return rows if end_m is None else [*rows, ('end of path', came_up)]
+    told = arrival_text(card)
+    return [*rows, ('arrival', told)] if told else rows
+
+
+def arrival_text(card: dict) -> str:
+    """Whether and when it came to the end of its path; empty where that is not its end."""
+    told = card.get('arrival')
+    if not told:
+        return ''
+    place = told['place_latlon_deg']
+    where = f', at {place_told(*place)}' if place else ''
+    if told['arrived']:
+        missed = show(told['missed_m'], 'm', 1)
+        return f'came up {missed} from its last point after {span(told["t_s"])}{where}'
+    text = f'not in {span(card["sim_time_s"])}: {way(told["left_m"])} of the path left{where}'
+    more_s = None if told['eta_s'] is None else told['eta_s'] - card['sim_time_s']
+    return text + ('' if more_s is None else f'; at its pace {span(more_s)} more')
 
 
 def _energy_rows(card: dict) -> list[tuple[str, str]]:

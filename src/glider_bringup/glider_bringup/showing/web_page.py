@@ -127,6 +127,7 @@ class FlownRun(NamedTuple):
             'packed': pack_arrays(arrays),
             'inflections': [round(float(time), 3) for time in traces.inflections_s()],
             'path': self.path_points(),
+            'origin': self.rules.origin and self.rules.origin._asdict(),
             'faults': [one for one in self.card.get('faults', []) if one['t_s'] is not None],
             'surfacings': (reckoned(self.card) or {}).get('reports', []),
         }

@@ -172,6 +172,11 @@ class _ThroughWaypoints(_PathSettings):
         max_length=10_000,
         description='Waypoints [north, east] or [north, east, depth] (m).',
     )
+    waypoints_latlon: list[tuple[float | str, float | str]] | None = Field(
+        None,
+        description='Waypoints [latitude, longitude] (deg, or degrees and minutes as '
+        "'47 30.5 N') in place of waypoints, which a scenario makes of them.",
+    )
 
     @pydantic.field_validator('waypoints')
     @classmethod

@@ -33,6 +33,19 @@ function mapFrame() {
   return { east, north, depth, span, scale, unit };
 }
 
+/** What is said of the places of a trace: in degrees if there is a chart. */
+function hover(run, unit, scale, { x, y }) {
+  const { origin } = run;
+  if (!origin) return { hovertemplate: `east %{x:.3~f} ${unit}, north %{y:.3~f} ${unit}` };
+  const told = (degrees, letters) => `${Math.abs(degrees).toFixed(5)} ${letters[degrees < 0 ? 1 : 0]}`;
+  const text = x.map((e, i) => {
+    if (e === null) return '';
+    const longitude = origin.longitude + e / scale / origin.east;
+    return [told(origin.latitude + y[i] / scale / origin.north, 'NS'), told(longitude - 360 * Math.round(longitude / 360), 'EW')].join(', ');
+  });
+  return { text, hovertemplate: '%{text}' };
+}
+
 function pathTrace(run, scale, more) {
   return {
     x: run.path.map((p) => p[1] * scale), y: run.path.map((p) => p[0] * scale), mode: 'lines',
@@ -75,10 +88,11 @@ function drawTrack(panel, element, from, to) {
   if (page.runs.length === 1) traces.push(currentTrace(page.runs[0], frame));
   page.runs.forEach((run, i) => {
     const { track_east_m: e, track_north_m: n } = run.arrays;
+    const flown = { x: pick(e, 4000, frame.scale), y: pick(n, 4000, frame.scale) };
     traces.push({
-      x: pick(e, 4000, frame.scale), y: pick(n, 4000, frame.scale), mode: 'lines', name: trackName(run),
+      ...flown, mode: 'lines', name: trackName(run),
       line: { color: trackColour(i), width: lineWidth(i) + 0.4 },
-      hovertemplate: `east %{x:.3~f} ${frame.unit}, north %{y:.3~f} ${frame.unit}`,
+      ...hover(run, frame.unit, frame.scale, flown),
     });
     const [begin, end] = visible(run, from, to);
     traces.push({

@@ -29,21 +29,23 @@ const eastNorth = ([north, east]) => [east, north];
 /** Two tracks and what is known at each surfacing. */
 function planTraces(run, scale, unit) {
   const { surfacings } = run;
-  const at = `east %{x:.3~f} ${unit}, north %{y:.3~f} ${unit}`;
-  const track = (name, label, role, dash) => ({
+  const told = (trace) => ({ ...trace, ...hover(run, unit, scale, trace) });
+  const track = (name, label, role, dash) => told({
     x: pick(run.arrays[`${name}_east_m`], 6000, scale), y: pick(run.arrays[`${name}_north_m`], 6000, scale),
-    mode: 'lines', name: label, hovertemplate: at, line: { color: values(role), width: 1.8, dash },
+    mode: 'lines', name: label, line: { color: values(role), width: 1.8, dash },
   });
-  const places = (key, name, role, symbol, more) => through(
-    surfacings.map((one) => one[key] && eastNorth(one[key])), scale,
-    { mode: 'markers', name, hovertemplate: at, marker: marker(role, symbol), ...more });
+  const places = (key, name, role, symbol, more) => ({
+    ...told(through(surfacings.map((one) => one[key] && eastNorth(one[key])), scale, {})),
+    mode: 'markers', name, marker: marker(role, symbol), ...more,
+  });
   const every = Math.ceil(surfacings.length / NUMBERED);
   return [
     pathTrace(run, scale, { line: { color: values('--limit'), width: 1.5, dash: 'dash' } }),
     track('track', 'true track', '--measured', 'solid'),
     track('believed', 'believed track', '--reference', 'dash'),
-    places('true_ned_m', 'true place at surfacing', '--measured', 'circle', {
-      mode: 'markers+text', textposition: 'bottom left',
+    places('true_ned_m', 'true place at surfacing', '--measured', 'circle'),
+    through(surfacings.map((one) => eastNorth(one.true_ned_m)), scale, {
+      mode: 'text', textposition: 'bottom left', hoverinfo: 'skip', showlegend: false,
       text: surfacings.map((_, i) => (i % every ? '' : `${i + 1} `)),
     }),
     places('believed_ned_m', 'believed place at surfacing', '--reference', 'diamond'),
