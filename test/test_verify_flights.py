@@ -35,6 +35,7 @@ from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.qos import EVENTS
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.signals import TICK_S, Joints, Water
+from glider_base.wiring import NO_ECHO
 from glider_bringup.engines.flight import mission_of
 from glider_control import block as control
 from glider_control.control import control_step
@@ -190,7 +191,9 @@ class Vehicle:
     def guide(self) -> None:
         stamp_ns, odom = self.odom
         odometry = odometry_from_wire(odom)
-        self.guidance, out = guidance_step(self.guidance, odometry, self.params.guidance, TICK_S)
+        self.guidance, out = guidance_step(
+            self.guidance, odometry, NO_ECHO, self.params.guidance, TICK_S
+        )
         self.publish('tracking_error', stamp_ns, out.error)
         self.publish('current_estimate', stamp_ns, water_to_wire(out.current))
         if (out.stage, out.infeasible) != self.told:

@@ -19,7 +19,7 @@ from glider_base.ros.hearing.inputs import Input
 from glider_base.ros.wire.codec import MessageError, to_cdr
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.signals import TICK_NS, TICK_S, Battery, Joints, Water
-from glider_base.wiring import GUARD, NAVIGATION, SENSORS
+from glider_base.wiring import GUARD, NAVIGATION, NO_ECHO, SENSORS
 from glider_bringup.engines.direct import MissionParams, MissionState, fly
 from glider_bringup.engines.flight import mission_of
 from glider_control.control import control_step
@@ -132,7 +132,9 @@ def _outputs(scene: Scene, name: str, values: tuple[float, ...]) -> list[float]:
         made += [number for numbers in believed for number in numbers]
         odometry = odometry_from_wire(wires['odom'])
         reference = reference_from_wire(wires['reference'])
-        guidance, guided = guidance_step(guidance, odometry, scene.params.guidance, TICK_S)
+        guidance, guided = guidance_step(
+            guidance, odometry, NO_ECHO, scene.params.guidance, TICK_S
+        )
         joints = Joints(*wires['joint_states'])
         control, out = control_step(
             control, odometry, joints, reference, scene.params.control, TICK_S

@@ -130,7 +130,7 @@ def tick(
         navigation, t_s, heard, params.navigation, TICK_S
     )
     seen = odometry_from_wire(believed[0])
-    guidance, guided = guidance_step(guidance, seen, params.guidance, TICK_S)
+    guidance, guided = guidance_step(guidance, seen, NO_ECHO, params.guidance, TICK_S)
     reference = reference_from_wire(reference_to_wire(guided.reference))
     control, controlled = control_step(
         control, seen, plant.joints, reference, params.control, TICK_S

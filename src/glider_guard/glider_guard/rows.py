@@ -175,7 +175,7 @@ ROWS = (
         'lag_share, lag_m, led_m, still_s',
         SURFACE,
         True,
-        'the measured depth, or all that is measured, stands still',
+        'the measured depth, or all that is measured, stands still, or the vehicle lies aground',
     ),
     Row(
         DEPTH_OFFSET,

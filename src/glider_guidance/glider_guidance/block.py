@@ -19,10 +19,10 @@ from glider_guidance.yo.stage import STAGE_NAMES
 @block_tick.body(GuidanceParams)
 @kernel
 def guidance_tick(state, t_s, inputs, params, dt):
-    """One tick: odom in; reference, tracking_error, current_estimate out; see `block_tick`."""
+    """One tick: odom, altitude in; reference, tracking_error, current_estimate out."""
     odometry = odometry_from_wire(inputs[0])
     state = hear_fixes(state, odometry, covariance_from_wire(inputs[0]), dt)
-    state, out = guidance_step(state, odometry, params, dt)
+    state, out = guidance_step(state, odometry, inputs[1][0], params, dt)
     error = (out.error.e1, out.error.e2, out.error.e3)
     outputs = (reference_to_wire(out.reference), error, water_to_wire(out.current))
     return state, outputs, (out.stage, int(out.infeasible))

@@ -292,8 +292,10 @@ def _way_left(state, e1, params):
 
 
 @kernel
-def advance(state, place, params, dt):
+def advance(state, place, altitude, params, dt):
     """Stage of the yo at this tick, and what the vehicle is to do in it.
+
+    ``altitude`` is the measured height over the bottom (m); 0.0 where there is no echo.
 
     Returns
     -------
@@ -313,7 +315,7 @@ def advance(state, place, params, dt):
         asked = params.profile
         if contradictions(state.fixes) > 0:
             asked = surfacing_every_dive(asked)
-        profile = profile_step(before, depth, rate, left, asked)
+        profile = profile_step(before, depth, rate, altitude, left, asked)
     stage = profile.stage
     turn_depth = coming_turn(profile, depth, left, params.profile)
     pitch_target, rate_target = profile_targets(stage, rate, params.profile)
@@ -437,7 +439,7 @@ def refer(state, place, doing, asked, aborted, params, dt):
 
 
 @kernel
-def guidance_step(state, odometry, params, dt):
+def guidance_step(state, odometry, altitude, params, dt):
     """One tick of guidance.
 
     Parameters
@@ -445,6 +447,8 @@ def guidance_step(state, odometry, params, dt):
     state : GuidanceState
     odometry : Odometry
         Measured pose and velocity over ground; what the gate refuses is not acted on.
+    altitude : float
+        Measured height over the bottom (m); 0.0 where there is no echo.
     params : GuidanceParams
     dt : float
         Length of the tick (s).
@@ -460,7 +464,7 @@ def guidance_step(state, odometry, params, dt):
     if state.path_id != params.path_id:
         state = _change_path(state, odometry, params)
     place = locate(state.s, odometry, params)
-    profile, doing = advance(state, place, params, dt)
+    profile, doing = advance(state, place, altitude, params, dt)
     followed = follow(state, odometry, params, dt)
     water = observe(state.water, place, doing.leg, params, dt)
     current = Water(water.observer.current_n, water.observer.current_e, 0.0)

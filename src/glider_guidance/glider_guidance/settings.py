@@ -166,12 +166,22 @@ class GuidanceSettings(GuidanceLawSettings):
     )
     orders: list[Order] = Field([], description='what the vehicle is told in flight, and when')
 
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Those of the topics that not every run has that it reads."""
+        return ('altitude',) if self.profile.clearance_m > 0.0 else ()
+
     def check(self) -> None:
         """Refuse a depth, a glide or a yo that the vehicle does not have."""
         if self.hold and self.profile.mode == 'path':
             raise ConfigurationError(
                 'hold = true: not along a path in three dimensions (allowed: with profile.mode = '
                 "'profile')"
+            )
+        if self.profile.clearance_m and self.profile.mode == 'path':
+            raise ConfigurationError(
+                f'profile.clearance_m = {self.profile.clearance_m:g}: not along a path in three '
+                "dimensions (allowed: 0, or with profile.mode = 'profile')"
             )
         self._check_depth()
         self._check_pitch()

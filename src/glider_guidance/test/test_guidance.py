@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from glider_base.frames import quaternion_from_euler, rotate_to_body
 from glider_base.signals import TICK_S, Odometry
+from glider_base.wiring import NO_ECHO
 from glider_guidance.current_observer import ObserverState
 from glider_guidance.guidance import INFEASIBLE_S, WaterState, guidance_abort, guidance_step
 from glider_guidance.methods.observer import LOOKAHEAD_STRETCH_MAX, lookahead_stretch
@@ -69,7 +70,7 @@ def _odometry(point, current, polar, stall=1.0):
 def _fly(state, point, current, stall, params, rows, dt):
     for i in range(len(rows)):
         odometry, v_n, v_e = _odometry(point, current, params.polar, stall)
-        state, output = guidance_step(state, odometry, params, dt)
+        state, output = guidance_step(state, odometry, NO_ECHO, params, dt)
         reference = output.reference
         rows[i, 0], rows[i, 1], rows[i, 2] = point.n, point.e, point.d
         for j, number in enumerate(reference):
@@ -135,7 +136,7 @@ def step(guidance, point, current=(0.0, 0.0), observer=(0.0, 0.0, 0.0, 0.0)):
     params = guidance.params()
     state = guidance.initial_state()._replace(water=WaterState(ObserverState(*observer), 0.0))
     odometry, _, _ = _odometry(Point(*(float(x) for x in point)), current, params.polar)
-    return guidance_step(state, odometry, params, TICK_S)
+    return guidance_step(state, odometry, NO_ECHO, params, TICK_S)
 
 
 LEGS = [(0.0, 0.0), (500.0, 0.0), (500.0, 400.0), (1500.0, 900.0)]
@@ -265,7 +266,7 @@ def test_cross_current_faster_than_the_vehicle_is_infeasible_after_a_while():
     odometry, _, _ = _odometry(Point(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0), params.polar)
     flags = []
     for _ in range(round(INFEASIBLE_S / TICK_S) + 5):
-        state, output = guidance_step(state, odometry, params, TICK_S)
+        state, output = guidance_step(state, odometry, NO_ECHO, params, TICK_S)
         flags.append(output.infeasible)
     assert flags.index(True) == pytest.approx(INFEASIBLE_S / TICK_S, abs=1.0)
     assert all(flags[flags.index(True) :])
@@ -445,12 +446,12 @@ def test_vehicle_that_steers_weakly_approaches_by_a_smaller_angle():
         params = guidance.params()
         point = Point(100.0, 30.0, 300.0, -0.5, 0.0, 0.25)
         odometry, _, _ = _odometry(point, (0.0, 0.0), params.polar)
-        state, _ = guidance_step(guidance.initial_state(), odometry, params, TICK_S)
+        state, _ = guidance_step(guidance.initial_state(), odometry, NO_ECHO, params, TICK_S)
         state = steered(state, **phases)._replace(
             profile=state.profile._replace(stage=GLIDING_DOWN, ticks=0),
         )
         for _ in range(500):
-            state, output = guidance_step(state, odometry, params, TICK_S)
+            state, output = guidance_step(state, odometry, NO_ECHO, params, TICK_S)
         headings[name] = output.reference.psi
     assert headings['none'] < -0.2
     assert math.tan(headings['dive']) == pytest.approx(math.tan(headings['none']) / 2.0, rel=0.05)

@@ -10,6 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from glider_base.signals import TICK_S
+from glider_base.wiring import NO_ECHO
 from glider_guidance.yo.end_of_path import WayLeft
 from glider_guidance.yo.machine import (
     INITIAL_PROFILE,
@@ -63,7 +64,9 @@ class Point:
         self.stages, self.depths = [self.state.stage], [0.0]
 
     def tick(self):
-        self.state = profile_step(self.state, self.depth, self.rate, self.left(), self.params)
+        self.state = profile_step(
+            self.state, self.depth, self.rate, NO_ECHO, self.left(), self.params
+        )
         full = self.settings.net_heaviness_kg
         wanted = math.copysign(full, profile_targets(self.state.stage, self.rate, self.params)[1])
         step = self.pump * TICK_S
@@ -218,7 +221,8 @@ def test_preparation_lasts_as_long_as_asked():
 def test_abort_leads_to_surfacing_from_every_stage(stage):
     params = ProfileSettings().params(1, PUMP, POLAR)
     state = profile_step(
-        INITIAL_PROFILE._replace(stage=stage, ticks=100, aborted=True), 200.0, 0.2, NO_END, params
+        INITIAL_PROFILE._replace(stage=stage, ticks=100, aborted=True),
+        *(200.0, 0.2, NO_ECHO, NO_END, params),
     )
     assert state.stage == SURFACING
 
@@ -228,7 +232,7 @@ def test_abort_at_the_surface_stays_there(stage):
     params = ProfileSettings(wait_s=0.0, prepare_s=0.0).params(5, PUMP, POLAR)
     state = INITIAL_PROFILE._replace(stage=stage, ticks=10**6, aborted=True)
     for _ in range(100):
-        state = profile_step(state, 0.2, 0.0, NO_END, params)
+        state = profile_step(state, 0.2, 0.0, NO_ECHO, NO_END, params)
     assert state.stage == WAITING_ON_SURFACE
 
 

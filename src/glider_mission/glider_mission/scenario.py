@@ -209,7 +209,8 @@ class Scenario(Settings):
     @property
     def topics(self) -> tuple[str, ...]:
         """Those of the topics that not every run has that there are in a run of this."""
-        return tuple(dict.fromkeys((*self.navigation.topics, *self.sensors.also_fitted)))
+        needed = ('altitude',) if self.profile.clearance_m > 0.0 else ()
+        return tuple(dict.fromkeys((*self.navigation.topics, *self.sensors.also_fitted, *needed)))
 
     @property
     def _holds(self) -> bool:

@@ -203,7 +203,7 @@ def measured_angles(phi_deg, theta_deg, psi_deg, **errors):
     """Roll, pitch and heading (deg) as the compass shows them."""
     params = SensorSettings(**errors).params(0)
     sample = take_sample(
-        odometry(*np.radians([phi_deg, theta_deg, psi_deg])), 500.0, NO_SAMPLE, 0, params
+        odometry(*np.radians([phi_deg, theta_deg, psi_deg])), math.inf, NO_SAMPLE, 0, params
     )
     return np.degrees(euler_from_quaternion(*sample[:4]))
 
@@ -246,7 +246,7 @@ def test_errors_of_the_compass_stay(phi_deg, theta_deg, psi_deg):
 def test_depth_has_its_offset_and_comes_in_steps(depth_m, step_m, offset_m):
     params = SensorSettings(depth_offset_m=offset_m, depth_resolution_m=step_m).params(0)
     measured = odometry(position=(0.0, 0.0, depth_m))
-    shown = take_sample(measured, depth_m, NO_SAMPLE, 0, params).p_d
+    shown = take_sample(measured, math.inf, NO_SAMPLE, 0, params).p_d
     assert abs(shown - depth_m - offset_m) <= 0.5 * step_m + 1e-9
     if step_m:
         assert shown / step_m == pytest.approx(round(shown / step_m), abs=1e-9)
@@ -302,7 +302,7 @@ def test_without_a_gyro_there_are_no_rates():
     truth, joints = odometry(), Joints(0.0, 0.0, 0.0, 0.0)
     for gyro, rates in ((True, (0.01, 0.02, -0.03, 0.0)), (False, (0.0, 0.0, 0.0, NO_RATES))):
         params = SensorSettings(gyro=gyro).params(0)
-        told = sense(truth, joints, NO_SAMPLE, 0, 0, 0, params)
+        told = sense(truth, math.inf, joints, NO_SAMPLE, 0, 0, 0, params)
         assert told[IMU][4:] == pytest.approx(rates, abs=1e-15)
         assert told[MEASURED][10:] == pytest.approx(rates[:3], abs=1e-15)
 
@@ -360,7 +360,8 @@ def fix_of(depth_m, surfaced_ticks, dives=1, tick=0, seed=0, **sensors):
     params = SensorSettings(gps_first_fix_s=10.0, **sensors).params(seed, ORIGIN, ('fix',))
     truth = odometry(position=(4000.0, -300.0, depth_m))
     return sense(
-        truth, Joints(0.0, 0.0, 0.0, 0.0), NO_SAMPLE, surfaced_ticks, dives, tick, params
+        *(truth, math.inf, Joints(0.0, 0.0, 0.0, 0.0), NO_SAMPLE),
+        *(surfaced_ticks, dives, tick, params),
     )[FIX]
 
 

@@ -96,7 +96,9 @@ def fly(state, params, log, dt):
             navigation, t_s, (joints, *sensors), params.navigation, dt
         )
         odom = believed[0]
-        guidance, guided, stage = guidance_tick(guidance, t_s, (odom,), params.guidance, dt)
+        guidance, guided, stage = guidance_tick(
+            guidance, t_s, (odom, measured.altitude), params.guidance, dt
+        )
         seen = (guided[0], odom, joints)
         control, controlled, limits = control_tick(control, t_s, seen, params.control, dt)
         condition = (measured.health, measured.battery, pressure, measured.altitude)

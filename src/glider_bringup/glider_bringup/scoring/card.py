@@ -183,6 +183,14 @@ class _Arrival(_Checked):
     place_latlon_deg: _Pair | None
 
 
+class _Bottom(_Checked):
+    """How near to the bottom of the sea it came."""
+
+    touched: bool
+    t_s: _Figure
+    least_height_m: _Figure
+
+
 class _Report(_Checked):
     """One surfacing."""
 
@@ -253,6 +261,7 @@ class _Card(_Checked):
     navigation: _Navigation | None = None
     energy: _Energy | None = None
     arrival: _Arrival | None = None
+    bottom: _Bottom | None = None
 
     @model_validator(mode='after')
     def _flown_or_never_flown(self) -> '_Card':

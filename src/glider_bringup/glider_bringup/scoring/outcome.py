@@ -18,6 +18,7 @@ from glider_guard.depth import SURFACE_M
 from glider_guard.rows import ALL, DROPS, ROWS, SURFACES
 from glider_guidance.path.curve import path_closest, path_length, path_point
 from glider_mission.rules import Rules
+from glider_model.ocean.bottom import least_height
 
 COMPLETED, SURFACED, LOST, INFEASIBLE = 'completed', 'surfaced', 'lost', 'infeasible'
 #: The pace is known once so much of the path has been made good (-).
@@ -134,6 +135,30 @@ def arrival_of(
         'overrun_s': None if eta_s is None else max(0.0, eta_s - rules.duration_s),
         'place_latlon_deg': list(to_geodetic(*place, rules.origin)) if rules.origin else None,
     }
+
+
+class BottomWatch:
+    """How near to the bottom of the sea a vehicle came, tick by tick."""
+
+    def __init__(self, bottom: NamedTuple) -> None:
+        self._bottom, self._ticks = bottom, 0
+        self._least_m, self._touched_tick = math.inf, None
+
+    def add(self, n: np.ndarray, e: np.ndarray, depth: np.ndarray) -> None:
+        """Take in the true places of a block of ticks, float64[n] each (m)."""
+        least_m, where = least_height(n, e, depth, self._bottom)
+        self._least_m = min(self._least_m, least_m)
+        if self._touched_tick is None and least_m <= 0.0:
+            self._touched_tick = self._ticks + where
+        self._ticks += len(depth)
+
+    def result(self) -> dict[str, Any] | None:
+        """Whether and when it touched the bottom first (s), and its least height over it (m)."""
+        if not math.isfinite(self._least_m):
+            return None
+        tick = self._touched_tick
+        at_s = None if tick is None else round(tick * TICK_S, 6)
+        return {'touched': tick is not None, 't_s': at_s, 'least_height_m': self._least_m}
 
 
 def _ended(told: np.ndarray) -> str:

@@ -14,6 +14,7 @@ What is scored is the true motion, whatever the vehicle believes.
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from glider_bringup.scoring.navigation import NavigationScorer
 from glider_bringup.scoring.outcome import (
     COMPLETED,
     INFEASIBLE,
+    BottomWatch,
     arrival_of,
     ends_mission,
     outcome_of,
@@ -47,6 +49,7 @@ from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS
 from glider_mission.rules import Rules
 from glider_mission.scenario import Scenario
+from glider_model.ocean.bottom import NO_BOTTOM
 from glider_model.plant.faults.settings import FaultSettings
 from glider_model.plant.plant import dive_depths
 from glider_model.plant.readings import Readings, make_readings, noise_of_readings
@@ -113,6 +116,8 @@ class Scorer:
         Noise of where the actuators say that they are: no way that they go.
     course_rad : float
         Of the path at its start, for a vehicle whose target never moved along it.
+    bottom : NamedTuple
+        Of the sea, as the plant has it.
     """
 
     def __init__(
@@ -123,12 +128,14 @@ class Scorer:
         vehicle: Vehicle | None = None,
         readings: Readings | None = None,
         course_rad: float = 0.0,
+        bottom: NamedTuple = NO_BOTTOM,
     ) -> None:
         self.topics = topics  #: that it needs, beside those that are always read
         self._steers_by = vehicle.steers_by if vehicle else ''
         self._crush_depth_m = vehicle.crush_depth_m if vehicle else math.inf
         self._has_weight = bool(vehicle and vehicle.drop_weight)
         self._course_rad = course_rad
+        self._bottom = None if bottom is NO_BOTTOM else BottomWatch(bottom)
         self._truth = TrueMotion()
         origin = origin or OriginSettings().params()
         self._navigation = NavigationScorer(origin, reckons=bool(topics))
@@ -152,6 +159,8 @@ class Scorer:
         self._faults.add(log)
         self._energy.add(log)
         self._blocks.append(_series_of(log, told))
+        if self._bottom:
+            self._bottom.add(*np.ascontiguousarray(poses_from_wire(log[:, _ODOM])[:, :3].T))
         if self._first is None:
             self._first = log[0].copy()
         self._last = log[-1].copy()
@@ -176,9 +185,9 @@ class Scorer:
         -------
         dict
             The run's part of ``score.json``: ticks, settle_s, dives, distance_along_path_m,
-            end_of_path_m, arrival, what is `measured`, actuator_travel, energy, guard, faults,
-            navigation, final_state, and ``status`` and ``reason`` of a run that was flown to its
-            end. A figure without data is None.
+            end_of_path_m, arrival, bottom, what is `measured`, actuator_travel, energy, guard,
+            faults, navigation, final_state, and ``status`` and ``reason`` of a run that was flown
+            to its end. A figure without data is None.
         """
         series, ticks = self._series, self.ticks
         depth, told = series('depth'), told_by_guard(series('guard'))
@@ -210,6 +219,7 @@ class Scorer:
             'dives': dives,
             'distance_along_path_m': way_m,
             **self._arrival(rules),
+            'bottom': self._bottom.result() if self._bottom else None,
             **measured(flown),
             'actuator_travel': self._actuator_travel(),
             'energy': self._energy.result(time_s, dives, pace_m),
@@ -290,6 +300,7 @@ def make_scorer(scenario: Scenario) -> Scorer:
         vehicle=vehicle,
         readings=readings,
         course_rad=course_rad,
+        bottom=scenario.water.bottom(),
     )
 
 

@@ -183,6 +183,8 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
         notes += navigation_notes(told, run.scenario.navigation.current != 'none')
     notes += [f'Broken on purpose: {text}.' for text in fault_texts(card)]
     problems += [f'The guard, {text}.' for text in guard_texts(card)]
+    if (card.get('bottom') or {}).get('touched'):
+        problems.append(f'It touched the bottom at {at(card["bottom"]["t_s"])}.')
     if card['messages_lost']:
         problems.append(f'{card["messages_lost"]:,} messages were lost on the way to the bag.')
     broken = {

@@ -106,8 +106,18 @@ def _end_rows(card: dict) -> list[tuple[str, str]]:
     """Lines of what broke, what the guard told, and where it came up if it flew to its end."""
     rows = [('fault', text) for text in fault_texts(card)]
     rows += [('guard', text) for text in guard_texts(card)]
-    told = arrival_text(card)
-    return [*rows, ('arrival', told)] if told else rows
+    texts = {'arrival': arrival_text(card), 'bottom': bottom_text(card)}
+    return [*rows, *((name, text) for name, text in texts.items() if text)]
+
+
+def bottom_text(card: dict) -> str:
+    """Whether it touched the bottom, or how near it came; empty where there is none."""
+    told = card.get('bottom')
+    if not told:
+        return ''
+    if told['touched']:
+        return f'touched at {show(told["t_s"], "s", 1)}'
+    return f'cleared by {show(told["least_height_m"], "m", 1)} or more'
 
 
 def arrival_text(card: dict) -> str:

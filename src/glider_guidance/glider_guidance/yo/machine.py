@@ -10,6 +10,7 @@ from pydantic import Field
 from glider_base.kernel import kernel, replace
 from glider_base.settings import TUNABLE, Settings
 from glider_base.signals import TICK_S
+from glider_base.wiring import NO_ECHO
 from glider_guidance.yo.end_of_path import WayLeft, lower_turn, next_dive
 from glider_guidance.yo.stage import (
     AT_END_OF_PATH,
@@ -34,6 +35,8 @@ TURNED_MPS = 0.05
 LEAD_RANGE = 6.0
 #: The flight model is believed this long after a glide began (s), or after this share of it.
 SETTLED_S, SETTLED_SHARE = 120.0, 0.3
+#: A bottom that is heard for longer than this is there, and no fish or bubble.
+NEAR_TICKS = round(3.0 / TICK_S)
 #: The path is looked at for so many full dives before its end.
 DIVES_AHEAD = 4.0
 
@@ -74,6 +77,13 @@ class ProfileSettings(Settings):
     climb_net_heaviness_kg: float | None = Field(
         None, gt=0.0, le=20.0, description='magnitude for the climb, if another one (kg)'
     )
+    clearance_m: float = Field(
+        0.0,
+        ge=0.0,
+        le=80.0,
+        description='height over the bottom at which a dive is turned, by the altimeter that the '
+        'vehicle then has (m); 0.0: none',
+    )
     prepare_s: float = Field(
         60.0, ge=0.0, le=86400.0, description='surface preparation before a dive (s)'
     )
@@ -108,6 +118,7 @@ class ProfileSettings(Settings):
             dive_rate=dive_rate,
             climb_rate=climb_rate,
             glide_rate=rate,
+            clearance=self.clearance_m,
             dives=dives,
             surface_every=self.surface_every_dives,
             prepare_ticks=round(self.prepare_s / TICK_S),
@@ -141,6 +152,7 @@ class ProfileParams(NamedTuple):
     dive_rate: float  #: vertical rates of the steady glides, by the polar, magnitudes (m/s)
     climb_rate: float
     glide_rate: float  #: down and up again over the time that both take (m/s)
+    clearance: float  #: over the bottom (m); 0: none
     dives: int  #: 0: no end
     surface_every: int  #: dives between waits on the surface; 0: after the last
     prepare_ticks: int
@@ -161,6 +173,7 @@ class ProfileState(NamedTuple):
 
     stage: int
     ticks: int  #: ticks in this stage
+    near_ticks: int  #: for which the bottom has been heard too near for this dive
     dives: int  #: dives completed
     aborted: bool
     lead_up_s: float  #: lead of the turn at depth, as learnt from the last one; 0: none yet (s)
@@ -172,6 +185,7 @@ class ProfileState(NamedTuple):
 INITIAL_PROFILE = ProfileState(
     stage=SURFACE_PREPARATION,
     ticks=0,
+    near_ticks=0,
     dives=0,
     aborted=False,
     lead_up_s=0.0,
@@ -255,7 +269,16 @@ def _next_stage(state, depth, vertical_rate, turn_depth, params):
 
 
 @kernel
-def profile_step(state, depth, vertical_rate, left, params):
+def _near_ticks(state, vertical_rate, altitude, params):
+    """Ticks for which a dive has been so near to the bottom that it is to turn."""
+    if params.clearance == 0.0 or altitude == NO_ECHO or not is_descending(state.stage):
+        return 0
+    lead = max(0.0, vertical_rate) * (turn_lead_s(state, params) + NEAR_TICKS * TICK_S)
+    return state.near_ticks + 1 if altitude < params.clearance + lead else 0
+
+
+@kernel
+def profile_step(state, depth, vertical_rate, altitude, left, params):
     """Advance the stage by one tick.
 
     Parameters
@@ -263,14 +286,19 @@ def profile_step(state, depth, vertical_rate, left, params):
     state : ProfileState
     depth, vertical_rate : float
         Measured (m, m/s, + down).
+    altitude : float
+        Measured height over the bottom (m); 0.0 where there is no echo.
     left : WayLeft
         What is left of the path; ``NO_END`` if the mission does not end with it.
     params : ProfileParams
     """
     if state.depth != params.depth and is_descending(state.stage):  # another one since it began
         state = replace(state, turn_depth=params.depth)
+    near_ticks = _near_ticks(state, vertical_rate, altitude, params)
     planned = _planned_turn(state, depth, left, params)
     turn_depth = coming_turn(state, depth, left, params)
+    if near_ticks > NEAR_TICKS:
+        turn_depth = min(turn_depth, depth)
     stage = _next_stage(state, depth, vertical_rate, turn_depth, params)
     up_s, down_s = state.lead_up_s, state.lead_down_s
     if stage == state.stage:
@@ -285,6 +313,7 @@ def profile_step(state, depth, vertical_rate, left, params):
         return replace(
             state,
             ticks=state.ticks + 1,
+            near_ticks=near_ticks,
             lead_up_s=up_s,
             lead_down_s=down_s,
             turn_depth=planned,
@@ -293,7 +322,13 @@ def profile_step(state, depth, vertical_rate, left, params):
     climbed = state.stage == GLIDING_UP and not params.holds and not state.aborted
     dives = state.dives + (1 if climbed else 0)
     return replace(
-        state, stage=stage, ticks=0, dives=dives, turn_depth=planned, depth=params.depth
+        state,
+        stage=stage,
+        ticks=0,
+        near_ticks=0,
+        dives=dives,
+        turn_depth=planned,
+        depth=params.depth,
     )
 
 

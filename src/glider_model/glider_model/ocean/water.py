@@ -16,6 +16,7 @@ from pydantic import Field
 from glider_base.errors import ConfigurationError
 from glider_base.kernel import kernel
 from glider_base.signals import Vector, Water
+from glider_model.ocean.bottom import NO_BOTTOM, FlatBottom
 from glider_model.ocean.cast import CastParams, cast_params, check_cast, read_cast
 from glider_model.ocean.columns import MAX_ROWS
 from glider_model.ocean.density import DensityParams, DensitySettings
@@ -48,7 +49,7 @@ class WaterSettings(DensitySettings):
         0.0,
         ge=0.0,
         le=12000.0,
-        description='depth of the bottom that an altimeter hears (m); 0: none. It stops nobody',
+        description='depth of a flat bottom (m); 0: none',
     )
     wind_mps: float = Field(0.0, ge=0.0, le=40.0, description='speed of the wind (m/s)')
     wind_from_deg: float = Field(
@@ -106,6 +107,10 @@ class WaterSettings(DensitySettings):
         if self.profile is None:
             return super().params()
         return cast_params(self.profile, self.hull_compression_per_m)
+
+    def bottom(self) -> FlatBottom:
+        """Kernel parameters of the bottom."""
+        return FlatBottom(self.bottom_m) if self.bottom_m else NO_BOTTOM
 
     def wind_drift(self) -> Vector:
         """Drift by wind and waves at the surface (m/s)."""

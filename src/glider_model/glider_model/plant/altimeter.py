@@ -15,19 +15,17 @@ class AltimeterParams(NamedTuple):
     """The altimeter as the kernels see it."""
 
     is_fitted: bool
-    bottom: float  #: its depth (m); 0.0: none
     std: float  #: (m)
     period_ticks: int  #: from one echo to the next
     stream: np.uint64  #: start of the random stream
 
 
 @kernel
-def echo(depth, tick, params):
-    """Height over the bottom (m) at a depth (m), as a float32 holds it; `NO_ECHO` out of reach."""
-    height = params.bottom - depth
+def echo(height, tick, params):
+    """Measured height over the bottom, of a true one (m), as a float32; `NO_ECHO` out of reach."""
     if params.std > 0.0:
         noise, _ = normal_pair(params.stream, np.uint64(tick))
         height += params.std * noise
-    if params.bottom <= 0.0 or height < ALTIMETER_REACH_M[0] or height > ALTIMETER_REACH_M[1]:
+    if height < ALTIMETER_REACH_M[0] or height > ALTIMETER_REACH_M[1]:
         return NO_ECHO
     return float(np.float32(height))

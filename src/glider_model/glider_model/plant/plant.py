@@ -13,6 +13,7 @@ from glider_base.settings import Settings
 from glider_base.signals import TICK_S, Joints, Odometry, Vector, Water, not_finite
 from glider_base.slot import default, slot
 from glider_base.wiring import SENSORS
+from glider_model.ocean.bottom import aground, bottom_depth
 from glider_model.ocean.water import WaterSettings, with_wind
 from glider_model.plant.energy import FULL, Ledger, battery_of, spend
 from glider_model.plant.faults.body import acting, blown, felt, moved
@@ -101,6 +102,7 @@ class PlantParams(NamedTuple):
     faults: NamedTuple  #: NoFaults, or FaultParams
     energy: EnergyParams
     readings: Readings  #: noise of where the actuators say that they are
+    bottom: NamedTuple  #: FlatBottom, or another one
 
 
 def dive_depths(depth_m: float) -> tuple[float, float]:
@@ -183,10 +185,11 @@ class PlantSettings(Settings):
             round(self.surface_s / TICK_S),
             round(self.afloat_s / TICK_S),
             *dive_depths(self.dive_depth_m),
-            self.sensors.params(self.seed, self.origin, tuple(self.fitted), self.water.bottom_m),
+            self.sensors.params(self.seed, self.origin, tuple(self.fitted)),
             fault_params(self.faults, self.seed),
             vehicle.energy.params() if vehicle.energy else NO_ENERGY,
             make_readings(real, self.seed),
+            self.water.bottom(),
         )
 
     def initial_state(self) -> PlantState:
@@ -240,10 +243,17 @@ def plant_odometry(state):
 
 
 @kernel
+def _height(motion, params):
+    """Height over the bottom (m); infinite where there is none."""
+    return bottom_depth(motion.p_n, motion.p_e, params.bottom) - motion.p_d
+
+
+@kernel
 def tell(state, params):
     """What the vehicle tells at a tick: numbers of the topics of the plant, as on the wire."""
     numbers = sense(
         plant_odometry(state),
+        _height(state.motion, params),
         read(state.joints, state.tick, params.readings),
         state.sample,
         state.surfacing.out_ticks,
@@ -312,6 +322,7 @@ def plant_step(state, command, water, params, dt, drops=False):
     while error > LARGEST_ERROR_J and steps <= MOST_STEPS:
         motion, error = integrate(state.motion, start, end, water, water_rate, body, dt, steps)
         steps *= 2
+    motion = aground(motion, water, bottom_depth(motion.p_n, motion.p_e, params.bottom))
     deep = motion.p_d > params.dive_below or (state.deep and motion.p_d >= params.dive_above)
     dives = state.dives + 1 if state.deep and not deep else state.dives
     surface_ticks = state.surface_ticks + 1 if motion.p_d < SURFACE_M else 0
@@ -320,7 +331,8 @@ def plant_step(state, command, water, params, dt, drops=False):
     sample = state.sample
     if params.sensors.is_held:
         measured = add_noise(plant_odometry(state), state.tick, params.sensors)
-        sample = take_sample(measured, state.motion.p_d, sample, state.tick, params.sensors)
+        height = _height(state.motion, params)
+        sample = take_sample(measured, height, sample, state.tick, params.sensors)
     surfacing = surface_after(state.surfacing, motion.p_d)
     depths, surfacings = (state.motion.p_d, motion.p_d), (state.surfacing, surfacing)
     return PlantState(

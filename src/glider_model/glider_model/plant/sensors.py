@@ -160,13 +160,11 @@ class SensorSettings(Settings):
         seed: int,
         origin: OriginSettings | None = None,
         fitted: tuple[str, ...] = SENSORS,
-        bottom_m: float = 0.0,
     ) -> 'SensorParams':
         """Kernel parameters for the errors under one seed, for the sensors that are fitted."""
         pattern = self.fix_missed_pattern
         altimeter = AltimeterParams(
             'altitude' in fitted,
-            bottom_m,
             self.altimeter_std_m,
             round(self.altimeter_period_s / TICK_S),
             np.uint64(random_stream(seed, _STREAM_OFFSET, 2)),
@@ -387,15 +385,15 @@ def _is_sampled(tick, params):
 
 
 @kernel
-def take_sample(measured, depth, sample, tick, params):
+def take_sample(measured, height, sample, tick, params):
     """What of a `Sample` is shown at a tick: each part is new, or that of ``sample``.
 
     Parameters
     ----------
     measured : Odometry
         With noise.
-    depth : float
-        The true one (m).
+    height : float
+        The true one over the bottom (m).
     sample : Sample
         That of the tick before.
     tick : int
@@ -403,7 +401,7 @@ def take_sample(measured, depth, sample, tick, params):
     """
     altitude = sample.altitude
     if params.altimeter.is_fitted and tick % params.altimeter.period_ticks == 0:
-        altitude = echo(depth, tick, params.altimeter)
+        altitude = echo(height, tick, params.altimeter)
     if not _is_sampled(tick, params):
         return replace(sample, altitude=altitude)
     x = measured
@@ -440,13 +438,15 @@ def _take_fix(odometry, out_ticks, surfacings, tick, params):
 
 
 @kernel
-def sense(odometry, joints, sample, out_ticks, surfacings, tick, params):
+def sense(odometry, height, joints, sample, out_ticks, surfacings, tick, params):
     """What the vehicle measures at a tick, for the topics of the plant.
 
     Parameters
     ----------
     odometry : Odometry
         Where the vehicle is.
+    height : float
+        Over the bottom (m).
     joints : Joints
         Where the actuators are.
     sample : Sample
@@ -464,7 +464,7 @@ def sense(odometry, joints, sample, out_ticks, surfacings, tick, params):
     """
     truth = odometry_to_wire(odometry)
     measured = add_noise(odometry, tick, params)
-    sample = x = take_sample(measured, odometry.p_d, sample, tick, params)
+    sample = x = take_sample(measured, height, sample, tick, params)
     position, imu, pressure = NO_POSITION, NO_IMU, 0.0
     fix = (NO_FIX, 0.0, 0.0, 0.0, 0.0)
     if params.has_position:

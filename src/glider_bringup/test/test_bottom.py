@@ -1,0 +1,71 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""The bottom of the sea: turned above by guidance, left by the guard, or touched and told."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+import glider_bringup
+from glider_base.settings import ConfigurationError
+from glider_base.signals import Water
+from glider_model.ocean.bottom import aground
+from glider_model.plant.motion import Motion
+
+#: A shelf that a yo to 200 m does not fit over.
+SHELF = {'water.bottom_m': 120.0}
+SPEED = st.floats(-2.0, 2.0)
+
+
+@given(*[SPEED] * 6, *[st.floats(-3.0, 3.0)] * 3, st.floats(90.0, 110.0))
+def test_a_vehicle_lies_where_it_touched_the_bottom(u, v, w, north, east, down, a, b, c, depth):
+    """By rotations of SciPy: it does not move over ground but upward."""
+    turn = Rotation.from_euler('xyz', (a, b, c))
+    x, y, z, scalar = turn.as_quat()
+    before = Motion(1.0, 2.0, depth, scalar, x, y, z, u, v, w, 0.1, 0.2, 0.3)
+    after = aground(before, Water(north, east, down), 100.0)
+    if depth <= 100.0:
+        assert after == before
+        return
+    over_ground = turn.apply(after[7:10]) + (north, east, down)
+    rose = min(0.0, (turn.apply((u, v, w)) + (north, east, down))[2])
+    np.testing.assert_allclose(over_ground, (0.0, 0.0, rose), atol=1e-9)
+    assert after[:3] == (1.0, 2.0, 100.0)
+    assert after[3:7] + after[10:] == before[3:7] + before[10:]
+
+
+def flown(**fields):
+    """Score of a mission over the shelf."""
+    return glider_bringup.fly('slocum_shelf', {**SHELF, **fields}).score
+
+
+def test_dives_turn_above_the_bottom():
+    told = flown(**{'profile.clearance_m': 10.0})
+    assert told['status'] == 'completed'
+    assert told['dives'] >= 4
+    assert not told['bottom']['touched']
+    assert 7.0 < told['bottom']['least_height_m'] < 15.0
+    assert told['guard']['events'] == []
+
+
+def test_an_altimeter_alone_ends_the_mission_above_the_bottom():
+    told = flown(**{'sensors.also_fitted': ['altitude']})
+    assert told['status'] == 'surfaced'
+    assert 'too close to the bottom' in told['reason']
+    assert not told['bottom']['touched']
+
+
+def test_a_vehicle_that_touches_comes_up_and_the_score_says_so():
+    told = flown()
+    assert told['status'] == 'surfaced'
+    assert 'lies aground' in told['reason']
+    assert told['bottom']['touched']
+    assert told['bottom']['least_height_m'] == 0.0
+    assert 120.0 / 0.5 < told['bottom']['t_s'] < told['sim_time_s']
+
+
+def test_clearance_is_for_yos():
+    with pytest.raises(ConfigurationError, match=r'profile.clearance_m = 10: not along a path'):
+        glider_bringup.fly('helix', {'profile.clearance_m': 10.0, 'profile.mode': 'path'})
