@@ -263,6 +263,13 @@ class OriginSettings(Settings):
             moment = moment.astimezone(UTC).replace(tzinfo=None)
         return f'{moment.isoformat()}Z'
 
+    @property
+    def time_s(self) -> float:
+        """Time of the start (s since 1970, UTC); not a number where there is none."""
+        if not self.time:
+            return math.nan
+        return datetime.fromisoformat(self.time[:-1]).replace(tzinfo=UTC).timestamp()
+
     def params(self) -> 'Origin':
         """Kernel parameters."""
         sine = math.sin(math.radians(self.latitude_deg))

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from glider_base.errors import clipped, shown, told_changes
 from glider_base.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
-from glider_base.frames import OriginSettings
+from glider_base.frames import OriginSettings, to_geodetic
 from glider_base.settings import (
     ConfigurationError,
     Settings,
@@ -34,7 +34,8 @@ from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.chart import charted, in_metres
 from glider_mission.rules import Rules
-from glider_model.ocean.current_settings import CurrentSettings
+from glider_model.ocean.current_settings import CurrentSettings, SumOfCurrents
+from glider_model.ocean.field import Mission
 from glider_model.ocean.water import WaterSettings
 from glider_model.onboard.gate import GateSettings
 from glider_model.plant.faults.settings import (
@@ -227,8 +228,23 @@ class Scenario(Settings):
 
     def current_settings(self) -> CurrentSettings:
         """What the current node is told: directions absolute, the scenario's seed."""
-        resolved = self.current.resolved(self.path.course_rad())
+        resolved = self._resolved(self.current)
         return resolved.model_copy(update={'seed': self.seed})
+
+    def _resolved(self, current: SumOfCurrents) -> SumOfCurrents:
+        """A current with what it has to know of the mission."""
+        return current.resolved(self.path.course_rad(), self._mission() if current.field else None)
+
+    def _mission(self) -> Mission:
+        """Where and when it is flown."""
+        origin = self.origin.params()
+        corners = self.path.points(0)
+        return Mission(
+            origin=self.origin,
+            places=tuple(to_geodetic(float(n), float(e), origin) for n, e, _ in corners),
+            deepest_m=self.profile.depth_m,
+            lasts_s=self.duration_s,
+        )
 
     def constant_current(self) -> tuple[float, float]:
         """Constant part of the current, north and east (m/s)."""
@@ -253,7 +269,7 @@ class Scenario(Settings):
             also_fitted=self.sensors.also_fitted,
             **{
                 **dict(self.navigation),
-                'forecast': self.navigation.forecast.resolved(self.path.course_rad()),
+                'forecast': self._resolved(self.navigation.forecast),
             },
         )
 
@@ -466,6 +482,7 @@ def make_scenario(
     if not recorded:
         try:
             _check_glide(scenario)
+            return _with_known_fields(scenario)
         except ConfigurationError as error:
             raise ConfigurationError(f'{path}{changed}: {error}') from None
     return scenario
@@ -491,6 +508,24 @@ def _check_glide(scenario: Scenario) -> None:
             f'initial.depth_m = {start_m:g}: deeper than the vehicle is rated for (allowed: <= '
             f'{rated_m:g} m, its rated_depth)'
         )
+
+
+def _with_known_fields(scenario: Scenario) -> Scenario:
+    """Scenario that says which files its currents are from, once they were read."""
+    currents = {'current': scenario.current, 'navigation.forecast': scenario.navigation.forecast}
+    for name, current in currents.items():
+        if current.field is None:
+            continue
+        try:
+            field = current.field.known()
+            scenario._resolved(current).field.params()
+        except ValueError as error:
+            raise ConfigurationError(f'{name}.field.{error}') from None
+        currents[name] = current.model_copy(update={'field': field})
+    navigation = scenario.navigation.model_copy(
+        update={'forecast': currents['navigation.forecast']}
+    )
+    return scenario.model_copy(update={'current': currents['current'], 'navigation': navigation})
 
 
 def load_scenario(

@@ -37,7 +37,7 @@ from glider_model.ocean.current_profile import (
     check_speed,
     read_profile,
 )
-from glider_model.ocean.field import FieldSettings, NoField
+from glider_model.ocean.field import FieldSettings, Mission, NoField
 
 #: One international knot (m/s).
 KNOT_MPS = 1852.0 / 3600.0
@@ -404,13 +404,15 @@ class SumOfCurrents(_Flow):
             self._require_flow()
         return self
 
-    def resolved(self, course_rad: float) -> 'SumOfCurrents':
+    def resolved(self, course_rad: float, mission: Mission | None = None) -> 'SumOfCurrents':
         """Copy that needs no path: every angle absolute, every speed in m/s.
 
         Parameters
         ----------
         course_rad : float
             Course of the first leg of the path (rad, clockwise from north).
+        mission : Mission, optional
+            Where and when it is flown, which a field by place may have to know.
 
         Returns
         -------
@@ -418,7 +420,9 @@ class SumOfCurrents(_Flow):
             With ``direction_deg`` and ``speed_mps`` in place of ``angle_deg`` and ``speed_kn``.
         """
         components = [component.resolved(course_rad) for component in self.components]
-        return super().resolved(course_rad).model_copy(update={'components': components})
+        field = self.field.resolved(mission) if self.field and mission else self.field
+        changed = {'components': components, 'field': field}
+        return super().resolved(course_rad).model_copy(update=changed)
 
     def params(self, seed: int = 0) -> CurrentParams:
         """Arrays that `current_step` reads.

@@ -9,9 +9,23 @@ only. docs/your_law.md builds one from nothing.
 
 from typing import NamedTuple
 
+from pydantic import Field
+
+from glider_base.frames import OriginSettings
 from glider_base.kernel import kernel
 from glider_base.settings import Settings
 from glider_base.slot import slot
+
+
+class Mission(Settings):
+    """Where and when a field is flown, as a scenario says it."""
+
+    origin: OriginSettings = Field(OriginSettings(), description='Of its chart, and its start.')
+    places: tuple[tuple[float, float], ...] = Field(
+        (), description='Latitude and longitude of the corners of its path (deg).'
+    )
+    deepest_m: float = Field(1000.0, description='Depth of its dives (m).')
+    lasts_s: float = Field(0.0, description='Time that it may last (s).')
 
 
 class FieldSettings(Settings):
@@ -21,6 +35,14 @@ class FieldSettings(Settings):
     `glider_model.ocean.fields` or of its entry point in the group ``glider.currents``, and
     defaults for all else.
     """
+
+    def resolved(self, mission: Mission) -> 'FieldSettings':
+        """Copy that knows where and when it is flown; itself, of a field that need not know."""
+        return self
+
+    def known(self) -> 'FieldSettings':
+        """Copy with what tells another file; itself, of a field that has none."""
+        return self
 
     def params(self) -> NamedTuple:
         """Kernel parameters, of a type of the field's own."""

@@ -1,0 +1,61 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider ocean``: what is in a file of an ocean model, and whether it covers a mission."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from glider_base.settings import ConfigurationError
+from glider_bringup.console import Json, messages, output, print_table
+from glider_bringup.showing.ocean import Sea, draw_sea, in_words, look, mission_in
+
+app = typer.Typer()
+
+
+@app.command(epilog='Example: ./glider ocean cmems_mod_glo_phy.nc --mission survey --out sea.png')
+def ocean(
+    file: Annotated[Path, typer.Argument(help='NetCDF file of an ocean model.')],
+    mission: Annotated[
+        str | None,
+        typer.Option(metavar='SCENARIO', help='Whether it covers this mission, if it flew in it.'),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help='Image file: png, svg or pdf, of the currents, and of the mission.'),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Tell what is in a file of currents, whether it covers a mission, and draw it.
+
+    Exit code 2: it is no grid of currents, or does not cover the mission.
+    """
+    with messages.status('reading'):
+        told, sea, refused = _told(file, mission)
+        if out and sea:
+            draw_sea(sea, out)
+            told['drawn'] = str(out)
+    if as_json:
+        print(json.dumps(told, allow_nan=False))
+    else:
+        print_table(str(file), (), in_words(told))
+    if refused:
+        raise ConfigurationError(refused)
+    if out and not as_json:
+        output.print(f'drawn: {out}', soft_wrap=True)
+
+
+def _told(file: Path, mission: str | None) -> tuple[dict[str, Any], Sea | None, str]:
+    """What is in a file, its water, and why it does not cover a mission; empty: it does."""
+    told, sea = look(file)
+    if mission is None:
+        return told, sea, ''
+    try:
+        sea = mission_in(file, mission)
+    except ConfigurationError as error:
+        told['mission'] = {'scenario': mission, 'covered': False, 'reason': str(error)}
+        return told, None, str(error)
+    told['mission'] = {'scenario': mission, 'covered': True, 'reason': ''}
+    return told, sea, ''

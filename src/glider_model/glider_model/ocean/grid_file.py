@@ -1,0 +1,449 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Currents of ocean models from NetCDF files: what is in a file, and a window of it.
+
+Variables and axes are found by what the CF conventions call them, in whatever order: velocities to
+the east and to the north on axes of time, depth, latitude and longitude, as CMEMS and HYCOM write
+them. Of a file only the window that is asked for is read, step by step. What is no such grid is
+refused by name.
+"""
+
+import hashlib
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from glider_base.files import is_file
+
+if TYPE_CHECKING:
+    import xarray
+
+#: Velocities by what they are called in CF, else by name.
+_VELOCITIES = {
+    'east': ('eastward_sea_water_velocity', ('uo', 'water_u')),
+    'north': ('northward_sea_water_velocity', ('vo', 'water_v')),
+}
+#: m/s in units that files have.
+_SPEEDS = {
+    **dict.fromkeys(('m s-1', 'm/s', 'm s^-1', 'm.s-1', 'meter/s', 'meter second-1'), 1.0),
+    **dict.fromkeys(('cm s-1', 'cm/s', 'centimeter/s'), 0.01),
+}
+_LENGTHS = {
+    **dict.fromkeys(('m', 'meter', 'meters', 'metre', 'metres'), 1.0),
+    **dict.fromkeys(('cm', 'centimeter', 'centimeters'), 0.01),
+}
+_AXES = ('time', 'depth', 'latitude', 'longitude')
+#: What of a grid no regular axes have, by names of dimensions or coordinates: what it is called.
+_OTHER_GRIDS = {
+    's_rho': 'levels that follow the bottom, as ROMS and CROCO have',
+    'sigma': 'levels that follow the bottom',
+    'projection_x_coordinate': 'a projected grid, as polar models have',
+    'rlon': 'a rotated grid',
+    'node': 'a mesh of triangles',
+    'face': 'a mesh',
+}
+#: Bytes of a window at most.
+MAX_BYTES = 400_000_000
+#: The fingerprint of a file is made of its size and so many bytes at either end.
+_ENDS = 1_000_000
+
+
+class Window(NamedTuple):
+    """What of a grid a mission needs."""
+
+    south: float  #: (deg)
+    north: float
+    west: float  #: may be less than -180, and east more than 180
+    east: float
+    deepest: float  #: (m)
+    begin: float  #: (s since 1970, UTC); nan: where the file begins
+    lasts: float  #: (s)
+
+
+class Axes(NamedTuple):
+    """Axes of a grid, each increasing."""
+
+    times: np.ndarray  #: (s since 1970, UTC)
+    depths: np.ndarray  #: (m, + down); a file without has its one level at the surface
+    latitudes: np.ndarray  #: (deg)
+    longitudes: np.ndarray  #: (deg), those nearest to the middle of the window
+
+
+class Loaded(NamedTuple):
+    """A window of a grid."""
+
+    axes: Axes
+    whole: Axes  #: of the file
+    water: np.ndarray  #: float32[time, depth, latitude, longitude, 2], to the north, east (m/s)
+    land: np.ndarray  #: bool[latitude, longitude], of the uppermost level
+    filled: float  #: share of the values that are land or bottom: those of the nearest water
+
+
+class _Layout(NamedTuple):
+    """Where in a dataset the velocities and their axes are."""
+
+    dataset: 'xarray.Dataset'
+    variables: dict[str, str]  #: of east and north
+    scales: dict[str, float]  #: that makes m/s of them
+    axes: dict[str, str]  #: dimension by axis; depth may be missing
+    values: dict[str, np.ndarray]  #: of each axis, as in the file
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator['xarray.Dataset']:
+    """Dataset of a file, of which nothing is read yet.
+
+    Raises
+    ------
+    ValueError
+        Naming the file.
+    """
+    import xarray
+
+    if not is_file(path):
+        raise ValueError(f'file {path}: no such file')
+    with open(path, 'rb') as file:
+        is_hdf = file.read(4) == b'\x89HDF'
+    try:
+        engine = 'h5netcdf' if is_hdf else 'scipy'
+        dataset = xarray.open_dataset(path, engine=engine, decode_times=False)
+    except ModuleNotFoundError:
+        raise ValueError(
+            f'file {path}: NetCDF-4 takes the library h5netcdf; install it with: ./glider python '
+            '-m pip install --no-deps -r requirements-flights.txt'
+        ) from None
+    except Exception as error:  # of libraries, of many types, for files that are none
+        text = f'{type(error).__name__}: {error}'.splitlines()[0][:200]
+        raise ValueError(f'file {path}: not a NetCDF file that xarray reads: {text}') from None
+    with dataset:
+        yield dataset
+
+
+def fingerprint(path: Path) -> str:
+    """Whether a file is the same one, by its size and its ends: 16 hexadecimal digits.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be read.
+    """
+    try:
+        with open(path, 'rb') as file:
+            size = file.seek(0, 2)
+            file.seek(0)
+            digest = hashlib.sha256(f'{size} '.encode() + file.read(_ENDS))
+            file.seek(max(0, size - _ENDS))
+            digest.update(file.read(_ENDS))
+    except OSError as error:
+        raise ValueError(f'file {path}: {error.strerror}') from None
+    return digest.hexdigest()[:16]
+
+
+def _velocity(dataset: 'xarray.Dataset', side: str) -> str:
+    """Name of a velocity."""
+    standard, names = _VELOCITIES[side]
+    found = [
+        n for n, one in dataset.data_vars.items() if one.attrs.get('standard_name') == standard
+    ]
+    found = found or [name for name in names if name in dataset.data_vars]
+    if not found:
+        listed = ', '.join(map(str, list(dataset.data_vars)[:12])) or 'none'
+        raise ValueError(
+            f'no velocity to the {side} (allowed: a variable of standard_name {standard}, or '
+            f'called {" or ".join(names)}; it has {listed})'
+        )
+    if len(found) > 1:
+        raise ValueError(f'several velocities to the {side}: {", ".join(found)} (allowed: one)')
+    return found[0]
+
+
+def _axis_of(name: str, variable: 'xarray.Variable') -> str:
+    """Which axis a coordinate is; empty if none."""
+    told = variable.attrs
+    units, standard = str(told.get('units', '')), told.get('standard_name')
+    if standard in _AXES:
+        return standard
+    if ' since ' in units or name.lower() == 'time':
+        return 'time'
+    for axis, prefix in (('latitude', 'degrees_n'), ('longitude', 'degrees_e')):
+        if units.lower().startswith(prefix) or name.lower() in (axis, axis[:3]):
+            return axis
+    is_depth = told.get('axis') == 'Z' or told.get('positive') in ('up', 'down')
+    return 'depth' if is_depth or name.lower() in ('depth', 'lev') else ''
+
+
+def _flat(dataset: 'xarray.Dataset') -> str:
+    """Name of a latitude or longitude of two dimensions; empty if there is none."""
+    for name, one in dataset.variables.items():
+        if one.ndim == 2 and _axis_of(str(name), one) in ('latitude', 'longitude'):
+            return str(name)
+    return ''
+
+
+def _find_axes(dataset: 'xarray.Dataset', name: str) -> dict[str, str]:
+    """Dimension of a variable by axis.
+
+    Raises
+    ------
+    ValueError
+        Naming the dimension that is none, and what grid it seems to be.
+    """
+    found: dict[str, str] = {}
+    for dimension in map(str, dataset[name].dims):
+        coordinate = dataset.variables.get(dimension)
+        axis = '' if coordinate is None else _axis_of(dimension, coordinate)
+        known = ' '.join((dimension, str(getattr(coordinate, 'attrs', {}).get('standard_name'))))
+        other = next((text for word, text in _OTHER_GRIDS.items() if word in known.lower()), '')
+        if not axis or axis in found or other:
+            if not other and (flat := _flat(dataset)):
+                other = f'a curvilinear grid: {flat} has two dimensions'
+            raise ValueError(
+                f'{name}: dimension {dimension} is no axis{f"; {other}" if other else ""} '
+                '(allowed: regular axes of time, depth, latitude and longitude)'
+            )
+        found[axis] = dimension
+    missing = [axis for axis in _AXES if axis not in found and axis != 'depth']
+    if missing:
+        raise ValueError(f'{name}: no axis of {missing[0]} (it has {", ".join(found.values())})')
+    return found
+
+
+def _times(variable: 'xarray.Variable') -> np.ndarray:
+    """Times of an axis (s since 1970, UTC)."""
+    import xarray
+
+    decoded = xarray.decode_cf(xarray.Dataset(coords={'time': ('time', *_bare(variable))}))
+    values = decoded['time'].values
+    if values.dtype.kind != 'M':
+        calendar = variable.attrs.get('calendar', 'none')
+        raise ValueError(
+            f'time: units = {variable.attrs.get("units")!r}, calendar = {calendar!r}: no times of '
+            "this world (allowed: such as 'hours since 1950-01-01', of the standard calendar)"
+        )
+    return values.astype('datetime64[ns]').astype(np.int64) / 1e9
+
+
+def _bare(variable: 'xarray.Variable') -> tuple[np.ndarray, dict]:
+    """Numbers of a variable, and what is said of them but their bounds."""
+    return variable.values, {k: v for k, v in variable.attrs.items() if k != 'bounds'}
+
+
+def _layout(dataset: 'xarray.Dataset') -> _Layout:
+    """Where the velocities of a dataset and their axes are.
+
+    Raises
+    ------
+    ValueError
+        Naming what is missing, or is no regular grid.
+    """
+    names = {side: _velocity(dataset, side) for side in _VELOCITIES}
+    axes = _find_axes(dataset, names['east'])
+    if _find_axes(dataset, names['north']) != axes:
+        both = ' and '.join(str(dataset[name].dims) for name in names.values())
+        raise ValueError(f'{" and ".join(names.values())}: on different axes, {both}, as a '
+                         'staggered grid has them (allowed: both at the same places)')  # fmt: skip
+    scales, values = {}, {}
+    for side, name in names.items():
+        units = str(dataset[name].attrs.get('units', '')).strip()
+        if units not in _SPEEDS:
+            raise ValueError(f'{name}: units = {units!r} (allowed: {", ".join(_SPEEDS)})')
+        scales[side] = _SPEEDS[units]
+    for axis, dimension in axes.items():
+        one = dataset.variables[dimension]
+        values[axis] = _times(one) if axis == 'time' else np.asarray(one.values, dtype=float)
+        if axis == 'depth':
+            units = str(one.attrs.get('units', 'm')).strip()
+            if units not in _LENGTHS:
+                raise ValueError(
+                    f'{dimension}: units = {units!r} (allowed: {", ".join(_LENGTHS)})'
+                )
+            values[axis] *= _LENGTHS[units] * (-1.0 if one.attrs.get('positive') == 'up' else 1.0)
+        steps = np.diff(values[axis])
+        is_axis = np.isfinite(values[axis]).all() and (np.all(steps > 0) or np.all(steps < 0))
+        if not len(values[axis]) or not is_axis:
+            raise ValueError(f'{dimension}: neither increases nor decreases all along')
+    return _Layout(dataset, names, scales, axes, values)
+
+
+def _chosen(values: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Indices, by increasing value, of what lies within limits, and of one on either side."""
+    order = np.argsort(values, kind='stable')
+    first, last = np.searchsorted(values[order], (low, high), side='left')
+    last += last < len(order) and values[order][last] == high
+    return order[max(0, first - 1) : last + 1]
+
+
+def _unwrapped(longitudes: np.ndarray, middle: float) -> np.ndarray:
+    """The same meridians, as near to the middle as they can be (deg)."""
+    return middle + (longitudes - middle + 180.0) % 360.0 - 180.0
+
+
+def _runs(indices: np.ndarray) -> list[slice]:
+    """Indices as slices of steps of 1 or -1: files are read in slices."""
+    found = []
+    for part in np.split(indices, np.flatnonzero(np.abs(np.diff(indices)) != 1) + 1):
+        step = -1 if len(part) > 1 and part[1] < part[0] else 1
+        end = int(part[-1]) + step
+        found.append(slice(int(part[0]), None if end < 0 else end, step))
+    return found
+
+
+def load(path: Path, window: Window | None = None) -> Loaded:
+    """Read a window of a file; all of it without one.
+
+    Parameters
+    ----------
+    path : Path
+    window : Window, optional
+
+    Raises
+    ------
+    ValueError
+        Naming the file, and what is missing in it or what of the window it does not cover.
+    """
+    try:
+        with _opened(path) as dataset:
+            layout = _layout(dataset)
+            chosen, axes, whole = _select(layout, window)
+            size = 8 * math.prod(map(len, chosen.values()))
+            if size > MAX_BYTES:
+                raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
+            return _read(layout, chosen, axes, whole)
+    except ValueError as error:
+        text = str(error)
+        raise ValueError(text if text.startswith('file ') else f'file {path}: {text}') from None
+
+
+def _select(layout: _Layout, window: Window | None) -> tuple[dict[str, np.ndarray], Axes, Axes]:
+    """Indices that a window needs, by axis, the axes that they make, and those of all."""
+    values = {'depth': np.zeros(1), **layout.values}
+    longitudes = values['longitude']
+    middle = 0.5 * (longitudes.min() + longitudes.max())
+    if window is not None:
+        middle = 0.5 * (window.west + window.east)
+    values['longitude'] = _unwrapped(longitudes, middle)
+    if window is None:
+        chosen = {axis: np.argsort(values[axis], kind='stable') for axis in _AXES}
+    else:
+        begin = values['time'].min() if math.isnan(window.begin) else window.begin
+        limits = {
+            'time': (begin, begin + window.lasts),
+            'depth': (0.0, window.deepest),
+            'latitude': (window.south, window.north),
+            'longitude': (window.west, window.east),
+        }
+        chosen = {axis: _chosen(values[axis], *limits[axis]) for axis in _AXES}
+        empty = next((axis for axis in _AXES if not len(chosen[axis])), None)
+        if empty:
+            raise ValueError(f'nothing of it is near the {empty} of the mission')
+    axes = Axes(*(values[axis][chosen[axis]] for axis in _AXES))
+    return chosen, axes, Axes(*(np.sort(values[axis]) for axis in _AXES))
+
+
+def _read(layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes, whole: Axes) -> Loaded:
+    """Numbers of a window, with the nearest water in place of land and bottom."""
+    shape = tuple(len(one) for one in axes)
+    water = np.empty((*shape, 2), dtype=np.float32)
+    present = [axis for axis in _AXES[1:] if axis in layout.axes]
+    land, filled = np.zeros(shape[2:], dtype=bool), 0
+    for step, index in enumerate(chosen['time']):
+        for side, component in (('north', 0), ('east', 1)):
+            part = layout.dataset[layout.variables[side]].isel({layout.axes['time']: int(index)})
+            for axis in present:
+                runs = _runs(chosen[axis])
+                pieces = [part.isel({layout.axes[axis]: run}) for run in runs]
+                part = pieces[0] if len(pieces) == 1 else _joined(pieces, layout.axes[axis])
+            read = part.transpose(*(layout.axes[axis] for axis in present)).values
+            read = layout.scales[side] * np.asarray(read, dtype=float).reshape(shape[1:])
+            if step == 0:
+                land |= ~np.isfinite(read[0])
+            filled += np.count_nonzero(~np.isfinite(read))
+            water[step, ..., component] = _fill_land(read)
+    return Loaded(axes, whole, water, land, filled / water.size)
+
+
+def _joined(pieces: list, dimension: str):
+    """Pieces of a variable one after the other."""
+    import xarray
+
+    return xarray.concat([piece.load() for piece in pieces], dimension)
+
+
+def _fill_land(levels: np.ndarray) -> np.ndarray:
+    """The nearest water in place of land, level by level; below the bottom the water above it."""
+    from scipy.ndimage import distance_transform_edt
+
+    for level, values in enumerate(levels):
+        dry = ~np.isfinite(values)
+        if dry.all():
+            values[:] = levels[level - 1] if level else 0.0
+        elif dry.any():
+            _, nearest = distance_transform_edt(dry, return_indices=True)
+            values[:] = values[tuple(nearest)]
+    return levels
+
+
+class Contents(NamedTuple):
+    """What is in a file."""
+
+    variables: list[str]  #: to the east and to the north
+    axes: Axes
+    source: str  #: as the file says
+
+
+def contents(path: Path) -> Contents:
+    """What is in a file, of which no velocity is read; raises as `load`."""
+    try:
+        with _opened(path) as dataset:
+            layout = _layout(dataset)
+            source = dataset.attrs.get('source') or dataset.attrs.get('title') or ''
+            names = [layout.variables[side] for side in _VELOCITIES]
+            return Contents(names, _select(layout, None)[1], str(source))
+    except ValueError as error:
+        text = str(error)
+        raise ValueError(text if text.startswith('file ') else f'file {path}: {text}') from None
+
+
+def told_time(seconds: float) -> str:
+    """A time (s since 1970, UTC) as a person reads it."""
+    return f'{datetime.fromtimestamp(seconds, timezone.utc):%Y-%m-%dT%H:%MZ}'
+
+
+def refuse_uncovered(axes: Axes, window: Window, source: str) -> None:
+    """Refuse a grid that does not cover a window in place or time.
+
+    A grid with one time is a steady one. Above its first level and below its last one it has the
+    water of these.
+
+    Raises
+    ------
+    ValueError
+        Naming the source, the axis, and what there is.
+    """
+    if len(axes.times) > 1 and not math.isnan(window.begin):
+        first, last = axes.times[0], axes.times[-1]
+        if window.begin < first or window.begin + window.lasts > last:
+            raise ValueError(
+                f'{source}: the mission goes from {told_time(window.begin)} to '
+                f'{told_time(window.begin + window.lasts)} (allowed: within '
+                f'{told_time(first)} to {told_time(last)}, the times of the file)'
+            )
+    elif len(axes.times) > 1 and window.lasts > axes.times[-1] - axes.times[0]:
+        raise ValueError(
+            f'{source}: the mission lasts {window.lasts:,.0f} s (allowed: '
+            f'<= {axes.times[-1] - axes.times[0]:,.0f} s, the times of the file)'
+        )
+    for name, values, low, high in (
+        ('latitude', axes.latitudes, window.south, window.north),
+        ('longitude', axes.longitudes, window.west, window.east),
+    ):
+        if low < values[0] or high > values[-1]:
+            raise ValueError(
+                f'{source}: the {name} of the path goes from {low:.3f} to {high:.3f} deg '
+                f'(allowed: within {values[0]:.3f} to {values[-1]:.3f}, as the file has it)'
+            )

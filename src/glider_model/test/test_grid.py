@@ -1,0 +1,253 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Currents from files of ocean models: against xarray's own interpolation, and what is refused."""
+
+import numpy as np
+import pytest
+import xarray
+
+from glider_base.frames import OriginSettings
+from glider_model.ocean.current import current_initial, current_step
+from glider_model.ocean.current_settings import CurrentSettings
+from glider_model.ocean.field import Mission, field_velocity
+from glider_model.ocean.fields.grid import GridSettings, interpolate
+from glider_model.ocean.grid_file import contents, load
+
+DEPTHS = np.array([0.494, 2.6, 9.6, 25.2, 65.8, 130.7, 266.0, 541.1, 1062.4])
+TIMES = np.datetime64('2026-03-01T12:00') + np.arange(4) * np.timedelta64(24, 'h')
+#: Names of CMEMS and of HYCOM: variables, dimensions.
+LAYOUTS = {
+    'cmems': (('uo', 'vo'), ('time', 'depth', 'latitude', 'longitude')),
+    'hycom': (('water_u', 'water_v'), ('time', 'depth', 'lat', 'lon')),
+}
+
+
+def smooth(shape, seed):
+    """Random water without jumps, of about 0.3 m/s."""
+    rng = np.random.default_rng(seed)
+    return 0.3 * rng.standard_normal(shape)
+
+
+def dataset(layout='cmems', latitudes=None, longitudes=None, order=(0, 1, 2, 3), seed=1):
+    """Dataset in the layout of a service."""
+    names, dims = LAYOUTS[layout]
+    latitudes = np.arange(34.0, 38.01, 0.25) if latitudes is None else latitudes
+    longitudes = np.arange(120.0, 124.01, 0.25) if longitudes is None else longitudes
+    shape = (len(TIMES), len(DEPTHS), len(latitudes), len(longitudes))
+    variables = {
+        name: (
+            [dims[i] for i in order],
+            smooth(shape, seed + k).transpose(order),
+            {'standard_name': f'{side}_sea_water_velocity', 'units': ('m s-1', 'm/s')[k]},
+        )
+        for k, (name, side) in enumerate(zip(names, ('eastward', 'northward'), strict=True))
+    }
+    coords = {
+        dims[0]: ([dims[0]], TIMES, {'standard_name': 'time'}),
+        dims[1]: ([dims[1]], DEPTHS, {'units': 'm', 'positive': 'down'}),
+        dims[2]: ([dims[2]], latitudes, {'units': 'degrees_north'}),
+        dims[3]: ([dims[3]], longitudes, {'units': 'degrees_east'}),
+    }
+    return xarray.Dataset(variables, coords)
+
+
+def written(data, path, packed=False, **how):
+    """File of a dataset; packed as HYCOM packs it."""
+    pack = {'dtype': 'int16', 'scale_factor': np.float32(0.001), '_FillValue': np.int16(-30000)}
+    encoding = {name: dict(pack) for name in data.data_vars} if packed else {}
+    encoding['time'] = {'units': 'hours since 2000-01-01', 'dtype': 'float64'}
+    data.to_netcdf(path, encoding=encoding, **{'engine': 'h5netcdf', **how})
+    return path
+
+
+def mission(*places, begin='2026-03-01T12:00', lasts_s=3 * 86400.0, deepest_m=1000.0):
+    """A mission through places (deg), with its origin at the first."""
+    latitude, longitude = places[0]
+    origin = OriginSettings(latitude_deg=latitude, longitude_deg=longitude, time=begin)
+    return Mission(origin=origin, places=places, deepest_m=deepest_m, lasts_s=lasts_s)
+
+
+def grid(path, *places, **more):
+    """Params of a grid for a mission."""
+    return GridSettings(file=str(path)).resolved(mission(*places, **more)).params()
+
+
+@pytest.mark.parametrize('layout', LAYOUTS)
+@pytest.mark.parametrize('packed', [False, True])
+@pytest.mark.parametrize('engine', ['h5netcdf', 'scipy'])
+def test_water_is_what_xarray_makes_of_it(layout, packed, engine, tmp_path):
+    """At 10,000 places, depths and times; also held above the first and below the last level."""
+    order = (0, 1, 2, 3) if packed else (3, 0, 2, 1)
+    path = written(dataset(layout, order=order), tmp_path / 'sea.nc', packed, engine=engine)
+    params = grid(path, (35.0, 121.0), (37.0, 123.0))
+    rng = np.random.default_rng(3)
+    n = 10_000
+    t_s = rng.uniform(0.0, 3 * 86400.0, n)
+    depth = rng.uniform(0.0, 1200.0, n)
+    latitude, longitude = rng.uniform(34.0, 38.0, n), rng.uniform(120.0, 124.0, n)
+    with xarray.open_dataset(path, engine=engine) as data:
+        names, dims = LAYOUTS[layout]
+        at = {
+            dims[0]: TIMES[0].astype('M8[ns]') + (1e9 * t_s).astype('m8[ns]'),
+            dims[1]: np.clip(depth, DEPTHS[0], DEPTHS[-1]),
+            dims[2]: latitude,
+            dims[3]: longitude,
+        }
+        at = {name: ('point', values) for name, values in at.items()}
+        east, north = (data[name].astype(float).interp(at).values for name in names)
+    points = np.stack((t_s, depth, latitude, longitude), axis=1)
+    found = np.array([interpolate(*one, params) for one in points])
+    assert np.isfinite(east).all()
+    np.testing.assert_allclose(found, np.stack((north, east), axis=1), rtol=0.0, atol=1e-6)
+
+
+def test_the_vehicle_meets_the_water_of_its_place_and_time(tmp_path):
+    path = written(dataset(), tmp_path / 'sea.nc')
+    settings = CurrentSettings(field={'kind': 'grid', 'file': str(path)})
+    told = settings.resolved(0.0, mission((36.0, 122.0), begin='2026-03-02T00:00', lasts_s=3600.0))
+    params = told.params()
+    origin = told.field.mission.origin.params()
+    place = (0.3 * origin.north, -0.4 * origin.east, 100.0)
+    _, water = current_step(current_initial(params), place, 1800.0, params, 0.1)
+    with xarray.open_dataset(path) as data:
+        there = data.interp(
+            time=np.datetime64('2026-03-02T00:30', 'ns'),
+            depth=100.0,
+            latitude=36.3,
+            longitude=121.6,
+        )
+        np.testing.assert_allclose(water, (float(there.vo), float(there.uo), 0.0), atol=1e-6)
+    assert field_velocity(place, 1800.0, params.field) == tuple(water)
+
+
+@pytest.mark.parametrize('start', [-180.0, 0.0])
+@pytest.mark.parametrize('longitude', [-179.9, 179.9, 0.05, -0.05, 359.9])
+def test_a_sea_round_the_earth_has_no_seam(start, longitude, tmp_path):
+    """Where longitudes begin at 0 or at -180: at either, water goes on."""
+    longitudes = start + np.arange(0.0, 360.0, 0.5)
+    latitudes = np.array([10.0, 9.5, 9.0])  # from north to south, as some files are
+    data = dataset(latitudes=latitudes, longitudes=longitudes)
+    east = np.cos(np.radians(longitudes)) * np.ones_like(data.uo)
+    path = written(data.assign(uo=data.uo.copy(data=east)), tmp_path / 'sea.nc')
+    wrapped = (longitude + 180.0) % 360.0 - 180.0
+    params = grid(path, (9.6, wrapped))
+    for away in (-1.0, -0.25, 0.0, 0.25, 1.0):
+        found = interpolate(0.0, 10.0, 9.6, wrapped + away, params)[1]
+        assert found == pytest.approx(np.cos(np.radians(longitude + away)), abs=2e-5)
+    assert len(params.longitudes) < 20
+
+
+def test_land_is_told_and_has_the_water_beside_it(tmp_path):
+    data = dataset()
+    shore = (data.longitude < 121.0) | (data.depth > 500.0)
+    path = written(data.where(~shore), tmp_path / 'sea.nc', packed=True)
+    loaded = load(path)
+    assert loaded.filled == pytest.approx(float(shore.mean()), abs=1e-12)
+    assert loaded.land[:, :4].all()
+    assert not loaded.land[:, 4:].any()
+    params = grid(path, (36.0, 122.0))
+    at_shore = interpolate(0.0, 0.0, 36.0, 121.0, params)
+    assert interpolate(0.0, 0.0, 36.0, 120.1, params) == pytest.approx(at_shore)
+    above = interpolate(0.0, 266.0, 36.0, 122.0, params)
+    assert interpolate(0.0, 900.0, 36.0, 122.0, params) == pytest.approx(above)
+    with pytest.raises(ValueError, match=r'36.0000, 120.3000 on the path is land'):
+        grid(path, (36.0, 120.3))
+
+
+@pytest.mark.parametrize(
+    ('places', 'more', 'text'),
+    [
+        ([(36.0, 122.0), (38.5, 122.0)], {}, r'latitude of the path goes from 36.000 to 38.500'),
+        ([(36.0, -60.0)], {}, r'longitude of the path goes from -60.000 to -60.000 deg \(allowed'),
+        ([(36.0, 122.0)], {'begin': '2026-02-01'}, r'from 2026-02-01T00:00Z to 2026-02-04T00:00Z '
+         r'\(allowed: within 2026-03-01T12:00Z to 2026-03-04T12:00Z'),
+        ([(36.0, 122.0)], {'lasts_s': 1e6}, 'the mission goes from'),
+        ([(36.0, 122.0)], {'begin': '', 'lasts_s': 1e6}, r'lasts 1,000,000 s \(allowed: <= 259,2'),
+    ],
+)  # fmt: skip
+def test_what_the_file_does_not_cover_is_refused(places, more, text, tmp_path):
+    path = written(dataset(), tmp_path / 'sea.nc')
+    with pytest.raises(ValueError, match=text):
+        grid(path, *places, **more)
+
+
+def bent(data):
+    """The same on a curvilinear grid."""
+    flat = data.rename(latitude='y', longitude='x').drop_vars(['y', 'x'])
+    across = np.tile(data.latitude.values[:, None], (1, data.sizes['longitude']))
+    return flat.assign_coords(nav_lat=(('y', 'x'), across, {'units': 'degrees_north'}))
+
+
+@pytest.mark.parametrize(
+    ('change', 'text'),
+    [
+        (lambda one: one.drop_vars('vo'), 'no velocity to the north .*it has uo'),
+        (bent, 'uo: dimension y is no axis; a curvilinear grid: nav_lat has two dimensions'),
+        (lambda one: one.rename(depth='s_rho').drop_vars('s_rho'), 'follow the bottom, as ROMS'),
+        (lambda one: one.assign(vo=one.vo.rename(latitude='latitude_v').assign_coords(
+            latitude_v=one.latitude.values + 0.1).assign_attrs(one.vo.attrs)),
+         r'dimension latitude_v is no axis'),
+        (lambda one: one.assign(uo=one.uo.assign_attrs(units='knots')), "uo: units = 'knots'"),
+        (lambda one: one.isel(latitude=[0, 2, 1]), 'latitude: neither increases nor decreases'),
+        (lambda one: one.isel(longitude=0), 'uo: no axis of longitude'),
+    ],
+)  # fmt: skip
+def test_what_is_no_regular_grid_is_refused_by_name(change, text, tmp_path):
+    path = written(change(dataset()), tmp_path / 'sea.nc')
+    with pytest.raises(ValueError, match=rf'file {path}: .*{text}'):
+        load(path)
+
+
+def test_what_is_no_file_is_refused(tmp_path):
+    with pytest.raises(ValueError, match='no such file'):
+        load(tmp_path / 'none.nc')
+    (tmp_path / 'text.nc').write_text('hello')
+    with pytest.raises(ValueError, match='not a NetCDF file that xarray reads'):
+        load(tmp_path / 'text.nc')
+
+
+def test_what_is_in_a_file(tmp_path):
+    path = written(dataset('hycom'), tmp_path / 'sea.nc', packed=True)
+    found = contents(path)
+    assert found.variables == ['water_u', 'water_v']
+    np.testing.assert_allclose(found.axes.depths, DEPTHS)
+    assert found.axes.times[0] == TIMES[0].astype('M8[s]').astype(float)
+
+
+def test_another_file_is_told_from_the_one_that_was_flown(tmp_path):
+    path = written(dataset(), tmp_path / 'sea.nc')
+    known = GridSettings(file=str(path)).known()
+    assert known.known() == known
+    written(dataset(seed=7), path)
+    with pytest.raises(ValueError, match='not the one that was flown'):
+        known.known()
+
+
+def test_of_a_large_file_the_window_alone_is_read(tmp_path):
+    """A file of 5 GB, sparse: what is read is counted by the size of what is kept."""
+    h5py = pytest.importorskip('h5py')
+    path = tmp_path / 'large.nc'
+    shape = (30, 40, 1000, 2000)
+    with h5py.File(path, 'w') as file:
+        axes = {
+            'time': (np.arange(30.0), {'units': 'days since 2026-03-01', 'standard_name': 'time'}),
+            'depth': (np.linspace(0.5, 2000.0, 40), {'units': 'm', 'positive': 'down'}),
+            'latitude': (np.linspace(20.0, 60.0, 1000), {'units': 'degrees_north'}),
+            'longitude': (np.linspace(100.0, 180.0, 2000), {'units': 'degrees_east'}),
+        }
+        for name, (values, attrs) in axes.items():
+            file[name] = values
+            file[name].make_scale(name)
+            file[name].attrs.update(attrs)
+        for name, side in (('uo', 'east'), ('vo', 'north')):
+            made = file.create_dataset(
+                name, shape, 'i2', chunks=(1, 1, 1000, 2000), fillvalue=np.int16(250)
+            )
+            made.attrs['standard_name'] = f'{side}ward_sea_water_velocity'
+            made.attrs['units'], made.attrs['scale_factor'] = 'm s-1', 0.001
+            for number, dimension in enumerate(axes):
+                made.dims[number].attach_scale(file[dimension])
+        assert 2 * np.prod(shape) * 2 > 5e9 * 0.9
+    params = grid(path, (36.0, 122.0), (37.0, 123.0), begin='2026-03-05', lasts_s=86400.0 * 3)
+    assert params.water.nbytes < 20e6
+    assert interpolate(1000.0, 50.0, 36.5, 122.5, params) == pytest.approx((0.25, 0.25))
