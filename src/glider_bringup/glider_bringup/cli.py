@@ -62,8 +62,13 @@ OF_THE_SCRIPT = {
         'jupyter lab examples/first_flight.ipynb',
     ),
     'bench': (
-        'Measure how fast this machine flies, as ratios to floors measured in the same run.',
+        'Measure how fast this machine flies, as ratios to baselines timed alongside.',
         'bench --only compute --json',
+    ),
+    'docs': ('Build the documentation as a site; --open shows it.', 'docs --open'),
+    'figures': (
+        'Make the moving picture of README and its figures anew.',
+        'figures --at-sea ~/flights',
     ),
 }
 
