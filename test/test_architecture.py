@@ -84,7 +84,7 @@ ONLY_PIP = {
     'zstandard',
 }
 #: The same, from a file of their own: what only some commands need, and say so.
-OPTIONAL = {'requirements-flights.txt': {'dbdreader', 'gliderflight', 'gsw', 'h5netcdf'}}
+OPTIONAL = {'requirements-flights.txt': {'dbdreader', 'gliderflight', 'gsw', 'h5netcdf', 'ppigrf'}}
 #: Names on PyPI that are not those of the modules.
 PYPI_NAMES = {'foxglove': 'foxglove-sdk'}
 

@@ -12,9 +12,6 @@ from glider_flights.forecast import FORECASTS, Forecaster
 from glider_flights.reckoning import Reckoned, mean_current, reckon
 from glider_flights.record import Flight, Segment
 
-#: Over what a vehicle's own current is a mean: a base station counts the drift at the surface too.
-ON_BOARD_OVER = {'slocum': 'under water', 'seaglider': 'between fixes'}
-
 
 class Row(NamedTuple):
     """What came out for a segment."""
@@ -29,7 +26,7 @@ class Row(NamedTuple):
 
 def comparable_current(flight: Flight, segment: Segment, reckoned: Reckoned) -> np.ndarray:
     """Our current (m/s) over what the vehicle's own is a mean, shape (2,): north, east."""
-    if ON_BOARD_OVER[flight.kind] == 'between fixes':
+    if flight.on_board_over == 'between fixes':
         return mean_current(segment, reckoned)
     return reckoned.dac_mps
 
@@ -71,7 +68,7 @@ def summary(flight: Flight, rows: list[Row]) -> dict[str, Any]:
         'duration_s': round(rows[-1].reckoned.surfaced_s - rows[0].reckoned.dived_s, 1),
         'under_water_s': round(sum(row.reckoned.seconds for row in rows), 1),
         'through_water_m': round(float(sum(through_water)), 1),
-        'on_board_current_is_mean': ON_BOARD_OVER[flight.kind],
+        'on_board_current_is_mean': flight.on_board_over,
         'dac_difference_mps': _spread(dac, 4),
         'way_difference_m': _spread(way, 1),
         'prediction_m': {name: _spread([row.missed_m[name] for row in rows], 1) for name in names},

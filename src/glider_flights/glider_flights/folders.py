@@ -1,12 +1,31 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the files of a flight are, and the libraries that read them."""
+"""Which files are those of a flight, and the libraries that read them."""
 
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from datetime import datetime, timezone
 from pathlib import Path
+from typing import NamedTuple, TypeVar
+
+import numpy as np
 
 from glider_base.errors import ConfigurationError
+
+#: There is no later date (s since 1970): the end of 2099.
+LATEST_S = 4.1e9
+#: No glider is at sea for longer (s): files further apart are of two flights, or of a wrong clock.
+LONGEST_FLIGHT_S = 400 * 86_400.0
+Read = TypeVar('Read')
+
+
+class Part(NamedTuple):
+    """What one file says of the flight that it is of."""
+
+    name: str
+    vehicle: str  #: '' if it does not say
+    time_s: np.ndarray  #: times of its samples (s since 1970), shape (n,), NaN or not
 
 
 def files_in(place: Path, wanted: Callable[[Path], bool]) -> list[Path]:
@@ -47,3 +66,106 @@ def installed(library: str) -> Iterator[None]:
             f'{library}, is not installed; install it with: '
             './glider python -m pip install --no-deps -r requirements-flights.txt'
         ) from None
+
+
+def read_each(
+    files: list[Path], progress: Callable[[int, int], None], read: Callable[[Path], Read]
+) -> tuple[list[Read], dict[str, str]]:
+    """What can be read of files, and why others cannot be, by name; of one alone, it is raised.
+
+    Raises
+    ------
+    ConfigurationError
+    """
+    found, left_out = [], {}
+    for number, path in enumerate(files):
+        progress(number, len(files))
+        try:
+            found.append(read(path))
+        except ConfigurationError as error:
+            if len(files) == 1 or 'not installed' in str(error):
+                raise
+            left_out[path.name] = str(error).removeprefix(f'{path}: ')
+    return found, left_out
+
+
+def strangers(place: Path, parts: Sequence[Part]) -> dict[str, str]:
+    """Files that are not of the flight that most of them are of, by name, and why not.
+
+    Of another vehicle, far off in time, or at a time at which the vehicle wrote another file.
+
+    Parameters
+    ----------
+    place : Path
+        Where they are, for the error.
+    parts : sequence of Part
+        In the order in which the vehicle wrote them, by their names.
+
+    Raises
+    ------
+    ConfigurationError
+        If no vehicle has more files than each of the others.
+    """
+    vehicles = Counter(part.vehicle for part in parts if part.vehicle).most_common()
+    if len(vehicles) > 1 and vehicles[0][1] == vehicles[1][1]:
+        raise ConfigurationError(
+            f'{place}: files of several vehicles, {", ".join(sorted(dict(vehicles)))} '
+            '(allowed: those of one, or most of one)'
+        )
+    found, rest = {}, []
+    for part in parts:
+        if part.vehicle and part.vehicle != vehicles[0][0]:
+            found[part.name] = f'it is of {part.vehicle}, most are of {vehicles[0][0]}'
+            continue
+        dated = part.time_s[(part.time_s > 0.0) & (part.time_s < LATEST_S)]
+        if len(dated):
+            rest.append(part._replace(time_s=dated))
+        else:
+            found[part.name] = 'it has no samples with a date'
+    return found | _of_other_times(rest)
+
+
+def _of_other_times(parts: list[Part]) -> dict[str, str]:
+    """Files whose times cannot be right, by name, and why not."""
+    if not parts:
+        return {}
+    begin, middle, end = np.array([np.percentile(one.time_s, (5, 50, 95)) for one in parts]).T
+    usual = np.sort(middle)[len(parts) // 2]
+    found = {
+        part.name: f'its dates are about {_day(at)}, most are about {_day(usual)}'
+        for part, at in zip(parts, middle, strict=True)
+        if abs(at - usual) > LONGEST_FLIGHT_S
+    }
+    near = np.flatnonzero(np.abs(middle - usual) <= LONGEST_FLIGHT_S)
+    believed = near[_longest_row(begin[near], end[near])]
+    for one in np.setdiff1d(near, believed):
+        same = believed[(begin[believed] < end[one]) & (end[believed] > begin[one])]
+        if len(same):
+            found[parts[one].name] = f'it is of the time of {parts[same[0]].name}'
+    return found
+
+
+def _day(time_s: float) -> str:
+    return f'{datetime.fromtimestamp(time_s, timezone.utc):%Y-%m-%d}'
+
+
+def _longest_row(begin: np.ndarray, end: np.ndarray) -> list[int]:
+    """Indices of the most times, from ``begin`` to ``end``, of which each is after the last."""
+    before, length = np.full(len(begin), -1), np.ones(len(begin), int)
+    for index in range(len(begin)):
+        earlier = np.flatnonzero(end[:index] <= begin[index])
+        if len(earlier):
+            before[index] = earlier[length[earlier].argmax()]
+            length[index] += length[before[index]]
+    found = [int(length.argmax())]
+    while before[found[-1]] >= 0:
+        found.append(int(before[found[-1]]))
+    return found[::-1]
+
+
+def said(left_out: dict[str, str]) -> list[str]:
+    """A sentence for each reason for which files are left out, with their names."""
+    names: dict[str, list[str]] = {}
+    for name, why in left_out.items():
+        names.setdefault(why, []).append(name)
+    return [f'left out: {", ".join(those)}: {why}' for why, those in names.items()]

@@ -10,6 +10,7 @@ from glider_base.errors import ConfigurationError
 from glider_flights.energy.seaglider import seaglider_uses
 from glider_flights.energy.slocum import slocum_uses
 from glider_flights.energy.uses import Uses
+from glider_flights.folders import said
 from glider_flights.og1 import og1_files, read_og1
 from glider_flights.record import Flight
 from glider_flights.seaglider import read_seaglider, seaglider_files
@@ -34,7 +35,7 @@ def read_flight(place: Path, cache: Path | None, progress: Progress) -> Flight:
     ------
     ConfigurationError
     """
-    flight = _read(place, cache, progress, read_slocum, read_seaglider)
+    flight = _read(place, cache, progress, read_slocum, read_seaglider, read_og1)
     if not flight.segments:
         why = '; '.join(flight.notes)
         raise ConfigurationError(
@@ -57,19 +58,31 @@ def read_uses(place: Path, cache: Path | None, progress: Progress) -> Uses:
 
 
 def _read(place: Path, cache: Path | None, progress: Progress, slocum, seaglider, og1=None):
-    """What that function says of a flight which is for its kind of files."""
+    """What that function says of a flight which is for the kind of most of the files."""
     if not place.exists():
         raise ConfigurationError(f'{place}: there is no such folder or file')
     if cache is not None and not cache.is_dir():
         raise ConfigurationError(f'--cache {cache}: there is no such folder')
-    if slocum_files(place):
-        return slocum(place, cache, progress)
-    if og1 and og1_files(place):
-        return og1(place, progress)
-    if seaglider_files(place):
-        return seaglider(place, progress)
-    raise ConfigurationError(
-        f'{place}: no files of a flight in it (allowed: .dbd, .mbd, .sbd, .dcd, .mcd, .scd of '
-        'a Slocum, p*.nc of a Seaglider'
-        + (', NetCDF with TIME and PITCH as OG1 has them)' if og1 else ')')
-    )
+    in_og1 = og1_files(place)
+    dives = [path for path in seaglider_files(place) if path not in in_og1]
+    readers = {
+        'a Slocum': (slocum_files(place), partial(slocum, place, cache, progress)),
+        'a Seaglider': (dives, partial(seaglider, place, progress)),
+    }
+    if og1:
+        readers['OG1'] = (in_og1, partial(og1, place, progress))
+    kind = max(readers, key=lambda kind: len(readers[kind][0]))
+    files, read = readers.pop(kind)
+    if not files:
+        raise ConfigurationError(
+            f'{place}: no files of a flight in it (allowed: .dbd, .mbd, .sbd, .dcd, .mcd, .scd of '
+            'a Slocum, p*.nc of a Seaglider'
+            + (', NetCDF with TIME as OG1 has it)' if og1 else ')')
+        )
+    flight = read()
+    others = {
+        path.name: f'it is of {other}, most are of {kind}'
+        for other, (files, _) in readers.items()
+        for path in files
+    }
+    return flight._replace(notes=said(others) + flight.notes)

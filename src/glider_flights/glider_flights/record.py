@@ -96,7 +96,7 @@ class Instruments(NamedTuple):
 class Flight(NamedTuple):
     """A recorded flight."""
 
-    kind: str  #: kind of vehicle: 'slocum' or 'seaglider'
+    kind: str  #: kind of files: 'slocum', 'seaglider' or 'og1'
     #: Names of the files that were read.
     files: list[str]
     segments: list[Segment]
@@ -106,6 +106,8 @@ class Flight(NamedTuple):
     #: Constants of the body that the files name: mass_kg, and volume_m3 with the engine at zero.
     #: Those of a base station for compressibility belong to its own way of computing.
     body: dict[str, float] | None = None
+    #: Over what the vehicle's own current is a mean; a base station counts the drift, too.
+    on_board_over: str = 'under water'
 
 
 SamplesOrInstruments = TypeVar('SamplesOrInstruments', Samples, Instruments)

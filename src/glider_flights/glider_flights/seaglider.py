@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_base.errors import ConfigurationError
-from glider_flights.folders import files_in
+from glider_flights.folders import Part, files_in, read_each, said, strangers
 from glider_flights.netcdf import SUFFIXES, refuse_missing, variables
 from glider_flights.record import (
     NOT_KNOWN,
@@ -87,6 +87,8 @@ CONSTANTS = {
 ERIKSEN = {'a': 0.003836, 'b': 0.010078, 'c': 2.1e-6, 's': -0.25, 'length': 1.8}
 #: At shallower pitch the base station takes a Seaglider for stalled (rad).
 SHALLOWEST_RAD = math.radians(5.0)
+#: A dive with its fixes is not longer than this (s).
+LONGEST_DIVE_S = 2 * 86_400.0
 #: Marks of the base station for values that are bad, or missing.
 BAD = ('4', '9', '4.0', '9.0')
 
@@ -123,42 +125,36 @@ def read_seaglider(place: Path, progress: Callable[[int, int], None]) -> Flight:
     ------
     ConfigurationError
     """
-    dives, notes = [], []
-    files = seaglider_files(place)
-    for number, path in enumerate(files):
-        progress(number, len(files))
-        try:
-            dives.append(_read_dive(path, notes))
-        except ConfigurationError as error:
-            if len(files) == 1 or 'not installed' in str(error):
-                raise
-            notes.append(f'left out: {error}')
-    vehicles = sorted({dive.vehicle for dive in dives if dive.vehicle})
-    if len(vehicles) > 1:
-        raise ConfigurationError(
-            f'{place}: dives of several vehicles, {", ".join(vehicles)} (allowed: one)'
-        )
+    files, notes = seaglider_files(place), []
+    dives, left_out = read_each(files, progress, lambda path: _read_dive(path, notes))
+    dives.sort(key=lambda dive: (dive.number, dive.name))
+    left_out |= strangers(
+        place, [Part(dive.name, dive.vehicle, dive.samples.time_s) for dive in dives]
+    )
+    dives = [dive for dive in dives if dive.name not in left_out]
+    notes += said(left_out)
     if not dives:
-        raise ConfigurationError(f'{place}: no file of a dive could be read; {notes[0]}')
+        raise ConfigurationError(f'{place}: no file of a dive could be read; {"; ".join(notes)}')
     dives.sort(key=lambda dive: dive.fixes[0, 0])
     origin = dives[0].fixes[0, 1:]
-    segments, left_out = [], []
+    segments, unused = [], []
     for run in _runs(dives):
-        found, said = _segments(run, origin)
+        found, why = _segments(run, origin)
         segments += found
-        left_out += [one for one in said if one not in left_out]
+        unused += [one for one in why if one not in unused]
     names = {name for dive in dives for name in dive.body}
     body = {
         name: usual([dive.body[name] for dive in dives if name in dive.body]) for name in names
     }
     return Flight(
         kind='seaglider',
-        files=[path.name for path in files],
+        files=[dive.name for dive in dives],
         segments=segments,
-        notes=notes + left_out,
+        notes=notes + unused,
         origin_deg=origin,
         instruments=joined(_of_one_zero(dive, body) for dive in dives),
         body=body,
+        on_board_over='between fixes',
     )
 
 
@@ -217,6 +213,12 @@ def _read_dive(path: Path, notes: list[str]) -> Dive:
         good &= ~np.isin(quality.astype('U8'), BAD)
     if not good.any():
         raise ConfigurationError(f'{path}: log_gps_lat, log_gps_lon: no usable fix (needed: 1)')
+    apart_s = np.nanmedian(fixes[good, 0]) - np.nanmedian(found['time'])
+    if not abs(apart_s) <= LONGEST_DIVE_S:
+        raise ConfigurationError(
+            f'{path}: log_gps_time is {apart_s / 86400.0:.1f} days off time (allowed: '
+            f'{LONGEST_DIVE_S / 86400.0:.0f})'
+        )
     declination = _number(found, 'declination')
     if math.isnan(declination):
         notes.append(f'{path.name}: magnetic_variation is missing: 0 deg is taken')
@@ -232,7 +234,7 @@ def _read_dive(path: Path, notes: list[str]) -> Dive:
         np.array([_number(found, 'dac_north'), _number(found, 'dac_east')]),
         np.array([_number(found, 'speed_north'), _number(found, 'speed_east')])
         * _number(found, 'flight_s'),
-        _polar(found),
+        polar_of(found),
         _instruments(found, samples),
         _body(found),
     )
@@ -282,7 +284,7 @@ def _body(found: dict[str, np.ndarray]) -> dict[str, float]:
     return {name: value for name, value in body.items() if math.isfinite(value)}
 
 
-def _polar(found: dict[str, np.ndarray]) -> Polar:
+def polar_of(found: dict[str, np.ndarray]) -> Polar:
     """The file's own constants of lift and drag, else Eriksen's; angles in degrees there."""
     own = {name: _number(found, name) for name in ERIKSEN}
     used = {name: ERIKSEN[name] if math.isnan(own[name]) else own[name] for name in ERIKSEN}

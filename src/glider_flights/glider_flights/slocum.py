@@ -7,14 +7,16 @@ magnetic north as y. ``m_gps_mag_var`` is what is subtracted from a magnetic hea
 """
 
 import math
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from glider_base.errors import ConfigurationError
-from glider_flights.folders import files_in, installed
+from glider_flights.folders import LATEST_S, Part, files_in, installed, said, strangers
 from glider_flights.record import (
     NOT_KNOWN,
     Fixes,
@@ -44,6 +46,14 @@ CACHES = '.cac'
 CACHES_ABOVE = 2
 #: A file with its header has no fewer bytes.
 SMALLEST_FILE = 100
+#: Where its first cycle is after the header, and what a cycle and, often, the end begin with.
+FIRST_CYCLE, CYCLE_TAG, LAST_TAG = 16, b'd', b'X'
+#: Name of a file on board: vehicle, year, day of the year, mission of the day, segment.
+WRITTEN = re.compile(r'(.+)-(\d+)-(\d+)-(\d+)-(\d+)')
+#: What a glider can have been told by its sensors (m, rad): other values are damage.
+PLAUSIBLE = {'m_depth': (-50.0, 7000.0), 'm_pitch': (-1.6, 1.6), 'm_heading': (-6.3, 6.3)}
+#: Times in one file are no further apart than this (s).
+LONGEST_FILE_S = 20 * 86_400.0
 #: Without these nothing can be reckoned.
 NEEDED = ('m_depth', 'm_pitch', 'm_heading', 'm_gps_lat', 'm_gps_lon')
 WANTED = (
@@ -83,18 +93,13 @@ Sensors = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
 def slocum_files(place: Path) -> list[Path]:
-    """Files of the flight computer, of the fullest kind that is there; plain before compressed."""
-    suffixes = {suffix for kind in KINDS for suffix in kind}
+    """Files of the flight computer, each of its fullest kind; plain before compressed."""
+    suffixes = [suffix for kind in KINDS for suffix in kind]
     files = files_in(place, lambda path: path.suffix.lower() in suffixes)
-    for kind in KINDS:
-        by_stem: dict[str, Path] = {}
-        for suffix in kind:
-            for path in files:
-                if path.suffix.lower() == suffix:
-                    by_stem.setdefault(path.stem.lower(), path)
-        if by_stem:
-            return sorted(by_stem.values())
-    return []
+    by_stem: dict[str, Path] = {}
+    for path in sorted(files, key=lambda path: suffixes.index(path.suffix.lower())):
+        by_stem.setdefault(path.stem.lower(), path)
+    return sorted(by_stem.values())
 
 
 def read_slocum(
@@ -110,7 +115,7 @@ def read_slocum(
     """
     files = slocum_files(place)
     listed = NEEDED + WANTED + (ENGINEERING if whole else ())
-    sensors, names, notes = read_sensors(files, cache, progress, listed)
+    sensors, files, names, notes = read_sensors(files, cache, progress, listed, NEEDED[:3])
     missing = [name for name in NEEDED if not len(sensors[name][0])]
     if missing:
         raise ConfigurationError(
@@ -142,7 +147,8 @@ def read_slocum(
         water = dict.fromkeys(WATER + CTD_TIMES, (np.empty(0), np.empty(0)))
         if beside:
             try:
-                water, _, unread = read_sensors(beside, cache, progress, WATER + CTD_TIMES)
+                found = read_sensors(beside, cache, progress, WATER + CTD_TIMES)
+                water, unread = found.sensors, found.notes
             except ConfigurationError as error:
                 unread = [f'no water: {error}']
             notes += unread
@@ -219,52 +225,171 @@ def _instruments(sensors: Sensors, declined: float, origin: np.ndarray) -> Instr
     )
 
 
+class Recorded(NamedTuple):
+    """What the files of one computer say."""
+
+    sensors: Sensors
+    files: list[Path]  #: that were read
+    begun: list[tuple[float, str]]  #: when each begins (s since 1970), and its name
+    notes: list[str]
+
+
+class DbdFile(NamedTuple):
+    """What one file says."""
+
+    path: Path
+    vehicle: str
+    #: Numbers in its name on board: year, day of the year, mission, segment.
+    written: tuple[int, ...]
+    #: Sensors that it lists, by name, whether or not they have values.
+    sensors: Sensors
+    is_cut: bool
+
+    @property
+    def time_s(self) -> np.ndarray:
+        """Times of all of its values (s since 1970)."""
+        return np.concatenate([np.empty(0), *(times for times, _ in self.sensors.values())])
+
+
 def read_sensors(
     files: list[Path],
     cache: Path | None,
     progress: Callable[[int, int], None],
     names: tuple[str, ...],
-) -> tuple[Sensors, list[tuple[float, str]], list[str]]:
-    """Sensors by name, when each file begins, and what is to be said of files left out.
+    needed: tuple[str, ...] = (),
+) -> Recorded:
+    """Sensors by name; one that was never recorded has no times.
 
-    A sensor that was never recorded has no times. Of the flight computer ``m_depth`` has to be
-    among the names: it says when a file begins.
+    A file without a sensor that is needed is left out, as is one that cannot be read, or is not of
+    the flight of the others.
+
+    Raises
+    ------
+    ConfigurationError
+        If that leaves none.
     """
-    with installed(f'{files[0]}: dbdreader, which reads the files of a Slocum'):
-        from dbdreader import DBD, DbdError
+    found, left_out = _read_files(files, cache, progress, names)
+    found.sort(key=lambda file: file.written)
+    parts = [Part(file.path.name, file.vehicle, file.time_s) for file in found]
+    left_out |= strangers(files[0].parent, parts)
+    for file in found:
+        missing = [name for name in needed if name not in file.sensors]
+        if missing and len(files) > 1:
+            left_out.setdefault(file.path.name, f'no {", ".join(missing)} in it')
+    found = [file for file in found if file.path.name not in left_out]
+    notes = said(left_out)
+    if not found:
+        raise ConfigurationError(f'{files[0].parent}: no file could be read; {"; ".join(notes)}')
+    cut = [file.path.name for file in found if file.is_cut]
+    if cut:
+        notes.append(f'read as far as it goes: {", ".join(cut)}: cut short')
+    for name in names:
+        lack = [file.path.name for file in found if name not in file.sensors]
+        if 0 < len(lack) < len(found):
+            notes.append(f'no {name} in {", ".join(lack)}')
+    begun = [
+        (float(file.sensors['m_depth'][0][0]), file.path.name)
+        for file in found
+        if 'm_depth' in file.sensors and len(file.sensors['m_depth'][0])
+    ]
+    sensors = {
+        name: _joined([file.sensors[name] for file in found if name in file.sensors])
+        for name in names
+    }
+    return Recorded(sensors, [file.path for file in found], sorted(begun), notes)
 
-    parts: dict[str, list] = {name: [] for name in names}
-    begun, unread = [], []
+
+def _read_files(
+    files: list[Path],
+    cache: Path | None,
+    progress: Callable[[int, int], None],
+    names: tuple[str, ...],
+) -> tuple[list[DbdFile], dict[str, str]]:
+    """The files that can be read, and why others cannot, by name."""
+    with installed(f'{files[0]}: dbdreader, which reads the files of a Slocum'):
+        from dbdreader import DbdError
+
+    found, left_out = [], {}
     with tempfile.TemporaryDirectory() as scratch:
         _gather_caches(files[0].parent, cache, Path(scratch))
         for number, path in enumerate(files):
             progress(number, len(files))
             if path.stat().st_size < SMALLEST_FILE:
-                unread.append(f'{path.name}: cannot be read: it has no whole header')
+                left_out[path.name] = 'it has no whole header'
                 continue
             try:
-                file = DBD(str(path), scratch)
-                known = [name for name in parts if file.has_parameter(name)]
-                read = dict(zip(known, file.get(*known), strict=True)) if len(known) > 1 else {}
+                found.append(_read_file(path, Path(scratch), names))
             except Exception as error:  # noqa: BLE001 - of a damaged file dbdreader says anything
                 lacking = getattr(getattr(error, 'data', None), 'missing_cache_files', None)
-                if lacking:
-                    raise ConfigurationError(
-                        f'{path}: its cache {"".join(lacking)}.cac is '
-                        f'neither beside it nor in a folder {" or ".join(CACHE_FOLDERS[:2])} '
-                        'there or above; give the folder that has it with --cache'
-                    ) from None
                 kind = '' if isinstance(error, DbdError) else f'{type(error).__name__}: '
-                unread.append(f'{path.name}: cannot be read: {kind}{error}')
-                continue
-            for name, pair in read.items():
-                parts[name].append(pair)
-            if 'm_depth' in read and len(read['m_depth'][0]):
-                begun.append((float(read['m_depth'][0][0]), path.name))
-    if len(unread) == len(files):
-        raise ConfigurationError(f'{files[0].parent}: no file could be read; {unread[0]}')
-    sensors = {name: _joined(pairs) for name, pairs in parts.items()}
-    return sensors, sorted(begun), unread
+                left_out[path.name] = f'cannot be read: {kind}{error}'
+                if lacking:
+                    left_out[path.name] = (
+                        f'its cache {"".join(lacking)}.cac is neither beside it nor in a folder '
+                        f'{" or ".join(CACHE_FOLDERS[:2])} there or above; give the folder that '
+                        'has it with --cache'
+                    )
+    return found, left_out
+
+
+def _read_file(path: Path, scratch: Path, names: tuple[str, ...]) -> DbdFile:
+    """Read a file, by the caches in a folder; what dbdreader raises."""
+    from dbdreader import DBD
+
+    plain, is_cut = path, False
+    if path.suffix.lower()[2] == 'c':
+        # dbdreader takes the whole process down with a compressed file that is damaged.
+        plain = scratch / 'plain.dbd'
+        is_cut = _decompress(path, plain)
+    dbd = DBD(str(plain), str(scratch))
+    known = [name for name in names if dbd.has_parameter(name)]
+    read = dbd.get(*known) if len(known) > 1 else [dbd.get(*known)] if known else []
+    written = WRITTEN.match(str(dbd.headerInfo.get('full_filename', '')))
+    return DbdFile(
+        path,
+        written[1] if written else '',
+        tuple(map(int, written.groups()[1:])) if written else (),
+        {name: _plausible(name, *pair) for name, pair in zip(known, read, strict=True)},
+        is_cut or _is_cut(plain.read_bytes(), dbd),
+    )
+
+
+def _is_cut(content: bytes, dbd) -> bool:
+    """Whether a file, opened, ends within a cycle or is damaged before its end."""
+    if content.endswith(LAST_TAG):
+        return False
+    sizes, at = np.array(dbd.byteSizes), dbd.fp_binary_start + FIRST_CYCLE
+    while at < len(content) and content[at : at + 1] == CYCLE_TAG:
+        states = np.frombuffer(content[at + 1 : at + 1 + dbd.n_state_bytes], np.uint8)
+        updated = np.unpackbits(states).reshape(-1, 2)[: len(sizes)] == (1, 0)
+        if len(updated) < len(sizes):
+            return True
+        at += 1 + dbd.n_state_bytes + int(sizes[updated.all(axis=1)].sum())
+    return at != len(content)
+
+
+def _decompress(path: Path, plain: Path) -> bool:
+    """Write a compressed file out as far as it is whole; whether it is cut."""
+    from dbdreader.decompress import Decompressor
+    from lz4.block import LZ4BlockError
+
+    with Decompressor(str(path)) as blocks, plain.open('wb') as file:
+        try:
+            for block in blocks.decompressed_blocks():
+                file.write(block)
+        except LZ4BlockError:
+            return True
+    return False
+
+
+def _plausible(name: str, time_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values of one sensor that a glider can have, with their times."""
+    good = np.isfinite(values) & (time_s > 0.0) & (time_s < LATEST_S)
+    lowest, highest = PLAUSIBLE.get(name, (-math.inf, math.inf))
+    good &= (values >= lowest) & (values <= highest)
+    if good.any():
+        good &= np.abs(time_s - np.median(time_s[good])) < LONGEST_FILE_S
+    return time_s[good], values[good]
 
 
 def _gather_caches(folder: Path, cache: Path | None, into: Path) -> None:
@@ -281,11 +406,10 @@ def _gather_caches(folder: Path, cache: Path | None, into: Path) -> None:
 
 
 def _joined(pairs: list) -> tuple[np.ndarray, np.ndarray]:
-    """Times and finite values of one sensor from all files, in the order of time."""
+    """Times and values of one sensor from all files, in the order of time."""
     times, values = np.concatenate([np.empty((2, 0)), *map(np.asarray, pairs)], axis=1)
-    good = np.isfinite(times) & np.isfinite(values) & (times > 0.0)
-    order = np.argsort(times[good], kind='stable')
-    return times[good][order], values[good][order]
+    order = np.argsort(times, kind='stable')
+    return times[order], values[order]
 
 
 def _places(sensors: Sensors, latitude: str, longitude: str) -> tuple[np.ndarray, np.ndarray]:

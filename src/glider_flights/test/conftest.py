@@ -12,7 +12,13 @@ import pytest
 _DBD_START_S = 1.6e9
 
 
-def _write_dbd(file: Path, table: dict[str, tuple[np.ndarray, np.ndarray]], cached: bool) -> None:
+def _write_dbd(
+    file: Path,
+    table: dict[str, tuple[np.ndarray, np.ndarray]],
+    cached: bool,
+    written: str = 'unit-2026-001-0-0',
+    cache_name: str = 'AB12CD34',
+) -> None:
     """Write a dbd file of 2020; its cache goes beside it, in capitals as some tools do."""
     names = ['m_present_time', *table]
     listed = ''.join(f's: T {n:4d} {n:4d} 8 {name} nodim\n' for n, name in enumerate(names))
@@ -23,21 +29,21 @@ def _write_dbd(file: Path, table: dict[str, tuple[np.ndarray, np.ndarray]], cach
         'num_ascii_tags': 14,
         'all_sensors': 'F',
         'the8x3_filename': '00010000',
-        'full_filename': 'unit-2026-001-0-0',
+        'full_filename': written,
         'filename_extension': 'dbd',
         'mission_name': 'test.mi',
         'fileopen_time': 'Sun_Sep_13_12:26:40_2020',
         'total_num_sensors': len(names),
         'sensors_per_cycle': len(names),
         'state_bytes_per_cycle': state_bytes,
-        'sensor_list_crc': 'AB12CD34',
+        'sensor_list_crc': cache_name,
         'sensor_list_factored': int(cached),
     }
     text = ''.join(f'{name}:    {value}\n' for name, value in header.items())
     if cached:
         cache = file.parent / 'cache'
         cache.mkdir(exist_ok=True)
-        (cache / 'AB12CD34.CAC').write_text(listed)
+        (cache / f'{cache_name}.CAC').write_text(listed)
     data = [(text if cached else text + listed).encode(), b'sa']
     data += [struct.pack('<Hfd', 0x1234, 123.456, 123456789.12345678), b'd']
     cycles: dict[float, dict[str, float]] = {_DBD_START_S - 1.0: {}}

@@ -4,6 +4,7 @@
 
 import json
 import math
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -237,7 +238,85 @@ def test_a_damaged_file_is_left_out_and_named(tmp_path, write_dbd):
     (tmp_path / '00020000.dbd').write_bytes(b'\0' * 1000)
     flight = read_flight(tmp_path, None, quiet)
     assert len(flight.segments) == 2
-    assert flight.notes[0].startswith('00020000.dbd: cannot be read')
+    assert flight.notes[0].startswith('left out: 00020000.dbd: cannot be read')
+
+
+def part(table: dict, begin_s: float, end_s: float, later_s: float = 0.0) -> dict:
+    """What sensors told in a time, with dates that are so much later."""
+    chosen = {}
+    for name, (time_s, values) in table.items():
+        inside = (time_s >= begin_s) & (time_s < end_s)
+        chosen[name] = (time_s[inside] + later_s, values[inside])
+    return chosen
+
+
+def test_each_bad_file_of_a_slocum_costs_what_it_holds_and_is_named(tmp_path, write_dbd):
+    pytest.importorskip('dbdreader')
+    dives, year_s = 12, 365 * 86_400.0
+    table = sensors(dives)
+    bad = {1: 'cut', 3: 'packed', 5: 'foreign', 6: 'no_cache', 7: 'empty', 8: 'late', 9: 'twice'}
+    bad[10] = 'no_pitch'
+    for number in range(dives + 1):
+        begin = START_S + 2600.0 * number
+        kind, vehicle, cache, later_s = bad.get(number, ''), 'unit', 'AB12CD34', 0.0
+        if kind == 'foreign':
+            vehicle = 'other'
+        elif kind == 'no_cache':
+            cache = 'LOST0000'
+        elif kind in ('late', 'twice'):
+            later_s = 3.0 * year_s if kind == 'late' else -5.0 * 2600.0 + 17.0
+        mine = part(table, begin, begin + 2600.0, later_s)
+        if kind == 'no_pitch':
+            del mine['m_pitch']
+        file = tmp_path / f'{number:04d}0000.dbd'
+        write_dbd(file, mine, kind != 'no_pitch', f'{vehicle}-2026-001-0-{number}', cache)
+        content = file.read_bytes()
+        if kind == 'cut':
+            file.write_bytes(content[: len(content) // 2 + 1])
+        elif kind == 'empty':
+            file.write_bytes(b'')
+        elif kind == 'packed':
+            file.unlink()
+            file.with_suffix('.dcd').write_bytes(packed(content)[: len(content) // 5])
+    (tmp_path / 'cache' / 'LOST0000.CAC').unlink()
+    flight = read_flight(tmp_path, None, quiet)
+    assert flight.segments
+    for row in navigated(flight):
+        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
+    whole = {number for number in range(dives) if number not in bad}
+    # A dive ends with the fixes in the file after it.
+    kept = {int(segment.name[:4]) for segment in flight.segments}
+    assert kept >= {number for number in whole if number + 1 in whole or number + 1 in (1, 3)}
+    for number in bad:
+        assert any(f'{number:04d}0000.d' in note for note in flight.notes), bad[number]
+    assert len(flight.files) == dives + 1 - 6
+
+
+def packed(content: bytes) -> bytes:
+    """A file as a Slocum compresses it: blocks with their length before them."""
+    from lz4.block import compress
+
+    blocks = [
+        compress(content[at : at + 8192], store_size=False) for at in range(0, len(content), 8192)
+    ]
+    return b''.join(struct.pack('>H', len(block)) + block for block in blocks)
+
+
+def test_a_damaged_compressed_file_does_not_end_the_program(tmp_path, write_dbd):
+    """Random bytes in it: what can be read is plausible, whatever dbdreader makes of it."""
+    pytest.importorskip('dbdreader')
+    file, generator = tmp_path / '00010000.dbd', np.random.default_rng(3)
+    table, edge_s = sensors(3), START_S + 2.0 * 2600.0 + 600.0
+    write_dbd(file, part(table, edge_s, math.inf), False, 'unit-2026-001-0-1')
+    content = packed(file.read_bytes())
+    write_dbd(file, part(table, 0.0, edge_s), False)
+    for _ in range(20):
+        at = int(generator.integers(2000, len(content) - 64))
+        damaged = content[:at] + generator.bytes(64) + content[at + 64 :]
+        (tmp_path / '00020000.dcd').write_bytes(damaged)
+        flight = read_flight(tmp_path, None, quiet)
+        assert len(flight.segments) >= 2
+        assert any('00020000.dcd' in note for note in flight.notes)
 
 
 def test_instruments_of_a_slocum_come_from_both_computers(tmp_path, write_dbd):
@@ -353,6 +432,105 @@ def test_what_a_dive_lacks_is_told(tmp_path):
     write_dive(file, 0, 1)
     write_dive(tmp_path / 'p1240001.nc', 0, 1)
     assert 'several vehicles, 123, 124' in told(str(tmp_path))
+
+
+def test_each_bad_dive_of_a_seaglider_costs_what_it_holds_and_is_named(tmp_path):
+    year = 365 * 86_400.0
+    for number in range(12):
+        write_dive(tmp_path / f'p123{number + 1:04d}.nc', number, 12)
+    write_dive(tmp_path / 'p1230003.nc', 2, 12, eng_head=None)
+    for name, size in (('p1230005.nc', 3000), ('p1230006.nc', 0)):
+        (tmp_path / name).write_bytes((tmp_path / name).read_bytes()[:size])
+    for number, by_s in ((8, 19.6 * year), (10, -3.0 * 2600.0)):
+        name = tmp_path / f'p123{number:04d}.nc'
+        with xarray.open_dataset(name, decode_times=False) as dataset:
+            dive = dataset.load()
+        for one in ('time', 'log_gps_time'):
+            dive[one] = dive[one] + by_s
+        dive.to_netcdf(name, engine='scipy')
+    (tmp_path / 'p1230012.nc').rename(tmp_path / 'p4560012.nc')
+    (tmp_path / '00010000.dbd').write_bytes(bytes(200))
+    flight = read_flight(tmp_path, None, quiet)
+    kept = {1, 2, 4, 7, 9, 11}
+    assert [segment.name for segment in flight.segments] == [f'p123{n:04d}.nc' for n in kept]
+    for row in navigated(flight)[:-1]:
+        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.02)
+    for name in (*(f'p123{n:04d}.nc' for n in (3, 5, 6, 8, 10)), 'p4560012.nc', '00010000.dbd'):
+        assert any(name in note for note in flight.notes), name
+
+
+# ---------------------------------------------------------------------- OG1
+
+
+def og1(dives: int) -> xarray.Dataset:
+    """A flight as OG1 has it: one time for samples and fixes, true north told."""
+    samples, fixes = made_up(dives)
+    latitude, longitude = degrees(fixes).T
+    nothing = np.full(len(fixes), math.nan)
+    table = {
+        'TIME': (samples[:, 0], fixes[:, 0]),
+        'DEPTH': (samples[:, 1], nothing),
+        'PITCH': (np.degrees(samples[:, 2]), nothing),
+        'HEADING': (np.degrees(samples[:, 3]), nothing),
+        'TIME_GPS': (samples[:, 0] * math.nan, fixes[:, 0]),
+        'LATITUDE_GPS': (samples[:, 0] * math.nan, latitude),
+        'LONGITUDE_GPS': (samples[:, 0] * math.nan, longitude),
+        'DAVG_CURR_NORTH': (np.full(len(samples), CURRENT[0] + 0.02), nothing),
+        'DAVG_CURR_EAST': (np.full(len(samples), CURRENT[1]), nothing),
+    }
+    order = np.argsort(np.concatenate(table['TIME']), kind='stable')
+    dataset = xarray.Dataset(
+        {name: ('N_MEASUREMENTS', np.concatenate(pair)[order]) for name, pair in table.items()}
+    )
+    dataset['TIME'].attrs['units'] = 'seconds since 1970-01-01T00:00:00Z'
+    dataset['MAGNETIC_VARIATION'] = 0.0
+    dataset['PLATFORM_SERIAL_NUMBER'] = 'unit_1'
+    return dataset
+
+
+def test_a_flight_in_og1_is_navigated(tmp_path):
+    og1(4).to_netcdf(tmp_path / 'unit_1_20200913T122640_R.nc', engine='scipy')
+    flight = read_flight(tmp_path, None, quiet)
+    rows = navigated(flight)
+    assert len(rows) == 4
+    for row in rows:
+        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
+    assert summary(flight, rows)['dac_difference_mps']['median'] == pytest.approx(0.02, abs=0.003)
+
+
+def test_magnetic_heading_of_og1_is_turned_by_the_field_of_the_earth(tmp_path):
+    """In 2020 the compass pointed 18 deg west of north off Newfoundland (IGRF-14)."""
+    pytest.importorskip('ppigrf')
+    dataset = og1(2).drop_vars('MAGNETIC_VARIATION')
+    dataset['HEADING'] = dataset['HEADING'] + 18.0
+    dataset.to_netcdf(tmp_path / 'unit.nc', engine='scipy')
+    flight = read_flight(tmp_path, None, quiet)
+    assert any('by IGRF' in note for note in flight.notes)
+    for row in navigated(flight):
+        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.02)
+
+
+def test_each_bad_file_in_og1_costs_what_it_holds_and_is_named(tmp_path):
+    whole, edges = og1(8), START_S + 2600.0 * np.arange(10)
+    for number in range(8):
+        time_s = whole['TIME'].values
+        inside = (time_s >= edges[number]) & (time_s < edges[number + 1] + 600.0)
+        mine = whole.isel(N_MEASUREMENTS=inside)
+        if number == 1:
+            mine = mine.drop_vars('PITCH')
+        elif number == 3:
+            mine['PLATFORM_SERIAL_NUMBER'] = 'unit_2'
+        elif number == 5:
+            mine = mine.assign({name: mine[name] + 1e9 for name in ('TIME', 'TIME_GPS')})
+        mine.to_netcdf(tmp_path / f'unit_{number}.nc', engine='scipy')
+    (tmp_path / 'unit_6.nc').write_bytes((tmp_path / 'unit_6.nc').read_bytes()[:500])
+    (tmp_path / 'unit_7.nc').write_bytes(b'')
+    flight = read_flight(tmp_path, None, quiet)
+    assert [segment.name for segment in flight.segments] == [f'unit_{n}.nc' for n in (0, 2, 4)]
+    for row in navigated(flight):
+        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.01)
+    for number in (1, 3, 5, 6, 7):
+        assert any(f'unit_{number}.nc' in note for note in flight.notes), number
 
 
 def test_missing_numbers_in_a_dive_do_not_spread(tmp_path):

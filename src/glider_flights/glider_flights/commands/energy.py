@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from glider_bringup.console import Cache, Json, Recording, counter, print_table
+from glider_bringup.console import Cache, Json, Recording, counter, output, print_table
 
 app = typer.Typer()
 #: What the parts of a flight are.
@@ -57,3 +57,5 @@ def energy(
         'predicted': f'{report["predicted_wh"]:,.2f} Wh, {report["error_percent"]:+.1f} %',
     }
     print_table(f'{report["vehicle"].capitalize()}, {report["files"]} files', (), rows.items())
+    for note in report['notes']:
+        output.print(note, soft_wrap=True)

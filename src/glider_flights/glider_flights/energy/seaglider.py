@@ -4,11 +4,13 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_flights.energy.uses import PUMP, Uses
+from glider_flights.folders import read_each, said
 from glider_flights.netcdf import refuse_missing
 from glider_flights.seaglider import read_variables, seaglider_files
 
@@ -33,34 +35,51 @@ MASSES = {'pitch': ('pitch_mass', 'log_PITCH_CNV'), 'roll': ('roll_mass', 'log_R
 
 def seaglider_uses(place: Path, progress: Callable[[int, int], None]) -> Uses:
     """Pumpings of all dives, by current, voltage and time of the motor."""
-    files = seaglider_files(place)
-    doings, joules, dives = [], [], []
-    moved = {field: np.zeros(2) for field, _ in MASSES.values()}
-    for number, path in enumerate(files):
-        progress(number, len(files))
-        found = read_variables(path, MOVES | _of_masses())
-        missing = [names for key, names in MOVES.items() if not len(found.get(key, ()))]
-        refuse_missing(path, missing, 'for the energy of a Seaglider')
-        rows = {key: len(found[key]) for key in MOVES if key != 'cc_per_count'}
-        if len(set(rows.values())) > 1:
-            told = ', '.join(f'{MOVES[key][0]} {count}' for key, count in rows.items())
-            raise ConfigurationError(f'{path}: {told} values (allowed: as many of each)')
-        counts = found['after_1'] + found['after_2'] - found['before_1'] - found['before_2']
-        pumped = 0.5 * counts * found['cc_per_count'][0]
-        energy = found['amps'] * found['volts'] * np.abs(found['seconds'])
-        ran = (pumped > PUMPED_CC) & (found['amps'] > PUMPING_A)
-        ran &= np.isfinite(energy * found['depth'])
-        doings.append(np.stack([pumped, pumped * found['depth']], axis=-1)[ran])
-        joules.append(energy[ran])
-        dives.append(np.full(int(ran.sum()), number))
-        for name, (field, _) in MASSES.items():
-            moved[field] += _moved(found, name)
-    if not sum(map(len, joules)):
-        raise ConfigurationError(f'{place}: no pumping in its {len(files)} files')
-    first_half = np.concatenate(dives) < len(files) // 2
-    masses = {field: float(took / way) for field, (took, way) in moved.items() if way > 0.0}
-    together = np.concatenate(doings), np.concatenate(joules)
-    return Uses('seaglider', len(files), tuple(PUMP), *together, first_half, masses)
+    dives, left_out = read_each(seaglider_files(place), progress, _pumpings)
+    if not sum(len(dive.joules) for dive in dives):
+        why = '; '.join(said(left_out))
+        raise ConfigurationError(f'{place}: no pumping in its {len(dives)} files; {why}')
+    number = np.repeat(np.arange(len(dives)), [len(dive.joules) for dive in dives])
+    moved = {field: sum(dive.moved[field] for dive in dives) for field, _ in MASSES.values()}
+    return Uses(
+        'seaglider',
+        len(dives),
+        tuple(PUMP),
+        np.concatenate([dive.doings for dive in dives]),
+        np.concatenate([dive.joules for dive in dives]),
+        number < len(dives) // 2,
+        {field: float(took / way) for field, (took, way) in moved.items() if way > 0.0},
+        said(left_out),
+    )
+
+
+class _Dive(NamedTuple):
+    """What its actuators did."""
+
+    doings: np.ndarray  #: shape (n, 2): cc pumped out, and times depth (m)
+    joules: np.ndarray  #: shape (n,)
+    moved: dict[str, np.ndarray]  #: energy (J) and way of the masses, by field of a vehicle file
+
+
+def _pumpings(path: Path) -> _Dive:
+    """Read a dive."""
+    found = read_variables(path, MOVES | _of_masses())
+    missing = [names for key, names in MOVES.items() if not len(found.get(key, ()))]
+    refuse_missing(path, missing, 'for the energy of a Seaglider')
+    rows = {key: len(found[key]) for key in MOVES if key != 'cc_per_count'}
+    if len(set(rows.values())) > 1:
+        told = ', '.join(f'{MOVES[key][0]} {count}' for key, count in rows.items())
+        raise ConfigurationError(f'{path}: {told} values (allowed: as many of each)')
+    counts = found['after_1'] + found['after_2'] - found['before_1'] - found['before_2']
+    pumped = 0.5 * counts * found['cc_per_count'][0]
+    energy = found['amps'] * found['volts'] * np.abs(found['seconds'])
+    ran = (pumped > PUMPED_CC) & (found['amps'] > PUMPING_A)
+    ran &= np.isfinite(energy * found['depth'])
+    return _Dive(
+        np.stack([pumped, pumped * found['depth']], axis=-1)[ran],
+        energy[ran],
+        {field: _moved(found, name) for name, (field, _) in MASSES.items()},
+    )
 
 
 def _of_masses() -> dict[str, tuple[str, ...]]:

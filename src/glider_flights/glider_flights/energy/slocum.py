@@ -32,8 +32,7 @@ SENSORS = ('m_depth', *CHARGE, *VOLTAGE, *OIL, CALL)
 
 def slocum_uses(place: Path, cache: Path | None, progress: Callable[[int, int], None]) -> Uses:
     """Half hours of what the counter of charge counted, times the voltage."""
-    files = slocum_files(place)
-    sensors, _, _ = read_sensors(files, cache, progress, SENSORS)
+    sensors, files, _, notes = read_sensors(slocum_files(place), cache, progress, SENSORS)
     (time_s, charge), (volts_s, volts), (oil_s, oil) = (
         _liveliest(place, sensors, names) for names in (CHARGE, VOLTAGE, OIL)
     )
@@ -65,7 +64,7 @@ def slocum_uses(place: Path, cache: Path | None, progress: Callable[[int, int], 
     starts = np.flatnonzero(np.diff(part, prepend=-1))
     summed = np.add.reduceat(doings, starts), np.add.reduceat(joules[known], starts)
     first_half = np.arange(len(starts)) < len(starts) // 2
-    return Uses('slocum', len(files), (*HOTEL, *PUMP), *summed, first_half, {})
+    return Uses('slocum', len(files), (*HOTEL, *PUMP), *summed, first_half, {}, notes)
 
 
 def _liveliest(place: Path, sensors: Sensors, names: tuple[str, ...]) -> tuple:

@@ -31,6 +31,7 @@ class Uses(NamedTuple):
     joules: np.ndarray  #: shape (n,)
     first_half: np.ndarray  #: bool, shape (n,)
     masses: dict[str, float]  #: what the moving masses took as they moved, where that is recorded
+    notes: list[str]  #: what a person should know of the files: a sentence each
 
 
 def fit(uses: Uses, chosen: np.ndarray) -> np.ndarray:
@@ -76,4 +77,5 @@ def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
         'predicted_wh': told / 3600.0,
         'error_percent': 100.0 * (told / recorded - 1.0),
         'measured': uses.masses,
+        'notes': uses.notes,
     }
