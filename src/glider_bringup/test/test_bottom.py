@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+import xarray
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -34,6 +35,49 @@ def test_a_vehicle_lies_where_it_touched_the_bottom(u, v, w, north, east, down, 
     np.testing.assert_allclose(over_ground, (0.0, 0.0, rose), atol=1e-9)
     assert after[:3] == (1.0, 2.0, 100.0)
     assert after[3:7] + after[10:] == before[3:7] + before[10:]
+
+
+#: Corners of the chart (deg): the shelf around the origin of the chart, and north of it.
+CHART = np.linspace(35.9, 36.3, 41), np.linspace(121.9, 122.1, 21)
+
+
+def mountains(path, seed, height_m=150.0):
+    """Chart as GEBCO writes it: a plain at 250 m, with four hills of a height or less."""
+    draw = np.random.default_rng(seed)
+    latitudes, longitudes = CHART
+    elevation = np.full((len(latitudes), len(longitudes)), -250.0)
+    for _ in range(4):
+        north, east = draw.uniform(36.01, 36.15), draw.uniform(121.97, 122.03)
+        away = np.hypot(latitudes[:, None] - north, 0.8 * (longitudes - east))
+        size = draw.uniform(0.012, 0.03)
+        elevation += draw.uniform(0.5, 1.0) * height_m * np.exp(-((away / size) ** 2))
+    data = xarray.Dataset(
+        {'elevation': (('lat', 'lon'), np.minimum(elevation, -60.0).round().astype(np.int16))},
+        {
+            'lat': ('lat', latitudes, {'standard_name': 'latitude', 'units': 'degrees_north'}),
+            'lon': ('lon', longitudes, {'standard_name': 'longitude', 'units': 'degrees_east'}),
+        },
+    )
+    data['elevation'].attrs = {'standard_name': 'height_above_mean_sea_level', 'units': 'm'}
+    data.to_netcdf(path, engine='h5netcdf')
+    return path
+
+
+def over_mountains(folder, seed, clearance_m=10.0):
+    """Score of a mission over random mountains."""
+    given = {
+        'bathymetry.file': str(mountains(folder / f'{seed}.nc', seed)),
+        'profile.clearance_m': clearance_m,
+    }
+    return glider_bringup.fly('slocum_shelf', given).score
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_dives_turn_above_mountains(seed, tmp_path):
+    told = over_mountains(tmp_path, seed)
+    assert told['status'] == 'completed', told['reason']
+    assert not told['bottom']['touched']
+    assert told['bottom']['least_height_m'] > 5.0
 
 
 def flown(**fields):

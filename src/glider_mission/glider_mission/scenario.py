@@ -34,6 +34,7 @@ from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.chart import charted, in_metres
 from glider_mission.rules import Rules
+from glider_model.ocean.bottom import BathymetrySettings
 from glider_model.ocean.current_settings import CurrentSettings, SumOfCurrents
 from glider_model.ocean.field import Mission
 from glider_model.ocean.water import WaterSettings
@@ -111,6 +112,9 @@ class Scenario(Settings):
     )
     water: WaterSettings = Field(
         WaterSettings(), description='density of the water, its bottom, and wind'
+    )
+    bathymetry: BathymetrySettings = Field(
+        BathymetrySettings(), description='chart of the bottom, instead of water.bottom_m'
     )
     current: CurrentSettings = Field(CurrentSettings(), description='current')
     sensors: SensorSettings = Field(SensorSettings(), description='errors of the sensors')
@@ -194,6 +198,7 @@ class Scenario(Settings):
         return PlantSettings(
             vehicle=self.vehicle,
             water=self.water,
+            bathymetry=self._bathymetry(),
             initial=self.initial,
             duration_s=self.duration_s,
             dives=0 if self._holds else self.dives,
@@ -234,6 +239,15 @@ class Scenario(Settings):
     def _resolved(self, current: SumOfCurrents) -> SumOfCurrents:
         """A current with what it has to know of the mission."""
         return current.resolved(self.path.course_rad(), self._mission() if current.field else None)
+
+    def _bathymetry(self) -> BathymetrySettings:
+        """Chart of the bottom, which knows where the mission is, if there is one."""
+        chart = self.bathymetry
+        return chart.resolved(self._mission()) if chart.file else chart
+
+    def bottom(self) -> NamedTuple:
+        """Kernel parameters of the bottom."""
+        return self.plant_settings().bottom()
 
     def _mission(self) -> Mission:
         """Where and when it is flown."""
@@ -525,7 +539,19 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
     navigation = scenario.navigation.model_copy(
         update={'forecast': currents['navigation.forecast']}
     )
-    return scenario.model_copy(update={'current': currents['current'], 'navigation': navigation})
+    bathymetry = scenario.bathymetry
+    if bathymetry.file:
+        try:
+            bathymetry = bathymetry.known()
+            scenario.bottom()
+        except ValueError as error:
+            raise ConfigurationError(f'bathymetry.{error}') from None
+    changed = {
+        'current': currents['current'],
+        'navigation': navigation,
+        'bathymetry': bathymetry,
+    }
+    return scenario.model_copy(update=changed)
 
 
 def load_scenario(

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import xarray
 
-from glider_base.frames import OriginSettings
+from glider_base.frames import OriginSettings, from_geodetic
+from glider_model.ocean.bottom import BathymetrySettings, bottom_depth
 from glider_model.ocean.current import current_initial, current_step
 from glider_model.ocean.current_settings import CurrentSettings
 from glider_model.ocean.field import Mission, field_velocity
@@ -251,3 +252,74 @@ def test_of_a_large_file_the_window_alone_is_read(tmp_path):
     params = grid(path, (36.0, 122.0), (37.0, 123.0), begin='2026-03-05', lasts_s=86400.0 * 3)
     assert params.water.nbytes < 20e6
     assert interpolate(1000.0, 50.0, 36.5, 122.5, params) == pytest.approx((0.25, 0.25))
+
+
+# ---------------------------------------------------------------------- bottom
+
+
+def chart(path, name, seed=0, sign=1.0, **attributes):
+    """File of a random bottom of some hundred metres."""
+    rng = np.random.default_rng(seed)
+    latitudes, longitudes = np.arange(35.0, 37.01, 0.05), np.arange(121.0, 123.01, 0.05)
+    depth = rng.uniform(100.0, 900.0, (len(latitudes), len(longitudes))).round()
+    coords = {
+        'lat': ('lat', latitudes, {'units': 'degrees_north'}),
+        'lon': ('lon', longitudes, {'units': 'degrees_east'}),
+    }
+    data = xarray.Dataset(
+        {name: (('lat', 'lon'), (sign * depth).astype(np.int16), attributes)}, coords
+    )
+    data.to_netcdf(path, engine='h5netcdf')
+    return data[name]
+
+
+@pytest.mark.parametrize(
+    ('name', 'sign', 'standard'),
+    [
+        ('elevation', -1.0, 'height_above_mean_sea_level'),
+        ('deptho', 1.0, 'sea_floor_depth_below_geoid'),
+        ('z', -1.0, None),
+    ],
+)
+def test_the_bottom_is_what_xarray_makes_of_a_chart(name, sign, standard, tmp_path):
+    told = {'standard_name': standard} if standard else {}
+    data = chart(tmp_path / 'chart.nc', name, sign=sign, units='m', **told)
+    flown = mission((35.5, 121.5), (36.5, 122.5))
+    settings = BathymetrySettings(file=str(tmp_path / 'chart.nc')).resolved(flown)
+    params = settings.params()
+    rng = np.random.default_rng(3)
+    latitudes, longitudes = rng.uniform(35.5, 36.5, 1000), rng.uniform(121.5, 122.5, 1000)
+    at = {'lat': ('p', latitudes), 'lon': ('p', longitudes)}
+    wanted = sign * data.interp(**at).values
+    north, east = from_geodetic_all(latitudes, longitudes, flown.origin)
+    found = [bottom_depth(n, e, params) for n, e in zip(north, east, strict=True)]
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-3)
+
+
+def from_geodetic_all(latitudes, longitudes, origin):
+    """Places on the chart of an origin (m)."""
+    places = [
+        from_geodetic(a, b, origin.params()) for a, b in zip(latitudes, longitudes, strict=True)
+    ]
+    return np.array(places).T
+
+
+@pytest.mark.parametrize(
+    ('place', 'attributes', 'text'),
+    [
+        ((30.0, 122.0), {'units': 'm'}, 'latitude of the path goes from 30.000'),
+        ((36.0, 122.0), {'units': 'fathoms'}, "elevation: units = 'fathoms'"),
+    ],
+)
+def test_a_chart_that_does_not_serve_is_refused_by_name(place, attributes, text, tmp_path):
+    chart(tmp_path / 'chart.nc', 'elevation', sign=-1.0, **attributes)
+    settings = BathymetrySettings(file=str(tmp_path / 'chart.nc')).resolved(mission(place))
+    with pytest.raises(ValueError, match=f'file .*chart.nc: .*{text}'):
+        settings.params()
+
+
+def test_a_path_over_land_is_refused(tmp_path):
+    chart(tmp_path / 'chart.nc', 'elevation', sign=1.0, units='m')
+    settings = BathymetrySettings(file=str(tmp_path / 'chart.nc')).resolved(mission((36.0, 122.0)))
+    with pytest.raises(ValueError, match=r'36.0000, 122.0000 on the path is land'):
+        settings.params()

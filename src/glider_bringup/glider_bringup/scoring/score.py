@@ -300,7 +300,7 @@ def make_scorer(scenario: Scenario) -> Scorer:
         vehicle=vehicle,
         readings=readings,
         course_rad=course_rad,
-        bottom=scenario.water.bottom(),
+        bottom=scenario.bottom(),
     )
 
 

@@ -2,12 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bottom of the sea: how deep it is at a place, and a vehicle that touches it."""
 
+import functools
 import math
+from pathlib import Path
 from typing import NamedTuple
 
-from glider_base.frames import rotate_to_body, rotate_to_ned
+import numpy as np
+
+from glider_base.frames import Origin, rotate_to_body, rotate_to_ned
 from glider_base.kernel import kernel, replace
 from glider_base.slot import slot
+from glider_model.ocean.field import Mission
+from glider_model.ocean.fields.grid import (
+    GridFileSettings,
+    bracket,
+    mission_window,
+    widened,
+)
+from glider_model.ocean.grid_file import LoadedBottom, load_bottom
+
+#: Chart around the path that is read too, as far as the file has it (m).
+MARGIN_M = 50_000.0
 
 
 class FlatBottom(NamedTuple):
@@ -29,6 +44,58 @@ def bottom_depth(n, e, params):
 @kernel
 def _flat_depth(n, e, params):
     return params.depth
+
+
+class ChartedBottom(NamedTuple):
+    """A bottom on a chart; its axes increase."""
+
+    latitudes: np.ndarray  #: float64[y] (deg)
+    longitudes: np.ndarray  #: float64[x] (deg), around the origin
+    depth: np.ndarray  #: float32[y, x] (m); 0: land
+    origin: Origin
+
+
+@bottom_depth.body(ChartedBottom)
+@kernel
+def _charted_depth(n, e, params):
+    """Linear between the points of the chart; beyond its edge that of the edge."""
+    origin = params.origin
+    y, y_next, f_y = bracket(origin.latitude + n / origin.north, params.latitudes)
+    x, x_next, f_x = bracket(origin.longitude + e / origin.east, params.longitudes)
+    south = (1.0 - f_x) * params.depth[y, x] + f_x * params.depth[y, x_next]
+    north = (1.0 - f_x) * params.depth[y_next, x] + f_x * params.depth[y_next, x_next]
+    return (1.0 - f_y) * south + f_y * north
+
+
+class BathymetrySettings(GridFileSettings):
+    """A chart of the bottom, from a file as GEBCO writes it."""
+
+    def params(self) -> ChartedBottom:
+        """Kernel parameters.
+
+        Raises
+        ------
+        ValueError
+            Naming the file, and what of it or of the mission is at fault.
+        """
+        return ChartedBottom(*_loaded(self.file, self.mission), self.mission.origin.params())
+
+
+@functools.lru_cache(maxsize=4)
+def _loaded(file: str, mission: Mission) -> LoadedBottom:
+    """What a mission needs of a chart."""
+    needed = mission_window(mission)
+    loaded = load_bottom(Path(file), widened(needed, MARGIN_M), needed)
+    chart = ChartedBottom(*loaded, mission.origin.params())
+    for latitude, longitude in mission.places:
+        away = (longitude - chart.origin.longitude + 180.0) % 360.0 - 180.0
+        north = (latitude - chart.origin.latitude) * chart.origin.north
+        if bottom_depth(north, away * chart.origin.east, chart) <= 0.0:
+            raise ValueError(
+                f'file {file}: {latitude:.4f}, {longitude:.4f} on the path is land (allowed: '
+                'water)'
+            )
+    return loaded
 
 
 @kernel

@@ -185,7 +185,9 @@ def _flat(dataset: 'xarray.Dataset') -> str:
     return ''
 
 
-def _find_axes(dataset: 'xarray.Dataset', name: str) -> dict[str, str]:
+def _find_axes(
+    dataset: 'xarray.Dataset', name: str, allowed: tuple[str, ...] = _AXES
+) -> dict[str, str]:
     """Dimension of a variable by axis.
 
     Raises
@@ -199,15 +201,15 @@ def _find_axes(dataset: 'xarray.Dataset', name: str) -> dict[str, str]:
         axis = '' if coordinate is None else _axis_of(dimension, coordinate)
         known = ' '.join((dimension, str(getattr(coordinate, 'attrs', {}).get('standard_name'))))
         other = next((text for word, text in _OTHER_GRIDS.items() if word in known.lower()), '')
-        if not axis or axis in found or other:
+        if axis not in allowed or axis in found or other:
             if not other and (flat := _flat(dataset)):
                 other = f'a curvilinear grid: {flat} has two dimensions'
             raise ValueError(
                 f'{name}: dimension {dimension} is no axis{f"; {other}" if other else ""} '
-                '(allowed: regular axes of time, depth, latitude and longitude)'
+                f'(allowed: regular axes of {", ".join(allowed)})'
             )
         found[axis] = dimension
-    missing = [axis for axis in _AXES if axis not in found and axis != 'depth']
+    missing = [axis for axis in allowed if axis not in found and axis != 'depth']
     if missing:
         raise ValueError(f'{name}: no axis of {missing[0]} (it has {", ".join(found.values())})')
     return found
@@ -354,17 +356,21 @@ def _read(layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes, whole: Axe
     for step, index in enumerate(chosen['time']):
         for side, component in (('north', 0), ('east', 1)):
             part = layout.dataset[layout.variables[side]].isel({layout.axes['time']: int(index)})
-            for axis in present:
-                runs = _runs(chosen[axis])
-                pieces = [part.isel({layout.axes[axis]: run}) for run in runs]
-                part = pieces[0] if len(pieces) == 1 else _joined(pieces, layout.axes[axis])
-            read = part.transpose(*(layout.axes[axis] for axis in present)).values
-            read = layout.scales[side] * np.asarray(read, dtype=float).reshape(shape[1:])
+            read = _cut(part, {axis: layout.axes[axis] for axis in present}, chosen)
+            read = layout.scales[side] * read.reshape(shape[1:])
             if step == 0:
                 land |= ~np.isfinite(read[0])
             filled += np.count_nonzero(~np.isfinite(read))
             water[step, ..., component] = _fill_land(read)
     return Loaded(axes, whole, water, land, filled / water.size)
+
+
+def _cut(part: 'xarray.DataArray', axes: dict[str, str], chosen: dict[str, np.ndarray]):
+    """Numbers of a variable where they are chosen along its axes, in the order of these."""
+    for axis, dimension in axes.items():
+        pieces = [part.isel({dimension: run}) for run in _runs(chosen[axis])]
+        part = pieces[0] if len(pieces) == 1 else _joined(pieces, dimension)
+    return np.asarray(part.transpose(*axes.values()).values, dtype=float)
 
 
 def _joined(pieces: list, dimension: str):
@@ -386,6 +392,92 @@ def _fill_land(levels: np.ndarray) -> np.ndarray:
             _, nearest = distance_transform_edt(dry, return_indices=True)
             values[:] = values[tuple(nearest)]
     return levels
+
+
+#: Bottoms by what they are called in CF, else by name, and whether they are heights.
+_BOTTOMS = {
+    'height_above_mean_sea_level': True,
+    'height_above_reference_ellipsoid': True,
+    'surface_altitude': True,
+    'sea_floor_depth_below_geoid': False,
+    'sea_floor_depth_below_mean_sea_level': False,
+    'sea_floor_depth_below_sea_surface': False,
+    'sea_floor_depth': False,
+    'elevation': True,
+    'z': True,
+    'deptho': False,
+    'bathymetry': False,
+}
+
+
+class LoadedBottom(NamedTuple):
+    """A window of a chart of the bottom."""
+
+    latitudes: np.ndarray  #: (deg), increasing
+    longitudes: np.ndarray  #: (deg), increasing, those nearest to the middle of the window
+    depth: np.ndarray  #: float32[latitude, longitude] (m); 0: land
+
+
+def load_bottom(path: Path, window: Window, needed: Window) -> LoadedBottom:
+    """Read a window of a chart of the bottom, as GEBCO and CMEMS (``deptho``) write them.
+
+    Parameters
+    ----------
+    path : Path
+    window : Window
+        That is read, as far as the file has it.
+    needed : Window
+        That the file has to cover.
+
+    Raises
+    ------
+    ValueError
+        Naming the file, and what is missing in it or what of the mission it does not cover.
+    """
+    try:
+        with _opened(path) as dataset:
+            name, scale = _bottom(dataset)
+            axes = _find_axes(dataset, name, ('latitude', 'longitude'))
+            values = {
+                axis: np.asarray(dataset.variables[one].values, float)
+                for axis, one in axes.items()
+            }
+            values['longitude'] = _unwrapped(
+                values['longitude'], 0.5 * (window.west + window.east)
+            )
+            whole = Axes(np.zeros(1), np.zeros(1), *(np.sort(values[a]) for a in _AXES[2:]))
+            refuse_uncovered(whole, needed, f'file {path}')
+            chosen = {
+                'latitude': _chosen(values['latitude'], window.south, window.north),
+                'longitude': _chosen(values['longitude'], window.west, window.east),
+            }
+            size = 4 * math.prod(map(len, chosen.values()))
+            if size > MAX_BYTES:
+                raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
+            depth = scale * _cut(dataset[name], {axis: axes[axis] for axis in chosen}, chosen)
+            depth = np.nan_to_num(np.maximum(depth, 0.0)).astype(np.float32)
+            return LoadedBottom(*(values[axis][chosen[axis]] for axis in chosen), depth)
+    except ValueError as error:
+        text = str(error)
+        raise ValueError(text if text.startswith('file ') else f'file {path}: {text}') from None
+
+
+def _bottom(dataset: 'xarray.Dataset') -> tuple[str, float]:
+    """Name of the variable of the bottom, and what makes a depth in m of it."""
+    named = {str(name): one.attrs.get('standard_name') for name, one in dataset.data_vars.items()}
+    found = [name for name, standard in named.items() if standard in _BOTTOMS]
+    found = found or [name for name in named if name.lower() in _BOTTOMS]
+    if len(found) != 1:
+        raise ValueError(
+            f'{len(found)} variables of the depth of the bottom (allowed: one of standard_name '
+            f'{", ".join(list(_BOTTOMS)[:7])}, or called {", ".join(list(_BOTTOMS)[7:])}; it has '
+            f'{", ".join(list(named)[:12]) or "none"})'
+        )
+    name, units = found[0], str(dataset[found[0]].attrs.get('units', 'm')).strip()
+    if units not in _LENGTHS:
+        raise ValueError(f'{name}: units = {units!r} (allowed: {", ".join(_LENGTHS)})')
+    is_height = _BOTTOMS[named[name] if named[name] in _BOTTOMS else name.lower()]
+    return name, -_LENGTHS[units] if is_height else _LENGTHS[units]
 
 
 class Contents(NamedTuple):

@@ -13,7 +13,7 @@ from glider_base.settings import Settings
 from glider_base.signals import TICK_S, Joints, Odometry, Vector, Water, not_finite
 from glider_base.slot import default, slot
 from glider_base.wiring import SENSORS
-from glider_model.ocean.bottom import aground, bottom_depth
+from glider_model.ocean.bottom import BathymetrySettings, aground, bottom_depth
 from glider_model.ocean.water import WaterSettings, with_wind
 from glider_model.plant.energy import FULL, Ledger, battery_of, spend
 from glider_model.plant.faults.body import acting, blown, felt, moved
@@ -134,6 +134,9 @@ class PlantSettings(Settings):
     water: WaterSettings = Field(
         WaterSettings(), description='density of the water, its bottom, and wind'
     )
+    bathymetry: BathymetrySettings = Field(
+        BathymetrySettings(), description='chart of the bottom, instead of a flat one'
+    )
     initial: InitialSettings = Field(InitialSettings(), description='state at the start')
     duration_s: float = Field(
         108000.0, ge=0.1, le=1e8, description='the run ends after this simulated time (s)'
@@ -189,8 +192,12 @@ class PlantSettings(Settings):
             fault_params(self.faults, self.seed),
             vehicle.energy.params() if vehicle.energy else NO_ENERGY,
             make_readings(real, self.seed),
-            self.water.bottom(),
+            self.bottom(),
         )
+
+    def bottom(self) -> NamedTuple:
+        """Kernel parameters of the bottom: on a chart, flat, or none."""
+        return self.bathymetry.params() if self.bathymetry.file else self.water.bottom()
 
     def initial_state(self) -> PlantState:
         """State at tick 0."""

@@ -18,6 +18,7 @@ from pydantic import Field
 
 from glider_base.frames import Origin, OriginSettings
 from glider_base.kernel import kernel
+from glider_base.settings import Settings
 from glider_model.ocean.field import FieldSettings, Mission, field_velocity
 from glider_model.ocean.grid_file import (
     Loaded,
@@ -31,10 +32,9 @@ from glider_model.ocean.grid_file import (
 MARGIN_M = 150_000.0
 
 
-class GridSettings(FieldSettings):
-    """The current of an ocean model, from a file."""
+class GridFileSettings(Settings):
+    """A file with a grid on the chart of a mission."""
 
-    kind: Literal['grid'] = 'grid'
     file: str = Field(
         '', max_length=4000, description='NetCDF file, relative to the folder of the scenario.'
     )
@@ -51,11 +51,11 @@ class GridSettings(FieldSettings):
         folder = (info.context or {}).get('folder')
         return str((Path(folder) / file).resolve()) if folder and file else file
 
-    def resolved(self, mission: Mission) -> 'GridSettings':
+    def resolved(self, mission: Mission) -> 'GridFileSettings':
         """Copy that knows where and when it is flown."""
         return self.model_copy(update={'mission': mission})
 
-    def known(self) -> 'GridSettings':
+    def known(self) -> 'GridFileSettings':
         """Copy with the fingerprint of its file.
 
         Raises
@@ -70,6 +70,12 @@ class GridSettings(FieldSettings):
                 f'allowed: {self.fingerprint}, or an empty one)'
             )
         return self.model_copy(update={'fingerprint': found})
+
+
+class GridSettings(GridFileSettings, FieldSettings):
+    """The current of an ocean model, from a file."""
+
+    kind: Literal['grid'] = 'grid'
 
     def params(self) -> 'GridParams':
         """Kernel parameters.
