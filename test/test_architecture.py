@@ -39,9 +39,9 @@ MAY_IMPORT = {
 FLOORS = {
     'glider_model': (('vehicle', 'ocean'), ('onboard', 'plant'), ('nodes',)),
     'glider_mission': (
-        ('blocks', 'chart', 'disk', 'rules'),
+        ('blocks', 'chart', 'disk', 'forecast', 'rules'),
         ('scenario',),
-        ('choices', 'planned', 'run_folder'),
+        ('choices', 'planned', 'routing', 'run_folder'),
         ('recording',),
     ),
     'glider_bringup': (

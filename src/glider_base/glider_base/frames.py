@@ -244,10 +244,12 @@ class OriginSettings(Settings):
     at 36 degrees 0.1 % for 9 km, 1 % for 88 km.
     """
 
-    latitude_deg: float = Field(36.0, ge=-85.0, le=85.0, description='latitude (deg, + north)')
-    longitude_deg: float = Field(122.0, ge=-180.0, le=180.0, description='longitude (deg, + east)')
+    latitude_deg: float = Field(36.0, ge=-85.0, le=85.0, description='Latitude (deg, + north).')
+    longitude_deg: float = Field(
+        122.0, ge=-180.0, le=180.0, description='Longitude (deg, + east).'
+    )
     time: str = Field(
-        '', description='time of the start (UTC, as 2026-03-01T06:00); where nothing asks: none'
+        '', description='Time of the start (UTC, as 2026-03-01T06:00), if anything asks for it.'
     )
 
     @field_validator('time')

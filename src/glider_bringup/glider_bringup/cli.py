@@ -48,7 +48,7 @@ _USAGE = {
 ORDER = (
     *('run', 'montecarlo', 'experiments', 'sweep', 'map', 'score', 'figure', 'report', 'compare'),
     *('export', 'replay', 'verify', 'recover', 'navigate', 'validate', 'energy'),
-    *('ocean', 'autopilot', 'trim', 'list'),
+    *('plan', 'ocean', 'autopilot', 'trim', 'list'),
 )
 #: What the ./glider script does by itself, and --help has to tell of: text and example.
 OF_THE_SCRIPT = {

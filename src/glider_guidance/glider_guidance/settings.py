@@ -116,6 +116,15 @@ class GuidanceLawSettings(_MethodGains):
         SteeringLearningSettings(), description='what the vehicle can follow, learnt'
     )
     gate: GateSettings = Field(GateSettings(), description='odometry that is refused')
+    route: Literal['straight', 'planned'] = Field(
+        'straight',
+        description='straight legs between waypoints, or a route through the forecast, which the '
+        'direct engine gives as orders',
+    )
+    replan: Literal['never', 'surfacing'] = Field(
+        'never',
+        description='a planned route is planned anew at surfacings, with what was observed',
+    )
 
     @pydantic.model_validator(mode='before')
     @classmethod

@@ -41,10 +41,15 @@ def make_run_folder(scenario: Scenario, out: Path | None) -> Path:
                 f'empty folder)'
             )
         write_whole(folder / VEHICLE_FILE, vehicle_file(scenario.vehicle))
-        write_whole(folder / SCENARIO_FILE, scenario.to_yaml(vehicle=VEHICLE_FILE))
+        write_scenario(scenario, folder)
     except OSError as error:
         raise ConfigurationError(f'{folder}: {error.strerror}') from None
     return folder
+
+
+def write_scenario(scenario: Scenario, folder: Path) -> None:
+    """Write the scenario of a run, with the vehicle that lies beside it."""
+    write_whole(folder / SCENARIO_FILE, scenario.to_yaml(vehicle=VEHICLE_FILE))
 
 
 def make_result_folder(folder: Path, result: str) -> None:

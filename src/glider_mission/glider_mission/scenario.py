@@ -5,6 +5,7 @@
 import json
 import math
 import shlex
+from collections.abc import Iterable
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -33,6 +34,7 @@ from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.chart import charted, in_metres
+from glider_mission.forecast import RouteForecast
 from glider_mission.rules import Rules
 from glider_model.ocean.bottom import BathymetrySettings
 from glider_model.ocean.current_settings import CurrentSettings, SumOfCurrents
@@ -128,6 +130,9 @@ class Scenario(Settings):
         PerturbSettings(), description='what the plant differs in from its vehicle file'
     )
     faults: list[Fault] = FAULTS
+    forecast: RouteForecast = Field(
+        RouteForecast(), description='what a planned route is planned by'
+    )
     path: PathSettings = Field(
         StraightPath(kind='straight', length_m=25000.0), description='path to follow'
     )
@@ -365,6 +370,12 @@ class Scenario(Settings):
             return math.inf
         profile = self.guidance_settings().params().profile
         return profile.depth / profile.glide_rate
+
+    def with_orders(self, orders: Iterable[Order]) -> 'Scenario':
+        """The same with orders that were given in flight: who flies it again plans no more."""
+        guidance = self.guidance.model_copy(update={'route': 'straight', 'replan': 'never'})
+        given = [*self.orders, *orders]
+        return self.model_copy(update={'orders': given, 'guidance': guidance})
 
     def to_yaml(self, vehicle: str = '') -> str:
         """The scenario as a file that loads to the same scenario.

@@ -11,6 +11,7 @@ import typer
 from glider_base.settings import ConfigurationError
 from glider_bringup.console import Json, messages, output, print_table
 from glider_bringup.showing.ocean import Sea, draw_sea, in_words, look, mission_in
+from glider_model.ocean.eddying_sea import EddyingSea, write_sea
 
 app = typer.Typer()
 
@@ -26,12 +27,23 @@ def ocean(
         Path | None,
         typer.Option(help='Image file: png, svg or pdf, of the currents, and of the mission.'),
     ] = None,
+    make: Annotated[
+        int | None,
+        typer.Option(
+            metavar='SEED', min=0, help='First make the file: a sea full of eddies, by this seed.'
+        ),
+    ] = None,
+    rms: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help='rms of what --make makes, at the top (m/s).')
+    ] = 0.18,
     as_json: Json = False,
 ) -> None:
     """Tell what is in a file of currents, whether it covers a mission, and draw it.
 
     Exit code 2: it is no grid of currents, or does not cover the mission.
     """
+    if make is not None:
+        _make(file, make, rms)
     with messages.status('reading'):
         told, sea, refused = _told(file, mission)
         if out and sea:
@@ -45,6 +57,13 @@ def ocean(
         raise ConfigurationError(refused)
     if out and not as_json:
         output.print(f'drawn: {out}', soft_wrap=True)
+
+
+def _make(file: Path, seed: int, rms_mps: float) -> None:
+    """Make a sea full of eddies, in the layout of CMEMS."""
+    if file.exists():
+        raise ConfigurationError(f'{file}: is there already (allowed: a new file)')
+    write_sea(EddyingSea(seed=seed, rms_mps=rms_mps), file)
 
 
 def _told(file: Path, mission: str | None) -> tuple[dict[str, Any], Sea | None, str]:

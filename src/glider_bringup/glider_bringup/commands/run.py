@@ -199,7 +199,7 @@ def _fly(
     from glider_bringup.scoring.score import make_scorer, scores_of
     from glider_bringup.scoring.traces import make_tracer
     from glider_mission.planned import planned_ticks
-    from glider_mission.run_folder import make_run_folder
+    from glider_mission.run_folder import make_run_folder, write_scenario
 
     if bag or engine == 'nodes':  # else nothing of ROS is needed
         from glider_bringup.engines.recorded import fly_nodes, fly_recorded
@@ -221,6 +221,9 @@ def _fly(
             flight = fly_recorded(scenario, folder, takers, flying, sync)
         else:
             flight = fly(scenario, takers, flying)
+    if flight.orders:
+        scenario = scenario.with_orders(flight.orders)
+        write_scenario(scenario, folder)
     card = scorecard(scenario, engine, flight, scores_of(scenario, scorer))
     has_room = True
     try:

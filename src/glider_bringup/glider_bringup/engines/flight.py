@@ -35,6 +35,7 @@ from glider_guidance.orders import (
 from glider_guidance.settings import GuidanceSettings
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.disk import VANISHED, DiskError
+from glider_mission.routing.pilot import LOOK_TICKS, Pilot
 from glider_mission.scenario import Scenario
 
 _STAGE = COLUMNS['stage']
@@ -51,6 +52,7 @@ class Outcome(NamedTuple):
     wall_time_s: float | None  #: None if nobody measured it
     messages_recorded: int = 0
     messages_lost: int = 0
+    orders: tuple[Order, ...] = ()  #: that were given by who planned the route
 
 
 class Taker(Protocol):
@@ -191,6 +193,35 @@ def refuse_message_faults(scenario: Scenario) -> None:
         )
 
 
+def refuse_planned_route(scenario: Scenario) -> None:
+    """Refuse a scenario whose route is planned in flight."""
+    if scenario.guidance.route == 'planned':
+        raise ConfigurationError(
+            "guidance.route = 'planned': not over nodes, nor with a bag (fly it with --engine "
+            'direct: the scenario of its run folder has the route as orders, and flies so by '
+            'either engine)'
+        )
+
+
+def _piloted(held: Held, pilot: Pilot) -> Callable[[np.ndarray], tuple[int, bool]]:
+    """Fill a log as `Held.fly` does, by the orders of a pilot too."""
+    last: np.ndarray | None = None
+
+    def advance(log: np.ndarray) -> tuple[int, bool]:
+        nonlocal last
+        filled, is_over = 0, False
+        while filled < len(log) and not is_over:
+            if held.tick % LOOK_TICKS == 0 and (order := pilot.order(held.tick, last)):
+                held.order(order)
+            ticks = LOOK_TICKS - held.tick % LOOK_TICKS
+            rows, is_over = held.fly(log[filled : filled + ticks])
+            filled += rows
+            last = log[filled - 1].copy()
+        return filled, is_over
+
+    return advance
+
+
 def fly(
     scenario: Scenario,
     takers: Iterable[Taker] = (),
@@ -221,10 +252,12 @@ def fly(
     status, reason, ticks = 'completed', '', 0
     with interrupts_noted() as interrupts:
         state, params = mission or mission_of(scenario)
+        pilot = Pilot(scenario) if scenario.guidance.route == 'planned' else None
         start = time.perf_counter()
         try:
-            held = Held(scenario, (state, params)) if scenario.orders else None
-            for log in blocks_of(held.fly) if held else fly_blocks(state, params):
+            held = Held(scenario, (state, params)) if scenario.orders or pilot else None
+            advance = _piloted(held, pilot) if held and pilot else held and held.fly
+            for log in blocks_of(advance) if advance else fly_blocks(state, params):
                 for taker in takers:
                     taker.add(log)
                 ticks += len(log)
@@ -235,4 +268,5 @@ def fly(
                     break
         except (NotFiniteError, DiskError) as error:
             status, reason = ended(False, str(error)), str(error)
-    return Outcome(status, reason, time.perf_counter() - start)
+    orders = tuple(pilot.orders) if pilot else ()
+    return Outcome(status, reason, time.perf_counter() - start, orders=orders)

@@ -9,7 +9,14 @@ from glider_base.errors import EXIT_USAGE
 from glider_base.ros.places import NAMESPACE
 from glider_base.ros.wire.topics import recorded_topics
 from glider_base.settings import ConfigurationError
-from glider_bringup.engines.flight import Outcome, Progress, Taker, ended, fly
+from glider_bringup.engines.flight import (
+    Outcome,
+    Progress,
+    Taker,
+    ended,
+    fly,
+    refuse_planned_route,
+)
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import Layout, node_commands, run_nodes
 from glider_mission.disk import DiskError, vanished
@@ -36,6 +43,7 @@ def fly_recorded(
     sync: Sync = 'end',
 ) -> Outcome:
     """Fly with the direct engine, as `fly` does, and write the bag of the run."""
+    refuse_planned_route(scenario)
     attachments = [folder / SCENARIO_FILE, folder / VEHICLE_FILE]
     topics = scenario.topics
     recorded = recorded_topics(topics)
@@ -88,6 +96,7 @@ def fly_nodes(
         Which nodes share a process: 'together' all but the recorder, 'autopilot' those on board,
         'processes' none.
     """
+    refuse_planned_route(scenario)
     attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)
     as_flown = scenario.model_copy(update={'vehicle': str((folder / VEHICLE_FILE).resolve())})
     parameters = node_parameters(

@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from glider_base.settings import ConfigurationError
-from glider_bringup.showing.figure import ORANGE, new_figure
+from glider_bringup.showing.figure import GREEN, ORANGE, new_figure
 from glider_mission.chart import place_told
 from glider_mission.disk import save_figure
+from glider_mission.routing.plan import Plan
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.grid_file import Axes, Loaded, Window, contents, load, told_time
 
@@ -156,6 +157,45 @@ def draw_sea(sea: Sea, file: Path) -> None:
     axis.set(title=f'{sea.title}, {depths}', xlabel='longitude (deg)', ylabel='latitude (deg)')
     axis.set_facecolor('#c9c2b8')
     axis.set_aspect(1.0 / math.cos(math.radians(float(np.mean(axes.latitudes)))))
+    save_figure(figure, file, 150)
+
+
+def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
+    """Draw a plan: the current at the start, fronts of each leg every 12 h, route and path.
+
+    Raises
+    ------
+    ConfigurationError
+        If the image cannot be written.
+    """
+    chart, origin = made.chart, scenario.origin.params()
+    longitudes = origin.longitude + chart.easts / origin.east
+    latitudes = origin.latitude + chart.norths / origin.north
+    north, east = np.moveaxis(chart.current[0], -1, 0)
+    figure = new_figure(8.0, 6.5)
+    axis = figure.add_subplot()
+    drawn = axis.pcolormesh(longitudes, latitudes, np.hypot(north, east), cmap='Blues')
+    figure.colorbar(drawn, label='depth-averaged current at the start (m/s)')
+    rows, columns = (slice(None, None, -(-len(one) // _ARROWS)) for one in (latitudes, longitudes))
+    places = longitudes[columns], latitudes[rows]
+    axis.quiver(*places, east[rows, columns], north[rows, columns], width=0.002)
+    for arrivals in made.route.fronts:
+        reached = np.ma.masked_invalid(arrivals / 3600.0)
+        if reached.count():
+            levels = np.arange(0.0, float(reached.max()) + 12.0, 12.0)
+            axis.contour(longitudes, latitudes, reached, levels, colors='#666666', linewidths=0.5)
+    _draw_path(axis, scenario)
+    corners = made.route.corners
+    axis.plot(
+        origin.longitude + corners[:, 1] / origin.east,
+        origin.latitude + corners[:, 0] / origin.north,
+        color=GREEN,
+        label='planned route',
+    )
+    axis.legend(loc='upper right', fontsize='small')
+    title = f'{scenario.name}: fronts every 12 h of each leg'
+    axis.set(title=title, xlabel='longitude (deg)', ylabel='latitude (deg)')
+    axis.set_aspect(1.0 / math.cos(math.radians(origin.latitude)))
     save_figure(figure, file, 150)
 
 

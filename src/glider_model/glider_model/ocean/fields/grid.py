@@ -77,6 +77,19 @@ class GridSettings(GridFileSettings, FieldSettings):
 
     kind: Literal['grid'] = 'grid'
 
+    def land_at(self, norths: np.ndarray, easts: np.ndarray) -> np.ndarray:
+        """Where there is land, by the nearest points of the grid, bool[n, m]."""
+        loaded, _ = _loaded(self.file, self.mission)
+        origin = self.mission.origin.params()
+        nearest = [
+            np.abs(axis[None, :] - (one / scale + zero)[:, None]).argmin(axis=1)
+            for axis, one, scale, zero in (
+                (loaded.axes.latitudes, norths, origin.north, origin.latitude),
+                (loaded.axes.longitudes, easts, origin.east, origin.longitude),
+            )
+        ]
+        return loaded.land[np.ix_(*nearest)]
+
     def params(self) -> 'GridParams':
         """Kernel parameters.
 

@@ -1,0 +1,103 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider plan``: whether a mission gets there, when, and by what route."""
+
+import json
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from glider_base.frames import to_geodetic
+from glider_bringup.console import Changes, Json, Named, changed_fields, counter, print_table
+from glider_bringup.showing.words import span
+from glider_mission.chart import place_told
+from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
+
+app = typer.Typer()
+
+
+@app.command(epilog='Example: ./glider plan eddies_10d --out plan.png')
+def plan(
+    scenario: Named = DEFAULT_SCENARIO,
+    changes: Changes = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help='Image file: png, svg or pdf, of route and fronts on the current.'),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Plan a mission by its forecast: fronts of earliest arrival, against straight legs.
+
+    Exit code 0, whether it gets there or not.
+    """
+    from glider_mission.routing.plan import MEMBERS
+    from glider_mission.routing.plan import plan as make_plan
+
+    planned = load_scenario(scenario, changed_fields(changes))
+    with counter('planning', MEMBERS + 1) as update:
+        made = make_plan(planned, update)
+    if out:
+        from glider_bringup.showing.ocean import draw_plan
+
+        draw_plan(made, planned, out)
+    told = _told(made, planned)
+    if as_json:
+        print(json.dumps(told, allow_nan=False))
+    else:
+        print_table(f'{planned.name}: {planned.described}', (), _rows(told))
+
+
+def _hours(seconds: float) -> float | None:
+    """Hours of a time; None of what never comes."""
+    return seconds / 3600.0 if math.isfinite(seconds) else None
+
+
+def _told(made: Any, scenario: Scenario) -> dict[str, Any]:
+    """What a plan says, for machines."""
+    origin = scenario.origin.params()
+    corners = [to_geodetic(*map(float, corner), origin) for corner in made.route.corners]
+    return {
+        'scenario': scenario.name,
+        'changed': scenario.changed,
+        'reachable': made.reachable,
+        'arrival_h': {f'p{p}': _hours(made.arrival_s(float(p))) for p in (10, 50, 90)},
+        'waypoints_h': [_hours(one) for one in made.route.passed_s],
+        'straight_h': _hours(made.straight_s),
+        'mission_h': scenario.duration_s / 3600.0,
+        'wh': made.wh,
+        'surfacings': _surfacings(made),
+        'speed_mps': made.pace.speed,
+        'route_latlon': [list(one) for one in corners],
+    }
+
+
+def _surfacings(made: Any) -> int | None:
+    """How often it comes up on its way; None of one that does not get there."""
+    time_s = made.arrival_s(50.0)
+    return math.ceil(time_s / made.pace.cycle_s) if math.isfinite(time_s) else None
+
+
+def _rows(told: dict[str, Any]) -> list[tuple[str, str]]:
+    """The same for a person."""
+
+    def when(hours: float | None) -> str:
+        return 'not in its time' if hours is None else span(3600.0 * hours)
+
+    arrival = told['arrival_h']
+    bands = f'{when(arrival["p50"])} (p10 {when(arrival["p10"])}, p90 {when(arrival["p90"])})'
+    reach = 'yes' if told['reachable'] else f'not in {span(3600.0 * told["mission_h"])}'
+    rows = [
+        ('reachable', reach),
+        ('arrival, planned', bands),
+        ('arrival, straight legs', when(told['straight_h'])),
+        ('energy', '-' if told['wh'] is None else f'{told["wh"]:.0f} Wh'),
+        ('surfacings', '-' if told['surfacings'] is None else str(told['surfacings'])),
+        ('through the water', f'{told["speed_mps"]:.3f} m/s, stays at the surface included'),
+    ]
+    rows += [
+        (f'corner {number}' if number else 'start', place_told(*place))
+        for number, place in enumerate(told['route_latlon'])
+    ]
+    return rows

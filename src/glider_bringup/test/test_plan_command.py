@@ -1,0 +1,67 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""``./glider plan``, and flights on a planned route: orders that are kept and flown again."""
+
+import json
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from glider_base.settings import ConfigurationError
+from glider_bringup.commands.plan import plan
+from glider_bringup.engines.flight import fly
+from glider_bringup.engines.recorded import fly_recorded
+from glider_mission.run_folder import make_run_folder, write_scenario
+from glider_mission.scenario import load_scenario
+
+#: Two dives on a route that is planned anew between them.
+SHORT = {'dives': 2}
+
+
+class Rows:
+    """Keeps the rows of a flight."""
+
+    def __init__(self) -> None:
+        self.blocks = []
+
+    def add(self, log: np.ndarray) -> None:
+        self.blocks.append(log.copy())
+
+
+def test_a_plan_in_json_and_as_a_picture(tmp_path, capsys):
+    picture = tmp_path / 'plan.png'
+    plan('eddies_hard', out=picture, as_json=True)
+    told = json.loads(capsys.readouterr().out)
+    assert told['reachable'] is True
+    assert told['straight_h'] is None
+    assert 150.0 < told['arrival_h']['p50'] < told['mission_h'] == 336.0
+    assert 100.0 < told['wh'] < 600.0
+    np.testing.assert_allclose(told['route_latlon'][0], [36.0, 122.0], atol=1e-6)
+    np.testing.assert_allclose(told['route_latlon'][-1], [36.0, 121.7], atol=1e-6)
+    assert len(told['waypoints_h']) == 5
+    assert sorted(told['waypoints_h']) == told['waypoints_h']
+    assert matplotlib.image.imread(picture).std() > 0.05
+
+
+def test_a_planned_flight_has_its_route_as_orders_and_flies_so_to_the_same_bits(tmp_path):
+    scenario, first, again = load_scenario('eddies_hard', SHORT), Rows(), Rows()
+    flight = fly(scenario, [first])
+    assert flight.status == 'completed'
+    assert flight.orders[0].at_s == 0.0
+    assert len(flight.orders) > 1
+    assert all(order.path.at_end == 'stop' for order in flight.orders)
+    folder = make_run_folder(scenario, tmp_path / 'run')
+    write_scenario(scenario.with_orders(flight.orders), folder)
+    kept = load_scenario(str(folder / 'scenario.yaml'))
+    assert kept.guidance.route == 'straight'
+    assert not fly(kept, [again]).orders
+    one, other = (np.concatenate(rows.blocks) for rows in (first, again))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_a_route_that_is_planned_in_flight_is_not_recorded(tmp_path):
+    scenario = load_scenario('eddies_hard', SHORT)
+    folder = make_run_folder(scenario, tmp_path / 'run')
+    with pytest.raises(ConfigurationError, match=r"guidance.route = 'planned': not over nodes"):
+        fly_recorded(scenario, folder)

@@ -1,0 +1,157 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Charts of depth-averaged current: of a forecast, with errors, and with what was observed."""
+
+import math
+
+import numpy as np
+
+from glider_base.kernel import kernel
+from glider_base.noise import random_stream
+from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_S
+from glider_mission.routing.fronts import Chart, current_on
+from glider_mission.scenario import Scenario
+from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
+from glider_model.ocean.current_settings import CurrentSettings
+from glider_model.ocean.fields.grid import GridSettings
+
+#: Step of the lattice (m) at least, of time (s), levels of a mean over depth, margin (m).
+STEP_M, STEP_S, _LEVELS, MARGIN_M = 3000.0, 3.0 * 3600.0, 10, 60_000.0
+#: Points along either side of a chart at most.
+_MOST = 160
+#: Errors of a forecast last about so long (s); what is left of one that was observed (m/s).
+_ERROR_S, OBSERVED_STD = 4.0 * 86_400.0, 0.02
+
+
+@kernel
+def _depth_means(params, nothing, times, norths, easts, depths, found):
+    """Fill ``found`` with means of the current over depths."""
+    for t in range(len(times)):
+        for i in range(len(norths)):
+            for j in range(len(easts)):
+                v_n, v_e = 0.0, 0.0
+                for depth in depths:
+                    place = (norths[i], easts[j], depth)
+                    _, water = current_step_in_place(nothing, place, times[t], params, TICK_S)
+                    v_n += water.v_n
+                    v_e += water.v_e
+                found[t, i, j, 0] = v_n / len(depths)
+                found[t, i, j, 1] = v_e / len(depths)
+
+
+def _lattice(scenario: Scenario, params: CurrentParams) -> tuple[np.ndarray, np.ndarray]:
+    """North and east of the points of a chart around a mission (m), within its grid if any."""
+    corners = scenario.path.points(0)[:, :2]
+    start = (scenario.initial.north_m, scenario.initial.east_m)
+    places = np.vstack((corners, start))
+    low, high = places.min(axis=0) - MARGIN_M, places.max(axis=0) + MARGIN_M
+    field, origin = params.field, scenario.origin.params()
+    if hasattr(field, 'latitudes'):
+        edges = field.latitudes[[0, -1]] - origin.latitude, field.longitudes[[0, -1]]
+        north, east = edges[0] * origin.north, (edges[1] - origin.longitude) * origin.east
+        low = np.maximum(low, (north[0], east[0]))
+        high = np.minimum(high, (north[1], east[1]))
+    step = max(STEP_M, float((high - low).max()) / _MOST)
+    return tuple(np.arange(a, b + 1e-6, step) for a, b in zip(low, high, strict=True))
+
+
+def forecast_of(scenario: Scenario) -> tuple[Chart, np.ndarray]:
+    """What a route is planned by, and where there is land on it, bool[n, m].
+
+    Raises
+    ------
+    ConfigurationError
+        If the file of the forecast cannot be read, or does not cover the mission.
+    """
+    told, current = scenario.forecast, scenario.current
+    if told.file:
+        current = CurrentSettings(field=GridSettings(file=told.file))
+    steady = [one for one in current.components if one.kind != 'gauss_markov']
+    settings = scenario._resolved(current.model_copy(update={'components': steady}))
+    try:
+        params = settings.params(0)
+    except ValueError as error:
+        raise ConfigurationError(f'forecast: {error}') from None
+    norths, easts = _lattice(scenario, params)
+    times = np.arange(0.0, scenario.duration_s + STEP_S, STEP_S)
+    depths = (np.arange(_LEVELS) + 0.5) * scenario.profile.depth_m / _LEVELS
+    means = np.empty((len(times), len(norths), len(easts), 2), dtype=np.float32)
+    nothing = CurrentState(0, np.zeros(0))
+    late_s = 3600.0 * told.late_h
+    _depth_means(params, nothing, times - late_s, norths, easts, depths, means)
+    chart = Chart(times, norths, easts, means)
+    land = np.zeros(means.shape[1:3], dtype=bool)
+    if isinstance(settings.field, GridSettings):
+        land = settings.field.land_at(norths, easts)
+    if told.error_mps > 0.0:
+        chart = erroneous(chart, told.error_mps, told.error_km, scenario.seed, 0)
+    return chart, land
+
+
+def erroneous(chart: Chart, error_mps: float, error_km: float, seed: int, member: int) -> Chart:
+    """A chart with a random error of its own: eddies that are not there.
+
+    Parameters
+    ----------
+    chart : Chart
+    error_mps : float
+        Its rms, of each part (m/s).
+    error_km : float
+        Its correlation length (km).
+    seed, member : int
+        Which error.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    rng = np.random.default_rng(int(random_stream(seed, member, 0)))
+    step = chart.norths[1] - chart.norths[0]
+    widths = _ERROR_S / STEP_S, *(2 * (1e3 * error_km / step,))
+    beyond = [math.ceil(2.0 * width) for width in widths]
+    shape = [len(one) + 2 * more for one, more in zip(chart[:3], beyond, strict=True)]
+    stream = gaussian_filter(rng.standard_normal(shape), widths, mode='wrap', truncate=3.0)
+    inside = tuple(slice(more, -more) for more in beyond)
+    east, north = -np.gradient(stream, axis=1)[inside], np.gradient(stream, axis=2)[inside]
+    scale = error_mps / math.sqrt(0.5 * float(np.mean(east**2 + north**2)))
+    error = scale * np.stack((north, east), axis=-1)
+    return chart._replace(current=(chart.current + error).astype(np.float32))
+
+
+def observed(chart: Chart, seen: np.ndarray, error_mps: float, error_km: float) -> Chart:
+    """A chart corrected by what was observed: optimal interpolation (Gandin 1963).
+
+    Parameters
+    ----------
+    chart : Chart
+    seen : float64[n, 5]
+        Time (s), north, east (m), and the depth-averaged current there, north and east (m/s).
+    error_mps, error_km : float
+        How far the chart is off, and over what distance alike.
+    """
+    if not len(seen) or error_mps <= 0.0:
+        return chart
+    length, (times, norths, easts, _) = 1e3 * error_km, chart
+    told = np.array([current_on(chart, *one) for one in seen[:, :3]])
+    off = seen[:, 3:] - told
+
+    def alike(t: np.ndarray, n: np.ndarray, e: np.ndarray) -> np.ndarray:
+        away = (n[..., None] - seen[:, 1]) ** 2 + (e[..., None] - seen[:, 2]) ** 2
+        since = np.abs(t[..., None] - seen[:, 0]) / _ERROR_S
+        return error_mps**2 * np.exp(-away / (2.0 * length**2) - since)
+
+    covariance = alike(*seen[:, :3].T) + OBSERVED_STD**2 * np.eye(len(seen))
+    weights = np.linalg.solve(covariance, off)
+    n, e = np.meshgrid(norths, easts, indexing='ij')
+    current = chart.current.copy()
+    for k, t_s in enumerate(times):
+        current[k] += alike(np.full_like(n, t_s), n, e) @ weights
+    return chart._replace(current=current)
+
+
+def with_land(chart: Chart, land: np.ndarray) -> Chart:
+    """A chart over whose land nothing sails: not a number is no current to sail in."""
+    if not land.any():
+        return chart
+    current = chart.current.copy()
+    current[:, land] = np.nan
+    return chart._replace(current=current)

@@ -1,0 +1,136 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Who plans a route before the flight and, if asked to, anew at every surfacing.
+
+A pilot knows the forecast and what the vehicle tells at the surface: its place by fixes, and the
+mean current of the dive segment before. What was observed corrects the forecast. Where a planned
+route gains too little to be worth the errors of the forecast, straight legs are flown.
+"""
+
+import math
+
+import numpy as np
+
+from glider_base.signals import TICK_S
+from glider_guidance.order import Order
+from glider_guidance.orders import is_surfaced
+from glider_guidance.path.settings import WaypointPath
+from glider_mission.blocks import COLUMNS
+from glider_mission.routing.forecast_chart import forecast_of, observed, with_land
+from glider_mission.routing.plan import pace_of, route_through, sailed_s, waypoints_of
+from glider_mission.scenario import Scenario
+
+#: The pilot looks so often (ticks).
+LOOK_TICKS = 600
+#: At the surface a place is known after this time, or half of the stay if that is shorter (s).
+_LISTEN_S = 180.0
+#: A waypoint is passed from this near on (m); from this near on to the last one nothing changes.
+_PASSED_M, _LAST_M = 2000.0, 8000.0
+#: A planned route has to be faster than straight legs by this share, and by this much more for an
+#: error of the forecast as large as the speed of the vehicle.
+LEAST_GAIN, GAIN_BY_ERROR = 0.03, 0.25
+#: Routes may take so long (s), whatever time the mission has.
+_HORIZON_S = 60.0 * 86_400.0
+#: Corners of a route are farther apart than this (m).
+_APART_M = 200.0
+
+_ODOM, _BELIEVED, _STAGE = COLUMNS['odom'].start, COLUMNS['believed_current'], COLUMNS['stage']
+
+
+class Pilot:
+    """Gives the orders of a mission whose route is planned.
+
+    Parameters
+    ----------
+    scenario : Scenario
+
+    Raises
+    ------
+    ConfigurationError
+        If its forecast cannot be read, or does not cover the mission.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario, self._speed = scenario, pace_of(scenario).speed
+        self._chart, self._land = forecast_of(scenario)
+        self._waypoints, self._next = waypoints_of(scenario), 1
+        self._replans = scenario.guidance.replan == 'surfacing'
+        self._listen_s = min(_LISTEN_S, 0.5 * scenario.profile.wait_s)
+        self._seen: list[tuple[float, ...]] = []
+        self._last: tuple[float, np.ndarray] = (0.0, self._waypoints[0])
+        self._up_s = 0.0  #: time for which it has been at the surface
+        self._was_told, self._is_straight = True, True
+        self.orders: list[Order] = []  #: that it gave
+
+    def order(self, tick: int, row: np.ndarray | None) -> Order | None:
+        """What the vehicle is told at a tick, if anything.
+
+        Parameters
+        ----------
+        tick : int
+            A multiple of `LOOK_TICKS`.
+        row : float64[ROW] or None
+            Log row of the tick before; None: it begins.
+        """
+        t_s = round(tick * TICK_S, 1)
+        if row is None:
+            return self._told(t_s, self._waypoints[0])
+        if not self._replans:
+            return None
+        if not is_surfaced(int(row[_STAGE])):
+            self._up_s, self._was_told = 0.0, False
+            return None
+        self._up_s += LOOK_TICKS * TICK_S
+        if self._was_told or self._up_s < self._listen_s:
+            return None
+        self._was_told = True
+        place = np.array([row[_ODOM + 1], row[_ODOM]])
+        self._look(t_s, place, row[_BELIEVED])
+        if math.dist(place, self._waypoints[-1]) < _LAST_M:
+            return None
+        return self._told(t_s, place)
+
+    def _look(self, t_s: float, place: np.ndarray, believed: np.ndarray) -> None:
+        """Note the current of the dive segment, and which waypoints were passed in it."""
+        before_s, before = self._last
+        self._last = t_s, place
+        east, north = float(believed[0]), float(believed[1])
+        if before_s > 0.0 and math.isfinite(east) and math.isfinite(north) and (east or north):
+            self._seen.append((0.5 * (t_s + before_s), *(0.5 * (place + before)), north, east))
+        way = place - before
+        while self._next < len(self._waypoints) - 1:
+            goal = self._waypoints[self._next]
+            share = np.clip((goal - before) @ way / max(1.0, way @ way), 0.0, 1.0)
+            if math.dist(before + share * way, goal) > _PASSED_M:
+                return
+            self._next += 1
+
+    def _told(self, t_s: float, place: np.ndarray) -> Order | None:
+        """Order to follow the best route from a place; None where it follows that already."""
+        told = self._scenario.forecast
+        seen = np.array(self._seen).reshape(-1, 5)
+        chart = observed(self._chart, seen, told.error_mps, told.error_km)
+        left = np.vstack((place, self._waypoints[self._next :]))
+        end_s = t_s + _HORIZON_S
+        route = route_through(with_land(chart, self._land), left, t_s, self._speed, end_s)
+        planned_s, straight_s = (
+            sailed_s(chart, corners, t_s, self._speed, end_s) for corners in (route.corners, left)
+        )
+        gain = LEAST_GAIN + GAIN_BY_ERROR * told.error_mps / self._speed
+        is_worth_it = route.arrives and not planned_s - t_s > (1.0 - gain) * (straight_s - t_s)
+        if not is_worth_it and self._is_straight:
+            return None
+        self._is_straight = not is_worth_it
+        corners = route.corners if is_worth_it else left
+        apart = np.hypot(*np.diff(corners, axis=0).T) > _APART_M
+        corners = corners[[True, *apart]]
+        if len(corners) < 2:
+            return None
+        path = WaypointPath(
+            kind='waypoints',
+            waypoints=[tuple(map(float, corner)) for corner in corners],
+            at_end=self._scenario.path.at_end,
+        )
+        order = Order(at_s=t_s, path=path)
+        self.orders.append(order)
+        return order

@@ -1,0 +1,211 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a mission will take: whether it gets there, when, by what route and with what energy."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from glider_base.signals import TICK_S
+from glider_guidance.guidance import GuidanceParams
+from glider_mission.routing.forecast_chart import erroneous, forecast_of, with_land
+from glider_mission.routing.fronts import STENCIL, Chart, fronts, sail
+from glider_mission.scenario import Scenario
+from glider_model.ocean.density import immersed
+from glider_model.vehicle.file import load_vehicle
+
+#: A route is straightened where that moves it by less than this (m).
+_STRAIGHT_M = 1000.0
+#: Errors of a forecast that are tried.
+MEMBERS = 12
+#: Levels of a climb at which its pumping is counted.
+_PUMP_LEVELS = 21
+
+
+class Pace(NamedTuple):
+    """How a vehicle gets on, by its glide polar and its profile."""
+
+    speed: float  #: through the water, horizontally, stays at the surface included (m/s)
+    cycle_s: float  #: from one stay at the surface to the next (s)
+    cycle_wh: float | None  #: that it takes; None where the battery is not known
+
+
+class Route(NamedTuple):
+    """A route through waypoints, and when it is at each of them."""
+
+    corners: np.ndarray  #: float64[n, 2], north and east (m), the start among them
+    passed_s: list[float]  #: arrival at each waypoint (s); those that are not reached are missing
+    fronts: list[np.ndarray]  #: arrivals on the chart, float64[n, m], one for each waypoint
+
+    @property
+    def arrives(self) -> bool:
+        """Whether all waypoints are reached in the time."""
+        return len(self.passed_s) == len(self.fronts)
+
+
+class Plan(NamedTuple):
+    """What a mission will take."""
+
+    route: Route
+    arrivals_s: np.ndarray  #: float64[members], along the route; infinite: not in the time
+    straight_s: float  #: along straight legs, by the forecast; infinite: not in the time
+    pace: Pace
+    chart: Chart
+
+    @property
+    def reachable(self) -> bool:
+        """Whether it gets there in the time, by the forecast."""
+        return self.route.arrives
+
+    def arrival_s(self, percent: float) -> float:
+        """Arrival (s) that so many of the errors that were tried keep; infinite: not in time."""
+        return float(np.sort(self.arrivals_s)[round(percent / 100.0 * (len(self.arrivals_s) - 1))])
+
+    @property
+    def wh(self) -> float | None:
+        """Energy until the arrival, of half of the errors; None where nobody knows."""
+        time_s = self.arrival_s(50.0)
+        if self.pace.cycle_wh is None or not math.isfinite(time_s):
+            return None
+        return self.pace.cycle_wh * time_s / self.pace.cycle_s
+
+
+def pace_of(scenario: Scenario) -> Pace:
+    """How the vehicle of a mission gets on."""
+    params = scenario.guidance_settings().params()
+    profile = params.profile
+    dives = max(1, profile.surface_every)
+    stay_s = (
+        (profile.wait_ticks + profile.prepare_ticks) * TICK_S if profile.surface_every else 0.0
+    )
+    deep = profile.depth - (0.0 if dives == 1 else profile.top_depth)
+    glide_s = 2.0 * dives * deep / profile.glide_rate
+    cycle_s = glide_s + 2.0 * dives * profile.lead_s + stay_s
+    speed = params.profile_speed * glide_s / cycle_s
+    return Pace(speed, cycle_s, _cycle_wh(scenario, params, glide_s, cycle_s - glide_s, dives))
+
+
+def _cycle_wh(
+    scenario: Scenario, params: GuidanceParams, glide_s: float, other_s: float, dives: int
+) -> float | None:
+    """Energy (Wh) from one stay at the surface to the next: pump, electronics and a call."""
+    vehicle, profile = load_vehicle(scenario.vehicle), params.profile
+    if vehicle.energy is None:
+        return None
+    told, water, body = vehicle.energy.params(), scenario.water.params(), vehicle.params()
+
+    def heaviness(depth: float, net: float) -> float:
+        """What the pump makes of it (kg) for a net weight (kg) in the water of a depth (m)."""
+        empty = immersed(depth, 0.0, body, water)
+        return (net - empty.net) / empty.ratio
+
+    levels = np.linspace(profile.depth, 0.0, _PUMP_LEVELS)
+    rising = [heaviness(float(z), -profile.climb_net_heaviness) for z in levels]
+    steps = [heaviness(profile.depth, profile.net_heaviness), *rising, -body.m_b_max]
+    out = np.maximum(0.0, -np.diff(steps))
+    at = np.array([profile.depth, *(0.5 * (levels[1:] + levels[:-1])), 0.0])
+    costs = np.maximum(0.0, told.out + told.out_per_m * at)
+    turns = dives * out[:-1] @ costs[:-1] + out[-1] * costs[-1]
+    let_in = (dives * out[:-1].sum() + out[-1]) * max(0.0, told.let_in)
+    hotel = 0.5 * (told.dive + told.climb) * glide_s + told.surface * other_s
+    call = told.call_start + told.call * told.call_s
+    return float(turns + let_in + hotel + call) / 3600.0
+
+
+def route_through(
+    chart: Chart, waypoints: np.ndarray, t_s: float, speed: float, end_s: float
+) -> Route:
+    """Fastest way from the first of some places to the others, one after the other.
+
+    Parameters
+    ----------
+    chart : Chart
+    waypoints : float64[n, 2]
+        North and east (m); the first is where it starts.
+    t_s, speed, end_s : float
+        Start (s), speed through the water (m/s), and the end of the time (s).
+
+    Returns
+    -------
+    Route
+        Straight on from where it does not get on any more.
+    """
+    corners, passed, found = [waypoints[0]], [], []
+    columns = len(chart.easts)
+    for place, goal in zip(waypoints, waypoints[1:], strict=False):
+        arrivals, before, goal_s, last = fronts(
+            chart, t_s, *map(float, place), *map(float, goal), speed, end_s, STENCIL
+        )
+        found.append(arrivals)
+        if not math.isfinite(goal_s):
+            break
+        points, point = [], last
+        while point >= 0:
+            points.append((chart.norths[point // columns], chart.easts[point % columns]))
+            point = before[point]
+        corners += straightened(np.array([place, *points[::-1], goal]))[1:]
+        passed.append(goal_s)
+        t_s = goal_s
+    done = len(passed) + 1
+    missing = [np.empty((0, 0))] * (len(waypoints) - 1 - len(found))
+    return Route(np.array([*corners, *waypoints[done:]]), passed, [*found, *missing])
+
+
+def straightened(points: np.ndarray) -> list[np.ndarray]:
+    """Fewer corners, none farther than `_STRAIGHT_M` off (Douglas and Peucker 1973)."""
+    first, last = points[0], points[-1]
+    if len(points) < 3:
+        return [first, last]
+    chord = last - first
+    length = max(1e-9, float(np.hypot(*chord)))
+    away = points - first
+    off = np.abs(away[:, 0] * chord[1] - away[:, 1] * chord[0]) / length
+    farthest = int(off.argmax())
+    if off[farthest] < _STRAIGHT_M:
+        return [first, last]
+    return straightened(points[: farthest + 1])[:-1] + straightened(points[farthest:])
+
+
+def sailed_s(chart: Chart, route: np.ndarray, t_s: float, speed: float, end_s: float) -> float:
+    """Arrival (s) of a vehicle that follows a route; infinite: not in the time."""
+    return sail(chart, t_s, np.ascontiguousarray(route), speed, end_s, np.empty((0, 2)))
+
+
+def waypoints_of(scenario: Scenario) -> np.ndarray:
+    """Where a mission starts, and the corners of its path after that (m), float64[n, 2]."""
+    corners = scenario.path.points(0)[:, :2]
+    start = np.array([scenario.initial.north_m, scenario.initial.east_m])
+    is_there = np.hypot(*(corners[0] - start)) < _STRAIGHT_M
+    return np.vstack((start, corners[1:] if is_there else corners))
+
+
+def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None) -> Plan:
+    """Plan a mission by its forecast.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    progress : callable, optional
+        Called with how many of `MEMBERS` + 1 steps are done.
+
+    Raises
+    ------
+    ConfigurationError
+        If its forecast cannot be read.
+    """
+    chart, land = forecast_of(scenario)
+    pace, end_s = pace_of(scenario), scenario.duration_s
+    waypoints = waypoints_of(scenario)
+    route = route_through(with_land(chart, land), waypoints, 0.0, pace.speed, end_s)
+    progress(1)
+    told, arrivals = scenario.forecast, []
+    for member in range(MEMBERS if told.error_mps > 0.0 else 1):
+        sea = chart
+        if told.error_mps > 0.0:
+            sea = erroneous(chart, told.error_mps, told.error_km, scenario.seed, member + 1)
+        arrivals.append(sailed_s(sea, route.corners, 0.0, pace.speed, end_s))
+        progress(member + 2)
+    straight_s = sailed_s(chart, waypoints, 0.0, pace.speed, end_s)
+    return Plan(route, np.array(arrivals), straight_s, pace, chart)

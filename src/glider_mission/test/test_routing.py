@@ -1,0 +1,235 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Routes: fronts against closed forms, plans of the shipped seas, and what a pilot orders."""
+
+import math
+
+import numpy as np
+import pytest
+
+from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.routing import pilot as piloting
+from glider_mission.routing.forecast_chart import erroneous, forecast_of, observed, with_land
+from glider_mission.routing.fronts import (
+    STENCIL,
+    Chart,
+    current_on,
+    fronts,
+    line_arrival,
+    made_good,
+)
+from glider_mission.routing.pilot import LOOK_TICKS, Pilot
+from glider_mission.routing.plan import (
+    pace_of,
+    plan,
+    route_through,
+    sailed_s,
+    straightened,
+    waypoints_of,
+)
+from glider_mission.scenario import SCENARIO_FOLDER, load_scenario
+from glider_model.ocean.eddying_sea import EddyingSea, currents, write_sea
+from glider_model.ocean.grid_file import load
+
+END_S = 1e9
+SPEED = 0.3
+
+
+def chart_of(current, side_m=150_000.0, points=101, times=(0.0,)):
+    """Chart of a current by place, a function of north and east (m)."""
+    axis = np.linspace(-side_m, side_m, points)
+    north, east = np.meshgrid(axis, axis, indexing='ij')
+    field = np.stack(np.broadcast_arrays(*current(north, east)), axis=-1).astype(np.float32)
+    return Chart(np.array(times), axis, axis, np.stack([field] * len(times)))
+
+
+@pytest.fixture(scope='module')
+def hard():
+    """The shipped mission among strong eddies, and its chart."""
+    scenario = load_scenario('eddies_hard')
+    return scenario, *forecast_of(scenario)
+
+
+def test_fronts_in_a_uniform_current_are_circles_that_drift():
+    """Half as fast as the vehicle: never too early, 0.3 % late on average, 1.5 % at most."""
+    chart = chart_of(lambda n, e: (0.09 + 0.0 * n, -0.12 + 0.0 * e))
+    arrivals, _, goal_s, _ = fronts(chart, 0.0, 0.0, 0.0, 1e7, 1e7, SPEED, END_S, STENCIL)
+    assert goal_s == math.inf
+    north, east = np.meshgrid(chart.norths, chart.easts, indexing='ij')
+    far = np.maximum(np.hypot(north, east), 1e-9)
+    exact = np.vectorize(made_good)(0.09, -0.12, north / far, east / far, SPEED)
+    off = (arrivals / (far / exact) - 1.0)[far > 15_000.0]
+    assert off.min() > -1e-6
+    assert off.mean() < 3e-3
+    assert off.max() < 15e-3
+
+
+def test_the_fastest_way_in_a_sheared_current_is_that_of_zermelo():
+    """From (3.66, -1.86) to 0 in u = -V y / h: heading from 105 to 240 deg (Bryson and Ho)."""
+    first, last = math.radians(105.0), math.radians(240.0)
+    length = 30_000.0
+
+    def sec(a):
+        return 1.0 / math.cos(a)
+
+    y = sec(first) - sec(last)
+    tangents = math.tan(last) + sec(last), math.tan(first) + sec(first)
+    x = -0.5 * (
+        sec(last) * (math.tan(last) - math.tan(first))
+        - math.tan(first) * (sec(last) - sec(first))
+        + math.log(tangents[0] / tangents[1])
+    )
+    exact_s = abs(math.tan(first) - math.tan(last)) * length / SPEED
+    chart = chart_of(lambda n, e: (0.0 * n, -SPEED * n / length), 6.0 * length, 241)
+    _, _, found_s, _ = fronts(chart, 0.0, y * length, x * length, 0.0, 0.0, SPEED, END_S, STENCIL)
+    assert found_s == pytest.approx(exact_s, rel=6e-3)
+    assert found_s > exact_s * (1.0 - 2e-3)
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_no_straight_line_is_faster_than_the_fronts_say(seed):
+    """And who sails the route in the same sea arrives as they say."""
+    rng = np.random.default_rng(seed)
+    still = chart_of(lambda n, e: (0.0 * n, 0.0 * e), 90_000.0, 61, np.arange(60) * 10_800.0)
+    chart = erroneous(still, 0.12, 35.0, seed, 0)
+    start, goal = rng.uniform(-60_000.0, 60_000.0, (2, 2))
+    route = route_through(chart, np.array([start, goal]), 0.0, SPEED, END_S)
+    straight_s = line_arrival(chart, 0.0, *start, *goal, SPEED)
+    assert route.passed_s[0] <= straight_s * (1.0 + 1e-9)
+    assert sailed_s(chart, route.corners, 0.0, SPEED, END_S) == pytest.approx(
+        route.passed_s[0], rel=0.06
+    )
+
+
+def test_nothing_sails_over_land():
+    """An island across the way: the route leads around it, a closed bay is not left."""
+    chart = chart_of(lambda n, e: (0.0 * n, 0.0 * e), 60_000.0, 41)
+    north, east = np.meshgrid(chart.norths, chart.easts, indexing='ij')
+    island = with_land(chart, (abs(east) < 3500.0) & (north < 40_000.0))
+    ends = np.array([[0.0, -30_000.0], [0.0, 30_000.0]])
+    route = route_through(island, ends, 0.0, SPEED, END_S)
+    assert route.corners[:, 0].max() > 40_000.0
+    assert route.passed_s[0] > 2.0 * math.hypot(30_000.0, 40_000.0) / SPEED
+    wall = with_land(chart, abs(east) < 3500.0)
+    assert not route_through(wall, ends, 0.0, SPEED, END_S).arrives
+
+
+def test_a_straightened_route_stays_near_and_keeps_its_ends():
+    way = np.array([[0.0, 0.0], [100.0, 3000.0], [-100.0, 6000.0], [9000.0, 9000.0]])
+    found = np.array(straightened(way))
+    np.testing.assert_array_equal(found, way[[0, 2, 3]])
+
+
+def test_an_error_has_the_size_that_was_asked_for_and_loses_no_water():
+    still = chart_of(lambda n, e: (0.0 * n, 0.0 * e), 200_000.0, 101, np.arange(8) * 10_800.0)
+    one, other = (erroneous(still, 0.15, 40.0, 3, member).current for member in (1, 2))
+    assert math.sqrt(0.5 * np.mean(one**2) * 2.0) == pytest.approx(0.15, rel=1e-3)
+    assert abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) < 0.4
+    north = np.gradient(one[0, ..., 0], axis=0) + np.gradient(one[0, ..., 1], axis=1)
+    assert np.abs(north[2:-2, 2:-2]).max() < 0.15 * 0.02
+
+
+def test_what_was_observed_corrects_the_forecast_where_it_was():
+    chart = chart_of(lambda n, e: (0.1 + 0.0 * n, 0.0 * e), times=(0.0, 86_400.0))
+    seen = np.array([[0.0, 10_000.0, 0.0, -0.1, 0.05]])
+    found = observed(chart, seen, 0.15, 40.0)
+    np.testing.assert_allclose(current_on(found, *seen[0, :3]), seen[0, 3:], atol=0.006)
+    np.testing.assert_allclose(current_on(found, 0.0, -150_000.0, 0.0), (0.1, 0.0), atol=1e-3)
+    assert observed(chart, seen, 0.0, 40.0) is chart
+
+
+def test_straight_legs_do_for_gentle_eddies_and_not_for_strong_ones():
+    gentle, hard = (plan(load_scenario(f'eddies_{name}')) for name in ('10d', 'hard'))
+    assert gentle.reachable
+    assert hard.reachable
+    assert gentle.straight_s < 10.0 * 86_400.0
+    assert hard.straight_s == math.inf
+    assert gentle.arrival_s(50.0) < 1.01 * gentle.straight_s
+    assert 100.0 < gentle.wh < 500.0
+
+
+def test_errors_of_the_forecast_widen_what_a_plan_says():
+    sure = plan(load_scenario('eddies_10d'))
+    unsure = plan(load_scenario('eddies_10d', {'forecast.error_mps': 0.05}))
+    assert sure.arrival_s(10.0) == sure.arrival_s(90.0)
+    assert unsure.arrival_s(10.0) < unsure.arrival_s(50.0) < unsure.arrival_s(90.0)
+
+
+def test_a_mission_that_is_too_short_is_not_reachable():
+    made = plan(load_scenario('eddies_hard', {'duration_s': 4e5}))
+    assert not made.reachable
+    assert made.arrival_s(50.0) == math.inf
+    assert made.wh is None
+
+
+def row_at(place, stage, believed=(0.0, 0.0)):
+    """Log row of a vehicle at a place."""
+    row = np.zeros(ROW)
+    row[COLUMNS['odom'].start], row[COLUMNS['odom'].start + 1] = place[1], place[0]
+    row[COLUMNS['stage']] = stage
+    row[COLUMNS['believed_current']][:2] = believed[::-1]
+    return row
+
+
+def test_a_pilot_plans_at_the_start_and_at_each_surfacing_once(hard):
+    scenario, chart, _ = hard
+    pilot = Pilot(scenario)
+    first = pilot.order(0, None)
+    start, end = waypoints_of(scenario)[[0, -1]]
+    np.testing.assert_allclose(first.path.waypoints[0][:2], start)
+    np.testing.assert_allclose(first.path.waypoints[-1][:2], end)
+    place, given = start + 4000.0, []
+    for stage, looks in ((1, 3), (5, 8), (1, 3), (5, 8)):
+        for _ in range(looks):
+            tick = LOOK_TICKS * (len(given) + 1)
+            given.append(pilot.order(tick, row_at(place, stage, (0.1, 0.0))))
+    told = [number for number, order in enumerate(given) if order]
+    assert told == [5, 16]
+    assert pilot.orders == [first, *(given[number] for number in told)]
+    np.testing.assert_allclose(given[5].path.waypoints[0][:2], place)
+
+
+def test_a_pilot_who_shall_not_replan_or_is_nearly_there_says_nothing(hard):
+    scenario, *_ = hard
+    end = waypoints_of(scenario)[-1]
+    for replan, place in (('never', (0.0, 0.0)), ('surfacing', end + 3000.0)):
+        pilot = Pilot(load_scenario('eddies_hard', {'guidance.replan': replan}))
+        pilot.order(0, None)
+        stages = [1, *(8 * [5])]
+        told = [pilot.order(LOOK_TICKS * k, row_at(place, s)) for k, s in enumerate(stages, 1)]
+        assert told == [None] * len(stages)
+
+
+def test_straight_legs_are_flown_where_a_plan_gains_little(monkeypatch):
+    monkeypatch.setattr(piloting, 'LEAST_GAIN', 0.5)
+    assert Pilot(load_scenario('eddies_10d', {'guidance.route': 'planned'})).order(0, None) is None
+
+
+def test_the_pace_is_that_of_the_polar_less_the_stays():
+    scenario = load_scenario('eddies_10d')
+    params = scenario.guidance_settings().params()
+    pace, longer = pace_of(scenario), pace_of(load_scenario('eddies_10d', {'profile.wait_s': 6e3}))
+    assert 0.9 * params.profile_speed < pace.speed < params.profile_speed
+    assert longer.cycle_s == pytest.approx(pace.cycle_s + 5400.0)
+    assert longer.speed * longer.cycle_s == pytest.approx(pace.speed * pace.cycle_s)
+
+
+@pytest.mark.parametrize(('name', 'seed', 'rms'), [('10d', 3, 0.18), ('hard', 8, 0.42)])
+def test_the_shipped_seas_are_what_the_command_makes(name, seed, rms, tmp_path):
+    write_sea(EddyingSea(seed=seed, rms_mps=rms), tmp_path / 'sea.nc')
+    made, shipped = load(tmp_path / 'sea.nc'), load(SCENARIO_FOLDER / f'eddies_{name}.nc')
+    for one, other in zip(made.axes, shipped.axes, strict=True):
+        np.testing.assert_allclose(one, other)
+    np.testing.assert_allclose(made.water, shipped.water, rtol=0.0, atol=2.1e-4)
+
+
+def test_a_made_sea_is_as_strong_as_it_was_asked_to_be_and_loses_no_water():
+    axes, east, north = currents(EddyingSea(seed=2, rms_mps=0.3))
+    rms = math.sqrt(0.5 * np.mean(east[:, 0] ** 2 + north[:, 0] ** 2))
+    assert rms == pytest.approx(0.3, rel=2e-3)
+    degree_m = 111_200.0
+    shrunk = math.cos(math.radians(float(axes['latitude'].mean())))
+    spread = np.gradient(east[0, 0], axes['longitude'] * degree_m * shrunk, axis=1)
+    spread += np.gradient(north[0, 0], axes['latitude'] * degree_m, axis=0)
+    turning = np.gradient(north[0, 0], axes['longitude'] * degree_m * shrunk, axis=1)
+    assert np.abs(spread[1:-1, 1:-1]).max() < 0.35 * np.abs(turning).max()
