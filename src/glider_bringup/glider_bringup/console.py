@@ -97,7 +97,7 @@ Recording = Annotated[
     typer.Argument(
         metavar='FLIGHT',
         help='Folder of dbd files of a Slocum (or mbd, sbd, dcd, mcd, scd), folder of p*.nc '
-        'of a Seaglider, or one p*.nc.',
+        'of a Seaglider, or one p*.nc; NetCDF of OceanGliders (OG1).',
     ),
 ]
 Cache = Annotated[

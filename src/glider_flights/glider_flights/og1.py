@@ -16,14 +16,18 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_base.errors import ConfigurationError
+from glider_base.files import parse_yaml
+from glider_base.settings import validate
 from glider_flights.folders import Part, files_in, installed, read_each, said, strangers
 from glider_flights.netcdf import SUFFIXES, datasets, refuse_missing, variables
+from glider_flights.reckoning import DENSITY
 from glider_flights.record import (
     NOT_KNOWN,
     Fixes,
     Flight,
     Instruments,
     OnBoard,
+    Polar,
     Samples,
     Segment,
     angles_at_times,
@@ -37,6 +41,8 @@ from glider_flights.seaglider import DIVE_FILE, polar_of
 from glider_flights.seawater import depth_of
 from glider_flights.segments import cut
 from glider_flights.slocum import POLAR
+from glider_model.onboard.glide_polar import make_polar
+from glider_model.vehicle.file import Vehicle
 
 #: Names of variables in capitals, by ours, and what their values are multiplied by.
 NAMES = {
@@ -79,6 +85,7 @@ class File(NamedTuple):
     #: Shape (n, 3): time (s since 1970), latitude, longitude (degrees).
     fixes: np.ndarray
     notes: list[str]
+    own_polar: Polar | None  #: of the file of the vehicle, where that is in it
 
 
 def og1_files(place: Path) -> list[Path]:
@@ -120,8 +127,9 @@ def read_og1(place: Path, progress: Callable[[int, int], None]) -> Flight:
     origin = fixes[0, 1:] if len(fixes) else _middle(files[0].known)
     samples = Samples(*np.concatenate([np.stack(file.samples) for file in files], axis=1))
     cuts, unused = cut(Fixes(fixes[:, 0], local_metres(origin, *fixes.T[1:])), samples)
-    of_base = 'seaglider' in files[0].model.lower()
-    polar, segments = polar_of({}) if of_base else POLAR, []
+    of_base = 'seaglider' in files[0].model.lower() and not files[0].own_polar
+    polar = files[0].own_polar or (polar_of({}) if of_base else POLAR)
+    segments = []
     for one in cuts:
         middle = 0.5 * (one.before.time_s[-1] + one.after.time_s[0])
         file = [file for file in files if np.nanmin(file.samples.time_s) <= middle][-1]
@@ -192,7 +200,25 @@ def _read(path: Path) -> File:
         known.get('buoyancy_kg', nothing),
     )
     vehicle, model = texts.get('vehicle', ''), texts.get('model', '')
-    return File(path.name, vehicle, model, known, samples, fixes, notes)
+    return File(path.name, vehicle, model, known, samples, fixes, notes, _own_polar(path))
+
+
+def _own_polar(path: Path) -> Polar | None:
+    """Lift and drag of the file of a vehicle, as `glider_flights.record.Polar` has them."""
+    text = datasets(path)[0].attrs.get('vehicle_yaml')
+    if text is None:
+        return None
+    values = parse_yaml(text, f'{path}: vehicle_yaml')
+    own = make_polar(validate(Vehicle, values, f'{path}: vehicle_yaml').params())
+    per_pressure = 2.0 / DENSITY  # V^2 of a dynamic pressure
+    return Polar(
+        lift=own.K_L * per_pressure,
+        drag=own.K_D0 * per_pressure ** (1.0 + 0.5 * own.n),
+        induced=own.K_D * per_pressure,
+        exponent=0.5 * own.n,
+        area_m2=1.0,
+        shallowest_rad=own.shallowest,
+    )
 
 
 def _fixes(known: dict[str, np.ndarray]) -> np.ndarray:

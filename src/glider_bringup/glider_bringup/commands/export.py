@@ -8,10 +8,21 @@ from typing import Annotated
 
 import typer
 
+from glider_base.errors import ConfigurationError
 from glider_bringup.console import Json, Run, beside, counter, messages, print_written
 
 app = typer.Typer()
-Kind = Enum('Kind', {text: text for text in ('netcdf', 'csv', 'mat')})
+#: Kinds of files, and how they end.
+SUFFIXES = {
+    'netcdf': '.nc',
+    'csv': '.csv',
+    'mat': '.mat',
+    'og1': '.og1.nc',
+    'geojson': '.geojson',
+    'kml': '.kml',
+    'gpx': '.gpx',
+}
+Kind = Enum('Kind', {text: text for text in SUFFIXES})
 
 
 @app.command(epilog='Example: ./glider export runs/20260101-120000-current_8deg --to mat')
@@ -21,25 +32,58 @@ def export(
         Kind,
         typer.Option(
             help='netcdf: for xarray and other readers of NetCDF 3; csv: one row a tick; mat: '
-            'structs for MATLAB and Octave.'
+            'structs for MATLAB and Octave; og1: what it measured, in the format of OceanGliders; '
+            'geojson, kml, gpx: tracks, waypoints and surfacings on a chart.'
         ),
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar='FILE', help='Default: run.nc, run.csv or run.mat beside the bag.'),
+        typer.Option(metavar='FILE', help='Default: run.nc, run.csv, run.kml ... beside the bag.'),
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            metavar='TIME',
+            help='When it started (UTC, as 2026-03-01T06:00), of a run without origin.time; for '
+            'og1, geojson, kml and gpx.',
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write every number of a run's bag into one file, with names and units.
+    """Write a run for other programs.
 
-    World NED, body FRD, SI and radians, whatever the topics carry; docs/python.md has the names.
+    netcdf, csv and mat have every number of its bag, with names and units: world NED, body FRD, SI
+    and radians, whatever the topics carry; docs/python.md has the names.
     """
-    from glider_bringup.door.export import SUFFIXES, WRITERS, dataset_of
+    kind = to.value
+    file = out or beside(run, f'run{SUFFIXES[kind]}')
+    if kind == 'og1':
+        from glider_bringup.door.og1 import write_og1
+
+        with counter('reading the bag', None) as update:
+            write_og1(run, start, file, update)
+    elif kind in ('geojson', 'kml', 'gpx'):
+        from glider_bringup.door.tracks import write_chart
+        from glider_bringup.showing.flown_run import read_run
+
+        with counter('reading', None) as update:
+            write_chart(kind, read_run(run, update), start, file)
+    else:
+        _write_all(run, kind, file, start)
+    print_written('written', run, file, as_json)
+
+
+def _write_all(run: Path, kind: str, file: Path, start: str | None) -> None:
+    """Write every number of the bag."""
+    from glider_bringup.door.export import WRITERS, dataset_of
     from glider_bringup.door.run import open_run
 
-    file = out or beside(run, f'run{SUFFIXES[to.value]}')
+    if start is not None:
+        raise ConfigurationError(
+            f'--start {start}: not of {kind}, which has seconds since the start (allowed: og1, '
+            'geojson, kml, gpx)'
+        )
     with messages.status('reading the bag'):
         dataset = dataset_of(open_run(run))
     with counter('writing', dataset.sizes['time']) as update:
-        WRITERS[to.value](dataset, file, update)
-    print_written('written', run, file, as_json)
+        WRITERS[kind](dataset, file, update)

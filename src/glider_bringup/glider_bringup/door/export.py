@@ -17,8 +17,6 @@ from glider_model.vehicle.file import vehicle_file
 
 #: Rows of a CSV file that are written at once: an hour.
 _ROWS = 36_000
-#: How the files end.
-SUFFIXES = {'netcdf': '.nc', 'csv': '.csv', 'mat': '.mat'}
 
 #: Called with the rows that are written.
 Progress = Callable[[int], None]

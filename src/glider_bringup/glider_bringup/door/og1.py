@@ -1,0 +1,315 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run as the OceanGliders community exchanges flights: NetCDF 4 in the format OG1.0.
+
+What the vehicle measured and believed, as a glider brings it home; nothing of the truth. The
+simulated compass knows no declination: magnetic north is true north. Format:
+https://oceangliderscommunity.github.io/OG-format-user-manual/OG_Format.html
+"""
+
+from collections.abc import Callable
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray
+
+from glider_base.errors import ConfigurationError
+from glider_base.frames import poses_from_wire
+from glider_base.signals import TICK_NS
+from glider_bringup.door.tracks import start_of
+from glider_bringup.scoring.card import read_score
+from glider_mission.blocks import COLUMNS
+from glider_mission.disk import whole_file
+from glider_mission.recording.bag_files import has_bag
+from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.read_back import read_back
+from glider_mission.run_folder import scenario_of
+from glider_mission.scenario import Scenario
+from glider_model.ocean.density import depth_at
+from glider_model.vehicle.file import load_vehicle, vehicle_file
+
+#: Time between two measurements in the file (ticks): 2 s.
+EVERY = 20
+#: Without a GPS in the scenario, it has a fix this often (s) where it is this shallow (m).
+FIX_EVERY_S, FIX_DEPTH_M = 60.0, 1.0
+#: Phases of OG1 by the stages of guidance.
+PHASES = {0: 3, 1: 2, 2: 5, 3: 1, 4: 5, 5: 3, 6: 1, 7: 3}
+PHASE_NAMES = 'unknown ascent descent surfacing parking inflection propelled transition'
+VOCABULARY = 'http://vocab.nerc.ac.uk/collection'
+DIMENSION = 'N_MEASUREMENTS'
+_SECONDS = {'units': 'seconds since 1970-01-01T00:00:00Z', 'calendar': 'gregorian'}
+_NORTH = {'units': 'degrees_north', 'standard_name': 'latitude'}
+_EAST = {'units': 'degrees_east', 'standard_name': 'longitude'}
+_ALONG = {'coordinates': 'TIME LATITUDE LONGITUDE DEPTH'}
+
+
+def _of(concept: str, long_name: str, **more: Any) -> dict[str, Any]:
+    """Attributes of a measured variable."""
+    return {'long_name': long_name, 'vocabulary': f'{VOCABULARY}/OG1/current/{concept}/', **more}
+
+
+#: Variables over the measurements, and what they are.
+VARIABLES = {
+    'TIME': _of('TIME', 'time of measurement', standard_name='time', axis='T', **_SECONDS),
+    'LATITUDE': _of('LAT', 'latitude that the vehicle believed to be at', **_NORTH),
+    'LONGITUDE': _of('LON', 'longitude that the vehicle believed to be at', **_EAST),
+    'DEPTH': _of(
+        'DEPTH',
+        'depth by the pressure sensor',
+        standard_name='depth',
+        units='m',
+        positive='down',
+        axis='Z',
+    ),
+    'TIME_GPS': _of('TIME', 'time of each GPS location', **_SECONDS),
+    'LATITUDE_GPS': _of('LAT_GPS', 'latitude of each GPS location', **_NORTH),
+    'LONGITUDE_GPS': _of('LON_GPS', 'longitude of each GPS location', **_EAST),
+    'PITCH': _of(
+        'PITCH',
+        'pitch, nose up positive',
+        units='degree',
+        standard_name='platform_pitch',
+        **_ALONG,
+    ),
+    'ROLL': _of(
+        'ROLL',
+        'roll, to starboard positive',
+        units='degree',
+        standard_name='platform_roll',
+        **_ALONG,
+    ),
+    'HEADING': _of('HEADING', 'heading from magnetic north', units='degree', **_ALONG),
+    'WCUR_X': _of(
+        'WCUR_X',
+        'depth-averaged current of the dive, as the vehicle believed it, eastward',
+        units='m s-1',
+        standard_name='eastward_sea_water_velocity',
+        **_ALONG,
+    ),
+    'WCUR_Y': _of(
+        'WCUR_Y',
+        'depth-averaged current of the dive, as the vehicle believed it, northward',
+        units='m s-1',
+        standard_name='northward_sea_water_velocity',
+        **_ALONG,
+    ),
+    'PHASE': _of(
+        'PHASE',
+        'behavior of the glider at sea',
+        flag_values=np.arange(8, dtype=np.int8),
+        flag_meanings=PHASE_NAMES,
+        phase_calculation_method='stage of the mission by the guidance on board',
+        **_ALONG,
+    ),
+}
+
+
+class _Thinned:
+    """Takes rows of a bag as they come and keeps one in so many."""
+
+    topics = ('imu', 'pressure', 'fix', 'odom')
+
+    def __init__(self) -> None:
+        self._kept: list[np.ndarray] = []
+        self.ticks = 0
+
+    def add(self, log: np.ndarray) -> None:
+        self._kept.append(log[-self.ticks % EVERY :: EVERY].copy())
+        self.ticks += len(log)
+
+    def result(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times since the start (s), shape (n,), and rows, shape (n, ROW)."""
+        rows = np.concatenate(self._kept)
+        return np.arange(len(rows)) * EVERY * TICK_NS / 1e9, rows
+
+
+def write_og1(
+    run: Path, start: str | None, file: Path, progress: Callable[[int, int], None]
+) -> None:
+    """Write a run with a bag as a flight in OG1.0.
+
+    Raises
+    ------
+    ConfigurationError
+        If it has no bag or nobody knows when it was, or the file cannot be written.
+    """
+    try:
+        import h5netcdf  # noqa: F401 - xarray writes NetCDF 4 through it
+    except ImportError:
+        raise ConfigurationError(
+            'h5netcdf, which writes NetCDF 4, is not installed; install it with: '
+            './glider python -m pip install --no-deps -r requirements-flights.txt'
+        ) from None
+    if not has_bag(run):
+        raise ConfigurationError(
+            f'{run}: no bag in it (allowed: a run over nodes, or one flown with --bag)'
+        )
+    bag, taker = Bag(run), _Thinned()
+    with scenario_of(run, bag.attachments) as found:
+        scenario, card = found.scenario, read_score(run) or {}
+        began_s = start_of(scenario, start)
+        if began_s is None:
+            raise ConfigurationError(
+                f'{run}: origin.time is not set, so that nobody knows when it was (allowed: with '
+                '--start 2026-03-01T06:00, or a run with origin.time)'
+            )
+        total = int(scenario.duration_s / (TICK_NS / 1e9))
+        read_back(bag, scenario.vehicle, [taker], lambda ticks: progress(ticks, total))
+        dataset = flight_dataset(*taker.result(), scenario, card, began_s)
+    with whole_file(file) as stream:
+        dataset.to_netcdf(
+            stream.name,
+            engine='h5netcdf',
+            unlimited_dims=[DIMENSION],
+            encoding={name: _encoding(dataset[name]) for name in dataset.variables},
+        )
+
+
+def _encoding(variable: xarray.DataArray) -> dict[str, Any]:
+    """How a variable is kept: what has no value is filled, what is along the time is packed."""
+    if variable.dtype.kind == 'f' and variable.ndim:
+        return {'_FillValue': -1.0 if 'TIME' in variable.name else -9999.9, 'zlib': True}
+    return {'_FillValue': None}
+
+
+def flight_dataset(
+    time_s: np.ndarray, rows: np.ndarray, scenario: Scenario, card: dict, began_s: float
+) -> xarray.Dataset:
+    """Dataset in OG1.0 of rows of a run, shape (n, ROW), at times since its start (s)."""
+    values = _measured(time_s, rows, scenario, card)
+    for name in ('TIME', 'TIME_GPS'):
+        values[name] = values[name] + began_s
+    dataset = xarray.Dataset(
+        {name: (DIMENSION, values[name], VARIABLES[name]) for name in VARIABLES if name in values}
+    )
+    vehicle = load_vehicle(scenario.vehicle)
+    serial, day = f'simulated_{vehicle.name}', _compact(began_s)
+    about = {
+        'TRAJECTORY': (f'{serial}_{day}', {'cf_role': 'trajectory_id', 'long_name': 'trajectory'}),
+        'WMO_IDENTIFIER': ('0000000', {'long_name': 'wmo id'}),
+        'PLATFORM_MODEL': (vehicle.name, {'long_name': 'model of the glider'}),
+        'PLATFORM_SERIAL_NUMBER': (serial, {'long_name': 'glider serial number'}),
+        'DEPLOYMENT_TIME': (
+            began_s,
+            {'long_name': 'date of deployment', 'standard_name': 'time', **_SECONDS},
+        ),
+        'DEPLOYMENT_LATITUDE': (
+            values['LATITUDE'][0],
+            {'long_name': 'latitude of deployment', **_NORTH},
+        ),
+        'DEPLOYMENT_LONGITUDE': (
+            values['LONGITUDE'][0],
+            {'long_name': 'longitude of deployment', **_EAST},
+        ),
+        'MAGNETIC_VARIATION': (
+            0.0,
+            {'long_name': 'true less magnetic heading, + east', 'units': 'degree'},
+        ),
+    }
+    dataset = dataset.assign({name: ((), *pair) for name, pair in about.items()})
+    return dataset.assign_attrs(_about(dataset, scenario, card, serial, day))
+
+
+def _measured(
+    time_s: np.ndarray, rows: np.ndarray, scenario: Scenario, card: dict
+) -> dict[str, np.ndarray]:
+    """Variables over the measurements; times since the start (s)."""
+    odom = COLUMNS['odom'].start
+    place = poses_from_wire(np.ascontiguousarray(rows[:, odom : odom + 7]))
+    attitude, depth = place[:, 3:], place[:, 2]
+    if 'imu' in scenario.topics:
+        wire = np.zeros((len(rows), 7))
+        wire[:, 3:] = rows[:, COLUMNS['imu']][:, :4]
+        attitude = poses_from_wire(wire)[:, 3:]
+        depth = depth_at(rows[:, COLUMNS['pressure'].start])
+    latitude, longitude = _degrees(place[:, 0], place[:, 1], scenario)
+    fix = _fixes(time_s, rows, scenario, latitude, longitude, depth)
+    roll, pitch, heading = np.degrees(attitude).T
+    stage = np.nan_to_num(rows[:, COLUMNS['stage']], nan=-1.0).astype(int)
+    values = {
+        'TIME': time_s,
+        'LATITUDE': latitude,
+        'LONGITUDE': longitude,
+        'DEPTH': depth,
+        'TIME_GPS': np.where(np.isfinite(fix[0]), time_s, np.nan),
+        'LATITUDE_GPS': fix[0],
+        'LONGITUDE_GPS': fix[1],
+        'PITCH': pitch,
+        'ROLL': roll,
+        'HEADING': heading % 360.0,
+        'PHASE': np.array([PHASES.get(one, 0) for one in stage], np.int8),
+    }
+    reports = (card.get('navigation') or {}).get('reports') or []
+    if reports:
+        values |= {name: np.full(len(time_s), np.nan) for name in ('WCUR_X', 'WCUR_Y')}
+    for report in reports:
+        dive = (time_s > report['dive_t_s']) & (time_s <= report['t_s'])
+        if report['dac_believed_mps']:
+            values['WCUR_Y'][dive], values['WCUR_X'][dive] = report['dac_believed_mps']
+    return values
+
+
+def _degrees(north: np.ndarray, east: np.ndarray, scenario: Scenario) -> tuple[np.ndarray, ...]:
+    """Latitude and longitude (deg) of places north and east of the origin (m)."""
+    origin = scenario.origin.params()
+    longitude = origin.longitude + east / origin.east
+    return origin.latitude + north / origin.north, (longitude + 180.0) % 360.0 - 180.0
+
+
+def _fixes(
+    time_s: np.ndarray,
+    rows: np.ndarray,
+    scenario: Scenario,
+    latitude: np.ndarray,
+    longitude: np.ndarray,
+    depth: np.ndarray,
+) -> np.ndarray:
+    """Latitude and longitude (deg) of fixes, shape (2, n); NaN where there is none."""
+    if 'fix' in scenario.topics:
+        status, *fix = rows[:, COLUMNS['fix']].T[:3]
+        # It is known where the vehicle was put into the water.
+        return np.where(time_s == 0.0, (latitude, longitude), np.where(status >= 0.0, fix, np.nan))
+    told = (depth < FIX_DEPTH_M) & (time_s % FIX_EVERY_S == 0.0)
+    return np.where(told, (latitude, longitude), np.nan)
+
+
+def _compact(time_s: float) -> str:
+    """A time as OG1 writes it."""
+    return f'{datetime.fromtimestamp(time_s, timezone.utc):%Y%m%dT%H%M%S}'
+
+
+def _about(
+    dataset: xarray.Dataset, scenario: Scenario, card: dict, serial: str, day: str
+) -> dict[str, str]:
+    """Global attributes."""
+    nobody, now = 'not given', _compact(datetime.now(timezone.utc).timestamp())
+    return {
+        'Conventions': 'CF-1.10, OG-1.0',
+        'featureType': 'trajectory',
+        'title': f'Simulated glider trajectory: {scenario.described or scenario.name}',
+        'platform': 'sub-surface gliders',
+        'platform_vocabulary': f'{VOCABULARY}/L06/current/27/',
+        'id': f'{serial}_{day}_delayed',
+        'comment': 'Simulated by the glider stack: no measurement of the sea.',
+        'contributor_name': nobody,
+        'contributor_email': nobody,
+        'contributor_role': 'PI',
+        'contributor_role_vocabulary': f'{VOCABULARY}/W08/current/',
+        'contributing_institutions': nobody,
+        'contributing_institutions_role': 'Operator',
+        'contributing_institutions_role_vocabulary': f'{VOCABULARY}/W08/current/',
+        'rtqc_method': 'No QC applied',
+        'start_date': day,
+        'time_coverage_start': day,
+        'time_coverage_end': _compact(float(dataset['TIME'][-1])),
+        'date_created': now,
+        'history': f'{now} written by ./glider export --to og1',
+        'geospatial_lat_min': float(dataset['LATITUDE'].min()),
+        'geospatial_lat_max': float(dataset['LATITUDE'].max()),
+        'geospatial_lon_min': float(dataset['LONGITUDE'].min()),
+        'geospatial_lon_max': float(dataset['LONGITUDE'].max()),
+        'scenario_yaml': scenario.to_yaml(),
+        'vehicle_yaml': vehicle_file(scenario.vehicle).decode(),
+    }

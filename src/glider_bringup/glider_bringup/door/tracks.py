@@ -1,0 +1,225 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run on other people's charts: GeoJSON (RFC 7946), KML 2.2 and GPX 1.1.
+
+Where the vehicle was and where it believed to be, its waypoints, and where it came up.
+"""
+
+import json
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+
+from glider_base.errors import ConfigurationError
+from glider_base.frames import OriginSettings, to_geodetic
+from glider_bringup.showing.web_page import FlownRun
+from glider_mission.disk import write_whole
+from glider_mission.scenario import Scenario
+
+#: A track has no more points than this: more are slow to draw in a browser.
+MOST_POINTS = 4000
+KML, GPX = 'http://www.opengis.net/kml/2.2', 'http://www.topografix.com/GPX/1/1'
+
+
+class Line(NamedTuple):
+    """A way over the chart."""
+
+    name: str
+    places: list[tuple[float, float]]  #: latitude, longitude (deg)
+    depths_m: list[float]
+    times: list[str]  #: UTC as ISO 8601; empty where nobody knows when it was
+
+
+class Point(NamedTuple):
+    """A surfacing."""
+
+    name: str
+    place: tuple[float, float]  #: latitude, longitude (deg)
+    time: str
+    told: dict[str, Any]  #: what else is known of it
+
+
+class Chart(NamedTuple):
+    """What of a run is on a chart."""
+
+    name: str
+    route: list[tuple[float, float]]  #: waypoints: latitude, longitude (deg)
+    lines: list[Line]
+    surfacings: list[Point]
+
+
+def start_of(scenario: Scenario, start: str | None) -> float | None:
+    """When a run started (s since 1970): as its scenario says, or else as told; None if unknown.
+
+    Raises
+    ------
+    ConfigurationError
+        If both say it, or it is no time.
+    """
+    told = scenario.origin.time
+    if start is not None:
+        if told:
+            raise ConfigurationError(
+                f'--start {start}: the run has origin.time = {told} (allowed: without --start)'
+            )
+        try:
+            told = OriginSettings(time=start).time
+        except ValueError:
+            told = ''
+        if not told:
+            raise ConfigurationError(f'--start {start}: not a time (allowed: as 2026-03-01T06:00)')
+    return datetime.fromisoformat(told.replace('Z', '+00:00')).timestamp() if told else None
+
+
+def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
+    """What of a run is on a chart; times where it is known when it started (s since 1970)."""
+    scenario = flown.scenario
+    origin = scenario.origin.params()
+
+    def places(norths, easts) -> list[tuple[float, float]]:
+        pairs = zip(norths, easts, strict=True)
+        return [to_geodetic(float(north), float(east), origin) for north, east in pairs]
+
+    def when(t_s: float) -> str:
+        if began_s is None:
+            return ''
+        moment = datetime.fromtimestamp(began_s, timezone.utc) + timedelta(seconds=float(t_s))
+        return f'{moment:%Y-%m-%dT%H:%M:%SZ}'
+
+    traces = flown.traces.thinned(MOST_POINTS)
+    samples, lines = traces.samples, []
+    times = [when(t) for t in 2.0 * traces.spacing_s * np.arange(len(samples['track_north_m']))]
+    for name, of in (('track', 'track'), ('believed track', 'believed')):
+        table = np.array(
+            [samples[f'{of}_north_m'], samples[f'{of}_east_m'], samples['track_depth_m']]
+        )
+        known = np.flatnonzero(np.isfinite(table).all(axis=0))
+        north, east, depth = table[:, known]
+        told = [times[at] for at in known] if began_s is not None else []
+        lines.append(Line(name, places(north, east), [round(float(d), 2) for d in depth], told))
+    reports = (flown.card.get('navigation') or {}).get('reports') or []
+    surfacings = [
+        Point(
+            f'surfacing {number}',
+            places(*([value] for value in report['true_ned_m'][:2]))[0],
+            when(report['t_s']),
+            {
+                't_s': report['t_s'],
+                'error_m': report['error_m'],
+                'dac_believed_mps': report['dac_believed_mps'],
+            },
+        )
+        for number, report in enumerate(reports, 1)
+    ]
+    route = getattr(scenario.path, 'waypoints', None) or flown.path_points()
+    norths, easts = np.array([point[:2] for point in route]).T
+    return Chart(
+        scenario.name, places(norths, easts), [line for line in lines if line.places], surfacings
+    )
+
+
+def geojson(chart: Chart) -> bytes:
+    """A FeatureCollection: lines of route and tracks, points of surfacings."""
+
+    def at(place: tuple[float, float], *depth: float) -> list[float]:
+        return [round(place[1], 7), round(place[0], 7), *(-d for d in depth)]
+
+    def feature(kind: str, coordinates: list, **told: Any) -> dict[str, Any]:
+        geometry = {'type': kind, 'coordinates': coordinates}
+        return {'type': 'Feature', 'properties': told, 'geometry': geometry}
+
+    features = []
+    if chart.route:
+        features.append(feature('LineString', [at(place) for place in chart.route], name='route'))
+    for line in chart.lines:
+        told = {'name': line.name} | ({'times': line.times} if line.times else {})
+        pairs = zip(line.places, line.depths_m, strict=True)
+        features.append(feature('LineString', [at(*pair) for pair in pairs], **told))
+    for point in chart.surfacings:
+        told = {'name': point.name} | ({'time': point.time} if point.time else {}) | point.told
+        features.append(feature('Point', at(point.place), **told))
+    return json.dumps({'type': 'FeatureCollection', 'features': features}).encode()
+
+
+def kml(chart: Chart) -> bytes:
+    """A document with a placemark for each line and surfacing."""
+    root = ElementTree.Element('kml', xmlns=KML)
+    document = _child(root, 'Document')
+    _child(document, 'name', chart.name)
+
+    def placemark(name: str, time: str, kind: str, places, depths_m) -> None:
+        mark = _child(document, 'Placemark')
+        _child(mark, 'name', name)
+        if time:
+            _child(_child(mark, 'TimeStamp'), 'when', time)
+        shape = _child(mark, kind)
+        _child(shape, 'altitudeMode', 'absolute' if any(depths_m) else 'clampToGround')
+        pairs = zip(places, depths_m, strict=True)
+        told = (f'{place[1]:.7f},{place[0]:.7f},{-depth:.2f}' for place, depth in pairs)
+        _child(shape, 'coordinates', ' '.join(told))
+
+    if chart.route:
+        placemark('route', '', 'LineString', chart.route, [0.0] * len(chart.route))
+    for line in chart.lines:
+        placemark(line.name, '', 'LineString', line.places, line.depths_m)
+    for point in chart.surfacings:
+        placemark(point.name, point.time, 'Point', [point.place], [0.0])
+    return _text(root)
+
+
+def gpx(chart: Chart) -> bytes:
+    """Surfacings as waypoints, the waypoints as a route, the tracks as tracks."""
+    root = ElementTree.Element('gpx', version='1.1', creator='glider stack', xmlns=GPX)
+
+    def at(parent, tag: str, place, time: str = '', name: str = '', depth: float | None = None):
+        point = _child(parent, tag)
+        point.set('lat', f'{place[0]:.7f}')
+        point.set('lon', f'{place[1]:.7f}')
+        told = {'ele': '' if depth is None else f'{-depth:.2f}', 'time': time, 'name': name}
+        for key, text in told.items():
+            if text:
+                _child(point, key, text)
+
+    for one in chart.surfacings:
+        at(root, 'wpt', one.place, one.time, one.name)
+    if chart.route:
+        route = _child(root, 'rte')
+        _child(route, 'name', chart.name)
+        for place in chart.route:
+            at(route, 'rtept', place)
+    for line in chart.lines:
+        track = _child(root, 'trk')
+        _child(track, 'name', line.name)
+        segment = _child(track, 'trkseg')
+        times = line.times or [''] * len(line.places)
+        for place, depth, time in zip(line.places, line.depths_m, times, strict=True):
+            at(segment, 'trkpt', place, time, depth=depth)
+    return _text(root)
+
+
+def _child(parent: ElementTree.Element, tag: str, text: str = '') -> ElementTree.Element:
+    child = ElementTree.SubElement(parent, tag)
+    child.text = text or None
+    return child
+
+
+def _text(root: ElementTree.Element) -> bytes:
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding='UTF-8', xml_declaration=True)
+
+
+CHARTS = {'geojson': geojson, 'kml': kml, 'gpx': gpx}
+
+
+def write_chart(to: str, flown: FlownRun, start: str | None, file: Path) -> None:
+    """Write what of a run is on a chart.
+
+    Raises
+    ------
+    ConfigurationError
+        If the file cannot be written, or ``start`` cannot be used.
+    """
+    write_whole(file, CHARTS[to](chart_of(flown, start_of(flown.scenario, start))))

@@ -1,0 +1,159 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run as OG1, GeoJSON, KML and GPX: read by libraries that are not ours, and navigated."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray
+from typer.testing import CliRunner
+
+import glider_bringup as glider
+from glider_base.errors import ConfigurationError
+from glider_bringup.cli import app
+
+WAYPOINTS = [(47.5, -52.5), (47.51, -52.49), (47.52, -52.5)]
+#: What the manual of OG1.0 calls mandatory.
+VARIABLES = (
+    'TIME LATITUDE LONGITUDE DEPTH TIME_GPS LATITUDE_GPS LONGITUDE_GPS TRAJECTORY WMO_IDENTIFIER '
+    'PLATFORM_MODEL PLATFORM_SERIAL_NUMBER DEPLOYMENT_TIME DEPLOYMENT_LATITUDE '
+    'DEPLOYMENT_LONGITUDE'
+).split()
+GLOBALS = (
+    'title platform platform_vocabulary id comment contributor_name contributor_email '
+    'contributor_role contributor_role_vocabulary contributing_institutions '
+    'contributing_institutions_role contributing_institutions_role_vocabulary rtqc_method '
+    'start_date date_created featureType Conventions'
+).split()
+
+
+@pytest.fixture(scope='module')
+def flown(tmp_path_factory):
+    """Three dives of a Slocum in a current, with fixes between them."""
+    changes = {
+        'path': {'kind': 'waypoints', 'waypoints_latlon': WAYPOINTS, 'at_end': 'continue'},
+        'origin.time': '2026-03-01T06:00',
+        'dives': 3,
+        'profile.depth_m': 60.0,
+        'profile.surface_every_dives': 1,
+        'profile.wait_s': 400.0,
+        'sensors.gps_std_m': 0.0,
+    }
+    out = tmp_path_factory.mktemp('flown') / 'run'
+    return glider.fly('slocum_shelf', changes, out=out, bag=True)
+
+
+@pytest.fixture(scope='module')
+def export(flown, tmp_path_factory):
+    """Function that exports the run, and gives the file."""
+
+    def run(kind: str):
+        file = tmp_path_factory.mktemp('export') / f'run.{kind}'
+        words = ['export', str(flown.folder), '--to', kind, '--out', str(file)]
+        done = CliRunner().invoke(app, words, catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+        return file
+
+    return run
+
+
+@pytest.fixture(scope='module')
+def og1(export, tmp_path_factory):
+    pytest.importorskip('h5netcdf')
+    return export('og1').rename(tmp_path_factory.mktemp('og1') / 'run.nc')
+
+
+def test_og1_has_what_its_manual_wants(og1):
+    """The checker itself, which needs the network: docs/sea.md."""
+    with xarray.open_dataset(og1, engine='h5netcdf') as read:
+        assert set(VARIABLES) <= set(read.variables)
+        assert set(GLOBALS) <= set(read.attrs)
+        assert read.encoding['unlimited_dims'] == {'N_MEASUREMENTS'}
+        assert all(name.isupper() for name in read.variables)
+        for name, variable in read.variables.items():
+            if variable.dims == ('N_MEASUREMENTS',):
+                vocabulary = variable.attrs['vocabulary']
+                assert vocabulary.startswith('http://vocab.nerc.ac.uk/collection/OG1/current/')
+                assert vocabulary.endswith('/'), name
+        assert read['TIME'].values[0] == np.datetime64('2026-03-01T06:00')
+        assert read['LATITUDE'].values[0] == pytest.approx(WAYPOINTS[0][0], abs=1e-4)
+        assert read['LONGITUDE'].values[0] == pytest.approx(WAYPOINTS[0][1], abs=1e-4)
+        phase, depth = read['PHASE'].values, read['DEPTH'].values
+        assert set(phase) <= {0, 1, 2, 3, 5}
+        down = np.gradient(depth)[(depth > 10.0) & (depth < 50.0) & (phase == 2)]
+        assert np.mean(down > 0.0) > 0.95
+        assert np.isfinite(read['LATITUDE_GPS']).sum() > 100
+
+
+def test_og1_read_back_has_the_same_current(og1, flown):
+    """What navigation believed of the current in the flight, from what it measured.
+
+    Over dives of 13 minutes 8 mm/s are 6 m: of when it left the surface and came back.
+    """
+    done = CliRunner().invoke(app, ['navigate', str(og1), '--json'], catch_exceptions=False)
+    report = json.loads(done.stdout)
+    assert report['segments'] >= 2
+    assert report['dac_difference_mps']['segments'] >= 2
+    assert report['dac_difference_mps']['p90'] <= 0.01
+
+
+def test_geojson_is_valid_and_where_the_vehicle_was(export, flown):
+    library = pytest.importorskip('geojson')
+    read = library.loads(export('geojson').read_text())
+    assert read.is_valid
+    by_name = {feature['properties']['name']: feature for feature in read['features']}
+    longitude, latitude = np.array(by_name['route']['geometry']['coordinates']).T
+    assert np.stack([latitude, longitude], axis=-1) == pytest.approx(np.array(WAYPOINTS), abs=1e-6)
+    track = np.array(by_name['track']['geometry']['coordinates'])
+    data = flown.to_xarray()
+    assert -track[:, 2].min() == pytest.approx(
+        float(data['ground_truth_odom_depth'].max()), abs=2.0
+    )
+    surfacings = [name for name in by_name if name.startswith('surfacing')]
+    assert len(surfacings) == len(flown.score['navigation']['reports'])
+
+
+def test_kml_and_gpx_say_the_same_as_geojson(export):
+    fastkml, gpxpy = pytest.importorskip('fastkml'), pytest.importorskip('gpxpy')
+    features = json.loads(export('geojson').read_text())['features']
+    ours = {one['properties']['name']: one['geometry']['coordinates'] for one in features}
+    (document,) = fastkml.KML.parse(export('kml')).features
+    marks = {mark.name: mark.geometry for mark in document.features}
+    assert marks.keys() == ours.keys()
+    for name, geometry in marks.items():
+        places = ours[name] if geometry.geom_type == 'LineString' else [ours[name]]
+        # The library leaves out a point that is the same as the one before.
+        kept = [
+            place for place, last in zip(places, [None, *places], strict=False) if place != last
+        ]
+        assert np.array(geometry.coords)[:, :2] == pytest.approx(np.array(kept)[:, :2], abs=1e-6)
+    read = gpxpy.parse(export('gpx').read_text())
+    for track in read.tracks:
+        (segment,) = track.segments
+        found = [(point.longitude, point.latitude, point.elevation) for point in segment.points]
+        assert np.array(found) == pytest.approx(np.array(ours[track.name]), abs=0.01)
+        assert f'{segment.points[0].time:%Y-%m-%dT%H:%M}' == '2026-03-01T06:00'
+    (route,) = read.routes
+    found = np.array([(point.latitude, point.longitude) for point in route.points])
+    assert found == pytest.approx(np.array(WAYPOINTS), abs=1e-6)
+    assert len(read.waypoints) == sum(name.startswith('surfacing') for name in ours)
+
+
+def test_a_run_of_no_date_is_refused_unless_it_is_told(tmp_path):
+    run = glider.fly('slocum_shelf', duration=30.0, out=tmp_path / 'run', bag=True)
+
+    def told(*words: str) -> str:
+        with pytest.raises(ConfigurationError) as error:
+            words = ['export', str(run.folder), *words]
+            CliRunner().invoke(app, words, catch_exceptions=False)
+        return str(error.value)
+
+    pytest.importorskip('h5netcdf')
+    assert 'origin.time' in told('--to', 'og1')
+    assert 'allowed: as 2026-03-01' in told('--to', 'og1', '--start', 'noon')
+    assert 'not of mat' in told('--to', 'mat', '--start', '2026-03-01')
+    words = ['export', str(run.folder), '--to', 'og1', '--start', '2026-03-01T06:00']
+    assert CliRunner().invoke(app, words, catch_exceptions=False).exit_code == 0
+    with xarray.open_dataset(run.folder / 'run.og1.nc', engine='h5netcdf') as read:
+        assert read['TIME'].values[0] == np.datetime64('2026-03-01T06:00')
