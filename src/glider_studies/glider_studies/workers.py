@@ -7,6 +7,7 @@ its worker time and again, flown with nothing else beside it, is given up.
 """
 
 import logging
+import multiprocessing
 import os
 import signal
 import tempfile
@@ -14,7 +15,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
-from multiprocessing import resource_tracker
+from multiprocessing import forkserver, resource_tracker
 from socket import gethostname
 from typing import Any, NamedTuple
 
@@ -38,6 +39,7 @@ CONNECT_S, LOOK_S = 5.0, 2.0
 _CONFIG = {
     'distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED': 'critical',
     'distributed.scheduler.allowed-failures': 1,
+    'distributed.worker.multiprocessing-method': 'forkserver',
 }
 
 WORKER_DIED = 'the worker process died each time it flew this'
@@ -191,7 +193,12 @@ def _interrupts_held_back() -> Iterator[None]:
 
 
 def _local_cluster(workers: int, folder: str) -> LocalCluster:
-    """Workers of this machine, which do not outlive this process."""
+    """Workers of this machine, which do not outlive this process.
+
+    They are copies of one process that has imported what is imported here.
+    """
+    multiprocessing.set_forkserver_preload([__name__])
+    forkserver.ensure_running()  # before Dask has something else imported
     return LocalCluster(
         n_workers=workers,
         threads_per_worker=1,
