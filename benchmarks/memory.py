@@ -15,7 +15,7 @@ from glider_bringup.engines.memory import memory_mb
 from glider_bringup.engines.processes import AUTOPILOT, ON_BOARD, Layout
 
 #: Simulated time (s) of the flights of what is on board.
-FLIGHT_S = 600.0
+FLIGHT_S = 120.0
 
 MEANING = {
     'imported_rss_mb': 'resident memory with everything imported, the floor (MB)',

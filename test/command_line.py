@@ -6,6 +6,7 @@ import atexit
 import multiprocessing
 import os
 import runpy
+import signal
 import subprocess
 import sys
 import tempfile
@@ -67,15 +68,54 @@ def _forked(words, env, timeout):
     """Finished process of a command, forked."""
     with tempfile.TemporaryDirectory() as folder:
         files = [f'{folder}/{name}' for name in ('out', 'err')]
-        process = _forks().Process(target=_become, args=(words, env, os.getcwd(), files))
-        process.start()
-        process.join(timeout)
-        if process.is_alive():
+        process = Started(words, env, *files)
+        try:
+            code = process.wait(timeout)
+        finally:
             process.kill()
-            process.join()
-            raise subprocess.TimeoutExpired(words, timeout)
         out, err = (Path(file).read_text(encoding='utf-8') for file in files)
-    return subprocess.CompletedProcess(words, process.exitcode, out, err)
+    return subprocess.CompletedProcess(words, code, out, err)
+
+
+class Started:
+    """A command that is forked and runs: what tests use of `subprocess.Popen`.
+
+    Parameters
+    ----------
+    words : list of str
+        Of the command line.
+    env : dict
+        Environment.
+    out, error : path
+        Files that get standard output and standard error.
+    """
+
+    def __init__(self, words, env, out, error) -> None:
+        files = [str(out), str(error)]
+        self._process = _forks().Process(target=_become, args=(words, env, os.getcwd(), files))
+        self._process.start()
+        self.pid = self._process.pid
+
+    def poll(self) -> int | None:
+        """Exit code, negative for a signal; None while it runs."""
+        return self._process.exitcode
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Exit code, once it has ended."""
+        self._process.join(timeout)
+        if self.poll() is None:
+            raise subprocess.TimeoutExpired('glider', timeout)
+        return self.poll()
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal, unless it has ended."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        """End it and wait for that."""
+        self.send_signal(signal.SIGKILL)
+        self._process.join()
 
 
 def _become(words, env, folder, files):

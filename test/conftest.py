@@ -4,8 +4,6 @@
 
 import json
 import os
-import subprocess
-import sys
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -14,9 +12,8 @@ import pytest
 
 import command_line
 
-GLIDER = [sys.executable, '-m', 'glider_bringup.cli']
-#: The flight that tests share: every kind of current, and long enough for a descent to 200 m.
-SCENARIO, DURATION_S = 'rough_water', 1200
+#: The flight that tests share: every kind of current, and a descent to 100 m.
+SCENARIO, DURATION_S = 'rough_water', 600
 
 
 class Recorded(NamedTuple):
@@ -42,23 +39,14 @@ def start_glider(tmp_path):
     """Start a command; gives the process, whose output lies in files of tmp_path."""
     processes = []
 
-    def start(*arguments) -> subprocess.Popen:
-        with (tmp_path / 'stdout').open('w') as out, (tmp_path / 'stderr').open('w') as error:
-            process = subprocess.Popen(
-                [*GLIDER, *map(str, arguments)],
-                env=_environment(),
-                stdin=subprocess.DEVNULL,
-                stdout=out,
-                stderr=error,
-            )
-        processes.append(process)
-        return process
+    def start(*arguments) -> command_line.Started:
+        files = tmp_path / 'stdout', tmp_path / 'stderr'
+        processes.append(command_line.Started(list(map(str, arguments)), _environment(), *files))
+        return processes[-1]
 
     yield start
     for process in processes:
-        if process.poll() is None:
-            process.kill()
-            process.wait()
+        process.kill()
 
 
 def _fly(glider, folder: Path, *options) -> Recorded:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Imported where commands are forked (`command_line`): they need not load it again."""
 
+import glider_studies.workers  # noqa: F401  # Dask takes longest of all
 from glider_bringup.warm_up import fly_one_tick, score_nothing
 
 fly_one_tick()

@@ -27,7 +27,7 @@ from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
 
-CHANGES = {'dives': 0, 'duration_s': 200.0, 'navigation.method': 'dead_reckoned'}
+CHANGES = {'dives': 0, 'duration_s': 100.0, 'navigation.method': 'dead_reckoned'}
 DEADLINE_S = 120.0
 SIGNALS = [signal.SIGINT, signal.SIGTERM]
 

@@ -6,7 +6,6 @@ import contextlib
 import json
 import os
 import signal
-import subprocess
 import time
 from collections import Counter
 from pathlib import Path
@@ -38,7 +37,7 @@ FLOWN_BYTES = 300_000  #: of recording: several chunks are on disk
 # ---------------------------------------------------------------------- processes
 
 
-def wait_until(condition, deadline_s: float, process: subprocess.Popen, what: str):
+def wait_until(condition, deadline_s: float, process, what: str):
     """Wait for a condition while the process runs; gives what the condition gave."""
     end = time.monotonic() + deadline_s
     while not (value := condition()):
