@@ -59,7 +59,7 @@ def mountains(path, seed, height_m=150.0):
         },
     )
     data['elevation'].attrs = {'standard_name': 'height_above_mean_sea_level', 'units': 'm'}
-    data.to_netcdf(path, engine='h5netcdf')
+    data.to_netcdf(path, engine='scipy')
     return path
 
 

@@ -269,7 +269,7 @@ def chart(path, name, seed=0, sign=1.0, **attributes):
     data = xarray.Dataset(
         {name: (('lat', 'lon'), (sign * depth).astype(np.int16), attributes)}, coords
     )
-    data.to_netcdf(path, engine='h5netcdf')
+    data.to_netcdf(path, engine='scipy')
     return data[name]
 
 
