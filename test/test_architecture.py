@@ -294,13 +294,13 @@ def test_what_is_crowded_is_found(tmp_path):
 # ---------------------------------------------------------------------- the map
 
 MAP = SOURCES.parent / 'docs' / 'architecture.md'
-MAP_BEGIN = '<!-- rooms: made by ./glider python test/test_architecture.py -->\n'
-MAP_END = '<!-- end of rooms -->\n'
+MAP_BEGIN = '<!-- folders: made by ./glider python test/test_architecture.py -->\n'
+MAP_END = '<!-- end of folders -->\n'
 
 
 def rooms() -> str:
     """The table of rooms: each folder with the sentence of its docstring."""
-    rows = ['| room | what belongs there |', '|---|---|']
+    rows = ['| folder | what belongs there |', '|---|---|']
     for package in MAY_IMPORT:
         for init in sorted((SOURCES / package / package).rglob('__init__.py')):
             folder = init.parent.relative_to(SOURCES / package)

@@ -128,16 +128,16 @@ def test_the_bag_gives_the_same_score(flown):
 def test_printed_card_tells_of_navigation_where_the_place_was_reckoned(flown, known):
     told, rows = flown.score['navigation'], dict(card_rows(flown.score))
     assert rows['navigation'].startswith(f'dead_reckoned, {told["surfacings"]} surfacings')
-    assert f'{told["error_m"]["worst"]:,.1f} m (worst)' in rows['believed place, surfacing']
+    assert f'{told["error_m"]["worst"]:,.1f} m (worst)' in rows['surfacing position error']
     rms = told['dac_error_mps']['rms'] / KNOT_MPS
-    assert rows['mean current learnt (DAC)'].startswith(f'off by rms {rms:.3f} kn')
+    assert rows['depth-averaged current'].startswith(f'off by rms {rms:.3f} kn')
     inside = sum(one['inside_95'] for one in told['reports'])
     assert rows['inside the 95 % ellipse'] == f'{inside} of {told["surfacings"]} true places'
     assert known.score['navigation']['reports'] == []
     new = set(rows) - set(dict(card_rows(known.score)))
     assert new == {
-        *('navigation', 'believed place, surfacing', 'cross-track, surfacing'),
-        *('cross-track, believed', 'mean current learnt (DAC)', 'inside the 95 % ellipse'),
+        *('navigation', 'surfacing position error', 'cross-track, surfacing'),
+        *('cross-track, estimated', 'depth-averaged current', 'inside the 95 % ellipse'),
     }
 
 
@@ -171,7 +171,7 @@ def test_report_shows_true_and_believed(flown, data):
     body, page = read_page(file)
     panels = {panel['id']: panel for panel in page['panels']}
     assert {curve['label'] for curve in panels['believed_cross_track']['curves']} == {
-        *('true', 'believed'),
+        *('true', 'estimated'),
     }
     run, reports = page['runs'][0], flown.score['navigation']['reports']
     assert run['surfacings'] == reports
@@ -242,8 +242,8 @@ def test_the_largest_error_comes_first(flown):
     off_m = flown.score['cross_track_m']['max_run']
     assert worst_m > 100.0
     assert verdict(flown.score, 600.0).startswith(
-        f'At worst it was {small(off_m)} off its path and came up {small(worst_m)} from where it '
-        'believed to be.'
+        f'At worst it was {small(off_m)} off its path and came up {small(worst_m)} from its '
+        'estimated position.'
     )
 
 
@@ -251,19 +251,19 @@ def test_navigation_is_told_in_words():
     learnt = told_of([753.0, -85.0, 37.0, 17.0, 2.0, -1.0], 6)
     came_up, place, ellipses, current = navigation_notes(learnt, learns=True)
     assert came_up == (
-        'Came up 753 m beside its path the first time, from surfacing 3 on at most 37 m: the '
+        'Came up 753 m off its path the first time, from surfacing 3 on at most 37 m: the '
         'current was learnt.'
     )
     assert '5.00 m or less half of the times, by 60 m at worst' in place
     assert ellipses == 'The 95 % ellipses hold 6 of 6 true places.'
     assert '0.019 kn' in current
     still = navigation_notes(learnt, learns=False)[0]
-    assert still == 'Came up 753 m beside its path the first time, later at most 85 m.'
+    assert still == 'Came up 753 m off its path the first time, later at most 85 m.'
     too_sure = navigation_notes(told_of([100.0] * 13, 8), learns=True)
     assert too_sure[0].endswith('later at most 100 m.')
-    assert too_sure[2].endswith('8 of 13 true places: it is too sure of what it believes.')
+    assert too_sure[2].endswith('8 of 13 true places: its ellipses are too small.')
     once = navigation_notes(told_of([20.0], 1, rms=None), learns=True)
-    assert once[0] == 'Came up 20 m beside its path.'
+    assert once[0] == 'Came up 20 m off its path.'
     assert len(once) == 3
     assert 'never came up' in navigation_notes(told_of([], 0), learns=True)[0]
 
@@ -284,8 +284,8 @@ def test_comparison_has_lines_of_navigation_where_a_run_reckons(flown, known, tm
     rows = rows_of(out)
     assert rows['navigation'] == ['dead_reckoned', 'known']
     worst = flown.score['navigation']['error_m']['worst']
-    assert rows['believed place, surfacing, worst'] == [f'{worst:,.1f} m', '-']
-    assert rows['mean current learnt, error, rms'][0].endswith('kn')
+    assert rows['surfacing position error, worst'] == [f'{worst:,.1f} m', '-']
+    assert rows['depth-averaged current, error, rms'][0].endswith('kn')
     assert rows['inside the 95 % ellipse'][0].endswith('%')
     assert call('compare', flown.folder, known.folder, '--out', page)[0] == 0
     _, data = read_page(page)

@@ -130,7 +130,7 @@ def flown(tmp_path_factory):
 def test_every_scenario_has_a_report_of_what_its_vehicle_can_move(tmp_path, name):
     page, _ = report_of(fly(tmp_path, of=name, duration_s=30.0))
     is_slocum = name.startswith('slocum')
-    assert 'Net heaviness, + sinks' in page.text and '+ forward: nose down' in page.text
+    assert 'Net buoyancy, + sinks' in page.text and '+ forward: nose down' in page.text
     assert ('Angle, + turns the nose to starboard' in page.text) == is_slocum
     assert ('Rotation, + to starboard' in page.text) != is_slocum
 

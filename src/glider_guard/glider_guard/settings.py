@@ -66,7 +66,7 @@ class GuardLimitSettings(Settings):
         description='least height over the bottom, where there is an altimeter (m); 0.0: any',
     )
     altitude_s: float = Field(
-        2.0, ge=0.0, le=3600.0, description='the bottom is heard for longer than this (s)'
+        2.0, ge=0.0, le=3600.0, description='an echo of the bottom lasts longer than this (s)'
     )
     climb_progress_m: float = Field(
         5.0, ge=0.5, le=100.0, description='way upward that counts as progress (m)'
@@ -87,7 +87,7 @@ class GuardLimitSettings(Settings):
         1200.0,
         ge=600.0,
         le=86400.0,
-        description='the same where the depth is not to be believed, beside the time of the way '
+        description='the same where the depth is not to be trusted, beside the time of the way '
         'up (s)',
     )
     climb_mps: float = Field(
@@ -156,7 +156,7 @@ class GuardLimitSettings(Settings):
         10.0,
         ge=0.0,
         le=3600.0,
-        description='leak, vacuum and battery are believed after so long (s)',
+        description='leak, vacuum and battery are trusted after so long (s)',
     )
     contact_s: float = Field(
         259200.0,

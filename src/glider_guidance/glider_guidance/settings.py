@@ -173,7 +173,7 @@ class GuidanceSettings(GuidanceLawSettings):
         description='come up, and wait at the surface until it is false',
         json_schema_extra=TUNABLE,
     )
-    orders: list[Order] = Field([], description='what the vehicle is told in flight, and when')
+    orders: list[Order] = Field([], description='orders to the vehicle in flight, and when')
 
     @property
     def topics(self) -> tuple[str, ...]:

@@ -124,7 +124,7 @@ class Scenario(Settings):
         OriginSettings(), description='where the origin of the path lies on the Earth'
     )
     navigation: NavigationLawSettings = Field(
-        NavigationLawSettings(), description='where the vehicle believes it is'
+        NavigationLawSettings(), description='where the vehicle estimates it is'
     )
     perturb: PerturbSettings = Field(
         PerturbSettings(), description='what the plant differs in from its vehicle file'
@@ -137,7 +137,7 @@ class Scenario(Settings):
         StraightPath(kind='straight', length_m=25000.0), description='path to follow'
     )
     profile: ProfileSettings = Field(ProfileSettings(), description='sawtooth')
-    orders: list[Order] = Field([], description='what the vehicle is told in flight, and when')
+    orders: list[Order] = Field([], description='orders to the vehicle in flight, and when')
     guidance: GuidanceLawSettings = Field(GuidanceLawSettings(), description='guidance')
     control: ControlLawSettings = Field(ControlLawSettings(), description='control')
     guard: GuardLimitSettings = Field(

@@ -212,8 +212,8 @@ def test_a_pitch_out_of_the_mass_reach_does_not_count():
         ({'pitch_mass_m': 0.07}, r'pitch mass = 0.07 m: .*allowed: -0.06 to 0.06 m\)'),
         ({'pitch_deg': math.nan}, r'pitch = nan deg: out of range'),
         ({'pitch_deg': -30.0, 'roll_mass_deg': 61.0}, r'roll mass = 61.0 deg: .*-60 to 60 deg'),
-        ({'pitch_deg': -30.0, 'net_heaviness_kg': 1.1}, r'net heaviness = 1.1 kg: .*-1 to 1 kg'),
-        ({'pitch_deg': -30.0, 'net_heaviness_kg': 0.0}, r'net heaviness = 0 kg: .*neutral'),
+        ({'pitch_deg': -30.0, 'net_heaviness_kg': 1.1}, r'net buoyancy = 1.1 kg: .*-1 to 1 kg'),
+        ({'pitch_deg': -30.0, 'net_heaviness_kg': 0.0}, r'net buoyancy = 0 kg: .*neutral'),
     ],
 )
 def test_what_cannot_be_trimmed_is_refused(arguments, message):

@@ -54,7 +54,7 @@ class NavigationLawSettings(_MethodChoice):
         'forecast, and by how much that was off on the last way',
     )
     forecast: ForecastSettings = Field(
-        ForecastSettings(), description='current that is forecast, where it is believed'
+        ForecastSettings(), description='current that is forecast, where it is used'
     )
 
     gate: GateSettings = Field(GateSettings(), description='samples of sensors that are refused')

@@ -24,7 +24,7 @@ app = typer.Typer()
 def trim(
     vehicle: Annotated[str, typer.Argument(help='Vehicle by name or path of its YAML file.')],
     net_heaviness_kg: Annotated[
-        float, typer.Option('--net-heaviness-kg', help='Net heaviness, + sinks (kg).')
+        float, typer.Option('--net-heaviness-kg', help='Net buoyancy, + sinks (kg).')
     ],
     pitch_deg: Annotated[
         float | None, typer.Option('--pitch-deg', help='Pitch, + nose up (deg).')

@@ -108,7 +108,7 @@ def _velocity(topic: str, what: str, before: str = '') -> list[_Variable]:
 
 def _joints(topic: str, what: str, steers_by: str) -> list[_Variable]:
     found = [
-        _Variable(topic, 'buoyancy_engine', 'kg', f'{what} net heaviness, positive sinks'),
+        _Variable(topic, 'buoyancy_engine', 'kg', f'{what} net buoyancy, positive sinks'),
         _Variable(topic, 'pitch_mass', 'm', f'{what} pitch mass, positive forward', FRD),
         _Variable(topic, 'roll_mass', 'rad', f'{what} roll mass about the x axis', FRD),
     ]
@@ -130,7 +130,7 @@ def _learnt() -> list[_Variable]:
 
 #: What `_turn` writes, in its order.
 _TURNED = (
-    *_position('odom', 'believed position'),
+    *_position('odom', 'estimated position'),
     *(
         _Variable('odom', f'q_{part}', '1', f'attitude quaternion, FRD to NED, {part}', NED)
         for part in 'wxyz'
@@ -141,7 +141,7 @@ _TURNED = (
     _Variable('odom', 'p', 'rad/s', 'angular rate about the x axis', FRD),
     _Variable('odom', 'q', 'rad/s', 'angular rate about the y axis', FRD),
     _Variable('odom', 'r', 'rad/s', 'angular rate about the z axis', FRD),
-    *_euler('odom', 'believed'),
+    *_euler('odom', 'estimated'),
     *_position('reference', 'virtual target'),
     *_euler('reference', 'desired'),
     *_velocity('reference', 'desired velocity over ground', 'velocity_'),
@@ -188,7 +188,7 @@ def _water(topic: str, what: str) -> list[_Variable]:
 
 
 #: What the covariance of a believed place is called.
-_PLACE = _covariance('odom', 'believed position', 'm2')
+_PLACE = _covariance('odom', 'estimated position', 'm2')
 #: What there is of sensors and beliefs, by topic: nothing of it where navigation has none.
 _BESIDE = {
     'imu': (
@@ -209,9 +209,9 @@ _BESIDE = {
         _Variable('fix', 'variance', 'm2', 'fix, variance to the north and to the east each', NED),
     ),
     'altitude': (_Variable('altitude', 'height', 'm', 'measured height over the bottom'),),
-    'believed_current': _water('believed_current', 'believed current under water'),
+    'believed_current': _water('believed_current', 'estimated current under water'),
     'believed_surface_current': _water(
-        'believed_surface_current', 'believed drift at the surface'
+        'believed_surface_current', 'estimated drift at the surface'
     ),
 }
 
@@ -319,7 +319,7 @@ def _bits(block: Block, flag: str, log: np.ndarray, what: str, names: dict[int, 
     about = {
         'units': '1',
         'topic': '/diagnostics',
-        'long_name': f'{what}, bit by bit, told once a second at most',
+        'long_name': f'{what}, bit by bit, once a second at most',
         'flag_masks': np.array(list(names), dtype=np.int32),
         'flag_meanings': ' '.join(names.values()),
     }

@@ -42,7 +42,7 @@ class Surfacing(NamedTuple):
 
     @property
     def error_m(self) -> float:
-        """Distance between the true and the believed place (m)."""
+        """Distance between the true and the estimated position (m)."""
         return math.dist(self.true, self.believed)
 
     def off_squared(self, place: tuple[float, float], variance: float = 0.0) -> float | None:

@@ -22,7 +22,7 @@ _OVERLAID = {
     'depth': ('How deep each was.', 'depth_m'),
     'cross_track': ('Distance from its own path, + to starboard of it.', 'cross_track_m'),
     'place_error': (
-        'Horizontal distance between the true and the believed place.',
+        'Horizontal distance between the true and the estimated position.',
         'place_error_m',
     ),
     'pitch': ('Nose up is positive.', 'pitch_deg'),

@@ -24,7 +24,7 @@ _PANELS = {
         'Cross-track error',
         'off the path, + to starboard (m)',
         [
-            ('believed', 'measured_cross_track_m', ORANGE, 1.0),
+            ('estimated', 'measured_cross_track_m', ORANGE, 1.0),
             ('cross-track error', 'cross_track_m', BLUE, 1.0),
         ],
     ),
@@ -55,7 +55,7 @@ _PANELS = {
         'Actuators',
         'share of 1 kg, 100 mm, 100 deg',
         [
-            ('net heaviness / 1 kg', 'buoyancy_engine_kg', BLUE, 1.0),
+            ('net buoyancy / 1 kg', 'buoyancy_engine_kg', BLUE, 1.0),
             ('pitch mass / 100 mm', 'pitch_mass_mm', ORANGE, 100.0),
             ('roll mass / 100 deg', 'roll_mass_deg', GREEN, 100.0),
         ],
@@ -120,7 +120,7 @@ def _draw_track(axis, samples: dict[str, np.ndarray]) -> None:
     axis.plot(*target[::-1], color=ORANGE, label='desired path')
     axis.plot(east, north, color=BLUE, label='track')
     if np.any(np.isfinite(believed[0])):
-        axis.plot(*believed[::-1], color=GREEN, linestyle='--', label='believed track')
+        axis.plot(*believed[::-1], color=GREEN, linestyle='--', label='estimated track')
     if len(east):
         axis.plot(east[0], north[0], 'o', color=BLUE, label='start')
         pick = np.linspace(0, len(east) - 1, ARROWS).astype(int)

@@ -57,7 +57,7 @@ def _worst(card: dict[str, Any]) -> str:
         texts.append(f'it was {small(off)} off its path')
     place = ((reckoned(card) or {}).get('error_m') or {}).get('worst')
     if place is not None:
-        texts.append(f'came up {small(place)} from where it believed to be')
+        texts.append(f'came up {small(place)} from its estimated position')
     return f'At worst {" and ".join(texts)}.' if texts else ''
 
 
@@ -106,16 +106,16 @@ def navigation_notes(told: dict[str, Any], learns: bool) -> list[str]:
     """
     off = [abs(value) for value in told['surfacing_cross_track_m']]
     if not off:
-        return ['It never came up, so where it believed to be was never put to the proof.']
+        return ['It never came up, so its estimated position was never put to the proof.']
     notes = [_came_up(off, learns)]
     error = told['error_m']
     if len(off) > 1:
         notes.append(
-            f'It came up off the place it believed to be at: by {small(error["p50"])} or less '
+            f'It surfaced off its estimated position: by {small(error["p50"])} or less '
             f'half of the times, by {small(error["worst"])} at worst.'
         )
     else:
-        notes.append(f'It came up {small(error["worst"])} off the place it believed to be at.')
+        notes.append(f'It came up {small(error["worst"])} off its estimated position.')
     if told['ellipse_95_share'] is not None:
         inside = round(told['ellipse_95_share'] * len(off))
         text = f'The 95 % ellipses hold {inside} of {count(len(off), "true place")}'
@@ -123,12 +123,12 @@ def navigation_notes(told: dict[str, Any], learns: bool) -> list[str]:
         chance = sum(
             math.comb(len(off), k) * 0.95**k * 0.05 ** (len(off) - k) for k in range(inside + 1)
         )
-        too_sure = ': it is too sure of what it believes' if chance < UNLIKELY else ''
+        too_sure = ': its ellipses are too small' if chance < UNLIKELY else ''
         notes.append(f'{text}{too_sure}.')
     if told['dac_error_mps']['rms'] is not None:
         rms, worst = (told['dac_error_mps'][name] / KNOT_MPS for name in ('rms', 'worst'))
         notes.append(
-            'What it believed of the mean current of a way after its fixes was off by '
+            'The depth-averaged current that it estimated after its fixes was off by '
             f'{rms:.3f} kn (rms), {worst:.3f} kn at worst.'
         )
     return notes
@@ -136,7 +136,7 @@ def navigation_notes(told: dict[str, Any], learns: bool) -> list[str]:
 
 def _came_up(off: list[float], learns: bool) -> str:
     """How far beside its path it came up, each time (m)."""
-    text = f'Came up {small(off[0])} beside its path'
+    text = f'Came up {small(off[0])} off its path'
     if len(off) == 1:
         return f'{text}.'
     rest = (i for i in range(1, len(off) - 1) if max(off[i:]) <= LEARNT_SHARE * off[0])

@@ -42,7 +42,7 @@ class Actuator(NamedTuple):
 
 
 ACTUATORS = (
-    Actuator('buoyancy_engine', 'kg', 'Buoyancy engine', 'Net heaviness, + sinks'),
+    Actuator('buoyancy_engine', 'kg', 'Buoyancy engine', 'Net buoyancy, + sinks'),
     Actuator('pitch_mass', 'mm', 'Pitch mass', 'Position from neutral, + forward: nose down'),
     Actuator('roll_mass', 'deg', 'Roll mass', 'Rotation, + to starboard; 0 hangs straight down'),
 )
@@ -119,7 +119,7 @@ def actuators_of(run: FlownRun) -> list[tuple[Actuator, float]]:
 _FLOWN = {
     'depth': ('Depth', 'depth (m)'),
     'cross_track': ('Cross-track error', 'off the path (m)'),
-    'place_error': ('Error of the believed place', 'error (m)'),
+    'place_error': ('Navigation error', 'error (m)'),
     'pitch': ('Pitch', 'pitch (deg)'),
     'heading': ('Heading', 'heading (deg)'),
     'roll': ('Roll', 'roll (deg)'),
@@ -141,7 +141,7 @@ def _desired(name: str, label: str = 'desired') -> Curve:
 def _flight_panels(run: FlownRun) -> list[Panel]:
     """How it flew: depth, errors, attitude."""
     noisy = run.traces.has('measured_depth_m')
-    told = 'believed' if reckoned(run.card) else 'measured, with noise'
+    told = 'estimated' if reckoned(run.card) else 'measured, with noise'
 
     def curves(name: str, *others: Curve) -> tuple[Curve, ...]:
         measured = (Curve(f'measured_{name}', told, 'faint'),) if noisy else ()
@@ -191,8 +191,8 @@ def _surfacing_panels(run: FlownRun) -> list[Panel]:
     return [
         Panel(
             'places',
-            'Where it came up, around where it believed to be',
-            'From above, each to its own scale, in metres east and north of the believed place, '
+            'Where it surfaced, around its estimated position',
+            'From above, each to its own scale, in metres east and north of the estimate '
             'before the first fix. Of many surfacings those that were farthest off.',
             kind='places',
         )
@@ -204,30 +204,30 @@ def _navigation_panels(run: FlownRun) -> list[Panel]:
     told = reckoned(run.card)
     if told is None:
         return []
-    believed = _desired('measured_cross_track_m', 'believed')
+    believed = _desired('measured_cross_track_m', 'estimated')
     return [
         Panel(
             'plan',
-            'True and believed track',
+            'True and estimated track',
             'From above, not to scale: north and east each have one of their own. Drag a box to '
             'zoom in. Numbers: surfacings, as in the table.',
             kind='plan',
         ),
         Panel(
             'believed_cross_track',
-            'Cross-track error, true and believed',
-            'Distance from the path, + to starboard of it. It steers by what it believes.',
+            'Cross-track error, true and estimated',
+            'Distance from the path, + to starboard of it. It steers by its estimate.',
             'off the path (m)',
             (Curve('cross_track_m', 'true', 'measured'), believed),
             surfacings=0,
         ),
         flown_panel(
             'place_error',
-            'Horizontal distance between the true and the believed place, and the bound that it '
+            'Horizontal distance between true and estimated position, and the bound that it '
             'should keep to 95 % of the time: the longer half axis of the ellipse.',
             (
                 Curve('place_error_m', 'error', 'measured'),
-                _desired('place_bound_m', '95 % bound, as believed'),
+                _desired('place_bound_m', '95 % bound, as estimated'),
             ),
             surfacings=0,
             log=True,
@@ -246,14 +246,14 @@ def _mean_current_panel(reports: list[dict], axis: int) -> Panel:
 
     return Panel(
         f'mean_current_{name}',
-        f'Mean current of each way under water, {name}',
+        f'Depth-averaged current of each dive segment, {name}',
         'Depth-averaged current (DAC): the true mean from dive to surfacing, and what was '
-        'believed of it after the fixes.',
+        'estimated of it after the fixes.',
         'current (kn)',
         (Curve(f'current_{name}_kn', 'true, where it is', 'faint'),),
         steps=(
             Steps('true mean of the way', 'measured', spans('dac_true_mps')),
-            Steps('believed of it, after fixes', 'reference', spans('dac_believed_mps'), True),
+            Steps('estimated, after fixes', 'reference', spans('dac_believed_mps'), True),
         ),
         surfacings=0,
     )

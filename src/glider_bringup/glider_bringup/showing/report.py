@@ -88,18 +88,20 @@ def _knots(values: list[float] | None) -> list[float] | None:
     return values and [value / KNOT_MPS for value in values]
 
 
+#: Positions at a surfacing: the word for each, and its name in the scorecard.
+_PLACES = {'estimated': 'believed', 'true': 'true'}
 #: Columns of the tables of surfacings and of dives: head, and text of a line.
 _SURFACING: dict[str, Callable[[dict], str]] = {
     'time': lambda one: span(one['t_s']),
     **{
-        f'{name} place, N / E (m)': lambda one, name=name: _pair(one[f'{name}_ned_m'], 0)
-        for name in ('believed', 'true')
+        f'{word} place, N / E (m)': lambda one, name=name: _pair(one[f'{name}_ned_m'], 0)
+        for word, name in _PLACES.items()
     },
     'error (m)': lambda one: f'{one["error_m"]:,.1f}',
     'in the 95 % ellipse': lambda one: {True: 'yes', False: 'no', None: '-'}[one['inside_95']],
     'off the path (m)': lambda one: f'{one["cross_track_m"]:+,.1f}',
-    'mean current, N / E (kn)': lambda one: _pair(_knots(one['dac_true_mps']), 3),
-    'believed of it, N / E (kn)': lambda one: _pair(_knots(one['dac_believed_mps']), 3),
+    'DAC, N / E (kn)': lambda one: _pair(_knots(one['dac_true_mps']), 3),
+    'estimated DAC, N / E (kn)': lambda one: _pair(_knots(one['dac_believed_mps']), 3),
 }
 _DIVE: dict[str, Callable[[Dive], str]] = {
     'from': lambda one: span(one.from_s),
@@ -123,7 +125,7 @@ def _surfacing(run: FlownRun) -> dict[str, Callable[[dict], str]]:
     def in_degrees(name: str) -> Callable[[dict], str]:
         return lambda one: place_told(*to_geodetic(*one[f'{name}_ned_m'], origin))
 
-    places = {f'{name} place': in_degrees(name) for name in ('believed', 'true')}
+    places = {f'{word} place': in_degrees(name) for word, name in _PLACES.items()}
     rest = {name: text for name, text in _SURFACING.items() if ' place, ' not in name}
     return {'time': rest.pop('time'), **places, **rest}
 

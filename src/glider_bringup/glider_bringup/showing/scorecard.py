@@ -46,13 +46,13 @@ def _navigation_rows(card: dict) -> list[tuple[str, str]]:
     inside = '-' if within is None else f'{round(within * surfacings)} of {surfacings} true places'
     return [
         ('navigation', f'{told["method"]}, {surfacings} surfacings, {told["fixed"]} with a fix'),
-        ('believed place, surfacing', f'off by {show(error["p50"], "m", 1)} (p50), '
+        ('surfacing position error', f'off by {show(error["p50"], "m", 1)} (p50), '
          f'{show(error["p95"], "m", 1)} (p95), {show(error["worst"], "m", 1)} (worst)'),
         ('cross-track, surfacing', f'max {show(max(map(abs, off), default=None), "m", 1)}, last '
          f'{show(abs(off[-1]) if off else None, "m", 1)}'),
-        ('cross-track, believed', f'steady: rms {show(believed["rms_steady"], "m", 3)}, max '
+        ('cross-track, estimated', f'steady: rms {show(believed["rms_steady"], "m", 3)}, max '
          f'{show(believed["max_steady"], "m", 3)}'),
-        ('mean current learnt (DAC)', f'off by rms {show(rms, "kn", 3)}, worst '
+        ('depth-averaged current', f'off by rms {show(rms, "kn", 3)}, worst '
          f'{show(worst, "kn", 3)}'),
         ('inside the 95 % ellipse', inside),
     ]  # fmt: skip

@@ -76,7 +76,7 @@ class FinLawSettings(SurfaceLawSettings):
         300.0, gt=0.0, le=2000.0, description='what lasts longer than this tells nothing of s (s)'
     )
     after_s: float = Field(
-        90.0, ge=0.0, le=600.0, description='learning begins this long after a turn-over (s)'
+        90.0, ge=0.0, le=600.0, description='learning begins this long after an inflection (s)'
     )
 
     def params(self, vehicle: Vehicle) -> 'FinLawParams':

@@ -22,7 +22,7 @@ MEANING = {
     'none': 'no current',
     'persistence': 'the last current',
     'ours': 'ours, of dives before',
-    'on_board': "the vehicle's own belief",
+    'on_board': "the vehicle's own estimate",
 }
 
 

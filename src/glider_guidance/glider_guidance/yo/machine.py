@@ -69,7 +69,7 @@ class ProfileSettings(Settings):
         0.4,
         gt=0.0,
         le=20.0,
-        description='net heaviness that sets the speed, - when climbing (kg)',
+        description='net buoyancy that sets the speed, - when climbing (kg)',
     )
     climb_pitch_deg: float | None = Field(
         None, ge=8.0, le=60.0, description='glide pitch of the climb, if another one (deg)'

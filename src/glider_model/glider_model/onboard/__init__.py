@@ -1,3 +1,3 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the vehicle believes of itself: filters, gate, glide polar, learnt steering."""
+"""What the vehicle estimates of itself: filters, gate, glide polar, learnt steering."""

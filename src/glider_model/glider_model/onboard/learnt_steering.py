@@ -91,7 +91,7 @@ class SteeringLearningSettings(Settings):
         description='low pass on roll and yaw rate, slower than the turn takes to build up (s)',
     )
     after_s: float = Field(
-        30.0, ge=0.0, le=600.0, description='learning begins this long after a turn-over (s)'
+        30.0, ge=0.0, le=600.0, description='learning begins this long after an inflection (s)'
     )
     bank_deg: float = Field(
         30.0,

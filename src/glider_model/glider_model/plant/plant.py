@@ -123,7 +123,7 @@ class InitialSettings(Settings):
     pitch_deg: float = Field(0.0, ge=-80.0, le=80.0, description='start pitch (deg, + nose up)')
     speed_mps: float = Field(0.0, ge=0.0, le=3.0, description='start speed through water (m/s)')
     net_heaviness_kg: float = Field(
-        0.0, ge=-50.0, le=50.0, description='start net heaviness (kg, + sinks)'
+        0.0, ge=-50.0, le=50.0, description='start net buoyancy (kg, + sinks)'
     )
 
 

@@ -76,7 +76,7 @@ def solve_trim(
     if (pitch_deg is None) == (pitch_mass_m is None):
         raise ConfigurationError('give either pitch_deg or pitch_mass_m')
     checks = (
-        ('net heaviness', net_heaviness_kg, 'kg', vehicle.m_b_max),
+        ('net buoyancy', net_heaviness_kg, 'kg', vehicle.m_b_max),
         ('roll mass', roll_mass_deg, 'deg', math.degrees(vehicle.mu_max)),
         ('fin', fin_deg, 'deg', math.degrees(vehicle.delta_max)),
         ('pitch', pitch_deg, 'deg', 80.0),
@@ -88,7 +88,7 @@ def solve_trim(
                 f'{name} = {number} {unit}: out of range (allowed: -{limit:g} to {limit:g} {unit})'
             )
     if net_heaviness_kg == 0.0:
-        raise ConfigurationError('net heaviness = 0 kg: a neutral vehicle does not glide')
+        raise ConfigurationError('net buoyancy = 0 kg: a neutral vehicle does not glide')
     theta = None if pitch_deg is None else math.radians(pitch_deg)
     mu, delta = math.radians(roll_mass_deg), math.radians(fin_deg)
     # its whole net weight is given: the hull that displaces it is of no account

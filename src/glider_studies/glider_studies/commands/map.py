@@ -24,8 +24,8 @@ def draw(
     by: Annotated[
         Literal['steady', 'surfacing'],
         typer.Option(
-            help='What a cell is judged by: the steady cross-track error, or how far beside the '
-            'path it comes up from the fourth time on.'
+            help='What a cell is judged by: the steady cross-track error, or that at '
+            'surfacings, from the fourth on.'
         ),
     ] = 'steady',
     as_json: Json = False,

@@ -108,8 +108,8 @@ def _print_study(study: dict) -> None:
     if any(one['ellipse_95_share'] for one in told):
         lines |= {
             'surfacings': [f'{one["surfacings"]:,}' for one in told],
-            'error of place, from the 4th (m)': [show(one['error_m']) for one in told],
-            'came up beside, from the 4th (m)': [show(one['cross_track_m']) for one in told],
+            'position error, from the 4th (m)': [show(one['error_m']) for one in told],
+            'cross-track, from the 4th (m)': [show(one['cross_track_m']) for one in told],
             'inside the 95 % ellipse': [f'{one["ellipse_95_share"]:.3f}' for one in told],
             'innovation squared': [f'{one["innovation_squared"]:.2f}' for one in told],
         }

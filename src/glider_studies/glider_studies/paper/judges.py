@@ -167,14 +167,14 @@ def judge_clean(rows: list[dict]) -> list[Check]:
     """Whether the guard had nothing to say, in hours enough."""
     hours = sum(row['hours'] for row in rows if row['status'] == 'completed')
     told = [
-        Check(f'{row["case"]}, {row["controller"]}', event['row'], 'nothing told', False)
+        Check(f'{row["case"]}, {row["controller"]}', event['row'], 'nothing reported', False)
         for row in rows
         for event in row['guard']['events']
     ]
     enough = Check(
         'hours flown', f'{hours:,.0f} h', f'{LEAST_CLEAN_H:,.0f} h', hours >= LEAST_CLEAN_H
     )
-    return [enough, Check('told by the guard', str(len(told)), '0', not told), *told]
+    return [enough, Check('reported by the guard', str(len(told)), '0', not told), *told]
 
 
 def _faults_of(row: dict, deepest_m: float) -> str:
@@ -192,7 +192,7 @@ def _faults_of(row: dict, deepest_m: float) -> str:
     if row['depth_m']['max'] > deepest_m:
         return f'{row["depth_m"]["max"]:.0f} m deep'
     if row['beside_m'] is not None and abs(east_m) > row['beside_m']:
-        return f'{abs(east_m):.0f} m beside the path at the end'
+        return f'{abs(east_m):.0f} m cross-track at the end'
     return ''
 
 

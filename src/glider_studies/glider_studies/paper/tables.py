@@ -162,9 +162,9 @@ _TABLES: dict[str, Callable[[list[dict]], Table]] = {
 }
 _REMARKS = {
     'reckoned': (
-        'Error: of the believed place when it comes up. Beside: largest true distance from the '
-        'path where it comes up, from the fourth surfacing on; under water from then on. DAC: how '
-        'far the mean current of a way, as it is believed after its fixes, is off the true one.'
+        'Error: of the estimated position at surfacing. Cross-track: largest true distance from '
+        'the path at surfacings, from the fourth surfacing on; under water from then on. DAC: how '
+        'far the depth-averaged current, as estimated after its fixes, is off the true one.'
     )
 }
 

@@ -42,13 +42,13 @@ function planTraces(run, scale, unit) {
   return [
     pathTrace(run, scale, { line: { color: values('--limit'), width: 1.5, dash: 'dash' } }),
     track('track', 'true track', '--measured', 'solid'),
-    track('believed', 'believed track', '--reference', 'dash'),
+    track('believed', 'estimated track', '--reference', 'dash'),
     places('true_ned_m', 'true place at surfacing', '--measured', 'circle'),
     through(surfacings.map((one) => eastNorth(one.true_ned_m)), scale, {
       mode: 'text', textposition: 'bottom left', hoverinfo: 'skip', showlegend: false,
       text: surfacings.map((_, i) => (i % every ? '' : `${i + 1} `)),
     }),
-    places('believed_ned_m', 'believed place at surfacing', '--reference', 'diamond'),
+    places('believed_ned_m', 'estimated position at surfacing', '--reference', 'diamond'),
     places('fix_ned_m', 'first fix', '--third', 'cross-thin', {
       marker: { size: 15, symbol: 'cross-thin', line: { color: values('--third'), width: 2 } },
     }),
@@ -122,7 +122,7 @@ function drawPlaces(panel, element) {
         ...common, mode: 'lines', hoverinfo: 'skip', name: '95 % ellipse', fill: 'toself', fillcolor: `${values('--reference')}22`,
         line: { color: values('--reference'), width: 1.2 },
       }),
-      place('believed place', [0, 0], '--reference', 'diamond'),
+      place('estimated position', [0, 0], '--reference', 'diamond'),
       place('true place', eastNorth(off), '--measured', 'circle'),
     );
     const ticks = { tickmode: 'array', tickvals: evenTicks(reach), tickformat: ',~r', tickfont: { size: room.font - 2 } };

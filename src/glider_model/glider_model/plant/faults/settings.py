@@ -123,7 +123,7 @@ class Mass(FaultSettings):
     """The vehicle is heavier, or lighter: something was picked up, or lost."""
 
     kind: Literal['mass']
-    mass_kg: float = Field(ge=-50.0, le=50.0, description='added net heaviness (kg, + sinks)')
+    mass_kg: float = Field(ge=-50.0, le=50.0, description='added net buoyancy (kg, + sinks)')
 
     def _pack(self) -> Packed:
         return Packed(kinds.MASS, 0, 1, (self.mass_kg,))
