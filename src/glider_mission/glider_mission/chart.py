@@ -8,10 +8,12 @@ refused.
 """
 
 import re
+from pathlib import Path
 from typing import Any
 
 from glider_base.errors import shown
 from glider_base.frames import Origin, OriginSettings, from_geodetic
+from glider_mission.goto_list import SUFFIX, read_goto_list
 
 #: By this share the chart may stretch a length at a waypoint.
 MAX_STRETCH = 0.05
@@ -61,13 +63,15 @@ def degrees(value: Any, axis: str) -> float:
 
 
 def places(waypoints: Any) -> list[tuple[float, float]]:
-    """Latitude and longitude (deg) of waypoints as a person wrote them.
+    """Latitude and longitude (deg) of waypoints as a person wrote them, or of a list of a Slocum.
 
     Raises
     ------
     ValueError
         Naming the waypoint, its value and what is allowed.
     """
+    if isinstance(waypoints, str) and waypoints.lower().endswith(SUFFIX):
+        waypoints = read_goto_list(Path(waypoints))
     if not isinstance(waypoints, list | tuple) or len(waypoints) < 2:
         raise ValueError('waypoints_latlon: no list of waypoints (allowed: 2 and more)')
     found = []
@@ -99,6 +103,8 @@ def in_metres(path: Any, settings: OriginSettings) -> Any:
     if not isinstance(path, dict) or path.get('waypoints_latlon') is None:
         return path
     origin, made = settings.params(), []
+    if isinstance(path['waypoints_latlon'], str):
+        path = {**path, 'waypoints_latlon': places(path['waypoints_latlon'])}
     for number, place in enumerate(places(path['waypoints_latlon'])):
         off = stretch(place[0], origin)
         if abs(off) > MAX_STRETCH:

@@ -21,6 +21,7 @@ SUFFIXES = {
     'geojson': '.geojson',
     'kml': '.kml',
     'gpx': '.gpx',
+    'ma': '.ma',
 }
 Kind = Enum('Kind', {text: text for text in SUFFIXES})
 
@@ -33,7 +34,8 @@ def export(
         typer.Option(
             help='netcdf: for xarray and other readers of NetCDF 3; csv: one row a tick; mat: '
             'structs for MATLAB and Octave; og1: what it measured, in the format of OceanGliders; '
-            'geojson, kml, gpx: tracks, waypoints and surfacings on a chart.'
+            'geojson, kml, gpx: tracks, waypoints and surfacings on a chart; ma: its waypoints, '
+            "as a Slocum's goto list."
         ),
     ],
     out: Annotated[
@@ -62,6 +64,11 @@ def export(
 
         with counter('reading the bag', None) as update:
             write_og1(run, start, file, update)
+    elif kind == 'ma':
+        from glider_bringup.door.tracks import write_goto_list
+        from glider_bringup.showing.flown_run import read_run
+
+        write_goto_list(read_run(run, traced=False), file)
     elif kind in ('geojson', 'kml', 'gpx'):
         from glider_bringup.door.tracks import write_chart
         from glider_bringup.showing.flown_run import read_run

@@ -17,6 +17,7 @@ from glider_base.errors import ConfigurationError
 from glider_base.frames import OriginSettings, to_geodetic
 from glider_bringup.showing.web_page import FlownRun
 from glider_mission.disk import write_whole
+from glider_mission.goto_list import goto_list
 from glider_mission.scenario import Scenario
 
 #: A track has no more points than this: more are slow to draw in a browser.
@@ -223,3 +224,20 @@ def write_chart(to: str, flown: FlownRun, start: str | None, file: Path) -> None
         If the file cannot be written, or ``start`` cannot be used.
     """
     write_whole(file, CHARTS[to](chart_of(flown, start_of(flown.scenario, start))))
+
+
+def write_goto_list(flown: FlownRun, file: Path) -> None:
+    """Write the waypoints of a run as a list of a Slocum's mission.
+
+    Raises
+    ------
+    ConfigurationError
+        If its path has no waypoints, or the file cannot be written.
+    """
+    path, origin = flown.scenario.path, flown.scenario.origin.params()
+    if path.kind != 'waypoints':
+        raise ConfigurationError(
+            f'{flown.label}: path.kind = {path.kind}: has no waypoints (allowed: waypoints)'
+        )
+    places = [to_geodetic(*point[:2], origin) for point in path.waypoints]
+    write_whole(file, goto_list(flown.scenario.name, places))

@@ -175,7 +175,8 @@ class _ThroughWaypoints(_PathSettings):
     waypoints_latlon: list[tuple[float | str, float | str]] | None = Field(
         None,
         description='Waypoints [latitude, longitude] (deg, or degrees and minutes as '
-        "'47 30.5 N') in place of waypoints, which a scenario makes of them.",
+        "'47 30.5 N'), or a Slocum's list such as goto_l10.ma, in place of waypoints, which a "
+        'scenario makes of them.',
     )
 
     @pydantic.field_validator('waypoints')
