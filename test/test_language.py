@@ -128,7 +128,7 @@ def helps() -> dict[str, str]:
 @pytest.mark.parametrize(('name', 'text'), helps().items())
 def test_help_is_short_and_in_words_of_the_field(name, text):
     assert text
-    assert long_ones(text) == own_words(text) == []
+    assert long_ones(text.replace(';', '.')) == own_words(text) == []  # ; divides what it lists
 
 
 def test_report_and_scorecard_are_in_words_of_the_field(tmp_path):
