@@ -205,16 +205,16 @@ def test_straight_legs_are_flown_where_a_plan_gains_little(monkeypatch):
     assert Pilot(load_scenario('eddies_10d', {'guidance.route': 'planned'})).order(0, None) is None
 
 
-def test_the_pace_is_that_of_the_polar_less_the_stays():
+def test_the_pace_is_that_of_the_polar_less_the_stays_and_faster_up_to_the_surface():
     scenario = load_scenario('eddies_10d')
     params = scenario.guidance_settings().params()
     pace, longer = pace_of(scenario), pace_of(load_scenario('eddies_10d', {'profile.wait_s': 6e3}))
-    assert 0.9 * params.profile_speed < pace.speed < params.profile_speed
+    assert 0.9 * params.profile_speed < pace.speed < 1.2 * params.profile_speed
     assert longer.cycle_s == pytest.approx(pace.cycle_s + 5400.0)
     assert longer.speed * longer.cycle_s == pytest.approx(pace.speed * pace.cycle_s)
 
 
-@pytest.mark.parametrize(('name', 'seed', 'rms'), [('10d', 3, 0.18), ('hard', 8, 0.42)])
+@pytest.mark.parametrize(('name', 'seed', 'rms'), [('10d', 3, 0.18), ('hard', 4, 0.55)])
 def test_the_shipped_seas_are_what_the_command_makes(name, seed, rms, tmp_path):
     write_sea(EddyingSea(seed=seed, rms_mps=rms), tmp_path / 'sea.nc')
     made, shipped = load(tmp_path / 'sea.nc'), load(SCENARIO_FOLDER / f'eddies_{name}.nc')

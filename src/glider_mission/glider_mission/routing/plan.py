@@ -14,14 +14,18 @@ from glider_mission.routing.forecast_chart import erroneous, forecast_of, with_l
 from glider_mission.routing.fronts import STENCIL, Chart, fronts, sail
 from glider_mission.scenario import Scenario
 from glider_model.ocean.density import immersed
+from glider_model.onboard.glide_polar import glide_horizontal_speed, glide_vertical_rate
 from glider_model.vehicle.file import load_vehicle
 
 #: A route is straightened where that moves it by less than this (m).
 _STRAIGHT_M = 1000.0
 #: Errors of a forecast that are tried.
 MEMBERS = 12
-#: Levels of a climb at which its pumping is counted.
-_PUMP_LEVELS = 21
+#: While all the pump has goes in or out, a vehicle stands for so much of the time: until it weighs
+#: nothing, and a third of what comes then, in which its speed grows as the root of the time.
+_STANDS_SHARE = 0.6
+#: Levels of a climb at which it is looked at.
+_LEVELS = 21
 
 
 class Pace(NamedTuple):
@@ -73,22 +77,47 @@ class Plan(NamedTuple):
 
 
 def pace_of(scenario: Scenario) -> Pace:
-    """How the vehicle of a mission gets on."""
+    """How the vehicle of a mission gets on: by its polar, up to the surface by all its pump."""
     params = scenario.guidance_settings().params()
-    profile = params.profile
-    dives = max(1, profile.surface_every)
-    stay_s = (
-        (profile.wait_ticks + profile.prepare_ticks) * TICK_S if profile.surface_every else 0.0
-    )
-    deep = profile.depth - (0.0 if dives == 1 else profile.top_depth)
-    glide_s = 2.0 * dives * deep / profile.glide_rate
-    cycle_s = glide_s + 2.0 * dives * profile.lead_s + stay_s
-    speed = params.profile_speed * glide_s / cycle_s
-    return Pace(speed, cycle_s, _cycle_wh(scenario, params, glide_s, cycle_s - glide_s, dives))
+    profile, every = params.profile, params.profile.surface_every
+    dives = max(1, every)
+    stay_s = (profile.wait_ticks + profile.prepare_ticks) * TICK_S if every else 0.0
+    deep = profile.depth - (profile.top_depth if dives > 1 else 0.0)
+    glide_s = (2 * dives - 1) * deep / profile.glide_rate
+    way_m, rise_s = glide_s * params.profile_speed, deep / profile.glide_rate
+    rise_m, turns_s = rise_s * params.profile_speed, 2.0 * dives * profile.lead_s
+    if every:
+        rise_s, rise_m = _rise(scenario, params)
+        vehicle = load_vehicle(scenario.vehicle)
+        swing = profile.net_heaviness + vehicle.params().m_b_max
+        pump_s = swing / vehicle.slowest_pump_rate(profile.depth)
+        turns_s += 2.0 * (_STANDS_SHARE * pump_s - profile.lead_s)
+    way_m += rise_m
+    cycle_s = glide_s + rise_s + turns_s + stay_s
+    hotel_s = glide_s + rise_s, cycle_s - glide_s - rise_s
+    return Pace(way_m / cycle_s, cycle_s, _cycle_wh(scenario, params, *hotel_s))
+
+
+def _levels(depth: float) -> np.ndarray:
+    """Levels of a climb (m), from below."""
+    return np.linspace(depth, 0.0, _LEVELS)
+
+
+def _rise(scenario: Scenario, params: GuidanceParams) -> tuple[float, float]:
+    """Time (s) and way through the water (m) of a climb with all the pump has."""
+    body, water = load_vehicle(scenario.vehicle).params(), scenario.water.params()
+    profile, (time_s, way_m) = params.profile, (0.0, 0.0)
+    step = profile.depth / _LEVELS
+    for depth in _levels(profile.depth):
+        net = immersed(float(depth), -body.m_b_max, body, water).net
+        rate = -glide_vertical_rate(profile.climb_pitch, net, params.polar)
+        speed = glide_horizontal_speed(profile.climb_pitch, -rate, params.polar)
+        time_s, way_m = time_s + step / rate, way_m + speed * step / rate
+    return time_s, way_m
 
 
 def _cycle_wh(
-    scenario: Scenario, params: GuidanceParams, glide_s: float, other_s: float, dives: int
+    scenario: Scenario, params: GuidanceParams, glide_s: float, other_s: float
 ) -> float | None:
     """Energy (Wh) from one stay at the surface to the next: pump, electronics and a call."""
     vehicle, profile = load_vehicle(scenario.vehicle), params.profile
@@ -101,17 +130,19 @@ def _cycle_wh(
         empty = immersed(depth, 0.0, body, water)
         return (net - empty.net) / empty.ratio
 
-    levels = np.linspace(profile.depth, 0.0, _PUMP_LEVELS)
-    rising = [heaviness(float(z), -profile.climb_net_heaviness) for z in levels]
-    steps = [heaviness(profile.depth, profile.net_heaviness), *rising, -body.m_b_max]
-    out = np.maximum(0.0, -np.diff(steps))
-    at = np.array([profile.depth, *(0.5 * (levels[1:] + levels[:-1])), 0.0])
-    costs = np.maximum(0.0, told.out + told.out_per_m * at)
-    turns = dives * out[:-1] @ costs[:-1] + out[-1] * costs[-1]
-    let_in = (dives * out[:-1].sum() + out[-1]) * max(0.0, told.let_in)
+    def cost(depth: float) -> float:
+        """Of as much pumped out there, and let in again (J/kg)."""
+        return max(0.0, told.out + told.out_per_m * depth) + max(0.0, told.let_in)
+
+    turns, levels = max(1, profile.surface_every) - 1, _levels(profile.depth)
+    heavy = heaviness(profile.depth, profile.net_heaviness)
+    rising = [heaviness(float(depth), -profile.climb_net_heaviness) for depth in levels]
+    pumped = turns * (heavy - rising[0]) * cost(profile.depth)
+    for depth, before, after in zip(levels, rising, rising[1:], strict=False):
+        pumped += turns * max(0.0, before - after) * cost(float(depth))
+    pumped += (heavy + body.m_b_max) * cost(profile.depth)
     hotel = 0.5 * (told.dive + told.climb) * glide_s + told.surface * other_s
-    call = told.call_start + told.call * told.call_s
-    return float(turns + let_in + hotel + call) / 3600.0
+    return (pumped + hotel + told.call_start + told.call * told.call_s) / 3600.0
 
 
 def route_through(
