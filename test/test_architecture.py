@@ -39,6 +39,7 @@ MAY_IMPORT = {
 FLOORS = {
     'glider_model': (('vehicle', 'ocean'), ('onboard', 'plant'), ('nodes',)),
     'glider_mission': (
+        ('goto_list',),
         ('blocks', 'chart', 'disk', 'forecast', 'rules'),
         ('scenario',),
         ('choices', 'planned', 'routing', 'run_folder'),
