@@ -58,7 +58,7 @@ LAWS = ['adaptive', 'pid']
 RECORDED = [name for name in COLUMNS if name in TOPICS]
 SPREADS = (
     *('max_steady_m', 'max_all_m', 'max_run_m'),
-    *('heading_fluctuation_deg', 'pitch_error_deg', 'energy_wh'),
+    *('heading_fluctuation_deg', 'pitch_error_deg', 'energy_wh', 'roll_travel_deg'),
 )
 
 
@@ -173,6 +173,7 @@ def scores(**changes):
         'status': 'completed',
         'navigation': dict.fromkeys(NAVIGATION),
         'energy': {'wh': 7.0},
+        'actuator_travel': {'roll_mass_deg': 800.0},
     }
     return {**good, **changes}
 
@@ -187,6 +188,7 @@ def test_a_good_run_has_not_diverged():
         'heading_fluctuation_deg': 0.1,
         'pitch_error_deg': 0.1,
         'energy_wh': 7.0,
+        'roll_travel_deg': 800.0,
         'navigation': dict.fromkeys(NAVIGATION),
     }
 
