@@ -31,15 +31,15 @@ def glider(*arguments, columns=160, timeout=300.0, preexec_fn=None, **variables)
     timeout : float
         Longer than the command takes (s).
     preexec_fn : callable, optional
-        Called in the process before the command.
+        Called in the process before the command; can be pickled.
     variables : str
         Of its environment, beside those of this process.
     """
     words = list(map(str, arguments))
     env = {name: value for name, value in os.environ.items() if name != 'ROS_DOMAIN_ID'}
     env |= {'COLUMNS': str(columns), 'PYTHONUTF8': '1', **variables}
-    if preexec_fn is None and not variables:
-        return _forked(words, env, timeout)
+    if not variables:
+        return _forked(words, env, timeout, preexec_fn)
     return subprocess.run(
         [sys.executable, '-m', 'glider_bringup.cli', *words],
         stdin=subprocess.DEVNULL,
@@ -48,7 +48,6 @@ def glider(*arguments, columns=160, timeout=300.0, preexec_fn=None, **variables)
         env=env,
         timeout=timeout,
         check=False,
-        preexec_fn=preexec_fn,
     )
 
 
@@ -64,17 +63,15 @@ def _forks():
     return context
 
 
-def _forked(words, env, timeout):
+def _forked(words, env, timeout, preexec_fn):
     """Finished process of a command, forked."""
     with tempfile.TemporaryDirectory() as folder:
-        files = [f'{folder}/{name}' for name in ('out', 'err')]
-        process = Started(words, env, *files)
+        process = Started(words, env, folder, preexec_fn=preexec_fn)
         try:
-            code = process.wait(timeout)
+            out, err = process.communicate(timeout)
         finally:
             process.kill()
-        out, err = (Path(file).read_text(encoding='utf-8') for file in files)
-    return subprocess.CompletedProcess(words, code, out, err)
+    return subprocess.CompletedProcess(words, process.returncode, out, err)
 
 
 class Started:
@@ -86,19 +83,34 @@ class Started:
         Of the command line.
     env : dict
         Environment.
-    out, error : path
-        Files that get standard output and standard error.
+    folder : path
+        Gets standard output and standard error as files, ``stdout`` and ``stderr``.
+    module : str
+        What is run.
+    preexec_fn : callable, optional
+        Called in the process before the command; can be pickled.
     """
 
-    def __init__(self, words, env, out, error) -> None:
-        files = [str(out), str(error)]
-        self._process = _forks().Process(target=_become, args=(words, env, os.getcwd(), files))
+    def __init__(self, words, env, folder, module='glider_bringup.cli', preexec_fn=None) -> None:
+        self._files = [Path(folder) / name for name in ('stdout', 'stderr')]
+        how = list(map(str, words)), env, os.getcwd(), self._files, module, preexec_fn
+        self._process = _forks().Process(target=_become, args=how)
         self._process.start()
         self.pid = self._process.pid
 
-    def poll(self) -> int | None:
+    @property
+    def returncode(self) -> int | None:
         """Exit code, negative for a signal; None while it runs."""
         return self._process.exitcode
+
+    def poll(self) -> int | None:
+        """The same."""
+        return self.returncode
+
+    def communicate(self, timeout: float | None = None) -> tuple[str, str]:
+        """Standard output and standard error, once it has ended."""
+        self.wait(timeout)
+        return tuple(file.read_text(encoding='utf-8') for file in self._files)
 
     def wait(self, timeout: float | None = None) -> int:
         """Exit code, once it has ended."""
@@ -118,7 +130,7 @@ class Started:
         self._process.join()
 
 
-def _become(words, env, folder, files):
+def _become(words, env, folder, files, module, preexec_fn):
     """Turn this process into a command that writes to two files."""
     os.environ.clear()
     os.environ.update(env)
@@ -130,7 +142,9 @@ def _become(words, env, folder, files):
     sys.stdin, sys.stdout = open(0), open(1, 'w', encoding='utf-8')
     sys.stderr = open(2, 'w', encoding='utf-8', errors='backslashreplace', buffering=1)
     sys.argv = ['glider', *words]
+    if preexec_fn:
+        preexec_fn()
     try:
-        runpy.run_module('glider_bringup.cli', run_name='__main__', alter_sys=True)
+        runpy.run_module(module, run_name='__main__', alter_sys=True)
     finally:
         atexit._run_exitfuncs()

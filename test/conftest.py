@@ -40,8 +40,7 @@ def start_glider(tmp_path):
     processes = []
 
     def start(*arguments) -> command_line.Started:
-        files = tmp_path / 'stdout', tmp_path / 'stderr'
-        processes.append(command_line.Started(list(map(str, arguments)), _environment(), *files))
+        processes.append(command_line.Started(arguments, _environment(), tmp_path))
         return processes[-1]
 
     yield start

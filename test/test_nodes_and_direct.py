@@ -38,11 +38,11 @@ RECKONED = {
     'water.bottom_m': 120.0,
     'water.wind_mps': 8.0,
     'water.wind_from_deg': 45.0,
-    'profile.depth_m': 45.0,
+    'profile.depth_m': 25.0,
     'profile.surface_every_dives': 1,
     'profile.wait_s': 130.0,
 }
-RECKONED_S = 1500
+RECKONED_S = 600
 
 #: What tells how a result came about, not what it is.
 HOW = {'engine', 'wall_time_s', 'real_time_factor', 'messages_recorded'}
@@ -158,7 +158,7 @@ def test_dead_reckoning_had_fixes_and_lost_its_way_between_them(reckoned):
     true, believed = (log[:, COLUMNS[name]][:, :2] for name in ('ground_truth/odom', 'odom'))
     apart_m = np.hypot(*(believed - true).T)
     surfacings = np.count_nonzero(np.diff(fixed.astype(int)) == 1)
-    assert surfacings >= 3
+    assert surfacings >= 2
     assert np.max(apart_m[~fixed]) > 50.0
     assert np.max(apart_m[fixed][-300:]) < 20.0
 
@@ -168,7 +168,7 @@ def test_altimeter_of_the_flight_heard_the_bottom_within_its_reach(reckoned):
     log = np.concatenate([block.copy() for block in blocks])
     height = log[:, COLUMNS['altitude'].start]
     depth = -log[:, COLUMNS['ground_truth/odom'].start + 2]
-    assert np.count_nonzero(height) > 1000
+    assert np.count_nonzero(height) > 300
     heard = height > 0.0
     assert np.max(np.abs(height + depth - 120.0)[heard]) < 1.5
     assert depth[heard].min() > 18.0
@@ -187,17 +187,17 @@ def test_dead_reckoning_verifies(glider, reckoned, engine):
 def test_payloads_are_the_same_without_the_internals_of_rclpy(glider, over_nodes, tmp_path):
     done = glider(
         *('run', over_nodes.folder / 'scenario.yaml', '--engine', 'direct', '--bag'),
-        *('--duration', 100, '--out', tmp_path / 'direct'),
+        *('--duration', 30, '--out', tmp_path / 'direct'),
     )
     assert done.returncode == 0, done.stderr
     flown = flown_by(
         over_nodes.folder,
         tmp_path / 'public',
-        100.0,
+        30.0,
         lambda name: ['-c', WITHOUT_INTERNALS, MODULES[name]],
     )
     assert flown == digests(tmp_path / 'direct')
-    assert all(count == 1000 for count, _ in flown.values())
+    assert all(count == 300 for count, _ in flown.values())
 
 
 def test_first_ticks_are_recorded_though_the_recorder_is_slow(over_nodes, tmp_path):

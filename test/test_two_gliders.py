@@ -3,8 +3,7 @@
 """Several gliders in one ROS domain: each flies as if it were alone, or says why it cannot."""
 
 import json
-import subprocess
-import sys
+import signal
 import time
 from pathlib import Path
 
@@ -13,13 +12,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 
+from command_line import Started
 from glider_base.ros.places import domain_id
 from glider_base.ros.wire.topics import recorded_topics
 from glider_bringup.engines.processes import node_environment
 
-GLIDER = [sys.executable, '-m', 'glider_bringup.cli']
 DEADLINE_S = 300.0
-DURATION_S = 600
+DURATION_S = 200
 FLOWN_BYTES = 300_000  #: of recording: several chunks are on disk
 #: Scenario by namespace.
 GLIDERS = {'alpha': 'rough_water', 'beta': 'current_8deg'}
@@ -28,16 +27,12 @@ PER_TICK = [
 ]
 
 
-def start(domain: int, scenario: str, out: Path, *options) -> subprocess.Popen:
+def start(domain: int, scenario: str, out: Path, *options) -> Started:
     """A run in a domain that is not its own."""
-    return subprocess.Popen(
-        [*GLIDER, 'run', scenario, '--out', out, '--json', *map(str, options)],
-        env=node_environment(domain),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    words = ('run', scenario, '--out', out, '--json', *options)
+    said = out.parent / f'{out.name}_said'
+    said.mkdir()
+    return Started(words, node_environment(domain), said)
 
 
 @pytest.fixture(scope='module')
@@ -57,7 +52,7 @@ def together(tmp_path_factory):
     return {name: (folders[name], json.loads(said[name][0])) for name in GLIDERS}
 
 
-def wait_for_recording(folder: Path, run: subprocess.Popen) -> None:
+def wait_for_recording(folder: Path, run: Started) -> None:
     """Return once some of a flight is on disk."""
     end = time.monotonic() + DEADLINE_S
     while not any(file.stat().st_size > FLOWN_BYTES for file in folder.glob('*.mcap')):
@@ -118,7 +113,7 @@ def rivals(tmp_path_factory):
             second = start(domain, 'rough_water', folder / 'second')
             _, message = second.communicate(timeout=DEADLINE_S)
         finally:
-            first.terminate()
+            first.send_signal(signal.SIGTERM)
             out, _ = first.communicate(timeout=DEADLINE_S)
     return second.returncode, message, folder / 'first', json.loads(out)
 

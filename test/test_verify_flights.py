@@ -4,8 +4,6 @@
 
 import json
 import os
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -19,6 +17,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
+from command_line import Started
 from glider_base.errors import EXIT_SURFACED
 from glider_base.frames import (
     odometry_from_wire,
@@ -102,18 +101,15 @@ def test_orders_in_flight_are_on_record_and_verified(glider, bystander, tmp_path
         for name in ('control_node', 'guidance_node')
     }
     out = tmp_path / 'run'
-    command = [sys.executable, '-m', 'glider_bringup.cli', 'run', '--duration', '60']
-    command += ['--speed', '8', '--set', 'profile.prepare_s=2.0', '--out', str(out)]
+    command = ('run', '--duration', 60, '--speed', 8, '--set', 'profile.prepare_s=2.0')
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
-    process = subprocess.Popen(
-        command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-    )
+    process = Started([*command, '--out', out], environment, tmp_path)
     end = time.monotonic() + DEADLINE_S
 
     def wait_for(condition, what: str) -> None:
         while not condition():
             assert time.monotonic() < end, what
-            assert process.poll() is None, f'{what}: {process.stderr.read()}'
+            assert process.poll() is None, f'{what}: {process.communicate()}'
             executor.spin_once(timeout_sec=0.05)
 
     def call(client, request):
@@ -138,9 +134,7 @@ def test_orders_in_flight_are_on_record_and_verified(glider, bystander, tmp_path
         assert process.returncode == EXIT_SURFACED, error
         assert 'ordered to the surface' in error
     finally:
-        if process.poll() is None:
-            process.kill()
-            process.wait()
+        process.kill()
     (file,) = out.glob('*.mcap')
     with file.open('rb') as stream:
         events = [m.data for _, _, m in make_reader(stream).iter_messages(['/diagnostics'])]

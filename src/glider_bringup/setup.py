@@ -11,12 +11,7 @@ setup(
     name=package_name,
     version='0.1.0',
     packages=find_packages(exclude=['test']),
-    package_data={
-        package_name: [
-            'nodes/*.xml',
-            'showing/web/*',
-        ]
-    },
+    package_data={package_name: ['showing/web/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

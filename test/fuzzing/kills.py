@@ -25,12 +25,12 @@ from typing import NamedTuple
 import numpy as np
 
 from fuzzing.counts import HANG_S, Counter
+from fuzzing.flight_listener import Heard, flight_heard
 from glider_base.ros.places import NAMESPACE, domain_id
 from glider_base.signals import TICK_NS, TICK_S
 from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive, left_over, mapped
 from glider_bringup.engines.processes import MODULES
-from glider_bringup.nodes.flight_listener import Heard, flight_heard
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.read_back import read_back
 from glider_mission.recording.recover import recover
@@ -160,5 +160,5 @@ def _wait(condition, seconds: float) -> bool:
     while not condition():
         if time.monotonic() > deadline_s:
             return False
-        time.sleep(0.002)
+        time.sleep(0.01)
     return True

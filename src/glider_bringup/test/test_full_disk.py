@@ -7,11 +7,12 @@ import json
 import os
 import resource
 import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+import command_line
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
@@ -31,14 +32,8 @@ MOST = 500_000
 
 def glider(*arguments) -> subprocess.CompletedProcess:
     """Run a command on a disk on which no file can grow beyond `MOST`."""
-    return subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        env={name: value for name, value in os.environ.items() if name != 'ROS_DOMAIN_ID'},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (MOST, MOST)),
-    )
+    limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (MOST, MOST))
+    return command_line.glider(*arguments, preexec_fn=limit)
 
 
 @pytest.mark.parametrize('code', [errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO])

@@ -7,8 +7,7 @@ import os
 import random
 import resource
 import shutil
-import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,7 @@ from mcap.writer import CompressionType
 from rosbags.highlevel import AnyReader
 from typer.testing import CliRunner
 
+from command_line import glider
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_bringup.cli import app
@@ -192,13 +192,8 @@ def test_full_disk_is_named_and_the_file_stays(short_run, cut_run):
     size = file_of(short_run).stat().st_size
     folder = cut_run(size - 100)
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    done = subprocess.run(
-        [sys.executable, '-m', 'glider_bringup.cli', 'recover', str(folder)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size // 2, size // 2)),
-    )
+    limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (size // 2, size // 2))
+    done = glider('recover', folder, preexec_fn=limit)
     assert (done.returncode, done.stdout) == (1, '')
     assert 'File too large' in done.stderr
     assert 'Traceback' not in done.stderr

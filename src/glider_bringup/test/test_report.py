@@ -10,6 +10,7 @@ import resource
 import shutil
 import sys
 import zlib
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -424,16 +425,12 @@ def test_times_are_said_as_people_say_them(seconds, text):
 # ---------------------------------------------------------------------------------- mistakes
 
 
-def limit_files():
-    """Let no file grow beyond 100 kB: a disk that is full."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
-
-
 def test_report_that_cannot_be_written_loses_no_run(tmp_path):
     folder = tmp_path / 'flight'
+    full = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (100_000, 100_000))
     done = glider(
         *('run', '--engine', 'direct', '--duration', 900, '--json', '--out', folder),
-        preexec_fn=limit_files,
+        preexec_fn=full,
     )
     assert done.returncode == 1, done.stderr
     assert 'Traceback' not in done.stderr

@@ -5,12 +5,12 @@
 import json
 import os
 import shutil
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
+
+from command_line import Started
 
 DEADLINE_S = 300.0
 FLOWN_BYTES = 100_000  #: of recording: several chunks are on disk
@@ -47,17 +47,12 @@ def exchange_bag(folder: Path) -> None:
 )
 def test_recording_that_vanishes_is_told_when_it_does(tmp_path, engine, happens):
     folder = tmp_path / 'run'
-    run = subprocess.Popen(
-        [
-            *(sys.executable, '-m', 'glider_bringup.cli', 'run', 'current_8deg', '--json'),
-            *('--no-report', '--engine', engine, '--bag', '--out', folder),
-            *('--duration', str(LONG_S[engine])),
-        ],
-        env={name: value for name, value in os.environ.items() if name != 'ROS_DOMAIN_ID'},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
+    words = (
+        *('run', 'current_8deg', '--json', '--no-report', '--engine', engine, '--bag'),
+        *('--out', folder, '--duration', LONG_S[engine]),
     )
+    env = {name: value for name, value in os.environ.items() if name != 'ROS_DOMAIN_ID'}
+    run = Started(words, env, tmp_path)
     try:
         end = time.monotonic() + DEADLINE_S
         while not any(file.stat().st_size > FLOWN_BYTES for file in folder.glob('*.mcap')):

@@ -3,11 +3,10 @@
 """Faults as part of a scenario: what is written, what is told of them, what verify says."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
+from command_line import glider
 from glider_base.settings import ConfigurationError, find_field, unit_of
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.recorded_run import Recording
@@ -30,10 +29,7 @@ faults:
 
 def fly(*words) -> dict:
     """Scorecard of a flight by the direct engine."""
-    line = [sys.executable, '-m', 'glider_bringup.cli', 'run', *map(str, words)]
-    process = subprocess.run(
-        [*line, '--engine', 'direct', '--json'], capture_output=True, text=True, timeout=300
-    )
+    process = glider('run', *words, '--engine', 'direct', '--json')
     assert process.returncode == 0, process.stderr
     return json.loads(process.stdout)
 
