@@ -174,11 +174,12 @@ class GuidanceSettings(GuidanceLawSettings):
         json_schema_extra=TUNABLE,
     )
     orders: list[Order] = Field([], description='orders to the vehicle in flight, and when')
+    altitude: bool = Field(False, description='an altimeter is fitted; its topic is waited for')
 
     @property
     def topics(self) -> tuple[str, ...]:
         """Those of the topics that not every run has that it reads."""
-        return ('altitude',) if self.profile.clearance_m > 0.0 else ()
+        return ('altitude',) if self.altitude or self.profile.clearance_m > 0.0 else ()
 
     def check(self) -> None:
         """Refuse a depth, a glide or a yo that the vehicle does not have."""

@@ -301,6 +301,7 @@ class Scenario(Settings):
             dives=self.dives,
             duration_s=self.duration_s,
             orders=self.orders,
+            altitude='altitude' in self.topics,
             **self._believing(self.guidance),
         )
 
