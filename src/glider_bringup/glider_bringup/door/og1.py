@@ -30,8 +30,8 @@ from glider_mission.scenario import Scenario
 from glider_model.ocean.density import depth_at
 from glider_model.vehicle.file import load_vehicle, vehicle_file
 
-#: Time between two measurements in the file (ticks): 2 s.
-EVERY = 20
+#: Time between two measurements in the file (ticks): 1 s.
+EVERY = 10
 #: Without a GPS in the scenario, it has a fix this often (s) where it is this shallow (m).
 FIX_EVERY_S, FIX_DEPTH_M = 60.0, 1.0
 #: Phases of OG1 by the stages of guidance.
