@@ -21,6 +21,8 @@ from glider_model.vehicle.file import load_vehicle
 _STRAIGHT_M = 1000.0
 #: Errors of a forecast that are tried.
 MEMBERS = 12
+#: What is left of the speed of the polar for a vehicle that steers, by what eddies_10d flies (-).
+_HELD_SHARE = 0.93
 #: While all the pump has goes in or out, a vehicle stands for so much of the time: until it weighs
 #: nothing, and a third of what comes then, in which its speed grows as the root of the time.
 _STANDS_SHARE = 0.6
@@ -95,7 +97,7 @@ def pace_of(scenario: Scenario) -> Pace:
     way_m += rise_m
     cycle_s = glide_s + rise_s + turns_s + stay_s
     hotel_s = glide_s + rise_s, cycle_s - glide_s - rise_s
-    return Pace(way_m / cycle_s, cycle_s, _cycle_wh(scenario, params, *hotel_s))
+    return Pace(_HELD_SHARE * way_m / cycle_s, cycle_s, _cycle_wh(scenario, params, *hotel_s))
 
 
 def _levels(depth: float) -> np.ndarray:
