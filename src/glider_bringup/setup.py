@@ -9,7 +9,7 @@ package_name = 'glider_bringup'
 
 setup(
     name=package_name,
-    version='0.1.0',
+    version='1.0.0',
     packages=find_packages(exclude=['test']),
     package_data={package_name: ['showing/web/*']},
     data_files=[
@@ -19,13 +19,23 @@ setup(
         (f'share/{package_name}/layouts', glob('layouts/*')),
         (f'share/{package_name}/security', glob('security/*')),
     ],
-    install_requires=['setuptools'],
+    install_requires=[
+        'setuptools',
+        'glider_mission',
+        'jinja2',
+        'matplotlib',
+        'plotly',
+        'rich',
+        'typer',
+        'xarray',
+    ],
     extras_require={'test': ['pytest', 'hypothesis']},
     zip_safe=False,
     maintainer='The glider stack authors',
     maintainer_email='maintainers@example.com',
     description='Flying an underwater glider: runner, recorder, score, report, command line.',
     license='Apache-2.0',
+    license_files=['LICENSE'],
     entry_points={
         'console_scripts': [
             'autopilot = glider_bringup.nodes.autopilot:main',

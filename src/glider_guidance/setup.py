@@ -7,19 +7,20 @@ package_name = 'glider_guidance'
 
 setup(
     name=package_name,
-    version='0.1.0',
+    version='1.0.0',
     packages=find_packages(exclude=['test']),
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=['setuptools', 'glider_model'],
     extras_require={'test': ['pytest', 'hypothesis']},
     zip_safe=False,
     maintainer='The glider stack authors',
     maintainer_email='maintainers@example.com',
     description='Guidance of an underwater glider: paths, line-of-sight laws, dive profile.',
     license='Apache-2.0',
+    license_files=['LICENSE'],
     entry_points={
         'console_scripts': [
             'guidance_node = glider_guidance.nodes.guidance_node:main',

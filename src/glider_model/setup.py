@@ -7,20 +7,21 @@ package_name = 'glider_model'
 
 setup(
     name=package_name,
-    version='0.1.0',
+    version='1.0.0',
     packages=find_packages(exclude=['test']),
     package_data={package_name: ['vehicle/vehicles/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=['setuptools', 'glider_base', 'scipy'],
     extras_require={'test': ['pytest', 'hypothesis']},
     zip_safe=False,
     maintainer='The glider stack authors',
     maintainer_email='maintainers@example.com',
     description='Underwater glider, water and frames as pure step functions, and their nodes.',
     license='Apache-2.0',
+    license_files=['LICENSE'],
     entry_points={
         'console_scripts': [
             'plant_node = glider_model.nodes.plant_node:main',

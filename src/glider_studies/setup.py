@@ -7,20 +7,21 @@ package_name = 'glider_studies'
 
 setup(
     name=package_name,
-    version='0.1.0',
+    version='1.0.0',
     packages=find_packages(exclude=['test']),
     package_data={package_name: ['paper/*.yaml', 'sweep/sweeps/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=['setuptools', 'glider_bringup', 'dask', 'distributed'],
     extras_require={'test': ['pytest', 'hypothesis']},
     zip_safe=False,
     maintainer='The glider stack authors',
     maintainer_email='maintainers@example.com',
     description='Many flights of a glider: sweeps, Monte Carlo, experiments, searches.',
     license='Apache-2.0',
+    license_files=['LICENSE'],
     entry_points={
         'glider.commands': [
             f'{name} = glider_studies.commands.{name}:app'

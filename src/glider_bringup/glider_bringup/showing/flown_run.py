@@ -3,10 +3,10 @@
 """A run as pages and figures show it: read from where it was kept, or from its bag."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
-from glider_bringup.scoring.again import Reading, score_bag
 from glider_bringup.scoring.card import read_score
 from glider_bringup.scoring.traces import Tracer, Traces, load_traces, make_tracer
 from glider_bringup.showing.figure import draw_run
@@ -24,9 +24,12 @@ from glider_mission.run_folder import (
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import load_vehicle
 
+if TYPE_CHECKING:
+    from glider_bringup.scoring.again import Reading
+
 
 def read_run(
-    run: Path, progress: Reading = lambda ticks, total: None, traced: bool = True
+    run: Path, progress: 'Reading' = lambda ticks, total: None, traced: bool = True
 ) -> FlownRun:
     """A run as pages and figures show it: as it was kept when it was flown, else from its bag.
 
@@ -58,6 +61,8 @@ def read_run(
             )
         else:
             tracer = make_tracer(scenario) if traced else None
+            from glider_bringup.scoring.again import score_bag  # which needs ROS 2
+
             card = score_bag(run, bag, scenario, card, progress, [tracer] if tracer else [])
             traces = tracer.result() if tracer else None
         return flown_run(run, scenario, found.text, card, traces)
@@ -119,7 +124,7 @@ def write_report(run: FlownRun, file: Path) -> None:
     write_whole(file, report_page(run))
 
 
-def draw(run: Path, file: Path, progress: Reading = lambda ticks, total: None) -> None:
+def draw(run: Path, file: Path, progress: 'Reading' = lambda ticks, total: None) -> None:
     """Draw a run into an image file.
 
     Raises
