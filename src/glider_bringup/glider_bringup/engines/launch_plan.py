@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace
-from glider_base.ros.wire.topics import CURRENT, GUARD, NAVIGATION
+from glider_base.ros.wire.topics import CURRENT, GUARD, GUIDANCE, NAVIGATION
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
@@ -218,6 +218,7 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     with_navigation = _TRUTH.get(text['navigation'], not knows_place)
     if not with_navigation:  # nor is there any sensor of its own
         parameters[GUARD] |= {'pressure': False, 'altitude': False}
+        parameters[GUIDANCE] |= {'altitude': False}
     nodes = _nodes(
         simulate,
         with_navigation,
