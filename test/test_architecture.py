@@ -32,7 +32,9 @@ MAY_IMPORT = {
     'glider_mission': ON_BOARD,
     'glider_bringup': {*ON_BOARD, 'glider_mission'},
     'glider_studies': {*ON_BOARD, 'glider_mission', 'glider_bringup'},
-    'glider_flights': {'glider_base', 'glider_model', 'glider_mission', 'glider_bringup'},
+    'glider_flights': {
+        *('glider_base', 'glider_model', 'glider_navigation', 'glider_mission', 'glider_bringup'),
+    },
 }
 
 #: Rooms of some packages by floors, from below: a room imports from the floors beneath it only.

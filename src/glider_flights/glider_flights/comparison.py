@@ -8,9 +8,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_flights.forecast import FORECASTS, Forecaster
-from glider_flights.reckoning import Reckoned, mean_current, reckon
+from glider_flights.reckoning import FIX_STD_M, Reckoned, check, mean_current, reckon, runs
 from glider_flights.record import Flight, Segment
+
+#: Method of navigation, if nothing else is said.
+METHOD = 'dead_reckoned'
+#: A current that is further off than this has its reason told (m/s).
+FAR_OFF_MPS = 0.02
+#: Names of the forecasts.
+FORECASTS = ('none', 'persistence', 'ours')
 
 
 class Row(NamedTuple):
@@ -31,49 +37,92 @@ def comparable_current(flight: Flight, segment: Segment, reckoned: Reckoned) -> 
     return reckoned.dac_mps
 
 
-def navigate(flight: Flight, progress: Callable[[int, int], None]) -> list[Row]:
-    """Navigate all segments, in the order of time, each by what was known before it."""
+def navigate(
+    flight: Flight, progress: Callable[[int, int], None], method: str = METHOD
+) -> list[Row]:
+    """Navigate all segments, in the order of time, each by what was known before it.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no such method, or it reads what was not recorded.
+    """
+    check(method)
     rows: list[Row] = []
-    forecaster = Forecaster()
-    for number, segment in enumerate(flight.segments):
-        progress(number, len(flight.segments))
-        reckoned = reckon(segment)
-        comparable = comparable_current(flight, segment, reckoned)
-        missed = dict.fromkeys(FORECASTS, math.nan)
-        at_s = 0.5 * (reckoned.dived_s + reckoned.surfaced_s)
-        for name, forecast in forecaster.forecast(at_s).items():
-            wrong = reckoned.dac_mps - forecast
-            missed[name] = float(np.hypot(*wrong)) * reckoned.seconds
-        forecaster.tell(at_s, reckoned.dac_mps, reckoned.seconds)
-        believed = segment.on_board.surfaced_m
-        missed['on_board'] = float(np.hypot(*(reckoned.surfaced_m - believed)))
-        rows.append(Row(segment, reckoned, comparable, missed))
+    done = 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        progress(done, 2 * len(flight.segments))
+
+    for run in runs(flight.segments):
+        last = None
+        for segment, reckoned in zip(run, reckon(flight, run, method, step), strict=True):
+            comparable = comparable_current(flight, segment, reckoned)
+            missed = _missed(segment, reckoned, last)
+            rows.append(Row(segment, reckoned, comparable, missed))
+            last = reckoned
     return rows
 
 
-def summary(flight: Flight, rows: list[Row]) -> dict[str, Any]:
+def _missed(segment: Segment, reckoned: Reckoned, last: Reckoned | None) -> dict[str, float]:
+    """How far off it surfaced (m), by forecasts that know of the dive before, if there is one."""
+    missed = dict.fromkeys(FORECASTS, math.nan)
+    if last is not None:
+        for name, current in (('none', np.zeros(2)), ('persistence', last.told_mps)):
+            missed[name] = float(np.hypot(*(reckoned.dac_mps - current))) * reckoned.seconds
+        missed['ours'] = float(np.hypot(*(reckoned.surfaced_m - reckoned.believed_m)))
+    believed = segment.on_board.surfaced_m
+    missed['on_board'] = float(np.hypot(*(reckoned.surfaced_m - believed)))
+    return missed
+
+
+def summary(flight: Flight, rows: list[Row], method: str = METHOD) -> dict[str, Any]:
     """Figures of a flight, as `--json` prints them."""
     dac = [np.hypot(*(row.comparable_mps - row.segment.on_board.dac_mps)) for row in rows]
+    told = [np.hypot(*(row.reckoned.told_mps - row.reckoned.dac_mps)) for row in rows]
     way = [np.hypot(*(row.reckoned.way_m - row.segment.on_board.way_m)) for row in rows]
     through_water = [np.hypot(*row.reckoned.way_m) for row in rows]
+    ratio = [
+        own / np.hypot(*row.segment.on_board.way_m)
+        for own, row in zip(through_water, rows, strict=True)
+    ]
     names = list(FORECASTS)
     if any(math.isfinite(row.missed_m['on_board']) for row in rows):
         names.append('on_board')
     return {
         'vehicle': flight.kind,
+        'method': method,
         'files': len(flight.files),
         'first_file': flight.files[0],
         'last_file': flight.files[-1],
         'segments': len(rows),
         'duration_s': round(rows[-1].reckoned.surfaced_s - rows[0].reckoned.dived_s, 1),
         'under_water_s': round(sum(row.reckoned.seconds for row in rows), 1),
-        'through_water_m': round(float(sum(through_water)), 1),
+        'through_water_m': round(float(np.nansum(through_water)), 1),
         'on_board_current_is_mean': flight.on_board_over,
         'dac_difference_mps': _spread(dac, 4),
+        'told_difference_mps': _spread(told, 4),
         'way_difference_m': _spread(way, 1),
+        'way_ratio': _spread(ratio, 4),
         'prediction_m': {name: _spread([row.missed_m[name] for row in rows], 1) for name in names},
-        'notes': flight.notes,
+        'notes': flight.notes + _why_far_off(rows, dac),
     }
+
+
+def _why_far_off(rows: list[Row], dac: list[float]) -> list[str]:
+    """Why the current is far off, if it is: what fixes and samples of such dives can tell."""
+    off = _spread(dac, 4)['median']
+    if off is None or off <= FAR_OFF_MPS:
+        return []
+    seconds = float(np.median([row.reckoned.seconds for row in rows]))
+    apart_s = float(np.median([np.median(np.diff(row.segment.samples.time_s)) for row in rows]))
+    return [
+        f'current {100.0 * off:.1f} cm/s off that on board: in dives of {seconds / 60.0:.0f} min '
+        f'{FIX_STD_M:g} m of each of two fixes are {140.0 * FIX_STD_M / seconds:.1f} cm/s, and '
+        f'samples {apart_s:.0f} s apart leave open when it left the surface and when it came back'
+    ]
 
 
 def _spread(values: list[float], digits: int) -> dict[str, Any]:

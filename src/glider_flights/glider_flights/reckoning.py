@@ -1,49 +1,66 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Dead reckoning of a dive, and the current that its next fix tells.
+"""What navigation makes of a recorded flight: its node's kernel, fed as by a driver.
 
-Speed through the water comes from pitch with the vertical rate, or with the buoyancy where that is
-recorded, by lift and drag of a steady glide (Merckelbach et al. 2010, Eriksen et al. 2001).
+A sample, or a fix, is there from the tick after it was recorded, and until the next one. Where a
+base station wrote the buoyancy it is that of the buoyancy engine; lift and drag are those of the
+flight. The way through the water is that of a second run, which believes in no current.
 """
 
+import itertools
 import math
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from glider_flights.record import (
-    NOT_KNOWN,
-    SURFACE_DEPTH_M,
-    Fixes,
-    Polar,
-    Samples,
-    Segment,
-)
+from glider_base.errors import ConfigurationError
+from glider_base.frames import imu_to_wire, quaternion_from_euler, to_geodetic
+from glider_base.kernel import kernel
+from glider_base.signals import TICK_NS, TICK_S, Imu
+from glider_base.wiring import WHEN_SILENT
+from glider_flights.record import NOT_KNOWN, Fixes, Flight, Samples, Segment
+from glider_mission.recording.recorded_inputs import RecordedBlock
+from glider_model.ocean.density import pressure_at
+from glider_model.vehicle.file import changed_vehicle
+from glider_navigation.block import NAVIGATION
+from glider_navigation.phase import UNDER_WATER
+from glider_navigation.settings import METHODS, NavigationSettings
 
-GRAVITY = 9.81
+#: Vehicle file whose lift and drag are changed to those of a flight.
+VEHICLE = 'seaglider'
+#: What recorded flights tell of the topics that navigation may read.
+RECORDED = ('imu', 'pressure', 'fix')
+#: Of the water in which the constants of a flight hold (kg/m^3).
 DENSITY = 1027.5
-#: Where the polar is not believed, in a turn-over, the last speed fades with this time (s).
-FADE_S = 7.5
-#: Angle of attack and dynamic pressure settle to this (rad), in no more steps than these.
-SETTLED_RAD, STEPS = 1e-6, 60
-#: No glider is faster through the water (m/s).
-FASTEST_MPS = 1.5
-#: The vertical rate is the slope of depth over about this time (s).
-RATE_S = 15.0
+#: Standard deviation of a fix, north and east (m).
+FIX_STD_M = 5.0
+#: No engine has more oil than this (cc): all of what is recorded is believed.
+MOST_OIL_CC = 2000.0
+#: Buoyancy tells the speed of a dive if it is known for this share of the samples.
+BUOYANCY_KNOWN = 0.5
+#: The stay before the first dive counts for no longer than this (s).
+FIRST_STAY_S = 6.0 * 3600.0
+#: What was the current of the last dive is told when the next one begins: it is made up, so long
+#: (s) and so deep (m).
+MADE_UP_S, MADE_UP_M = 5.0, 10.0
+#: So many ticks are worked through at once.
+TICKS = 36_000
 #: Fixes over a shorter time say nothing of the drift at the surface (s).
 SHORTEST_DRIFT_S = 60.0
 
 
 class Reckoned(NamedTuple):
-    """What navigation makes of a segment."""
+    """What navigation makes of a segment; places and ways of shape (2,): north, east."""
 
-    #: When it left the surface and when it came back (s since 1970).
+    #: When it dived and when it came up (s since 1970), and where, by the fixes of its stays (m).
     dived_s: float
     surfaced_s: float
-    #: Where, of shape (2,): north, east (m).
     dived_m: np.ndarray
     surfaced_m: np.ndarray
-    way_m: np.ndarray  #: way through the water between the two, of shape (2,): north, east (m)
+    way_m: np.ndarray  #: way through the water between the two (m)
+    believed_m: np.ndarray  #: where it believed to come up, from where it dived (m)
+    told_mps: np.ndarray  #: current that it told afterwards (m/s)
 
     @property
     def seconds(self) -> float:
@@ -63,73 +80,6 @@ def mean_current(segment: Segment, reckoned: Reckoned) -> np.ndarray:
     return (moved_m - reckoned.way_m) / (end_s - begin_s)
 
 
-def vertical_rate(time_s: np.ndarray, depth_m: np.ndarray, over_s: float = RATE_S) -> np.ndarray:
-    """Vertical rate (m/s, + down), shape (n,): the slope of depth over about ``over_s``."""
-    begin = np.maximum(time_s - 0.5 * over_s, time_s[0])
-    end = np.minimum(time_s + 0.5 * over_s, time_s[-1])
-    index = np.arange(len(time_s))
-    # With samples that are further apart, the neighbours.
-    begin = np.minimum(begin, time_s[np.maximum(index - 1, 0)])
-    end = np.maximum(end, time_s[np.minimum(index + 1, len(time_s) - 1)])
-    first, last = np.interp(begin, time_s, depth_m), np.interp(end, time_s, depth_m)
-    return (last - first) / (end - begin)
-
-
-def glide(
-    pitch_rad: np.ndarray, polar: Polar, rate_mps: np.ndarray, buoyancy_kg: np.ndarray
-) -> np.ndarray:
-    """Horizontal speed through the water (m/s) of steady glides, NaN where there is none.
-
-    Lift and drag balance the buoyancy: b q^s + c alpha^2 + a alpha tan(gamma) = 0, with the glide
-    angle gamma = theta - alpha and q from the vertical rate w = -V sin(gamma), or from drag equal
-    to B sin(gamma) where the buoyancy B is known.
-    """
-    rises = np.where(np.isnan(buoyancy_kg), -rate_mps, buoyancy_kg)
-    usable = (np.abs(pitch_rad) >= polar.shallowest_rad) & (rises * pitch_rad > 0.0)
-    theta = np.where(usable, pitch_rad, math.nan)
-    weighed = np.isfinite(buoyancy_kg)
-    force = np.abs(buoyancy_kg) * GRAVITY / polar.area_m2
-    gamma = np.copysign(0.25 * math.pi, theta)
-    pressure = np.where(
-        weighed, force / polar.drag, 0.5 * DENSITY * (rate_mps / np.sin(gamma)) ** 2
-    )
-    with np.errstate(invalid='ignore', divide='ignore'):
-        for _ in range(STEPS):
-            drag = polar.drag * pressure**polar.exponent
-            half = 0.5 * polar.lift * np.tan(gamma) / polar.induced
-            root = half * half - drag / polar.induced
-            alpha = -half + np.copysign(np.sqrt(np.maximum(root, 0.0)), half)
-            last, gamma = gamma, 0.5 * (gamma + theta - alpha)
-            sine = np.abs(np.sin(gamma))
-            told = force * sine / (drag + polar.induced * alpha * alpha)
-            pressure = np.where(weighed, told, 0.5 * DENSITY * (rate_mps / sine) ** 2)
-            if not (np.abs(gamma - last) > SETTLED_RAD).any():
-                break
-        level = np.sqrt(2.0 * pressure / DENSITY) * np.cos(gamma)
-        return np.where((root >= 0.0) & (level <= FASTEST_MPS), level, math.nan)
-
-
-def horizontal_speed(samples: Samples, polar: Polar) -> np.ndarray:
-    """Horizontal speed through the water (m/s), shape (n,), also where no glide is steady."""
-    rate_mps = vertical_rate(samples.time_s, samples.depth_m)
-    steady = glide(samples.pitch_rad, polar, rate_mps, samples.buoyancy_kg)
-    known = np.isfinite(steady)
-    if not known.any():
-        return np.zeros(len(steady))
-    last = np.maximum.accumulate(np.where(known, np.arange(len(steady)), 0))
-    faded = np.exp(-(samples.time_s - samples.time_s[last]) / FADE_S)
-    return np.nan_to_num(steady)[last] * faded
-
-
-def way_through_water(samples: Samples, polar: Polar) -> np.ndarray:
-    """Way through the water (m) since the first sample, shape (n, 2): north, east."""
-    speed = horizontal_speed(samples, polar)
-    heading = samples.heading_rad
-    velocity = np.stack([speed * np.cos(heading), speed * np.sin(heading)], axis=-1)
-    steps = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(samples.time_s)[:, None]
-    return np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
-
-
 def surface_drift(fixes: Fixes) -> np.ndarray:
     """Drift at the surface (m/s), shape (2,): the slope through the fixes; NaN if not known."""
     if len(fixes.time_s) < 2 or np.ptp(fixes.time_s) < SHORTEST_DRIFT_S:
@@ -137,35 +87,59 @@ def surface_drift(fixes: Fixes) -> np.ndarray:
     return np.polyfit(fixes.time_s - fixes.time_s[0], fixes.place_m, 1)[0]
 
 
-def moments_under_water(segment: Segment) -> tuple[float, float]:
-    """When a vehicle left the surface and when it came back (s since 1970).
+def runs(segments: Sequence[Segment]) -> list[list[Segment]]:
+    """Segments that follow each other without a dive between them that is not known."""
+    found = [list(segments[:1])] if segments else []
+    for last, segment in itertools.pairwise(segments):
+        if segment.before.time_s[-1] == last.after.time_s[-1]:
+            found[-1].append(segment)
+        else:
+            found.append([segment])
+    return found
 
-    Where samples are far apart the crossing of the surface is put as early or as late as the
-    vertical rate of the first or last of them has it, but not into the time of the fixes.
+
+def check(method: str) -> None:
+    """Refuse a method that recorded flights cannot feed.
+
+    Raises
+    ------
+    ConfigurationError
     """
-    time_s, depth_m = segment.samples.time_s, segment.samples.depth_m
-    deep = np.flatnonzero(depth_m > SURFACE_DEPTH_M)
-    first, last = deep[0], deep[-1]
-    rate = np.abs(vertical_rate(time_s, depth_m))
-    typical = max(0.02, float(np.median(rate)))
-    dived = time_s[first] - (depth_m[first] - SURFACE_DEPTH_M) / typical
-    surfaced = time_s[last] + (depth_m[last] - SURFACE_DEPTH_M) / typical
-    if first > 0:
-        dived = max(dived, time_s[first - 1])
-    if last < len(time_s) - 1:
-        surfaced = min(surfaced, time_s[last + 1])
-    return max(dived, segment.before.time_s[-1]), min(surfaced, segment.after.time_s[0])
+    if method not in METHODS:
+        raise ConfigurationError(f'--method {method} (allowed: {", ".join(METHODS)})')
+    lacking = [name for name in METHODS[method]().reads if name not in RECORDED]
+    if lacking:
+        raise ConfigurationError(
+            f'--method {method}: reads {", ".join(lacking)}, which no flight has recorded '
+            f'(allowed: what reads some of {", ".join(RECORDED)})'
+        )
 
 
-def reckon(segment: Segment) -> Reckoned:
-    """Dead reckoning of a segment: from the last fix before it to the first after it.
+def reckon(
+    flight: Flight, run: Sequence[Segment], method: str, progress: Callable[[], None]
+) -> list[Reckoned]:
+    """Navigate segments that follow each other."""
+    still = list(_navigated(flight, run, method, 'none', progress))
+    led = list(_navigated(flight, run, method, 'persistence', progress))
+    told = [one.told_mps for one in led[1:]]
+    return [
+        _reckoned(segment, one, other.way_m, current)
+        for segment, one, other, current in zip(run, still, led, told, strict=False)
+    ]
 
-    Between fix and dive, and between surfacing and fix, it drifts as its fixes there say; where
-    they say nothing, that time counts as under water.
-    """
-    dived_s, surfaced_s = moments_under_water(segment)
+
+class _Under(NamedTuple):
+    """What came out of the ticks from a dive until the next one."""
+
+    dived_s: float
+    surfaced_s: float
+    way_m: np.ndarray
+    told_mps: np.ndarray  #: at the end: the current of the segment before
+
+
+def _reckoned(segment: Segment, under: _Under, led_m, told_mps) -> Reckoned:
+    dived_s, surfaced_s = under.dived_s, under.surfaced_s
     dived_m, surfaced_m = segment.before.place_m[-1], segment.after.place_m[0]
-    way_m = way_through_water(segment.samples, segment.polar)[-1]
     drift = surface_drift(segment.before)
     if np.isnan(drift).any():
         dived_s = segment.before.time_s[-1]
@@ -176,4 +150,146 @@ def reckon(segment: Segment) -> Reckoned:
         surfaced_s = segment.after.time_s[0]
     else:
         surfaced_m = surfaced_m - drift * (segment.after.time_s[0] - surfaced_s)
-    return Reckoned(dived_s, surfaced_s, dived_m, surfaced_m, way_m)
+    believed_m = dived_m + led_m
+    return Reckoned(dived_s, surfaced_s, dived_m, surfaced_m, under.way_m, believed_m, told_mps)
+
+
+def _navigated(
+    flight: Flight, run: Sequence[Segment], method: str, current: str, progress
+) -> Iterator[_Under]:
+    """What came out of each segment of a run, and of the dive that is made up after it."""
+    fixes = _fixes_of(run)
+    begin_s, end_s = fixes.time_s[0] - 1.0, fixes.time_s[-1] + 1.0
+    made_up = Samples(*np.array([end_s, MADE_UP_M, -0.4, 0.0, math.nan])[:, None])
+    told = [*(segment.samples for segment in run), made_up]
+    samples = Samples(*(np.concatenate(values) for values in zip(*told, strict=True)))
+    start = _settings(flight, run[0], method, current, fixes.place_m[0])
+    block, driver = RecordedBlock(NAVIGATION, start), _Driver(samples, fixes, start)
+    edges = [begin_s, *(one.before.time_s[-1] for one in run[1:]), end_s, end_s + MADE_UP_S]
+    for number, (since_s, until_s) in enumerate(itertools.pairwise(edges)):
+        segment = run[min(number, len(run) - 1)]
+        block.tune(_settings(flight, segment, method, current, fixes.place_m[0]))
+        ticks = [round((edge - begin_s) / TICK_S) for edge in (since_s, until_s)]
+        parts = [
+            _published(block, driver, np.arange(first, min(first + TICKS, ticks[1])), begin_s)
+            for first in range(ticks[0], ticks[1], TICKS)
+        ]
+        dive_s = -math.inf if number == len(run) else segment.after.time_s[0] + 1.0
+        if number < len(run):
+            progress()
+        yield _under(*(np.concatenate(part) for part in zip(*parts, strict=True)), dive_s)
+
+
+def _published(block: RecordedBlock, driver: '_Driver', ticks: np.ndarray, begin_s: float):
+    """Times, places, told currents and phases of some ticks."""
+    time_s = begin_s + TICK_S * ticks
+    outputs, flags = block.run(ticks * TICK_NS, driver.inputs(time_s))
+    told = outputs.get('believed_current', np.full((len(ticks), 2), math.nan))
+    return time_s, outputs['odom'][:, 1::-1], told[:, 1::-1], flags[:, 0]
+
+
+def _under(time_s, place_m, told_mps, phase, until_s: float) -> _Under:
+    """What came out of some ticks, of which those under water count until a time."""
+    under = np.flatnonzero((phase == UNDER_WATER) & (time_s <= until_s))
+    if not len(under):
+        return _Under(math.nan, math.nan, NOT_KNOWN, told_mps[-1])
+    steps = np.diff(place_m, axis=0, prepend=place_m[:1])[under]
+    return _Under(time_s[under[0]], time_s[under[-1]], steps.sum(axis=0), told_mps[-1])
+
+
+def _fixes_of(run: Sequence[Segment]) -> Fixes:
+    """Fixes of a run, each once."""
+    stays = [run[0].before, *(segment.after for segment in run)]
+    time_s, place_m = (np.concatenate(values) for values in zip(*stays, strict=True))
+    counts = time_s >= run[0].before.time_s[-1] - FIRST_STAY_S
+    return Fixes(time_s[counts], place_m[counts])
+
+
+def _settings(
+    flight: Flight, segment: Segment, method: str, current: str, launched_m: np.ndarray
+) -> NavigationSettings:
+    """Navigation of a vehicle with the lift and drag of a segment."""
+    settings = {
+        'method': method,
+        'current': current,
+        'vehicle': _vehicle(segment),
+        'origin': dict(
+            zip(('latitude_deg', 'longitude_deg'), map(float, flight.origin_deg), strict=True)
+        ),
+        'north_m': float(launched_m[0]),
+        'east_m': float(launched_m[1]),
+        'imu_period_s': 30.0,
+        'gyro': False,
+    }
+    if 'speed_by' in METHODS[method].model_fields and _is_weighed(segment):
+        settings[method] = {'speed_by': 'buoyancy'}
+    return NavigationSettings(**settings)
+
+
+def _is_weighed(segment: Segment) -> bool:
+    return float(np.isfinite(segment.samples.buoyancy_kg).mean()) > BUOYANCY_KNOWN
+
+
+def _vehicle(segment: Segment) -> str:
+    """Name of a vehicle with the lift and drag of a segment."""
+    polar = segment.polar
+    pressure = 0.5 * DENSITY  # at 1 m/s
+    per_v2 = pressure * polar.area_m2
+    coefficients = {
+        'eriksen': None,
+        'merckelbach': None,
+        'K_D0': polar.drag * per_v2 * pressure**polar.exponent,
+        'K_D': polar.induced * per_v2,
+        'K_L0': 0.0,
+        'K_L': polar.lift * per_v2,
+        'speed_exponent': 2.0 * polar.exponent,
+    }
+    changes = {f'hydrodynamics.{name}': value for name, value in coefficients.items()}
+    changes |= {
+        'buoyancy_engine.range': MOST_OIL_CC,
+        'pump_x': 0.0,  # nothing is told of the masses that oppose it
+        'shallowest_glide': math.degrees(polar.shallowest_rad),
+    }
+    return changed_vehicle(VEHICLE, changes)
+
+
+class _Driver:
+    """What drivers of the sensors would deliver of a recorded flight, as on the wire."""
+
+    def __init__(self, samples: Samples, fixes: Fixes, start: NavigationSettings) -> None:
+        self.time_s, self.fix_s = samples.time_s, fixes.time_s
+        self.pressure = pressure_at(samples.depth_m)
+        self.imu = _imu_rows(samples.pitch_rad, samples.heading_rad)
+        # Where none is recorded, in a turn-over, none tells the speed.
+        self.joints = np.outer(-np.nan_to_num(samples.buoyancy_kg), [1.0, 0.0, 0.0, 0.0])
+        origin, variance = start.origin.params(), FIX_STD_M**2
+        self.fix = np.array(
+            [(0.0, *to_geodetic(*place, origin), variance, variance) for place in fixes.place_m]
+        )
+
+    def inputs(self, time_s: np.ndarray) -> dict[str, np.ndarray]:
+        """Numbers of the topics at the ticks of these times (s since 1970)."""
+        last = np.searchsorted(self.time_s, time_s, 'right') - 1
+        begun = last >= 0  # before, it lies still at the surface
+        fix = np.tile(WHEN_SILENT['fix'], (len(time_s), 1))
+        heard = np.searchsorted(time_s, self.fix_s)
+        inside = (heard < len(time_s)) & (self.fix_s > time_s[0] - TICK_S)
+        fix[heard[inside]] = self.fix[inside]
+        return {
+            'joint_states': np.where(begun[:, None], self.joints[last], 0.0),
+            'imu': self.imu[np.maximum(last, 0)],
+            'pressure': np.where(begun, self.pressure[last], pressure_at(0.0))[:, None],
+            'fix': fix,
+        }
+
+
+@kernel
+def _imu_rows(pitch_rad, heading_rad):
+    """Attitudes as on the wire, float64[n, 8]: without roll, which does not matter, or rates."""
+    rows = np.empty((len(pitch_rad), 8))
+    for i in range(len(pitch_rad)):
+        q_w, q_x, q_y, q_z = quaternion_from_euler(0.0, pitch_rad[i], heading_rad[i])
+        wire = imu_to_wire(Imu(q_w, q_x, q_y, q_z, 0.0, 0.0, 0.0, False))
+        for j in range(8):
+            rows[i, j] = wire[j]
+    return rows

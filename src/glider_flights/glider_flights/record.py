@@ -165,3 +165,15 @@ def angles_at_times(time_s: np.ndarray, own_s: np.ndarray, angles: np.ndarray) -
     """The same for angles (rad), across north."""
     east, north = (at_times(time_s, own_s, part(angles)) for part in (np.sin, np.cos))
     return np.arctan2(east, north)
+
+
+def vertical_rate(time_s: np.ndarray, depth_m: np.ndarray, over_s: float = 15.0) -> np.ndarray:
+    """Vertical rate (m/s, + down), shape (n,): the slope of depth over about ``over_s``."""
+    begin = np.maximum(time_s - 0.5 * over_s, time_s[0])
+    end = np.minimum(time_s + 0.5 * over_s, time_s[-1])
+    index = np.arange(len(time_s))
+    # With samples that are further apart, the neighbours.
+    begin = np.minimum(begin, time_s[np.maximum(index - 1, 0)])
+    end = np.maximum(end, time_s[np.minimum(index + 1, len(time_s) - 1)])
+    first, last = np.interp(begin, time_s, depth_m), np.interp(end, time_s, depth_m)
+    return (last - first) / (end - begin)

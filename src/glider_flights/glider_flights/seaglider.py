@@ -247,6 +247,8 @@ def _samples(found: dict[str, np.ndarray], declination: float) -> Samples:
     own_s = found.get('buoyancy_time', time_s)
     if len(grams) == len(own_s):
         buoyancy = 1e-3 * at_times(time_s, own_s, grams)
+        known = at_times(time_s, own_s, np.isfinite(grams).astype(float))
+        buoyancy[known < 0.5] = math.nan
     pitch, heading = (np.radians(found[name]) for name in ('pitch', 'heading'))
     heading = angles_at_times(time_s, time_s, heading) + declination
     return Samples(time_s, found['depth'], at_times(time_s, time_s, pitch), heading, buoyancy)

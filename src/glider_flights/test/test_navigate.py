@@ -23,6 +23,8 @@ START_S = 1.6e9
 #: Of the flights made up here: current below and at the surface (m/s north, east), pitch (rad).
 CURRENT, SURFACE = np.array([0.08, -0.05]), np.array([0.2, 0.1])
 PITCH, RATE = math.radians(26.0), 0.15
+#: Half a dive, and a dive with the stay before it (s).
+LEG_S, CYCLE_S = 3000.0, 6600.0
 DECLINED = 0.3
 ORIGIN = np.array([49.5, -50.2])
 
@@ -46,13 +48,13 @@ def slocum_speed(pitch: float, rate: float) -> float:
 
 
 def made_up(dives: int, period_s: float = 4.0, currents=None):
-    """Samples (t, depth, pitch, heading) and fixes (t, north, east) of dives to 150 m.
+    """Samples (t, depth, pitch, heading) and fixes (t, north, east) of dives to 450 m.
 
     Ten minutes at the surface before each, with a fix each minute from the second on.
     """
     speed = slocum_speed(PITCH, RATE)
     place, now = np.zeros(2), START_S
-    samples, fixes = [], []
+    samples, fixes, swings = [], [], np.random.default_rng(5)
     currents = [CURRENT] * dives if currents is None else currents
     for number in range(dives + 1):
         for step in np.arange(0.0, 600.0, 60.0):
@@ -64,11 +66,12 @@ def made_up(dives: int, period_s: float = 4.0, currents=None):
             break
         heading = 0.4 + 0.5 * number
         for sign in (-1.0, 1.0):
-            for step in np.arange(0.0, 1000.0, period_s):
-                depth = RATE * step if sign < 0.0 else 150.0 - RATE * step
-                samples.append((now + step, depth, sign * PITCH, heading))
+            for step in np.arange(0.0, LEG_S, period_s):
+                depth = RATE * step if sign < 0.0 else RATE * (LEG_S - step)
+                swing = 0.01 * swings.standard_normal()
+                samples.append((now + step, depth, sign * PITCH, heading + swing))
             along = speed * np.array([math.cos(heading), math.sin(heading)])
-            place, now = place + 1000.0 * (along + currents[number]), now + 1000.0
+            place, now = place + LEG_S * (along + currents[number]), now + LEG_S
     return np.array(samples), np.array(fixes)
 
 
@@ -90,7 +93,7 @@ def sensors(dives: int, **kwargs) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     samples, fixes = made_up(dives, **kwargs)
     time_s, depth, pitch, heading = samples.T
     latitude, longitude = degrees(fixes).T
-    told_s = START_S + 2600.0 * np.arange(1, dives + 1) + 400.0
+    told_s = START_S + CYCLE_S * np.arange(1, dives + 1) + 400.0
     cosine, sine = math.cos(DECLINED), math.sin(DECLINED)
     north, east = CURRENT
     magnetic = np.array([[east * cosine + north * sine], [north * cosine - east * sine + 0.02]])
@@ -110,7 +113,7 @@ def sensors(dives: int, **kwargs) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 def write_dive(file: Path, number: int, dives: int, engine: str = 'scipy', **changes) -> None:
     """Write the NetCDF file of one of several dives as a base station does."""
     samples, fixes = made_up(dives)
-    begin, end = START_S + 2600.0 * number, START_S + 2600.0 * (number + 1)
+    begin, end = START_S + CYCLE_S * number, START_S + CYCLE_S * (number + 1)
     inside = (samples[:, 0] >= begin + 600.0) & (samples[:, 0] < end)
     time_s, depth, pitch, heading = samples[inside].T
     mine = (fixes[:, 0] >= begin) & (fixes[:, 0] <= end + 120.0)
@@ -161,7 +164,7 @@ def test_a_slocum_finds_the_current_it_drifted_with(tmp_path, cached, write_dbd)
     assert (report['vehicle'], report['segments']) == ('slocum', 4)
     for row in rows:
         assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
-        assert row.reckoned.seconds == pytest.approx(2000.0, abs=40.0)
+        assert row.reckoned.seconds == pytest.approx(2.0 * LEG_S, abs=40.0)
     # The current of the vehicle is 2 cm/s off, in its magnetic coordinates.
     assert report['dac_difference_mps']['median'] == pytest.approx(0.02, abs=0.003)
     assert report['dac_difference_mps']['segments'] == 4
@@ -205,7 +208,7 @@ def test_a_current_of_another_time_is_not_compared(tmp_path, write_dbd):
     pytest.importorskip('dbdreader')
     table = sensors(2)
     told_s = table['m_final_water_vx'][0]
-    table['m_dr_time'] = (told_s, np.array([2000.0, 9000.0]))
+    table['m_dr_time'] = (told_s, np.array([2.0 * LEG_S, 9.0 * LEG_S]))
     write_dbd(tmp_path / '00010000.dbd', table, True)
     flight = read_flight(tmp_path, None, quiet)
     assert summary(flight, navigated(flight))['dac_difference_mps']['segments'] == 1
@@ -257,15 +260,15 @@ def test_each_bad_file_of_a_slocum_costs_what_it_holds_and_is_named(tmp_path, wr
     bad = {1: 'cut', 3: 'packed', 5: 'foreign', 6: 'no_cache', 7: 'empty', 8: 'late', 9: 'twice'}
     bad[10] = 'no_pitch'
     for number in range(dives + 1):
-        begin = START_S + 2600.0 * number
+        begin = START_S + CYCLE_S * number
         kind, vehicle, cache, later_s = bad.get(number, ''), 'unit', 'AB12CD34', 0.0
         if kind == 'foreign':
             vehicle = 'other'
         elif kind == 'no_cache':
             cache = 'LOST0000'
         elif kind in ('late', 'twice'):
-            later_s = 3.0 * year_s if kind == 'late' else -5.0 * 2600.0 + 17.0
-        mine = part(table, begin, begin + 2600.0, later_s)
+            later_s = 3.0 * year_s if kind == 'late' else -5.0 * CYCLE_S + 17.0
+        mine = part(table, begin, begin + CYCLE_S, later_s)
         if kind == 'no_pitch':
             del mine['m_pitch']
         file = tmp_path / f'{number:04d}0000.dbd'
@@ -306,7 +309,7 @@ def test_a_damaged_compressed_file_does_not_end_the_program(tmp_path, write_dbd)
     """Random bytes in it: what can be read is plausible, whatever dbdreader makes of it."""
     pytest.importorskip('dbdreader')
     file, generator = tmp_path / '00010000.dbd', np.random.default_rng(3)
-    table, edge_s = sensors(3), START_S + 2.0 * 2600.0 + 600.0
+    table, edge_s = sensors(3), START_S + 2.0 * CYCLE_S + 600.0
     write_dbd(file, part(table, edge_s, math.inf), False, 'unit-2026-001-0-1')
     content = packed(file.read_bytes())
     write_dbd(file, part(table, 0.0, edge_s), False)
@@ -363,9 +366,9 @@ def test_a_seaglider_finds_the_current_of_each_dive(tmp_path):
     for row in rows[:-1]:
         assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
     # After the last dive a single fix says nothing of the drift: it counts as under water.
-    assert rows[-1].reckoned.seconds == pytest.approx(2120.0, abs=40.0)
-    # From fix to fix the drift at the surface counts too: 180 s of 2180.
-    mean = (2000.0 * CURRENT + 180.0 * SURFACE) / 2180.0
+    assert rows[-1].reckoned.seconds == pytest.approx(2.0 * LEG_S + 120.0, abs=40.0)
+    # From fix to fix the drift at the surface counts too: 180 s of 6180.
+    mean = (2.0 * LEG_S * CURRENT + 180.0 * SURFACE) / (2.0 * LEG_S + 180.0)
     assert rows[1].comparable_mps == pytest.approx(mean, abs=0.004)
     off = np.hypot(*(mean - CURRENT - [0.03, 0.0]))
     report = summary(flight, rows)
@@ -382,7 +385,7 @@ def test_buoyancy_is_taken_where_it_is_recorded(tmp_path):
     grams = 1000.0 * drag / 9.81 / math.sin(PITCH + alpha)
     samples, _ = made_up(1)
     under = samples[samples[:, 0] >= START_S + 600.0]
-    under = under[under[:, 0] < START_S + 2600.0]
+    under = under[under[:, 0] < START_S + CYCLE_S]
     # A vertical rate of the water would mislead what goes by the vertical rate of the vehicle.
     waves = under[:, 1] + 10.0 * np.sin((under[:, 0] - START_S - 600.0) * math.pi / 250.0)
     write_dive(
@@ -394,7 +397,7 @@ def test_buoyancy_is_taken_where_it_is_recorded(tmp_path):
     )
     flight = read_flight(tmp_path / 'p1230001.nc', None, quiet)
     (row,) = navigated(flight)
-    assert np.hypot(*row.reckoned.way_m) == pytest.approx(2000.0 * speed, rel=0.02)
+    assert np.hypot(*row.reckoned.way_m) == pytest.approx(2.0 * LEG_S * speed, rel=0.02)
 
 
 def test_a_missing_dive_is_not_bridged(tmp_path):
@@ -441,7 +444,7 @@ def test_each_bad_dive_of_a_seaglider_costs_what_it_holds_and_is_named(tmp_path)
     write_dive(tmp_path / 'p1230003.nc', 2, 12, eng_head=None)
     for name, size in (('p1230005.nc', 3000), ('p1230006.nc', 0)):
         (tmp_path / name).write_bytes((tmp_path / name).read_bytes()[:size])
-    for number, by_s in ((8, 19.6 * year), (10, -3.0 * 2600.0)):
+    for number, by_s in ((8, 19.6 * year), (10, -3.0 * CYCLE_S)):
         name = tmp_path / f'p123{number:04d}.nc'
         with xarray.open_dataset(name, decode_times=False) as dataset:
             dive = dataset.load()
@@ -511,7 +514,7 @@ def test_magnetic_heading_of_og1_is_turned_by_the_field_of_the_earth(tmp_path):
 
 
 def test_each_bad_file_in_og1_costs_what_it_holds_and_is_named(tmp_path):
-    whole, edges = og1(8), START_S + 2600.0 * np.arange(10)
+    whole, edges = og1(8), START_S + CYCLE_S * np.arange(10)
     for number in range(8):
         time_s = whole['TIME'].values
         inside = (time_s >= edges[number]) & (time_s < edges[number + 1] + 600.0)
@@ -535,7 +538,7 @@ def test_each_bad_file_in_og1_costs_what_it_holds_and_is_named(tmp_path):
 
 def test_missing_numbers_in_a_dive_do_not_spread(tmp_path):
     samples, _ = made_up(1)
-    pitch = np.degrees(samples[10:510, 2])
+    pitch = np.degrees(samples[10:1510, 2])
     pitch[::3] = np.nan
     write_dive(tmp_path / 'p1230001.nc', 0, 1, eng_pitchAng=('sg_data_point', pitch))
     (row,) = navigated(read_flight(tmp_path, None, quiet))
@@ -556,23 +559,6 @@ def test_no_forecast_knows_what_comes_after_it(tmp_path):
         assert again.missed_m == pytest.approx(row.missed_m, nan_ok=True)
 
 
-def test_errors_of_single_dives_are_averaged_once_that_has_proven_itself():
-    from glider_flights.forecast import Forecaster
-
-    generator = np.random.default_rng(7)
-    missed = {'none': [], 'persistence': [], 'ours': []}
-    forecaster = Forecaster()
-    for dive in range(60):
-        current = CURRENT + 0.006 * generator.standard_normal(2)
-        for name, forecast in forecaster.forecast(9000.0 * dive).items():
-            missed[name].append(np.hypot(*(current - forecast)))
-        forecaster.tell(9000.0 * dive, current, 8000.0)
-    ours, persistence = np.mean(missed['ours']), np.mean(missed['persistence'])
-    # The error of a mean of many is 1 / sqrt(2) of that of a difference of two.
-    assert ours < 0.9 * persistence
-    assert missed['ours'][:5] == missed['persistence'][:5]
-
-
 def test_the_command_prints_what_was_agreed(tmp_path):
     for number in range(3):
         write_dive(tmp_path / f'p123{number + 1:04d}.nc', number, 3)
@@ -580,6 +566,7 @@ def test_the_command_prints_what_was_agreed(tmp_path):
     assert done.exit_code == 0
     report = json.loads(done.stdout)
     assert report['segments'] == 3
+    assert report['method'] == 'dead_reckoned'
     assert {'median', 'p90'} <= report['dac_difference_mps'].keys()
     for name in ('none', 'persistence', 'ours'):
         assert report['prediction_m'][name]['median'] >= 0.0
@@ -588,6 +575,12 @@ def test_the_command_prints_what_was_agreed(tmp_path):
     assert shown.exit_code == 0
     assert '3 dives' in shown.stdout
     assert 'p1230002' in shown.stdout
+
+
+@pytest.mark.parametrize('method', ['known', 'nobody'])
+def test_a_method_that_no_recording_feeds_is_refused(tmp_path, method):
+    write_dive(tmp_path / 'p1230001.nc', 0, 1)
+    assert f'--method {method}' in told(str(tmp_path), '--method', method)
 
 
 def test_what_is_no_flight_is_refused(tmp_path):

@@ -134,6 +134,23 @@ def test_polar_of_a_vehicle_without_lift_is_usable():
     assert math.isfinite(glide_alpha(-0.5, polar))
 
 
+@quick
+@given(
+    st.sampled_from(['seaglider', 'slocum_g2', 'zhang2021']),
+    st.floats(math.radians(7.0), math.radians(60.0)),
+    phases,
+)
+def test_shallow_glides_are_sought_until_forces_balance(name, pitch, phase):
+    """Where there is a glide at this pitch at all: its discriminant is not negative."""
+    polar = make_polar(load_vehicle(name).params(), to_the_end=True)._replace(n=0.0)
+    theta = -phase * pitch
+    alpha = glide_alpha(theta, polar)
+    drag, lift = polar.K_D0 + polar.K_D * alpha**2, polar.K_L0 + polar.K_L * alpha
+    slope = math.tan(theta - alpha)
+    if (polar.K_L * slope) ** 2 > 4.1 * polar.K_D * (polar.K_D0 + polar.K_L0 * slope):
+        assert drag + lift * slope == pytest.approx(0.0, abs=0.03 * drag)
+
+
 def test_linear_drag_is_taken_at_half_a_metre_per_second():
     vehicle = VEHICLES['zhang2021']._replace(D_u=2.0)
     assert make_polar(vehicle).K_D0 == pytest.approx(7.5 + 2.0 / 0.5, rel=1e-15)

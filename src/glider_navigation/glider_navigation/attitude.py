@@ -36,6 +36,8 @@ MOST_TURN = 0.2
 #: Pitched or rolled by more than this (rad), as a vehicle that bobs at the surface is, it tells
 #: nothing of turning.
 STEEP = 1.0
+#: Samples are no further apart (s): what has shown the same for longer was sampled again.
+REPEATED_S = 60.0
 #: Time constants with which roll and pitch follow the moving mass (s).
 ROLL_S, PITCH_S = 2.0, 2.0
 #: Time constant with which differences of samples are believed as rates (s).
@@ -178,6 +180,7 @@ def attitude_step(state, imu, joints, mass, dt):
     sample, before = Angles(phi, theta, psi), state.sample
     age_s = state.age_s + dt
     is_new = not state.seen or phi != before.phi or theta != before.theta or psi != before.psi
+    is_new = is_new or age_s > REPEATED_S
     phi = wrap_angle(before.phi + balance.phi - state.balance_then.phi)
     turn, turn_rate = _go_on_turning(state.turn, phi, before.theta, dt)
     dense = state.dense and age_s <= DENSE_S

@@ -1,16 +1,17 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""How fast the vehicle goes through the water, by pressure and pitch alone.
+"""How fast the vehicle goes through the water, by pitch, and by pressure or net weight.
 
-U_h = w / tan(theta - alpha(theta)) by the glide polar holds in a steady glide. In a turn-over,
-where pitch and vertical rate do not belong together, the last speed is held, and fades.
+U_h = w / tan(theta - alpha(theta)) by the glide polar holds in a steady glide, and so does the
+speed at which its drag carries a net weight. In a turn-over, where pitch and vertical rate (or
+weight) do not belong together, the last speed is held, and fades.
 """
 
 import math
 from typing import NamedTuple
 
 from glider_base.kernel import kernel
-from glider_model.onboard.glide_polar import glide_horizontal_speed
+from glider_model.onboard.glide_polar import glide_horizontal_speed, steady_horizontal_speed
 
 #: Shallower pitch (rad), or a slower vertical rate (m/s), is no glide.
 LEAST_PITCH, LEAST_RATE = math.radians(11.3), 0.02
@@ -20,6 +21,8 @@ FADES_S = 7.5
 FASTEST = 1.5
 #: Time constant of the vertical rate (s).
 RATE_S = 4.0
+#: A sample leads no further than this (s): then nobody knows how the depth goes on.
+AHEAD_S = 60.0
 
 
 class Flight(NamedTuple):
@@ -41,6 +44,8 @@ def follow_depth(flight, depth, is_new, dt):
     if not flight.seen:
         return Flight(depth, 0.0, 0.0, 0.0, True)
     age_s = flight.age_s + dt
+    if age_s > AHEAD_S and not is_new:
+        return Flight(flight.depth, 0.0, flight.speed, age_s, True)
     ahead = flight.depth + dt * flight.rate
     if not is_new:
         return Flight(ahead, flight.rate, flight.speed, age_s, True)
@@ -62,10 +67,26 @@ def set_anew(flight, by):
 
 
 @kernel
+def at_the_surface(flight, is_fix):
+    """The same flight; a fix says that it is at the surface, if no sample says otherwise."""
+    if is_fix and flight.age_s > AHEAD_S:
+        return Flight(0.0, 0.0, flight.speed, flight.age_s, flight.seen)
+    return flight
+
+
+@kernel
 def reckon_speed(flight, theta, polar, dt):
-    """Speed through the water at a pitch (rad)."""
+    """Speed through the water at a pitch (rad), by the vertical rate."""
+    speed = flight.speed * (1.0 - dt / FADES_S)
     if abs(theta) > LEAST_PITCH and abs(flight.rate) > LEAST_RATE and theta * flight.rate < 0.0:
         speed = min(FASTEST, glide_horizontal_speed(theta, flight.rate, polar))
-    else:
-        speed = flight.speed * (1.0 - dt / FADES_S)
+    return Flight(flight.depth, flight.rate, speed, flight.age_s, flight.seen)
+
+
+@kernel
+def weigh_speed(flight, theta, net_heaviness, polar, dt):
+    """Speed through the water at a pitch (rad), by the net heaviness (kg, + sinks)."""
+    speed = flight.speed * (1.0 - dt / FADES_S)
+    if abs(theta) > polar.shallowest and theta * net_heaviness < 0.0:
+        speed = min(FASTEST, steady_horizontal_speed(theta, net_heaviness, polar))
     return Flight(flight.depth, flight.rate, speed, flight.age_s, flight.seen)

@@ -29,8 +29,9 @@ EARLY_S = 900.0
 #: Farther from where the vehicle is believed to be than so many standard deviations, and than so
 #: far (m), a fix is set aside.
 FARTHEST_STD, FARTHEST_M = 6.0, 100.0
-#: Another one this much later (s), and no farther from it than this (m), confirms it.
-CONFIRMED_S, CONFIRMED_M = 10.0, 100.0
+#: Another one this much later (s), and no farther from it than this (m) and what the vehicle may
+#: have drifted since (m/s), confirms it.
+CONFIRMED_S, CONFIRMED_M, CONFIRMED_MPS = 10.0, 100.0, 1.5
 
 
 class Known(NamedTuple):
@@ -195,7 +196,8 @@ def hear_fix(stay, fix):
     farthest2 = max(FARTHEST_M * FARTHEST_M, FARTHEST_STD * FARTHEST_STD * variance)
     if _distance2(fix, here.n, here.e) <= farthest2:
         return take_fix(stay, fix)
-    beside = _distance2(fix, stay.aside.n, stay.aside.e) <= CONFIRMED_M * CONFIRMED_M
+    near = CONFIRMED_M + CONFIRMED_MPS * (stay.t_s - stay.aside_s)
+    beside = _distance2(fix, stay.aside.n, stay.aside.e) <= near * near
     if stay.aside_s == NO_FIX_ASIDE or not beside:
         return _set_aside(stay, fix)
     if stay.t_s - stay.aside_s >= CONFIRMED_S:

@@ -7,12 +7,20 @@ import math
 import numba
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.signal import lfilter
 
 from glider_base.signals import TICK_S
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
-from glider_navigation.flight_model import INITIAL_FLIGHT, Flight, follow_depth, reckon_speed
+from glider_navigation.flight_model import (
+    INITIAL_FLIGHT,
+    Flight,
+    at_the_surface,
+    follow_depth,
+    reckon_speed,
+    weigh_speed,
+)
 
 POLARS = {name: make_polar(load_vehicle(name).params()) for name in ('zhang2021', 'seawing')}
 #: Time constants of the vertical rate, and of a speed that fades (s).
@@ -113,3 +121,38 @@ def test_speed_fades_where_pitch_and_rate_are_no_glide(pitch_deg, rate):
 def test_no_glider_is_as_fast_as_a_wrong_rate_says():
     flight = Flight(100.0, 3.0, 0.4, 0.0, True)
     assert reckon_speed(flight, math.radians(-15.0), POLARS['seawing'], TICK_S).speed == 1.5
+
+
+@pytest.mark.parametrize('rate', [0.2, -0.2])
+def test_no_depth_is_invented_once_samples_stop(rate):
+    """What the last samples say leads for a minute; a fix then says that it is at the surface."""
+    flight = Flight(1.0, rate, 0.3, 0.0, True)
+    for _ in range(6000):
+        flight = follow_depth(flight, 1.0, False, TICK_S)
+    assert flight.depth == pytest.approx(1.0 + 60.0 * rate, abs=0.1)
+    assert flight.rate == 0.0
+    assert at_the_surface(flight, False) == flight
+    assert at_the_surface(flight, True).depth == 0.0
+    seen = follow_depth(flight, 25.0, True, TICK_S)
+    assert at_the_surface(seen, True) == seen
+
+
+@pytest.mark.parametrize('pitch_deg', [-8.0, -15.0, -30.0, 30.0])
+@pytest.mark.parametrize('weight', [0.05, 0.2])
+def test_speed_by_weight_and_by_its_own_rate_are_one(pitch_deg, weight):
+    """Forces balance at the speed that a weight gives; of its vertical rate the same one comes."""
+    polar = make_polar(load_vehicle('seaglider').params(), to_the_end=True)
+    theta, weight = math.radians(pitch_deg), math.copysign(weight, -pitch_deg)
+    by_weight = weigh_speed(INITIAL_FLIGHT, theta, weight, polar, TICK_S).speed
+    best = math.copysign(math.sqrt(polar.K_D0 * by_weight**polar.n / polar.K_D), -theta)
+    alpha = brentq(lambda a: _across(theta, a, by_weight / math.cos(theta - a), polar), 0.0, best)
+    speed = by_weight / math.cos(theta - alpha)
+    drag = polar.K_D0 * speed**polar.n + polar.K_D * alpha**2
+    assert drag * speed**2 == pytest.approx(-9.81 * weight * math.sin(theta - alpha), rel=0.01)
+    assert weigh_speed(INITIAL_FLIGHT, theta, -weight, polar, TICK_S).speed == 0.0
+
+
+def _across(theta, alpha, speed, polar):
+    """Drag times sine plus lift times cosine of the path: no force acts across a weight."""
+    drag = polar.K_D0 * speed**polar.n + polar.K_D * alpha**2
+    return drag * math.cos(theta - alpha) + polar.K_L * alpha * math.sin(theta - alpha)

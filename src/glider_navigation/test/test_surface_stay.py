@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 
 from glider_base.signals import Vector
 from glider_navigation.method import Fix
-from glider_navigation.surface_stay import begin, counts, drifted_variance, take_fix, wait
+from glider_navigation.surface_stay import (
+    begin,
+    counts,
+    drifted_variance,
+    hear_fix,
+    take_fix,
+    wait,
+)
 
 quick = settings(max_examples=50)
 
@@ -120,3 +127,15 @@ def test_without_a_fix_the_place_drifts_and_is_known_less():
     drifted = (600.0 * DRIFT_STD) ** 2 + WANDERS * 600.0**3 / 3.0
     assert drifted_variance(stay) == pytest.approx(drifted)
     assert stay.known.pp == pytest.approx(400.0 + drifted)
+
+
+@pytest.mark.parametrize('minutes', [3.0, 10.0])
+def test_true_fixes_far_from_where_it_believed_to_be_are_believed_in_a_strong_drift(minutes):
+    """Minutes apart in 1 m/s, the second is far from the first; a wrong one is still left."""
+    stay, drift = begin(Vector(0.0, 0.0), 100.0**2, Vector(0.0, 0.0)), 1.0
+    for number in range(3):
+        stay = wait(stay, 60.0 * minutes)
+        place = 900.0 + drift * 60.0 * minutes * number
+        stay = hear_fix(stay, Fix(True, place, 0.0, 25.0))
+    assert stay.place.n == pytest.approx(place, abs=10.0)
+    assert hear_fix(stay, Fix(True, place + 1e4, 0.0, 25.0)).place == stay.place

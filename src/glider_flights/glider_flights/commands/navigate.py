@@ -6,6 +6,7 @@ import json
 import math
 from datetime import datetime, timezone
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -21,7 +22,7 @@ MAX_NAME = 12
 MEANING = {
     'none': 'no current',
     'persistence': 'the last current',
-    'ours': 'ours, of dives before',
+    'ours': 'our navigation',
     'on_board': "the vehicle's own estimate",
 }
 
@@ -29,12 +30,16 @@ MEANING = {
 @app.command(epilog='Example: ./glider navigate flights/delayed/raw --cache flights/cache')
 def navigate(
     flight: Recording,
+    method: Annotated[
+        str, typer.Option(help='Navigation method, as a scenario has it under navigation.')
+    ] = 'dead_reckoned',
     cache: Cache = None,
     as_json: Json = False,
 ) -> None:
     """Navigate a recorded flight of a real glider; compare with what it made of it itself.
 
-    Depth-averaged current, way through the water, and where it would surface next.
+    The kernel of navigation_node makes of the recorded samples the depth-averaged current, the way
+    through the water, and where it would surface next.
     """
     from glider_flights.comparison import navigate as navigated
     from glider_flights.comparison import summary
@@ -42,9 +47,9 @@ def navigate(
 
     with counter('reading', None) as update:
         found = read_flight(flight, cache, update)
-    with counter('navigating', len(found.segments)) as update:
-        rows = navigated(found, update)
-    report = summary(found, rows)
+    with counter('navigating', 2 * len(found.segments)) as update:
+        rows = navigated(found, update, method)
+    report = summary(found, rows, method)
     if as_json:
         print(json.dumps({'flight': str(flight), **report}))
         return
@@ -104,7 +109,9 @@ def _print_figures(report: dict) -> None:
     over = report['on_board_current_is_mean']
     lines = [
         (f'current off that on board (cm/s; {over})', report['dac_difference_mps'], 100.0, 2),
+        ('current told less that by its way (cm/s)', report['told_difference_mps'], 100.0, 2),
         ('way through the water off (m)', report['way_difference_m'], 1.0, 0),
+        ('the same over that on board (%)', report['way_ratio'], 100.0, 1),
     ]
     for name, spread in report['prediction_m'].items():
         lines.append((f'surfaced off (m): {MEANING[name]}', spread, 1.0, 0))

@@ -9,8 +9,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_flights.energy.uses import HOTEL, PUMP, Uses
-from glider_flights.reckoning import vertical_rate
-from glider_flights.record import SURFACE_DEPTH_M, at_times
+from glider_flights.record import SURFACE_DEPTH_M, at_times, vertical_rate
 from glider_flights.slocum import Sensors, read_sensors, slocum_files
 
 #: A Slocum's parts are so long (s): several dives of a shallow one, less than one of a deep one.

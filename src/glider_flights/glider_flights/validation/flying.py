@@ -9,8 +9,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_base.signals import SEA_WATER_DENSITY, TICK_S
-from glider_flights.reckoning import vertical_rate
-from glider_flights.record import Flight
+from glider_flights.record import Flight, vertical_rate
 from glider_flights.validation.imposed import STEP_S, Flown, Forcing, fly_free, fly_held
 from glider_flights.validation.track import RATE_S, Track
 from glider_model.vehicle.file import VehicleParams, load_vehicle

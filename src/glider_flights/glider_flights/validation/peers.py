@@ -8,8 +8,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_flights.folders import installed
-from glider_flights.reckoning import vertical_rate
-from glider_flights.record import Flight
+from glider_flights.record import Flight, vertical_rate
 from glider_flights.validation.flying import Model
 from glider_flights.validation.score import rms
 from glider_flights.validation.track import RATE_S, Track

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_flights.comparison import comparable_current
-from glider_flights.reckoning import reckon
+from glider_flights.comparison import comparable_current, navigate
 from glider_flights.record import Flight, Segment, at_times
 from glider_flights.validation.flying import Simulated
 from glider_flights.validation.track import Track
@@ -20,6 +19,8 @@ TURN_S = 60.0
 TURN_MPS = 0.5
 #: A roll that does not vary by as much (-, standard deviation of its sine) tells nothing of turns.
 SMALLEST_ROLL = 0.02
+#: A dive counts as flown if this share of its time was.
+WHOLE = 0.8
 PHASES = {'dive': 1.0, 'climb': -1.0}
 
 
@@ -127,11 +128,11 @@ def _trapezoids(values: np.ndarray, time_s: np.ndarray) -> np.ndarray:
 def _closure(flight: Flight, pairs) -> dict[str, Any]:
     """Our depth-averaged current, by the plant's way through the water, less that on board."""
     off = []
-    for segment in flight.segments:
-        way = _way(segment, pairs)
-        if way is not None:
-            reckoned = reckon(segment)._replace(way_m=way)
-            own = comparable_current(flight, segment, reckoned)
+    for row in navigate(flight, lambda *_: None):
+        segment = row.segment
+        way, seconds = _way(segment, pairs)
+        if seconds > WHOLE * row.reckoned.seconds:
+            own = comparable_current(flight, segment, row.reckoned._replace(way_m=way))
             off.append(float(np.hypot(*(own - segment.on_board.dac_mps))))
     off = np.array(off, float)
     return {
@@ -140,8 +141,8 @@ def _closure(flight: Flight, pairs) -> dict[str, Any]:
     }
 
 
-def _way(segment: Segment, pairs) -> np.ndarray | None:
-    """Way through the water of a segment (m north, east); None if it was not flown whole."""
+def _way(segment: Segment, pairs) -> tuple[np.ndarray, float]:
+    """Way through the water of a segment (m north, east), and for how long it was flown (s)."""
     way, seconds = np.zeros(2), 0.0
     for track, one in pairs:
         time_s, heading = track.instruments.time_s, track.instruments.heading_rad
@@ -155,4 +156,4 @@ def _way(segment: Segment, pairs) -> np.ndarray | None:
         east = ahead * np.sin(middle) + abeam * np.cos(middle)
         way += np.array([np.nansum(north), np.nansum(east)])
         seconds += float(np.ptp(time_s))
-    return way if seconds > 0.8 * reckon(segment).seconds else None
+    return way, seconds

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_base.errors import ConfigurationError
-from glider_flights.reckoning import vertical_rate
-from glider_flights.record import SURFACE_DEPTH_M, Flight, Instruments, in_order
+from glider_flights.record import SURFACE_DEPTH_M, Flight, Instruments, in_order, vertical_rate
 from glider_flights.seawater import density_of, pressure_of
 
 #: The recorded vertical rate is the slope of depth over about this time (s).

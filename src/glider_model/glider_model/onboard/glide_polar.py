@@ -23,18 +23,26 @@ class Polar(NamedTuple):
     K_L: float
     n: float  #: 0: drag per V^2 does not change with speed
     shallowest: float  #: the polar is used at no shallower pitch than this (rad)
+    to_the_end: bool  #: whether the angle of attack of a shallow glide is sought to the end
 
 
 #: Slower than this drag is taken as at this (m/s).
 _SLOWEST = 0.05
 #: Where the search for a speed begins (m/s), and how often it is bettered.
 _TYPICAL, _PASSES = 0.3, 5
-#: Drag and lift polynomials are not believed beyond this angle of attack (rad).
-LARGEST_ALPHA = math.radians(15.0)
+#: Drag and lift polynomials are not believed beyond this angle of attack (rad), in steering and
+#: where it is sought to the end.
+LARGEST_ALPHA, LARGEST_SOUGHT = math.radians(15.0), math.radians(40.0)
+#: Passes in which the angle of attack of most glides is found; of a shallow one it takes more,
+#: until it changes by less than this (rad).
+_FEW, _MANY, _FOUND = 4, 60, 1e-3
 
 
-def make_polar(vehicle: VehicleParams) -> Polar:
-    """Polar of a vehicle; linear drag, where a vehicle has it, is taken at 0.5 m/s."""
+def make_polar(vehicle: VehicleParams, to_the_end: bool = False) -> Polar:
+    """Polar of a vehicle; linear drag, where a vehicle has it, is taken at 0.5 m/s.
+
+    To steer by, few passes do; what reckons with speeds of shallow glides seeks ``to_the_end``.
+    """
     return Polar(
         K_D0=max(1e-3, vehicle.K_D0 + vehicle.D_u / 0.5),
         K_D=max(1e-3, vehicle.K_D),
@@ -42,6 +50,7 @@ def make_polar(vehicle: VehicleParams) -> Polar:
         K_L=max(1e-3, vehicle.K_L),
         n=vehicle.speed_exponent,
         shallowest=vehicle.shallowest_glide,
+        to_the_end=to_the_end,
     )
 
 
@@ -65,19 +74,26 @@ def glide_alpha(theta, polar):
     """Angle of attack (rad) of the steady glide at pitch ``theta`` (rad); drag as at 1 m/s.
 
     Lift and drag balance a vertical weight: K_D0 + K_D a^2 + (K_L0 + K_L a) tan(theta - a) = 0.
-    Shallower than the polar allows, the angle of the best glide is given, 15 deg at most.
+    Shallower than the polar allows, the angle of the best glide is given, 15 deg at most, or 40.
     """
+    most, passes = LARGEST_ALPHA, _FEW
+    if polar.to_the_end:
+        most, passes = LARGEST_SOUGHT, _MANY
     drag, offset = polar.K_D0 / polar.K_D, polar.K_L0 / polar.K_D
     lift = 0.5 * polar.K_L / polar.K_D
-    alpha = 0.0
-    for _ in range(4):
+    alpha, last = 0.0, 0.0
+    for number in range(passes):
+        if number >= _FEW:
+            if abs(alpha - last) <= _FOUND:
+                break
+            alpha = 0.5 * (alpha + last)
         slope = math.tan(theta - alpha)
         half = lift * slope
         root = half * half - (drag + offset * slope)
-        alpha = -half
+        last, alpha = alpha, -half
         if root > 0.0:
             alpha += math.sqrt(root) if half > 0.0 else -math.sqrt(root)
-        alpha = min(LARGEST_ALPHA, max(-LARGEST_ALPHA, alpha))
+        alpha = min(most, max(-most, alpha))
     return alpha
 
 

@@ -9,7 +9,7 @@ in the way to come. A surfacing without a fix is one point of a longer way.
 """
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -34,9 +34,11 @@ from glider_navigation.current_belief import (
 from glider_navigation.flight_model import (
     INITIAL_FLIGHT,
     Flight,
+    at_the_surface,
     follow_depth,
     reckon_speed,
     set_anew,
+    weigh_speed,
 )
 from glider_navigation.forecast import Forecast, forecast_at, make_forecast
 from glider_navigation.method import (
@@ -78,17 +80,23 @@ class DeadReckonedSettings(NavigationMethodSettings):
     heading_error_deg: float = Field(
         2.0, ge=0.0, le=90.0, description='error of the compass (deg)'
     )
+    speed_by: Literal['rate', 'buoyancy'] = Field(
+        'rate',
+        description='what tells the speed with the pitch. rate: the vertical rate; buoyancy: that '
+        'of the buoyancy engine, as if nothing else made the vehicle heavy or light',
+    )
 
     def params(self, start: Start) -> 'DeadReckonedParams':
         """Kernel parameters."""
         vehicle = start.vehicle.params()
         return DeadReckonedParams(
-            polar=make_polar(vehicle),
+            polar=make_polar(vehicle, to_the_end=True),
             mass=make_moving_mass(vehicle),
             forecast=make_forecast(start.forecast, start.current == 'forecast'),
             believes_current=start.current != 'none',
             speed_variance=self.speed_error_share**2,
             heading_variance=math.radians(self.heading_error_deg) ** 2,
+            is_weighed=self.speed_by == 'buoyancy',
         )
 
     def initial_state(self, start: Start) -> 'DeadReckonedState':
@@ -133,6 +141,7 @@ class DeadReckonedParams(NamedTuple):
     believes_current: bool
     speed_variance: float  #: of the share by which speed is off
     heading_variance: float  #: (rad^2)
+    is_weighed: bool  #: speed comes from pitch and buoyancy
 
 
 class Drift(NamedTuple):
@@ -386,7 +395,11 @@ def dead_reckoned_step(state, heard, params, dt):
     zero = find_zero(state.zero, heard.depth, is_new, heard.fix.is_fix, dt)
     flight = set_anew(state.flight, state.zero.offset - zero.offset)
     flight = follow_depth(flight, heard.depth - zero.offset, is_new, dt)
-    flight = reckon_speed(flight, attitude.angles.theta, params.polar, dt)
+    flight = at_the_surface(flight, heard.fix.is_fix)
+    if params.is_weighed:
+        flight = weigh_speed(flight, attitude.angles.theta, heard.joints.m_b, params.polar, dt)
+    else:
+        flight = reckon_speed(flight, attitude.angles.theta, params.polar, dt)
     under = flight.depth > (SURFACES_M if state.under else DIVES_M)
     way, stay, current, column = _change_over(state, under, t_s, params)
     if under:
