@@ -217,7 +217,7 @@ def check_drawn(panels):
         assert panel['width'] == pytest.approx(panel['place'], abs=1.0), 'it fills its place'
         drawn = [trace for trace in panel['traces'] if len(finite(trace['y'])) > 1]
         assert drawn, panel['id']
-        markers = {'track': 1, 'plan': 3, 'places': 2 * len(drawn) // 3}.get(panel['kind'], 0)
+        markers = {'track': 1, 'plan': 4, 'places': 2 * len(drawn) // 3}.get(panel['kind'], 0)
         assert panel['lines'] >= len(drawn) - markers, panel['id']
         for trace in panel['traces']:
             assert len(trace['x']) == len(trace['y']), (panel['id'], trace['name'])

@@ -28,15 +28,16 @@ MARGIN_M = 50_000.0
 class FlatBottom(NamedTuple):
     """A bottom that is as deep everywhere."""
 
-    depth: float  #: (m); infinite: none
+    depth: float  #: (m)
 
 
-NO_BOTTOM = FlatBottom(math.inf)
+#: Deeper than any sea: there is none.
+NO_BOTTOM = FlatBottom(1e6)
 
 
 @slot
 def bottom_depth(n, e, params):
-    """Depth of the bottom (m) at a place north and east (m); infinite where there is none."""
+    """Depth of the bottom (m) at a place north and east (m)."""
     raise NotImplementedError
 
 

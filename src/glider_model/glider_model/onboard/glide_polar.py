@@ -36,6 +36,8 @@ LARGEST_ALPHA, LARGEST_SOUGHT = math.radians(15.0), math.radians(40.0)
 #: Passes in which the angle of attack of most glides is found; of a shallow one it takes more,
 #: until it changes by less than this (rad).
 _FEW, _MANY, _FOUND = 4, 60, 1e-3
+#: From twice so many passes on each goes less of the way: at the shallowest glide they alternate.
+_STEADIED = 6.0
 
 
 def make_polar(vehicle: VehicleParams, to_the_end: bool = False) -> Polar:
@@ -86,7 +88,8 @@ def glide_alpha(theta, polar):
         if number >= _FEW:
             if abs(alpha - last) <= _FOUND:
                 break
-            alpha = 0.5 * (alpha + last)
+            share = min(0.5, _STEADIED / number)
+            alpha = last + share * (alpha - last)
         slope = math.tan(theta - alpha)
         half = lift * slope
         root = half * half - (drag + offset * slope)

@@ -13,7 +13,7 @@ from glider_base.settings import Settings
 from glider_base.signals import TICK_S, Joints, Odometry, Vector, Water, not_finite
 from glider_base.slot import default, slot
 from glider_base.wiring import SENSORS
-from glider_model.ocean.bottom import BathymetrySettings, aground, bottom_depth
+from glider_model.ocean.bottom import NO_BOTTOM, BathymetrySettings, aground, bottom_depth
 from glider_model.ocean.water import WaterSettings, with_wind
 from glider_model.plant.energy import FULL, Ledger, battery_of, spend
 from glider_model.plant.faults.body import acting, blown, felt, moved
@@ -102,7 +102,7 @@ class PlantParams(NamedTuple):
     faults: NamedTuple  #: NoFaults, or FaultParams
     energy: EnergyParams
     readings: Readings  #: noise of where the actuators say that they are
-    bottom: NamedTuple  #: FlatBottom, or another one
+    bottom: NamedTuple = NO_BOTTOM  #: flat, or by a chart
 
 
 def dive_depths(depth_m: float) -> tuple[float, float]:
@@ -251,7 +251,7 @@ def plant_odometry(state):
 
 @kernel
 def _height(motion, params):
-    """Height over the bottom (m); infinite where there is none."""
+    """Height over the bottom (m)."""
     return bottom_depth(motion.p_n, motion.p_e, params.bottom) - motion.p_d
 
 
