@@ -134,10 +134,12 @@ def lacking_when_cut(culprit: str = '') -> dict[str, int]:
     Some nodes have answered the last tick, and others have not: one. Of a node that ended in the
     middle of a tick, what the others wait for may have reached them, but not the recorder, and the
     rest was never published. Then they begin the next tick, which this node does not answer: its
-    topics lack two. The plant does not answer ticks, it begins them: one.
+    topics lack two. Of the fork server that ends, every node does so, each at its own moment. The
+    plant does not answer ticks, it begins them: one.
     """
+    cut = {*MODULES} if culprit == FORK_SERVER else {culprit}
     return {
-        topic.full_name('/glider'): 2 if topic.publisher == culprit != PLANT else 1
+        topic.full_name('/glider'): 2 if topic.publisher in cut - {PLANT} else 1
         for topic in recorded_topics(['measured_odom'])
         if topic.per_tick
     }

@@ -292,14 +292,23 @@ class Origin(NamedTuple):
 
 
 @kernel
+def on_chart(p_n, p_e, origin):
+    """Latitude and longitude (deg) of places north and east of the origin (m), float or arrays.
+
+    The longitude goes on across the date line, so that charts around the origin have no seam.
+    """
+    return origin.latitude + p_n / origin.north, origin.longitude + p_e / origin.east
+
+
+@kernel
 def to_geodetic(p_n, p_e, origin):
     """Latitude and longitude (deg) of a place north and east of the origin (m)."""
-    longitude = origin.longitude + p_e / origin.east
+    latitude, longitude = on_chart(p_n, p_e, origin)
     if longitude > 180.0:
         longitude -= 360.0
     elif longitude < -180.0:
         longitude += 360.0
-    return origin.latitude + p_n / origin.north, longitude
+    return latitude, longitude
 
 
 @kernel

@@ -31,6 +31,12 @@ class Settings(pydantic.BaseModel):
         """
 
 
+def beside(file: str, info: pydantic.ValidationInfo) -> str:
+    """Path of a file that is named beside the file of the settings, if that is known."""
+    folder = (info.context or {}).get('folder')
+    return str((Path(folder) / file).resolve()) if folder and file else file
+
+
 #: ``json_schema_extra`` of a field that can be set on a node while it flies.
 TUNABLE = {'tunable': True}
 #: Numeric limits as pydantic calls them, and in a person's words.

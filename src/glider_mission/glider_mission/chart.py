@@ -13,6 +13,7 @@ from typing import Any
 
 from glider_base.errors import shown
 from glider_base.frames import Origin, OriginSettings, from_geodetic
+from glider_guidance.path.settings import MAX_DISTANCE_M
 from glider_mission.goto_list import SUFFIX, read_goto_list
 
 #: By this share the chart may stretch a length at a waypoint.
@@ -102,18 +103,26 @@ def in_metres(path: Any, settings: OriginSettings) -> Any:
     """
     if not isinstance(path, dict) or path.get('waypoints_latlon') is None:
         return path
-    origin, made = settings.params(), []
+    origin, made, found = settings.params(), [], places(path['waypoints_latlon'])
     if isinstance(path['waypoints_latlon'], str):
-        path = {**path, 'waypoints_latlon': places(path['waypoints_latlon'])}
-    for number, place in enumerate(places(path['waypoints_latlon'])):
+        path = {**path, 'waypoints_latlon': found}
+    for number, place in enumerate(found):
+        name = f'waypoints_latlon.{number}: {place_told(*place)}'
+        north, east = from_geodetic(*place, origin)
+        if max(abs(north), abs(east)) > MAX_DISTANCE_M:
+            raise ValueError(
+                f'{name}: {max(abs(north), abs(east)) / 1e3:,.0f} km from the chart origin, '
+                f'{place_told(origin.latitude, origin.longitude)} (allowed: '
+                f'<= {MAX_DISTANCE_M / 1e3:,.0f} km)'
+            )
         off = stretch(place[0], origin)
         if abs(off) > MAX_STRETCH:
             raise ValueError(
-                f'waypoints_latlon.{number}: {place_told(*place)}: the mission is too large for '
-                f'a flat chart: lengths eastward are off by {100.0 * off:+.1f} % there (allowed: '
+                f'{name}: the mission is too large for a flat chart: lengths eastward are off '
+                f'by {100.0 * off:+.1f} % there (allowed: '
                 f'{100.0 * MAX_STRETCH:g} %; origin.latitude_deg = {settings.latitude_deg:g})'
             )
-        made.append(from_geodetic(*place, origin))
+        made.append((north, east))
     if 'waypoints' in path and not _are_same(path['waypoints'], made):
         raise ValueError(
             'waypoints: other places than waypoints_latlon (allowed: one of the two alone)'

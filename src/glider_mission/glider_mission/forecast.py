@@ -2,12 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The forecast by which a route is planned: not what the vehicle will meet."""
 
-from pathlib import Path
-
 import pydantic
 from pydantic import Field
 
-from glider_base.settings import Settings
+from glider_base.settings import Settings, beside
 
 
 class RouteForecast(Settings):
@@ -31,8 +29,4 @@ class RouteForecast(Settings):
         0.0, ge=0.0, le=240.0, description='by what its water comes too late: its age (h)'
     )
 
-    @pydantic.field_validator('file')
-    @classmethod
-    def _found(cls, file: str, info: pydantic.ValidationInfo) -> str:
-        folder = (info.context or {}).get('folder')
-        return str((Path(folder) / file).resolve()) if folder and file else file
+    _found = pydantic.field_validator('file')(beside)

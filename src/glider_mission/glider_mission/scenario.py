@@ -238,10 +238,10 @@ class Scenario(Settings):
 
     def current_settings(self) -> CurrentSettings:
         """What the current node is told: directions absolute, the scenario's seed."""
-        resolved = self._resolved(self.current)
+        resolved = self.resolved_current(self.current)
         return resolved.model_copy(update={'seed': self.seed})
 
-    def _resolved(self, current: SumOfCurrents) -> SumOfCurrents:
+    def resolved_current(self, current: SumOfCurrents) -> SumOfCurrents:
         """A current with what it has to know of the mission."""
         return current.resolved(self.path.course_rad(), self._mission() if current.field else None)
 
@@ -288,7 +288,7 @@ class Scenario(Settings):
             also_fitted=self.sensors.also_fitted,
             **{
                 **dict(self.navigation),
-                'forecast': self._resolved(self.navigation.forecast),
+                'forecast': self.resolved_current(self.navigation.forecast),
             },
         )
 
@@ -544,7 +544,7 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
             continue
         try:
             field = current.field.known()
-            scenario._resolved(current).field.params()
+            scenario.resolved_current(current).field.params()
         except ValueError as error:
             raise ConfigurationError(f'{name}.field.{error}') from None
         currents[name] = current.model_copy(update={'field': field})

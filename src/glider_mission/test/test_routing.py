@@ -11,7 +11,6 @@ from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.routing import pilot as piloting
 from glider_mission.routing.forecast_chart import erroneous, forecast_of, observed, with_land
 from glider_mission.routing.fronts import (
-    STENCIL,
     Chart,
     current_on,
     fronts,
@@ -53,7 +52,7 @@ def hard():
 def test_fronts_in_a_uniform_current_are_circles_that_drift():
     """Half as fast as the vehicle: never too early, 0.3 % late on average, 1.5 % at most."""
     chart = chart_of(lambda n, e: (0.09 + 0.0 * n, -0.12 + 0.0 * e))
-    arrivals, _, goal_s, _ = fronts(chart, 0.0, 0.0, 0.0, 1e7, 1e7, SPEED, END_S, STENCIL)
+    arrivals, _, goal_s, _ = fronts(chart, 0.0, 0.0, 0.0, 1e7, 1e7, SPEED, END_S)
     assert goal_s == math.inf
     north, east = np.meshgrid(chart.norths, chart.easts, indexing='ij')
     far = np.maximum(np.hypot(north, east), 1e-9)
@@ -81,7 +80,7 @@ def test_the_fastest_way_in_a_sheared_current_is_that_of_zermelo():
     )
     exact_s = abs(math.tan(first) - math.tan(last)) * length / SPEED
     chart = chart_of(lambda n, e: (0.0 * n, -SPEED * n / length), 6.0 * length, 241)
-    _, _, found_s, _ = fronts(chart, 0.0, y * length, x * length, 0.0, 0.0, SPEED, END_S, STENCIL)
+    _, _, found_s, _ = fronts(chart, 0.0, y * length, x * length, 0.0, 0.0, SPEED, END_S)
     assert found_s == pytest.approx(exact_s, rel=6e-3)
     assert found_s > exact_s * (1.0 - 2e-3)
 

@@ -86,7 +86,9 @@ def _rows(told: dict[str, Any]) -> list[tuple[str, str]]:
         return 'not in its time' if hours is None else span(3600.0 * hours)
 
     arrival = told['arrival_h']
-    bands = f'{when(arrival["p50"])} (p10 {when(arrival["p10"])}, p90 {when(arrival["p90"])})'
+    bands = when(arrival['p50'])
+    if len(set(arrival.values())) > 1:
+        bands += f' (p10 {when(arrival["p10"])}, p90 {when(arrival["p90"])})'
     reach = 'yes' if told['reachable'] else f'not in {span(3600.0 * told["mission_h"])}'
     rows = [
         ('reachable', reach),
@@ -94,7 +96,7 @@ def _rows(told: dict[str, Any]) -> list[tuple[str, str]]:
         ('arrival, straight legs', when(told['straight_h'])),
         ('energy', '-' if told['wh'] is None else f'{told["wh"]:.0f} Wh'),
         ('surfacings', '-' if told['surfacings'] is None else str(told['surfacings'])),
-        ('through the water', f'{told["speed_mps"]:.3f} m/s, stays at the surface included'),
+        ('through the water', f'{told["speed_mps"]:.3f} m/s, surface intervals included'),
     ]
     rows += [
         (f'corner {number}' if number else 'start', place_told(*place))

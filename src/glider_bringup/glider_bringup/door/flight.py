@@ -19,7 +19,7 @@ from glider_bringup.engines.direct import (
     fault_of,
     finite_rows,
 )
-from glider_bringup.engines.flight import Held, Kept, refuse_message_faults
+from glider_bringup.engines.flight import Held, Kept, refuse_message_faults, refuse_planned_route
 from glider_control.law import LawSettings
 from glider_guard.rows import LATCHED
 from glider_guidance.order import Order
@@ -119,6 +119,7 @@ class Flight:
             scenario, set or {}, controller, law, guidance, seed, duration
         )
         refuse_message_faults(self.scenario)
+        refuse_planned_route(self.scenario)
         self._log = np.empty((_LOOK_TICKS, ROW))
         with told(combination_of(self.scenario), compiling):
             self._held = Held(self.scenario)

@@ -16,7 +16,7 @@ import numpy as np
 import xarray
 
 from glider_base.errors import ConfigurationError
-from glider_base.frames import poses_from_wire
+from glider_base.frames import on_chart, poses_from_wire
 from glider_base.signals import TICK_NS
 from glider_bringup.door.tracks import start_of
 from glider_bringup.scoring.card import read_score
@@ -253,9 +253,8 @@ def _measured(
 
 def _degrees(north: np.ndarray, east: np.ndarray, scenario: Scenario) -> tuple[np.ndarray, ...]:
     """Latitude and longitude (deg) of places north and east of the origin (m)."""
-    origin = scenario.origin.params()
-    longitude = origin.longitude + east / origin.east
-    return origin.latitude + north / origin.north, (longitude + 180.0) % 360.0 - 180.0
+    latitude, longitude = on_chart(north, east, scenario.origin.params())
+    return latitude, (longitude + 180.0) % 360.0 - 180.0
 
 
 def _fixes(

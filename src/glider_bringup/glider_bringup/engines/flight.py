@@ -197,9 +197,9 @@ def refuse_planned_route(scenario: Scenario) -> None:
     """Refuse a scenario whose route is planned in flight."""
     if scenario.guidance.route == 'planned':
         raise ConfigurationError(
-            "guidance.route = 'planned': not over nodes, nor with a bag (fly it with --engine "
-            'direct: the scenario of its run folder has the route as orders, and flies so by '
-            'either engine)'
+            "guidance.route = 'planned': not over nodes, step by step, or with a bag (fly it with "
+            '--engine direct: the scenario of its run folder has the route as orders, and flies '
+            'so by either engine)'
         )
 
 

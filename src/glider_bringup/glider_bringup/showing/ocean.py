@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from glider_base.frames import on_chart
 from glider_base.settings import ConfigurationError
 from glider_bringup.showing.figure import GREEN, ORANGE, new_figure
 from glider_mission.chart import place_told
@@ -124,7 +125,7 @@ def mission_in(file: Path, name: str) -> Sea:
     params = scenario.current_settings().field.params()
     axes = Axes(params.times, params.depths, params.latitudes, params.longitudes)
     none = np.zeros((len(axes.latitudes), len(axes.longitudes)), dtype=bool)
-    loaded = Loaded(axes, axes, params.water, none, 0.0)
+    loaded = Loaded(axes, params.water, none, 0.0)
     return Sea(f'{file.name} at the start of {scenario.name}', loaded, scenario)
 
 
@@ -169,8 +170,8 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
         If the image cannot be written.
     """
     chart, origin = made.chart, scenario.origin.params()
-    longitudes = origin.longitude + chart.easts / origin.east
-    latitudes = origin.latitude + chart.norths / origin.north
+    latitudes, _ = on_chart(chart.norths, 0.0 * chart.norths, origin)
+    _, longitudes = on_chart(0.0 * chart.easts, chart.easts, origin)
     north, east = np.moveaxis(chart.current[0], -1, 0)
     figure = new_figure(8.0, 6.5)
     axis = figure.add_subplot()
@@ -185,13 +186,8 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
             levels = np.arange(0.0, float(reached.max()) + 12.0, 12.0)
             axis.contour(longitudes, latitudes, reached, levels, colors='#666666', linewidths=0.5)
     _draw_path(axis, scenario)
-    corners = made.route.corners
-    axis.plot(
-        origin.longitude + corners[:, 1] / origin.east,
-        origin.latitude + corners[:, 0] / origin.north,
-        color=GREEN,
-        label='planned route',
-    )
+    latitude, longitude = on_chart(*made.route.corners.T.copy(), origin)
+    axis.plot(longitude, latitude, color=GREEN, label='planned route')
     axis.legend(loc='upper right', fontsize='small')
     title = f'{scenario.name}: fronts every 12 h of each leg'
     axis.set(title=title, xlabel='longitude (deg)', ylabel='latitude (deg)')
@@ -201,10 +197,8 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
 
 def _draw_path(axis: Any, scenario: Scenario) -> None:
     """Draw the path of a mission."""
-    origin = scenario.origin.params()
-    points = scenario.path.points(200)
-    longitude = origin.longitude + points[:, 1] / origin.east
-    latitude = origin.latitude + points[:, 0] / origin.north
+    points = scenario.path.points(200).T.copy()
+    latitude, longitude = on_chart(points[0], points[1], scenario.origin.params())
     axis.plot(longitude, latitude, color=ORANGE, label=scenario.name)
     axis.plot(longitude[:1], latitude[:1], 'o', color=ORANGE)
     axis.legend(loc='upper right', fontsize='small')

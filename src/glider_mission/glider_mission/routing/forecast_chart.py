@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from glider_base.frames import from_geodetic
 from glider_base.kernel import kernel
 from glider_base.noise import random_stream
 from glider_base.settings import ConfigurationError
@@ -48,10 +49,11 @@ def _lattice(scenario: Scenario, params: CurrentParams) -> tuple[np.ndarray, np.
     low, high = places.min(axis=0) - MARGIN_M, places.max(axis=0) + MARGIN_M
     field, origin = params.field, scenario.origin.params()
     if hasattr(field, 'latitudes'):
-        edges = field.latitudes[[0, -1]] - origin.latitude, field.longitudes[[0, -1]]
-        north, east = edges[0] * origin.north, (edges[1] - origin.longitude) * origin.east
-        low = np.maximum(low, (north[0], east[0]))
-        high = np.minimum(high, (north[1], east[1]))
+        edges = ((field.latitudes[k], field.longitudes[k]) for k in (0, -1))
+        low, high = (
+            limit(one, from_geodetic(*edge, origin))
+            for limit, one, edge in zip((np.maximum, np.minimum), (low, high), edges, strict=True)
+        )
     step = max(STEP_M, float((high - low).max()) / _MOST)
     return tuple(np.arange(a, b + 1e-6, step) for a, b in zip(low, high, strict=True))
 
@@ -68,7 +70,7 @@ def forecast_of(scenario: Scenario) -> tuple[Chart, np.ndarray]:
     if told.file:
         current = CurrentSettings(field=GridSettings(file=told.file))
     steady = [one for one in current.components if one.kind != 'gauss_markov']
-    settings = scenario._resolved(current.model_copy(update={'components': steady}))
+    settings = scenario.resolved_current(current.model_copy(update={'components': steady}))
     try:
         params = settings.params(0)
     except ValueError as error:

@@ -104,7 +104,7 @@ def line_arrival(chart, t_s, north, east, to_n, to_e, speed):
 
 
 @kernel
-def fronts(chart, t_s, north, east, goal_n, goal_e, speed, end_s, stencil):
+def fronts(chart, t_s, north, east, goal_n, goal_e, speed, end_s):
     """Earliest arrivals on the lattice of a chart, until the goal is reached.
 
     Parameters
@@ -118,7 +118,6 @@ def fronts(chart, t_s, north, east, goal_n, goal_e, speed, end_s, stencil):
         Through the water, horizontally (m/s).
     end_s : float
         Nobody looks further than to this time (s).
-    stencil : int64[n, 2]
 
     Returns
     -------
@@ -161,8 +160,8 @@ def fronts(chart, t_s, north, east, goal_n, goal_e, speed, end_s, stencil):
             reached = line_arrival(chart, at_s, norths[i], easts[j], goal_n, goal_e, speed)
             if reached < goal_s:
                 goal_s, last = reached, point
-        for k in range(len(stencil)):
-            a, b = i + stencil[k, 0], j + stencil[k, 1]
+        for k in range(len(STENCIL)):
+            a, b = i + STENCIL[k, 0], j + STENCIL[k, 1]
             if a < 0 or b < 0 or a >= rows or b >= columns or done[a * columns + b]:
                 continue
             reached = line_arrival(chart, at_s, norths[i], easts[j], norths[a], easts[b], speed)
@@ -176,7 +175,7 @@ def fronts(chart, t_s, north, east, goal_n, goal_e, speed, end_s, stencil):
 
 
 @kernel
-def sail(chart, t_s, route, speed, end_s, tracks):
+def sail(chart, t_s, route, speed, end_s):
     """Follow a route, as a vehicle does that aims at a point ahead of it on the way.
 
     Where the course to it cannot be held it steers across the current, and is carried.
@@ -192,8 +191,6 @@ def sail(chart, t_s, route, speed, end_s, tracks):
         Through the water (m/s).
     end_s : float
         It is given up at this time (s).
-    tracks : float64[m, 2]
-        Filled with its places, one for each look; repeated from its arrival on.
 
     Returns
     -------
@@ -201,11 +198,8 @@ def sail(chart, t_s, route, speed, end_s, tracks):
         Arrival at the last corner (s); infinite: not in the time.
     """
     north, east = route[0, 0], route[0, 1]
-    leg, row = 0, 0
+    leg = 0
     while t_s < end_s:
-        if row < len(tracks):
-            tracks[row, 0], tracks[row, 1] = north, east
-            row += 1
         goal_n, goal_e = route[leg + 1, 0], route[leg + 1, 1]
         d_n, d_e = goal_n - route[leg, 0], goal_e - route[leg, 1]
         length = max(1.0, math.hypot(d_n, d_e))
@@ -234,8 +228,6 @@ def sail(chart, t_s, route, speed, end_s, tracks):
         north += _LOOK_S * ground_n
         east += _LOOK_S * ground_e
         t_s += _LOOK_S
-    for k in range(row, len(tracks)):
-        tracks[k, 0], tracks[k, 1] = north, east
     if t_s >= end_s:
         return math.inf
     off = math.hypot(route[-1, 0] - north, route[-1, 1] - east)

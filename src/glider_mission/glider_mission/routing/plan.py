@@ -11,7 +11,7 @@ import numpy as np
 from glider_base.signals import TICK_S
 from glider_guidance.guidance import GuidanceParams
 from glider_mission.routing.forecast_chart import erroneous, forecast_of, with_land
-from glider_mission.routing.fronts import STENCIL, Chart, fronts, sail
+from glider_mission.routing.fronts import Chart, fronts, sail
 from glider_mission.scenario import Scenario
 from glider_model.ocean.density import immersed
 from glider_model.onboard.glide_polar import glide_horizontal_speed, glide_vertical_rate
@@ -169,7 +169,7 @@ def route_through(
     columns = len(chart.easts)
     for place, goal in zip(waypoints, waypoints[1:], strict=False):
         arrivals, before, goal_s, last = fronts(
-            chart, t_s, *map(float, place), *map(float, goal), speed, end_s, STENCIL
+            chart, t_s, *map(float, place), *map(float, goal), speed, end_s
         )
         found.append(arrivals)
         if not math.isfinite(goal_s):
@@ -203,7 +203,7 @@ def straightened(points: np.ndarray) -> list[np.ndarray]:
 
 def sailed_s(chart: Chart, route: np.ndarray, t_s: float, speed: float, end_s: float) -> float:
     """Arrival (s) of a vehicle that follows a route; infinite: not in the time."""
-    return sail(chart, t_s, np.ascontiguousarray(route), speed, end_s, np.empty((0, 2)))
+    return sail(chart, t_s, np.ascontiguousarray(route), speed, end_s)
 
 
 def waypoints_of(scenario: Scenario) -> np.ndarray:

@@ -9,7 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_base.frames import Origin, rotate_to_body, rotate_to_ned
+from glider_base.frames import (
+    Origin,
+    from_geodetic,
+    on_chart,
+    rotate_to_body,
+    rotate_to_ned,
+)
 from glider_base.kernel import kernel, replace
 from glider_base.slot import slot
 from glider_model.ocean.field import Mission
@@ -60,9 +66,9 @@ class ChartedBottom(NamedTuple):
 @kernel
 def _charted_depth(n, e, params):
     """Linear between the points of the chart; beyond its edge that of the edge."""
-    origin = params.origin
-    y, y_next, f_y = bracket(origin.latitude + n / origin.north, params.latitudes)
-    x, x_next, f_x = bracket(origin.longitude + e / origin.east, params.longitudes)
+    latitude, longitude = on_chart(n, e, params.origin)
+    y, y_next, f_y = bracket(latitude, params.latitudes)
+    x, x_next, f_x = bracket(longitude, params.longitudes)
     south = (1.0 - f_x) * params.depth[y, x] + f_x * params.depth[y, x_next]
     north = (1.0 - f_x) * params.depth[y_next, x] + f_x * params.depth[y_next, x_next]
     return (1.0 - f_y) * south + f_y * north
@@ -89,9 +95,7 @@ def _loaded(file: str, mission: Mission) -> LoadedBottom:
     loaded = load_bottom(Path(file), widened(needed, MARGIN_M), needed)
     chart = ChartedBottom(*loaded, mission.origin.params())
     for latitude, longitude in mission.places:
-        away = (longitude - chart.origin.longitude + 180.0) % 360.0 - 180.0
-        north = (latitude - chart.origin.latitude) * chart.origin.north
-        if bottom_depth(north, away * chart.origin.east, chart) <= 0.0:
+        if bottom_depth(*from_geodetic(latitude, longitude, chart.origin), chart) <= 0.0:
             raise ValueError(
                 f'file {file}: {latitude:.4f}, {longitude:.4f} on the path is land (allowed: '
                 'water)'

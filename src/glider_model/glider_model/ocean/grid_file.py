@@ -78,7 +78,6 @@ class Loaded(NamedTuple):
     """A window of a grid."""
 
     axes: Axes
-    whole: Axes  #: of the file
     water: np.ndarray  #: float32[time, depth, latitude, longitude, 2], to the north, east (m/s)
     land: np.ndarray  #: bool[latitude, longitude], of the uppermost level
     filled: float  #: share of the values that are land or bottom: those of the nearest water
@@ -101,7 +100,7 @@ def _opened(path: Path) -> Iterator['xarray.Dataset']:
     Raises
     ------
     ValueError
-        Naming the file.
+        Naming the file; also of what is found wrong in it.
     """
     import xarray
 
@@ -121,7 +120,10 @@ def _opened(path: Path) -> Iterator['xarray.Dataset']:
         text = f'{type(error).__name__}: {error}'.splitlines()[0][:200]
         raise ValueError(f'file {path}: not a NetCDF file that xarray reads: {text}') from None
     with dataset:
-        yield dataset
+        try:
+            yield dataset
+        except ValueError as error:
+            raise ValueError(f'file {path}: {error}') from None
 
 
 def fingerprint(path: Path) -> str:
@@ -295,30 +297,31 @@ def _runs(indices: np.ndarray) -> list[slice]:
     return found
 
 
-def load(path: Path, window: Window | None = None) -> Loaded:
+def load(path: Path, window: Window | None = None, needed: Window | None = None) -> Loaded:
     """Read a window of a file; all of it without one.
 
     Parameters
     ----------
     path : Path
     window : Window, optional
+        That is read, as far as the file has it.
+    needed : Window, optional
+        That the file has to cover.
 
     Raises
     ------
     ValueError
         Naming the file, and what is missing in it or what of the window it does not cover.
     """
-    try:
-        with _opened(path) as dataset:
-            layout = _layout(dataset)
-            chosen, axes, whole = _select(layout, window)
-            size = 8 * math.prod(map(len, chosen.values()))
-            if size > MAX_BYTES:
-                raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
-            return _read(layout, chosen, axes, whole)
-    except ValueError as error:
-        text = str(error)
-        raise ValueError(text if text.startswith('file ') else f'file {path}: {text}') from None
+    with _opened(path) as dataset:
+        layout = _layout(dataset)
+        chosen, axes, whole = _select(layout, window)
+        if needed is not None:
+            _refuse_uncovered(whole, needed)
+        size = 8 * math.prod(map(len, chosen.values()))
+        if size > MAX_BYTES:
+            raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
+        return _read(layout, chosen, axes)
 
 
 def _select(layout: _Layout, window: Window | None) -> tuple[dict[str, np.ndarray], Axes, Axes]:
@@ -347,7 +350,42 @@ def _select(layout: _Layout, window: Window | None) -> tuple[dict[str, np.ndarra
     return chosen, axes, Axes(*(np.sort(values[axis]) for axis in _AXES))
 
 
-def _read(layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes, whole: Axes) -> Loaded:
+def _refuse_uncovered(axes: Axes, window: Window) -> None:
+    """Refuse a grid that does not cover a window in place or time.
+
+    A grid with one time is a steady one. Above its first level and below its last one it has the
+    water of these.
+
+    Raises
+    ------
+    ValueError
+        Naming the axis, and what there is.
+    """
+    if len(axes.times) > 1 and not math.isnan(window.begin):
+        first, last = axes.times[0], axes.times[-1]
+        if window.begin < first or window.begin + window.lasts > last:
+            raise ValueError(
+                f'the mission goes from {told_time(window.begin)} to '
+                f'{told_time(window.begin + window.lasts)} (allowed: within '
+                f'{told_time(first)} to {told_time(last)}, the times of the file)'
+            )
+    elif len(axes.times) > 1 and window.lasts > axes.times[-1] - axes.times[0]:
+        raise ValueError(
+            f'the mission lasts {window.lasts:,.0f} s (allowed: '
+            f'<= {axes.times[-1] - axes.times[0]:,.0f} s, the times of the file)'
+        )
+    for name, values, low, high in (
+        ('latitude', axes.latitudes, window.south, window.north),
+        ('longitude', axes.longitudes, window.west, window.east),
+    ):
+        if low < values[0] or high > values[-1]:
+            raise ValueError(
+                f'the {name} of the path goes from {low:.3f} to {high:.3f} deg '
+                f'(allowed: within {values[0]:.3f} to {values[-1]:.3f}, as the file has it)'
+            )
+
+
+def _read(layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes) -> Loaded:
     """Numbers of a window, with the nearest water in place of land and bottom."""
     shape = tuple(len(one) for one in axes)
     water = np.empty((*shape, 2), dtype=np.float32)
@@ -362,7 +400,7 @@ def _read(layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes, whole: Axe
                 land |= ~np.isfinite(read[0])
             filled += np.count_nonzero(~np.isfinite(read))
             water[step, ..., component] = _fill_land(read)
-    return Loaded(axes, whole, water, land, filled / water.size)
+    return Loaded(axes, water, land, filled / water.size)
 
 
 def _cut(part: 'xarray.DataArray', axes: dict[str, str], chosen: dict[str, np.ndarray]):
@@ -434,32 +472,25 @@ def load_bottom(path: Path, window: Window, needed: Window) -> LoadedBottom:
     ValueError
         Naming the file, and what is missing in it or what of the mission it does not cover.
     """
-    try:
-        with _opened(path) as dataset:
-            name, scale = _bottom(dataset)
-            axes = _find_axes(dataset, name, ('latitude', 'longitude'))
-            values = {
-                axis: np.asarray(dataset.variables[one].values, float)
-                for axis, one in axes.items()
-            }
-            values['longitude'] = _unwrapped(
-                values['longitude'], 0.5 * (window.west + window.east)
-            )
-            whole = Axes(np.zeros(1), np.zeros(1), *(np.sort(values[a]) for a in _AXES[2:]))
-            refuse_uncovered(whole, needed, f'file {path}')
-            chosen = {
-                'latitude': _chosen(values['latitude'], window.south, window.north),
-                'longitude': _chosen(values['longitude'], window.west, window.east),
-            }
-            size = 4 * math.prod(map(len, chosen.values()))
-            if size > MAX_BYTES:
-                raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
-            depth = scale * _cut(dataset[name], {axis: axes[axis] for axis in chosen}, chosen)
-            depth = np.nan_to_num(np.maximum(depth, 0.0)).astype(np.float32)
-            return LoadedBottom(*(values[axis][chosen[axis]] for axis in chosen), depth)
-    except ValueError as error:
-        text = str(error)
-        raise ValueError(text if text.startswith('file ') else f'file {path}: {text}') from None
+    with _opened(path) as dataset:
+        name, scale = _bottom(dataset)
+        axes = _find_axes(dataset, name, ('latitude', 'longitude'))
+        values = {
+            axis: np.asarray(dataset.variables[one].values, float) for axis, one in axes.items()
+        }
+        values['longitude'] = _unwrapped(values['longitude'], 0.5 * (window.west + window.east))
+        whole = Axes(np.zeros(1), np.zeros(1), *(np.sort(values[a]) for a in _AXES[2:]))
+        _refuse_uncovered(whole, needed)
+        chosen = {
+            'latitude': _chosen(values['latitude'], window.south, window.north),
+            'longitude': _chosen(values['longitude'], window.west, window.east),
+        }
+        size = 4 * math.prod(map(len, chosen.values()))
+        if size > MAX_BYTES:
+            raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
+        depth = scale * _cut(dataset[name], {axis: axes[axis] for axis in chosen}, chosen)
+        depth = np.nan_to_num(np.maximum(depth, 0.0)).astype(np.float32)
+        return LoadedBottom(*(values[axis][chosen[axis]] for axis in chosen), depth)
 
 
 def _bottom(dataset: 'xarray.Dataset') -> tuple[str, float]:
@@ -490,52 +521,13 @@ class Contents(NamedTuple):
 
 def contents(path: Path) -> Contents:
     """What is in a file, of which no velocity is read; raises as `load`."""
-    try:
-        with _opened(path) as dataset:
-            layout = _layout(dataset)
-            source = dataset.attrs.get('source') or dataset.attrs.get('title') or ''
-            names = [layout.variables[side] for side in _VELOCITIES]
-            return Contents(names, _select(layout, None)[1], str(source))
-    except ValueError as error:
-        text = str(error)
-        raise ValueError(text if text.startswith('file ') else f'file {path}: {text}') from None
+    with _opened(path) as dataset:
+        layout = _layout(dataset)
+        source = dataset.attrs.get('source') or dataset.attrs.get('title') or ''
+        names = [layout.variables[side] for side in _VELOCITIES]
+        return Contents(names, _select(layout, None)[1], str(source))
 
 
 def told_time(seconds: float) -> str:
     """A time (s since 1970, UTC) as a person reads it."""
     return f'{datetime.fromtimestamp(seconds, timezone.utc):%Y-%m-%dT%H:%MZ}'
-
-
-def refuse_uncovered(axes: Axes, window: Window, source: str) -> None:
-    """Refuse a grid that does not cover a window in place or time.
-
-    A grid with one time is a steady one. Above its first level and below its last one it has the
-    water of these.
-
-    Raises
-    ------
-    ValueError
-        Naming the source, the axis, and what there is.
-    """
-    if len(axes.times) > 1 and not math.isnan(window.begin):
-        first, last = axes.times[0], axes.times[-1]
-        if window.begin < first or window.begin + window.lasts > last:
-            raise ValueError(
-                f'{source}: the mission goes from {told_time(window.begin)} to '
-                f'{told_time(window.begin + window.lasts)} (allowed: within '
-                f'{told_time(first)} to {told_time(last)}, the times of the file)'
-            )
-    elif len(axes.times) > 1 and window.lasts > axes.times[-1] - axes.times[0]:
-        raise ValueError(
-            f'{source}: the mission lasts {window.lasts:,.0f} s (allowed: '
-            f'<= {axes.times[-1] - axes.times[0]:,.0f} s, the times of the file)'
-        )
-    for name, values, low, high in (
-        ('latitude', axes.latitudes, window.south, window.north),
-        ('longitude', axes.longitudes, window.west, window.east),
-    ):
-        if low < values[0] or high > values[-1]:
-            raise ValueError(
-                f'{source}: the {name} of the path goes from {low:.3f} to {high:.3f} deg '
-                f'(allowed: within {values[0]:.3f} to {values[-1]:.3f}, as the file has it)'
-            )

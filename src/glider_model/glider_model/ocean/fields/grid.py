@@ -16,16 +16,15 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_base.frames import Origin, OriginSettings
+from glider_base.frames import Origin, OriginSettings, on_chart
 from glider_base.kernel import kernel
-from glider_base.settings import Settings
+from glider_base.settings import Settings, beside
 from glider_model.ocean.field import FieldSettings, Mission, field_velocity
 from glider_model.ocean.grid_file import (
     Loaded,
     Window,
     fingerprint,
     load,
-    refuse_uncovered,
 )
 
 #: Water around the path that is read too, as far as the file has it (m).
@@ -45,11 +44,7 @@ class GridFileSettings(Settings):
         Mission(), description='Where and when it is flown; a scenario says it.'
     )
 
-    @pydantic.field_validator('file')
-    @classmethod
-    def _found(cls, file: str, info: pydantic.ValidationInfo) -> str:
-        folder = (info.context or {}).get('folder')
-        return str((Path(folder) / file).resolve()) if folder and file else file
+    _found = pydantic.field_validator('file')(beside)
 
     def resolved(self, mission: Mission) -> 'GridFileSettings':
         """Copy that knows where and when it is flown."""
@@ -81,12 +76,11 @@ class GridSettings(GridFileSettings, FieldSettings):
         """Where there is land, by the nearest points of the grid, bool[n, m]."""
         loaded, _ = _loaded(self.file, self.mission)
         origin = self.mission.origin.params()
+        latitudes, _ = on_chart(norths, 0.0 * norths, origin)
+        _, longitudes = on_chart(0.0 * easts, easts, origin)
         nearest = [
-            np.abs(axis[None, :] - (one / scale + zero)[:, None]).argmin(axis=1)
-            for axis, one, scale, zero in (
-                (loaded.axes.latitudes, norths, origin.north, origin.latitude),
-                (loaded.axes.longitudes, easts, origin.east, origin.longitude),
-            )
+            np.abs(axis[None, :] - one[:, None]).argmin(axis=1)
+            for axis, one in zip(loaded.axes[2:], (latitudes, longitudes), strict=True)
         ]
         return loaded.land[np.ix_(*nearest)]
 
@@ -114,8 +108,7 @@ class GridSettings(GridFileSettings, FieldSettings):
 def _loaded(file: str, mission: Mission) -> tuple[Loaded, float]:
     """What a mission needs of a file, and its start (s since 1970)."""
     path, needed = Path(file), mission_window(mission)
-    loaded = load(path, widened(needed, MARGIN_M))
-    refuse_uncovered(loaded.whole, needed, f'file {path}')
+    loaded = load(path, widened(needed, MARGIN_M), needed)
     for place in mission.places:
         row, column = (
             int(np.argmin(np.abs(values - one)))
@@ -233,8 +226,6 @@ def interpolate(t_s, depth, latitude, longitude, params):
 @kernel
 def grid_velocity(position, t_s, params):
     """Velocity on a grid (m/s): see `field_velocity`."""
-    origin = params.origin
-    latitude = origin.latitude + position[0] / origin.north
-    longitude = origin.longitude + position[1] / origin.east
+    latitude, longitude = on_chart(position[0], position[1], params.origin)
     north, east = interpolate(t_s, position[2], latitude, longitude, params)
     return north, east, 0.0
