@@ -37,6 +37,7 @@ def test_a_vehicle_lies_where_it_touched_the_bottom(u, v, w, north, east, down, 
     assert after[3:7] + after[10:] == before[3:7] + before[10:]
 
 
+ORIGIN = 36.0, 122.0  #: of the chart of slocum_shelf (deg)
 #: Corners of the chart (deg): the shelf around the origin of the chart, and north of it.
 CHART = np.linspace(35.9, 36.3, 41), np.linspace(121.9, 122.1, 21)
 
@@ -63,21 +64,29 @@ def mountains(path, seed, height_m=150.0):
     return path
 
 
-def over_mountains(folder, seed, clearance_m=10.0):
-    """Score of a mission over random mountains."""
-    given = {
-        'bathymetry.file': str(mountains(folder / f'{seed}.nc', seed)),
-        'profile.clearance_m': clearance_m,
-    }
-    return glider_bringup.fly('slocum_shelf', given).score
+def least_height(run, chart) -> float:
+    """Of the true track over a chart (m), by xarray and the series for the length of a degree."""
+    told, phi = run.to_xarray(), np.radians(ORIGIN[0])
+    north, east, depth = (told[f'ground_truth_odom_{name}'] for name in ('north', 'east', 'depth'))
+    a_degree_north = 111132.92 - 559.82 * np.cos(2.0 * phi) + 1.175 * np.cos(4.0 * phi)
+    a_degree_east = 111412.84 * np.cos(phi) - 93.5 * np.cos(3.0 * phi) + 0.118 * np.cos(5.0 * phi)
+    at = {'lat': ORIGIN[0] + north / a_degree_north, 'lon': ORIGIN[1] + east / a_degree_east}
+    elevation = xarray.load_dataset(chart)['elevation'].astype(float).interp(at)
+    heights = -elevation - depth
+    assert heights.notnull().all()
+    return float(heights.min())
 
 
 @pytest.mark.parametrize('seed', range(4))
 def test_dives_turn_above_mountains(seed, tmp_path):
-    told = over_mountains(tmp_path, seed)
+    chart = mountains(tmp_path / 'chart.nc', seed)
+    given = {'bathymetry.file': str(chart), 'profile.clearance_m': 10.0}
+    run = glider_bringup.fly('slocum_shelf', given)
+    told = run.score
     assert told['status'] == 'completed', told['reason']
     assert not told['bottom']['touched']
     assert told['bottom']['least_height_m'] > 5.0
+    assert least_height(run, chart) == pytest.approx(told['bottom']['least_height_m'], abs=1.0)
 
 
 def flown(**fields):
