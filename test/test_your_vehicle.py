@@ -58,8 +58,9 @@ RECKONED = {
     **{'sensors.imu_period_s': 4.0, 'sensors.gyro': False},
 }
 #: How far odom may be from the truth (m), horizontally and in depth: navigation knows neither the
-#: current, 4 m until the abort, nor the 0.5 m/s of the first 20 s, when it has too few samples.
-OFF_M = (15.0, 1.0)
+#: current, 4 m until the abort, nor the 0.5 m/s of the start, when it has too few samples. A busy
+#: machine makes that longer, and depth drifts at 0.2 m/s until pressures come: told from FED_S on.
+OFF_M, FED_S = (15.0, 1.0), 20.0
 #: How the stand-in begins.
 GLIDING = {'heading_deg': 30.0, 'pitch_deg': -30.0, 'speed_mps': 0.5, 'net_heaviness_kg': 0.4}
 #: All the buoyancy there is; the mass holds it level for the pump.
@@ -282,7 +283,8 @@ def test_odom_is_where_it_is(flown):
     assert len(both) > 0.5 * ABORT_S / TICK_S
     off_m = np.abs([np.subtract(known[k][:3], truth[k][:3]) for k in both])
     assert np.max(np.hypot(off_m[:, 0], off_m[:, 1])) < OFF_M[0]
-    assert np.max(off_m[:, 2]) < OFF_M[1]
+    fed = np.array(both) * TICK_S >= FED_S
+    assert np.max(off_m[fed, 2]) < OFF_M[1]
 
 
 def test_line_was_as_bad_as_it_is_said_to_be(flight):
