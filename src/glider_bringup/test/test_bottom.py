@@ -43,12 +43,12 @@ CHART = np.linspace(35.9, 36.3, 41), np.linspace(121.9, 122.1, 21)
 
 
 def mountains(path, seed, height_m=150.0):
-    """Chart as GEBCO writes it: a plain at 250 m, with four hills of a height or less."""
+    """Chart as GEBCO writes it: a plain at 250 m, four hills of a height or less on the way."""
     draw = np.random.default_rng(seed)
     latitudes, longitudes = CHART
     elevation = np.full((len(latitudes), len(longitudes)), -250.0)
     for _ in range(4):
-        north, east = draw.uniform(36.01, 36.15), draw.uniform(121.97, 122.03)
+        north, east = draw.uniform(36.01, 36.15), draw.uniform(121.99, 122.01)
         away = np.hypot(latitudes[:, None] - north, 0.8 * (longitudes - east))
         size = draw.uniform(0.012, 0.03)
         elevation += draw.uniform(0.5, 1.0) * height_m * np.exp(-((away / size) ** 2))
@@ -77,11 +77,13 @@ def least_height(run, chart) -> float:
     return float(heights.min())
 
 
-@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('seed', [1, 2, 3, 5])
 def test_dives_turn_above_mountains(seed, tmp_path):
+    """Over which the same yo does not fit without; over those of 0 and 4 it does."""
     chart = mountains(tmp_path / 'chart.nc', seed)
-    given = {'bathymetry.file': str(chart), 'profile.clearance_m': 10.0}
-    run = glider_bringup.fly('slocum_shelf', given)
+    given = {'bathymetry.file': str(chart)}
+    assert glider_bringup.fly('slocum_shelf', given).score['bottom']['touched']
+    run = glider_bringup.fly('slocum_shelf', {**given, 'profile.clearance_m': 10.0})
     told = run.score
     assert told['status'] == 'completed', told['reason']
     assert not told['bottom']['touched']

@@ -125,7 +125,7 @@ def mission_in(file: Path, name: str) -> Sea:
     params = scenario.current_settings().field.params()
     axes = Axes(params.times, params.depths, params.latitudes, params.longitudes)
     none = np.zeros((len(axes.latitudes), len(axes.longitudes)), dtype=bool)
-    loaded = Loaded(axes, params.water, none, 0.0)
+    loaded = Loaded(axes, params.water, none)
     return Sea(f'{file.name} at the start of {scenario.name}', loaded, scenario)
 
 
@@ -170,8 +170,7 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
         If the image cannot be written.
     """
     chart, origin = made.chart, scenario.origin.params()
-    latitudes, _ = on_chart(chart.norths, 0.0 * chart.norths, origin)
-    _, longitudes = on_chart(0.0 * chart.easts, chart.easts, origin)
+    latitudes, longitudes = on_chart(chart.norths, chart.easts, origin)
     north, east = np.moveaxis(chart.current[0], -1, 0)
     figure = new_figure(8.0, 6.5)
     axis = figure.add_subplot()
@@ -186,7 +185,7 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
             levels = np.arange(0.0, float(reached.max()) + 12.0, 12.0)
             axis.contour(longitudes, latitudes, reached, levels, colors='#666666', linewidths=0.5)
     _draw_path(axis, scenario)
-    latitude, longitude = on_chart(*made.route.corners.T.copy(), origin)
+    latitude, longitude = on_chart(*made.route.corners.T, origin)
     axis.plot(longitude, latitude, color=GREEN, label='planned route')
     axis.legend(loc='upper right', fontsize='small')
     title = f'{scenario.name}: fronts every 12 h of each leg'
@@ -197,8 +196,8 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
 
 def _draw_path(axis: Any, scenario: Scenario) -> None:
     """Draw the path of a mission."""
-    points = scenario.path.points(200).T.copy()
-    latitude, longitude = on_chart(points[0], points[1], scenario.origin.params())
+    north, east, *_ = scenario.path.points(200).T
+    latitude, longitude = on_chart(north, east, scenario.origin.params())
     axis.plot(longitude, latitude, color=ORANGE, label=scenario.name)
     axis.plot(longitude[:1], latitude[:1], 'o', color=ORANGE)
     axis.legend(loc='upper right', fontsize='small')

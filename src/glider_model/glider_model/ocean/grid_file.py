@@ -80,7 +80,6 @@ class Loaded(NamedTuple):
     axes: Axes
     water: np.ndarray  #: float32[time, depth, latitude, longitude, 2], to the north, east (m/s)
     land: np.ndarray  #: bool[latitude, longitude], of the uppermost level
-    filled: float  #: share of the values that are land or bottom: those of the nearest water
 
 
 class _Layout(NamedTuple):
@@ -390,7 +389,7 @@ def _read(layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes) -> Loaded:
     shape = tuple(len(one) for one in axes)
     water = np.empty((*shape, 2), dtype=np.float32)
     present = [axis for axis in _AXES[1:] if axis in layout.axes]
-    land, filled = np.zeros(shape[2:], dtype=bool), 0
+    land = np.zeros(shape[2:], dtype=bool)
     for step, index in enumerate(chosen['time']):
         for side, component in (('north', 0), ('east', 1)):
             part = layout.dataset[layout.variables[side]].isel({layout.axes['time']: int(index)})
@@ -398,9 +397,8 @@ def _read(layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes) -> Loaded:
             read = layout.scales[side] * read.reshape(shape[1:])
             if step == 0:
                 land |= ~np.isfinite(read[0])
-            filled += np.count_nonzero(~np.isfinite(read))
             water[step, ..., component] = _fill_land(read)
-    return Loaded(axes, water, land, filled / water.size)
+    return Loaded(axes, water, land)
 
 
 def _cut(part: 'xarray.DataArray', axes: dict[str, str], chosen: dict[str, np.ndarray]):

@@ -75,12 +75,10 @@ class GridSettings(GridFileSettings, FieldSettings):
     def land_at(self, norths: np.ndarray, easts: np.ndarray) -> np.ndarray:
         """Where there is land, by the nearest points of the grid, bool[n, m]."""
         loaded, _ = _loaded(self.file, self.mission)
-        origin = self.mission.origin.params()
-        latitudes, _ = on_chart(norths, 0.0 * norths, origin)
-        _, longitudes = on_chart(0.0 * easts, easts, origin)
+        places = on_chart(norths, easts, self.mission.origin.params())
         nearest = [
             np.abs(axis[None, :] - one[:, None]).argmin(axis=1)
-            for axis, one in zip(loaded.axes[2:], (latitudes, longitudes), strict=True)
+            for axis, one in zip(loaded.axes[2:], places, strict=True)
         ]
         return loaded.land[np.ix_(*nearest)]
 
