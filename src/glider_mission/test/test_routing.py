@@ -131,10 +131,11 @@ def test_an_error_has_the_size_that_was_asked_for_and_loses_no_water():
 def test_what_was_observed_corrects_the_forecast_where_it_was():
     chart = chart_of(lambda n, e: (0.1 + 0.0 * n, 0.0 * e), times=(0.0, 86_400.0))
     seen = np.array([[0.0, 10_000.0, 0.0, -0.1, 0.05]])
-    found = observed(chart, seen, 0.15, 40.0)
-    np.testing.assert_allclose(current_on(found, *seen[0, :3]), seen[0, 3:], atol=0.006)
-    np.testing.assert_allclose(current_on(found, 0.0, -150_000.0, 0.0), (0.1, 0.0), atol=1e-3)
-    assert observed(chart, seen, 0.0, 40.0) is chart
+    for error_mps in (0.15, 0.0):  # it shows of itself that it is off
+        found = observed(chart, seen, error_mps, 40.0)
+        np.testing.assert_allclose(current_on(found, *seen[0, :3]), seen[0, 3:], atol=0.006)
+        np.testing.assert_allclose(current_on(found, 0.0, -150_000.0, 0.0), (0.1, 0.0), atol=1e-3)
+    assert observed(chart, seen[:0], 0.0, 40.0) is chart
 
 
 def test_straight_legs_do_for_gentle_eddies_and_not_for_strong_ones():
@@ -186,6 +187,22 @@ def test_a_pilot_plans_at_the_start_and_at_each_surfacing_once(hard):
     assert told == [5, 16]
     assert pilot.orders == [first, *(given[number] for number in told)]
     np.testing.assert_allclose(given[5].path.waypoints[0][:2], place)
+
+
+def test_a_waypoint_that_was_passed_on_a_bend_under_way_is_not_gone_back_to(hard):
+    """3 km off the line between the surfacings; one that was passed so far away is."""
+    scenario, *_ = hard
+    start, first, second = waypoints_of(scenario)[:3]
+    for off_m, is_passed in ((500.0, True), (3000.0, False)):
+        pilot = Pilot(scenario)
+        pilot.order(0, None)
+        bend = first + (0.0, off_m)
+        way = [(start, 1), (0.5 * (start + bend), 1), (bend, 1), (bend + (-3e3, 3e3), 1)]
+        way += [(bend + (-6e3, 0.0), 5)] * 8
+        told = [pilot.order(LOOK_TICKS * k, row_at(*one)) for k, one in enumerate(way, 1)]
+        (order,) = filter(None, told)
+        nearest = min(np.hypot(*(np.array(one[:2]) - first)) for one in order.path.waypoints)
+        assert (nearest > 1.0) == is_passed
 
 
 def test_a_pilot_who_shall_not_replan_or_is_nearly_there_says_nothing(hard):

@@ -128,13 +128,15 @@ def observed(chart: Chart, seen: np.ndarray, error_mps: float, error_km: float) 
     seen : float64[n, 5]
         Time (s), north, east (m), and the depth-averaged current there, north and east (m/s).
     error_mps, error_km : float
-        How far the chart is off, and over what distance alike.
+        How far the chart is off, at least, and over what distance alike. Where it was seen to be
+        farther off, it is believed to be.
     """
-    if not len(seen) or error_mps <= 0.0:
+    if not len(seen):
         return chart
     length, (times, norths, easts, _) = 1e3 * error_km, chart
     told = np.array([current_on(chart, *one) for one in seen[:, :3]])
     off = seen[:, 3:] - told
+    error_mps = max(error_mps, math.sqrt(float(np.mean(off**2))))
 
     def alike(t: np.ndarray, n: np.ndarray, e: np.ndarray) -> np.ndarray:
         away = (n[..., None] - seen[:, 1]) ** 2 + (e[..., None] - seen[:, 2]) ** 2

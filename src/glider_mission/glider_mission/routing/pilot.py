@@ -77,6 +77,8 @@ class Pilot:
             return self._told(t_s, self._waypoints[0])
         if not self._replans:
             return None
+        place = np.array([row[_ODOM + 1], row[_ODOM]])
+        self._pass(place)
         if not is_surfaced(int(row[_STAGE])):
             self._up_s, self._was_told = 0.0, False
             return None
@@ -84,26 +86,24 @@ class Pilot:
         if self._was_told or self._up_s < self._listen_s:
             return None
         self._was_told = True
-        place = np.array([row[_ODOM + 1], row[_ODOM]])
         self._look(t_s, place, row[_BELIEVED])
         if math.dist(place, self._waypoints[-1]) < _LAST_M:
             return None
         return self._told(t_s, place)
 
+    def _pass(self, place: np.ndarray) -> None:
+        """Note the waypoints that are passed, where the vehicle believes it is on its way."""
+        goals = self._waypoints[self._next : -1]
+        if len(goals) and math.dist(place, goals[0]) < _PASSED_M:
+            self._next += 1
+
     def _look(self, t_s: float, place: np.ndarray, believed: np.ndarray) -> None:
-        """Note the current of the dive segment, and which waypoints were passed in it."""
+        """Note the current of the dive segment."""
         before_s, before = self._last
         self._last = t_s, place
         east, north = float(believed[0]), float(believed[1])
         if before_s > 0.0 and math.isfinite(east) and math.isfinite(north) and (east or north):
             self._seen.append((0.5 * (t_s + before_s), *(0.5 * (place + before)), north, east))
-        way = place - before
-        while self._next < len(self._waypoints) - 1:
-            goal = self._waypoints[self._next]
-            share = np.clip((goal - before) @ way / max(1.0, way @ way), 0.0, 1.0)
-            if math.dist(before + share * way, goal) > _PASSED_M:
-                return
-            self._next += 1
 
     def _told(self, t_s: float, place: np.ndarray) -> Order | None:
         """Order to follow the best route from a place; None where it follows that already."""
