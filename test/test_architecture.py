@@ -82,10 +82,7 @@ ROSDEP_KEYS = {
 }
 
 #: Modules for which rosdep has no key; pip brings them, from requirements.txt.
-ONLY_PIP = {
-    *('dask', 'distributed', 'foxglove', 'lz4', 'mcap', 'plotly', 'rosbags', 'xarray'),
-    'zstandard',
-}
+ONLY_PIP = {'dask', 'distributed', 'foxglove', 'lz4', 'mcap', 'plotly', 'xarray', 'zstandard'}
 #: The same, from a file of their own: what only some commands need, and say so.
 OPTIONAL = {'requirements-flights.txt': {'dbdreader', 'gliderflight', 'gsw', 'h5netcdf', 'ppigrf'}}
 #: Names on PyPI that are not those of the modules.

@@ -3,6 +3,7 @@
 """The command line as a person or a script meets it: a process, its output, its exit code."""
 
 import json
+import os
 import sys
 from functools import partial
 from pathlib import Path
@@ -47,6 +48,19 @@ def refused(*arguments):
 def write(path, values):
     path.write_text(yaml.safe_dump(values), encoding='utf-8')
     return path
+
+
+@pytest.mark.parametrize('options', [(), ('--engine', 'direct', '--bag')])
+def test_what_needs_a_ros_that_is_not_there_says_so(tmp_path, options):
+    """As from wheels in an environment of Python alone."""
+    missing = "raise ModuleNotFoundError('no such module', name='diagnostic_msgs')"
+    (tmp_path / 'diagnostic_msgs.py').write_text(missing)
+    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
+    process = glider('run', *options, '--out', tmp_path / 'run', PYTHONPATH=path)
+    assert process.returncode == 2
+    assert 'Traceback' not in process.stderr
+    assert 'ROS 2 Jazzy' in process.stderr and '--engine direct' in process.stderr
+    assert not (tmp_path / 'run').exists()
 
 
 @pytest.fixture(scope='module')

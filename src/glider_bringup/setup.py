@@ -32,7 +32,6 @@ setup(
     extras_require={'test': ['pytest', 'hypothesis']},
     zip_safe=False,
     maintainer='The glider stack authors',
-    maintainer_email='maintainers@example.com',
     description='Flying an underwater glider: runner, recorder, score, report, command line.',
     license='Apache-2.0',
     license_files=['LICENSE'],

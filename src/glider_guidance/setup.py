@@ -17,7 +17,6 @@ setup(
     extras_require={'test': ['pytest', 'hypothesis']},
     zip_safe=False,
     maintainer='The glider stack authors',
-    maintainer_email='maintainers@example.com',
     description='Guidance of an underwater glider: paths, line-of-sight laws, dive profile.',
     license='Apache-2.0',
     license_files=['LICENSE'],

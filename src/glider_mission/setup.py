@@ -27,7 +27,6 @@ setup(
     extras_require={'test': ['pytest', 'hypothesis']},
     zip_safe=False,
     maintainer='The glider stack authors',
-    maintainer_email='maintainers@example.com',
     description='Missions of an underwater glider: scenarios, the blocks of a tick, recordings.',
     license='Apache-2.0',
     license_files=['LICENSE'],

@@ -17,7 +17,6 @@ setup(
     extras_require={'test': ['pytest', 'hypothesis']},
     zip_safe=False,
     maintainer='The glider stack authors',
-    maintainer_email='maintainers@example.com',
     description='Navigation of an underwater glider: dead reckoning, and the current it tells.',
     license='Apache-2.0',
     license_files=['LICENSE'],

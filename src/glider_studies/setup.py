@@ -18,7 +18,6 @@ setup(
     extras_require={'test': ['pytest', 'hypothesis']},
     zip_safe=False,
     maintainer='The glider stack authors',
-    maintainer_email='maintainers@example.com',
     description='Many flights of a glider: sweeps, Monte Carlo, experiments, searches.',
     license='Apache-2.0',
     license_files=['LICENSE'],

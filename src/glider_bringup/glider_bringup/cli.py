@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The command line: ``./glider COMMAND``, or ``glider COMMAND`` in a sourced workspace."""
+"""The command line: ``./glider COMMAND``, or ``glider COMMAND`` where wheels were installed."""
 
 import errno
 import os
@@ -43,6 +43,10 @@ _USAGE = {
     *(errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST),
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP, errno.EINVAL),
 }
+
+#: What ends the name of a module of ROS 2, if it does not begin as these do.
+_ROS_ENDS = '_msgs', '_srvs', '_interfaces'
+_ROS_BEGINS = 'rcl', 'rosidl', 'rpyutils', 'ament_'
 
 #: Commands in the order in which --help lists them; those that are not named here follow.
 ORDER = (
@@ -158,6 +162,14 @@ def main() -> int:
     except ConfigurationError as error:
         _tell(str(error))
         code = EXIT_FAILED if isinstance(error, DiskError) else EXIT_USAGE
+    except ModuleNotFoundError as error:
+        if not _of_ros(error.name or ''):
+            raise
+        _tell(
+            f'ROS 2 Jazzy is not there (no module {error.name}), which nodes and bags need; '
+            'glider run --engine direct flies without it'
+        )
+        code = EXIT_USAGE
     except OSError as error:
         _tell(f'{error.filename or "input or output"}: {error.strerror or error}'[:MAX_LINE])
         code = EXIT_USAGE if error.errno in _USAGE else EXIT_FAILED
@@ -173,6 +185,12 @@ def _run() -> int:
     except SystemExit as end:
         return end.code
     return 0
+
+
+def _of_ros(module: str) -> bool:
+    """Whether a module comes with ROS 2."""
+    top = module.partition('.')[0]
+    return top.startswith(_ROS_BEGINS) or top.endswith(_ROS_ENDS)
 
 
 def _tell(text: str) -> None:
