@@ -12,12 +12,19 @@ from typing import NamedTuple
 
 from pydantic import Field
 
+from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings
 from glider_base.signals import Adaptation, Reference
 from glider_base.slot import default, slot
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
+from glider_model.onboard.righting import rights_itself
 from glider_model.vehicle.file import Vehicle
+
+#: A glide that leaves less than this share of the righting at rest hardly stops a roll;
+LEAST_RIGHTING = 0.25
+#: so the vehicle is then rolled to this share of its bank, and at this share of its rate.
+CAREFUL_SHARE = 1.0 / 3.0
 
 
 class HeadingSettings(Settings):
@@ -46,6 +53,25 @@ class Bank(NamedTuple):
 
     limit: float  #: largest commanded roll (rad); 0 of a vehicle with a steering surface
     filter: FilterParams  #: command filter of the roll
+
+
+@kernel
+def bank_carefully(m_b, params):
+    """Params of a law, with less bank where a net heaviness m_b (kg) hardly lets the roll stop.
+
+    What does not right itself is stopped by the roll mass alone, which takes long to the other
+    side and holds a small roll only. Rolled as far and as fast as else, it rolls over.
+
+    Parameters
+    ----------
+    m_b : float
+    params : NamedTuple
+        With ``roll_limit``, ``roll_filter`` and ``righting``.
+    """
+    if rights_itself(m_b, LEAST_RIGHTING, params.righting):
+        return params
+    slow = replace(params.roll_filter, rate_limit=CAREFUL_SHARE * params.roll_filter.rate_limit)
+    return replace(params, roll_limit=CAREFUL_SHARE * params.roll_limit, roll_filter=slow)
 
 
 class Seen(NamedTuple):

@@ -12,7 +12,7 @@ with the angle error K1 and the rate error K2 = omega - a_s:
 K1bar = K1 - xi and K2bar = K2 - zeta are the errors less what the command filter and the actuators
 are to blame for (Farrell et al. 2009), so that neither is learnt as a disturbance. Regressors are
 scaled such that every parameter is a moment in N m. Unknown to the law: damping, static moments,
-trim, steering effectiveness and its sign.
+trim, steering effectiveness and its sign. Only how far it may bank goes by the file's dihedral.
 """
 
 import math
@@ -24,7 +24,7 @@ from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
 from glider_base.settings import TUNABLE, Settings
 from glider_base.signals import Adaptation
-from glider_control.law import Bank, LawSettings, law_learnt, law_step
+from glider_control.law import Bank, LawSettings, bank_carefully, law_learnt, law_step
 from glider_control.turning import roll_to_kick, roll_to_turn, sure_disturbance
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
 from glider_model.onboard.learnt_steering import (
@@ -35,6 +35,7 @@ from glider_model.onboard.learnt_steering import (
     learn,
     speed_ratio,
 )
+from glider_model.onboard.righting import Righting, make_righting
 from glider_model.vehicle.file import Vehicle
 from glider_model.vehicle.rigid_body import GRAVITY, rigid_body
 
@@ -158,6 +159,7 @@ class AdaptiveSettings(LawSettings):
             mass=kernel_vehicle.m,
             roll_limit=bank.limit,
             roll_filter=bank.filter,
+            righting=make_righting(kernel_vehicle),
         )
 
     def initial_state(self) -> 'AdaptiveState':
@@ -200,6 +202,7 @@ class AdaptiveParams(NamedTuple):
     mass: float  #: of the vehicle (kg)
     roll_limit: float  #: (rad)
     roll_filter: FilterParams
+    righting: Righting
 
 
 class ChannelState(NamedTuple):
@@ -317,6 +320,7 @@ def bank_to_turn(steering, disturbance, measured, reference, speed, learning, pa
 def adaptive_step(state, seen, params, dt):
     """Roll and pitch moment (N m) of the adaptive law: see `law_step`."""
     measured, reference, speed = seen.measured, seen.reference, seen.speed
+    params = bank_carefully(seen.m_b, params)
     steering = learn(state.steering, measured, speed, params.steering, dt)
     learning = steering.steady_s > LEARN_AFTER_S
     d_dive, d_climb = state.disturbance_dive, state.disturbance_climb

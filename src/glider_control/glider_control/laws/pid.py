@@ -14,9 +14,10 @@ from pydantic import Field
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
 from glider_base.settings import TUNABLE
-from glider_control.law import Bank, LawSettings, law_step
+from glider_control.law import Bank, LawSettings, bank_carefully, law_step
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
 from glider_model.onboard.learnt_steering import speed_ratio
+from glider_model.onboard.righting import Righting, make_righting
 from glider_model.vehicle.file import Vehicle
 
 
@@ -62,6 +63,7 @@ class PidSettings(LawSettings):
             vehicle.params().slowest_glide,
             bank.limit,
             bank.filter,
+            make_righting(vehicle.params()),
         )
 
     def initial_state(self) -> 'PidState':
@@ -86,6 +88,7 @@ class PidParams(NamedTuple):
     slowest_glide: float  #: vertical rate below which it turns over and cannot be steered (m/s)
     roll_limit: float  #: (rad)
     roll_filter: FilterParams
+    righting: Righting
 
 
 class PidState(NamedTuple):
@@ -136,6 +139,7 @@ def heading_to_roll(state, measured, reference, speed, params, dt):
 def pid_step(state, seen, params, dt):
     """Roll and pitch moment (N m) of the PID law: see `law_step`."""
     measured, reference = seen.measured, seen.reference
+    params = bank_carefully(seen.m_b, params)
     roll_command, heading_integral = heading_to_roll(
         state, measured, reference, seen.speed, params, dt
     )

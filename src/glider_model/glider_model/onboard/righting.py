@@ -1,0 +1,37 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What rights a vehicle that is rolled, by its file.
+
+At rest its weight below its buoyancy does: the first moment S_z of hull and moving mass. Under way
+net heaviness pulls a rolled vehicle to its low side, net buoyancy to its high side, until the side
+force K_beta V^2 beta of the slip balances that. With dihedral the slip rolls it by K_MR V^2 beta:
+back in the dive, further over in the climb. Speed and pitch cancel out, and what is left is
+
+    S_z + m_b K_MR / K_beta
+
+A vehicle of which that is less than nothing rolls over by itself, whatever its bank.
+"""
+
+from typing import NamedTuple
+
+from glider_base.kernel import kernel
+from glider_model.vehicle.file import VehicleParams
+
+
+class Righting(NamedTuple):
+    """What rights a vehicle at rest, and what its slip adds to that."""
+
+    at_rest: float  #: S_z with the roll mass in the middle (kg m)
+    lever: float  #: roll moment of a slip over its side force, K_MR / K_beta (m)
+
+
+def make_righting(vehicle: VehicleParams) -> Righting:
+    """Righting of a vehicle; without side force no slip is of account."""
+    lever = vehicle.K_MR / vehicle.K_beta if vehicle.K_beta else 0.0
+    return Righting(vehicle.s_z + vehicle.m_p * vehicle.R_p, lever)
+
+
+@kernel
+def rights_itself(m_b, share, righting):
+    """Whether a glide with net heaviness m_b (kg) leaves this share of the righting at rest."""
+    return righting.at_rest + m_b * righting.lever >= share * righting.at_rest
