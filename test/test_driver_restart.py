@@ -193,5 +193,5 @@ def test_recording_goes_on(flight):
         read = make_reader(stream).iter_messages(topics=['/glider/odom'])
         stamps_s = [message.log_time / 1e9 for _, _, message in read]
     gaps_s = [after - before for before, after in zip(stamps_s[:-1], stamps_s[1:], strict=True)]
-    assert AWAY_S < max(gaps_s) < ended_s - AFTER_S - killed_s + 1.0
+    assert AWAY_S < max(gaps_s) < ended_s - killed_s
     assert stamps_s[-1] - stamps_s[gaps_s.index(max(gaps_s)) + 1] > 1.0

@@ -36,7 +36,7 @@ def verdict(card: dict[str, Any], settle_s: float) -> str:
         return f'It ended before the first tick: {card["reason"] or "no reason is known"}.'
     texts = [_ended(card), _worst(card), _flown(card), _steady(card, settle_s)]
     if arrival := arrival_text(card):
-        texts.append(f'Arrival {arrival}.')
+        texts.append(f'It {arrival}.')
     return ' '.join(filter(None, texts))
 
 

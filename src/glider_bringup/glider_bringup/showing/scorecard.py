@@ -130,7 +130,7 @@ def arrival_text(card: dict) -> str:
     if told['arrived']:
         missed = show(told['missed_m'], 'm', 1)
         return f'came up {missed} from its last point after {span(told["t_s"])}{where}'
-    text = f'not in {span(card["sim_time_s"])}: {way(told["left_m"])} of the path left{where}'
+    text = f'did not arrive in {span(card["sim_time_s"])}: {way(told["left_m"])} left{where}'
     more_s = None if told['eta_s'] is None else told['eta_s'] - card['sim_time_s']
     return text + ('' if more_s is None else f'; at its pace {span(more_s)} more')
 

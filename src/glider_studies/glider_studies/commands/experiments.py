@@ -25,7 +25,7 @@ from glider_studies.at_work import workers_at_work
 app = typer.Typer()
 GROUPS = (
     *('current', 'yaw', 'profile', 'robustness', 'vehicles', 'paths', 'envelope', 'navigation'),
-    *('faults', 'random_faults'),
+    *('faults', 'random_faults', 'routes'),
 )
 Group = Literal[GROUPS]
 
@@ -40,7 +40,12 @@ def experiments(
         int, typer.Option(min=1, max=1_000_000, help='Missions of random_faults.')
     ] = 200,
     seed: Annotated[
-        int, typer.Option(min=0, max=2**31 - 1, help='Seed of the missions of random_faults.')
+        int,
+        typer.Option(
+            min=0,
+            max=2**31 - 1,
+            help='Seed of the missions of random_faults, and of the seas of routes.',
+        ),
     ] = 0,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -53,9 +58,11 @@ def experiments(
 
     By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
     engine; the flights of the paper last 30 hours. random_faults breaks random missions in two or
-    three random ways, and judges them by their true motion alone.
+    three random ways, and judges them by their true motion alone. routes crosses twelve seas full
+    of eddies by straight legs and along planned routes.
     """
     from glider_mission.run_folder import make_result_folder
+    from glider_studies import routes
     from glider_studies.hunt import search
     from glider_studies.paper import experiments as paper
     from glider_studies.paper import tables
@@ -63,22 +70,28 @@ def experiments(
 
     groups = picked(only, Group)
     planned = paper.make_experiments(groups)
-    hunts = search.NAME in groups
-    total = paper.count_flights(planned) + hunts * flights
+    hunts, crosses = search.NAME in groups, routes.NAME in groups
+    total = paper.count_flights(planned) + hunts * flights + crosses * routes.count_flights()
     if out:
         make_result_folder(out, paper.RESULT_FILE)
-    messages.print(f'{len(planned) + hunts} experiments, {total} flights')
+    messages.print(f'{len(planned) + hunts + crosses} experiments, {total} flights')
     loops = paper.combinations(planned)
     if hunts:
         loops |= search.combinations(seed, flights)
+    if crosses:
+        loops |= routes.combinations()
     with workers_at_work(workers, scheduler, loops) as pool, counter('flying', total) as update:
         rows, records = paper.fly(planned, pool, update)
         result = paper.report(planned, rows)
+        flown = paper.count_flights(planned)
         if hunts:
-            before = total - flights
-            found = search.search(seed, flights, pool, lambda done: update(before + done))
+            found = search.search(seed, flights, pool, lambda done: update(flown + done))
             result['experiments'].append(found)
             result |= found['counts']
+        if crosses:
+            before = total - routes.count_flights()
+            crossed = routes.cross(seed, pool, lambda done: update(before + done))
+            result['experiments'].append(crossed)
     if out:
         with messages.status('drawing'):
             drawn = paper_figures.draw(planned, rows, records, out)

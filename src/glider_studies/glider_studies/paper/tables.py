@@ -173,9 +173,9 @@ def show(result: dict[str, Any], output: Console) -> None:
     """Print experiment by experiment: the paper's figure, ours, verdict."""
     for one in result['experiments']:
         head = f'{one["section"]}: {one["title"]}' if one['section'] else one['title']
-        if 'counts' in one:
+        if one['name'] in _OTHERS:
             output.print(f'\n{head}', soft_wrap=True)
-            _show_search(one, output)
+            _OTHERS[one['name']](one, output)
             _show_verdict(one, output)
             continue
         said = described(one['name'])
@@ -204,6 +204,25 @@ def _show_search(one: dict[str, Any], output: Console) -> None:
         output.print(f'  {row["command"]}', soft_wrap=True)
     if len(one['rows']) > LISTED:
         output.print(f'and {len(one["rows"]) - LISTED} more')
+
+
+def _show_routes(one: dict[str, Any], output: Console) -> None:
+    """Print a line for each sea: what was planned, and when it was crossed in which way."""
+    ways = {name: name.removesuffix('_h') for name in one['rows'][0] if name.endswith('_h')}
+    table = _table(['sea'], ['rms (m/s)', *(f'{way}\n(h)' for way in ways.values())])
+    for row in one['rows']:
+        hours = (_number(row[name], 1) for name in ways)
+        table.add_row(str(row['sea']), _number(row['rms_mps']), *hours)
+    output.print(table)
+    output.print(
+        'Plan: with the true sea for a forecast. The others are flown, planned and erring along '
+        'routes by a forecast that is 12 h late; that of the last errs by 0.15 m/s as well. '
+        'A dash: not in 288 h.'
+    )
+
+
+#: What is no experiment of the catalogue.
+_OTHERS = {'random_faults': _show_search, 'routes': _show_routes}
 
 
 def _show_verdict(one: dict[str, Any], output: Console) -> None:
