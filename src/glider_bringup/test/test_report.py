@@ -316,6 +316,23 @@ def test_desired_path_is_drawn_as_far_as_it_was_followed(tmp_path):
         assert depth == 0.0
 
 
+def test_desired_path_is_that_which_was_ordered(tmp_path):
+    """North for five minutes, then to the east from where it is."""
+    path = '{kind: straight, length_m: 5000.0, course_deg: 0.0}'
+    east = '{kind: waypoints, waypoints: [[80.0, 0.0], [80.0, 5000.0]]}'
+    fields = ('--set', f'path={path}', '--set', f'orders=[{{at_s: 300.0, path: {east}}}]')
+    folder = tmp_path / 'ordered'
+    done = glider('run', *fields, '--engine', 'direct', '--duration', 900, '--out', folder)
+    assert done.returncode == 0, done.stderr
+    _, data = read_page(folder / 'report.html')
+    way = np.array(data['runs'][0]['path'])
+    ordered = way[:, 1] > 1.0
+    assert ordered.any() and not ordered.all()
+    np.testing.assert_allclose(way[ordered, 0], 80.0, atol=0.1)
+    np.testing.assert_allclose(way[~ordered, 1], 0.0, atol=0.1)
+    np.testing.assert_allclose(way[:, 2], 0.0)
+
+
 def test_battery_has_a_curve(flown):
     """Within rounding it is what the scorecard says was taken out of 100 %."""
     _, data = read_page(flown / 'report.html')

@@ -98,8 +98,18 @@ class FlownRun(NamedTuple):
     rules: Rules  #: by which it is scored
 
     def path_points(self) -> list[list[float]]:
-        """The desired path (m, NED): as far as it was followed, where it goes on at its end."""
+        """The desired path (m, NED): as far as it was followed, where it goes on at its end.
+
+        Where orders changed it: what was desired, from the start to the end.
+        """
         path, samples = self.scenario.path, self.traces.samples
+        if any(order.path for order in self.scenario.orders):
+            desired = [samples[f'target_{name}_m'] for name in ('north', 'east', 'depth')]
+            points = np.column_stack(desired)
+            points = points[np.isfinite(points).all(axis=1)]
+            points[:, 2] *= self.scenario.profile.mode == 'path'  # a yo's is level
+            chosen = np.linspace(0, len(points) - 1, min(_PATH_POINTS, len(points)))
+            return np.round(points[chosen.astype(int)], 2).tolist()
         points = path.points(_PATH_POINTS)
         if path.at_end == 'continue':
             params = path.params()
