@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The mission of eddies_10d in seas that nobody tuned on: straight, and along planned routes."""
 
+import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -41,6 +42,7 @@ class Crossing(NamedTuple):
     arrival_h: float | None  #: None: not in its time
     reachable: bool  #: whether a plan by the true sea says that it arrives
     plan_h: float | None  #: when, by that plan
+    plan_straight_h: float | None  #: along straight legs, by that plan
 
 
 def scenario_in(sea: Path, way: str) -> Scenario:
@@ -62,7 +64,10 @@ def _cross(task: tuple[int, float, str]) -> Crossing:
     return Crossing(
         arrival['t_s'] / 3600.0 if arrival['arrived'] else None,
         sure.reachable,
-        sure.arrival_s(50.0) / 3600.0 if sure.reachable else None,
+        *(
+            when_s / 3600.0 if math.isfinite(when_s) else None
+            for when_s in (sure.arrival_s(50.0), sure.straight_s)
+        ),
     )
 
 
@@ -104,6 +109,7 @@ def cross(seed: int, pool: Pool, progress: Progress) -> dict[str, Any]:
             'rms_mps': rms_mps,
             'reachable': flown[sea, 'straight'].reachable,
             'plan_h': flown[sea, 'straight'].plan_h,
+            'plan_straight_h': flown[sea, 'straight'].plan_straight_h,
             **{f'{way}_h': flown[sea, way].arrival_h for way in WAYS},
         }
         for sea, rms_mps in seas.items()

@@ -208,16 +208,20 @@ def _show_search(one: dict[str, Any], output: Console) -> None:
 
 def _show_routes(one: dict[str, Any], output: Console) -> None:
     """Print a line for each sea: what was planned, and when it was crossed in which way."""
-    ways = {name: name.removesuffix('_h') for name in one['rows'][0] if name.endswith('_h')}
+    ways = {
+        name: name.removesuffix('_h').replace('_', '\n')
+        for name in one['rows'][0]
+        if name.endswith('_h')
+    }
     table = _table(['sea'], ['rms (m/s)', *(f'{way}\n(h)' for way in ways.values())])
     for row in one['rows']:
         hours = (_number(row[name], 1) for name in ways)
         table.add_row(str(row['sea']), _number(row['rms_mps']), *hours)
     output.print(table)
     output.print(
-        'Plan: with the true sea for a forecast. The others are flown, planned and erring along '
-        'routes by a forecast that is 12 h late; that of the last errs by 0.15 m/s as well. '
-        'A dash: not in 288 h.'
+        'Plan: with the true sea for a forecast, and of straight legs in it. Others are flown, '
+        'planned and erring along routes by a forecast that is 12 h late; that of the last errs '
+        'by 0.15 m/s as well. A dash: not in 288 h.'
     )
 
 
