@@ -128,8 +128,8 @@ def observed(chart: Chart, seen: np.ndarray, error_mps: float, error_km: float) 
     seen : float64[n, 5]
         Time (s), north, east (m), and the depth-averaged current there, north and east (m/s).
     error_mps, error_km : float
-        How far the chart is off, at least, and over what distance alike. Where it was seen to be
-        farther off, it is believed to be.
+        How far the chart is off at least, and over what distance alike. It is taken to be as far
+        off as what was seen, if that is farther.
     """
     if not len(seen):
         return chart
