@@ -3,7 +3,7 @@
 """A vehicle from outside on a bad line, flown by free-running nodes, or by the autopilot.
 
 It publishes odom itself, or what its sensors take, for navigation. The stand-in of examples/ is a
-process of its own, with its own clock, four times as fast as real time. Its line delays, loses
+process of its own, with its own clock, twice as fast as real time. Its line delays, loses
 and, for three seconds, is silent.
 """
 
@@ -47,7 +47,7 @@ from glider_bringup.engines.processes import (
 from glider_mission.scenario import load_scenario
 
 STAND_IN = Path(__file__).resolve().parents[1] / 'examples' / 'stand_in.py'
-SPEED, LOSS = 4.0, 0.05
+SPEED, LOSS = 2.0, 0.05
 #: Seconds of the vehicle's time after its start.
 START_S, SILENCE_S, CHANGE_S, ABORT_S, END_S = 1000.0, 40.0, 65.0, 80.0, 95.0
 SILENT_S, MAX_AGE_S = 3.0, 2.0
