@@ -52,12 +52,13 @@ def dataset(layout='cmems', latitudes=None, longitudes=None, order=(0, 1, 2, 3),
     return xarray.Dataset(variables, coords)
 
 
-def written(data, path, packed=False, **how):
-    """File of a dataset; packed as HYCOM packs it."""
+def written(data, path, packed=False, engine='scipy'):
+    """File of a dataset; packed as HYCOM packs it. What reads NetCDF 4 is not always there."""
+    pytest.importorskip(engine)
     pack = {'dtype': 'int16', 'scale_factor': np.float32(0.001), '_FillValue': np.int16(-30000)}
     encoding = {name: dict(pack) for name in data.data_vars} if packed else {}
     encoding['time'] = {'units': 'hours since 2000-01-01', 'dtype': 'float64'}
-    data.to_netcdf(path, encoding=encoding, **{'engine': 'h5netcdf', **how})
+    data.to_netcdf(path, encoding=encoding, engine=engine)
     return path
 
 
