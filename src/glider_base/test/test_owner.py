@@ -4,7 +4,7 @@
 
 import pytest
 
-from glider_base.ros.hearing.owner import Owner, Verdict
+from glider_base.ros.hearing.owner import NAMED_WITHIN_S, Owner, Verdict
 from glider_base.ros.wire.topics import TOPICS
 
 NAME, PATIENCE_S = '/glider/driver', 1.0
@@ -43,3 +43,20 @@ def test_a_second_of_the_same_name_is_no_successor_while_the_first_is_heard(owne
     assert claimed(owner, SECOND, both, 0.5) is Verdict.DOUBTFUL
     assert owner.owns(FIRST, 0.6)
     assert claimed(owner, SECOND, both, 5.0) is Verdict.STRANGE
+
+
+@pytest.mark.parametrize('is_listed', [True, False])
+def test_a_successor_whose_name_comes_late_is_refused_when_it_should_be_known(owner, is_listed):
+    claimed(owner, FIRST, {FIRST: NAME}, 0.0)
+    names = {FIRST: NAME} | ({SECOND: ''} if is_listed else {})
+    assert claimed(owner, SECOND, names, 5.0) is Verdict.DOUBTFUL
+    assert claimed(owner, SECOND, names, 5.0 + NAMED_WITHIN_S) is Verdict.STRANGE
+    assert claimed(owner, SECOND, {SECOND: NAME}, 20.0) is Verdict.TAKEN_OVER
+    assert owner.before == NAME
+
+
+def test_who_has_no_name_is_a_stranger_while_the_owner_is_heard(owner):
+    claimed(owner, FIRST, {FIRST: NAME}, 0.0)
+    assert claimed(owner, SECOND, {FIRST: NAME}, 0.5) is Verdict.DOUBTFUL
+    assert owner.owns(FIRST, 0.6)
+    assert claimed(owner, SECOND, {FIRST: NAME}, 0.7) is Verdict.STRANGE

@@ -17,6 +17,8 @@ from glider_base.wiring import NAVIGATION, PLANT
 
 #: Blocks in the place of which a vehicle may publish, under a name of its own.
 _VEHICLE = (PLANT.node, NAVIGATION.node)
+#: Wall time (s) within which the middleware tells the name of a node that is heard.
+NAMED_WITHIN_S = 10.0
 
 
 class Verdict(Enum):
@@ -48,7 +50,7 @@ class Owner:
         self.before = ''  #: name of the owner before it
         self.heard_s = -float('inf')  #: when it was heard last
         self._strangers: set[bytes] = set()  #: have spoken while it did
-        self._new: set[bytes] = set()  #: have spoken since it did
+        self._new: dict[bytes, float] = {}  #: have spoken since it did, and when at first
 
     def owns(self, gid: bytes, now_s: float) -> bool:
         """Whether a message is that of the owner, as nearly every one is; or nobody can tell."""
@@ -56,8 +58,8 @@ class Owner:
             return False
         self.heard_s = now_s
         if self._new:
-            self._strangers |= self._new
-            self._new = set()
+            self._strangers |= set(self._new)
+            self._new = {}
         return True
 
     def is_strange(self, gid: bytes) -> bool:
@@ -87,13 +89,14 @@ class Owner:
         """
         if self.is_strange(gid):
             return Verdict.STRANGE
+        since_s = self._new.setdefault(gid, now_s)
         verdict = self._judged(gid, names, namespace, now_s - self.heard_s, patience_s)
+        if verdict is Verdict.STRANGE and not names.get(gid) and now_s < since_s + NAMED_WITHIN_S:
+            return Verdict.DOUBTFUL
         if verdict in (Verdict.OWNED, Verdict.TAKEN_OVER):
             self.before, self.name = self.name, names.get(gid, '')
             self.gid, self.heard_s = gid, now_s
-            self._new = set()
-        else:
-            self._new.add(gid)
+            self._new = {}
         return verdict
 
     def _judged(self, gid, names, namespace, silent_s, patience_s) -> Verdict:
