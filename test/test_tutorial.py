@@ -48,7 +48,7 @@ def test_every_block_prints_what_it_says(glider, tmp_path, monkeypatch):
             assert done.returncode == 0, f'{command}: {done.stderr}'
             assert left_out(expected, done.stdout.splitlines()) == [], f'{command}\n{done.stdout}'
         ran += 1
-    assert ran == 7
+    assert ran == 10
 
 
 def test_what_is_not_run_says_why_and_wrong_lines_are_found():

@@ -69,6 +69,8 @@ def test_nothing_is_told_where_nothing_was_changed():
     scenario = load_scenario('survey')
     assert scenario.described == scenario.description
     assert 'changed' not in scenario.to_yaml()
+    same = load_scenario('survey', {'dives': scenario.dives, 'seed': scenario.seed})
+    assert same.described == scenario.description
 
 
 def test_python_tells_it_too():

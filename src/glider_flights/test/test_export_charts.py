@@ -167,3 +167,22 @@ def test_a_run_of_no_date_is_refused_unless_it_is_told(tmp_path):
     assert CliRunner().invoke(app, words, catch_exceptions=False).exit_code == 0
     with xarray.open_dataset(run.folder / 'run.og1.nc', engine='h5netcdf') as read:
         assert read['TIME'].values[0] == np.datetime64('2026-03-01T06:00')
+
+
+def test_the_route_is_that_of_the_orders(tmp_path):
+    path = {**CHANGES['path'], 'waypoints_latlon': [WAYPOINTS[0], (47.5, -52.45)]}
+    order = {'at_s': 60.0, 'when': 'once', 'path': path}
+    glider.fly('slocum_shelf', {**CHANGES, 'dives': 1, 'orders': [order]}, out=tmp_path / 'run')
+    words = [
+        'export',
+        str(tmp_path / 'run'),
+        '--to',
+        'geojson',
+        '--out',
+        str(tmp_path / 'run.json'),
+    ]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    features = json.loads((tmp_path / 'run.json').read_text())['features']
+    (route,) = [one for one in features if one['properties']['name'] == 'route']
+    east, north, *_ = route['geometry']['coordinates'][-1]
+    assert east > WAYPOINTS[0][1] + 0.002 and abs(north - WAYPOINTS[0][0]) < 0.0005

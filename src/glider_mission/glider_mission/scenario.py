@@ -490,12 +490,11 @@ def make_scenario(
     """
     path, values = source.path, deepcopy(source.values)
     own, in_vehicle = split_changes(changes or {})
-    for field, value in own.items():
-        _set_field(values, field, value)
-    if changes:
+    same = {field for field, value in own.items() if not _set_field(values, field, value)}
+    fields = {field: shown(value) for field, value in (changes or {}).items() if field not in same}
+    if fields:
         before = values.get('changed')
-        before = before if isinstance(before, dict) else {}
-        values['changed'] = {**before, **{field: shown(value) for field, value in changes.items()}}
+        values['changed'] = {**(before if isinstance(before, dict) else {}), **fields}
     changed = told_changes(changes or {})
 
     def line_of(location: tuple[str, ...]) -> int | None:
@@ -613,12 +612,14 @@ def overlap(field: str, other: str) -> bool:
     return any(name.startswith(f'{other}.') or f'{other}.'.startswith(name) for name in names)
 
 
-def _set_field(values: dict, field: str, value) -> None:
-    """Set a field by its dotted name, making the mappings on the way."""
+def _set_field(values: dict, field: str, value) -> bool:
+    """Set a field by its dotted name, making the mappings on the way; whether that changes it."""
     holder, last = holder_of(values, field), field.rpartition('.')[2]
+    is_new = last not in holder or holder[last] != value
     for other in _alternatives(last):
         holder.pop(other, None)
     holder[last] = deepcopy(value)  # which may be changed by a field inside it
+    return is_new
 
 
 def told_fields(changed: dict[str, str]) -> str:

@@ -109,6 +109,6 @@ def cross(seed: int, pool: Pool, progress: Progress) -> dict[str, Any]:
     return told(Experiment(NAME, NAME, '', title, '-', [], judge), rows)
 
 
-def count_flights() -> int:
+def count_tasks() -> int:
     """Flights that it takes, and plans."""
     return len(SIZES) * SEAS * len(WAYS)

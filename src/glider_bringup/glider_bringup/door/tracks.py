@@ -115,7 +115,8 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
         )
         for number, report in enumerate(reports, 1)
     ]
-    route = getattr(scenario.path, 'waypoints', None) or flown.path_points()
+    waypoints = None if flown.is_rerouted else getattr(scenario.path, 'waypoints', None)
+    route = waypoints or flown.path_points()
     norths, easts = np.array([point[:2] for point in route]).T
     return Chart(
         scenario.name, places(norths, easts), [line for line in lines if line.places], surfacings

@@ -97,13 +97,18 @@ class FlownRun(NamedTuple):
     traces: Traces | None  #: None if only the score is wanted
     rules: Rules  #: by which it is scored
 
+    @property
+    def is_rerouted(self) -> bool:
+        """Whether an order changed the path."""
+        return any(order.path for order in self.scenario.orders)
+
     def path_points(self) -> list[list[float]]:
         """The desired path (m, NED): as far as it was followed, where it goes on at its end.
 
         Where orders changed it: what was desired, from the start to the end.
         """
         path, samples = self.scenario.path, self.traces.samples
-        if any(order.path for order in self.scenario.orders):
+        if self.is_rerouted:
             desired = [samples[f'target_{name}_m'] for name in ('north', 'east', 'depth')]
             points = np.column_stack(desired)
             points = points[np.isfinite(points).all(axis=1)]

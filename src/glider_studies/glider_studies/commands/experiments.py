@@ -71,10 +71,11 @@ def experiments(
     groups = picked(only, Group)
     planned = paper.make_experiments(groups)
     hunts, crosses = search.NAME in groups, routes.NAME in groups
-    total = paper.count_flights(planned) + hunts * flights + crosses * routes.count_flights()
+    total = paper.count_flights(planned) + hunts * flights + crosses * routes.count_tasks()
     if out:
         make_result_folder(out, paper.RESULT_FILE)
-    messages.print(f'{len(planned) + hunts + crosses} experiments, {total} flights')
+    what = 'flights and plans' if crosses else 'flights'
+    messages.print(f'{len(planned) + hunts + crosses} experiments, {total} {what}')
     loops = paper.combinations(planned)
     if hunts:
         loops |= search.combinations(seed, flights)
@@ -89,7 +90,7 @@ def experiments(
             result['experiments'].append(found)
             result |= found['counts']
         if crosses:
-            before = total - routes.count_flights()
+            before = total - routes.count_tasks()
             crossed = routes.cross(seed, pool, lambda done: update(before + done))
             result['experiments'].append(crossed)
     if out:
