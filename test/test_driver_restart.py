@@ -6,6 +6,7 @@ Driver, autopilot and recorder are processes of their own. What the middleware k
 driver stays listed for longer than the guard would wait.
 """
 
+import json
 import subprocess
 import sys
 import time
@@ -116,7 +117,7 @@ class Heard:
 def flight(tmp_path_factory):
     """What was heard; when the driver was killed and started again, and the end; the recording."""
     folder = tmp_path_factory.mktemp('restart')
-    script, places = folder / 'driver.py', folder / 'places.json'
+    script, places, told = folder / 'driver.py', folder / 'places.json', folder / 'recorder.txt'
     script.write_text(DRIVER)
     places.write_text('[0.4, 0.0, 0.0]')
     scenario = load_scenario('current_8deg', {'profile.prepare_s': 0.0})
@@ -132,26 +133,34 @@ def flight(tmp_path_factory):
     with domain_id() as domain:
         environment = node_environment(domain)
 
-        def start(command) -> subprocess.Popen:
-            processes.append(subprocess.Popen(list(map(str, command)), env=environment))
+        def start(command, **options) -> subprocess.Popen:
+            command = list(map(str, command))
+            processes.append(subprocess.Popen(command, env=environment, **options))
             return processes[-1]
+
+        def recorded_s() -> float:
+            """Stamp (s) of the newest odom that the recorder has, by what it prints."""
+            lines = told.read_text().rpartition('\n')[0].splitlines()
+            return json.loads(lines[-1])['t_s'] if lines else 0.0
 
         rclpy.init(context=context, domain_id=domain)
         heard = Heard(context)
         try:
             autopilot = start([*aboard, '-p', 'record:=false'])
-            recorder = start(commands[RECORDER])
+            with told.open('w') as stream:
+                recorder = start([*commands[RECORDER], '-p', 'progress:=true'], stdout=stream)
             nodes = {'guidance_node', 'control_node', 'guard_node', RECORDER}
             heard.until(lambda: heard.ready >= nodes)
             first = start(driver)
-            heard.until(lambda: heard.commands and heard.commands[-1][1] > 0.2)
+            heard.until(lambda: heard.commands and heard.commands[-1][1] > 0.2 and recorded_s())
             heard.listen(2.0)
             first.kill()
             killed_s = time.monotonic()
             heard.listen(AWAY_S)
             start(driver)
-            back_s = time.monotonic()
+            back_s, back_at_s = time.monotonic(), time.time()
             heard.until(lambda: len(heard.takers()) == 3)
+            heard.until(lambda: recorded_s() > back_at_s)
             heard.listen(AFTER_S)
             ended_s = time.monotonic()
             for process in (autopilot, recorder):
