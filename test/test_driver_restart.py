@@ -117,7 +117,8 @@ class Heard:
 def flight(tmp_path_factory):
     """What was heard; when the driver was killed and started again, and the end; the recording."""
     folder = tmp_path_factory.mktemp('restart')
-    script, places, told = folder / 'driver.py', folder / 'places.json', folder / 'recorder.txt'
+    script, places = folder / 'driver.py', folder / 'places.json'
+    printed = folder / 'recorder.txt'
     script.write_text(DRIVER)
     places.write_text('[0.4, 0.0, 0.0]')
     scenario = load_scenario('current_8deg', {'profile.prepare_s': 0.0})
@@ -140,15 +141,15 @@ def flight(tmp_path_factory):
 
         def recorded_s() -> float:
             """Stamp (s) of the newest odom that the recorder has, by what it prints."""
-            lines = told.read_text().rpartition('\n')[0].splitlines()
+            lines = printed.read_text().rpartition('\n')[0].splitlines()
             return json.loads(lines[-1])['t_s'] if lines else 0.0
 
         rclpy.init(context=context, domain_id=domain)
         heard = Heard(context)
         try:
             autopilot = start([*aboard, '-p', 'record:=false'])
-            with told.open('w') as stream:
-                recorder = start([*commands[RECORDER], '-p', 'progress:=true'], stdout=stream)
+            with printed.open('w') as stream:
+                recorder = start(commands[RECORDER], stdout=stream)
             nodes = {'guidance_node', 'control_node', 'guard_node', RECORDER}
             heard.until(lambda: heard.ready >= nodes)
             first = start(driver)

@@ -6,6 +6,7 @@ import json
 import shutil
 from functools import partial
 
+import numpy as np
 import pytest
 
 import command_line
@@ -71,6 +72,11 @@ def test_nothing_is_told_where_nothing_was_changed():
     assert 'changed' not in scenario.to_yaml()
     same = load_scenario('survey', {'dives': scenario.dives, 'seed': scenario.seed})
     assert same.described == scenario.description
+
+
+def test_points_may_be_an_array():
+    points = np.array([[0.0, 0.0, 0.0], [500.0, 0.0, 0.0]])
+    assert 'path.waypoints' in load_scenario('survey', {'path.waypoints': points}).changed
 
 
 def test_python_tells_it_too():

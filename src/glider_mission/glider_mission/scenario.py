@@ -490,8 +490,10 @@ def make_scenario(
     """
     path, values = source.path, deepcopy(source.values)
     own, in_vehicle = split_changes(changes or {})
-    same = {field for field, value in own.items() if not _set_field(values, field, value)}
-    fields = {field: shown(value) for field, value in (changes or {}).items() if field not in same}
+    fields = {field: shown(value) for field, value in (changes or {}).items()}
+    for field, value in own.items():
+        if not _set_field(values, field, value):
+            del fields[field]
     if fields:
         before = values.get('changed')
         values['changed'] = {**(before if isinstance(before, dict) else {}), **fields}
@@ -615,7 +617,8 @@ def overlap(field: str, other: str) -> bool:
 def _set_field(values: dict, field: str, value) -> bool:
     """Set a field by its dotted name, making the mappings on the way; whether that changes it."""
     holder, last = holder_of(values, field), field.rpartition('.')[2]
-    is_new = last not in holder or holder[last] != value
+    is_plain = isinstance(value, str | int | float)  # of an array one cannot ask it
+    is_new = not is_plain or last not in holder or holder[last] != value
     for other in _alternatives(last):
         holder.pop(other, None)
     holder[last] = deepcopy(value)  # which may be changed by a field inside it

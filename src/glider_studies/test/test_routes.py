@@ -44,7 +44,7 @@ def test_the_mission_is_the_shipped_one_in_another_sea(tmp_path):
         assert one.current_settings().field.params().water.std() > 0.1
 
 
-def test_the_best_route_through_the_true_sea_is_no_slower_than_straight_legs():
+def test_a_plan_by_the_true_sea_gains_on_straight_legs_in_a_strong_one():
     found = cross_one((1009, 0.42, PLAN))
     assert found['reachable']
     assert found['plan_h'] < 0.99 * found['plan_straight_h']

@@ -10,8 +10,7 @@ back in the dive, further over in the climb. Speed and pitch cancel out, and wha
     S_z + m_b K_MR / K_beta
 
 A vehicle of which that is less than nothing rolls over by itself, whatever its bank. Damping makes
-it a little later: a Seawing is steady against its roll mass only in climbs lighter than
-0.66 to 0.8 kg, by pitch.
+it a little later, by pitch (`test_righting.py`, by steady spirals).
 """
 
 from typing import NamedTuple

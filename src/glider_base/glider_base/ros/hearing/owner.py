@@ -5,7 +5,8 @@
 In lockstep it is the node that the wiring says, for good. Free-running, what the blocks say is
 theirs too; what a vehicle says (its sensors, where it is) is that of whoever is heard first, under
 any name, until it is gone. One that falls silent is followed by the next of its name: a driver
-that has crashed and was started again. Who has spoken while the owner did is never believed.
+that has crashed and was started again. Who has no name yet is waited for.
+Who has spoken while the owner did is never believed.
 """
 
 from collections.abc import Mapping
