@@ -49,6 +49,7 @@ from glider_guard.weight import (
     weigh,
 )
 from glider_guard.witness import (
+    AFLOAT_M,
     SURFACE_M,
     Shown,
     Witness,
@@ -236,8 +237,8 @@ def _sounding(state, taken, before, heard, shown, witness, last, told, params):
     ascends = last.m_b <= params.ascent.pumped
     ascends = ascends or (is_asked_up and last.m_b < min(0.0, neutral))
     is_afloat = witness.depth <= SURFACE_M
-    if heard.health.contact_age_s >= 0.0 and state.told & BLIND:
-        is_afloat = is_out(witness)
+    if heard.health.contact_age_s >= 0.0:
+        is_afloat = is_out(witness) or (witness.depth <= AFLOAT_M and not state.told & BLIND)
     return Sounding(
         odom=x.p_d,
         before=before.p_d,

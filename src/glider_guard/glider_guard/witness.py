@@ -16,6 +16,9 @@ from glider_guard.rows import DEPTH_OFFSET, DEPTH_WRONG, FROZEN
 
 #: Above this the vehicle is at the surface, and nothing of its depth is watched (m).
 SURFACE_M = 5.0
+#: Above this it is afloat, and its antenna may be out (m): one that surfaces for good hangs where
+#: it is deeper, and nobody is heard.
+AFLOAT_M = 2.0
 #: Somebody was heard within this time (s): the antenna is out of the water.
 HEARD_S = 1.0
 #: With the antenna out for so long (s) the vehicle is at the surface; a depth shown there is

@@ -14,8 +14,8 @@ from glider_base.block import changes_to_tell
 from glider_base.frames import to_geodetic
 from glider_base.signals import TICK_NS, TICK_S
 from glider_guard.block import TELL_EVERY_NS
-from glider_guard.depth import SURFACE_M
 from glider_guard.rows import ALL, DROPS, ROWS, SURFACES
+from glider_guard.witness import AFLOAT_M
 from glider_guidance.path.curve import path_closest, path_length, path_point
 from glider_mission.rules import Rules
 from glider_model.ocean.bottom import least_height
@@ -83,7 +83,7 @@ def outcome_of(
     if not ends_mission(told[-1:])[0]:
         return Outcome(INFEASIBLE if infeasible else COMPLETED, '')
     reason, end_m = _ended(told), float(depth[-1])
-    if end_m > SURFACE_M:
+    if end_m > AFLOAT_M:
         reason += f'; {end_m:,.0f} m deep at the end'
         if _nothing_is_left(depth, told):
             return Outcome(LOST, f'{reason}, and nothing left to try')

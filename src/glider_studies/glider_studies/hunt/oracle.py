@@ -25,7 +25,7 @@ from glider_model.vehicle.file import load_vehicle
 from glider_studies.hunt.missions import due_s
 
 #: At the surface is shallower than this (m).
-AT_SURFACE_M = 5.0
+AT_SURFACE_M = 2.0
 #: Deeper than rated by this share nobody goes untold.
 BELOW_RATED = 0.06
 #: Nor hangs within so many metres for so long (s) under water. One that has for the second time

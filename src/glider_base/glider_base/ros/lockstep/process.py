@@ -19,8 +19,8 @@ from glider_base.ros.parameters import refuse_unknown
 from glider_base.settings import ConfigurationError
 
 #: Middleware forgets messages of a node that is gone: leave them this time (s) to arrive, and to
-#: be sent again if need be.
-_LINGER_S = 0.3
+#: be sent again if need be. A node sent away by a signal leaves others behind that may lag more.
+_LINGER_S, _LINGER_SENT_AWAY_S = 0.3, 1.0
 #: Where Fast DDS looks for its settings, and ours.
 _FASTDDS, _PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE', Path(__file__).with_name('fastdds.xml')
 
@@ -89,7 +89,7 @@ def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
             except Stop as reason:
                 stop = stop if stop.code else reason
         if nodes:
-            time.sleep(_LINGER_S)
+            time.sleep(_LINGER_S if rclpy.ok() else _LINGER_SENT_AWAY_S)
         for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
