@@ -131,9 +131,9 @@ ROWS = (
     Row(
         NOT_RISING,
         'not_rising',
-        'surfacing for good, and no progress upward; not up, with the antenna out where that is known, by '
-        'the time that climb_mps takes, and some more; or it sinks with the pump out, and leaks, is too heavy or was up before; or '
-        'it leaks, and nobody knows',
+        'surfacing for good, and no progress upward; not up, with the antenna out where that is '
+        'known, by the time that climb_mps takes, and some more; or it sinks with the pump out, '
+        'and leaks, is too heavy or was up before; or it leaks, and nobody knows',
         'climb_progress_m, drop_after_s, drop_blind_s, climb_mps',
         DROP,
         True,

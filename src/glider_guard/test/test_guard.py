@@ -181,6 +181,22 @@ def test_a_depth_that_is_frozen_is_no_reason_to_drop_the_weight_at_once():
         assert one.out.drops == dropped
 
 
+@pytest.mark.parametrize(
+    ('depth_m', 'age_s', 'drops'),
+    [(4.0, 100.0, True), (4.0, 0.0, False), (4.0, -1.0, False), (1.0, 100.0, False)],
+)
+def test_who_hangs_just_below_the_surface_and_is_not_heard_lets_the_weight_go(
+    depth_m, age_s, drops
+):
+    """Neither one that is heard does, nor one that nobody could hear, nor one that is afloat."""
+    vehicle, health = Vehicle(depth_m=depth_m), WELL._replace(contact_age_s=age_s)
+    vehicle.target = SURFACE_TARGET
+    vehicle.go(1200.0, rate=0.0, health=health)
+    assert not vehicle.out.drops
+    assert bool(vehicle.go(60.0, rate=0.0, health=health) & rows.NOT_RISING) == drops
+    assert vehicle.out.drops == drops
+
+
 def test_a_leak_that_nobody_can_see_the_end_of_costs_the_weight():
     vehicle = Vehicle()
     vehicle.go(1.0)
