@@ -63,6 +63,11 @@ def test_who_stays_down_after_it_was_sent_up_is_late():
     assert kind_of(flight(up, told_s=1500.0), status='completed') == 'untold'
     sinks_again = [*up[:3], (19000.0, 0.0), (20000.0, 50.0)]
     assert kind_of(flight(sinks_again, told_s=1500.0)) == 'late'
+    for under_s, verdict in ((300.0, ''), (900.0, 'late')):  # 4 m deep: for how long?
+        dips = [(18000.0, 0.0), (18010.0, 4.0), (18000.0 + under_s, 4.0)]
+        dips += [(18010.0 + under_s, 0.0), (20000.0, 0.0)]
+        dips = flight([*up[:3], *dips], told_s=1500.0)
+        assert kind_of(dips, status='surfaced') == verdict
     struck = [{**PUMP_STUCK, 'at_s': 19000.0}]
     assert kind_of(flight(sinks_again, told_s=1500.0), struck, 'surfaced') == ''
     hangs_again = [*up[:3], (11000.0, 0.0), (12000.0, 50.0), (20000.0, 50.0)]

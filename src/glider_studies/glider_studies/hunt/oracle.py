@@ -24,8 +24,9 @@ from glider_model.plant.block import plant_move
 from glider_model.vehicle.file import load_vehicle
 from glider_studies.hunt.missions import due_s
 
-#: At the surface is shallower than this (m).
-AT_SURFACE_M = 2.0
+#: At the surface is shallower than this (m); one that fills up there may sink by so much for a
+#: while, until its weight goes.
+AT_SURFACE_M, SINKS_AGAIN_M = 2.0, 5.0
 #: Deeper than rated by this share nobody goes untold.
 BELOW_RATED = 0.06
 #: Nor hangs within so many metres for so long (s) under water. One that has for the second time
@@ -148,12 +149,18 @@ def _late(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
     for start, end in pairwise([told, *struck, len(depth)]):
         limit_s = due_s(float(depth[start]))
         late = depth[start + round(limit_s) : end]
-        if not (late > AT_SURFACE_M).any():
+        if not _is_under(late):
             continue
         best = _all_done(scenario, start + 1.0, end - start - 1.0)
         if any((depths[round(limit_s / TICK_S) :] < AT_SURFACE_M).all() for depths in best):
             return f'{late.max():.0f} m deep {limit_s:.0f} s after it was sent up at {start} s'
     return ''
+
+
+def _is_under(depth: np.ndarray) -> bool:
+    """Whether depths (m), float64[s], are under water, but for one that is soon up again."""
+    up = np.flatnonzero(np.concatenate(([True], depth <= AT_SURFACE_M, [True])))
+    return bool((depth > SINKS_AGAIN_M).any() or np.diff(up).max() > STANDS_S)
 
 
 def _untold(scenario: Scenario, truth: Truth, status: str) -> str:
