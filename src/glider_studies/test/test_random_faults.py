@@ -14,7 +14,7 @@ from glider_mission.scenario import load_scenario, parse_assignment
 from glider_studies.commands.experiments import app
 from glider_studies.hunt import search
 from glider_studies.hunt.missions import draw_mission, due_s
-from glider_studies.hunt.oracle import Truth, Verdict, judge
+from glider_studies.hunt.oracle import Truth, Verdict, _shown_s, judge
 
 #: zhang2021 is rated for 1000 m, its hull bears 1250 m.
 SCENARIO = ('current_8deg', {'dives': 0, 'duration_s': 20000.0})
@@ -46,6 +46,20 @@ SINKS = [(0.0, 0.0), (2500.0, 700.0), (5000.0, 1400.0), (20000.0, 1400.0)]
 
 def test_who_sinks_beyond_the_hull_with_a_weight_on_board_is_lost():
     assert kind_of(flight(SINKS, told_s=3000.0), [PUMP_STUCK]) == 'lost'
+
+
+def test_a_fault_shows_where_it_first_changes_the_flight():
+    cut = {'kind': 'partial', 'actuator': 'buoyancy_engine', 'low': -0.05, 'high': 0.5}
+    cut['at_s'] = 600.0  # a pump that cannot drive the climb is not asked to before 3900 s
+    leak = {'kind': 'leak', 'rate_kgps': 1e-6, 'at_s': 1000.0}
+    name, changes = SCENARIO
+    for faults in ([cut], [cut, cut], [cut, leak], [leak, cut]):
+        loaded = load_scenario(name, {**changes, 'faults': faults})
+        kinds = (fault['kind'] for fault in faults)
+        shown_s = dict(zip(kinds, _shown_s(loaded, 4500.0), strict=False))
+        assert 3900.0 < shown_s['partial'] < 4000.0
+        assert 1000.0 <= shown_s.get('leak', 1000.0) < 1001.0
+        assert _shown_s(loaded, 600.0) == []
 
 
 def test_who_has_no_means_left_is_not_lost_but_has_to_be_told():

@@ -4,7 +4,8 @@
 
 Nothing here knows what the guard watches for. Whether pump and weight would have sufficed is
 flown: from some tick on, the plant alone, with the whole pump out, the weight let go and the mass
-where it balances, at the climb stop, or there once the vehicle rises.
+where it balances, at the climb stop, or there once the vehicle rises. Nobody can act on a fault
+before it shows: while the flight is, to the last bit, the one without that fault.
 """
 
 from itertools import pairwise
@@ -32,7 +33,7 @@ BELOW_RATED = 0.06
 #: Nor hangs within so many metres for so long (s) under water. One that has for the second time
 #: does not fly its mission, whatever its settings ask for: it is rightly sent up.
 HANGS_M, HANGS_S, STANDS_S = 5.0, 7200.0, 600.0
-#: A vehicle is saved if all is done for it this long (s) after the last fault.
+#: A vehicle is saved if all is done for it this long (s) after the last fault has shown.
 GRACE_S = 300.0
 #: Ticks from one sample of the depth that is kept to the next.
 _EVERY = 10
@@ -115,7 +116,34 @@ def _comes_up(depths: np.ndarray) -> bool:
     return bool(depths[-1] < AT_SURFACE_M or depths[-1] < then - HANGS_M)
 
 
-def _lost(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
+def _flown(scenario: Scenario, for_s: float) -> np.ndarray:
+    """Log of a flight, float64[ticks, ROW], that ends after a time (s) at the latest."""
+    state, params = mission_of(scenario)
+    log = np.empty((round(for_s / TICK_S), ROW))
+    _, rows, _ = fly(state, params, log, TICK_S)
+    return log[:rows]
+
+
+def _shown_s(scenario: Scenario, until_s: float) -> list[float]:
+    """When (s) each fault showed that did so by then: the first tick at which it changed a bit.
+
+    Each is compared with the flight that has only those before it, so that one of two that do the
+    same shows.
+    """
+    flights = [
+        _flown(scenario.model_copy(update={'faults': scenario.faults[:count]}), until_s)
+        for count in range(len(scenario.faults) + 1)
+    ]
+    shown_s = []
+    for without, flown in pairwise(flights):
+        ticks = min(len(flown), len(without))
+        differs = (flown[:ticks] != without[:ticks]).any(axis=1)
+        if differs.any():
+            shown_s.append(float(np.argmax(differs)) * TICK_S)
+    return shown_s
+
+
+def _lost(scenario: Scenario, truth: Truth) -> str:
     """Why a vehicle is lost that could have been saved; empty if it is not, or could not."""
     vehicle = load_vehicle(scenario.vehicle)
     crush = vehicle.crush_depth_m
@@ -123,7 +151,7 @@ def _lost(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
         return ''
     depth = truth.depth
     crossed_s = float(np.argmax(depth > crush)) if (depth > crush).any() else len(depth) - 1.0
-    before = [one for one in begun_s if one + GRACE_S < crossed_s]
+    before = [one for one in _shown_s(scenario, crossed_s) if one + GRACE_S < crossed_s]
     moments = [max(before) + GRACE_S] if before else []
     too_deep = depth > (1.0 + BELOW_RATED) * vehicle.rated_depth_m
     if too_deep.any():
@@ -204,7 +232,7 @@ def judge(
     if status == 'failed':
         return Verdict('not_finite', reason)
     for kind, why in (
-        ('lost', _lost(scenario, truth, begun_s)),
+        ('lost', _lost(scenario, truth)),
         ('late', _late(scenario, truth, begun_s)),
         ('untold', _untold(scenario, truth, status)),
     ):
