@@ -81,7 +81,7 @@ def test_run_prints_one_json_object_and_nothing_else(run):
 def test_card_says_what_was_flown(run):
     card = json.loads(run[0].stdout)
     flown = [card[name] for name in 'scenario controller guidance engine seed status'.split()]
-    assert flown == ['current_8deg', 'pid', 'observer', 'direct', 3, 'completed']
+    assert flown == ['current_8deg', 'pid', 'los_current', 'direct', 3, 'completed']
     assert (card['ticks'], card['sim_time_s'], card['messages_lost']) == (3000, 300.0, 0)
 
 

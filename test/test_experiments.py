@@ -23,13 +23,13 @@ def fly(folder, *options, duration='full'):
 @pytest.fixture(scope='module')
 def observed(tmp_path_factory):
     """Line of sight with the current observer."""
-    return fly(tmp_path_factory.mktemp('observer'))
+    return fly(tmp_path_factory.mktemp('los_current'))
 
 
 @pytest.fixture(scope='module')
 def printed(tmp_path_factory):
     """Line of sight as the paper prints it."""
-    return fly(tmp_path_factory.mktemp('paper'), '--guidance', 'paper')
+    return fly(tmp_path_factory.mktemp('los_zhang2021'), '--guidance', 'los_zhang2021')
 
 
 def test_thirty_hours_are_flown_to_the_end(observed):
@@ -68,7 +68,7 @@ def test_way_made_good_is_that_of_the_velocity_triangle(observed):
 def test_method_of_the_paper_completes_in_a_limit_cycle(printed):
     """Lookahead 3.2 m: the heading swings by tens of degrees, the track by tens of metres."""
     assert printed['status'] == 'completed'
-    assert printed['guidance'] == 'paper'
+    assert printed['guidance'] == 'los_zhang2021'
     assert 5.0 < printed['cross_track_m']['rms_steady'] < 30.0
     assert 10.0 < printed['heading_fluctuation_deg']['rms_steady'] < 90.0
 

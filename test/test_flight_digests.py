@@ -54,9 +54,9 @@ NUMBERS = {
 }
 #: Fields of the three ways in which each is flown.
 WAYS = {
-    'adaptive': {'control.law': 'adaptive', 'guidance.los.method': 'observer'},
-    'pid': {'control.law': 'pid', 'guidance.los.method': 'observer'},
-    'paper': {'control.law': 'adaptive', 'guidance.los.method': 'paper'},
+    'adaptive': {'control.law': 'adaptive', 'guidance.los.method': 'los_current'},
+    'pid': {'control.law': 'pid', 'guidance.los.method': 'los_current'},
+    'paper': {'control.law': 'adaptive', 'guidance.los.method': 'los_zhang2021'},
 }
 
 

@@ -112,7 +112,7 @@ def test_studies_count_it_as_failed(driven):
     changes = {'vehicle': str(driven), 'dives': 0, 'duration_s': DURATION_S}
     scenario = load_scenario(changes=changes)
     assert montecarlo._fly_plant(scenario)['diverged']
-    row, _ = _fly_case(Case('', 'adaptive', 'observer', 'current_8deg', changes))
+    row, _ = _fly_case(Case('', 'adaptive', 'los_current', 'current_8deg', changes))
     assert (row['status'], row['finite']) == ('failed', False)
     vehicles = {fly.digest(fly.vehicle_text(scenario.vehicle))}
     inputs = Inputs(source=read_scenario(), vehicles=vehicles)

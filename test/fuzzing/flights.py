@@ -32,15 +32,15 @@ SECTIONS = (
     'guard',
 )
 #: What is chosen in every flight, beside a current.
-LAWS, GUIDANCES = ('adaptive', 'pid'), ('observer', 'paper')
+LAWS, GUIDANCES = ('adaptive', 'pid'), ('los_current', 'los_zhang2021')
 #: What is set for those that do not know their place.
 RECKONS = {
     'navigation.method': 'dead_reckoned',
-    'guidance.los.method': 'observer',
+    'guidance.los.method': 'los_current',
     'profile.surface_every_dives': 1,
 }
 #: The same for those with a steering surface.
-STEERS = {'control.law': 'adaptive', 'guidance.los.method': 'observer'}
+STEERS = {'control.law': 'adaptive', 'guidance.los.method': 'los_current'}
 #: Sections that the plant alone is told: half of the flights draw from these only.
 PLANT_SECTIONS = ('perturb', 'initial', 'water')
 #: Share of the flights by dead reckoning and with faults, and how many of them.

@@ -137,7 +137,7 @@ def test_seed_changes_nothing_where_nothing_is_random():
     assert np.array_equal(*logs)
 
 
-@pytest.mark.parametrize('method', ['observer', 'paper'])
+@pytest.mark.parametrize('method', ['los_current', 'los_zhang2021'])
 def test_mirrored_current_mirrors_the_flight(method):
     """Starboard for port, along a path due north: east, roll and heading change their sign.
 

@@ -130,7 +130,7 @@ if __name__ == '__main__':
     known = bytearray(plan.cells - 1) + b'\\0'
     known[:-1] = b'\\1' * (plan.cells - 1)
     (scenario,) = make_scenarios('current_8deg', {'duration_s': 1.0}, ['pid'], 1, 0).values()
-    case = Case('one', 'pid', 'observer', 'current_8deg', {'duration_s': 1.0})
+    case = Case('one', 'pid', 'los_current', 'current_8deg', {'duration_s': 1.0})
     studies = {
         'montecarlo': (_fly_plant, scenario),
         'sweep': (fly_chunk, next(make_chunks(plan, known, 1))),

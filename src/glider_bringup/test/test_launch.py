@@ -69,7 +69,7 @@ def test_arguments_reach_the_parameters(tmp_path):
     plant = values['/sea/one/plant_node']
     assert (plant['speed'], plant['duration_s'], plant['dives']) == (0.0, 120.0, 0)
     assert values['/sea/one/control_node']['law'] == 'pid'
-    assert values['/sea/one/guidance_node']['los']['method'] == 'paper'
+    assert values['/sea/one/guidance_node']['los']['method'] == 'los_zhang2021'
     assert '"kind":"helix"' in values['/sea/one/guidance_node']['path']
 
 
@@ -226,12 +226,12 @@ def test_what_cannot_be_used_is_refused_and_leaves_nothing(tmp_path, arguments, 
 
 def test_choices_are_those_of_the_settings():
     choices = {argument.name: argument.choices for argument in ARGUMENTS}
-    for name, model, field in (
-        ('controller', ControlLawSettings, 'law'),
-        ('guidance', LosSettings, 'method'),
+    for name, model, field, before in (
+        ('controller', ControlLawSettings, 'law', ()),
+        ('guidance', LosSettings, 'method', ('observer', 'paper')),
     ):
         words = model.model_fields[field].annotation.__args__
-        assert set(choices[name]) == {'', *words}
+        assert set(choices[name]) == {'', *words, *before}
     described = {argument.name: argument.description for argument in ARGUMENTS}
     assert all(name in described['scenario'] for name in scenario_names())
 

@@ -296,7 +296,7 @@ def test_bit_that_rots_in_a_chunk_is_named_with_file_and_chunk(
 CHANGES = {
     'gain': ('control', {'control.adaptive.pitch.b1': 6.000001}),
     'law': ('control', {'control.law': 'pid'}),
-    'guidance': ('guidance', {'guidance.los.method': 'paper'}),
+    'guidance': ('guidance', {'guidance.los.method': 'los_zhang2021'}),
     'filter': ('guidance', {'guidance.filters.pitch_frequency_radps': 0.120001}),
     'current': ('current', {'current.speed_kn': 0.71, 'current.angle_deg': 60.0}),
     'coefficient': ('plant', {'perturb.K_L': 1e-9}),

@@ -25,24 +25,24 @@ class LosGains(Settings):
         40.0,
         ge=1.0,
         le=10000.0,
-        description='least lookahead of the observer method (m)',
+        description='least lookahead of los_current (m)',
         json_schema_extra=TUNABLE,
     )
     lookahead_s: float = Field(
         150.0,
         ge=0.0,
         le=3600.0,
-        description='lookahead of the observer method in time at the speed over ground (s)',
+        description='lookahead of los_current in time at the speed over ground (s)',
         json_schema_extra=TUNABLE,
     )
     lead_turns: bool = Field(
-        True, description='share the drift of a turn between before and after (observer method)'
+        True, description='share the drift of a turn between before and after (los_current)'
     )
     delta1_m: float = Field(
         3.2,
         ge=0.1,
         le=10000.0,
-        description="Delta1, lookahead of the paper's method (m)",
+        description='Delta1, lookahead of los_zhang2021 (m)',
         json_schema_extra=TUNABLE,
     )
     delta1_per_s: float = Field(

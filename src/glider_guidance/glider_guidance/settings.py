@@ -31,6 +31,8 @@ TAKEN = {'los', 'observer', 'filters', 'steering', 'gate', 'vehicle', 'path', 'p
 TAKEN |= {'dives', 'duration_s', 'hold', 'orders'}
 #: Settings of every guidance method by its name.
 METHODS = plugins.classes(plugins.GUIDANCE_METHODS, MethodSettings, methods, TAKEN)
+#: What some of them were called before: still understood.
+OLD_NAMES = {'observer': 'los_current', 'paper': 'los_zhang2021'}
 
 _MethodChoice = pydantic.create_model(
     '_MethodChoice',
@@ -38,7 +40,7 @@ _MethodChoice = pydantic.create_model(
     method=(
         Literal[tuple(METHODS)],
         Field(
-            'observer',
+            'los_current',
             description=plugins.listed(METHODS),
             json_schema_extra={'others': plugins.others(plugins.GUIDANCE_METHODS)},
         ),
@@ -59,6 +61,12 @@ _MethodGains = pydantic.create_model(
 
 class LosSettings(LosGains, _MethodChoice):
     """Line of sight."""
+
+    @pydantic.field_validator('method', mode='before')
+    @classmethod
+    def _of_before(cls, value):
+        """The name of now."""
+        return OLD_NAMES.get(value, value) if isinstance(value, str) else value
 
 
 class ObserverSettings(Settings):

@@ -16,7 +16,7 @@ from glider_base.signals import TICK_S, Odometry
 from glider_base.wiring import NO_ECHO
 from glider_guidance.current_observer import ObserverState
 from glider_guidance.guidance import INFEASIBLE_S, WaterState, guidance_abort, guidance_step
-from glider_guidance.methods.observer import LOOKAHEAD_STRETCH_MAX, lookahead_stretch
+from glider_guidance.methods.los_current import LOOKAHEAD_STRETCH_MAX, lookahead_stretch
 from glider_guidance.path.settings import HelixPath, StraightPath, WaypointPath
 from glider_guidance.settings import GuidanceSettings
 from glider_guidance.yo.stage import (
@@ -143,7 +143,7 @@ LEGS = [(0.0, 0.0), (500.0, 0.0), (500.0, 400.0), (1500.0, 900.0)]
 
 
 @pytest.mark.parametrize('angle_deg', [37.0, 90.0, 143.0, 180.0, -101.0])
-@pytest.mark.parametrize('method', ['observer', 'paper'])
+@pytest.mark.parametrize('method', ['los_current', 'los_zhang2021'])
 def test_turned_and_shifted_world_gives_the_same_flight(method, angle_deg):
     """Path, current and vehicle turned and shifted together, over three legs: 1 mm, 1e-6 rad."""
     angle, shift = math.radians(angle_deg), np.array([5000.0, -12000.0])
@@ -281,7 +281,7 @@ def test_approach_from_far_does_not_make_a_feasible_course_infeasible():
 @quick
 @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-500.0, 500.0))
 def test_paper_method_ignores_the_estimate(current_n, current_e, beside):
-    guidance = straight(los={'method': 'paper'})
+    guidance = straight(los={'method': 'los_zhang2021'})
     point = (10.0, beside, 0.0, 0.0, 1.0, 0.0)
     _, plain = step(guidance, point)
     _, told = step(guidance, point, observer=(0.0, 0.0, current_n, current_e))
@@ -297,7 +297,7 @@ def test_observer_method_crabs_into_the_estimate():
 def test_paper_method_drifts_off_the_path_where_the_other_does_not():
     """Steady offset of a line of sight without compensation: Delta tan(crab) = 60 tan(28 deg)."""
     fields = {'profile': {'depth_m': 5000.0}}
-    paper = {'los': {'method': 'paper', 'delta1_m': 60.0}}
+    paper = {'los': {'method': 'los_zhang2021', 'delta1_m': 60.0}}
     flight = Flight(straight(**fields, **paper), current=(0.0, 0.2)).fly(3500.0)
     speed = flight.state.water.speed
     expected = 60.0 * 0.2 / math.sqrt(speed**2 - 0.2**2)

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glider_base.settings import ConfigurationError
+from glider_guidance.settings import OLD_NAMES
 from glider_mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
@@ -44,7 +45,7 @@ FULL = {
             {'kind': 'gauss_markov', 'std_mps': 0.02, 'time_constant_s': 900.0},
         ],
     },
-    'guidance': {'los': {'method': 'paper', 'delta1_m': 5.0}},
+    'guidance': {'los': {'method': 'los_zhang2021', 'delta1_m': 5.0}},
     'control': {'law': 'pid', 'pid': {'pitch_kp': 6.0}},
 }
 
@@ -470,3 +471,10 @@ def test_fields_that_are_given_stay_as_they_are():
     fields = {'sensors': {}, 'sensors.gps_std_m': 7.0}
     assert load_scenario('current_8deg', fields).sensors.gps_std_m == 7.0
     assert fields == {'sensors': {}, 'sensors.gps_std_m': 7.0}
+
+
+@pytest.mark.parametrize(('old', 'new'), OLD_NAMES.items())
+def test_what_guidance_was_called_before_is_understood(old, new):
+    for name in (old, new):
+        scenario = load_scenario('current_8deg', {'guidance.los.method': name})
+        assert scenario.guidance.los.method == new

@@ -20,10 +20,10 @@ def types_of(scenario):
 def test_loop_depends_on_law_and_methods_alone():
     """Else something is compiled of which nobody is told; of water from a file who flies is."""
     chosen = [
-        ('adaptive', 'observer', 'known'),
-        ('pid', 'observer', 'dead_reckoned'),
-        ('pid', 'paper', 'known'),
-        ('pid', 'paper', 'dead_reckoned'),
+        ('adaptive', 'los_current', 'known'),
+        ('pid', 'los_current', 'dead_reckoned'),
+        ('pid', 'los_zhang2021', 'known'),
+        ('pid', 'los_zhang2021', 'dead_reckoned'),
     ]
     found = {}
     for law, method, navigation in chosen:
@@ -44,11 +44,11 @@ def test_loop_depends_on_law_and_methods_alone():
 
 def test_line_names_law_and_method():
     lines = []
-    with told(Combination('pid', 'paper'), lines.append):
+    with told(Combination('pid', 'los_zhang2021'), lines.append):
         numba.njit(lambda x: x + 1.0)(1.0)
     (line,) = lines
-    assert 'law pid with method paper' in line
-    with told(Combination('pid', 'paper', steered='slocum_g2'), lines.append):
+    assert 'law pid with method los_zhang2021' in line
+    with told(Combination('pid', 'los_zhang2021', steered='slocum_g2'), lines.append):
         numba.njit(lambda x: x + 2.0)(1.0)
     assert 'vehicle slocum_g2' in lines[-1]
 

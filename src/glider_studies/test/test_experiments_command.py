@@ -76,7 +76,9 @@ def test_every_experiment_can_be_flown(planned):
 def test_paper_experiments_are_of_thirty_hours(planned):
     for name, angle in {'current_8deg': 8, 'current_10deg': 10, 'current_12deg': 12}.items():
         ways = {(case.controller, case.guidance) for case in planned[name].cases}
-        assert ways == {(law, los) for law in ('adaptive', 'pid') for los in ('observer', 'paper')}
+        assert ways == {
+            (law, los) for law in ('adaptive', 'pid') for los in ('los_current', 'los_zhang2021')
+        }
         scenario = planned[name].cases[0].load()
         assert scenario.duration_s == 30 * 3600
         assert (scenario.current.speed_kn, scenario.current.angle_deg) == (1.0, angle)
@@ -137,7 +139,7 @@ def test_expectation_is_physics(current, angle, expected):
 # --------------------------------------------------------------------------- verdicts
 
 
-def made_up(controller='adaptive', guidance='observer', case='', **fields):
+def made_up(controller='adaptive', guidance='los_current', case='', **fields):
     """Row of a good flight, with some of its figures changed (dots as double underscores)."""
     row = {
         'case': case,
@@ -204,7 +206,7 @@ def test_a_regression_fails_its_experiment(planned, name, fields):
 def test_limits_are_for_the_adaptive_law_alone(planned):
     lost = {'cross_track_m__max_steady': 9000.0, 'status': 'infeasible'}
     for name in ('current_12deg', 'robustness'):
-        rows = [made_up(), made_up('pid', **lost), made_up('adaptive', 'paper', **lost)]
+        rows = [made_up(), made_up('pid', **lost), made_up('adaptive', 'los_zhang2021', **lost)]
         assert passes(planned[name].judge, *rows)
 
 
@@ -326,8 +328,8 @@ SHORT = {'duration_s': 2400.0, 'profile.depth_m': 100.0, 'settle_s': 60.0}
 
 
 def test_results_do_not_depend_on_workers():
-    cases = [Case('', law, 'observer', 'current_8deg', SHORT) for law in ('adaptive', 'pid')]
-    told = Case('told', 'pid', 'observer', 'current_8deg', {**SHORT, 'vehicle': 'seawing'})
+    cases = [Case('', law, 'los_current', 'current_8deg', SHORT) for law in ('adaptive', 'pid')]
+    told = Case('told', 'pid', 'los_current', 'current_8deg', {**SHORT, 'vehicle': 'seawing'})
     cases += [told, told._replace(told='zhang2021')]
     one = Experiment('current', 'short', '', '', '', cases, judge_limits({}))
     counts, results = [], []
@@ -382,7 +384,7 @@ def test_figures_are_drawn_of_what_was_flown(tmp_path):
     """Only those whose flights there are."""
     from glider_studies.showing import paper_figures
 
-    cases = [Case('', 'pid', 'observer', 'current_8deg', SHORT, drawn=True)]
+    cases = [Case('', 'pid', 'los_current', 'current_8deg', SHORT, drawn=True)]
     one = Experiment('profile', 'profile', '', '', '', cases, judge_limits({}, 'pid'))
     with worker_pool(1) as pool:
         rows, records = fly([one], pool, lambda done: None)
@@ -459,7 +461,7 @@ def test_every_vehicle_flies_with_position_known_and_reckoned(planned):
 
     def verdict(controller, beside_m):
         from_fourth = {'surfacing_cross_track_m': beside_m, 'under_water_rms_m': 10.0}
-        row = {'case': 'seaglider', 'controller': controller, 'guidance': 'observer'}
+        row = {'case': 'seaglider', 'controller': controller, 'guidance': 'los_current'}
         row |= {'status': 'completed', 'navigation': {'from_fourth': from_fourth}}
         return [check.passed for check in reckoned.judge([row])]
 

@@ -63,7 +63,7 @@ def test_the_map_is_the_one_of_the_paper():
     assert values['current_angle'] == [5.0 * i for i in range(37)]
     cell = 2 * 31 * 37 + 20 * 37 + 2
     scenario = load_scenario('current_8deg', plan.changes(cell))
-    assert scenario.guidance.los.method == 'paper'
+    assert scenario.guidance.los.method == 'los_zhang2021'
     assert (scenario.current.speed_kn, scenario.current.angle_deg) == (1.0, 10.0)
     assert (scenario.dives, scenario.duration_s) == (0, 50000.0)
 
@@ -71,7 +71,7 @@ def test_the_map_is_the_one_of_the_paper():
 def test_last_dimension_runs_fastest_and_every_combination_is_one_cell(tmp_path):
     variants = {
         'a': {'control.law': 'pid'},
-        'b': {'control.law': 'adaptive', 'guidance.los.method': 'paper'},
+        'b': {'control.law': 'adaptive', 'guidance.los.method': 'los_zhang2021'},
     }
     plan = plan_of(
         tmp_path,
@@ -143,16 +143,16 @@ def test_every_vehicle_that_flies_is_an_input(tmp_path):
 def test_laws_and_methods_of_all_cells_are_known(tmp_path):
     """Their loops are compiled before workers need them."""
     laws = {'kind': 'values', 'field': 'control.law', 'values': ['pid', 'adaptive']}
-    variants = {'a': {}, 'b': {'guidance.los.method': 'paper'}}
+    variants = {'a': {}, 'b': {'guidance.los.method': 'los_zhang2021'}}
     plan = plan_of(
         tmp_path, dimensions={'law': laws, 'los': {'kind': 'variants', 'variants': variants}}
     )
     assert set(plan.combinations) == {
         (law, method, 'known', False, '')
         for law in ('pid', 'adaptive')
-        for method in ('observer', 'paper')
+        for method in ('los_current', 'los_zhang2021')
     }
-    assert plan_of(tmp_path).combinations == [('adaptive', 'observer', 'known', False, '')]
+    assert plan_of(tmp_path).combinations == [('adaptive', 'los_current', 'known', False, '')]
 
 
 def test_vehicles_with_a_fin_have_a_loop_of_their_own(tmp_path):

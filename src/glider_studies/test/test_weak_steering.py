@@ -9,7 +9,7 @@ from glider_base.signals import TICK_S
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.card import fly_scored
-from glider_guidance.methods.observer import lookahead_stretch
+from glider_guidance.methods.los_current import lookahead_stretch
 from glider_mission.blocks import ROW
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.perturb import PerturbSettings, perturbed

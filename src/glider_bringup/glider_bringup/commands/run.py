@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import typer
 
@@ -29,7 +29,7 @@ from glider_bringup.console import (
 )
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.showing.scorecard import STYLES, print_card, print_places
-from glider_guidance.settings import LosSettings
+from glider_guidance.settings import OLD_NAMES, LosSettings
 from glider_mission.choices import ENGINES, chosen_fields, combination_of
 from glider_mission.disk import DiskError
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
@@ -37,7 +37,8 @@ from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
 app = typer.Typer()
 Engine = Literal[ENGINES]
 When = Literal['never', 'end', 'chunk']
-Guidance = choices(LosSettings, 'method')
+#: Those of now, and what they were called before.
+Guidance = Literal[(*get_args(choices(LosSettings, 'method')), *OLD_NAMES)]
 
 
 # long: its options stand where it begins, each with its help.

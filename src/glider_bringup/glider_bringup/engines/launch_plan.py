@@ -28,7 +28,7 @@ from glider_bringup.engines.processes import (
     process_modules,
 )
 from glider_control.settings import LAWS
-from glider_guidance.settings import METHODS
+from glider_guidance.settings import METHODS, OLD_NAMES
 from glider_mission.run_folder import (
     PARAMETERS_FILE,
     SCENARIO_FILE,
@@ -64,7 +64,7 @@ ARGUMENTS = (
         f'Scenario: {", ".join(scenario_names())}; or path of a YAML file.',
     ),
     Argument('controller', '', "Attitude law; empty: the scenario's.", ('', *LAWS)),
-    Argument('guidance', '', "Line of sight; empty: the scenario's.", ('', *METHODS)),
+    Argument('guidance', '', "Line of sight; empty: the scenario's.", ('', *METHODS, *OLD_NAMES)),
     Argument(
         'duration',
         '',

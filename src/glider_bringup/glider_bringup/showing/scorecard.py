@@ -94,7 +94,7 @@ def _text(card: dict, score: Score) -> str:
 
 def flown_text(card: dict) -> str:
     """What flew, and by what laws."""
-    return f'{card["vehicle"]}, {card["controller"]}, LOS {card["guidance"]}'
+    return f'{card["vehicle"]}, {card["controller"]}, {card["guidance"]}'
 
 
 def engine_text(card: dict) -> str:

@@ -172,7 +172,7 @@ def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
         measures = tuple(one.get('measures', ['attitude']))
         cases += [
             Case(name, law, method, scenario, fields, measures, told, facts, 'drawn' in one)
-            for method in one.get('guidance', ['observer'])
+            for method in one.get('guidance', ['los_current'])
             for law in laws
         ]
     return cases

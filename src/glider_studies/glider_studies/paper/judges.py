@@ -68,7 +68,7 @@ def within(row: dict, limits: dict[str, float]) -> list[Check]:
 
 def _flown(rows: list[dict], controller: str = 'adaptive') -> list[dict]:
     """Rows of one controller, with our guidance."""
-    flown = (controller, 'observer')
+    flown = (controller, 'los_current')
     return [row for row in rows if (row['controller'], row['guidance']) == flown]
 
 

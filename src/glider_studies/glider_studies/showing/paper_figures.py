@@ -85,7 +85,7 @@ def _of(flights: Flights, drawing: Drawing, guidance: str) -> Iterator[tuple[str
 
 def _profiles(flights: Flights, drawing: Drawing) -> Iterator[tuple[str, Record, Any, np.ndarray]]:
     """Controllers, records, which part of them figures 5 to 7 show, and the hours of that."""
-    for controller, record in _of(flights, drawing, 'observer'):
+    for controller, record in _of(flights, drawing, 'los_current'):
         part = record.time_s <= PROFILE_HOURS * 3600.0
         yield controller, record, part, record.time_s[part] / 3600.0
 
@@ -98,7 +98,7 @@ def _plot(axis, controller: str, x, y, style: str = '-', width: float = 1.0) -> 
 
 def _shown(guidance: str, hours: np.ndarray) -> np.ndarray:
     """Mask of what is shown of a flight; with the paper's guidance a part, to see its cycle."""
-    first, last = (0.0, np.inf) if guidance == 'observer' else DETAIL_HOURS
+    first, last = (0.0, np.inf) if guidance == 'los_current' else DETAIL_HOURS
     return (hours >= first) & (hours <= last)
 
 
@@ -109,12 +109,12 @@ def _draw_current(figure, drawing: Drawing, flights: Flights, rows: list[dict]) 
     axes = figure.subplot_mosaic([['track', 'ours'], ['track', 'paper']], width_ratios=[1.0, 2.0])
     track = axes['track']
     for guidance, colour, width, label in (
-        ('paper', _RED, 0.4, _PAPER),
-        ('observer', BLUE, 1.5, _CRAB),
+        ('los_zhang2021', _RED, 0.4, _PAPER),
+        ('los_current', BLUE, 1.5, _CRAB),
     ):
         record = flights[name, '', 'adaptive', guidance]
         track.plot(record.east, record.north / 1e3, color=colour, linewidth=width, label=label)
-    for guidance, axis in (('observer', axes['ours']), ('paper', axes['paper'])):
+    for guidance, axis in (('los_current', axes['ours']), ('los_zhang2021', axes['paper'])):
         for controller, record in _of(flights, drawing, guidance):
             hours, error = record.time_s / 3600.0, record.cross_track
             part = _shown(guidance, hours)
@@ -180,7 +180,7 @@ def _draw_yaw(figure, drawing: Drawing, flights: Flights, rows: list[dict]) -> N
     controller = drawing.experiment.removeprefix('yaw_10deg_')
     colour, label = _COLOURS[controller], _NAMES[controller]
     ours, across, paper = figure.subplots(3, 1)
-    for guidance, axis in (('paper', paper), ('observer', ours)):
+    for guidance, axis in (('los_zhang2021', paper), ('los_current', ours)):
         record = flights[drawing.experiment, _READING, controller, guidance]
         hours = record.time_s / 3600.0
         part = _shown(guidance, hours)

@@ -39,19 +39,19 @@ LEAD_CORRECTION_S = 60.0
 READY_S, READY_S_MAX = 60.0, 100.0
 
 
-class ObserverSettings(MethodSettings):
+class LosCurrentSettings(MethodSettings):
     """Crab into the estimated current."""
 
-    def params(self, los: LosGains, vehicle: Vehicle) -> 'ObserverMethodParams':
+    def params(self, los: LosGains, vehicle: Vehicle) -> 'LosCurrentParams':
         """Kernel parameters."""
-        return ObserverMethodParams(los.lookahead_m, los.lookahead_s, los.delta2, los.lead_turns)
+        return LosCurrentParams(los.lookahead_m, los.lookahead_s, los.delta2, los.lead_turns)
 
-    def initial_state(self) -> 'ObserverMethodState':
+    def initial_state(self) -> 'LosCurrentState':
         """Nothing learnt yet."""
-        return ObserverMethodState(0.0, 0.0, 0.0, 0.0)
+        return LosCurrentState(0.0, 0.0, 0.0, 0.0)
 
 
-class ObserverMethodParams(NamedTuple):
+class LosCurrentParams(NamedTuple):
     """Gains of the method."""
 
     lookahead: float  #: (m), at least
@@ -60,7 +60,7 @@ class ObserverMethodParams(NamedTuple):
     leads: bool  #: share the drift of a turn between before and after
 
 
-class ObserverMethodState(NamedTuple):
+class LosCurrentState(NamedTuple):
     """What is known of the turns."""
 
     drift: float  #: what the last turn was expected to cost across the path (m)
@@ -108,7 +108,7 @@ def lead_turns(state, seen, stretch, next_stretch, lookahead_s):
 
     Parameters
     ----------
-    state : ObserverMethodState
+    state : LosCurrentState
     seen : Situation
     stretch, next_stretch : float
         `lookahead_stretch` of this phase and of the next one.
@@ -117,7 +117,7 @@ def lead_turns(state, seen, stretch, next_stretch, lookahead_s):
 
     Returns
     -------
-    ObserverMethodState, Aside
+    LosCurrentState, Aside
     """
     leg, current = seen.leg, seen.current
     more_up_s, more_down_s = state.more_up_s, state.more_down_s
@@ -151,14 +151,14 @@ def lead_turns(state, seen, stretch, next_stretch, lookahead_s):
         offset += OFFSET_AHEAD * lookahead_s * moved
         is_nearly_over = leg.to_turn_s < min(READY_S_MAX, READY_S * (next_stretch - 1.0))
     return (
-        ObserverMethodState(drift, state.beside, more_up_s, more_down_s),
+        LosCurrentState(drift, state.beside, more_up_s, more_down_s),
         Aside(offset, is_nearly_over),
     )
 
 
-@method_step.body(ObserverMethodParams)
+@method_step.body(LosCurrentParams)
 @kernel
-def observer_method_step(state, seen, params, dt):
+def los_current_step(state, seen, params, dt):
     """Direction to fly: see `method_step`."""
     leg, current = seen.leg, seen.current
     # a turn-over is flown on the heading of the glide to come, as it should be
@@ -173,7 +173,7 @@ def observer_method_step(state, seen, params, dt):
         lookahead_s * math.sqrt(seen.ground_n * seen.ground_n + seen.ground_e * seen.ground_e),
     )
     beside = state.beside + dt / BESIDE_S * (seen.error.e2 - state.beside)
-    state = ObserverMethodState(state.drift, beside, state.more_up_s, state.more_down_s)
+    state = LosCurrentState(state.drift, beside, state.more_up_s, state.more_down_s)
     aside = Aside(0.0, False)
     if params.leads and not seen.follows_path:
         state, aside = lead_turns(state, seen, stretch, next_stretch, lookahead_s)

@@ -10,34 +10,34 @@ from glider_guidance.method import Asked, LosGains, MethodSettings, method_step
 from glider_model.vehicle.file import Vehicle
 
 
-class PaperSettings(MethodSettings):
+class LosZhangSettings(MethodSettings):
     """As printed, no estimate."""
 
-    def params(self, los: LosGains, vehicle: Vehicle) -> 'PaperParams':
+    def params(self, los: LosGains, vehicle: Vehicle) -> 'LosZhangParams':
         """Kernel parameters."""
-        return PaperParams(los.delta1_m, los.delta2)
+        return LosZhangParams(los.delta1_m, los.delta2)
 
-    def initial_state(self) -> 'PaperState':
+    def initial_state(self) -> 'LosZhangState':
         """There is nothing that it keeps."""
-        return PaperState(0)
+        return LosZhangState(0)
 
 
-class PaperParams(NamedTuple):
+class LosZhangParams(NamedTuple):
     """Gains of the method."""
 
     lookahead: float  #: Delta1 (m)
     vertical_ratio: float  #: delta2 (-)
 
 
-class PaperState(NamedTuple):
+class LosZhangState(NamedTuple):
     """Nothing; a tuple of numbers cannot be empty."""
 
     nothing: int
 
 
-@method_step.body(PaperParams)
+@method_step.body(LosZhangParams)
 @kernel
-def paper_step(state, seen, params, dt):
+def los_zhang_step(state, seen, params, dt):
     """Direction to fly: see `method_step`."""
     gamma_r, rho_r = approach_angles(
         seen.error.e2, seen.error.e3, params.lookahead, params.vertical_ratio
