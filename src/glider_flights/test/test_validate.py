@@ -44,33 +44,35 @@ def density(depth: float) -> float:
     return float(gsw.rho_t_exact(absolute, temperature(depth), pressure))
 
 
-def glide(depth: float, sign: float) -> tuple[float, float]:
+def glide(
+    depth: float, sign: float, heavier: float = HEAVIER, rougher: float = ROUGHER
+) -> tuple[float, float]:
     """Speed and vertical rate (m/s, + down) of a steady glide of slocum_g2, by Merckelbach."""
     file, rho = load_vehicle('slocum_g2').params(), density(depth)
     squeezed = file.compressibility * rho * 9.81 * depth
     stretched = file.thermal_expansion * (temperature(depth) - file.reference_temperature)
     volume = file.volume * (1.0 - squeezed + stretched)
-    net = 70.0 + HEAVIER - rho * (volume - sign * PUMPED)
+    net = 70.0 + heavier - rho * (volume - sign * PUMPED)
     assert net * sign > 0.0
 
     def drag(alpha):
-        return ROUGHER * 0.15 + 10.5 * alpha**2
+        return rougher * 0.15 + 10.5 * alpha**2
 
     def balance(alpha):
         return drag(alpha) * math.cos(PITCH + alpha) - 7.5 * alpha * math.sin(PITCH + alpha)
 
-    alpha = brentq(balance, 0.0, math.radians(8.0))
+    alpha = brentq(balance, 0.0, math.radians(20.0))
     force = 9.81 * abs(net) * math.sin(PITCH + alpha)
     speed = math.sqrt(2.0 * force / (rho * 0.1 * drag(alpha)))
     return speed, sign * speed * math.sin(PITCH + alpha)
 
 
-def made_up() -> dict[str, np.ndarray]:
-    """A dive and a climb, a sample each few seconds."""
+def made_up(**differs: float) -> dict[str, np.ndarray]:
+    """A dive and a climb, a sample each few seconds; how it differs from the others."""
     now, depth, heading, rows = 0.0, 2.5, 0.3, []
     for sign in (1.0, -1.0):
         while (depth < DEEPEST) if sign > 0.0 else (depth > 2.5):
-            speed, rate = glide(depth, sign)
+            speed, rate = glide(depth, sign, **differs)
             roll = 0.12 * math.sin(now / 120.0)
             rows.append((now, depth, -sign * PITCH, roll, heading, -sign * PUMPED, -rate, speed))
             heading += PERIOD_S * TURNS[sign] * math.sin(roll) * speed / 0.5
@@ -106,6 +108,23 @@ def write_dive(file, dive, **changes) -> None:
     } | changes
     data = {name: value for name, value in data.items() if value is not None}
     xarray.Dataset(data).to_netcdf(file, engine='scipy')
+
+
+def write_flight(folder, dives, **changes) -> str:
+    """Write dives two hours apart; the folder."""
+    folder.mkdir()
+    for number, dive in enumerate(dives):
+        start_s = START_S + 7200.0 * number
+        end_s = start_s + dive['time'][-1]
+        moved = {
+            'time': ('sg_data_point', start_s + dive['time']),
+            'log_gps_time': (
+                'gps_info',
+                np.array([start_s - 300.0, start_s - 60.0, end_s + 60.0]),
+            ),
+        }
+        write_dive(folder / f'p123{number + 1:04d}.nc', dive, **moved, **changes)
+    return str(folder)
 
 
 def report(*words: str) -> dict:
@@ -300,3 +319,67 @@ def test_what_cannot_be_flown_is_told(file, dive, tmp_path):
 def test_gsw_that_is_not_there_is_named(file, monkeypatch):
     monkeypatch.setitem(__import__('sys').modules, 'gsw', None)
     assert 'requirements-flights.txt' in told(file, '--vehicle', 'slocum_g2')
+
+
+def test_a_half_is_fitted_and_the_other_one_tried(dive, tmp_path):
+    """The second half weighs 60 g more."""
+    slocum = ('--vehicle', 'slocum_g2', '--fit', 'mass,Cd0')
+    later = made_up(heavier=HEAVIER + 0.06)
+    alike = write_flight(tmp_path / 'alike', [dive] * 4, vert_speed=None)
+    place = write_flight(tmp_path / 'flight', [dive, dive, later, later], vert_speed=None)
+    found = {
+        on: report(place, *slocum, '--fit-on', on) for on in ('first', 'second', 'none', alike)
+    }
+    first, second, none, other = found.values()
+    assert second['fitted']['mass'] - first['fitted']['mass'] == pytest.approx(0.06, abs=0.005)
+    assert other['fitted']['mass'] == pytest.approx(first['fitted']['mass'], abs=0.005)
+    assert none['fitted'] == {} and none['w_rmse_cmps'] == none['unfitted']['w_rmse_cmps']
+    assert [one['segments'] for one in found.values()] == [2, 2, 4, 4]
+    assert first['w_bias_cmps'] < -1.0 < 1.0 < second['w_bias_cmps']  # too light, too heavy
+    within = report(alike, *slocum, '--fit-on', 'second')
+    assert within['w_rmse_cmps'] < 0.3 < within['unfitted']['w_rmse_cmps']
+    for name, phase in (('dive', 1.0), ('climb', -1.0)):
+        turn = within['turn_rate_per_sin_roll'][name]
+        assert turn['fitted'] == pytest.approx(TURNS[phase], rel=0.1)
+
+
+def test_gliderflight_is_fitted_on_the_same_half(dive, tmp_path):
+    pytest.importorskip('gliderflight')
+    later = made_up(heavier=HEAVIER + 0.06)
+    place = write_flight(tmp_path / 'flight', [dive, dive, later, later], vert_speed=None)
+    first = report(place, '--vehicle', 'slocum_g2', '--fit', 'mass,Cd0', '--fit-on', 'first')
+    whole = report(place, '--vehicle', 'slocum_g2', '--fit', 'mass,Cd0')
+    assert first['peer']['fitted'] == ['mg', 'Cd0']
+    assert first['peer']['w_rmse_cmps'] > 1.5 * whole['peer']['w_rmse_cmps']
+    assert first['unfitted']['peer_w_rmse_cmps'] > first['peer']['w_rmse_cmps']
+
+
+def test_a_constant_that_runs_away_is_held_and_told(tmp_path):
+    rough = made_up(rougher=7.0)
+    place = write_flight(tmp_path / 'flight', [rough, rough], vert_speed=None)
+    found = report(place, '--vehicle', 'slocum_g2', '--fit', 'Cd0')
+    file = load_vehicle('slocum_g2').params()
+    assert found['fitted']['Cd0'] == pytest.approx(5.0 * file.K_D0, rel=1e-3)
+    assert any('Cd0 ran to its bound' in note for note in found['notes'])
+
+
+def test_one_table_of_all_flights_of_a_folder(dive, tmp_path):
+    write_flight(tmp_path / 'long', [dive] * 5, vert_speed=None)
+    write_flight(tmp_path / 'short', [dive] * 2, vert_speed=None)
+    (tmp_path / 'bad').mkdir()
+    (tmp_path / 'bad' / 'p1230001.nc').write_bytes(b'no file')
+    table = report('--all', str(tmp_path), '--vehicle', 'slocum_g2')
+    (row,) = table['flights']
+    assert (row['flight'], row['segments']) == ('long', 5)
+    for half in ('fit_on_first', 'fit_on_second'):
+        assert row[half]['w_rmse_cmps'] < 0.5 < row[half]['unfitted']['w_rmse_cmps']
+    assert 'too few dives, stretches under water: 2 (needed' in table['left_out']['short']
+    assert table['left_out'].keys() == {'short', 'bad'}
+    shown = CliRunner().invoke(app, ['validate', '--all', str(tmp_path), '--vehicle', 'slocum_g2'])
+    assert 'left out: short' in shown.stdout
+    slocum = ('--vehicle', 'slocum_g2')
+    assert 'too few dives' in told(str(tmp_path / 'short'), *slocum, '--fit-on', 'first')
+    assert 'stands alone' in told('--all', str(tmp_path), '--fit-on', 'first')
+    assert 'FLIGHT is missing' in told(*slocum)
+    assert '--vehicle is missing' in told(str(tmp_path / 'long'))
+    assert 'no such folder' in told('--all', str(tmp_path / 'lost'))

@@ -4,29 +4,37 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
+from glider_base.errors import ConfigurationError
 from glider_bringup.console import Cache, Json, counter, output, print_table
 from glider_flights.validation.flying import Imposed
 
 app = typer.Typer()
 
 
+# long: its options stand where it begins, each with its help.
 @app.command(
-    epilog='Example: ./glider validate gliderflight/data/dbd --vehicle slocum_g2 --impose pitch'
+    epilog='Example: ./glider validate gliderflight/data/dbd --vehicle slocum_g2 --fit-on first'
 )
 def validate(
     flight: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
-            metavar='FLIGHT',
+            metavar='[FLIGHT]',
             help='Folder of dbd files of a Slocum with their ebd files (or of their kind), of '
             'p*.nc of a Seaglider, of OG1 or CF NetCDF, or one such file.',
         ),
-    ],
-    vehicle: Annotated[str, typer.Option(help='Vehicle by name or path of its YAML file.')],
+    ] = None,
+    vehicle: Annotated[
+        str | None,
+        typer.Option(
+            help='Vehicle by name or path of its YAML file. With --all by default slocum_g2 or '
+            'seaglider, by the kind of the flight.'
+        ),
+    ] = None,
     impose: Annotated[
         Imposed,
         typer.Option(
@@ -39,6 +47,23 @@ def validate(
             metavar='NAMES',
             help='Constants to be fitted to the vertical rate, such as Cd0,mass; none for none. '
             'Default: mass,Cd0; with actuators trim and righting too.',
+        ),
+    ] = None,
+    fit_on: Annotated[
+        str | None,
+        typer.Option(
+            metavar='first|second|none|FLIGHT',
+            help='Half of the flight that is fitted, and the other one tried; or another flight '
+            'of such a vehicle; or nothing. Default: fitted and tried on the whole flight.',
+        ),
+    ] = None,
+    every: Annotated[
+        Path | None,
+        typer.Option(
+            '--all',
+            metavar='FOLDER',
+            help='One table of all flights in a folder and the folders in it: fitted on each '
+            'half, tried on the other, turns and energy too.',
         ),
     ] = None,
     adcp: Annotated[
@@ -62,14 +87,33 @@ def validate(
     """
     from glider_flights.reading import read_whole
     from glider_flights.showing.validation import draw_validation
-    from glider_flights.validation.result import find_adcp
+    from glider_flights.validation.result import Half, find_adcp
     from glider_flights.validation.result import validate as validated
+    from glider_flights.validation.table import validate_all
 
+    if every is not None:
+        if flight is not None or fit_on is not None or adcp is not None or out is not None:
+            raise ConfigurationError(
+                f'--all {every}: stands alone (allowed with it: --vehicle, --fit, --cache, --json)'
+            )
+        with counter('flights', None) as update:
+            table = validate_all(every, vehicle, fit, cache, update)
+        if as_json:
+            print(json.dumps(table))
+        else:
+            _print_all(table)
+        return
+    if flight is None or vehicle is None:
+        lacks = 'FLIGHT' if flight is None else '--vehicle'
+        raise ConfigurationError(f'validate: {lacks} is missing (needed, unless with --all)')
     measured = find_adcp(flight, adcp)
     with counter('reading', None) as update:
         found = read_whole(flight, cache, update)
+        source = fit_on
+        if fit_on is not None and fit_on not in get_args(Half):
+            source = read_whole(Path(fit_on), cache, update)
     with counter('flying', None) as update:
-        result = validated(found, vehicle, impose, fit, measured, update)
+        result = validated(found, vehicle, impose, fit, measured, update, source)
     if out is not None:
         title = f'{flight}: recorded, and {vehicle} with {impose} imposed'
         draw_validation(result, title, out)
@@ -89,6 +133,7 @@ def _print(report: dict) -> None:
         f'{report["imposed"]} imposed'
     )
     turns, other = report['turn_rate_per_sin_roll'], report['peer']
+    unfitted = report['unfitted']
     rows = {
         'stretches under water': report['segments'],
         'vertical rate off, rms (cm/s)': report['w_rmse_cmps'],
@@ -100,13 +145,59 @@ def _print(report: dict) -> None:
             f'turn rate over sin(roll), {name} (rad/s)': None
             if turn['recorded'] is None
             else f'{turn["recorded"]}, simulated {turn["simulated"]}'
+            + (f', fitted {turn["fitted"]}' if turn.get('fitted') else '')
             for name, turn in turns.items()
         },
         'current off that on board, median (cm/s)': report['dac_off_cmps']['median'],
         'vertical rate off, of others (cm/s)': None
         if other is None
         else f'{other["w_rmse_cmps"]} ({other["name"]})',
+        'both with nothing fitted (cm/s)': f'{unfitted["w_rmse_cmps"]}, '
+        f'{_or_dash(unfitted["peer_w_rmse_cmps"])}',
+        'fitted on': report['fit_on'],
         'fitted': ', '.join(f'{name} {value:g}' for name, value in report['fitted'].items()),
     }
     texts = ('-' if value in (None, '') else str(value) for value in rows.values())
     print_table(title, (), zip(rows, texts, strict=True))
+
+
+def _or_dash(value: float | None, form: str = 'g') -> str:
+    return '-' if value is None else format(value, form)
+
+
+def _print_all(table: dict) -> None:
+    """A row for each flight: vertical rate off (cm/s), ours and the other model's."""
+    columns = ('flight', 'parts', 'unfitted', 'on first', 'on second', 'turns', 'energy')
+    rows = []
+    for one in table['flights']:
+        first, second = one['fit_on_first'], one['fit_on_second']
+        unfitted = first['unfitted']
+        turns = [
+            f'{_or_dash(turn["recorded"])}, {_or_dash(turn["fitted"])}'
+            for turn in first['turn_rate_per_sin_roll'].values()
+        ]
+        tried = [
+            f'{_or_dash(half["w_rmse_cmps"], ".2f")}, '
+            f'{_or_dash((half["peer"] or {}).get("w_rmse_cmps"), ".2f")}'
+            for half in (first, second)
+        ]
+        rows.append(
+            (
+                one['flight'],
+                str(one['segments']),
+                f'{_or_dash(unfitted["w_rmse_cmps"], ".2f")}, '
+                f'{_or_dash(unfitted["peer_w_rmse_cmps"], ".2f")}',
+                *tried,
+                '; '.join(turns),
+                '-'
+                if one['energy_error_percent'] is None
+                else f'{one["energy_error_percent"]:+.1f} %',
+            )
+        )
+    title = (
+        'Vertical rate off in the other half, rms (cm/s): ours, the other model. Turn rate over '
+        'sin(roll) in dives and climbs (rad/s): recorded, fitted. Energy of the second half.'
+    )
+    print_table(title, columns, rows)
+    for name, why in table['left_out'].items():
+        output.print(f'left out: {name}: {why}', soft_wrap=True)

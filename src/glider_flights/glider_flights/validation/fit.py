@@ -39,40 +39,56 @@ class Constant(NamedTuple):
     #: Its value in a model, and the model with another one.
     read: Callable[[Model], float]
     write: Callable[[Model, float], Model]
-    lowest: float = -math.inf  #: it is no less
+    #: A fit moves it by no more than this from where it was (in its unit), and if it is a drag or
+    #: the like by no more than this factor either way.
+    within: float = math.inf
+    factor: float = math.inf
+
+    def bounds(self, value: float) -> tuple[float, float]:
+        """Smallest and largest value of a fit that begins with one."""
+        if self.factor < math.inf:
+            return (value / self.factor, value * self.factor) if value > 0.0 else (0.0, math.inf)
+        return value - self.within, value + self.within
 
 
-def _of_vehicle(field: str, unit: str, step: float, lowest: float = -math.inf) -> Constant:
+def _of_vehicle(
+    field: str, unit: str, step: float, within: float = math.inf, factor: float = math.inf
+) -> Constant:
     return Constant(
         unit,
         step,
         lambda model: getattr(model.vehicle, field),
         lambda model, value: model._replace(vehicle=model.vehicle._replace(**{field: value})),
-        lowest,
+        within,
+        factor,
     )
 
 
+#: No body differs from its file by more than so many times, either way (-).
+FACTOR = 5.0
 CONSTANTS = {
-    'mass': _of_vehicle('ballast', 'kg', 0.01),
-    'Cd0': _of_vehicle('K_D0', 'kg/m', 0.1, 0.0),
-    'Cd1': _of_vehicle('K_D', 'kg/m/rad^2', 10.0, 0.0),
-    'lift': _of_vehicle('K_L', 'kg/m/rad', 10.0, 0.0),
-    'compressibility': _of_vehicle('compressibility', '1/Pa', 1e-11, 0.0),
-    'expansion': _of_vehicle('thermal_expansion', '1/K', 1e-6),
-    'trim': _of_vehicle('s_x', 'kg m', 0.01),
-    'righting': _of_vehicle('s_z', 'kg m', 0.01),
-    'pump_x': _of_vehicle('pump_x', 'm', 0.01),
+    'mass': _of_vehicle('ballast', 'kg', 0.01, within=SEARCH_KG),
+    'Cd0': _of_vehicle('K_D0', 'kg/m', 0.1, factor=FACTOR),
+    'Cd1': _of_vehicle('K_D', 'kg/m/rad^2', 10.0, factor=FACTOR),
+    'lift': _of_vehicle('K_L', 'kg/m/rad', 10.0, factor=FACTOR),
+    'compressibility': _of_vehicle('compressibility', '1/Pa', 1e-11, factor=FACTOR),
+    'expansion': _of_vehicle('thermal_expansion', '1/K', 1e-6, within=2e-4),
+    'trim': _of_vehicle('s_x', 'kg m', 0.01, within=2.0),
+    'righting': _of_vehicle('s_z', 'kg m', 0.01, within=2.0),
+    'pump_x': _of_vehicle('pump_x', 'm', 0.01, within=1.0),
     'pitch_scale': Constant(
         '-',
         0.01,
         lambda model: model.pitch_scale,
         lambda model, value: model._replace(pitch_scale=value),
+        within=0.3,
     ),
     'pitch_offset': Constant(
         'deg',
         0.1,
         lambda model: math.degrees(model.pitch_offset_rad),
         lambda model, value: model._replace(pitch_offset_rad=math.radians(value)),
+        within=10.0,
     ),
 }
 #: What is fitted if nothing else is said: what the makers of a vehicle fit too.
@@ -122,9 +138,11 @@ def fitted(
     every = max(1, round(len(found) / STRETCHES))
     some = [track for track in found if track.counts.any()][::every]
     step = max(1, sum(int(track.counts.sum()) for track in some) // SAMPLES)
+    constants = [CONSTANTS[name] for name in names]
+    limits = np.array([one.bounds(one.read(model)) for one in constants])
+    limits = (limits / [[one.step] for one in constants]).T
     if 'mass' in names:
         model = _balanced(some[:FEW], model)
-    constants = [CONSTANTS[name] for name in names]
     start = np.array([one.read(model) / one.step for one in constants])
 
     def moved(values: np.ndarray) -> Model:
@@ -146,10 +164,24 @@ def fitted(
         return np.stack([wrong(values + one) - here for one in np.eye(len(values))], axis=1)
 
     tolerances = dict.fromkeys(('ftol', 'xtol', 'gtol'), TOLERANCE)
-    lowest = np.array([one.lowest / one.step for one in constants])
-    start = np.maximum(start, lowest)
-    limits = (lowest - 1e-9, np.inf)
-    return moved(least_squares(wrong, start, slope, limits, loss='soft_l1', **tolerances).x)
+    return moved(
+        least_squares(
+            wrong, np.clip(start, *limits), slope, limits, loss='soft_l1', **tolerances
+        ).x
+    )
+
+
+def at_bounds(names: tuple[str, ...], start: Model, model: Model) -> list[str]:
+    """Those of the fitted constants that ran to their bounds, in words."""
+    told = []
+    for name in names:
+        one = CONSTANTS[name]
+        value, ends = one.read(model), one.bounds(one.read(start))
+        if min(abs(value - end) for end in ends) < 1e-3 * one.step:
+            told.append(
+                f'{name} ran to its bound, {value:g} {one.unit}: the flight does not tell it'
+            )
+    return told
 
 
 def _balanced(some: list[Track], model: Model) -> Model:

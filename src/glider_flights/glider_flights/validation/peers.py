@@ -8,7 +8,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_flights.folders import installed
-from glider_flights.record import Flight, vertical_rate
+from glider_flights.record import vertical_rate
 from glider_flights.validation.flying import Model
 from glider_flights.validation.score import rms
 from glider_flights.validation.track import RATE_S, Track
@@ -16,22 +16,32 @@ from glider_flights.validation.track import RATE_S, Track
 #: As the documentation of gliderflight has it: lift slope of the hull (1/rad), induced drag
 #: (1/rad^2), and the parasitic drag that its fit begins with.
 LIFT, INDUCED, DRAG = 3.8, 10.5, 0.15
+#: What it calls those of our constants that it can fit too.
+THEIRS = {'mass': 'mg', 'Cd0': 'Cd0', 'Cd1': 'Cd1', 'lift': 'ah', 'compressibility': 'epsilon'}
 CC_PER_M3, BAR_PER_DBAR = 1e6, 0.1
 
 
-def peer(flight: Flight, found: list[Track], model: Model) -> tuple[dict[str, Any] | None, str]:
-    """Figures of the other model of this kind of vehicle, or None and why."""
-    own = [track.instruments.own_rate_mps for track in found]
+def peer(
+    told: list[Track], tried: list[Track], model: Model, names: tuple[str, ...]
+) -> tuple[dict[str, Any] | None, str]:
+    """Figures of the other model of this kind of vehicle, or None and why.
+
+    Its constants are fitted to the stretches ``told``, those that stand for ``names`` of ours, and
+    it is tried on others. What a base station wrote is as it is: it has fitted it to all.
+    """
+    own = [track.instruments.own_rate_mps for track in tried]
     if any(np.isfinite(rate).any() for rate in own):
-        return _figures('basestation', found, own), ''
+        return _figures('basestation', tried, own), ''
     try:
         with installed('gliderflight, the model to compare with'):
             import gliderflight
     except ConfigurationError as error:
         return None, str(error)
-    if any(np.isnan(track.density_kgpm3).all() for track in found):
+    if any(np.isnan(track.density_kgpm3).all() for track in [*told, *tried]):
         return None, 'gliderflight needs temperature and salinity, which were not recorded'
-    return _figures('gliderflight', found, _gliderflight(gliderflight, found, model)), ''
+    fits = [THEIRS[name] for name in names if name in THEIRS] if told else []
+    rates = _gliderflight(gliderflight, told, tried, model, fits)
+    return {**_figures('gliderflight', tried, rates), 'fitted': fits}, ''
 
 
 def _figures(name: str, found: list[Track], rates: list[np.ndarray]) -> dict[str, Any]:
@@ -45,19 +55,28 @@ def _figures(name: str, found: list[Track], rates: list[np.ndarray]) -> dict[str
     }
 
 
-def _gliderflight(gliderflight, found: list[Track], model: Model) -> list[np.ndarray]:
-    """Vertical rates (m/s, + down) of Merckelbach's steady model, its mass and drag fitted."""
-    rho_0 = float(np.nanmean(np.concatenate([track.density_kgpm3 for track in found])))
+def _gliderflight(
+    gliderflight, told: list[Track], tried: list[Track], model: Model, fits: list[str]
+) -> list[np.ndarray]:
+    """Vertical rates (m/s, + down) of Merckelbach's steady model, fitted to what it is told.
+
+    Unfitted it weighs what our file says; a fit begins with the weight of the water.
+    """
+    rho_0 = float(np.nanmean(np.concatenate([track.density_kgpm3 for track in told or tried])))
     theirs = gliderflight.SteadyStateCalibrate(rho0=rho_0)
-    volume = model.vehicle.volume
-    theirs.define(ah=LIFT, Cd1=INDUCED, Cd0=DRAG, mg=rho_0 * volume, Vg=volume)
-    theirs.set_input_data(**_inputs(found, model))
-    theirs.set_mask(~np.concatenate([track.counts for track in found]))
-    theirs.calibrate('Cd0', 'mg')
+    vehicle = model.vehicle
+    weight = rho_0 * vehicle.volume if fits else vehicle.m + vehicle.ballast
+    theirs.define(ah=LIFT, Cd1=INDUCED, Cd0=DRAG, mg=weight, Vg=vehicle.volume)
+    if fits:
+        theirs.set_input_data(**_inputs(told, model))
+        theirs.set_mask(~np.concatenate([track.counts for track in told]))
+        theirs.calibrate(*fits)
+    theirs.set_input_data(**_inputs(tried, model))
+    theirs.set_mask(~np.concatenate([track.counts for track in tried]))
     theirs.solve()
     rates = []
-    ends = np.cumsum([len(track.phase) for track in found])[:-1]
-    for track, rising in zip(found, np.split(theirs.wg, ends), strict=True):
+    ends = np.cumsum([len(track.phase) for track in tried])[:-1]
+    for track, rising in zip(tried, np.split(theirs.wg, ends), strict=True):
         time_s = track.instruments.time_s
         sunk = 0.5 * (rising[1:] + rising[:-1]) * np.diff(time_s)
         rates.append(vertical_rate(time_s, -np.concatenate([[0.0], np.cumsum(sunk)]), RATE_S))

@@ -5,13 +5,13 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_flights.record import Flight
-from glider_flights.validation.fit import BY_ADCP, CONSTANTS, chosen, fitted
+from glider_flights.validation.fit import BY_ADCP, CONSTANTS, at_bounds, chosen, fitted
 from glider_flights.validation.flying import (
     Imposed,
     Model,
@@ -21,13 +21,17 @@ from glider_flights.validation.flying import (
     model_of,
 )
 from glider_flights.validation.peers import peer
-from glider_flights.validation.score import Adcp, score, speed_off
+from glider_flights.validation.score import Adcp, rms, score, speed_off, turn_rates
 from glider_flights.validation.track import Track, tracks
 
 #: Speeds of an ADCP that come with a flight, in its folder or the one above it.
 ADCP_FILES = 'U_*.npy'
 #: Speeds of an ADCP that are none, or larger than this (m/s), stand for nothing.
 FASTEST_MPS = 5.0
+#: What of a flight its constants can be fitted to; it is then tried on the other half, or on all.
+Half = Literal['first', 'second', 'none']
+#: A part of a flight to be fitted or tried has at least so many stretches under water.
+FEWEST = 2
 
 
 class Validation(NamedTuple):
@@ -47,30 +51,43 @@ def validate(
     fit: str | None,
     adcp: Adcp | None,
     progress: Callable[[int, int], None],
+    fit_on: Half | Flight | None = None,
 ) -> Validation:
-    """Fly a vehicle along a recorded flight, with constants that ``fit`` names fitted to it first.
+    """Fly a vehicle along a recorded flight, with constants that ``fit`` names fitted first.
+
+    They are fitted to the whole flight, or out of sample: to one half of it, and tried on the
+    other, or to another flight. With ``none`` nothing is fitted.
 
     Raises
     ------
     ConfigurationError
     """
-    names = chosen(fit, flight.kind, impose, adcp is not None)
+    names = chosen('none' if fit_on == 'none' else fit, flight.kind, impose, adcp is not None)
     found = tracks(flight)
     check(found, impose)
     start = model_of(vehicle, flight)
-    told = found if adcp is not None and set(BY_ADCP) & set(names) else []
-    model = fitted(found, start, impose, names, told, adcp)
+    learnt_on, begun, tried = found, start, found
+    if isinstance(fit_on, Flight):
+        learnt_on, begun = tracks(fit_on), model_of(vehicle, fit_on)
+        check(learnt_on, impose)
+    elif fit_on in ('first', 'second'):
+        learnt_on, tried = _halves(found, flight)[:: 1 if fit_on == 'first' else -1]
+    told = learnt_on if adcp is not None and set(BY_ADCP) & set(names) else []
+    learnt = fitted(learnt_on, begun, impose, names, told, adcp)
+    model = start
+    for name in names:
+        model = CONSTANTS[name].write(model, CONSTANTS[name].read(learnt))
     flown = []
-    for number, track in enumerate(found):
-        progress(number, len(found))
+    for number, track in enumerate(tried):
+        progress(number, len(tried))
         flown.append(fly(track, model, impose))
-    pitch = [model.pitch(track.instruments.pitch_rad) for track in found]
+    pitch = [model.pitch(track.instruments.pitch_rad) for track in tried]
     speed = np.empty(0)
-    if told:
+    if told and fit_on is None:
         speed = _crosswise(found, start, impose, names, adcp)
     elif adcp is not None:
-        speed = np.concatenate([speed_off(*pair, adcp) for pair in zip(found, flown, strict=True)])
-    other, why = peer(flight, found, model)
+        speed = np.concatenate([speed_off(*pair, adcp) for pair in zip(tried, flown, strict=True)])
+    other, why = peer(learnt_on if names else [], tried, model, names)
     report = {
         'kind': flight.kind,
         'files': len(flight.files),
@@ -78,12 +95,54 @@ def validate(
         'last_file': flight.files[-1],
         'vehicle': vehicle,
         'imposed': impose,
+        'fit_on': fit_on.files[0] if isinstance(fit_on, Flight) else fit_on or 'all',
         'fitted': {name: float(f'{CONSTANTS[name].read(model):.6g}') for name in names},
-        **score(flight, found, flown, pitch, speed),
+        **score(flight, tried, flown, pitch, speed),
         'peer': other,
-        'notes': flight.notes + ([why] if why else []),
+        'unfitted': _unfitted(tried, start, impose),
+        'notes': flight.notes + ([why] if why else []) + at_bounds(names, begun, learnt),
     }
-    return Validation(found, flown, model, adcp, report)
+    if fit_on not in (None, 'none'):
+        flown_there = [fly(track, learnt, impose) for track in learnt_on]
+        _try_turns(report['turn_rate_per_sin_roll'], turn_rates(learnt_on, flown_there))
+    return Validation(tried, flown, model, adcp, report)
+
+
+def _halves(found: list[Track], flight: Flight) -> tuple[list[Track], list[Track]]:
+    """The stretches of a flight in two parts, of as many samples that are compared."""
+    samples = np.cumsum([int(track.counts.sum()) for track in found])
+    cut = int(np.argmin(np.abs(samples - 0.5 * samples[-1]))) + 1
+    parts = found[:cut], found[cut:]
+    for part in parts:
+        if len(part) < FEWEST:
+            raise ConfigurationError(
+                f'{flight.files[0]} to {flight.files[-1]}: too few dives, stretches under water: '
+                f'{len(found)} (needed: {FEWEST} in each half)'
+            )
+    return parts
+
+
+def _unfitted(tried: list[Track], start: Model, impose: Imposed) -> dict[str, Any]:
+    """How far off vertical rates are with nothing fitted, ours and the other model's."""
+    rates = [fly(track, start, impose).rate_mps for track in tried]
+    off = [(rate - track.rate_mps)[track.counts] for rate, track in zip(rates, tried, strict=True)]
+    other, _ = peer([], tried, start, ())
+    is_fitted = other is None or other['name'] == 'basestation'
+    return {
+        'w_rmse_cmps': rms(np.concatenate(off), 100.0),
+        'peer_w_rmse_cmps': None if is_fitted else other['w_rmse_cmps'],
+    }
+
+
+def _try_turns(rates: dict[str, Any], learnt: dict[str, Any]) -> None:
+    """Add how the plant turns, scaled by what it turned too much in the part that it was told."""
+    for phase, rate in rates.items():
+        known = learnt[phase]
+        rate['fitted'] = None
+        if None not in (known['recorded'], known['simulated'], rate['simulated']):
+            if known['simulated'] != 0.0:
+                scale = known['recorded'] / known['simulated']
+                rate['fitted'] = round(rate['simulated'] * scale, 4)
 
 
 def _crosswise(

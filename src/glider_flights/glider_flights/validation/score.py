@@ -65,14 +65,20 @@ def score(
         'u_adcp_rmse_cmps': rms(speed, 100.0),
         'u_adcp_bias_cmps': figure(speed, 100.0),
         'pitch_rmse_deg': rms(pitch, math.degrees(1.0)),
-        'turn_rate_per_sin_roll': {
-            name: {
-                'recorded': _turn_rate(pairs, phase, recorded=True),
-                'simulated': _turn_rate(pairs, phase, recorded=False),
-            }
-            for name, phase in PHASES.items()
-        },
+        'turn_rate_per_sin_roll': turn_rates(found, flown),
         'dac_off_cmps': _closure(flight, pairs),
+    }
+
+
+def turn_rates(found: list[Track], flown: list[Simulated]) -> dict[str, Any]:
+    """Turn rate over sin(roll) at `TURN_MPS` (rad/s), recorded and flown, by phase."""
+    pairs = list(zip(found, flown, strict=True))
+    return {
+        name: {
+            'recorded': _turn_rate(pairs, phase, recorded=True),
+            'simulated': _turn_rate(pairs, phase, recorded=False),
+        }
+        for name, phase in PHASES.items()
     }
 
 
