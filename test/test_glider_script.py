@@ -63,9 +63,9 @@ def test_another_ros_that_is_sourced_is_refused(tmp_path):
     [
         (
             ['test', '--only', 'weather'],
-            'test --only weather: no such tests (allowed: fast, fuzz, soak)',
+            'test --only weather: no such tests (allowed: fast, fuzz, mutants, soak)',
         ),
-        (['test', '--only'], 'test --only : no such tests (allowed: fast, fuzz, soak)'),
+        (['test', '--only'], 'test --only : no such tests (allowed: fast, fuzz, mutants, soak)'),
         (['soak'], 'soak: no command any more (allowed: ./glider test --only soak)'),
     ],
 )

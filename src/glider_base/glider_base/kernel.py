@@ -55,7 +55,10 @@ def kernel(function: Callable) -> numba.core.dispatcher.Dispatcher:
 
     What unpacks the arguments of a call from Python is long to compile, and kernels do not need
     it of each other: they get a twin without, by a dispatcher of its own behind that of Python.
+    With NUMBA_DISABLE_JIT=1 it stays what it was, for a debugger and for tests of mutants.
     """
+    if numba.config.DISABLE_JIT:
+        return function
     options = {'error_model': 'numpy', 'forceinline': True, 'no_cfunc_wrapper': True}
     compiled = numba.njit(**options)(function)
     inlined = numba.njit(no_cpython_wrapper=True, **options)(function)

@@ -56,7 +56,10 @@ ORDER = (
 )
 #: What the ./glider script does by itself, and --help has to tell of: text and example.
 OF_THE_SCRIPT = {
-    'test': ('Run all tests; --only fuzz or soak: those that try long and count.', 'test'),
+    'test': (
+        'Run all tests; --only fuzz, soak or mutants: those that try long and count.',
+        'test',
+    ),
     'python': (
         'Run Python with the stack in it: a program, -m MODULE, or an interpreter.',
         'python my_study.py',
