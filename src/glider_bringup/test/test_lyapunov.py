@@ -23,7 +23,7 @@ from glider_base.signals import TICK_S, Adaptation
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_control.allocation import moments
-from glider_control.laws.adaptive import (
+from glider_control.laws.backstepping import (
     SCALE_ALPHA,
     SCALE_PITCH_RATE,
     SCALE_ROLL_RATE,
@@ -57,10 +57,11 @@ def record(state, params, out):
     log = np.empty((1, ROW))
     for tick in range(len(out)):
         joints = state.plant.joints
-        th_p, th_q = state.control.law.roll_theta, state.control.law.pitch_theta
+        channels = state.control.law.channels
+        th_p, th_q = channels.roll_theta, channels.pitch_theta
         state, _, finished = fly(state, params, log, TICK_S)
-        measured, adaptive = state.control.measured, state.control.law
-        roll, pitch, polar = adaptive.roll_channel, adaptive.pitch_channel, params.control.polar
+        measured, channels = state.control.measured, state.control.law.channels
+        roll, pitch, polar = channels.roll, channels.pitch, params.control.polar
         phi, theta = measured.phi, measured.theta
         s_phi, c_phi, c_theta = math.sin(phi), math.cos(phi), math.cos(theta)
         p = measured.phi_dot - math.sin(theta) * measured.psi_dot

@@ -11,14 +11,8 @@ from hypothesis import strategies as st
 
 from glider_base.signals import Reference
 from glider_control.law import Bank, Seen
-from glider_control.laws.adaptive import (
-    DISTURBANCE_MAX,
-    SCALE_ALPHA,
-    SCALE_PITCH_RATE,
-    SCALE_V2,
-    AdaptiveSettings,
-    adaptive_step,
-)
+from glider_control.laws.adaptive import DISTURBANCE_MAX, AdaptiveSettings, adaptive_step
+from glider_control.laws.backstepping import SCALE_ALPHA, SCALE_PITCH_RATE, SCALE_V2
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
 from glider_model.vehicle.file import load_vehicle
@@ -61,9 +55,9 @@ class PitchPlant:
         for tick in range(round(seconds / DT)):
             target = wanted(tick * DT) if wanted else reference()
             now = measured(theta=self.theta, theta_dot=self.q)
-            before = self.state.pitch_theta
+            before = self.state.channels.pitch_theta
             self.state, _, self.tau = step(self.state, now, target, (0.0, self.tau))
-            self.learnt.append(self.state.pitch_theta != before)
+            self.learnt.append(self.state.channels.pitch_theta != before)
             values.append(self.lyapunov())
             errors.append(self.theta - target.theta)
             phi = np.array(
@@ -71,7 +65,7 @@ class PitchPlant:
                     1.0,
                     SPEED**2 * ALPHA / SCALE_ALPHA,
                     SPEED**2 / SCALE_V2,
-                    self.state.pitch_channel.rate.value / SCALE_PITCH_RATE,
+                    self.state.channels.pitch.rate.value / SCALE_PITCH_RATE,
                 ]
             )
             for _ in range(20):
@@ -82,8 +76,8 @@ class PitchPlant:
 
     def lyapunov(self):
         """V2 = 1/2 B1 K1bar^2 + 1/2 M K2bar^2 + 1/2 theta_tilde^2 / Gamma."""
-        channel = self.state.pitch_channel
-        wrong = self.theta_star - np.array(self.state.pitch_theta)
+        channel = self.state.channels.pitch
+        wrong = self.theta_star - np.array(self.state.channels.pitch_theta)
         return (
             0.5 * PARAMS.pitch.b1 * channel.k1**2
             + 0.5 * PARAMS.pitch.inertia * channel.k2**2
@@ -126,13 +120,15 @@ def test_constant_moments_are_learnt_whatever_they_are_called():
     plant = PitchPlant((0.3, -0.5, 0.2, 0.0))
     plant.fly(1800.0)
     phi = np.array([1.0, SPEED**2 * ALPHA / SCALE_ALPHA, SPEED**2 / SCALE_V2, 0.0])
-    assert phi @ plant.state.pitch_theta == pytest.approx(phi @ plant.theta_star, abs=0.01)
+    assert phi @ plant.state.channels.pitch_theta == pytest.approx(
+        phi @ plant.theta_star, abs=0.01
+    )
 
 
 def test_parameters_stay_within_the_projection():
     plant = PitchPlant((50.0, 0.0, 0.0, 0.0))
     plant.fly(600.0)
-    assert np.max(np.abs(plant.state.pitch_theta)) == PARAMS.pitch.bound
+    assert np.max(np.abs(plant.state.channels.pitch_theta)) == PARAMS.pitch.bound
 
 
 @pytest.mark.parametrize('held', [(True, False), (False, True)])
@@ -140,8 +136,8 @@ def test_held_actuator_teaches_nothing(held):
     state = SETTINGS.initial_state()
     for _ in range(1000):
         state, *_ = step(state, measured(phi=0.1, theta=-0.4), reference(), held=held)
-    assert (state.roll_theta == (0.0, 0.0, 0.0)) == held[0]
-    assert (state.pitch_theta == (0.0, 0.0, 0.0, 0.0)) == held[1]
+    assert (state.channels.roll_theta == (0.0, 0.0, 0.0)) == held[0]
+    assert (state.channels.pitch_theta == (0.0, 0.0, 0.0, 0.0)) == held[1]
 
 
 @pytest.mark.parametrize('change', [{'vertical_rate': 0.05}, {'vertical_rate': -0.05}])
@@ -149,7 +145,7 @@ def test_nothing_is_learnt_while_the_vehicle_turns_over(change):
     state = SETTINGS.initial_state()
     for _ in range(1000):
         state, *_ = step(state, measured(theta=-0.3, phi=0.2, psi_dot=0.01, **change), reference())
-    assert state.pitch_theta == (0.0, 0.0, 0.0, 0.0)
+    assert state.channels.pitch_theta == (0.0, 0.0, 0.0, 0.0)
     assert state.steering.dive == SETTINGS.initial_state().steering.dive
     assert state.steering.climb == SETTINGS.initial_state().steering.climb
 

@@ -77,7 +77,9 @@ def test_paper_experiments_are_of_thirty_hours(planned):
     for name, angle in {'current_8deg': 8, 'current_10deg': 10, 'current_12deg': 12}.items():
         ways = {(case.controller, case.guidance) for case in planned[name].cases}
         assert ways == {
-            (law, los) for law in ('adaptive', 'pid') for los in ('los_current', 'los_zhang2021')
+            (law, los)
+            for law in ('adaptive', 'backstepping', 'pid')
+            for los in ('los_current', 'los_zhang2021')
         }
         scenario = planned[name].cases[0].load()
         assert scenario.duration_s == 30 * 3600
@@ -434,7 +436,7 @@ def test_interrupt_ends_the_command():
         start_new_session=True,
     )
     try:
-        assert process.stderr.readline() == '3 experiments, 12 flights\n'
+        assert process.stderr.readline() == '3 experiments, 18 flights\n'
         time.sleep(3.0)
         os.killpg(process.pid, signal.SIGINT)
         out, error = process.communicate(timeout=60.0)

@@ -53,7 +53,7 @@ from glider_studies.montecarlo import (
 #: A dive to 600 m and back, scored from its first minute on.
 SHORT = {'profile.depth_m': 600.0, 'settle_s': 60.0, 'duration_s': 5400.0}
 OPTIONS = [f'--set={field}={value}' for field, value in SHORT.items()]
-LAWS = ['adaptive', 'pid']
+LAWS = ['adaptive', 'backstepping', 'pid']
 #: Topics whose numbers are compared.
 RECORDED = [name for name in COLUMNS if name in TOPICS]
 SPREADS = (

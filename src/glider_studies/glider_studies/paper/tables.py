@@ -21,7 +21,7 @@ from glider_studies.paper.judges import figure_of
 LISTED = 12
 #: Marks a figure in which the tuned PID is better than the adaptive law.
 BETTER = '*'
-_LAW_NAMES = {'adaptive': 'adaptive', 'pid': 'tuned PID'}
+_LAW_NAMES = {'adaptive': 'adaptive', 'backstepping': "paper's law", 'pid': 'tuned PID'}
 
 
 def _number(value: float | str | None, digits: int = 2) -> str:
@@ -63,12 +63,12 @@ def _by_flight(figures: dict[str, str]) -> Callable[[list[dict]], Table]:
 
 
 def _marked(row: dict | None, rival: dict | None, name: str) -> str:
-    """Figure of a row, marked if it is the PID's and better than that of its rival."""
+    """Figure of a row, marked if it is of another law and better than that of its rival."""
     if row is None:
         return '-'
     value = figure_of(row, name)
     marked = (
-        row['controller'] == 'pid'
+        row['controller'] != 'adaptive'
         and rival is not None
         and name in compared([row])
         and is_better(value, figure_of(rival, name))
@@ -80,7 +80,7 @@ def _side_by_side(rows: list[dict]) -> Table:
     """One line for each case; in every column adaptive | tuned PID."""
     figures = dict(list(compared(rows).items())[:5])
     table = _table(['adaptive | tuned PID'], list(figures.values()))
-    ours, theirs = (by_case(rows, law) for law in _LAW_NAMES)
+    ours, theirs = (by_case(rows, law) for law in ('adaptive', 'pid'))
     for case in dict.fromkeys((row['case'], row['guidance']) for row in rows):
         one, other = ours.get(case), theirs.get(case)
         cells = (f'{_marked(one, None, name)} | {_marked(other, one, name)}' for name in figures)

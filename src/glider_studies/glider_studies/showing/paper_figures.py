@@ -21,9 +21,9 @@ from glider_studies.paper.experiments import Experiment
 #: Flights by experiment, case, controller and guidance.
 Flights = dict[tuple[str, str, str, str], Record]
 
-_COLOURS = {'adaptive': BLUE, 'pid': ORANGE}
-_NAMES = {'adaptive': 'adaptive', 'pid': 'tuned PID'}
-_STYLES = {'adaptive': '-', 'pid': '--'}
+_COLOURS = {'adaptive': BLUE, 'backstepping': GREEN, 'pid': ORANGE}
+_NAMES = {'adaptive': 'adaptive', 'backstepping': "paper's law", 'pid': 'tuned PID'}
+_STYLES = {'adaptive': '-', 'backstepping': ':', 'pid': '--'}
 _RED = '#c0392b'
 #: Figures 5 to 7 show this much of a flight (h).
 PROFILE_HOURS = 8.0
