@@ -376,7 +376,7 @@ def test_a_package_that_cannot_be_used_is_told_and_all_else_works(tmp_path):
     command = [sys.executable, '-m', 'two_helps']
     program = f'import glider_control.settings, subprocess; subprocess.run({command}, check=True)'
     done = broken.start('-c', program)
-    assert done.returncode == 0 and '<adaptive|pid' in done.stdout
+    assert done.returncode == 0 and '<adaptive|back' in done.stdout
     told = done.stderr.splitlines()
     expected = [(group, name, *what) for group in BROKEN for name, what in BROKEN[group].items()]
     assert len(told) == len(expected)
