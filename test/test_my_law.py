@@ -288,7 +288,7 @@ def test_montecarlo_flies_it(machine, direct):
 
 
 def test_all_laws_are_flown_by_montecarlo_and_it_is_one_of_them(known):
-    assert known['laws'] == ['adaptive', 'pid', 'sliding']
+    assert known['laws'] == ['adaptive', 'backstepping', 'pid', 'sliding']
 
 
 def test_ros2_launch_knows_it(known):
@@ -326,7 +326,7 @@ def test_a_run_whose_law_is_not_installed_is_told_in_one_line_each(machine, node
     assert (done.returncode, done.stdout) == (2, '')
     one, other = filter(str.strip, done.stderr.splitlines())
     assert "guidance.los.method = 'scalar_field'" in one and 'glider.guidance_methods' in one
-    assert "control.law = 'gliding'" in other and "'adaptive', 'pid' or 'sliding'" in other
+    assert "control.law = 'gliding'" in other and "'adaptive', 'backstepping', 'pid' or 'sliding'" in other
     assert 'others come with packages that register them in the group' in other
 
 
