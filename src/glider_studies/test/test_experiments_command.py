@@ -42,7 +42,12 @@ from glider_studies.paper.experiments import (
     pid_better,
     report,
 )
-from glider_studies.paper.judges import judge_envelope, judge_limits, judge_survey
+from glider_studies.paper.judges import (
+    judge_ablation,
+    judge_envelope,
+    judge_limits,
+    judge_survey,
+)
 from glider_studies.paper.measures import horizontal_speed
 from glider_studies.workers import worker_pool
 
@@ -84,6 +89,35 @@ def test_paper_experiments_are_of_thirty_hours(planned):
         scenario = planned[name].cases[0].load()
         assert scenario.duration_s == 30 * 3600
         assert (scenario.current.speed_kn, scenario.current.angle_deg) == (1.0, angle)
+
+
+def test_every_piece_that_is_off_has_a_figure_it_was_built_for(planned):
+    cases = planned['ablation'].cases
+    places = {case.case.partition(', ')[0] for case in cases}
+    pieces = {case.case.partition(', ')[2]: case for case in cases}
+    assert len(cases) == len(places) * len(pieces)
+    for name, case in pieces.items():
+        if name != 'whole':
+            where, _ = case.facts['built_for']
+            assert where in places
+            assert case.load() != pieces['whole'].load()
+
+
+def test_a_piece_has_its_place_if_a_tenth_is_lost_without_it():
+    def row(case, steady, status='completed'):
+        return made_up(case=case, cross_track_m__max_steady=steady, status=status) | (
+            {'built_for': ['here', 'cross_track_m.max_steady']} if 'whole' not in case else {}
+        )
+
+    whole = [row('here, whole', 1.0), row('there, whole', 1.0)]
+    rows = [*whole, row('here, good', 1.2), row('there, good', 0.5), row('here, idle', 1.05)]
+    rows += [row('here, needed', 0.1, 'infeasible')]
+    checks = {check.what: check.passed for check in judge_ablation(rows)}
+    assert checks == {
+        'here, good: cross_track_m.max_steady': True,
+        'here, idle: cross_track_m.max_steady': False,
+        'here, needed: cross_track_m.max_steady': True,
+    }
 
 
 def test_command_of_a_row_flies_the_same_scenario(planned):

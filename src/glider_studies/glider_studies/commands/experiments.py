@@ -25,7 +25,7 @@ from glider_studies.at_work import workers_at_work
 app = typer.Typer()
 GROUPS = (
     *('current', 'yaw', 'profile', 'robustness', 'vehicles', 'paths', 'envelope', 'navigation'),
-    *('faults', 'random_faults', 'routes'),
+    *('ablation', 'faults', 'random_faults', 'routes'),
 )
 Group = Literal[GROUPS]
 
@@ -57,9 +57,10 @@ def experiments(
     """Fly the experiments of the paper and what goes beyond them; exit code 1 if one fails.
 
     By the adaptive law, by the tuned PID, and along the paper's line of sight, with the direct
-    engine; the flights of the paper last 30 hours. random_faults breaks random missions in two or
-    three random ways, and judges them by their true motion alone. routes crosses twelve seas full
-    of eddies by straight legs and along planned routes.
+    engine; the flights of the paper last 30 hours. ablation turns off one piece of the law after
+    another, and asks of each whether it earns its place. random_faults breaks random missions in
+    two or three random ways, and judges them by their true motion alone. routes crosses twelve
+    seas full of eddies by straight legs and along planned routes.
     """
     from glider_mission.run_folder import make_result_folder
     from glider_studies import routes

@@ -27,7 +27,7 @@ from glider_mission.scenario import Scenario, load_scenario, run_command
 from glider_model.ocean.current_settings import KNOT_MPS
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.perturb import perturbed
-from glider_studies.montecarlo import airframe
+from glider_studies.montecarlo import airframe, sample_plant
 from glider_studies.paper.judges import JUDGES, Check, figure_of, judge_limits
 from glider_studies.paper.measures import MEASURES, horizontal_speed
 from glider_studies.workers import Pool, Progress
@@ -57,7 +57,7 @@ COMPARED_ON_PATHS = {
 }
 
 #: What a case in the file has that is told in its row.
-_FACTS = ('reactions', 'beside_m', 'hours', 'dive_m')
+_FACTS = ('reactions', 'beside_m', 'hours', 'dive_m', 'built_for')
 
 
 class Case(NamedTuple):
@@ -166,6 +166,9 @@ def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
         scenario = fields.pop('scenario', one.get('scenario', experiment))
         told = fields.pop('told', '')
         laws = fields.pop('laws', one.get('laws', ['adaptive', 'pid']))
+        if 'plant' in fields:
+            seed = fields.pop('plant')
+            fields |= _plant(seed, load_scenario(scenario, fields))
         if 'fault' in fields:
             fields['faults'] = [fields.pop('fault')]
         name = one['named'].format(*names) if 'named' in one else ', '.join(names)
@@ -176,6 +179,13 @@ def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
             for law in laws
         ]
     return cases
+
+
+def _plant(seed: int, scenario: Scenario) -> dict[str, Any]:
+    """Fields of a plant of Monte Carlo."""
+    plant = sample_plant(seed, load_vehicle(scenario.vehicle).params())
+    water = {f'water.{name}': value for name, value in plant.pop('water').items()}
+    return {**plant, **water}
 
 
 def _changed(case: Case) -> dict[str, Any]:

@@ -34,6 +34,8 @@ BELOW_RATED_M = 20.0
 #: Who surfaces for good is shallower than this at the end (m).
 SURFACED_M = 5.0
 LEAST_CLEAN_H = 1000.0
+#: A piece of the law has its place if the figure it was built for is so many times worse without.
+EARNED = 1.1
 
 
 class Check(NamedTuple):
@@ -209,10 +211,24 @@ def judge_faults(rows: list[dict]) -> list[Check]:
     return checks
 
 
+def judge_ablation(rows: list[dict]) -> list[Check]:
+    """Without a piece what it was built for is worse by a tenth, or the path is lost."""
+    by_case, checks = {row['case']: row for row in rows}, []
+    for case, row in by_case.items():
+        where, name = row.get('built_for', ('', ''))
+        if where and case.startswith(f'{where}, '):
+            least = EARNED * figure_of(by_case[f'{where}, whole'], name)
+            without = figure_of(row, name)
+            lost = row['status'] != 'completed' or without is None
+            checks.append(Check(f'{case}: {name}', without, least, lost or without >= least))
+    return checks
+
+
 #: Judgements of experiments, where they are not by limits alone.
 JUDGES = {
     'reckoned_12deg': judge_reckoned,
     'survey': judge_survey,
+    'ablation': judge_ablation,
     'envelope': judge_envelope,
     'long_stays': judge_stays,
     'hard_seas': judge_hard,

@@ -125,9 +125,30 @@ def _envelope(rows: list[dict]) -> Table:
     return table
 
 
+def _ablation(rows: list[dict]) -> Table:
+    """Largest steady cross-track error (m) without a piece; where it was built for in brackets."""
+    places = list(dict.fromkeys(row['case'].partition(', ')[0] for row in rows))
+    pieces = list(dict.fromkeys(row['case'].partition(', ')[2] for row in rows))
+    table = _table(['max steady (m)'], [place.replace(' ', '\n') for place in places])
+    by_name = {row['case']: row for row in rows}
+    for piece in pieces:
+        cells = []
+        for place in places:
+            row = by_name[f'{place}, {piece}']
+            text = (
+                'x'
+                if row['status'] != 'completed'
+                else _number(row['cross_track_m']['max_steady'])
+            )
+            cells.append(f'({text})' if row.get('built_for', [''])[0] == place else text)
+        table.add_row(piece, *cells)
+    return table
+
+
 _TABLES: dict[str, Callable[[list[dict]], Table]] = {
     'side_by_side': _side_by_side,
     'survey': _survey,
+    'ablation': _ablation,
     'envelope': _envelope,
     'yaw': _by_flight(
         {
