@@ -24,8 +24,8 @@ from glider_studies.at_work import workers_at_work
 
 app = typer.Typer()
 GROUPS = (
-    *('current', 'yaw', 'profile', 'robustness', 'vehicles', 'paths', 'envelope', 'navigation'),
-    *('ablation', 'faults', 'random_faults', 'routes'),
+    *('current', 'yaw', 'profile', 'robustness', 'ablation', 'vehicles', 'paths', 'envelope'),
+    *('navigation', 'faults', 'random_faults', 'routes'),
 )
 Group = Literal[GROUPS]
 
