@@ -12,6 +12,7 @@ import pytest
 import command_line
 from glider_base.settings import ConfigurationError
 from glider_bringup.door.run import fly, open_run
+from glider_guidance.settings import OLD_NAMES
 from glider_mission.scenario import load_scenario
 
 CHANGED = {'current.speed_kn': 0.6, 'profile.depth_m': 300}
@@ -104,6 +105,20 @@ def test_so_it_is_in_a_run_without_a_bag(tmp_path):
         shutil.copy(other / name, folder / name)
     assert 'not what was flown' in refused('report', folder)
     assert json.loads(glider('score', folder, '--json').stdout)['scenario'] == 'current_8deg'
+
+
+@pytest.mark.parametrize('new', ['los_current', 'los_zhang2021'])
+def test_a_run_of_before_guidance_had_its_names_is_reported(tmp_path, new):
+    (old,) = (name for name, now in OLD_NAMES.items() if now == new)
+    fields = {'guidance.los.method': new}
+    folder = fly('current_8deg', fields, duration=1.0, out=tmp_path / 'flight').folder
+    for name in ('scenario.yaml', 'score.json'):
+        text = (folder / name).read_text()
+        assert new in text
+        (folder / name).write_text(text.replace(new, old))
+    assert glider('report', folder).returncode == 0
+    (folder / 'score.json').write_text((folder / 'score.json').read_text().replace(old, 'alos'))
+    assert 'not what was flown' in refused('report', folder)
 
 
 @pytest.mark.parametrize(

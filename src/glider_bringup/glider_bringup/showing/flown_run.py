@@ -12,6 +12,7 @@ from glider_bringup.scoring.traces import Tracer, Traces, load_traces, make_trac
 from glider_bringup.showing.figure import draw_run
 from glider_bringup.showing.report import report_page
 from glider_bringup.showing.web_page import FlownRun
+from glider_guidance.settings import OLD_NAMES
 from glider_mission.disk import write_whole
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
@@ -77,8 +78,9 @@ def _refuse_another(card: dict, scenario: Scenario, source: str) -> None:
         'guidance': scenario.guidance.los.method,
         'seed': scenario.seed,
     }
+    called = {old for old, new in OLD_NAMES.items() if new == flown['guidance']}
     for name, value in flown.items():
-        if card and card[name] != value:
+        if card and card[name] != value and not (name == 'guidance' and card[name] in called):
             raise ConfigurationError(
                 f'{source}: {name} = {value!r}: not what was flown (allowed: {card[name]!r}, by '
                 f'{SCORE_FILE})'

@@ -16,8 +16,11 @@ let waiting;
 
 const place = (panel) => document.getElementById(panel.id);
 
-/** Number without useless digits, with its unit of time. */
-const clock = (seconds) => `${Number(inUnit(seconds).toFixed(4))} ${page.unit.name}`;
+/** Time with its unit, to a thousandth of a span or so, without useless digits. */
+function clock(seconds, span) {
+  const digits = Math.max(0, 2 - Math.floor(Math.log10(inUnit(span))));
+  return `${Number(inUnit(seconds).toFixed(Math.min(digits, 9)))} ${page.unit.name}`;
+}
 
 function draw(panel) {
   widths.set(panel.id, place(panel).clientWidth);
@@ -33,7 +36,7 @@ async function show(from, to, everything = false) {
   const mine = turn;
   shown = [from, to];
   root.dataset.state = 'busy';
-  document.getElementById('shown').textContent = `${clock(from)} to ${clock(to)}`;
+  document.getElementById('shown').textContent = `${clock(from, to - from)} to ${clock(to, to - from)}`;
   document.getElementById('whole').disabled = !isZoomed(from, to);
   const inView = (panel) => {
     const box = place(panel).getBoundingClientRect();
