@@ -326,7 +326,10 @@ def test_a_run_whose_law_is_not_installed_is_told_in_one_line_each(machine, node
     assert (done.returncode, done.stdout) == (2, '')
     one, other = filter(str.strip, done.stderr.splitlines())
     assert "guidance.los.method = 'scalar_field'" in one and 'glider.guidance_methods' in one
-    assert "control.law = 'gliding'" in other and "'adaptive', 'backstepping', 'pid' or 'sliding'" in other
+    assert (
+        "control.law = 'gliding'" in other
+        and "'adaptive', 'backstepping', 'pid' or 'sliding'" in other
+    )
     assert 'others come with packages that register them in the group' in other
 
 

@@ -9,15 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glider_base.signals import TICK_S, Reference
+from glider_control.heading import HEADING_INTEGRAL_MAX, heading_to_roll
 from glider_control.law import Seen
-from glider_control.laws.pid import (
-    HEADING_INTEGRAL_MAX,
-    PITCH_INTEGRAL_MAX,
-    ROLL_INTEGRAL_MAX,
-    PidState,
-    heading_to_roll,
-    pid_step,
-)
+from glider_control.laws.pid import PITCH_INTEGRAL_MAX, ROLL_INTEGRAL_MAX, PidState, pid_step
 from glider_control.settings import ControlSettings
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import Filtered
@@ -61,7 +55,8 @@ def asked(theta=0.0, psi=0.0, theta_dot=0.0, psi_dot=0.0):
 
 def steer(seen, reference, vehicle='zhang2021', state=AT_REST, speed=0.5):
     """Commanded roll (rad) and heading integral after one tick."""
-    return heading_to_roll(state, seen, reference, speed, PARAMS[vehicle], TICK_S)
+    law, integral = PARAMS[vehicle], state.heading_integral
+    return heading_to_roll(integral, seen, reference, speed, law.roll_limit, law.heading, TICK_S)
 
 
 def control(seen, reference, state=AT_REST, pitch_held=False, roll_held=False, params=None):
@@ -113,7 +108,7 @@ def test_yaw_rate_is_damped_and_fed_forward(vehicle, vertical_rate, side):
 def test_roll_makes_the_turn_rate_asked_for(vehicle, turn, w, speed):
     """psi_dot = b V / 0.5 sin(phi) without an error, b of the vehicle file."""
     params = PARAMS[vehicle]
-    b = params.steering_dive if w > 0.0 else params.steering_climb
+    b = params.heading.steering_dive if w > 0.0 else params.heading.steering_climb
     roll, _ = steer(measured(r=turn, w=w), asked(psi_dot=turn), vehicle, speed=speed)
     bound = math.sin(math.radians(30.0))
     expected = min(bound, max(-bound, turn / (b * speed / 0.5)))

@@ -26,8 +26,8 @@ from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
 from glider_base.settings import TUNABLE, Settings
 from glider_base.signals import Adaptation
-from glider_control.law import Bank, LawSettings, bank_carefully, law_learnt, law_step
-from glider_control.laws.pid import heading_to_roll
+from glider_control.heading import HeadingLawSettings, HeadingParams, heading_to_roll
+from glider_control.law import Bank, bank_carefully, law_learnt, law_step
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
 from glider_model.onboard.righting import Righting, make_righting
 from glider_model.vehicle.file import Vehicle, VehicleParams
@@ -107,20 +107,11 @@ class RollChannelSettings(ChannelSettings):
     )
 
 
-class BacksteppingSettings(LawSettings):
+class BacksteppingSettings(HeadingLawSettings):
     """Gains of the paper's law."""
 
     pitch: ChannelSettings = Field(ChannelSettings(), description='pitch channel')
     roll: RollChannelSettings = Field(RollChannelSettings(), description='roll channel')
-    heading_kp_per_s: float = Field(
-        0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=TUNABLE
-    )
-    heading_ki_per_s2: float = Field(
-        2e-4, ge=0.0, le=0.1, description='heading integral (1/s^2)', json_schema_extra=TUNABLE
-    )
-    heading_kd: float = Field(
-        0.3, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=TUNABLE
-    )
 
     def params(self, vehicle: Vehicle, bank: Bank) -> 'BacksteppingParams':
         """Kernel parameters for a vehicle whose masses and steering are known."""
@@ -130,12 +121,7 @@ class BacksteppingSettings(LawSettings):
             roll=roll,
             pitch=pitch,
             mass=of_file.m,
-            heading_kp=self.heading_kp_per_s,
-            heading_ki=self.heading_ki_per_s2,
-            heading_kd=self.heading_kd,
-            steering_dive=vehicle.steering_rates.dive,
-            steering_climb=vehicle.steering_rates.climb,
-            slowest_glide=of_file.slowest_glide,
+            heading=self.heading_params(vehicle),
             roll_limit=bank.limit,
             roll_filter=bank.filter,
             righting=make_righting(of_file),
@@ -170,12 +156,7 @@ class BacksteppingParams(NamedTuple):
     roll: ChannelParams
     pitch: ChannelParams
     mass: float  #: of the vehicle (kg)
-    heading_kp: float
-    heading_ki: float
-    heading_kd: float
-    steering_dive: float  #: turn rate over sin(roll) at STEERING_SPEED (rad/s), signed
-    steering_climb: float
-    slowest_glide: float  #: vertical rate below which it turns over and cannot be steered (m/s)
+    heading: HeadingParams
     roll_limit: float  #: (rad)
     roll_filter: FilterParams
     righting: Righting
@@ -360,9 +341,17 @@ def backstepping_step(state, seen, params, dt):
     """Roll and pitch moment (N m) of the paper's law: see `law_step`."""
     measured = seen.measured
     params = bank_carefully(seen.m_b, params)
-    is_gliding = abs(measured.vertical_rate) > params.slowest_glide
+    is_gliding = abs(measured.vertical_rate) > params.heading.slowest_glide
     steady_s = state.steady_s + dt if is_gliding else 0.0
-    command, integral = heading_to_roll(state, measured, seen.reference, seen.speed, params, dt)
+    command, integral = heading_to_roll(
+        state.heading_integral,
+        measured,
+        seen.reference,
+        seen.speed,
+        params.roll_limit,
+        params.heading,
+        dt,
+    )
     roll = filter_command(state.roll, command, params.roll_filter, dt)
     learning = steady_s > LEARN_AFTER_S
     channels, tau_p, tau_q = roll_and_pitch(state.channels, roll, seen, learning, params, dt)

@@ -6,7 +6,6 @@ It is the opponent that the adaptive law is measured against, so it is made as g
 knows the vehicle: steering effectiveness and its sign in both phases, and the masses.
 """
 
-import math
 from typing import NamedTuple
 
 from pydantic import Field
@@ -14,14 +13,14 @@ from pydantic import Field
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
 from glider_base.settings import TUNABLE
-from glider_control.law import Bank, LawSettings, bank_carefully, law_step
+from glider_control.heading import HeadingLawSettings, HeadingParams, heading_to_roll
+from glider_control.law import Bank, bank_carefully, law_step
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
-from glider_model.onboard.learnt_steering import speed_ratio
 from glider_model.onboard.righting import Righting, make_righting
 from glider_model.vehicle.file import Vehicle
 
 
-class PidSettings(LawSettings):
+class PidSettings(HeadingLawSettings):
     """Gains of the PID law.
 
     Moments in N m, angles in rad.
@@ -45,25 +44,20 @@ class PidSettings(LawSettings):
     roll_kd: float = Field(
         2.0, ge=0.0, le=1000.0, description='roll rate (N m s/rad)', json_schema_extra=TUNABLE
     )
-    heading_kp_per_s: float = Field(
-        0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=TUNABLE
-    )
-    heading_ki_per_s2: float = Field(
-        2e-4, ge=0.0, le=0.1, description='heading integral (1/s^2)', json_schema_extra=TUNABLE
-    )
-    heading_kd: float = Field(
-        0.3, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=TUNABLE
-    )
 
     def params(self, vehicle: Vehicle, bank: Bank) -> 'PidParams':
         """Kernel parameters for a vehicle whose steering is known."""
         return PidParams(
-            *(getattr(self, name) for name in PidSettings.model_fields),
-            *vehicle.steering_rates,
-            vehicle.params().slowest_glide,
-            bank.limit,
-            bank.filter,
-            make_righting(vehicle.params()),
+            pitch_kp=self.pitch_kp,
+            pitch_ki=self.pitch_ki,
+            pitch_kd=self.pitch_kd,
+            roll_kp=self.roll_kp,
+            roll_ki=self.roll_ki,
+            roll_kd=self.roll_kd,
+            heading=self.heading_params(vehicle),
+            roll_limit=bank.limit,
+            roll_filter=bank.filter,
+            righting=make_righting(vehicle.params()),
         )
 
     def initial_state(self) -> 'PidState':
@@ -80,12 +74,7 @@ class PidParams(NamedTuple):
     roll_kp: float
     roll_ki: float
     roll_kd: float
-    heading_kp: float
-    heading_ki: float
-    heading_kd: float
-    steering_dive: float  #: turn rate over sin(roll) at STEERING_SPEED (rad/s), signed
-    steering_climb: float
-    slowest_glide: float  #: vertical rate below which it turns over and cannot be steered (m/s)
+    heading: HeadingParams
     roll_limit: float  #: (rad)
     roll_filter: FilterParams
     righting: Righting
@@ -100,38 +89,13 @@ class PidState(NamedTuple):
     roll: Filtered
 
 
-#: Integrators are held within these bounds (N m, N m, rad/s).
-PITCH_INTEGRAL_MAX, ROLL_INTEGRAL_MAX, HEADING_INTEGRAL_MAX = 3.0, 2.0, 0.005
+#: Integrators are held within these bounds (N m).
+PITCH_INTEGRAL_MAX, ROLL_INTEGRAL_MAX = 3.0, 2.0
 
 
 @kernel
 def _clip(number, limit):
     return min(limit, max(-limit, number))
-
-
-@kernel
-def heading_to_roll(state, measured, reference, speed, params, dt):
-    """Roll command (rad) and heading integral that steer to the reference heading.
-
-    phi_s = asin sat((psi_s' + k_psi e + k_d (psi_s' - psi') + d) / (b V / V_0))
-    """
-    if abs(measured.vertical_rate) < params.slowest_glide:
-        return 0.0, state.heading_integral
-    steering = params.steering_dive if measured.vertical_rate > 0.0 else params.steering_climb
-    gain = steering * speed_ratio(speed)
-    error = wrap_angle(reference.psi - measured.psi)
-    turn = (
-        reference.psi_dot
-        + params.heading_kp * error
-        + params.heading_kd * (reference.psi_dot - measured.psi_dot)
-        + state.heading_integral
-    )
-    demand = turn / gain
-    limit = math.sin(params.roll_limit)
-    integral = state.heading_integral
-    if abs(demand) < limit or demand * gain * error < 0.0:
-        integral = _clip(integral + dt * params.heading_ki * error, HEADING_INTEGRAL_MAX)
-    return math.asin(_clip(demand, limit)), integral
 
 
 @law_step.body(PidParams)
@@ -141,7 +105,13 @@ def pid_step(state, seen, params, dt):
     measured, reference = seen.measured, seen.reference
     params = bank_carefully(seen.m_b, params)
     roll_command, heading_integral = heading_to_roll(
-        state, measured, reference, seen.speed, params, dt
+        state.heading_integral,
+        measured,
+        reference,
+        seen.speed,
+        params.roll_limit,
+        params.heading,
+        dt,
     )
     roll = filter_command(state.roll, roll_command, params.roll_filter, dt)
 

@@ -21,7 +21,7 @@ from glider_flights.validation.flying import (
     model_of,
 )
 from glider_flights.validation.peers import peer
-from glider_flights.validation.score import Adcp, rms, score, speed_off, turn_rates
+from glider_flights.validation.score import Adcp, rate_off, rms, score, speed_off, turn_rates
 from glider_flights.validation.track import Track, tracks
 
 #: Speeds of an ADCP that come with a flight, in its folder or the one above it.
@@ -88,6 +88,13 @@ def validate(
     elif adcp is not None:
         speed = np.concatenate([speed_off(*pair, adcp) for pair in zip(tried, flown, strict=True)])
     other, why = peer(learnt_on if names else [], tried, model, names)
+    unfitted, unfitted_other = flown, other
+    if names:
+        unfitted = [fly(track, start, impose) for track in tried]
+        unfitted_other, _ = peer([], tried, start, ())
+    # the basestation's constants are in the file, fitted already
+    has_other = unfitted_other is not None and unfitted_other['name'] != 'basestation'
+    other_unfitted = unfitted_other['w_rmse_cmps'] if has_other else None
     report = {
         'kind': flight.kind,
         'files': len(flight.files),
@@ -99,7 +106,10 @@ def validate(
         'fitted': {name: float(f'{CONSTANTS[name].read(model):.6g}') for name in names},
         **score(flight, tried, flown, pitch, speed),
         'peer': other,
-        'unfitted': _unfitted(tried, start, impose),
+        'unfitted': {
+            'w_rmse_cmps': rms(rate_off(tried, unfitted), 100.0),
+            'peer_w_rmse_cmps': other_unfitted,
+        },
         'notes': flight.notes + ([why] if why else []) + at_bounds(names, begun, learnt),
     }
     if fit_on not in (None, 'none'):
@@ -120,18 +130,6 @@ def _halves(found: list[Track], flight: Flight) -> tuple[list[Track], list[Track
                 f'{len(found)} (needed: {FEWEST} in each half)'
             )
     return parts
-
-
-def _unfitted(tried: list[Track], start: Model, impose: Imposed) -> dict[str, Any]:
-    """How far off vertical rates are with nothing fitted, ours and the other model's."""
-    rates = [fly(track, start, impose).rate_mps for track in tried]
-    off = [(rate - track.rate_mps)[track.counts] for rate, track in zip(rates, tried, strict=True)]
-    other, _ = peer([], tried, start, ())
-    is_fitted = other is None or other['name'] == 'basestation'
-    return {
-        'w_rmse_cmps': rms(np.concatenate(off), 100.0),
-        'peer_w_rmse_cmps': None if is_fitted else other['w_rmse_cmps'],
-    }
 
 
 def _try_turns(rates: dict[str, Any], learnt: dict[str, Any]) -> None:

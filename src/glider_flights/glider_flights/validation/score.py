@@ -50,7 +50,7 @@ def score(
         Simulated speed less that by an ADCP (m/s); none without one.
     """
     pairs = list(zip(found, flown, strict=True))
-    rate = np.concatenate([(one.rate_mps - track.rate_mps)[track.counts] for track, one in pairs])
+    rate = rate_off(found, flown)
     pitch = np.concatenate(
         [
             (one.pitch_rad - true)[track.counts]
@@ -68,6 +68,12 @@ def score(
         'turn_rate_per_sin_roll': turn_rates(found, flown),
         'dac_off_cmps': _closure(flight, pairs),
     }
+
+
+def rate_off(found: list[Track], flown: list[Simulated]) -> np.ndarray:
+    """Vertical rate flown less that recorded (m/s), of the samples that are compared."""
+    pairs = zip(found, flown, strict=True)
+    return np.concatenate([(one.rate_mps - track.rate_mps)[track.counts] for track, one in pairs])
 
 
 def turn_rates(found: list[Track], flown: list[Simulated]) -> dict[str, Any]:
