@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -20,7 +20,6 @@ from glider_bringup.console import (
     Law,
     Named,
     changed_fields,
-    choices,
     compiling,
     messages,
     number,
@@ -29,7 +28,7 @@ from glider_bringup.console import (
 )
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.showing.scorecard import STYLES, print_card, print_places
-from glider_guidance.settings import OLD_NAMES, LosSettings
+from glider_guidance.settings import METHODS, OLD_NAMES
 from glider_mission.choices import ENGINES, chosen_fields, combination_of
 from glider_mission.disk import DiskError
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
@@ -37,8 +36,14 @@ from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
 app = typer.Typer()
 Engine = Literal[ENGINES]
 When = Literal['never', 'end', 'chunk']
-#: Those of now, and what they were called before.
-Guidance = Literal[(*get_args(choices(LosSettings, 'method')), *OLD_NAMES)]
+
+
+def guidance_method(name: str) -> str:
+    """A guidance method as it is called now, by that name or the one it had before."""
+    name = OLD_NAMES.get(name, name)
+    if name not in METHODS:
+        raise typer.BadParameter(f'{name!r}: no such method (allowed: {", ".join(METHODS)})')
+    return name
 
 
 # long: its options stand where it begins, each with its help.
@@ -53,7 +58,12 @@ def run(
     ] = 'nodes',
     controller: Law = None,
     guidance: Annotated[
-        Guidance | None, typer.Option(help="Line of sight, instead of the scenario's.")
+        str | None,
+        typer.Option(
+            parser=guidance_method,
+            metavar='|'.join(METHODS),
+            help="Line of sight, instead of the scenario's.",
+        ),
     ] = None,
     duration: Annotated[
         str | None,
