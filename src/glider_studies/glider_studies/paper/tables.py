@@ -126,22 +126,17 @@ def _envelope(rows: list[dict]) -> Table:
 
 
 def _ablation(rows: list[dict]) -> Table:
-    """Largest steady cross-track error (m) without a piece; where it was built for in brackets."""
-    places = list(dict.fromkeys(row['case'].partition(', ')[0] for row in rows))
-    pieces = list(dict.fromkeys(row['case'].partition(', ')[2] for row in rows))
-    table = _table(['max steady (m)'], [place.replace(' ', '\n') for place in places])
+    """What each piece was built for, where, and that figure with it and without."""
+    table = _table(['off', 'built for', 'where'], ['whole', 'without'])
     by_name = {row['case']: row for row in rows}
-    for piece in pieces:
-        cells = []
-        for place in places:
-            row = by_name[f'{place}, {piece}']
-            text = (
-                'x'
-                if row['status'] != 'completed'
-                else _number(row['cross_track_m']['max_steady'])
+    for row in rows:
+        where, _, piece = row['case'].partition(', ')
+        place, name = row.get('built_for', ('', ''))
+        if place == where:
+            whole = by_name[f'{where}, whole']
+            table.add_row(
+                piece, name, where, *(_number(figure_of(one, name)) for one in (whole, row))
             )
-            cells.append(f'({text})' if row.get('built_for', [''])[0] == place else text)
-        table.add_row(piece, *cells)
     return table
 
 
