@@ -243,10 +243,10 @@ def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
     state, params = mission_of(scenario)
     if case.told:
         steering = load_vehicle(case.told).steering_rates
-        pid = params.control.law._replace(
-            steering_dive=steering.dive, steering_climb=steering.climb
-        )
-        params = params._replace(control=params.control._replace(law=pid))
+        law = params.control.law
+        heading = law.heading._replace(steering_dive=steering.dive, steering_climb=steering.climb)
+        control = params.control._replace(law=law._replace(heading=heading))
+        params = params._replace(control=control)
     scorer, recorder = make_scorer(scenario), Recorder()
     flight = fly_mission(scenario, [scorer, recorder], mission=(state, params))
     record, scores = recorder.result(), scores_of(scenario, scorer)
