@@ -14,6 +14,10 @@ from typer.testing import CliRunner
 from glider_base.errors import ConfigurationError
 from glider_bringup.cli import app
 from glider_flights.reading import read_whole
+from glider_flights.record import Instruments
+from glider_flights.validation.flying import Simulated
+from glider_flights.validation.score import turn_rates
+from glider_flights.validation.track import Track
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle
 
@@ -181,6 +185,25 @@ def test_turns_over_roll_are_told_by_phase(file):
     turns = report(file, '--vehicle', 'seaglider', '--fit', 'mass,Cd0')[name]
     assert -0.1 < turns['dive']['simulated'] < -0.01
     assert 0.01 < turns['climb']['simulated'] < 0.1
+
+
+def test_turns_over_fin_are_those_that_were_made():
+    """At 0.4 m/s: the turn rate goes by the sine of the fin and the square of the speed."""
+    time_s = np.arange(0.0, 1800.0, 4.0)
+    fin = np.radians(12.0) * np.sin(time_s / 40.0)
+    nothing = np.full(len(time_s), math.nan)
+    turned = np.concatenate([[0.0], np.cumsum(4.0 * (0.4 / 0.5) ** 2 * np.sin(fin[:-1]))])
+    own = Instruments(*(nothing for _ in Instruments._fields))
+    own = own._replace(time_s=time_s, surface_rad=fin, heading_rad=np.mod(0.11 * turned, math.tau))
+    level = np.ones(len(time_s))
+    track = Track(own, nothing, nothing, nothing, phase=level, counts=level > 0.0)
+    flown = Simulated(*(nothing for _ in Simulated._fields))
+    flown = flown._replace(speed_mps=0.4 * level, heading_rad=0.12 * turned)
+    by_fin = turn_rates([track], [flown])['turn_rate_per_sin_fin']
+    assert by_fin['dive']['recorded'] == pytest.approx(0.11, rel=0.01)
+    assert by_fin['dive']['simulated'] == pytest.approx(0.12, rel=0.01)
+    assert by_fin['climb'] == {'recorded': None, 'simulated': None}
+    assert turn_rates([track], [flown])['turn_rate_per_sin_roll']['dive']['recorded'] is None
 
 
 def test_speed_is_compared_with_an_adcp(file, dive, tmp_path):

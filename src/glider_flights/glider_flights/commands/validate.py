@@ -132,8 +132,7 @@ def _print(report: dict) -> None:
         f'{report["vehicle"]} along {report["files"]} files of a {report["kind"]}, '
         f'{report["imposed"]} imposed'
     )
-    turns, other = report['turn_rate_per_sin_roll'], report['peer']
-    unfitted = report['unfitted']
+    other, unfitted = report['peer'], report['unfitted']
     rows = {
         'stretches under water': report['segments'],
         'vertical rate off, rms (cm/s)': report['w_rmse_cmps'],
@@ -142,11 +141,12 @@ def _print(report: dict) -> None:
         'its mean (cm/s)': report['u_adcp_bias_cmps'],
         'pitch off, rms (deg)': report['pitch_rmse_deg'],
         **{
-            f'turn rate over sin(roll), {name} (rad/s)': None
+            f'turn rate over sin({by}), {name} (rad/s)': None
             if turn['recorded'] is None
             else f'{turn["recorded"]}, simulated {turn["simulated"]}'
             + (f', fitted {turn["fitted"]}' if turn.get('fitted') else '')
-            for name, turn in turns.items()
+            for by in ('roll', 'fin')
+            for name, turn in report[f'turn_rate_per_sin_{by}'].items()
         },
         'current off that on board, median (cm/s)': report['dac_off_cmps']['median'],
         'vertical rate off, of others (cm/s)': None
@@ -173,8 +173,10 @@ def _print_all(table: dict) -> None:
         first, second = one['fit_on_first'], one['fit_on_second']
         unfitted = first['unfitted']
         turns = [
-            f'{_or_dash(turn["recorded"])}, {_or_dash(turn["fitted"])}'
-            for turn in first['turn_rate_per_sin_roll'].values()
+            f'{by} {_or_dash(turn["recorded"])}, {_or_dash(turn["fitted"])}'
+            for by in ('roll', 'fin')
+            for turn in first[f'turn_rate_per_sin_{by}'].values()
+            if turn['recorded'] is not None
         ]
         tried = [
             f'{_or_dash(half["w_rmse_cmps"], ".2f")}, '
@@ -188,7 +190,7 @@ def _print_all(table: dict) -> None:
                 f'{_or_dash(unfitted["w_rmse_cmps"], ".2f")}, '
                 f'{_or_dash(unfitted["peer_w_rmse_cmps"], ".2f")}',
                 *tried,
-                '; '.join(turns),
+                '; '.join(turns) or '-',
                 '-'
                 if one['energy_error_percent'] is None
                 else f'{one["energy_error_percent"]:+.1f} %',
@@ -196,7 +198,8 @@ def _print_all(table: dict) -> None:
         )
     title = (
         'Vertical rate off in the other half, rms (cm/s): ours, the other model. Turn rate over '
-        'sin(roll) in dives and climbs (rad/s): recorded, fitted. Energy of the second half.'
+        'sin(roll) or sin(fin) in dives and climbs (rad/s): recorded, fitted. Energy of the '
+        'second half.'
     )
     print_table(title, columns, rows)
     for name, why in table['left_out'].items():

@@ -114,7 +114,8 @@ def validate(
     }
     if fit_on not in (None, 'none'):
         flown_there = [fly(track, learnt, impose) for track in learnt_on]
-        _try_turns(report['turn_rate_per_sin_roll'], turn_rates(learnt_on, flown_there))
+        for turns, learnt_rates in turn_rates(learnt_on, flown_there).items():
+            _try_turns(report[turns], learnt_rates)
     return Validation(tried, flown, model, adcp, report)
 
 

@@ -15,10 +15,15 @@ from glider_flights.validation.track import Track
 
 #: Heading turns over this time (s), so that noise of the compass is small beside a turn.
 TURN_S = 60.0
-#: Turn rate over sin(roll) is told for this speed through the water (m/s), with which it grows.
+#: Turn rates are told for this speed through the water (m/s).
 TURN_MPS = 0.5
-#: A roll that does not vary by as much (-, standard deviation of its sine) tells nothing of turns.
-SMALLEST_ROLL = 0.02
+#: What turns a vehicle: the angle, and with which power of the speed its turn rate grows.
+STEERED_BY = {
+    'turn_rate_per_sin_roll': ('roll_rad', 1.0),
+    'turn_rate_per_sin_fin': ('surface_rad', 2.0),
+}
+#: An angle whose sine does not vary by as much (-, standard deviation) tells nothing of turns.
+SMALLEST_ANGLE = 0.02
 #: A dive counts as flown if this share of its time was.
 WHOLE = 0.8
 PHASES = {'dive': 1.0, 'climb': -1.0}
@@ -65,7 +70,7 @@ def score(
         'u_adcp_rmse_cmps': rms(speed, 100.0),
         'u_adcp_bias_cmps': figure(speed, 100.0),
         'pitch_rmse_deg': rms(pitch, math.degrees(1.0)),
-        'turn_rate_per_sin_roll': turn_rates(found, flown),
+        **turn_rates(found, flown),
         'dac_off_cmps': _closure(flight, pairs),
     }
 
@@ -77,14 +82,17 @@ def rate_off(found: list[Track], flown: list[Simulated]) -> np.ndarray:
 
 
 def turn_rates(found: list[Track], flown: list[Simulated]) -> dict[str, Any]:
-    """Turn rate over sin(roll) at `TURN_MPS` (rad/s), recorded and flown, by phase."""
+    """Turn rates over the sine of roll and fin at `TURN_MPS` (rad/s), by phase."""
     pairs = list(zip(found, flown, strict=True))
     return {
-        name: {
-            'recorded': _turn_rate(pairs, phase, recorded=True),
-            'simulated': _turn_rate(pairs, phase, recorded=False),
+        turns: {
+            name: {
+                'recorded': _turn_rate(pairs, phase, True, *by),
+                'simulated': _turn_rate(pairs, phase, False, *by),
+            }
+            for name, phase in PHASES.items()
         }
-        for name, phase in PHASES.items()
+        for turns, by in STEERED_BY.items()
     }
 
 
@@ -107,30 +115,32 @@ def speed_off(track: Track, flown: Simulated, adcp: Adcp) -> np.ndarray:
     return (flown.speed_mps - measured)[track.counts & (track.phase > 0.0)]
 
 
-def _turn_rate(pairs, phase: float, recorded: bool) -> float | None:
-    """Turn rate over sin(roll) at `TURN_MPS` (rad/s), by least squares with an offset."""
+def _turn_rate(pairs, phase: float, recorded: bool, by: str, power: float) -> float | None:
+    """Turn rate over an angle's sine at `TURN_MPS` (rad/s), by least squares with an offset."""
     rows, rates = [], []
     for track, one in pairs:
         time_s = track.instruments.time_s
-        told = track.instruments if recorded else one
-        heading, roll = told.heading_rad, told.roll_rad
-        good = np.isfinite(heading) & np.isfinite(roll)
+        heading = (track.instruments if recorded else one).heading_rad
+        angle = getattr(track.instruments if recorded else one, by, track.instruments.surface_rad)
+        good = np.isfinite(heading) & np.isfinite(angle)
         if good.sum() < 3:
             continue
         heading = np.interp(time_s, time_s[good], np.unwrap(heading[good]))
-        sine = np.interp(time_s, time_s[good], np.sin(roll[good]))
+        sine = np.interp(time_s, time_s[good], np.sin(angle[good]))
         begin, end = time_s - 0.5 * TURN_S, time_s + 0.5 * TURN_S
         inside = (begin >= time_s[0]) & (end <= time_s[-1]) & track.counts
         counts = inside & (track.phase == phase)
         turned = np.interp(end, time_s, heading) - np.interp(begin, time_s, heading)
-        way = np.concatenate([[0.0], np.cumsum(_trapezoids(sine * one.speed_mps, time_s))])
-        banked = np.interp(end, time_s, way) - np.interp(begin, time_s, way)
-        rows.append((banked / TURN_S / TURN_MPS)[counts])
+        asked = sine * (one.speed_mps / TURN_MPS) ** power
+        asked = np.concatenate([[0.0], np.cumsum(_trapezoids(asked, time_s))])
+        rows.append(
+            ((np.interp(end, time_s, asked) - np.interp(begin, time_s, asked)) / TURN_S)[counts]
+        )
         rates.append((turned / TURN_S)[counts])
-    banked = np.concatenate(rows or [np.empty(0)])
-    if len(banked) < 3 or np.std(banked) * TURN_MPS / 0.3 < SMALLEST_ROLL:
+    asked = np.concatenate(rows or [np.empty(0)])
+    if len(asked) < 3 or np.std(asked) * TURN_MPS / 0.3 < SMALLEST_ANGLE:
         return None
-    return round(float(np.polyfit(banked, np.concatenate(rates), 1)[0]), 4)
+    return round(float(np.polyfit(asked, np.concatenate(rates), 1)[0]), 4)
 
 
 def _trapezoids(values: np.ndarray, time_s: np.ndarray) -> np.ndarray:

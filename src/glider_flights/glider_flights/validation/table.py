@@ -13,6 +13,7 @@ from glider_flights.reading import read_uses, read_whole
 from glider_flights.seaglider import seaglider_files
 from glider_flights.slocum import slocum_files
 from glider_flights.validation.result import validate
+from glider_flights.validation.score import STEERED_BY
 
 #: The vehicle file that stands for a kind of vehicle, unless another one is named.
 VEHICLES = {'slocum': 'slocum_g2', 'seaglider': 'seaglider', 'og1': 'seaglider'}
@@ -95,7 +96,7 @@ def _row(place: Path, vehicle: str | None, fit: str | None, cache: Path | None) 
                     'w_bias_cmps',
                     'peer',
                     'unfitted',
-                    'turn_rate_per_sin_roll',
+                    *STEERED_BY,
                 )
             }
             for half, one in halves.items()
