@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from glider_base.signals import Reference
 from glider_control.law import Bank, Seen
-from glider_control.laws.adaptive import AdaptiveSettings, adaptive_step
+from glider_control.laws.adaptive import DISTURBANCE_MAX, AdaptiveSettings, adaptive_step
 from glider_control.laws.backstepping import SCALE_ALPHA, SCALE_PITCH_RATE, SCALE_V2
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
@@ -178,6 +178,15 @@ def test_vehicle_has_to_turn_at_the_roll_that_it_may_take():
         assert params.steering.bank == pytest.approx(math.sin(math.radians(bank_deg)))
 
 
+def test_disturbance_estimate_is_bounded():
+    state = SETTINGS.initial_state()
+    steering = state.steering
+    state = state._replace(steering=steering._replace(dive=steering.dive._replace(b=0.5)))
+    for _ in range(20000):
+        state, *_ = step(state, measured(psi=-0.3), reference())
+    assert abs(state.disturbance_dive) == DISTURBANCE_MAX
+
+
 def test_mirror_image_gives_mirror_image():
     """Port and starboard exchanged: roll moment, roll and disturbance change their sign only."""
     port, starboard = SETTINGS.initial_state(), SETTINGS.initial_state()
@@ -192,4 +201,4 @@ def test_mirror_image_gives_mirror_image():
                 starboard, tau_starboard, pitch_starboard = result
         assert tau_port == pytest.approx(-tau_starboard, abs=1e-15)
         assert pitch_port == pytest.approx(pitch_starboard, abs=1e-15)
-    assert port.steering.dive.d == -starboard.steering.dive.d
+    assert port.disturbance_dive == -starboard.disturbance_dive
