@@ -78,9 +78,9 @@ def _refuse_another(card: dict, scenario: Scenario, source: str) -> None:
         'guidance': scenario.guidance.los.method,
         'seed': scenario.seed,
     }
-    called = {old for old, new in OLD_NAMES.items() if new == flown['guidance']}
+    card = card and {**card, 'guidance': OLD_NAMES.get(card['guidance'], card['guidance'])}
     for name, value in flown.items():
-        if card and card[name] != value and not (name == 'guidance' and card[name] in called):
+        if card and card[name] != value:
             raise ConfigurationError(
                 f'{source}: {name} = {value!r}: not what was flown (allowed: {card[name]!r}, by '
                 f'{SCORE_FILE})'

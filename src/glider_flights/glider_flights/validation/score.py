@@ -87,12 +87,12 @@ def turn_rates(found: list[Track], flown: list[Simulated]) -> dict[str, Any]:
     return {
         turns: {
             name: {
-                'recorded': _turn_rate(pairs, phase, True, *by),
-                'simulated': _turn_rate(pairs, phase, False, *by),
+                'recorded': _turn_rate(pairs, phase, angle, power, recorded=True),
+                'simulated': _turn_rate(pairs, phase, angle, power, recorded=False),
             }
             for name, phase in PHASES.items()
         }
-        for turns, by in STEERED_BY.items()
+        for turns, (angle, power) in STEERED_BY.items()
     }
 
 
@@ -115,13 +115,15 @@ def speed_off(track: Track, flown: Simulated, adcp: Adcp) -> np.ndarray:
     return (flown.speed_mps - measured)[track.counts & (track.phase > 0.0)]
 
 
-def _turn_rate(pairs, phase: float, recorded: bool, by: str, power: float) -> float | None:
+def _turn_rate(pairs, phase: float, by: str, power: float, recorded: bool) -> float | None:
     """Turn rate over an angle's sine at `TURN_MPS` (rad/s), by least squares with an offset."""
     rows, rates = [], []
     for track, one in pairs:
         time_s = track.instruments.time_s
-        heading = (track.instruments if recorded else one).heading_rad
-        angle = getattr(track.instruments if recorded else one, by, track.instruments.surface_rad)
+        told = track.instruments if recorded else one
+        heading = told.heading_rad
+        # the fin is where it was recorded, also of the plant
+        angle = getattr(told if by in told._fields else track.instruments, by)
         good = np.isfinite(heading) & np.isfinite(angle)
         if good.sum() < 3:
             continue
@@ -133,9 +135,8 @@ def _turn_rate(pairs, phase: float, recorded: bool, by: str, power: float) -> fl
         turned = np.interp(end, time_s, heading) - np.interp(begin, time_s, heading)
         asked = sine * (one.speed_mps / TURN_MPS) ** power
         asked = np.concatenate([[0.0], np.cumsum(_trapezoids(asked, time_s))])
-        rows.append(
-            ((np.interp(end, time_s, asked) - np.interp(begin, time_s, asked)) / TURN_S)[counts]
-        )
+        share = (np.interp(end, time_s, asked) - np.interp(begin, time_s, asked)) / TURN_S
+        rows.append(share[counts])
         rates.append((turned / TURN_S)[counts])
     asked = np.concatenate(rows or [np.empty(0)])
     if len(asked) < 3 or np.std(asked) * TURN_MPS / 0.3 < SMALLEST_ANGLE:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The experiments' results as tables for a person."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -21,6 +22,8 @@ from glider_studies.paper.judges import figure_of
 LISTED = 12
 #: Marks a figure in which the tuned PID is better than the adaptive law.
 BETTER = '*'
+#: Largest steady cross-track error (m).
+STEADY = 'cross_track_m.max_steady'
 _LAW_NAMES = {'adaptive': 'adaptive', 'backstepping': "paper's law", 'pid': 'tuned PID'}
 
 
@@ -126,17 +129,24 @@ def _envelope(rows: list[dict]) -> Table:
 
 
 def _ablation(rows: list[dict]) -> Table:
-    """What each piece was built for, where, and that figure with it and without."""
-    table = _table(['off', 'built for', 'where'], ['whole', 'without'])
+    """What each piece was built for, with it and without; and where it is missed most, steady."""
+    table = _table(['off', 'built for'], ['whole', 'without', 'missed most', 'whole', 'without'])
     by_name = {row['case']: row for row in rows}
+    places = dict.fromkeys(row['case'].partition(', ')[0] for row in rows)
+
+    def figures(place: str, piece: str, name: str = STEADY) -> list[float | None]:
+        return [figure_of(by_name[f'{place}, {one}'], name) for one in ('whole', piece)]
+
     for row in rows:
         where, _, piece = row['case'].partition(', ')
         place, name = row.get('built_for', ('', ''))
         if place == where:
-            whole = by_name[f'{where}, whole']
-            table.add_row(
-                piece, name, where, *(_number(figure_of(one, name)) for one in (whole, row))
-            )
+            steady = {one: figures(one, piece) for one in places}
+            most = max(places, key=lambda one, by=steady: (by[one][1] or math.inf) / by[one][0])
+            built_for = f'{where}: {name.replace(".", ", ").replace("_", " ")}'
+            both = (figures(where, piece, name), steady[most])
+            first, second = ([*map(_number, pair)] for pair in both)
+            table.add_row(piece, built_for, *first, most, *second)
     return table
 
 
