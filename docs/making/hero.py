@@ -86,7 +86,7 @@ def images(run: FlownRun) -> Iterator[Image.Image]:
         chart.plot(east[passed - 1], north[passed - 1], '^', color='black', markersize=8)
         chart.set(xlabel='east (km)', ylabel='north (km)', xlim=box[:2], ylim=box[2:])
         chart.set_title(f'{run.card["vehicle"]}, dead-reckoned: {now:.0f} h', fontsize=11)
-        chart.legend(loc='lower right', fontsize='small')
+        chart.legend(loc='upper right', fontsize='small')
         seen = (hours <= now) & (hours > now - WINDOW_H)
         depth, pitch = curves['depth_m'][seen], curves['pitch_deg'][seen]
         profile.plot(hours[seen], depth, color=BLUE, linewidth=1.5)
