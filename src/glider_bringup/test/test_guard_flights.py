@@ -165,10 +165,16 @@ def test_an_offset_is_taken_off_at_the_surface_and_told(error):
 
 
 @pytest.mark.parametrize('changes', [RECKONED, {}])
-def test_a_depth_that_jumps_and_stays_there_is_not_set_anew_quietly(changes):
-    bias = broken('biased', 600.0, sensor='depth', error=-300.0)
-    flown = fly('current_8deg', 9000.0, [bias], **changes)
-    assert flown.depth.max() < 650.0
+@pytest.mark.parametrize(
+    ('name', 'at_m', 'error', 'least_m'),
+    [('current_8deg', 600.0, -300.0, 650.0), ('slocum_shelf', 190.0, -19.6, 208.0)],
+)
+def test_a_depth_that_jumps_and_stays_there_is_not_set_anew_quietly(
+    name, at_m, error, least_m, changes
+):
+    bias = broken('biased', at_m, sensor='depth', error=error)
+    flown = fly(name, 9000.0, [bias], **changes)
+    assert flown.depth.max() < least_m
     assert flown.first(rows.DEPTH_WRONG) < np.inf
     assert flown.depth[-1] < AT_SURFACE_M
 

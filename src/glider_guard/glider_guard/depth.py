@@ -28,6 +28,8 @@ RISES_MPS = 0.02
 SUNK_M = 3.0
 #: The depth by which it sinks, or stays where it is, is averaged over this time (s).
 MEAN_S = 10.0
+#: A mean depth that changes faster than this is not standing still (m/s), though it comes back.
+MOVES_MPS = 0.1
 #: A depth that changes by no more than this rests (m).
 AT_REST_M = 1.0
 #: For longer than this (s) the depth lags behind the vertical rate before it is told.
@@ -220,6 +222,7 @@ def sound(state, at, limits, dt):
         mean, before = depth, depth
     top, bottom = min(state.top, mean), max(state.bottom, mean)
     is_stalled = under and bottom - top < limits.stalled_m
+    is_stalled = is_stalled and abs(depth - mean) < MOVES_MPS * MEAN_S
     if not is_stalled:
         top, bottom = mean, mean
     is_counted = at.surfaces and at.is_pumped and not at.is_out

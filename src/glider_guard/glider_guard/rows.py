@@ -152,7 +152,7 @@ ROWS = (
     Row(
         STALLED,
         'stalled',
-        'under water at the same depth',
+        'under water at the same depth, and not moving up and down about it',
         'stalled_m, stalled_s',
         SURFACE,
         True,
@@ -189,8 +189,9 @@ ROWS = (
     Row(
         DEPTH_WRONG,
         'depth_wrong',
-        'at the surface the depth is not 0 by more than that, or it jumps and stays there',
-        'offset_max_m, gate.depth_jump_m, gate.hold_s',
+        'at the surface the depth is not 0 by more than that, or under water it jumps and stays '
+        'there',
+        'offset_max_m, jump_m, gate.hold_s',
         SURFACE,
         True,
         'the measured depth is wrong at the surface, or has jumped',

@@ -120,6 +120,12 @@ class GuardLimitSettings(Settings):
         le=1000.0,
         description='way that pump and pitch lead while the depth rests within a metre (m)',
     )
+    jump_m: float = Field(
+        5.0,
+        ge=1.0,
+        le=1000.0,
+        description='under water a depth that jumps by more, and stays there, is wrong (m)',
+    )
     offset_max_m: float = Field(
         20.0,
         ge=2.0,
@@ -268,7 +274,7 @@ class GuardSettings(GuardLimitSettings):
                 same_s=self.still_s + self._gap_s,
                 is_rough=self.depth_resolution_m > 0.0,
                 led_m=self.lag_m + 3.0 * self.depth_resolution_m,
-                jump_m=gate.depth_jump,
+                jump_m=self.jump_m + 2.0 * self.depth_resolution_m,
                 hold_s=gate.hold_s + self._gap_s,
                 settled_s=4.0 * self.imu_period_s,
                 offset_m=self.offset_max_m,

@@ -154,7 +154,8 @@ def watch(state, shown, sees, limits, dt):
     if abs(raw - own) > limits.jump_m + FASTEST_MPS * own_s:
         far_s = state.far_s + dt
     if far_s > limits.hold_s:
-        far_s, told = 0.0, DEPTH_WRONG
+        # at the surface it is checked against 0
+        far_s, told = 0.0, 0 if state.out_s > OUT_S else DEPTH_WRONG
     if far_s == 0.0 and raw != own:
         own, own_s = raw, 0.0
     is_out = 0.0 <= shown.contact_age_s < HEARD_S

@@ -258,6 +258,38 @@ def test_the_depth_is_checked_at_the_surface(shown_m, told):
         assert vehicle.state.witness.depth == pytest.approx(0.0, abs=0.1)
 
 
+@pytest.mark.parametrize(
+    ('jump_m', 'resolution_m', 'told'),
+    [(-20.0, 0.0, True), (8.0, 0.0, True), (4.0, 0.0, False), (8.0, 5.0, False)],
+)
+def test_a_depth_that_jumps_under_water_is_wrong(jump_m, resolution_m, told):
+    """By more than it is measured in steps of, and whatever the gate lets through."""
+    vehicle = Vehicle(pressure=True, depth_resolution_m=resolution_m)
+    vehicle.go(10.0)
+    vehicle.depth += jump_m
+    assert bool(vehicle.go(10.0) & rows.DEPTH_WRONG) == told
+
+
+def test_a_depth_that_jumps_at_the_surface_has_an_offset():
+    vehicle = Vehicle(depth_m=0.5, pressure=True)
+    out = WELL._replace(contact_age_s=0.0)
+    for second in range(120):
+        vehicle.depth = shown = (0.5 if second < 60 else 12.0) + 0.01 * (second % 3)
+        now = vehicle.go(1.0, odometry=vehicle.odometry(0.0), depth=shown, health=out)
+    assert now == rows.DEPTH_OFFSET
+
+
+@pytest.mark.parametrize(('period_s', 'told'), [(60.0, False), (600.0, True)])
+def test_who_moves_within_a_few_metres_does_not_stand_still(period_s, told):
+    """A yo of a vehicle whose pump is too slow for it, 4 m from top to bottom; and one that hangs."""
+    vehicle = Vehicle(depth_m=20.0)
+    now = 0
+    for second in range(2400):
+        rate = 4.0 * math.pi / period_s * math.cos(2.0 * math.pi * second / period_s)
+        now |= vehicle.go(1.0, rate=rate)
+    assert bool(now & rows.STALLED) == told
+
+
 @pytest.mark.parametrize(('pitch_deg', 'demand'), [(-25.0, DIVES), (25.0, RISES)])
 def test_a_vehicle_that_is_heavier_than_its_pump_says_comes_up(pitch_deg, demand):
     """By 0.9 kg of 1.0 it flies on, by 1.1 kg it does not; the weights are those of the polar."""
