@@ -26,6 +26,10 @@ PACKAGES = (
 Values = TypeVar('Values', bound=NamedTuple)
 
 
+#: What all are compiled with: IEEE arithmetic, and no wrapper for C.
+_OPTIONS = {'error_model': 'numpy', 'no_cfunc_wrapper': True}
+
+
 @cache
 def source_digest() -> str:
     """Digest of the sources of our packages, and of those that registered something."""
@@ -59,14 +63,27 @@ def kernel(function: Callable) -> numba.core.dispatcher.Dispatcher:
     """
     if numba.config.DISABLE_JIT:
         return function
-    options = {'error_model': 'numpy', 'forceinline': True, 'no_cfunc_wrapper': True}
-    compiled = numba.njit(**options)(function)
-    inlined = numba.njit(no_cpython_wrapper=True, **options)(function)
+    compiled = _compiled_once(function, forceinline=True)
+    inlined = numba.njit(no_cpython_wrapper=True, forceinline=True, **_OPTIONS)(function)
+    if is_kept(function):
+        inlined._cache = KernelCache(function, '.inlined')
     compiled.get_call_template = inlined.get_call_template
     compiled.get_overload = inlined.get_overload
+    return compiled
+
+
+def loop(function: Callable) -> numba.core.dispatcher.Dispatcher:
+    """Compile a pure function that takes so long to compile that it is not done twice.
+
+    It is called by kernels as it is by Python, and not inlined.
+    """
+    return function if numba.config.DISABLE_JIT else _compiled_once(function)
+
+
+def _compiled_once(function: Callable, **options) -> numba.core.dispatcher.Dispatcher:
+    compiled = numba.njit(**_OPTIONS, **options)(function)
     if is_kept(function):
         compiled._cache = KernelCache(function)  # as its enable_caching() does
-        inlined._cache = KernelCache(function, '.inlined')
     return compiled
 
 

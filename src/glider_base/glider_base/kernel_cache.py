@@ -144,6 +144,8 @@ def _classes(kinds: Iterable) -> Iterator[type]:
         if isinstance(kind, types.BaseTuple):
             # all of a uniform tuple are alike
             yield from _classes(set(kind.types))
+        if isinstance(kind, types.StructRef):
+            yield from _classes(kind.field_dict.values())
 
 
 def _outlive(arguments: Iterable) -> bool:

@@ -117,6 +117,29 @@ def scaled(x, params):
     return FACTOR * params.gain * x
 """,
     'factor': 'FACTOR = 3.0\n',
+    'box': """
+from numba.core import types
+from numba.experimental import structref
+from glider_base.kernel import kernel
+from parts.hole import flown
+
+@structref.register
+class BoxType(types.StructRef):
+    pass
+
+class Box(structref.StructRefProxy):
+    pass
+
+structref.define_proxy(Box, BoxType, ['params'])
+
+@kernel
+def put(params):
+    return Box(params)
+
+@kernel
+def flown_by(box, x):
+    return flown(x, box.params)
+""",
     'unused': """
 from parts.hole import law
 from parts.laws import Others
@@ -129,12 +152,15 @@ def nothing(x, params):
 """,
 }
 CALL = """
+from parts.box import flown_by, put
 from parts.high import high
 from parts.hole import flown
 from parts.laws import Params
 from parts.other import other
 
-for one, values in ((high, (1.0,)), (flown, (1.0, Params(2.0))), (other, (1.0,))):
+params = Params(2.0)
+calls = (high, (1.0,)), (flown, (1.0, params)), (other, (1.0,)), (flown_by, (put(params), 1.0))
+for one, values in calls:
     print(one(*values), sum(one.stats.cache_misses.values()))
 """
 
@@ -162,22 +188,23 @@ def package(tmp_path):
 
 
 def test_a_change_compiles_what_it_reaches_and_nothing_else(package):
+    """A law is reached through the types of its params, and through what these are kept in."""
     package.write('here')
-    assert package.call('here') == [(4.0, 1), (6.0, 1), (0.0, 1)]
-    assert package.call('here') == [(4.0, 0), (6.0, 0), (0.0, 0)]
+    assert package.call('here') == [(4.0, 1), (6.0, 1), (0.0, 1), (6.0, 1)]
+    assert package.call('here') == [(4.0, 0), (6.0, 0), (0.0, 0), (6.0, 0)]
     package.write('here', low=PARTS['low'].replace('1.0', '5.0'))
-    assert package.call('here') == [(12.0, 1), (6.0, 0), (0.0, 0)]
+    assert package.call('here') == [(12.0, 1), (6.0, 0), (0.0, 0), (6.0, 0)]
     package.write('here', factor='FACTOR = 4.0\n')
-    assert package.call('here') == [(4.0, 0), (8.0, 1), (0.0, 0)]
+    assert package.call('here') == [(4.0, 0), (8.0, 1), (0.0, 0), (8.0, 1)]
     package.write('here', unused=PARTS['unused'].replace('0.0', '9.0'))
-    assert package.call('here') == [(4.0, 0), (6.0, 0), (0.0, 0)]
+    assert package.call('here') == [(4.0, 0), (6.0, 0), (0.0, 0), (6.0, 0)]
 
 
 def test_another_checkout_finds_what_is_there(package):
     package.write('here')
     package.write('there')
     package.call('here')
-    assert package.call('there') == [(4.0, 0), (6.0, 0), (0.0, 0)]
+    assert package.call('there') == [(4.0, 0), (6.0, 0), (0.0, 0), (6.0, 0)]
 
 
 def test_what_was_not_used_for_longest_is_forgotten_first(monkeypatch, tmp_path):

@@ -281,7 +281,7 @@ def test_a_depth_that_jumps_at_the_surface_has_an_offset():
 
 @pytest.mark.parametrize(('period_s', 'told'), [(60.0, False), (600.0, True)])
 def test_who_moves_within_a_few_metres_does_not_stand_still(period_s, told):
-    """A yo of a vehicle whose pump is too slow for it, 4 m from top to bottom; and one that hangs."""
+    """A yo whose pump is too slow for it, 4 m from top to bottom; and one that hangs."""
     vehicle = Vehicle(depth_m=20.0)
     now = 0
     for second in range(2400):

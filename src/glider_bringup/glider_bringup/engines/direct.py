@@ -7,14 +7,17 @@ too, so that a run over topics and a direct run of one scenario agree to the las
 """
 
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import NamedTuple
 
+import numba
 import numpy as np
-from numba.typed import List
+from numba.core import types
+from numba.experimental import structref
 
 from glider_base.block import put
 from glider_base.frames import odometry_from_wire, water_to_wire
-from glider_base.kernel import kernel, replace
+from glider_base.kernel import kernel, loop, replace
 from glider_base.signals import TICK_S, Joints
 from glider_base.wiring import FIELDS, publisher
 from glider_control.block import control_tick
@@ -57,7 +60,7 @@ class MissionState(NamedTuple):
     guard: GuardState
 
 
-@kernel
+@loop
 def fly(state, params, log, dt):
     """Fly until the log is full or the mission ends.
 
@@ -121,16 +124,27 @@ def fly(state, params, log, dt):
     return state, rows, finished
 
 
-@kernel
-def hold(state, params):
-    """State and parameters where compiled code finds them: a list of one each.
+@structref.register
+class HeldType(types.StructRef):
+    """Type of `HeldMission` in compiled code."""
+
+
+class HeldMission(structref.StructRefProxy):
+    """State and parameters of a mission, where compiled code finds them and changes them.
 
     To hand a state to Python and back costs many times what the tick itself does.
     """
-    held, with_params = List(), List()
-    held.append(apart(state))
-    with_params.append(params)
-    return held, with_params
+
+
+structref.define_proxy(HeldMission, HeldType, ['state', 'params'])
+if numba.config.DISABLE_JIT:
+    HeldMission = SimpleNamespace
+
+
+@kernel
+def hold(state, params):
+    """Have a mission held: `HeldMission`. The state that was given does not change with it."""
+    return HeldMission(state=apart(state), params=params)
 
 
 @kernel
@@ -141,23 +155,28 @@ def apart(state):
 
 
 @kernel
-def fly_held(held, params, log, dt):
+def fly_held(held, log, dt):
     """Fly on what is held, as `fly` does; rows filled, and whether the mission has ended."""
-    state, rows, finished = fly(held[0], params[0], log, dt)
-    held[0] = state
+    held.state, rows, finished = fly(held.state, held.params, log, dt)
     return rows, finished
 
 
 @kernel
 def held_state(held):
     """What is held: a state of one's own."""
-    return apart(held[0])
+    return apart(held.state)
 
 
 @kernel
 def set_held(held, state):
     """Hold another state."""
-    held[0] = apart(state)
+    held.state = apart(state)
+
+
+@kernel
+def set_held_params(held, params):
+    """Fly on with other parameters."""
+    held.params = params
 
 
 def finite_rows(log: np.ndarray) -> int:

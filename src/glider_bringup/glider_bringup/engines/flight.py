@@ -20,6 +20,7 @@ from glider_bringup.engines.direct import (
     held_state,
     hold,
     set_held,
+    set_held_params,
 )
 from glider_bringup.engines.interrupts import interrupts_noted
 from glider_guidance.guidance import guidance_abort
@@ -94,11 +95,11 @@ class Held:
         self, scenario: Scenario, mission: tuple[MissionState, MissionParams] | None = None
     ) -> None:
         state, self._params = mission or mission_of(scenario)
-        self._held, self._with_params = hold(state, self._params)
+        self._held = hold(state, self._params)
         self.tick, self._stage = 0, -1
         self._settings, self._has_held = scenario.guidance_settings(), False
         self._waiting = tuple(scenario.orders)
-        fly_held(self._held, self._with_params, np.empty((0, ROW)), TICK_S)
+        fly_held(self._held, np.empty((0, ROW)), TICK_S)
 
     def keep(self) -> Kept:
         """All that it is at this moment."""
@@ -148,11 +149,11 @@ class Held:
         """Fill a log, but not beyond where an order waits for the surface."""
         waits = wait_for_surface(self._waiting, self.tick)
         before = held_state(self._held) if waits else None
-        rows, is_over = fly_held(self._held, self._with_params, log, TICK_S)
+        rows, is_over = fly_held(self._held, log, TICK_S)
         up = np.flatnonzero(is_surfaced(log[:rows, _STAGE])) if waits else ()
         if len(up) and up[0] + 1 < rows:  # again, and no further
             set_held(self._held, before)
-            rows, is_over = fly_held(self._held, self._with_params, log[: up[0] + 1], TICK_S)
+            rows, is_over = fly_held(self._held, log[: up[0] + 1], TICK_S)
         return rows, is_over
 
     def _follow(self, order: Order) -> None:
@@ -174,7 +175,7 @@ class Held:
         if has_held:
             plant = params.plant._replace(stop_after_dives=0, stop_afloat_ticks=0)
             params = params._replace(plant=plant)
-        self._with_params[0] = params
+        set_held_params(self._held, params)
 
 
 def ended(complete: bool, reason: str) -> str:
