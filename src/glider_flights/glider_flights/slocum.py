@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_base.errors import ConfigurationError
-from glider_flights.folders import LATEST_S, Part, files_in, installed, said, strangers
+from glider_flights.folders import LATEST_S, files_in, gsw, installed, of_one_flight
 from glider_flights.record import (
     NOT_KNOWN,
     Fixes,
@@ -32,7 +32,6 @@ from glider_flights.record import (
     local_metres,
     usual,
 )
-from glider_flights.seawater import depth_of, pressure_of, salinity_of
 from glider_flights.segments import DIVE_DEPTH_M, Cut, cut
 
 #: Kinds of files of the flight computer, fullest first: all that is measured, then what is sent.
@@ -193,7 +192,7 @@ def _instruments(sensors: Sensors, declined: float, origin: np.ndarray) -> Instr
         for name in ('sci_water_pressure', 'm_pressure')
     }
     own_s, dbar = max(pressures.values(), key=lambda pair: len(pair[0]))
-    time_s, depth_m = own_s, depth_of(dbar, origin[0])
+    time_s, depth_m = own_s, -gsw().z_from_p(dbar, origin[0])
     if not len(time_s):
         time_s, depth_m = sensors['m_depth']
 
@@ -217,10 +216,10 @@ def _instruments(sensors: Sensors, declined: float, origin: np.ndarray) -> Instr
         mass_roll_rad=measured('m_battroll'),
         surface_rad=measured('m_fin'),
         temperature_degc=temperature,
-        salinity=salinity_of(
+        salinity=gsw().SP_from_C(
             measured('sci_water_cond', SIEMENS_PER_METRE),
             temperature,
-            pressure_of(depth_m, origin[0]),
+            gsw().p_from_z(-depth_m, origin[0]),
         ),
     )
 
@@ -244,6 +243,11 @@ class DbdFile(NamedTuple):
     #: Sensors that it lists, by name, whether or not they have values.
     sensors: Sensors
     is_cut: bool
+
+    @property
+    def name(self) -> str:
+        """Name of the file."""
+        return self.path.name
 
     @property
     def time_s(self) -> np.ndarray:
@@ -270,25 +274,20 @@ def read_sensors(
     """
     found, left_out = _read_files(files, cache, progress, names)
     found.sort(key=lambda file: file.written)
-    parts = [Part(file.path.name, file.vehicle, file.time_s) for file in found]
-    left_out |= strangers(files[0].parent, parts)
     for file in found:
         missing = [name for name in needed if name not in file.sensors]
         if missing and len(files) > 1:
-            left_out.setdefault(file.path.name, f'no {", ".join(missing)} in it')
-    found = [file for file in found if file.path.name not in left_out]
-    notes = said(left_out)
-    if not found:
-        raise ConfigurationError(f'{files[0].parent}: no file could be read; {"; ".join(notes)}')
-    cut = [file.path.name for file in found if file.is_cut]
+            left_out[file.name] = f'no {", ".join(missing)} in it'
+    found, notes = of_one_flight(files[0].parent, found, left_out)
+    cut = [file.name for file in found if file.is_cut]
     if cut:
         notes.append(f'read as far as it goes: {", ".join(cut)}: cut short')
     for name in names:
-        lack = [file.path.name for file in found if name not in file.sensors]
+        lack = [file.name for file in found if name not in file.sensors]
         if 0 < len(lack) < len(found):
             notes.append(f'no {name} in {", ".join(lack)}')
     begun = [
-        (float(file.sensors['m_depth'][0][0]), file.path.name)
+        (float(file.sensors['m_depth'][0][0]), file.name)
         for file in found
         if 'm_depth' in file.sensors and len(file.sensors['m_depth'][0])
     ]
