@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_flights.reckoning import FIX_STD_M, Reckoned, check, mean_current, reckon, runs
+from glider_flights.reckoning import FIX_STD_M, Reckoned, check, reckon, runs
 from glider_flights.record import Flight, Segment
 
 #: Method of navigation, if nothing else is said.
@@ -32,9 +32,10 @@ class Row(NamedTuple):
 
 def comparable_current(flight: Flight, segment: Segment, reckoned: Reckoned) -> np.ndarray:
     """Our current (m/s) over what the vehicle's own is a mean, shape (2,): north, east."""
-    if flight.on_board_over == 'between fixes':
-        return mean_current(segment, reckoned)
-    return reckoned.dac_mps
+    if flight.on_board_over != 'between fixes':
+        return reckoned.dac_mps
+    moved_m = segment.after.place_m[0] - segment.before.place_m[-1]
+    return (moved_m - reckoned.way_m) / (segment.after.time_s[0] - segment.before.time_s[-1])
 
 
 def navigate(

@@ -73,13 +73,6 @@ class Reckoned(NamedTuple):
         return (self.surfaced_m - self.dived_m - self.way_m) / self.seconds
 
 
-def mean_current(segment: Segment, reckoned: Reckoned) -> np.ndarray:
-    """Mean current (m/s) from fix to fix, also while at the surface, shape (2,): north, east."""
-    begin_s, end_s = segment.before.time_s[-1], segment.after.time_s[0]
-    moved_m = segment.after.place_m[0] - segment.before.place_m[-1]
-    return (moved_m - reckoned.way_m) / (end_s - begin_s)
-
-
 def surface_drift(fixes: Fixes) -> np.ndarray:
     """Drift at the surface (m/s), shape (2,): the slope through the fixes; NaN if not known."""
     if len(fixes.time_s) < 2 or np.ptp(fixes.time_s) < SHORTEST_DRIFT_S:

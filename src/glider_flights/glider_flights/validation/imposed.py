@@ -47,18 +47,6 @@ class Forcing(NamedTuple):
     temperature: float  #: of the water (deg C)
 
 
-class Flown(NamedTuple):
-    """Columns of what was flown."""
-
-    down: float  #: way through the water since the first sample: down (m)
-    ahead: float  #: along the heading (m)
-    abeam: float  #: to starboard of it (m)
-    heading: float  #: turned since the first sample (rad)
-    speed: float  #: through the water (m/s)
-    phi: float  #: roll, pitch (rad)
-    theta: float
-
-
 class MeasuredWater(NamedTuple):
     """Water as it was measured beside the vehicle."""
 
@@ -172,7 +160,9 @@ def fly_held(table, vehicle, step, flown):
     step : float
         Longest step (s).
     flown : float64[n, 7]
-        Takes `Flown` of each sample.
+        Takes of each sample the way through the water since the first: down, along the heading
+        and to starboard of it (m), how far it has turned since (rad), speed through the water
+        (m/s), roll and pitch (rad).
     """
     u, v, w, turn = START_MPS, 0.0, 0.0, 0.0
     down, ahead, abeam, heading = 0.0, 0.0, 0.0, 0.0

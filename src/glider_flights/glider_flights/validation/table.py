@@ -8,10 +8,7 @@ from typing import Any
 
 from glider_base.errors import ConfigurationError
 from glider_flights.energy.uses import predict
-from glider_flights.og1 import og1_files
-from glider_flights.reading import read_uses, read_whole
-from glider_flights.seaglider import seaglider_files
-from glider_flights.slocum import slocum_files
+from glider_flights.reading import files_by_kind, read_uses, read_whole
 from glider_flights.validation.result import validate
 from glider_flights.validation.score import STEERED_BY
 
@@ -32,11 +29,10 @@ def flights_in(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise ConfigurationError(f'--all {folder}: there is no such folder')
     inside = sorted(path for path in folder.rglob('*') if path.is_dir())
-    kinds = (slocum_files, seaglider_files, og1_files)
     found = [
         path
         for path in [folder, *inside]
-        if any(files_of(file) for files_of in kinds for file in path.iterdir() if file.is_file())
+        if any(any(files_by_kind(one).values()) for one in path.iterdir() if one.is_file())
     ]
     if not found:
         raise ConfigurationError(
