@@ -132,9 +132,8 @@ def _read(path: Path) -> LogFile:
     if 'pressure' in known:
         latitude = fixes[0, 1] if len(fixes) else _middle(known)[0]
         known['depth_m'] = -gsw().z_from_p(known['pressure'], latitude)
-    needed = ('time', 'depth_m', 'pitch_rad')
-    missing = [NAMES[key][0] for key in needed if not len(known.get(key, ()))]
-    refuse_missing(path, missing, 'of a flight in OG1 or CF')
+    needed = {key: wanted[key] for key in ('time', 'depth_m', 'pitch_rad')}
+    refuse_missing(path, known, needed, 'of a flight in OG1 or CF')
     if 'heading_rad' in known:
         declination, note = _declination(known, fixes)
         known['heading_rad'] = known['heading_rad'] + declination

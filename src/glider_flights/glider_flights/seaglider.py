@@ -115,8 +115,7 @@ def _read_dive(path: Path) -> LogFile:
                 f'{path}: {" or ".join(NEEDED[key])} has {len(found[key])} values '
                 f'(allowed: as many as time, {len(found.get("time", ()))})'
             )
-    missing = [names for key, names in NEEDED.items() if not len(found.get(key, ()))]
-    refuse_missing(path, missing, 'of a dive of a Seaglider')
+    refuse_missing(path, found, NEEDED, 'of a dive of a Seaglider')
     fixes = np.stack([found['fix_time'], found['fix_latitude'], found['fix_longitude']], axis=-1)
     good = np.isfinite(fixes).all(axis=-1) & (np.abs(fixes[:, 1:]) <= (90.0, 180.0)).all(axis=-1)
     quality = found.get('fix_quality', ())

@@ -406,7 +406,7 @@ def test_file_does_not_depend_on_the_order_and_tells_of_failures(flown, tmp_path
     files = []
     for seed in range(3):
         random.Random(seed).shuffle(records)
-        write_dataset(make_dataset(plan, records, STATUSES), tmp_path / f'{seed}.nc')
+        write_dataset(make_dataset(plan, records), tmp_path / f'{seed}.nc')
         files.append((tmp_path / f'{seed}.nc').read_bytes())
     assert files[0] == files[1] == files[2]
     with xarray.load_dataset(tmp_path / '0.nc') as data:

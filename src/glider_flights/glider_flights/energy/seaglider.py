@@ -64,8 +64,7 @@ class _Dive(NamedTuple):
 def _pumpings(path: Path) -> _Dive:
     """Read a dive."""
     found = read_variables(path, MOVES | _of_masses())
-    missing = [names for key, names in MOVES.items() if not len(found.get(key, ()))]
-    refuse_missing(path, missing, 'for the energy of a Seaglider')
+    refuse_missing(path, found, MOVES, 'for the energy of a Seaglider')
     rows = {key: len(found[key]) for key in MOVES if key != 'cc_per_count'}
     if len(set(rows.values())) > 1:
         told = ', '.join(f'{MOVES[key][0]} {count}' for key, count in rows.items())

@@ -28,6 +28,7 @@ from glider_model.vehicle.file import vehicle_path
 from glider_studies.sweep.journal import Journal
 from glider_studies.sweep.netcdf import (
     NOT_FIGURES,
+    STATUSES,
     VECTORS,
     make_dataset,
     variable_name,
@@ -36,8 +37,6 @@ from glider_studies.sweep.plan import Plan, vehicle_text
 from glider_studies.workers import WORKER_DIED, Pool, Progress, WorkError
 
 JOURNAL_FILE, RESULT_FILE = 'journal.jsonl', 'sweep.nc'
-#: Those of before come first: a result keeps a status as its place among them.
-STATUSES = ('completed', 'infeasible', 'failed', 'surfaced', 'lost')
 FAILED = 'failed'
 
 #: A worker is given so much simulated time at once (s): seconds of work, milliseconds of overhead.
@@ -233,7 +232,7 @@ def write_result(plan: Plan, journal: Journal, file: Path) -> dict[str, Any]:
 
     Returns its summary: ``sweep``, ``file``, ``cells``, and how many of each status.
     """
-    dataset = make_dataset(plan, journal.records(), STATUSES)
+    dataset = make_dataset(plan, journal.records())
     with whole_file(file) as stream:
         write_dataset(dataset, Path(stream.name))
     status = dataset['status'].values.ravel()
