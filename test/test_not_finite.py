@@ -114,7 +114,7 @@ def test_studies_count_it_as_failed(driven):
     assert montecarlo._fly_plant(scenario)['diverged']
     row, _ = _fly_case(Case('', 'adaptive', 'los_current', 'current_8deg', changes))
     assert (row['status'], row['finite']) == ('failed', False)
-    vehicles = {fly.digest(fly.vehicle_text(scenario.vehicle))}
+    vehicles = {fly.vehicle_digest(scenario.vehicle)}
     inputs = Inputs(source=read_scenario(), vehicles=vehicles)
     (record,) = fly.fly_chunk(Chunk(inputs, [(0, changes)]))
     assert (record['status'], record['figures']) == ('failed', {})

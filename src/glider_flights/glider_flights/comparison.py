@@ -3,11 +3,11 @@
 """Our navigation over a recorded flight, beside what was made of it on board or ashore."""
 
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from glider_flights.folders import Progress
 from glider_flights.reckoning import FIX_STD_M, Reckoned, check, reckon, runs
 from glider_flights.record import Flight, Segment
 
@@ -38,9 +38,7 @@ def comparable_current(flight: Flight, segment: Segment, reckoned: Reckoned) -> 
     return (moved_m - reckoned.way_m) / (segment.after.time_s[0] - segment.before.time_s[-1])
 
 
-def navigate(
-    flight: Flight, progress: Callable[[int, int], None], method: str = METHOD
-) -> list[Row]:
+def navigate(flight: Flight, progress: Progress, method: str = METHOD) -> list[Row]:
     """Navigate all segments, in the order of time, each by what was known before it.
 
     Raises

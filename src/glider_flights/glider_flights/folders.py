@@ -17,6 +17,8 @@ from glider_base.errors import ConfigurationError
 LATEST_S = 4.1e9
 #: No glider is at sea for longer (s): files further apart are of two flights, or of a wrong clock.
 LONGEST_FLIGHT_S = 400 * 86_400.0
+#: Gets how many files, or other things, are done, and how many there are.
+Progress = Callable[[int, int], None]
 
 
 class OneFile(Protocol):
@@ -79,7 +81,7 @@ def gsw():
 
 
 def read_each(
-    files: list[Path], progress: Callable[[int, int], None], read: Callable[[Path], Read]
+    files: list[Path], progress: Progress, read: Callable[[Path], Read]
 ) -> tuple[list[Read], dict[str, str]]:
     """What can be read of files, and why others cannot be, by name; of one alone, it is raised.
 

@@ -8,7 +8,6 @@ the file of the vehicle. ``HEADING`` is magnetic in the vocabulary of OG1.
 """
 
 import math
-from collections.abc import Callable
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
@@ -17,7 +16,14 @@ import numpy as np
 
 from glider_base.files import parse_yaml
 from glider_base.settings import validate
-from glider_flights.folders import files_in, gsw, installed, of_one_flight, read_each
+from glider_flights.folders import (
+    Progress,
+    files_in,
+    gsw,
+    installed,
+    of_one_flight,
+    read_each,
+)
 from glider_flights.netcdf import SUFFIXES, datasets, refuse_missing, variables
 from glider_flights.reckoning import DENSITY
 from glider_flights.record import (
@@ -87,7 +93,7 @@ def _is_one(path: Path) -> bool:
     return 'TIME' in names and bool(told) and 'LOG_GPS_LAT' not in names
 
 
-def read_og1(place: Path, progress: Callable[[int, int], None]) -> Flight:
+def read_og1(place: Path, progress: Progress) -> Flight:
     """Read a flight.
 
     Raises

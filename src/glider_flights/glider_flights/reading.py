@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reading a recorded flight, or its energy, of whichever kind of vehicle its files are."""
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -10,13 +9,11 @@ from glider_base.errors import ConfigurationError
 from glider_flights.energy.seaglider import seaglider_uses
 from glider_flights.energy.slocum import slocum_uses
 from glider_flights.energy.uses import Uses
-from glider_flights.folders import said
+from glider_flights.folders import Progress, said
 from glider_flights.og1 import og1_files, read_og1
 from glider_flights.record import Flight
 from glider_flights.seaglider import read_seaglider, seaglider_files
 from glider_flights.slocum import read_slocum, slocum_files
-
-Progress = Callable[[int, int], None]
 
 
 def files_by_kind(place: Path) -> dict[str, list[Path]]:
@@ -35,8 +32,7 @@ def read_flight(place: Path, cache: Path | None, progress: Progress) -> Flight:
         Folder, or one file.
     cache : Path or None
         Folder of a Slocum's caches; without it they are looked for.
-    progress : callable
-        Gets how many files are read, and how many there are.
+    progress : Progress
 
     Raises
     ------

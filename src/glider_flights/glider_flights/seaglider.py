@@ -8,13 +8,12 @@ m/s; the base station has it from buoyancy and pitch, and so has this where buoy
 
 import math
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from glider_base.errors import ConfigurationError
-from glider_flights.folders import files_in, of_one_flight, read_each
+from glider_flights.folders import Progress, files_in, of_one_flight, read_each
 from glider_flights.netcdf import SUFFIXES, refuse_missing, variables
 from glider_flights.record import (
     NOT_KNOWN,
@@ -94,7 +93,7 @@ def seaglider_files(place: Path) -> list[Path]:
     return [path for path in files if DIVE_FILE.fullmatch(path.name)] or files
 
 
-def read_seaglider(place: Path, progress: Callable[[int, int], None]) -> Flight:
+def read_seaglider(place: Path, progress: Progress) -> Flight:
     """Read a flight.
 
     Raises

@@ -9,14 +9,20 @@ magnetic north as y. ``m_gps_mag_var`` is what is subtracted from a magnetic hea
 import math
 import re
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from glider_base.errors import ConfigurationError
-from glider_flights.folders import LATEST_S, files_in, gsw, installed, of_one_flight
+from glider_flights.folders import (
+    LATEST_S,
+    Progress,
+    files_in,
+    gsw,
+    installed,
+    of_one_flight,
+)
 from glider_flights.record import (
     NOT_KNOWN,
     Fixes,
@@ -88,6 +94,7 @@ SAME_TIME = 0.2
 #: The current of a segment is told until so long after the next dive has begun (s).
 LATE_S = 60.0
 
+Names = tuple[str, ...]
 Sensors = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
@@ -102,7 +109,7 @@ def slocum_files(place: Path) -> list[Path]:
 
 
 def read_slocum(
-    place: Path, cache: Path | None, progress: Callable[[int, int], None], whole: bool = False
+    place: Path, cache: Path | None, progress: Progress, whole: bool = False
 ) -> Flight:
     """Read a flight; without a folder of caches they are looked for.
 
@@ -256,11 +263,7 @@ class DbdFile(NamedTuple):
 
 
 def read_sensors(
-    files: list[Path],
-    cache: Path | None,
-    progress: Callable[[int, int], None],
-    names: tuple[str, ...],
-    needed: tuple[str, ...] = (),
+    files: list[Path], cache: Path | None, progress: Progress, names: Names, needed: Names = ()
 ) -> Recorded:
     """Sensors by name; one that was never recorded has no times.
 
@@ -299,10 +302,7 @@ def read_sensors(
 
 
 def _read_files(
-    files: list[Path],
-    cache: Path | None,
-    progress: Callable[[int, int], None],
-    names: tuple[str, ...],
+    files: list[Path], cache: Path | None, progress: Progress, names: Names
 ) -> tuple[list[DbdFile], dict[str, str]]:
     """The files that can be read, and why others cannot, by name."""
     with installed(f'{files[0]}: dbdreader, which reads the files of a Slocum'):
@@ -331,7 +331,7 @@ def _read_files(
     return found, left_out
 
 
-def _read_file(path: Path, scratch: Path, names: tuple[str, ...]) -> DbdFile:
+def _read_file(path: Path, scratch: Path, names: Names) -> DbdFile:
     """Read a file, by the caches in a folder; what dbdreader raises."""
     from dbdreader import DBD
 

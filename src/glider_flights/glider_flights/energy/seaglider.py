@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What actuators of a Seaglider took out of its battery, by its table of their moves."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_flights.energy.uses import PUMP, Uses
-from glider_flights.folders import read_each, said
+from glider_flights.folders import Progress, read_each, said
 from glider_flights.netcdf import refuse_missing
 from glider_flights.seaglider import read_variables, seaglider_files
 
@@ -33,7 +32,7 @@ MOVES = {
 MASSES = {'pitch': ('pitch_mass', 'log_PITCH_CNV'), 'roll': ('roll_mass', 'log_ROLL_CNV')}
 
 
-def seaglider_uses(place: Path, progress: Callable[[int, int], None]) -> Uses:
+def seaglider_uses(place: Path, progress: Progress) -> Uses:
     """Pumpings of all dives, by current, voltage and time of the motor."""
     dives, left_out = read_each(seaglider_files(place), progress, _pumpings)
     if not sum(len(dive.joules) for dive in dives):

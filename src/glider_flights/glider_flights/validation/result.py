@@ -3,13 +3,13 @@
 """A validation from files to figures."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from glider_base.errors import ConfigurationError
+from glider_flights.folders import Progress
 from glider_flights.record import Flight
 from glider_flights.validation.fit import BY_ADCP, CONSTANTS, at_bounds, chosen, fitted
 from glider_flights.validation.flying import Imposed, Model, check, fly, model_of
@@ -50,7 +50,7 @@ def validate(
     impose: Imposed,
     fit: str | None,
     adcp: Adcp | None,
-    progress: Callable[[int, int], None],
+    progress: Progress,
     fit_on: Half | Flight | None = None,
 ) -> Validation:
     """Fly a vehicle along a recorded flight, with constants that ``fit`` names fitted first.

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """One table of all flights that a folder holds: fitted on one half, tried on the other."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from glider_base.errors import ConfigurationError
 from glider_flights.energy.uses import predict
+from glider_flights.folders import Progress
 from glider_flights.reading import files_by_kind, read_uses, read_whole
 from glider_flights.validation.result import validate
 from glider_flights.validation.score import STEERED_BY
@@ -43,11 +43,7 @@ def flights_in(folder: Path) -> list[Path]:
 
 
 def validate_all(
-    folder: Path,
-    vehicle: str | None,
-    fit: str | None,
-    cache: Path | None,
-    progress: Callable[[int, int], None],
+    folder: Path, vehicle: str | None, fit: str | None, cache: Path | None, progress: Progress
 ) -> dict[str, Any]:
     """Figures of every flight in a folder, as `--json` prints them; what has none is named."""
     places, rows, left_out = flights_in(folder), [], {}

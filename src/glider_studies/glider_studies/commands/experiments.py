@@ -78,7 +78,7 @@ def experiments(
         others.append((flights, search.combinations(seed, flights), hunt))
     if routes.NAME in groups:
         crossing = partial(routes.cross, seed)
-        others.append((routes.count_tasks(), routes.combinations(), crossing))
+        others.append((routes.TASKS, routes.combinations(), crossing))
     total = flown + sum(count for count, _, _ in others)
     if out:
         make_result_folder(out, paper.RESULT_FILE)

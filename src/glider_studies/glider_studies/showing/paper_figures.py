@@ -50,13 +50,7 @@ def draw(
     records: list[list[Record | None]],
     folder: Path,
 ) -> list[Path]:
-    """Draw what was flown into PNG files.
-
-    Returns
-    -------
-    list of Path
-        Files, by number of the figure.
-    """
+    """Draw what was flown into PNG files; returns them, by number of the figure."""
     flights = {
         (one.name, case.case, case.controller, case.guidance): record
         for one, kept in zip(experiments, records, strict=True)

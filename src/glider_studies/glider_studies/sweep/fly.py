@@ -6,7 +6,6 @@ What is known of a cell goes into a journal as it comes, and from there into one
 depends on the inputs alone: not on the workers, their order, or interruptions.
 """
 
-import hashlib
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
@@ -33,7 +32,7 @@ from glider_studies.sweep.netcdf import (
     make_dataset,
     variable_name,
 )
-from glider_studies.sweep.plan import Plan, vehicle_text
+from glider_studies.sweep.plan import Plan, vehicle_digest
 from glider_studies.workers import WORKER_DIED, Pool, Progress, WorkError
 
 JOURNAL_FILE, RESULT_FILE = 'journal.jsonl', 'sweep.nc'
@@ -91,7 +90,7 @@ def fly_chunk(chunk: Chunk) -> list[dict[str, Any]]:
 def _fly_cell(inputs: Inputs, changes: dict[str, Any]) -> dict[str, Any]:
     try:
         scenario = make_scenario(inputs.source, changes)
-        if digest(vehicle_text(scenario.vehicle)) not in inputs.vehicles:
+        if vehicle_digest(scenario.vehicle) not in inputs.vehicles:
             name = vehicle_path(scenario.vehicle).stem
             raise WorkError(f'{gethostname()} has another file of {name}')
         flight, scores = fly_scored(scenario)
@@ -104,11 +103,6 @@ def _fly_cell(inputs: Inputs, changes: dict[str, Any]) -> dict[str, Any]:
             text = f'{type(error).__name__}: {text}'
         return failure(text)
     return judge(card)
-
-
-def digest(text: str) -> str:
-    """Digest of a text."""
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def failure(reason: str) -> dict[str, Any]:
@@ -190,8 +184,7 @@ def flown_cells(plan: Plan, journal: Journal) -> bytearray:
 
 def make_chunks(plan: Plan, known: bytearray, threads: int) -> Iterator[Chunk]:
     """Chunks of all cells that are not known yet, in order, for so many threads at once."""
-    vehicles = frozenset(digest(text) for text in plan.vehicle_texts)
-    inputs = Inputs(plan.source, vehicles)
+    inputs = Inputs(plan.source, plan.vehicle_digests)
     cell_s = planned_ticks(plan.first) * TICK_S
     share = known.count(0) // (CHUNKS_EACH * max(1, threads))
     size = max(1, min(CHUNK_CELLS, share, int(CHUNK_S / cell_s)))
