@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Our navigation over a recorded flight, beside what was made of it on board or ashore."""
 
+import itertools
 import math
 from typing import Any, NamedTuple
 
@@ -48,16 +49,11 @@ def navigate(flight: Flight, progress: Progress, method: str = METHOD) -> list[R
     """
     check(method)
     rows: list[Row] = []
-    done = 0
-
-    def step() -> None:
-        nonlocal done
-        done += 1
-        progress(done, 2 * len(flight.segments))
-
+    done = itertools.count(1)
     for run in runs(flight.segments):
+        found = reckon(flight, run, method, lambda: progress(next(done), 2 * len(flight.segments)))
         last = None
-        for segment, reckoned in zip(run, reckon(flight, run, method, step), strict=True):
+        for segment, reckoned in zip(run, found, strict=True):
             comparable = comparable_current(flight, segment, reckoned)
             missed = _missed(segment, reckoned, last)
             rows.append(Row(segment, reckoned, comparable, missed))

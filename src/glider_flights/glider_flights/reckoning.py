@@ -214,13 +214,10 @@ def _settings(
         'imu_period_s': 30.0,
         'gyro': False,
     }
-    if 'speed_by' in METHODS[method].model_fields and _is_weighed(segment):
+    is_weighed = np.isfinite(segment.samples.buoyancy_kg).mean() > BUOYANCY_KNOWN
+    if 'speed_by' in METHODS[method].model_fields and is_weighed:
         settings[method] = {'speed_by': 'buoyancy'}
     return NavigationSettings(**settings)
-
-
-def _is_weighed(segment: Segment) -> bool:
-    return float(np.isfinite(segment.samples.buoyancy_kg).mean()) > BUOYANCY_KNOWN
 
 
 def _vehicle(segment: Segment) -> str:

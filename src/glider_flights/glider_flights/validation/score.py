@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from glider_flights.comparison import comparable_current, navigate
 from glider_flights.record import Flight, Segment, at_times
@@ -129,7 +130,7 @@ def _turn_rate(pairs, phase: float, by: str, power: float, recorded: bool) -> fl
         counts = inside & (track.phase == phase)
         turned = np.interp(end, time_s, heading) - np.interp(begin, time_s, heading)
         asked = sine * (one.speed_mps / TURN_MPS) ** power
-        asked = np.concatenate([[0.0], np.cumsum(_trapezoids(asked, time_s))])
+        asked = cumulative_trapezoid(asked, time_s, initial=0.0)
         share = (np.interp(end, time_s, asked) - np.interp(begin, time_s, asked)) / TURN_S
         rows.append(share[counts])
         rates.append((turned / TURN_S)[counts])
@@ -137,10 +138,6 @@ def _turn_rate(pairs, phase: float, by: str, power: float, recorded: bool) -> fl
     if len(asked) < 3 or np.std(asked) * TURN_MPS / 0.3 < SMALLEST_ANGLE:
         return None
     return round(float(np.polyfit(asked, np.concatenate(rates), 1)[0]), 4)
-
-
-def _trapezoids(values: np.ndarray, time_s: np.ndarray) -> np.ndarray:
-    return 0.5 * (values[1:] + values[:-1]) * np.diff(time_s)
 
 
 def _closure(flight: Flight, pairs) -> dict[str, Any]:
