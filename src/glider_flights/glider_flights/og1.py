@@ -29,7 +29,6 @@ from glider_flights.reckoning import DENSITY
 from glider_flights.record import (
     NOT_KNOWN,
     Flight,
-    Instruments,
     OnBoard,
     Polar,
     Samples,
@@ -163,13 +162,11 @@ def _read(path: Path) -> LogFile:
         name=path.name,
         vehicle=texts.get('vehicle', ''),
         dive=0,
-        begin_s=np.nanmin(own_s),
+        begin_s=np.min(own_s, where=np.isfinite(own_s), initial=math.inf),
         fixes=fixes,
         about_deg=_middle(known),
         samples=samples,
-        instruments=instruments(
-            own_s, **{name: known[name] for name in Instruments._fields[1:] if name in known}
-        ),
+        instruments=instruments(own_s, **known),
         body={},
         polar=own_polar or (polar_of({}) if of_base else POLAR),
         on_board=partial(_on_board, known),
