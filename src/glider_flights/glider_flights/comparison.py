@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from glider_flights.folders import Progress
-from glider_flights.reckoning import FIX_STD_M, Reckoned, check, reckon, runs
+from glider_flights.reckoning import FIX_STD_M, Reckoned, check, reckon
 from glider_flights.record import Flight, Segment
+from glider_flights.segments import runs
 
 #: Method of navigation, if nothing else is said.
 METHOD = 'dead_reckoned'
@@ -50,7 +51,10 @@ def navigate(flight: Flight, progress: Progress, method: str = METHOD) -> list[R
     check(method)
     rows: list[Row] = []
     done = itertools.count(1)
-    for run in runs(flight.segments):
+    # Between others there is a dive that is not known.
+    for run in runs(
+        flight.segments, lambda last, one: one.before.time_s[-1] == last.after.time_s[-1]
+    ):
         found = reckon(flight, run, method, lambda: progress(next(done), 2 * len(flight.segments)))
         last = None
         for segment, reckoned in zip(run, found, strict=True):

@@ -3,7 +3,7 @@
 """A recorded flight of its files, cut into segments from one stay at the surface to the next."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -43,6 +43,9 @@ WHY_LEFT_OUT = {
 }
 
 
+Item = TypeVar('Item')
+
+
 class LogFile(NamedTuple):
     """What one file says of a flight."""
 
@@ -74,7 +77,8 @@ def put_together(kind: str, files: list[LogFile], notes: list[str]) -> Flight:
     fixes = np.concatenate([file.fixes for file in files])
     origin = fixes[0, 1:] if len(fixes) else files[0].about_deg
     segments, unused = [], []
-    for run in _runs(files):
+    # Where a dive is missing a vehicle may have been anywhere.
+    for run in runs(files, lambda last, one: one.dive == last.dive + 1 or not one.dive):
         found, why = _segments(run, origin)
         segments += found
         unused += [one for one in why if one not in unused]
@@ -106,15 +110,15 @@ def _of_one_zero(file: LogFile, body: dict[str, float]) -> Instruments:
     return own._replace(pumped_m3=own.pumped_m3 + shift)
 
 
-def _runs(files: list[LogFile]) -> list[list[LogFile]]:
-    """Files that follow each other: where a dive is missing a vehicle may have been anywhere."""
-    runs = [[files[0]]]
-    for last, file in zip(files[:-1], files[1:], strict=True):
-        if file.dive == last.dive + 1 or not file.dive:
-            runs[-1].append(file)
+def runs(items: list[Item], follows: Callable[[Item, Item], bool]) -> list[list[Item]]:
+    """Items in runs: in each every one follows the one before it."""
+    found: list[list[Item]] = []
+    for item in items:
+        if found and follows(found[-1][-1], item):
+            found[-1].append(item)
         else:
-            runs.append([file])
-    return runs
+            found.append([item])
+    return found
 
 
 def _segments(files: list[LogFile], origin: np.ndarray) -> tuple[list[Segment], list[str]]:

@@ -153,8 +153,7 @@ def read_slocum(
         water = dict.fromkeys(WATER + CTD_TIMES, (np.empty(0), np.empty(0)))
         if beside:
             try:
-                found = read_sensors(beside, cache, progress, WATER + CTD_TIMES)
-                water, unread = found.sensors, found.notes
+                water, _, _, unread = read_sensors(beside, cache, progress, WATER + CTD_TIMES)
             except ConfigurationError as error:
                 unread = [f'no water: {error}']
             notes += unread

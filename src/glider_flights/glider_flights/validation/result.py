@@ -137,10 +137,9 @@ def _try_turns(rates: dict[str, Any], learnt: dict[str, Any]) -> None:
     for phase, rate in rates.items():
         known = learnt[phase]
         rate['fitted'] = None
-        if None not in (known['recorded'], known['simulated'], rate['simulated']):
-            if known['simulated'] != 0.0:
-                scale = known['recorded'] / known['simulated']
-                rate['fitted'] = round(rate['simulated'] * scale, 4)
+        if None not in (known['recorded'], rate['simulated']) and known['simulated']:
+            scale = known['recorded'] / known['simulated']
+            rate['fitted'] = round(rate['simulated'] * scale, 4)
 
 
 def _crosswise(
