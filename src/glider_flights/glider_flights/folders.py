@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,16 +21,7 @@ LONGEST_FLIGHT_S = 400 * 86_400.0
 Progress = Callable[[int, int], None]
 
 
-class OneFile(Protocol):
-    """What one file says of the flight that it is of."""
-
-    name: str
-    vehicle: str  #: '' if it does not say
-    time_s: np.ndarray  #: times of its samples (s since 1970), shape (n,), NaN or not
-
-
-Read = TypeVar('Read')
-Some = TypeVar('Some', bound=OneFile)
+File = TypeVar('File')
 
 
 def files_in(place: Path, wanted: Callable[[Path], bool]) -> list[Path]:
@@ -81,8 +72,8 @@ def gsw():
 
 
 def read_each(
-    files: list[Path], progress: Progress, read: Callable[[Path], Read]
-) -> tuple[list[Read], dict[str, str]]:
+    files: list[Path], progress: Progress, read: Callable[[Path], File]
+) -> tuple[list[File], dict[str, str]]:
     """What can be read of files, and why others cannot be, by name; of one alone, it is raised.
 
     Raises
@@ -102,13 +93,22 @@ def read_each(
 
 
 def of_one_flight(
-    place: Path, files: list[Some], left_out: dict[str, str]
-) -> tuple[list[Some], list[str]]:
+    place: Path, files: list[File], left_out: dict[str, str]
+) -> tuple[list[File], list[str]]:
     """Files that are of the flight that most of them are of, and a sentence for each other one.
 
     Not those of another vehicle, far off in time, or of a time at which the vehicle wrote another
-    file. They come in the order in which the vehicle wrote them; ``left_out`` says by name why
-    some are left out already.
+    file.
+
+    Parameters
+    ----------
+    place : Path
+    files : list
+        What they say, in the order in which the vehicle wrote them: each has a ``name``, its
+        ``vehicle``, '' if it does not say, and the times of its samples, ``time_s`` (s since
+        1970), NaN or not.
+    left_out : dict
+        Why some are left out already, by name.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def of_one_flight(
     return kept, notes
 
 
-def _strangers(place: Path, files: list[Some]) -> dict[str, str]:
+def _strangers(place: Path, files: list[File]) -> dict[str, str]:
     """Files that are not of the flight that most of them are of, by name, and why not."""
     vehicles = Counter(file.vehicle for file in files if file.vehicle).most_common()
     if len(vehicles) > 1 and vehicles[0][1] == vehicles[1][1]:

@@ -230,15 +230,6 @@ def _instruments(sensors: Sensors, declined: float, origin: np.ndarray) -> Instr
     )
 
 
-class Recorded(NamedTuple):
-    """What the files of one computer say."""
-
-    sensors: Sensors
-    files: list[Path]  #: that were read
-    begun: list[tuple[float, str]]  #: when each begins (s since 1970), and its name
-    notes: list[str]
-
-
 class DbdFile(NamedTuple):
     """What one file says."""
 
@@ -263,11 +254,13 @@ class DbdFile(NamedTuple):
 
 def read_sensors(
     files: list[Path], cache: Path | None, progress: Progress, names: Names, needed: Names = ()
-) -> Recorded:
-    """Sensors by name; one that was never recorded has no times.
+) -> tuple[Sensors, list[Path], list[tuple[float, str]], list[str]]:
+    """Read the files of one computer.
 
-    A file without a sensor that is needed is left out, as is one that cannot be read, or is not of
-    the flight of the others.
+    Returns sensors by name, of which one that was never recorded has no times; the files that were
+    read; when each begins (s since 1970) with its name; what is to be said of them. A file without
+    a sensor that is needed is left out, as is one that cannot be read, or is not of the flight of
+    the others.
 
     Raises
     ------
@@ -297,7 +290,7 @@ def read_sensors(
         name: _joined([file.sensors[name] for file in found if name in file.sensors])
         for name in names
     }
-    return Recorded(sensors, [file.path for file in found], sorted(begun), notes)
+    return sensors, [file.path for file in found], sorted(begun), notes
 
 
 def _read_files(

@@ -224,6 +224,7 @@ def fly_free(table, vehicle, step, flown):
     for k in range(len(table)):
         here = table[k]
         phi, theta, _ = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
+        before = _rate(x.u, x.v, x.w, phi, theta)
         speed = math.sqrt(x.u * x.u + x.v * x.v + x.w * x.w)
         flown[k, 0], flown[k, 1], flown[k, 2], flown[k, 3] = down, ahead, abeam, heading
         flown[k, 4], flown[k, 5], flown[k, 6] = speed, phi, theta
@@ -236,8 +237,6 @@ def fly_free(table, vehicle, step, flown):
         for i in range(steps):
             begin = _between(here, after, i / steps)
             end = _between(here, after, (i + 1.0) / steps)
-            phi, theta, psi = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
-            before = _rate(x.u, x.v, x.w, phi, theta)
             x = _stepped(x, begin, end, vehicle, h)
             phi, theta, psi = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
             now = _rate(x.u, x.v, x.w, phi, theta)
@@ -245,7 +244,7 @@ def fly_free(table, vehicle, step, flown):
             ahead += 0.5 * h * (before[1] + now[1])
             abeam += 0.5 * h * (before[2] + now[2])
             heading += wrap_angle(psi - last)
-            last = psi
+            before, last = now, psi
 
 
 @kernel
