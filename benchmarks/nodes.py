@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from statistics import mean, median
 from tempfile import TemporaryDirectory
@@ -50,10 +51,7 @@ def measure(progress: Callable[[str], None]) -> dict:
         flights.append(flight)
         progress(f'five hops of bare rclpy, after flight {i + 1} of {REPEATS}')
         floors.append(floor_ticks_per_s())
-    ratios = [
-        rate / mean(around)
-        for rate, around in zip(rates, zip(floors[:-1], floors[1:], strict=True), strict=True)
-    ]
+    ratios = [rate / mean(two) for rate, two in zip(rates, pairwise(floors), strict=True)]
     progress('a flight with a process for each node, and one without')
     processes, together = (_costs(layout) for layout in ('processes', 'together'))
     return {

@@ -16,6 +16,11 @@ from glider_flights.validation.score import STEERED_BY
 VEHICLES = {'slocum': 'slocum_g2', 'seaglider': 'seaglider', 'og1': 'seaglider'}
 #: Both ways.
 HALVES = ('first', 'second')
+#: What is told of each.
+OF_HALF = (
+    *('segments', 'fitted', 'w_rmse_cmps', 'w_bias_cmps', 'peer', 'unfitted'),
+    *STEERED_BY,
+)
 
 
 def flights_in(folder: Path) -> list[Path]:
@@ -79,19 +84,7 @@ def _row(place: Path, vehicle: str | None, fit: str | None, cache: Path | None) 
         'vehicle': chosen,
         'segments': sum(one['segments'] for one in halves.values()),
         **{
-            f'fit_on_{half}': {
-                name: one[name]
-                for name in (
-                    'segments',
-                    'fitted',
-                    'w_rmse_cmps',
-                    'w_bias_cmps',
-                    'peer',
-                    'unfitted',
-                    *STEERED_BY,
-                )
-            }
-            for half, one in halves.items()
+            f'fit_on_{half}': {name: one[name] for name in OF_HALF} for half, one in halves.items()
         },
         'peer': (first['peer'] or {}).get('name'),
         'energy_error_percent': energy,

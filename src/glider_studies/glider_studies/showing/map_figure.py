@@ -59,11 +59,6 @@ class Extent(NamedTuple):
     across_kn: tuple[float, float]  #: in view, left and right
     along_kn: tuple[float, float]  #: in view, bottom and top
 
-    @property
-    def rim_kn(self) -> float:
-        """Largest speed of a cell."""
-        return float(self.speed_kn[-1])
-
 
 def _edges(values: np.ndarray, alone: float) -> np.ndarray:
     """Bounds of cells around increasing values; the outer ones go half a step beyond them."""
@@ -153,7 +148,7 @@ def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray, extent: Exte
         rasterized=True,
     )
     _draw_rose(axis, extent)
-    _draw_limits(axis, extent.rim_kn, stability.horizontal_kn)
+    _draw_limits(axis, extent.speed_kn[-1], stability.horizontal_kn)
     for degrees, _, marker in PAPER_POINTS:
         across, along = _tip(PAPER_KN, degrees)
         axis.plot(across, along, marker, color='white', markeredgecolor='black', markersize=6.5)
@@ -186,7 +181,7 @@ def _round_values(first: float, last: float, steps: tuple[float, ...]) -> np.nda
 
 def _draw_rose(axis, extent: Extent) -> None:
     """Rays and circles by which angle and speed of a current can be read."""
-    first, last, rim = extent.angle_deg[0], extent.angle_deg[-1], extent.rim_kn
+    first, last, rim = extent.angle_deg[0], extent.angle_deg[-1], extent.speed_kn[-1]
     thin = {'color': 'black', 'linewidth': 0.4, 'alpha': 0.4}
     for degrees in _round_values(first, last, _RAYS):
         across, along = _tip(rim, degrees)
