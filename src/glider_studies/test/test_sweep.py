@@ -291,7 +291,7 @@ def test_worker_with_another_program_is_refused():
 def test_worker_with_another_vehicle_file_is_refused(flown):
     chunk = next(make_chunks(load_sweep(str(flown.file)), bytearray(12), 2))
     with pytest.raises(WorkError, match='another file of zhang2021'):
-        fly_chunk(chunk._replace(inputs=chunk.inputs._replace(vehicles=frozenset())))
+        fly_chunk(chunk._replace(vehicles=frozenset()))
 
 
 # ---------------------------------------------------------------------- resuming
