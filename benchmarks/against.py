@@ -46,7 +46,11 @@ def measure(progress: Callable[[str], None], checkout: Path | None = None) -> di
     """
     if checkout is None:
         return {}
-    ways = {'mission': _mission_s, 'nodes': _nodes_s, 'sweep': _sweep_s}
+    ways = {
+        'mission': lambda root: _flight_s(root, MISSION_S, '--engine', 'direct'),
+        'nodes': lambda root: _flight_s(root, NODES_S),
+        'sweep': _sweep_s,
+    }
     roots = {'this': Path(__file__).parents[1], 'other': checkout.resolve()}
     figures = {}
     for way, time_s in ways.items():
@@ -80,14 +84,6 @@ def _flight_s(root: Path, duration_s: float, *words: str) -> float:
         out = ('--out', f'{scratch}/run', '--no-report', '--json')
         said = _glider(root, 'run', 'current_8deg', '--duration', str(duration_s), *words, *out)
     return json.loads(said)['wall_time_s']
-
-
-def _mission_s(root: Path) -> float:
-    return _flight_s(root, MISSION_S, '--engine', 'direct')
-
-
-def _nodes_s(root: Path) -> float:
-    return _flight_s(root, NODES_S)
 
 
 def _sweep_s(root: Path) -> float:

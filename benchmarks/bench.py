@@ -15,6 +15,7 @@ import importlib
 import json
 import os
 import platform
+import re
 import sys
 from pathlib import Path
 from typing import Annotated, Literal
@@ -77,16 +78,10 @@ def bench(
 
 def machine() -> dict:
     """What the figures were measured on."""
-    model = platform.processor() or platform.machine()
-    try:
-        with open('/proc/cpuinfo', encoding='utf-8') as file:
-            model = next(
-                line.partition(':')[2].strip() for line in file if line.startswith('model name')
-            )
-    except (OSError, StopIteration):
-        pass
+    told = Path('/proc/cpuinfo').read_text(encoding='utf-8')
+    model = re.search(r'^model name\s*:\s*(.*)$', told, re.MULTILINE)
     return {
-        'processor': model,
+        'processor': model[1] if model else platform.machine(),
         'processors': len(os.sched_getaffinity(0)),
         'load_average': os.getloadavg()[0],
         'python': platform.python_version(),

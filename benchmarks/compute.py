@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from tempfile import TemporaryDirectory
 
 import numpy as np
@@ -109,39 +110,31 @@ def _step_s() -> float:
         for _ in range(STEPS):
             flight.step()
 
-    fly()
-    return min(cost_s(fly) for _ in range(REPEATS)) / STEPS
+    return _least_s(fly)[0] / STEPS
 
 
 def _plant_s() -> tuple[float, float | None, int | None]:
     """Processor time (s) of a tick of the plant, and of one in C; ticks with the same bits."""
     flight = flight_of(load_mission(**SHALLOW))
-    motions = np.empty((len(flight[2]), len(flight[0].motion)))
-    ways = {'plant': plant_steps}
-    if compiler():
-        ways['floor'] = Floor(*flight[:2]).plant_steps
-    filled = {name: motions.copy() for name in ways}
-    for name, way in ways.items():
-        way(*flight, filled[name])
-    compared = compare(*filled.values()) if compiler() else None
-    times = {name: [] for name in ways}
-    for _ in range(2 * REPEATS):
-        for name, way in ways.items():
-            times[name].append(cost_s(way, *flight, motions) / len(motions))
-    return min(times['plant']), min(times.get('floor', [None])), compared
+    motions = np.empty((2, len(flight[2]), len(flight[0].motion)))
+    ways = [plant_steps, *([Floor(*flight[:2]).plant_steps] if compiler() else [])]
+    calls = (partial(way, *flight, rows) for way, rows in zip(ways, motions, strict=False))
+    plant_s, *floor_s = (time_s / len(flight[2]) for time_s in _least_s(*calls))
+    return (plant_s, *floor_s, compare(*motions)) if floor_s else (plant_s, None, None)
 
 
 def _sea_s() -> tuple[float, float]:
     """Processor time (s) of a tick of the plant with a fin in measured water, and without."""
     flights = [flight_of(load_mission(**SHALLOW, **changes)) for changes in (SEA, {})]
     motions = np.empty((len(flights[0][2]), len(flights[0][0].motion)))
-    for flight in flights:
-        plant_steps(*flight, motions)
-    times = [[], []]
-    for _ in range(2 * REPEATS):
-        for flight, taken in zip(flights, times, strict=True):
-            taken.append(cost_s(plant_steps, *flight, motions) / len(motions))
-    return min(times[0]), min(times[1])
+    sea_s, plain_s = _least_s(*(partial(plant_steps, *flight, motions) for flight in flights))
+    return sea_s / len(motions), plain_s / len(motions)
+
+
+def _least_s(*calls: Callable[[], None]) -> list[float]:
+    """Least processor times (s) of some calls, by turns; in the first turn they may compile."""
+    turns = [[cost_s(call) for call in calls] for _ in range(2 * REPEATS)]
+    return [min(times) for times in zip(*turns, strict=True)]
 
 
 def _warm_up_s(cache: str) -> float:

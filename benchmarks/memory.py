@@ -64,7 +64,6 @@ def _on_board_mb(layout: Layout) -> float:
     peaks = {}
     fly_once(
         FLIGHT_S,
-        0.0,
         lambda tick, depth_m: peaks.update(memory_mb('VmHWM')),
         navigation='dead_reckoned',
         layout=layout,

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from statistics import mean, median
 from tempfile import TemporaryDirectory
@@ -50,10 +51,7 @@ def measure(progress: Callable[[str], None]) -> dict:
         flights.append(flight)
         progress(f'five hops of bare rclpy, after flight {i + 1} of {REPEATS}')
         floors.append(floor_ticks_per_s())
-    ratios = [
-        rate / mean(around)
-        for rate, around in zip(rates, zip(floors[:-1], floors[1:], strict=True), strict=True)
-    ]
+    ratios = [rate / mean(two) for rate, two in zip(rates, pairwise(floors), strict=True)]
     progress('a flight with a process for each node, and one without')
     processes, together = (_costs(layout) for layout in ('processes', 'together'))
     return {
@@ -91,17 +89,16 @@ def floor_ticks_per_s() -> float:
 
 def fly_once(
     duration_s: float,
-    speed: float,
     on_progress: Progress,
     navigation: str = 'known',
     layout: Layout = 'together',
 ) -> Outcome:
-    """Fly the scenario over topics, at ``speed`` times real time (0.0: as fast as possible)."""
+    """Fly the scenario over topics, as fast as possible."""
     changes = {'dives': 0, 'duration_s': duration_s, 'navigation.method': navigation}
     scenario = load_scenario(SCENARIO, changes)
     with TemporaryDirectory() as parent:
         folder = make_run_folder(scenario, Path(parent) / 'run')
-        flight = fly_nodes(scenario, folder, progress=on_progress, speed=speed, layout=layout)
+        flight = fly_nodes(scenario, folder, progress=on_progress, speed=0.0, layout=layout)
     if flight.status != 'completed':
         raise RuntimeError(f'the flight over topics was aborted: {flight.reason}')
     return flight
@@ -111,7 +108,7 @@ def _costs(layout: Layout) -> tuple[float, float]:
     """Processor time (s) and most resident memory (MB) of the processes of a flight."""
     peaks: dict[str, float] = {}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    fly_once(DURATION_S, 0.0, lambda *_: peaks.update(memory_mb('VmHWM')), layout=layout)
+    fly_once(DURATION_S, lambda *_: peaks.update(memory_mb('VmHWM')), layout=layout)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     used_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return used_s, sum(peaks.values())
@@ -131,6 +128,6 @@ def fly_over_topics(
             said.append((tick, time.perf_counter()))
             on_tick(tick)
 
-    flight = fly_once(duration_s, 0.0, note)
+    flight = fly_once(duration_s, note)
     (first, start_s), (last, end_s) = said[0], said[-2]
     return (last - first) / (end_s - start_s), flight

@@ -75,7 +75,7 @@ def _fly(pool: Pool, chunks: Iterable[Chunk]) -> float:
 def _task_ms(pool: Pool) -> float:
     """Processor time (ms) of this process, the scheduler's too, for a chunk with nothing in it."""
     start = time.process_time()
-    for _ in pool.outcomes(fly_chunk, [Chunk(None, [])] * EMPTY_CHUNKS):
+    for _ in pool.outcomes(fly_chunk, [Chunk(None, frozenset(), [])] * EMPTY_CHUNKS):
         pass
     return 1e3 * (time.process_time() - start) / EMPTY_CHUNKS
 

@@ -22,7 +22,7 @@ from glider_model.vehicle.file import vehicle_path
 from glider_studies import montecarlo
 from glider_studies.paper.experiments import Case, _fly_case
 from glider_studies.sweep import fly
-from glider_studies.sweep.fly import Chunk, Inputs
+from glider_studies.sweep.fly import Chunk
 
 DURATION_S = 600.0
 
@@ -114,9 +114,8 @@ def test_studies_count_it_as_failed(driven):
     assert montecarlo._fly_plant(scenario)['diverged']
     row, _ = _fly_case(Case('', 'adaptive', 'los_current', 'current_8deg', changes))
     assert (row['status'], row['finite']) == ('failed', False)
-    vehicles = {fly.digest(fly.vehicle_text(scenario.vehicle))}
-    inputs = Inputs(source=read_scenario(), vehicles=vehicles)
-    (record,) = fly.fly_chunk(Chunk(inputs, [(0, changes)]))
+    vehicles = {fly.vehicle_digest(scenario.vehicle)}
+    (record,) = fly.fly_chunk(Chunk(read_scenario(), vehicles, [(0, changes)]))
     assert (record['status'], record['figures']) == ('failed', {})
     assert 'not finite at tick' in record['reason']
 

@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Our navigation over a recorded flight, beside what was made of it on board or ashore."""
 
+import itertools
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from glider_flights.reckoning import FIX_STD_M, Reckoned, check, mean_current, reckon, runs
+from glider_flights.folders import Progress
+from glider_flights.reckoning import FIX_STD_M, Reckoned, check, reckon
 from glider_flights.record import Flight, Segment
+from glider_flights.segments import runs
 
 #: Method of navigation, if nothing else is said.
 METHOD = 'dead_reckoned'
@@ -32,14 +34,13 @@ class Row(NamedTuple):
 
 def comparable_current(flight: Flight, segment: Segment, reckoned: Reckoned) -> np.ndarray:
     """Our current (m/s) over what the vehicle's own is a mean, shape (2,): north, east."""
-    if flight.on_board_over == 'between fixes':
-        return mean_current(segment, reckoned)
-    return reckoned.dac_mps
+    if flight.on_board_over != 'between fixes':
+        return reckoned.dac_mps
+    moved_m = segment.after.place_m[0] - segment.before.place_m[-1]
+    return (moved_m - reckoned.way_m) / (segment.after.time_s[0] - segment.before.time_s[-1])
 
 
-def navigate(
-    flight: Flight, progress: Callable[[int, int], None], method: str = METHOD
-) -> list[Row]:
+def navigate(flight: Flight, progress: Progress, method: str = METHOD) -> list[Row]:
     """Navigate all segments, in the order of time, each by what was known before it.
 
     Raises
@@ -49,16 +50,14 @@ def navigate(
     """
     check(method)
     rows: list[Row] = []
-    done = 0
-
-    def step() -> None:
-        nonlocal done
-        done += 1
-        progress(done, 2 * len(flight.segments))
-
-    for run in runs(flight.segments):
+    done = itertools.count(1)
+    # Between others there is a dive that is not known.
+    for run in runs(
+        flight.segments, lambda last, one: one.before.time_s[-1] == last.after.time_s[-1]
+    ):
+        found = reckon(flight, run, method, lambda: progress(next(done), 2 * len(flight.segments)))
         last = None
-        for segment, reckoned in zip(run, reckon(flight, run, method, step), strict=True):
+        for segment, reckoned in zip(run, found, strict=True):
             comparable = comparable_current(flight, segment, reckoned)
             missed = _missed(segment, reckoned, last)
             rows.append(Row(segment, reckoned, comparable, missed))

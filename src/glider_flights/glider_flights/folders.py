@@ -3,11 +3,11 @@
 """Which files are those of a flight, and the libraries that read them."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,15 +17,11 @@ from glider_base.errors import ConfigurationError
 LATEST_S = 4.1e9
 #: No glider is at sea for longer (s): files further apart are of two flights, or of a wrong clock.
 LONGEST_FLIGHT_S = 400 * 86_400.0
-Read = TypeVar('Read')
+#: Gets how many files, or other things, are done, and how many there are.
+Progress = Callable[[int, int], None]
 
 
-class Part(NamedTuple):
-    """What one file says of the flight that it is of."""
-
-    name: str
-    vehicle: str  #: '' if it does not say
-    time_s: np.ndarray  #: times of its samples (s since 1970), shape (n,), NaN or not
+File = TypeVar('File')
 
 
 def files_in(place: Path, wanted: Callable[[Path], bool]) -> list[Path]:
@@ -68,9 +64,16 @@ def installed(library: str) -> Iterator[None]:
         ) from None
 
 
+def gsw():
+    """The library of sea water, TEOS-10."""
+    with installed('gsw, which knows sea water'):
+        import gsw
+    return gsw
+
+
 def read_each(
-    files: list[Path], progress: Callable[[int, int], None], read: Callable[[Path], Read]
-) -> tuple[list[Read], dict[str, str]]:
+    files: list[Path], progress: Progress, read: Callable[[Path], File]
+) -> tuple[list[File], dict[str, str]]:
     """What can be read of files, and why others cannot be, by name; of one alone, it is raised.
 
     Raises
@@ -89,51 +92,66 @@ def read_each(
     return found, left_out
 
 
-def strangers(place: Path, parts: Sequence[Part]) -> dict[str, str]:
-    """Files that are not of the flight that most of them are of, by name, and why not.
+def of_one_flight(
+    place: Path, files: list[File], left_out: dict[str, str]
+) -> tuple[list[File], list[str]]:
+    """Files that are of the flight that most of them are of, and a sentence for each other one.
 
-    Of another vehicle, far off in time, or at a time at which the vehicle wrote another file.
+    Not those of another vehicle, far off in time, or of a time at which the vehicle wrote another
+    file.
 
     Parameters
     ----------
     place : Path
-        Where they are, for the error.
-    parts : sequence of Part
-        In the order in which the vehicle wrote them, by their names.
+    files : list
+        What they say, in the order in which the vehicle wrote them: each has a ``name``, its
+        ``vehicle``, '' if it does not say, and the times of its samples, ``time_s`` (s since
+        1970), NaN or not.
+    left_out : dict
+        Why some are left out already, by name.
 
     Raises
     ------
     ConfigurationError
-        If no vehicle has more files than each of the others.
+        If no vehicle has more files than each of the others, or none is left.
     """
-    vehicles = Counter(part.vehicle for part in parts if part.vehicle).most_common()
+    left_out = left_out | _strangers(place, files)
+    notes = said(left_out)
+    kept = [file for file in files if file.name not in left_out]
+    if not kept:
+        raise ConfigurationError(f'{place}: no file could be read; {"; ".join(notes)}')
+    return kept, notes
+
+
+def _strangers(place: Path, files: list[File]) -> dict[str, str]:
+    """Files that are not of the flight that most of them are of, by name, and why not."""
+    vehicles = Counter(file.vehicle for file in files if file.vehicle).most_common()
     if len(vehicles) > 1 and vehicles[0][1] == vehicles[1][1]:
         raise ConfigurationError(
             f'{place}: files of several vehicles, {", ".join(sorted(dict(vehicles)))} '
             '(allowed: those of one, or most of one)'
         )
-    found, rest = {}, []
-    for part in parts:
-        if part.vehicle and part.vehicle != vehicles[0][0]:
-            found[part.name] = f'it is of {part.vehicle}, most are of {vehicles[0][0]}'
-            continue
-        dated = part.time_s[(part.time_s > 0.0) & (part.time_s < LATEST_S)]
-        if len(dated):
-            rest.append(part._replace(time_s=dated))
+    found, dates = {}, {}
+    for file in files:
+        time_s = file.time_s
+        dated = time_s[(time_s > 0.0) & (time_s < LATEST_S)]
+        if file.vehicle and file.vehicle != vehicles[0][0]:
+            found[file.name] = f'it is of {file.vehicle}, most are of {vehicles[0][0]}'
+        elif len(dated):
+            dates[file.name] = dated
         else:
-            found[part.name] = 'it has no samples with a date'
-    return found | _of_other_times(rest)
+            found[file.name] = 'it has no samples with a date'
+    return found | (_of_other_times(dates) if dates else {})
 
 
-def _of_other_times(parts: list[Part]) -> dict[str, str]:
-    """Files whose times cannot be right, by name, and why not."""
-    if not parts:
-        return {}
-    begin, middle, end = np.array([np.percentile(one.time_s, (5, 50, 95)) for one in parts]).T
-    usual = np.sort(middle)[len(parts) // 2]
+def _of_other_times(dates: dict[str, np.ndarray]) -> dict[str, str]:
+    """Files whose times (s since 1970) cannot be right, by name, and why not."""
+    names = list(dates)
+    begin, middle, end = np.array([np.percentile(one, (5, 50, 95)) for one in dates.values()]).T
+    usual = np.sort(middle)[len(names) // 2]
     found = {
-        part.name: f'its dates are about {_day(at)}, most are about {_day(usual)}'
-        for part, at in zip(parts, middle, strict=True)
+        name: f'its dates are about {_day(at)}, most are about {_day(usual)}'
+        for name, at in zip(names, middle, strict=True)
         if abs(at - usual) > LONGEST_FLIGHT_S
     }
     near = np.flatnonzero(np.abs(middle - usual) <= LONGEST_FLIGHT_S)
@@ -141,7 +159,7 @@ def _of_other_times(parts: list[Part]) -> dict[str, str]:
     for one in np.setdiff1d(near, believed):
         same = believed[(begin[believed] < end[one]) & (end[believed] > begin[one])]
         if len(same):
-            found[parts[one].name] = f'it is of the time of {parts[same[0]].name}'
+            found[names[one]] = f'it is of the time of {names[same[0]]}'
     return found
 
 

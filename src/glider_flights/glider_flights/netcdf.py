@@ -69,13 +69,14 @@ def variables(
         raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
 
 
-def refuse_missing(path: Path, missing: Sequence[Sequence[str]], why: str) -> None:
-    """Refuse a file that lacks variables, each by the names that it may have.
+def refuse_missing(path: Path, found: dict, needed: dict[str, Sequence[str]], why: str) -> None:
+    """Refuse a file that lacks variables: by our names, the names that each may have.
 
     Raises
     ------
     ConfigurationError
     """
+    missing = [names for key, names in needed.items() if not len(found.get(key, ()))]
     if missing:
         names = ', '.join(' or '.join(names) for names in missing)
         raise ConfigurationError(f'{path}: no variable {names} (needed {why})')

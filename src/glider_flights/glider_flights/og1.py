@@ -8,38 +8,37 @@ the file of the vehicle. ``HEADING`` is magnetic in the vocabulary of OG1.
 """
 
 import math
-from collections.abc import Callable
 from datetime import datetime, timezone
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from glider_base.errors import ConfigurationError
 from glider_base.files import parse_yaml
 from glider_base.settings import validate
-from glider_flights.folders import Part, files_in, installed, read_each, said, strangers
+from glider_flights.folders import (
+    Progress,
+    files_in,
+    gsw,
+    installed,
+    of_one_flight,
+    read_each,
+)
 from glider_flights.netcdf import SUFFIXES, datasets, refuse_missing, variables
 from glider_flights.reckoning import DENSITY
 from glider_flights.record import (
     NOT_KNOWN,
-    Fixes,
     Flight,
-    Instruments,
     OnBoard,
     Polar,
     Samples,
-    Segment,
     angles_at_times,
     at_times,
     instruments,
-    joined,
-    local_metres,
     usual,
 )
 from glider_flights.seaglider import DIVE_FILE, polar_of
-from glider_flights.seawater import depth_of
-from glider_flights.segments import cut
+from glider_flights.segments import LogFile, put_together
 from glider_flights.slocum import POLAR
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import Vehicle
@@ -74,20 +73,6 @@ SCALES = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0, 'cm/s': 1e-2, 'cm s-1': 1e-
 TEXTS = {'model': ('PLATFORM_MODEL', 'PLATFORM_TYPE'), 'vehicle': ('PLATFORM_SERIAL_NUMBER',)}
 
 
-class File(NamedTuple):
-    """What one file says."""
-
-    name: str
-    vehicle: str
-    model: str
-    known: dict[str, np.ndarray]  #: variables by our names, times in s since 1970
-    samples: Samples
-    #: Shape (n, 3): time (s since 1970), latitude, longitude (degrees).
-    fixes: np.ndarray
-    notes: list[str]
-    own_polar: Polar | None  #: of the file of the vehicle, where that is in it
-
-
 def og1_files(place: Path) -> list[Path]:
     """NetCDF files, if one of them has a single time for all and fixes or pitch, as OG1 has.
 
@@ -107,7 +92,7 @@ def _is_one(path: Path) -> bool:
     return 'TIME' in names and bool(told) and 'LOG_GPS_LAT' not in names
 
 
-def read_og1(place: Path, progress: Callable[[int, int], None]) -> Flight:
+def read_og1(place: Path, progress: Progress) -> Flight:
     """Read a flight.
 
     Raises
@@ -116,34 +101,7 @@ def read_og1(place: Path, progress: Callable[[int, int], None]) -> Flight:
     """
     files, left_out = read_each(og1_files(place), progress, _read)
     files.sort(key=lambda file: file.name)
-    parts = [Part(file.name, file.vehicle, file.samples.time_s) for file in files]
-    left_out |= strangers(place, parts)
-    files = [file for file in files if file.name not in left_out]
-    notes = said(left_out)
-    if not files:
-        raise ConfigurationError(f'{place}: no file could be read; {"; ".join(notes)}')
-    files.sort(key=lambda file: np.nanmin(file.samples.time_s))
-    fixes = np.concatenate([file.fixes for file in files])
-    origin = fixes[0, 1:] if len(fixes) else _middle(files[0].known)
-    samples = Samples(*np.concatenate([np.stack(file.samples) for file in files], axis=1))
-    cuts, unused = cut(Fixes(fixes[:, 0], local_metres(origin, *fixes.T[1:])), samples)
-    of_base = 'seaglider' in files[0].model.lower() and not files[0].own_polar
-    polar = files[0].own_polar or (polar_of({}) if of_base else POLAR)
-    segments = []
-    for one in cuts:
-        middle = 0.5 * (one.before.time_s[-1] + one.after.time_s[0])
-        file = [file for file in files if np.nanmin(file.samples.time_s) <= middle][-1]
-        on_board = OnBoard(_dac(file, one.samples), NOT_KNOWN, NOT_KNOWN)
-        segments.append(Segment(file.name, *one, on_board, polar))
-    return Flight(
-        kind='og1',
-        files=[file.name for file in files],
-        segments=segments,
-        notes=notes + [note for file in files for note in file.notes] + unused,
-        origin_deg=origin,
-        instruments=joined(_instruments(file) for file in files),
-        on_board_over='between fixes' if of_base else 'under water',
-    )
+    return put_together('og1', *of_one_flight(place, files, left_out))
 
 
 def _middle(known: dict[str, np.ndarray]) -> np.ndarray:
@@ -151,17 +109,17 @@ def _middle(known: dict[str, np.ndarray]) -> np.ndarray:
     return np.nan_to_num([usual(known.get(name, ())) for name in ('latitude', 'longitude')])
 
 
-def _dac(file: File, samples: Samples) -> np.ndarray:
-    """What the file says of the current of a segment, shape (2,): north, east (m/s)."""
-    time_s = file.known['time']
+def _on_board(known: dict[str, np.ndarray], samples: Samples) -> OnBoard:
+    """What a file says of the current of a segment with such samples."""
+    time_s = known['time']
     inside = (time_s >= samples.time_s[0]) & (time_s <= samples.time_s[-1])
-    told = [file.known.get(name, ()) for name in ('dac_north', 'dac_east')]
+    told = [known.get(name, ()) for name in ('dac_north', 'dac_east')]
     if any(len(values) != len(time_s) for values in told):
-        return NOT_KNOWN
-    return np.array([usual(values[inside]) for values in told])
+        return OnBoard(NOT_KNOWN, NOT_KNOWN, NOT_KNOWN)
+    return OnBoard(np.array([usual(values[inside]) for values in told]), NOT_KNOWN, NOT_KNOWN)
 
 
-def _read(path: Path) -> File:
+def _read(path: Path) -> LogFile:
     known, texts = {}, {}
     wanted = {key: names for key, (names, _) in NAMES.items()} | TEXTS
     for key, _, values, units in variables(path, wanted, str.upper):
@@ -178,10 +136,9 @@ def _read(path: Path) -> File:
     fixes, notes = _fixes(known), []
     if 'pressure' in known:
         latitude = fixes[0, 1] if len(fixes) else _middle(known)[0]
-        known['depth_m'] = depth_of(known['pressure'], latitude)
-    needed = ('time', 'depth_m', 'pitch_rad')
-    missing = [NAMES[key][0] for key in needed if not len(known.get(key, ()))]
-    refuse_missing(path, missing, 'of a flight in OG1 or CF')
+        known['depth_m'] = -gsw().z_from_p(known['pressure'], latitude)
+    needed = {key: wanted[key] for key in ('time', 'depth_m', 'pitch_rad')}
+    refuse_missing(path, known, needed, 'of a flight in OG1 or CF')
     if 'heading_rad' in known:
         declination, note = _declination(known, fixes)
         known['heading_rad'] = known['heading_rad'] + declination
@@ -199,8 +156,23 @@ def _read(path: Path) -> File:
         angles_at_times(own_s, own_s, known.get('heading_rad', nothing)),
         known.get('buoyancy_kg', nothing),
     )
-    vehicle, model = texts.get('vehicle', ''), texts.get('model', '')
-    return File(path.name, vehicle, model, known, samples, fixes, notes, _own_polar(path))
+    own_polar = _own_polar(path)
+    of_base = own_polar is None and 'seaglider' in texts.get('model', '').lower()
+    return LogFile(
+        name=path.name,
+        vehicle=texts.get('vehicle', ''),
+        dive=0,
+        begin_s=np.min(own_s, where=np.isfinite(own_s), initial=math.inf),
+        fixes=fixes,
+        about_deg=_middle(known),
+        samples=samples,
+        instruments=instruments(own_s, **known),
+        body={},
+        polar=own_polar or (polar_of({}) if of_base else POLAR),
+        on_board=partial(_on_board, known),
+        of_base_station=of_base,
+        notes=notes,
+    )
 
 
 def _own_polar(path: Path) -> Polar | None:
@@ -247,8 +219,3 @@ def _declination(known: dict[str, np.ndarray], fixes: np.ndarray) -> tuple[float
     declination = math.atan2(east.item(), north.item())
     turned = f'{math.degrees(declination):.1f} deg east'
     return declination, f'HEADING is magnetic, {turned} there by IGRF'
-
-
-def _instruments(file: File) -> Instruments:
-    known = {name: file.known[name] for name in Instruments._fields[1:] if name in file.known}
-    return instruments(file.known['time'], **known)

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reading a recorded flight, or its energy, of whichever kind of vehicle its files are."""
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -10,13 +9,18 @@ from glider_base.errors import ConfigurationError
 from glider_flights.energy.seaglider import seaglider_uses
 from glider_flights.energy.slocum import slocum_uses
 from glider_flights.energy.uses import Uses
-from glider_flights.folders import said
+from glider_flights.folders import Progress, said
 from glider_flights.og1 import og1_files, read_og1
 from glider_flights.record import Flight
 from glider_flights.seaglider import read_seaglider, seaglider_files
 from glider_flights.slocum import read_slocum, slocum_files
 
-Progress = Callable[[int, int], None]
+
+def files_by_kind(place: Path) -> dict[str, list[Path]]:
+    """Files of flights by the kind of vehicle, or of file."""
+    in_og1 = og1_files(place)
+    dives = [path for path in seaglider_files(place) if path not in in_og1]
+    return {'a Slocum': slocum_files(place), 'a Seaglider': dives, 'OG1': in_og1}
 
 
 def read_flight(place: Path, cache: Path | None, progress: Progress) -> Flight:
@@ -28,8 +32,7 @@ def read_flight(place: Path, cache: Path | None, progress: Progress) -> Flight:
         Folder, or one file.
     cache : Path or None
         Folder of a Slocum's caches; without it they are looked for.
-    progress : callable
-        Gets how many files are read, and how many there are.
+    progress : Progress
 
     Raises
     ------
@@ -63,26 +66,24 @@ def _read(place: Path, cache: Path | None, progress: Progress, slocum, seaglider
         raise ConfigurationError(f'{place}: there is no such folder or file')
     if cache is not None and not cache.is_dir():
         raise ConfigurationError(f'--cache {cache}: there is no such folder')
-    in_og1 = og1_files(place)
-    dives = [path for path in seaglider_files(place) if path not in in_og1]
+    files = files_by_kind(place)
     readers = {
-        'a Slocum': (slocum_files(place), partial(slocum, place, cache, progress)),
-        'a Seaglider': (dives, partial(seaglider, place, progress)),
+        'a Slocum': partial(slocum, place, cache, progress),
+        'a Seaglider': partial(seaglider, place, progress),
     }
     if og1:
-        readers['OG1'] = (in_og1, partial(og1, place, progress))
-    kind = max(readers, key=lambda kind: len(readers[kind][0]))
-    files, read = readers.pop(kind)
-    if not files:
+        readers['OG1'] = partial(og1, place, progress)
+    kind = max(readers, key=lambda kind: len(files[kind]))
+    if not files[kind]:
         raise ConfigurationError(
             f'{place}: no files of a flight in it (allowed: .dbd, .mbd, .sbd, .dcd, .mcd, .scd of '
             'a Slocum, p*.nc of a Seaglider'
             + (', NetCDF with TIME as OG1 has it)' if og1 else ')')
         )
-    flight = read()
+    flight = readers.pop(kind)()
     others = {
         path.name: f'it is of {other}, most are of {kind}'
-        for other, (files, _) in readers.items()
-        for path in files
+        for other in readers
+        for path in files[other]
     }
     return flight._replace(notes=said(others) + flight.notes)

@@ -73,31 +73,6 @@ class Reckoned(NamedTuple):
         return (self.surfaced_m - self.dived_m - self.way_m) / self.seconds
 
 
-def mean_current(segment: Segment, reckoned: Reckoned) -> np.ndarray:
-    """Mean current (m/s) from fix to fix, also while at the surface, shape (2,): north, east."""
-    begin_s, end_s = segment.before.time_s[-1], segment.after.time_s[0]
-    moved_m = segment.after.place_m[0] - segment.before.place_m[-1]
-    return (moved_m - reckoned.way_m) / (end_s - begin_s)
-
-
-def surface_drift(fixes: Fixes) -> np.ndarray:
-    """Drift at the surface (m/s), shape (2,): the slope through the fixes; NaN if not known."""
-    if len(fixes.time_s) < 2 or np.ptp(fixes.time_s) < SHORTEST_DRIFT_S:
-        return NOT_KNOWN
-    return np.polyfit(fixes.time_s - fixes.time_s[0], fixes.place_m, 1)[0]
-
-
-def runs(segments: Sequence[Segment]) -> list[list[Segment]]:
-    """Segments that follow each other without a dive between them that is not known."""
-    found = [list(segments[:1])] if segments else []
-    for last, segment in itertools.pairwise(segments):
-        if segment.before.time_s[-1] == last.after.time_s[-1]:
-            found[-1].append(segment)
-        else:
-            found.append([segment])
-    return found
-
-
 def check(method: str) -> None:
     """Refuse a method that recorded flights cannot feed.
 
@@ -138,20 +113,22 @@ class _Under(NamedTuple):
 
 
 def _reckoned(segment: Segment, under: _Under, led_m, told_mps) -> Reckoned:
-    dived_s, surfaced_s = under.dived_s, under.surfaced_s
-    dived_m, surfaced_m = segment.before.place_m[-1], segment.after.place_m[0]
-    drift = surface_drift(segment.before)
-    if np.isnan(drift).any():
-        dived_s = segment.before.time_s[-1]
-    else:
-        dived_m = dived_m + drift * (dived_s - segment.before.time_s[-1])
-    drift = surface_drift(segment.after)
-    if np.isnan(drift).any():
-        surfaced_s = segment.after.time_s[0]
-    else:
-        surfaced_m = surfaced_m - drift * (segment.after.time_s[0] - surfaced_s)
+    dived_s, dived_m = _at_surface(segment.before, -1, under.dived_s)
+    surfaced_s, surfaced_m = _at_surface(segment.after, 0, under.surfaced_s)
     believed_m = dived_m + led_m
     return Reckoned(dived_s, surfaced_s, dived_m, surfaced_m, under.way_m, believed_m, told_mps)
+
+
+def _at_surface(stay: Fixes, nearest: int, time_s: float) -> tuple[float, np.ndarray]:
+    """A time (s since 1970) and where it was then (m), by the slope through the fixes of a stay.
+
+    If they say nothing of the drift, the time and the place of the nearest fix.
+    """
+    fix_s, fix_m = stay.time_s[nearest], stay.place_m[nearest]
+    if len(stay.time_s) < 2 or np.ptp(stay.time_s) < SHORTEST_DRIFT_S:
+        return fix_s, fix_m
+    drift_mps = np.polyfit(stay.time_s - stay.time_s[0], stay.place_m, 1)[0]
+    return time_s, fix_m + drift_mps * (time_s - fix_s)
 
 
 def _navigated(
@@ -221,13 +198,10 @@ def _settings(
         'imu_period_s': 30.0,
         'gyro': False,
     }
-    if 'speed_by' in METHODS[method].model_fields and _is_weighed(segment):
+    is_weighed = np.isfinite(segment.samples.buoyancy_kg).mean() > BUOYANCY_KNOWN
+    if 'speed_by' in METHODS[method].model_fields and is_weighed:
         settings[method] = {'speed_by': 'buoyancy'}
     return NavigationSettings(**settings)
-
-
-def _is_weighed(segment: Segment) -> bool:
-    return float(np.isfinite(segment.samples.buoyancy_kg).mean()) > BUOYANCY_KNOWN
 
 
 def _vehicle(segment: Segment) -> str:

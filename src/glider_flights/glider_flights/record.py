@@ -115,7 +115,7 @@ NOT_KNOWN = np.full(2, math.nan)
 
 
 def instruments(time_s: np.ndarray, **known: np.ndarray) -> Instruments:
-    """Instruments of which some are known, all at the same times."""
+    """Instruments of which some are known, all at the same times; other names are no matter."""
     nothing = np.full(len(time_s), math.nan)
     return Instruments(
         time_s, **{name: known.get(name, nothing) for name in Instruments._fields[1:]}

@@ -8,32 +8,26 @@ m/s; the base station has it from buoyancy and pitch, and so has this where buoy
 
 import math
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from glider_base.errors import ConfigurationError
-from glider_flights.folders import Part, files_in, read_each, said, strangers
+from glider_flights.folders import Progress, files_in, of_one_flight, read_each
 from glider_flights.netcdf import SUFFIXES, refuse_missing, variables
 from glider_flights.record import (
     NOT_KNOWN,
-    Fixes,
     Flight,
     Instruments,
     OnBoard,
     Polar,
     Samples,
-    Segment,
     angles_at_times,
     at_times,
     instruments,
-    joined,
-    local_metres,
     usual,
 )
-from glider_flights.segments import cut
+from glider_flights.segments import LogFile, put_together
 
 #: Files of dives: the number of the vehicle, three digits, and of the dive, four.
 DIVE_FILE = re.compile(r'p(\d{3})(\d{4}).*\.nc.*', re.IGNORECASE)
@@ -93,109 +87,25 @@ LONGEST_DIVE_S = 2 * 86_400.0
 BAD = ('4', '9', '4.0', '9.0')
 
 
-class Dive(NamedTuple):
-    """What one file says."""
-
-    name: str
-    #: Numbers of the vehicle and of the dive; '' and 0 if the name of the file does not say.
-    vehicle: str
-    number: int
-    #: Shape (n, 3): time (s since 1970), latitude, longitude (degrees).
-    fixes: np.ndarray
-    samples: Samples
-    #: Of shape (2,), north and east: depth-averaged current (m/s), way through the water (m).
-    dac_mps: np.ndarray
-    way_m: np.ndarray
-    polar: Polar
-    instruments: Instruments
-    #: Constants of the body that the file names, see `glider_flights.record.Flight`.
-    body: dict[str, float]
-
-
 def seaglider_files(place: Path) -> list[Path]:
     """Files of dives; where none has the name of one, all NetCDF files."""
     files = files_in(place, lambda path: path.suffix.lower() in SUFFIXES)
     return [path for path in files if DIVE_FILE.fullmatch(path.name)] or files
 
 
-def read_seaglider(place: Path, progress: Callable[[int, int], None]) -> Flight:
+def read_seaglider(place: Path, progress: Progress) -> Flight:
     """Read a flight.
 
     Raises
     ------
     ConfigurationError
     """
-    files, notes = seaglider_files(place), []
-    dives, left_out = read_each(files, progress, lambda path: _read_dive(path, notes))
-    dives.sort(key=lambda dive: (dive.number, dive.name))
-    left_out |= strangers(
-        place, [Part(dive.name, dive.vehicle, dive.samples.time_s) for dive in dives]
-    )
-    dives = [dive for dive in dives if dive.name not in left_out]
-    notes += said(left_out)
-    if not dives:
-        raise ConfigurationError(f'{place}: no file of a dive could be read; {"; ".join(notes)}')
-    dives.sort(key=lambda dive: dive.fixes[0, 0])
-    origin = dives[0].fixes[0, 1:]
-    segments, unused = [], []
-    for run in _runs(dives):
-        found, why = _segments(run, origin)
-        segments += found
-        unused += [one for one in why if one not in unused]
-    names = {name for dive in dives for name in dive.body}
-    body = {
-        name: usual([dive.body[name] for dive in dives if name in dive.body]) for name in names
-    }
-    return Flight(
-        kind='seaglider',
-        files=[dive.name for dive in dives],
-        segments=segments,
-        notes=notes + unused,
-        origin_deg=origin,
-        instruments=joined(_of_one_zero(dive, body) for dive in dives),
-        body=body,
-        on_board_over='between fixes',
-    )
+    dives, left_out = read_each(seaglider_files(place), progress, _read_dive)
+    dives.sort(key=lambda dive: (dive.dive, dive.name))
+    return put_together('seaglider', *of_one_flight(place, dives, left_out))
 
 
-def _of_one_zero(dive: Dive, body: dict[str, float]) -> Instruments:
-    """Instruments of a dive; the zero of its engine is that of the whole flight.
-
-    Each dive may have another one: people move it between dives.
-    """
-    own = dive.instruments
-    if 'volume_m3' not in dive.body:
-        return own
-    shift = dive.body['volume_m3'] - body['volume_m3']
-    return own._replace(pumped_m3=own.pumped_m3 + shift)
-
-
-def _runs(dives: list[Dive]) -> list[list[Dive]]:
-    """Dives that follow each other: where one is missing a vehicle may have been anywhere."""
-    runs = [[dives[0]]]
-    for last, dive in zip(dives[:-1], dives[1:], strict=True):
-        if dive.number == last.number + 1 or not dive.number:
-            runs[-1].append(dive)
-        else:
-            runs.append([dive])
-    return runs
-
-
-def _segments(dives: list[Dive], origin: np.ndarray) -> tuple[list[Segment], list[str]]:
-    table = np.concatenate([dive.fixes for dive in dives])
-    fixes = Fixes(table[:, 0], local_metres(origin, *table.T[1:]))
-    samples = Samples(*np.concatenate([np.stack(dive.samples) for dive in dives], axis=1))
-    cuts, notes = cut(fixes, samples)
-    segments = []
-    for one in cuts:
-        middle = 0.5 * (one.before.time_s[-1] + one.after.time_s[0])
-        dive = [dive for dive in dives if dive.fixes[0, 0] <= middle][-1]
-        on_board = OnBoard(dive.dac_mps, dive.way_m, NOT_KNOWN)
-        segments.append(Segment(dive.name, *one, on_board, dive.polar))
-    return segments, notes
-
-
-def _read_dive(path: Path, notes: list[str]) -> Dive:
+def _read_dive(path: Path) -> LogFile:
     more = CONSTANTS | {key: names for key, (names, _) in MEASURED.items()}
     found = read_variables(path, NEEDED | WANTED | more)
     for key in ('time', 'pitch', 'heading', 'depth'):
@@ -204,8 +114,7 @@ def _read_dive(path: Path, notes: list[str]) -> Dive:
                 f'{path}: {" or ".join(NEEDED[key])} has {len(found[key])} values '
                 f'(allowed: as many as time, {len(found.get("time", ()))})'
             )
-    missing = [names for key, names in NEEDED.items() if not len(found.get(key, ()))]
-    refuse_missing(path, missing, 'of a dive of a Seaglider')
+    refuse_missing(path, found, NEEDED, 'of a dive of a Seaglider')
     fixes = np.stack([found['fix_time'], found['fix_latitude'], found['fix_longitude']], axis=-1)
     good = np.isfinite(fixes).all(axis=-1) & (np.abs(fixes[:, 1:]) <= (90.0, 180.0)).all(axis=-1)
     quality = found.get('fix_quality', ())
@@ -219,24 +128,31 @@ def _read_dive(path: Path, notes: list[str]) -> Dive:
             f'{path}: log_gps_time is {apart_s / 86400.0:.1f} days off time (allowed: '
             f'{LONGEST_DIVE_S / 86400.0:.0f})'
         )
-    declination = _number(found, 'declination')
+    declination, notes = _number(found, 'declination'), []
     if math.isnan(declination):
         notes.append(f'{path.name}: magnetic_variation is missing: 0 deg is taken')
         declination = 0.0
     named = DIVE_FILE.fullmatch(path.name)
     samples = _samples(found, math.radians(declination))
-    return Dive(
-        path.name,
-        named[1] if named else '',
-        int(named[2]) if named else 0,
-        fixes[good],
-        samples,
-        np.array([_number(found, 'dac_north'), _number(found, 'dac_east')]),
-        np.array([_number(found, 'speed_north'), _number(found, 'speed_east')])
-        * _number(found, 'flight_s'),
-        polar_of(found),
-        _instruments(found, samples),
-        _body(found),
+    dac, speed = (
+        np.array([_number(found, f'{what}_{way}') for way in ('north', 'east')])
+        for what in ('dac', 'speed')
+    )
+    on_board = OnBoard(dac, speed * _number(found, 'flight_s'), NOT_KNOWN)
+    return LogFile(
+        name=path.name,
+        vehicle=named[1] if named else '',
+        dive=int(named[2]) if named else 0,
+        begin_s=fixes[good][0, 0],
+        fixes=fixes[good],
+        about_deg=fixes[good][0, 1:],
+        samples=samples,
+        instruments=_instruments(found, samples),
+        body=_body(found),
+        polar=polar_of(found),
+        on_board=lambda samples: on_board,
+        of_base_station=True,
+        notes=notes,
     )
 
 

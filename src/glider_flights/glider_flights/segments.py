@@ -1,12 +1,26 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cutting a recorded flight into segments, from one stay at the surface to the next."""
+"""A recorded flight of its files, cut into segments from one stay at the surface to the next."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from glider_flights.record import SURFACE_DEPTH_M, Fixes, Samples, in_order
+from glider_flights.record import (
+    SURFACE_DEPTH_M,
+    Fixes,
+    Flight,
+    Instruments,
+    OnBoard,
+    Polar,
+    Samples,
+    Segment,
+    in_order,
+    joined,
+    local_metres,
+    usual,
+)
 
 #: Between two fixes with a sample deeper than this a glider has dived (m).
 DIVE_DEPTH_M = 5.0
@@ -27,6 +41,96 @@ WHY_LEFT_OUT = {
     'gap': 'with no samples for a large part of them',
     'far': 'with fixes further apart than a glider moves',
 }
+
+
+Item = TypeVar('Item')
+
+
+class LogFile(NamedTuple):
+    """What one file says of a flight."""
+
+    name: str
+    vehicle: str  #: '' if it does not say
+    dive: int  #: number of the one dive that it holds; 0 if it does not say
+    begin_s: float  #: when it begins (s since 1970)
+    fixes: np.ndarray  #: shape (n, 3): time (s since 1970), latitude, longitude (degrees)
+    about_deg: np.ndarray  #: latitude and longitude (degrees) for want of a fix, shape (2,)
+    samples: Samples
+    instruments: Instruments
+    #: Constants of the body that it names, see `glider_flights.record.Flight`.
+    body: dict[str, float]
+    polar: Polar
+    #: What was made on board, or by a base station, of a segment with such samples.
+    on_board: Callable[[Samples], OnBoard]
+    of_base_station: bool  #: whether that is of one: its current is a mean between fixes
+    notes: list[str]
+
+    @property
+    def time_s(self) -> np.ndarray:
+        """Times of its samples (s since 1970)."""
+        return self.samples.time_s
+
+
+def put_together(kind: str, files: list[LogFile], notes: list[str]) -> Flight:
+    """A flight of its files."""
+    files = sorted(files, key=lambda file: file.begin_s)
+    fixes = np.concatenate([file.fixes for file in files])
+    origin = fixes[0, 1:] if len(fixes) else files[0].about_deg
+    segments, unused = [], []
+    # Where a dive is missing a vehicle may have been anywhere.
+    for run in runs(files, lambda last, one: one.dive == last.dive + 1 or not one.dive):
+        found, why = _segments(run, origin)
+        segments += found
+        unused += [one for one in why if one not in unused]
+    names = {name for file in files for name in file.body}
+    body = {
+        name: usual([file.body[name] for file in files if name in file.body]) for name in names
+    }
+    return Flight(
+        kind=kind,
+        files=[file.name for file in files],
+        segments=segments,
+        notes=notes + [note for file in files for note in file.notes] + unused,
+        origin_deg=origin,
+        instruments=joined(_of_one_zero(file, body) for file in files),
+        body=body,
+        on_board_over='between fixes' if files[0].of_base_station else 'under water',
+    )
+
+
+def _of_one_zero(file: LogFile, body: dict[str, float]) -> Instruments:
+    """Instruments of a file; the zero of its engine is that of the whole flight.
+
+    Each dive may have another one: people move it between dives.
+    """
+    own = file.instruments
+    if 'volume_m3' not in file.body:
+        return own
+    shift = file.body['volume_m3'] - body['volume_m3']
+    return own._replace(pumped_m3=own.pumped_m3 + shift)
+
+
+def runs(items: list[Item], follows: Callable[[Item, Item], bool]) -> list[list[Item]]:
+    """Items in runs: in each every one follows the one before it."""
+    found: list[list[Item]] = []
+    for item in items:
+        if found and follows(found[-1][-1], item):
+            found[-1].append(item)
+        else:
+            found.append([item])
+    return found
+
+
+def _segments(files: list[LogFile], origin: np.ndarray) -> tuple[list[Segment], list[str]]:
+    table = np.concatenate([file.fixes for file in files])
+    samples = Samples(*np.concatenate([np.stack(file.samples) for file in files], axis=1))
+    cuts, notes = cut(Fixes(table[:, 0], local_metres(origin, *table.T[1:])), samples)
+    segments = []
+    for one in cuts:
+        middle = 0.5 * (one.before.time_s[-1] + one.after.time_s[0])
+        file = [file for file in files if file.begin_s <= middle][-1]
+        segments.append(Segment(file.name, *one, file.on_board(one.samples), file.polar))
+    return segments, notes
 
 
 class Cut(NamedTuple):

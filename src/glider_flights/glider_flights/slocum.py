@@ -9,14 +9,20 @@ magnetic north as y. ``m_gps_mag_var`` is what is subtracted from a magnetic hea
 import math
 import re
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from glider_base.errors import ConfigurationError
-from glider_flights.folders import LATEST_S, Part, files_in, installed, said, strangers
+from glider_flights.folders import (
+    LATEST_S,
+    Progress,
+    files_in,
+    gsw,
+    installed,
+    of_one_flight,
+)
 from glider_flights.record import (
     NOT_KNOWN,
     Fixes,
@@ -32,7 +38,6 @@ from glider_flights.record import (
     local_metres,
     usual,
 )
-from glider_flights.seawater import depth_of, pressure_of, salinity_of
 from glider_flights.segments import DIVE_DEPTH_M, Cut, cut
 
 #: Kinds of files of the flight computer, fullest first: all that is measured, then what is sent.
@@ -89,6 +94,7 @@ SAME_TIME = 0.2
 #: The current of a segment is told until so long after the next dive has begun (s).
 LATE_S = 60.0
 
+Names = tuple[str, ...]
 Sensors = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
@@ -103,7 +109,7 @@ def slocum_files(place: Path) -> list[Path]:
 
 
 def read_slocum(
-    place: Path, cache: Path | None, progress: Callable[[int, int], None], whole: bool = False
+    place: Path, cache: Path | None, progress: Progress, whole: bool = False
 ) -> Flight:
     """Read a flight; without a folder of caches they are looked for.
 
@@ -147,8 +153,7 @@ def read_slocum(
         water = dict.fromkeys(WATER + CTD_TIMES, (np.empty(0), np.empty(0)))
         if beside:
             try:
-                found = read_sensors(beside, cache, progress, WATER + CTD_TIMES)
-                water, unread = found.sensors, found.notes
+                water, _, _, unread = read_sensors(beside, cache, progress, WATER + CTD_TIMES)
             except ConfigurationError as error:
                 unread = [f'no water: {error}']
             notes += unread
@@ -193,7 +198,7 @@ def _instruments(sensors: Sensors, declined: float, origin: np.ndarray) -> Instr
         for name in ('sci_water_pressure', 'm_pressure')
     }
     own_s, dbar = max(pressures.values(), key=lambda pair: len(pair[0]))
-    time_s, depth_m = own_s, depth_of(dbar, origin[0])
+    time_s, depth_m = own_s, -gsw().z_from_p(dbar, origin[0])
     if not len(time_s):
         time_s, depth_m = sensors['m_depth']
 
@@ -217,21 +222,12 @@ def _instruments(sensors: Sensors, declined: float, origin: np.ndarray) -> Instr
         mass_roll_rad=measured('m_battroll'),
         surface_rad=measured('m_fin'),
         temperature_degc=temperature,
-        salinity=salinity_of(
+        salinity=gsw().SP_from_C(
             measured('sci_water_cond', SIEMENS_PER_METRE),
             temperature,
-            pressure_of(depth_m, origin[0]),
+            gsw().p_from_z(-depth_m, origin[0]),
         ),
     )
-
-
-class Recorded(NamedTuple):
-    """What the files of one computer say."""
-
-    sensors: Sensors
-    files: list[Path]  #: that were read
-    begun: list[tuple[float, str]]  #: when each begins (s since 1970), and its name
-    notes: list[str]
 
 
 class DbdFile(NamedTuple):
@@ -246,22 +242,25 @@ class DbdFile(NamedTuple):
     is_cut: bool
 
     @property
+    def name(self) -> str:
+        """Name of the file."""
+        return self.path.name
+
+    @property
     def time_s(self) -> np.ndarray:
         """Times of all of its values (s since 1970)."""
         return np.concatenate([np.empty(0), *(times for times, _ in self.sensors.values())])
 
 
 def read_sensors(
-    files: list[Path],
-    cache: Path | None,
-    progress: Callable[[int, int], None],
-    names: tuple[str, ...],
-    needed: tuple[str, ...] = (),
-) -> Recorded:
-    """Sensors by name; one that was never recorded has no times.
+    files: list[Path], cache: Path | None, progress: Progress, names: Names, needed: Names = ()
+) -> tuple[Sensors, list[Path], list[tuple[float, str]], list[str]]:
+    """Read the files of one computer.
 
-    A file without a sensor that is needed is left out, as is one that cannot be read, or is not of
-    the flight of the others.
+    Returns sensors by name, of which one that was never recorded has no times; the files that were
+    read; when each begins (s since 1970) with its name; what is to be said of them. A file without
+    a sensor that is needed is left out, as is one that cannot be read, or is not of the flight of
+    the others.
 
     Raises
     ------
@@ -270,25 +269,20 @@ def read_sensors(
     """
     found, left_out = _read_files(files, cache, progress, names)
     found.sort(key=lambda file: file.written)
-    parts = [Part(file.path.name, file.vehicle, file.time_s) for file in found]
-    left_out |= strangers(files[0].parent, parts)
     for file in found:
         missing = [name for name in needed if name not in file.sensors]
         if missing and len(files) > 1:
-            left_out.setdefault(file.path.name, f'no {", ".join(missing)} in it')
-    found = [file for file in found if file.path.name not in left_out]
-    notes = said(left_out)
-    if not found:
-        raise ConfigurationError(f'{files[0].parent}: no file could be read; {"; ".join(notes)}')
-    cut = [file.path.name for file in found if file.is_cut]
+            left_out[file.name] = f'no {", ".join(missing)} in it'
+    found, notes = of_one_flight(files[0].parent, found, left_out)
+    cut = [file.name for file in found if file.is_cut]
     if cut:
         notes.append(f'read as far as it goes: {", ".join(cut)}: cut short')
     for name in names:
-        lack = [file.path.name for file in found if name not in file.sensors]
+        lack = [file.name for file in found if name not in file.sensors]
         if 0 < len(lack) < len(found):
             notes.append(f'no {name} in {", ".join(lack)}')
     begun = [
-        (float(file.sensors['m_depth'][0][0]), file.path.name)
+        (float(file.sensors['m_depth'][0][0]), file.name)
         for file in found
         if 'm_depth' in file.sensors and len(file.sensors['m_depth'][0])
     ]
@@ -296,14 +290,11 @@ def read_sensors(
         name: _joined([file.sensors[name] for file in found if name in file.sensors])
         for name in names
     }
-    return Recorded(sensors, [file.path for file in found], sorted(begun), notes)
+    return sensors, [file.path for file in found], sorted(begun), notes
 
 
 def _read_files(
-    files: list[Path],
-    cache: Path | None,
-    progress: Callable[[int, int], None],
-    names: tuple[str, ...],
+    files: list[Path], cache: Path | None, progress: Progress, names: Names
 ) -> tuple[list[DbdFile], dict[str, str]]:
     """The files that can be read, and why others cannot, by name."""
     with installed(f'{files[0]}: dbdreader, which reads the files of a Slocum'):
@@ -332,7 +323,7 @@ def _read_files(
     return found, left_out
 
 
-def _read_file(path: Path, scratch: Path, names: tuple[str, ...]) -> DbdFile:
+def _read_file(path: Path, scratch: Path, names: Names) -> DbdFile:
     """Read a file, by the caches in a folder; what dbdreader raises."""
     from dbdreader import DBD
 

@@ -199,11 +199,11 @@ def test_turns_over_fin_are_those_that_were_made():
     track = Track(own, nothing, nothing, nothing, phase=level, counts=level > 0.0)
     flown = Simulated(*(nothing for _ in Simulated._fields))
     flown = flown._replace(speed_mps=0.4 * level, heading_rad=0.12 * turned)
-    by_fin = turn_rates([track], [flown])['turn_rate_per_sin_fin']
+    by_fin = turn_rates([(track, flown)])['turn_rate_per_sin_fin']
     assert by_fin['dive']['recorded'] == pytest.approx(0.11, rel=0.01)
     assert by_fin['dive']['simulated'] == pytest.approx(0.12, rel=0.01)
     assert by_fin['climb'] == {'recorded': None, 'simulated': None}
-    assert turn_rates([track], [flown])['turn_rate_per_sin_roll']['dive']['recorded'] is None
+    assert turn_rates([(track, flown)])['turn_rate_per_sin_roll']['dive']['recorded'] is None
 
 
 def test_speed_is_compared_with_an_adcp(file, dive, tmp_path):

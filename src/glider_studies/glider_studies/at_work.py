@@ -8,7 +8,8 @@ from contextlib import contextmanager
 import typer
 
 from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED, ConfigurationError
-from glider_bringup.console import compiling, messages
+from glider_bringup.console import compiling, counter, messages
+from glider_mission.choices import Combination
 from glider_studies.workers import WorkError, worker_pool
 
 
@@ -16,10 +17,11 @@ from glider_studies.workers import WorkError, worker_pool
 def workers_at_work(
     workers: int | None,
     scheduler: str | None,
-    combinations: Iterable[tuple[str, str]],
+    combinations: Iterable[Combination],
+    flights: int,
     advice: Callable[[], str] = lambda: '',
 ):
-    """Workers that fly laws with methods; yields their pool.
+    """Workers that fly laws with methods; yields their pool, and the update of a bar of flights.
 
     What ends their work early is told, with what ``advice`` adds, and is the exit code.
     """
@@ -28,8 +30,11 @@ def workers_at_work(
             f'--workers {workers}: not with --scheduler, whose cluster has workers of its own'
         )
     try:
-        with worker_pool(workers, scheduler, combinations, compiling) as pool:
-            yield pool
+        with (
+            worker_pool(workers, scheduler, combinations, compiling) as pool,
+            counter('flying', flights) as update,
+        ):
+            yield pool, update
         return
     except KeyboardInterrupt:
         reason, code = 'stopped by SIGINT', EXIT_INTERRUPTED

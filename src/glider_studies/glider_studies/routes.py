@@ -33,6 +33,8 @@ WAYS: dict[str, dict[str, Any]] = {
     'planned': _PLANNED,
     'erring': {**_PLANNED, 'forecast.error_mps': 0.15},
 }
+#: Flights that it takes, and plans.
+TASKS = len(SIZES) * SEAS * len(WAYS)
 #: A planned route takes at most this share of the time of straight legs, and by a forecast that
 #: errs never more than this share.
 GAIN, LOSS = 0.9, 1.1
@@ -107,8 +109,3 @@ def cross(seed: int, pool: Pool, progress: Progress) -> dict[str, Any]:
     ]
     title = f'{_TITLE}, seed {seed}'
     return told(Experiment(NAME, NAME, '', title, '-', [], judge), rows)
-
-
-def count_tasks() -> int:
-    """Flights that it takes, and plans."""
-    return len(SIZES) * SEAS * len(WAYS)

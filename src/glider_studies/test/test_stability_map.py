@@ -15,7 +15,7 @@ from command_line import glider
 from glider_bringup import cli
 from glider_bringup.door.netcdf import read_dataset, write_dataset
 from glider_studies.showing.stability_map import CLASSES, CRITICAL_M, STABLE_M, load_map, shares
-from glider_studies.sweep.fly import STATUSES, failure
+from glider_studies.sweep.fly import failure
 from glider_studies.sweep.netcdf import make_dataset
 from glider_studies.sweep.plan import load_sweep
 
@@ -42,7 +42,7 @@ def write(folder, errors, statuses=None, dimensions=DIMENSIONS):
         }
         for cell in range(plan.cells)
     ]
-    write_dataset(make_dataset(plan, records, STATUSES), folder / 'sweep.nc')
+    write_dataset(make_dataset(plan, records), folder / 'sweep.nc')
     return folder / 'sweep.nc'
 
 
@@ -75,7 +75,7 @@ def test_a_map_by_surfacing_has_its_own_measure_and_limits(tmp_path, monkeypatch
         for cell in range(plan.cells)
     ]
     file = tmp_path / 'sweep.nc'
-    write_dataset(make_dataset(plan, records, STATUSES), file)
+    write_dataset(make_dataset(plan, records), file)
     found = [CLASSES[i] for i in load_map(file, 'surfacing').classes[0].T.ravel()[:4]]
     assert found == ['stable', 'critical', 'critical', 'lost']
     assert (load_map(file).classes == CLASSES.index('stable')).all()
@@ -253,5 +253,5 @@ def test_sweep_that_failed_everywhere_has_no_map(tmp_path, monkeypatch, capsys):
     path.write_text(yaml.safe_dump({'dimensions': DIMENSIONS}))
     plan = load_sweep(str(path))
     records = [{'cell': cell, **failure('broken')} for cell in range(plan.cells)]
-    write_dataset(make_dataset(plan, records, STATUSES), tmp_path / 'sweep.nc')
+    write_dataset(make_dataset(plan, records), tmp_path / 'sweep.nc')
     assert 'every cell failed' in refused([tmp_path / 'sweep.nc'], monkeypatch, capsys)

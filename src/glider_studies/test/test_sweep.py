@@ -291,7 +291,7 @@ def test_worker_with_another_program_is_refused():
 def test_worker_with_another_vehicle_file_is_refused(flown):
     chunk = next(make_chunks(load_sweep(str(flown.file)), bytearray(12), 2))
     with pytest.raises(WorkError, match='another file of zhang2021'):
-        fly_chunk(chunk._replace(inputs=chunk.inputs._replace(vehicles=frozenset())))
+        fly_chunk(chunk._replace(vehicles=frozenset()))
 
 
 # ---------------------------------------------------------------------- resuming
@@ -406,7 +406,7 @@ def test_file_does_not_depend_on_the_order_and_tells_of_failures(flown, tmp_path
     files = []
     for seed in range(3):
         random.Random(seed).shuffle(records)
-        write_dataset(make_dataset(plan, records, STATUSES), tmp_path / f'{seed}.nc')
+        write_dataset(make_dataset(plan, records), tmp_path / f'{seed}.nc')
         files.append((tmp_path / f'{seed}.nc').read_bytes())
     assert files[0] == files[1] == files[2]
     with xarray.load_dataset(tmp_path / '0.nc') as data:

@@ -165,6 +165,10 @@ def _or_dash(value: float | None, form: str = 'g') -> str:
     return '-' if value is None else format(value, form)
 
 
+def _both(own: float | None, other: float | None) -> str:
+    return f'{_or_dash(own, ".2f")}, {_or_dash(other, ".2f")}'
+
+
 def _print_all(table: dict) -> None:
     """A row for each flight: vertical rate off (cm/s), ours and the other model's."""
     columns = ('flight', 'parts', 'unfitted', 'on first', 'on second', 'turns', 'energy')
@@ -179,23 +183,14 @@ def _print_all(table: dict) -> None:
             if turn['recorded'] is not None
         ]
         tried = [
-            f'{_or_dash(half["w_rmse_cmps"], ".2f")}, '
-            f'{_or_dash((half["peer"] or {}).get("w_rmse_cmps"), ".2f")}'
+            _both(half['w_rmse_cmps'], (half['peer'] or {}).get('w_rmse_cmps'))
             for half in (first, second)
         ]
-        rows.append(
-            (
-                one['flight'],
-                str(one['segments']),
-                f'{_or_dash(unfitted["w_rmse_cmps"], ".2f")}, '
-                f'{_or_dash(unfitted["peer_w_rmse_cmps"], ".2f")}',
-                *tried,
-                '; '.join(turns) or '-',
-                '-'
-                if one['energy_error_percent'] is None
-                else f'{one["energy_error_percent"]:+.1f} %',
-            )
-        )
+        before = _both(unfitted['w_rmse_cmps'], unfitted['peer_w_rmse_cmps'])
+        energy = one['energy_error_percent']
+        told = '-' if energy is None else f'{energy:+.1f} %'
+        shown = (one['flight'], str(one['segments']), before, *tried)
+        rows.append((*shown, '; '.join(turns) or '-', told))
     title = (
         'Vertical rate off in the other half, rms (cm/s): ours, the other model. Turn rate over '
         'sin(roll) or sin(fin) in dives and climbs (rad/s): recorded, fitted. Energy of the '

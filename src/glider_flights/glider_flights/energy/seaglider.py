@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What actuators of a Seaglider took out of its battery, by its table of their moves."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_flights.energy.uses import PUMP, Uses
-from glider_flights.folders import read_each, said
+from glider_flights.folders import Progress, read_each, said
 from glider_flights.netcdf import refuse_missing
 from glider_flights.seaglider import read_variables, seaglider_files
 
@@ -29,18 +28,18 @@ MOVES = {
     'volts': ('gc_vbd_volts',),
     'seconds': ('gc_vbd_secs',),
 }
-#: The same of its moving masses: field of the vehicle file, and what a count is (cm, deg).
-MASSES = {'pitch': ('pitch_mass', 'log_PITCH_CNV'), 'roll': ('roll_mass', 'log_ROLL_CNV')}
+#: Its moving masses: field of the vehicle file.
+MASSES = {'pitch': 'pitch_mass', 'roll': 'roll_mass'}
 
 
-def seaglider_uses(place: Path, progress: Callable[[int, int], None]) -> Uses:
+def seaglider_uses(place: Path, progress: Progress) -> Uses:
     """Pumpings of all dives, by current, voltage and time of the motor."""
     dives, left_out = read_each(seaglider_files(place), progress, _pumpings)
     if not sum(len(dive.joules) for dive in dives):
         why = '; '.join(said(left_out))
         raise ConfigurationError(f'{place}: no pumping in its {len(dives)} files; {why}')
     number = np.repeat(np.arange(len(dives)), [len(dive.joules) for dive in dives])
-    moved = {field: sum(dive.moved[field] for dive in dives) for field, _ in MASSES.values()}
+    moved = {field: sum(dive.moved[field] for dive in dives) for field in MASSES.values()}
     return Uses(
         'seaglider',
         len(dives),
@@ -63,9 +62,9 @@ class _Dive(NamedTuple):
 
 def _pumpings(path: Path) -> _Dive:
     """Read a dive."""
-    found = read_variables(path, MOVES | _of_masses())
-    missing = [names for key, names in MOVES.items() if not len(found.get(key, ()))]
-    refuse_missing(path, missing, 'for the energy of a Seaglider')
+    of_masses = {one: (one,) for name in MASSES for one in _variables_of(name)}
+    found = read_variables(path, MOVES | of_masses)
+    refuse_missing(path, found, MOVES, 'for the energy of a Seaglider')
     rows = {key: len(found[key]) for key in MOVES if key != 'cc_per_count'}
     if len(set(rows.values())) > 1:
         told = ', '.join(f'{MOVES[key][0]} {count}' for key, count in rows.items())
@@ -78,27 +77,22 @@ def _pumpings(path: Path) -> _Dive:
     return _Dive(
         np.stack([pumped, pumped * found['depth']], axis=-1)[ran],
         energy[ran],
-        {field: _moved(found, name) for name, (field, _) in MASSES.items()},
+        {field: _moved(found, name) for name, field in MASSES.items()},
     )
 
 
-def _of_masses() -> dict[str, tuple[str, ...]]:
-    """Variables of the moving masses, all of which a file may lack."""
-    parts = {'before': 'ad_start', 'after': 'ad', 'amps': 'i', 'volts': 'volts', 'secs': 'secs'}
-    return {
-        **{
-            f'{name}_{key}': (f'gc_{name}_{end}',) for name in MASSES for key, end in parts.items()
-        },
-        **{f'{name}_per_count': (count,) for name, (_, count) in MASSES.items()},
-    }
+def _variables_of(name: str) -> list[str]:
+    """Variables of a moving mass, all of which a file may lack; the last: a count in cm or deg."""
+    parts = ('ad_start', 'ad', 'i', 'volts', 'secs')
+    return [*(f'gc_{name}_{part}' for part in parts), f'log_{name.upper()}_CNV']
 
 
 def _moved(found: dict[str, np.ndarray], name: str) -> np.ndarray:
     """Energy (J) and way (m, deg) of one moving mass in a dive, shape (2,); zeros if not told."""
-    keys = [f'{name}_{key}' for key in ('before', 'after', 'amps', 'volts', 'secs', 'per_count')]
-    if any(not len(found.get(key, ())) for key in keys):
+    told = [found.get(one, ()) for one in _variables_of(name)]
+    if not all(map(len, told)):
         return np.zeros(2)
-    before, after, amps, volts, seconds, per_count = (found[key] for key in keys)
+    before, after, amps, volts, seconds, per_count = told
     scale = abs(per_count[0]) * (_METRES_PER_CM if name == 'pitch' else 1.0)
     energy = amps * volts * np.abs(seconds)
     ran = (seconds != 0.0) & (before > 0.0) & np.isfinite(energy * after)

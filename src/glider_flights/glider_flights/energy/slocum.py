@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a Slocum took out of its battery: its counter of charge, times the voltage."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_flights.energy.uses import HOTEL, PUMP, Uses
+from glider_flights.folders import Progress
 from glider_flights.record import SURFACE_DEPTH_M, at_times, vertical_rate
 from glider_flights.slocum import Sensors, read_sensors, slocum_files
 
@@ -29,7 +29,7 @@ CALL = 'm_iridium_on'
 SENSORS = ('m_depth', *CHARGE, *VOLTAGE, *OIL, CALL)
 
 
-def slocum_uses(place: Path, cache: Path | None, progress: Callable[[int, int], None]) -> Uses:
+def slocum_uses(place: Path, cache: Path | None, progress: Progress) -> Uses:
     """Half hours of what the counter of charge counted, times the voltage."""
     sensors, files, _, notes = read_sensors(slocum_files(place), cache, progress, SENSORS)
     (time_s, charge), (volts_s, volts), (oil_s, oil) = (

@@ -34,11 +34,6 @@ class Uses(NamedTuple):
     notes: list[str]  #: what a person should know of the files: a sentence each
 
 
-def fit(uses: Uses, chosen: np.ndarray) -> np.ndarray:
-    """Fields by least squares over the chosen parts, bool, shape (n,); each is 0 or more."""
-    return nnls(uses.doings[chosen], uses.joules[chosen])[0]
-
-
 def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
     """Energy of a flight as predicted and as recorded, as `--json` prints it.
 
@@ -62,7 +57,7 @@ def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
             f'{place}: {source.first_half.sum()} parts to fit {len(uses.fields)} numbers on '
             f'(needed: {len(uses.fields)})'
         )
-    numbers = fit(source, source.first_half)
+    numbers, _ = nnls(source.doings[source.first_half], source.joules[source.first_half])
     recorded = float(uses.joules[predicted].sum())
     if not recorded > 0.0:
         raise ConfigurationError(f'{place}: no energy is recorded in what is to be predicted')

@@ -29,8 +29,7 @@ def draw_validation(result: Validation, title: str, file: Path) -> None:
     axes = figure.subplot_mosaic(
         [['depth', 'rates'], ['rate', 'rate'], ['pitch', 'pitch'], ['speed', 'off']]
     )
-    number = int(np.argmax([track.counts.sum() for track in result.tracks]))
-    track, flown = result.tracks[number], result.flown[number]
+    track, flown = max(result.pairs, key=lambda pair: pair[0].counts.sum())
     own = track.instruments
     shown = own.time_s - own.time_s[0] <= LONGEST_S
     minutes = (own.time_s - own.time_s[0])[shown] / 60.0
@@ -61,9 +60,10 @@ def draw_validation(result: Validation, title: str, file: Path) -> None:
 
 def _scatter(axis, result: Validation) -> None:
     """Simulated over recorded vertical rate, of all stretches."""
-    pairs = list(zip(result.tracks, result.flown, strict=True))
-    recorded = 100.0 * np.concatenate([track.rate_mps[track.counts] for track, _ in pairs])
-    simulated = 100.0 * np.concatenate([one.rate_mps[track.counts] for track, one in pairs])
+    recorded, simulated = (
+        100.0 * np.concatenate([pair[which].rate_mps[pair[0].counts] for pair in result.pairs])
+        for which in (0, 1)
+    )
     axis.plot(recorded, simulated, '.', color=BLUE, markersize=1.0, rasterized=True)
     span = [float(np.nanmin(recorded)), float(np.nanmax(recorded))]
     axis.plot(span, span, color=GREY, linewidth=0.8)
@@ -74,7 +74,7 @@ def _depths(axis, result: Validation) -> None:
     """What the vertical rate is off by, over depth, in the dive and in the climb."""
     for name, phase, colour in (('dive', 1.0, BLUE), ('climb', -1.0, GREEN)):
         off, depth = [], []
-        for track, one in zip(result.tracks, result.flown, strict=True):
+        for track, one in result.pairs:
             part = track.counts & (track.phase == phase)
             off.append(100.0 * (one.rate_mps - track.rate_mps)[part])
             depth.append(track.instruments.depth_m[part])

@@ -7,7 +7,6 @@ and how rough it is differs from flight to flight, and nobody measures it otherw
 """
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -34,15 +33,24 @@ SEARCH_KG = 3.0
 class Constant(NamedTuple):
     """Something that can be fitted."""
 
+    field: str  #: of a `Model`, or of its vehicle
     unit: str
     step: float  #: a step of it that is felt, in its unit
-    #: Its value in a model, and the model with another one.
-    read: Callable[[Model], float]
-    write: Callable[[Model, float], Model]
     #: A fit moves it by no more than this from where it was (in its unit), and if it is a drag or
     #: the like by no more than this factor either way.
     within: float = math.inf
     factor: float = math.inf
+
+    def read(self, model: Model) -> float:
+        """Its value in a model."""
+        return getattr(model if self.field in Model._fields else model.vehicle, self.field)
+
+    def write(self, model: Model, value: float) -> Model:
+        """The model with another value."""
+        changed = {self.field: value}
+        if self.field not in Model._fields:
+            changed = {'vehicle': model.vehicle._replace(**changed)}
+        return model._replace(**changed)
 
     def bounds(self, value: float) -> tuple[float, float]:
         """Smallest and largest value of a fit that begins with one."""
@@ -51,45 +59,20 @@ class Constant(NamedTuple):
         return value - self.within, value + self.within
 
 
-def _of_vehicle(
-    field: str, unit: str, step: float, within: float = math.inf, factor: float = math.inf
-) -> Constant:
-    return Constant(
-        unit,
-        step,
-        lambda model: getattr(model.vehicle, field),
-        lambda model, value: model._replace(vehicle=model.vehicle._replace(**{field: value})),
-        within,
-        factor,
-    )
-
-
 #: No body differs from its file by more than so many times, either way (-).
 FACTOR = 5.0
 CONSTANTS = {
-    'mass': _of_vehicle('ballast', 'kg', 0.01, within=SEARCH_KG),
-    'Cd0': _of_vehicle('K_D0', 'kg/m', 0.1, factor=FACTOR),
-    'Cd1': _of_vehicle('K_D', 'kg/m/rad^2', 10.0, factor=FACTOR),
-    'lift': _of_vehicle('K_L', 'kg/m/rad', 10.0, factor=FACTOR),
-    'compressibility': _of_vehicle('compressibility', '1/Pa', 1e-11, factor=FACTOR),
-    'expansion': _of_vehicle('thermal_expansion', '1/K', 1e-6, within=2e-4),
-    'trim': _of_vehicle('s_x', 'kg m', 0.01, within=2.0),
-    'righting': _of_vehicle('s_z', 'kg m', 0.01, within=2.0),
-    'pump_x': _of_vehicle('pump_x', 'm', 0.01, within=1.0),
-    'pitch_scale': Constant(
-        '-',
-        0.01,
-        lambda model: model.pitch_scale,
-        lambda model, value: model._replace(pitch_scale=value),
-        within=0.3,
-    ),
-    'pitch_offset': Constant(
-        'deg',
-        0.1,
-        lambda model: math.degrees(model.pitch_offset_rad),
-        lambda model, value: model._replace(pitch_offset_rad=math.radians(value)),
-        within=10.0,
-    ),
+    'mass': Constant('ballast', 'kg', 0.01, within=SEARCH_KG),
+    'Cd0': Constant('K_D0', 'kg/m', 0.1, factor=FACTOR),
+    'Cd1': Constant('K_D', 'kg/m/rad^2', 10.0, factor=FACTOR),
+    'lift': Constant('K_L', 'kg/m/rad', 10.0, factor=FACTOR),
+    'compressibility': Constant('compressibility', '1/Pa', 1e-11, factor=FACTOR),
+    'expansion': Constant('thermal_expansion', '1/K', 1e-6, within=2e-4),
+    'trim': Constant('s_x', 'kg m', 0.01, within=2.0),
+    'righting': Constant('s_z', 'kg m', 0.01, within=2.0),
+    'pump_x': Constant('pump_x', 'm', 0.01, within=1.0),
+    'pitch_scale': Constant('pitch_scale', '-', 0.01, within=0.3),
+    'pitch_offset': Constant('pitch_offset_deg', 'deg', 0.1, within=10.0),
 }
 #: What is fitted if nothing else is said: what the makers of a vehicle fit too.
 FITTED = {'slocum': ('mass', 'Cd0'), 'seaglider': ('mass', 'Cd0', 'lift'), 'og1': ('mass', 'Cd0')}

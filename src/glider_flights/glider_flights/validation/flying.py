@@ -10,7 +10,7 @@ import numpy as np
 from glider_base.errors import ConfigurationError
 from glider_base.signals import SEA_WATER_DENSITY, TICK_S
 from glider_flights.record import Flight, vertical_rate
-from glider_flights.validation.imposed import STEP_S, Flown, Forcing, fly_free, fly_held
+from glider_flights.validation.imposed import STEP_S, Forcing, fly_free, fly_held
 from glider_flights.validation.track import RATE_S, Track
 from glider_model.vehicle.file import VehicleParams, load_vehicle
 
@@ -26,25 +26,25 @@ class Model(NamedTuple):
     """What is flown: a vehicle, and how its pitch sensor reads."""
 
     vehicle: VehicleParams
-    #: Pitch is what was recorded times this (-), and this more (rad).
+    #: Pitch is what was recorded times this (-), and this more (deg).
     pitch_scale: float = 1.0
-    pitch_offset_rad: float = 0.0
+    pitch_offset_deg: float = 0.0
 
     def pitch(self, recorded_rad: np.ndarray) -> np.ndarray:
         """True pitch (rad) behind what was recorded."""
-        return self.pitch_scale * recorded_rad + self.pitch_offset_rad
+        return self.pitch_scale * recorded_rad + math.radians(self.pitch_offset_deg)
 
 
 class Simulated(NamedTuple):
     """What the plant did along a stretch, arrays of shape (n,)."""
 
     rate_mps: np.ndarray  #: vertical rate (m/s, + down), over the same time as the recorded one
-    speed_mps: np.ndarray  #: speed through the water (m/s)
     #: Way through the water since the first sample (m), along the heading and to starboard.
     ahead_m: np.ndarray
     abeam_m: np.ndarray
     #: Heading since the first sample (rad), not wrapped.
     heading_rad: np.ndarray
+    speed_mps: np.ndarray  #: speed through the water (m/s)
     roll_rad: np.ndarray
     pitch_rad: np.ndarray
 
@@ -83,21 +83,13 @@ def check(found: list[Track], impose: Imposed) -> None:
 
 def fly(track: Track, model: Model, impose: Imposed) -> Simulated:
     """Fly the plant along a stretch."""
-    table, flown = forcing(track, model), np.empty((len(track.phase), len(Flown._fields)))
+    table, flown = forcing(track, model), np.empty((len(track.phase), len(Simulated._fields)))
     if impose == 'pitch':
         fly_held(table, model.vehicle, STEP_S, flown)
     else:
         fly_free(table, model.vehicle, TICK_S, flown)
-    own = Flown(*flown.T)
-    return Simulated(
-        rate_mps=vertical_rate(track.instruments.time_s, own.down, RATE_S),
-        speed_mps=own.speed,
-        ahead_m=own.ahead,
-        abeam_m=own.abeam,
-        heading_rad=own.heading,
-        roll_rad=own.phi,
-        pitch_rad=own.theta,
-    )
+    down_m, *others = flown.T
+    return Simulated(vertical_rate(track.instruments.time_s, down_m, RATE_S), *others)
 
 
 def forcing(track: Track, model: Model) -> np.ndarray:

@@ -47,18 +47,6 @@ class Forcing(NamedTuple):
     temperature: float  #: of the water (deg C)
 
 
-class Flown(NamedTuple):
-    """Columns of what was flown."""
-
-    down: float  #: way through the water since the first sample: down (m)
-    ahead: float  #: along the heading (m)
-    abeam: float  #: to starboard of it (m)
-    heading: float  #: turned since the first sample (rad)
-    speed: float  #: through the water (m/s)
-    phi: float  #: roll, pitch (rad)
-    theta: float
-
-
 class MeasuredWater(NamedTuple):
     """Water as it was measured beside the vehicle."""
 
@@ -172,7 +160,9 @@ def fly_held(table, vehicle, step, flown):
     step : float
         Longest step (s).
     flown : float64[n, 7]
-        Takes `Flown` of each sample.
+        Takes of each sample the way through the water since the first: down, along the heading
+        and to starboard of it (m), how far it has turned since (rad), speed through the water
+        (m/s), roll and pitch (rad).
     """
     u, v, w, turn = START_MPS, 0.0, 0.0, 0.0
     down, ahead, abeam, heading = 0.0, 0.0, 0.0, 0.0
@@ -234,6 +224,7 @@ def fly_free(table, vehicle, step, flown):
     for k in range(len(table)):
         here = table[k]
         phi, theta, _ = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
+        before = _rate(x.u, x.v, x.w, phi, theta)
         speed = math.sqrt(x.u * x.u + x.v * x.v + x.w * x.w)
         flown[k, 0], flown[k, 1], flown[k, 2], flown[k, 3] = down, ahead, abeam, heading
         flown[k, 4], flown[k, 5], flown[k, 6] = speed, phi, theta
@@ -246,8 +237,6 @@ def fly_free(table, vehicle, step, flown):
         for i in range(steps):
             begin = _between(here, after, i / steps)
             end = _between(here, after, (i + 1.0) / steps)
-            phi, theta, psi = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
-            before = _rate(x.u, x.v, x.w, phi, theta)
             x = _stepped(x, begin, end, vehicle, h)
             phi, theta, psi = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
             now = _rate(x.u, x.v, x.w, phi, theta)
@@ -255,7 +244,7 @@ def fly_free(table, vehicle, step, flown):
             ahead += 0.5 * h * (before[1] + now[1])
             abeam += 0.5 * h * (before[2] + now[2])
             heading += wrap_angle(psi - last)
-            last = psi
+            before, last = now, psi
 
 
 @kernel

@@ -5,6 +5,7 @@
 from typing import Any
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from glider_base.errors import ConfigurationError
 from glider_flights.folders import installed
@@ -78,8 +79,8 @@ def _gliderflight(
     ends = np.cumsum([len(track.phase) for track in tried])[:-1]
     for track, rising in zip(tried, np.split(theirs.wg, ends), strict=True):
         time_s = track.instruments.time_s
-        sunk = 0.5 * (rising[1:] + rising[:-1]) * np.diff(time_s)
-        rates.append(vertical_rate(time_s, -np.concatenate([[0.0], np.cumsum(sunk)]), RATE_S))
+        risen_m = cumulative_trapezoid(rising, time_s, initial=0.0)
+        rates.append(vertical_rate(time_s, -risen_m, RATE_S))
     return rates
 
 

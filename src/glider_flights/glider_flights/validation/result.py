@@ -3,25 +3,26 @@
 """A validation from files to figures."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from glider_base.errors import ConfigurationError
+from glider_flights.folders import Progress
 from glider_flights.record import Flight
 from glider_flights.validation.fit import BY_ADCP, CONSTANTS, at_bounds, chosen, fitted
-from glider_flights.validation.flying import (
-    Imposed,
-    Model,
-    Simulated,
-    check,
-    fly,
-    model_of,
-)
+from glider_flights.validation.flying import Imposed, Model, check, fly, model_of
 from glider_flights.validation.peers import peer
-from glider_flights.validation.score import Adcp, rate_off, rms, score, speed_off, turn_rates
+from glider_flights.validation.score import (
+    Adcp,
+    Pair,
+    rate_off,
+    rms,
+    score,
+    speed_off,
+    turn_rates,
+)
 from glider_flights.validation.track import Track, tracks
 
 #: Speeds of an ADCP that come with a flight, in its folder or the one above it.
@@ -37,8 +38,7 @@ FEWEST = 2
 class Validation(NamedTuple):
     """What came out."""
 
-    tracks: list[Track]
-    flown: list[Simulated]
+    pairs: list[Pair]
     model: Model
     adcp: Adcp | None
     report: dict[str, Any]  #: figures, as `--json` prints them
@@ -50,7 +50,7 @@ def validate(
     impose: Imposed,
     fit: str | None,
     adcp: Adcp | None,
-    progress: Callable[[int, int], None],
+    progress: Progress,
     fit_on: Half | Flight | None = None,
 ) -> Validation:
     """Fly a vehicle along a recorded flight, with constants that ``fit`` names fitted first.
@@ -77,20 +77,19 @@ def validate(
     model = start
     for name in names:
         model = CONSTANTS[name].write(model, CONSTANTS[name].read(learnt))
-    flown = []
+    pairs = []
     for number, track in enumerate(tried):
         progress(number, len(tried))
-        flown.append(fly(track, model, impose))
-    pitch = [model.pitch(track.instruments.pitch_rad) for track in tried]
+        pairs.append((track, fly(track, model, impose)))
     speed = np.empty(0)
     if told and fit_on is None:
         speed = _crosswise(found, start, impose, names, adcp)
     elif adcp is not None:
-        speed = np.concatenate([speed_off(*pair, adcp) for pair in zip(tried, flown, strict=True)])
+        speed = np.concatenate([speed_off(*pair, adcp) for pair in pairs])
     other, why = peer(learnt_on if names else [], tried, model, names)
-    unfitted, unfitted_other = flown, other
+    unfitted, unfitted_other = pairs, other
     if names:
-        unfitted = [fly(track, start, impose) for track in tried]
+        unfitted = [(track, fly(track, start, impose)) for track in tried]
         unfitted_other, _ = peer([], tried, start, ())
     # the basestation's constants are in the file, fitted already
     has_other = unfitted_other is not None and unfitted_other['name'] != 'basestation'
@@ -104,19 +103,19 @@ def validate(
         'imposed': impose,
         'fit_on': fit_on.files[0] if isinstance(fit_on, Flight) else fit_on or 'all',
         'fitted': {name: float(f'{CONSTANTS[name].read(model):.6g}') for name in names},
-        **score(flight, tried, flown, pitch, speed),
+        **score(flight, pairs, model, speed),
         'peer': other,
         'unfitted': {
-            'w_rmse_cmps': rms(rate_off(tried, unfitted), 100.0),
+            'w_rmse_cmps': rms(rate_off(unfitted), 100.0),
             'peer_w_rmse_cmps': other_unfitted,
         },
         'notes': flight.notes + ([why] if why else []) + at_bounds(names, begun, learnt),
     }
     if fit_on not in (None, 'none'):
-        flown_there = [fly(track, learnt, impose) for track in learnt_on]
-        for turns, learnt_rates in turn_rates(learnt_on, flown_there).items():
+        flown_there = [(track, fly(track, learnt, impose)) for track in learnt_on]
+        for turns, learnt_rates in turn_rates(flown_there).items():
             _try_turns(report[turns], learnt_rates)
-    return Validation(tried, flown, model, adcp, report)
+    return Validation(pairs, model, adcp, report)
 
 
 def _halves(found: list[Track], flight: Flight) -> tuple[list[Track], list[Track]]:
@@ -138,10 +137,9 @@ def _try_turns(rates: dict[str, Any], learnt: dict[str, Any]) -> None:
     for phase, rate in rates.items():
         known = learnt[phase]
         rate['fitted'] = None
-        if None not in (known['recorded'], known['simulated'], rate['simulated']):
-            if known['simulated'] != 0.0:
-                scale = known['recorded'] / known['simulated']
-                rate['fitted'] = round(rate['simulated'] * scale, 4)
+        if None not in (known['recorded'], rate['simulated']) and known['simulated']:
+            scale = known['recorded'] / known['simulated']
+            rate['fitted'] = round(rate['simulated'] * scale, 4)
 
 
 def _crosswise(

@@ -7,10 +7,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from glider_flights.comparison import comparable_current, navigate
 from glider_flights.record import Flight, Segment, at_times
-from glider_flights.validation.flying import Simulated
+from glider_flights.validation.flying import Model, Simulated
 from glider_flights.validation.track import Track
 
 #: Heading turns over this time (s), so that noise of the compass is small beside a turn.
@@ -29,6 +30,10 @@ WHOLE = 0.8
 PHASES = {'dive': 1.0, 'climb': -1.0}
 
 
+#: A stretch that was recorded, and what the plant did along it.
+Pair = tuple[Track, Simulated]
+
+
 class Adcp(NamedTuple):
     """Speed through the water (m/s) that was measured, and when (s since 1970), of shape (n,)."""
 
@@ -36,54 +41,45 @@ class Adcp(NamedTuple):
     speed_mps: np.ndarray
 
 
-def score(
-    flight: Flight,
-    found: list[Track],
-    flown: list[Simulated],
-    pitch_rad: list[np.ndarray],
-    speed: np.ndarray,
-) -> dict[str, Any]:
+def score(flight: Flight, pairs: list[Pair], model: Model, speed: np.ndarray) -> dict[str, Any]:
     """Figures of a flight.
 
     Parameters
     ----------
-    flight, found, flown
-        What was recorded, and what the plant did along each stretch.
-    pitch_rad : list of ndarray
-        True pitch of each stretch.
+    flight : Flight
+    pairs : list of Pair
+    model : Model
+        What was flown: it knows the true pitch.
     speed : ndarray, shape (n,)
         Simulated speed less that by an ADCP (m/s); none without one.
     """
-    pairs = list(zip(found, flown, strict=True))
-    rate = rate_off(found, flown)
+    rate = rate_off(pairs)
     pitch = np.concatenate(
         [
-            (one.pitch_rad - true)[track.counts]
-            for (track, one), true in zip(pairs, pitch_rad, strict=True)
+            (one.pitch_rad - model.pitch(track.instruments.pitch_rad))[track.counts]
+            for track, one in pairs
         ]
     )
     return {
-        'segments': len(found),
+        'segments': len(pairs),
         'samples': len(rate),
         'w_rmse_cmps': rms(rate, 100.0),
         'w_bias_cmps': figure(rate, 100.0),
         'u_adcp_rmse_cmps': rms(speed, 100.0),
         'u_adcp_bias_cmps': figure(speed, 100.0),
         'pitch_rmse_deg': rms(pitch, math.degrees(1.0)),
-        **turn_rates(found, flown),
+        **turn_rates(pairs),
         'dac_off_cmps': _closure(flight, pairs),
     }
 
 
-def rate_off(found: list[Track], flown: list[Simulated]) -> np.ndarray:
+def rate_off(pairs: list[Pair]) -> np.ndarray:
     """Vertical rate flown less that recorded (m/s), of the samples that are compared."""
-    pairs = zip(found, flown, strict=True)
     return np.concatenate([(one.rate_mps - track.rate_mps)[track.counts] for track, one in pairs])
 
 
-def turn_rates(found: list[Track], flown: list[Simulated]) -> dict[str, Any]:
+def turn_rates(pairs: list[Pair]) -> dict[str, Any]:
     """Turn rates over the sine of roll and fin at `TURN_MPS` (rad/s), by phase."""
-    pairs = list(zip(found, flown, strict=True))
     return {
         turns: {
             name: {
@@ -134,7 +130,7 @@ def _turn_rate(pairs, phase: float, by: str, power: float, recorded: bool) -> fl
         counts = inside & (track.phase == phase)
         turned = np.interp(end, time_s, heading) - np.interp(begin, time_s, heading)
         asked = sine * (one.speed_mps / TURN_MPS) ** power
-        asked = np.concatenate([[0.0], np.cumsum(_trapezoids(asked, time_s))])
+        asked = cumulative_trapezoid(asked, time_s, initial=0.0)
         share = (np.interp(end, time_s, asked) - np.interp(begin, time_s, asked)) / TURN_S
         rows.append(share[counts])
         rates.append((turned / TURN_S)[counts])
@@ -142,10 +138,6 @@ def _turn_rate(pairs, phase: float, by: str, power: float, recorded: bool) -> fl
     if len(asked) < 3 or np.std(asked) * TURN_MPS / 0.3 < SMALLEST_ANGLE:
         return None
     return round(float(np.polyfit(asked, np.concatenate(rates), 1)[0]), 4)
-
-
-def _trapezoids(values: np.ndarray, time_s: np.ndarray) -> np.ndarray:
-    return 0.5 * (values[1:] + values[:-1]) * np.diff(time_s)
 
 
 def _closure(flight: Flight, pairs) -> dict[str, Any]:

@@ -2,16 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """One table of all flights that a folder holds: fitted on one half, tried on the other."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from glider_base.errors import ConfigurationError
 from glider_flights.energy.uses import predict
-from glider_flights.og1 import og1_files
-from glider_flights.reading import read_uses, read_whole
-from glider_flights.seaglider import seaglider_files
-from glider_flights.slocum import slocum_files
+from glider_flights.folders import Progress
+from glider_flights.reading import files_by_kind, read_uses, read_whole
 from glider_flights.validation.result import validate
 from glider_flights.validation.score import STEERED_BY
 
@@ -19,6 +16,11 @@ from glider_flights.validation.score import STEERED_BY
 VEHICLES = {'slocum': 'slocum_g2', 'seaglider': 'seaglider', 'og1': 'seaglider'}
 #: Both ways.
 HALVES = ('first', 'second')
+#: What is told of each.
+OF_HALF = (
+    *('segments', 'fitted', 'w_rmse_cmps', 'w_bias_cmps', 'peer', 'unfitted'),
+    *STEERED_BY,
+)
 
 
 def flights_in(folder: Path) -> list[Path]:
@@ -32,11 +34,10 @@ def flights_in(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise ConfigurationError(f'--all {folder}: there is no such folder')
     inside = sorted(path for path in folder.rglob('*') if path.is_dir())
-    kinds = (slocum_files, seaglider_files, og1_files)
     found = [
         path
         for path in [folder, *inside]
-        if any(files_of(file) for files_of in kinds for file in path.iterdir() if file.is_file())
+        if any(any(files_by_kind(one).values()) for one in path.iterdir() if one.is_file())
     ]
     if not found:
         raise ConfigurationError(
@@ -47,11 +48,7 @@ def flights_in(folder: Path) -> list[Path]:
 
 
 def validate_all(
-    folder: Path,
-    vehicle: str | None,
-    fit: str | None,
-    cache: Path | None,
-    progress: Callable[[int, int], None],
+    folder: Path, vehicle: str | None, fit: str | None, cache: Path | None, progress: Progress
 ) -> dict[str, Any]:
     """Figures of every flight in a folder, as `--json` prints them; what has none is named."""
     places, rows, left_out = flights_in(folder), [], {}
@@ -87,19 +84,7 @@ def _row(place: Path, vehicle: str | None, fit: str | None, cache: Path | None) 
         'vehicle': chosen,
         'segments': sum(one['segments'] for one in halves.values()),
         **{
-            f'fit_on_{half}': {
-                name: one[name]
-                for name in (
-                    'segments',
-                    'fitted',
-                    'w_rmse_cmps',
-                    'w_bias_cmps',
-                    'peer',
-                    'unfitted',
-                    *STEERED_BY,
-                )
-            }
-            for half, one in halves.items()
+            f'fit_on_{half}': {name: one[name] for name in OF_HALF} for half, one in halves.items()
         },
         'peer': (first['peer'] or {}).get('name'),
         'energy_error_percent': energy,

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_base.errors import ConfigurationError
+from glider_flights.folders import gsw
 from glider_flights.record import SURFACE_DEPTH_M, Flight, Instruments, in_order, vertical_rate
-from glider_flights.seawater import density_of, pressure_of
 
 #: The recorded vertical rate is the slope of depth over about this time (s).
 RATE_S = 11.0
@@ -69,8 +69,10 @@ def _track(own: Instruments, origin_deg: np.ndarray) -> Track:
         for name in ('salinity', 'temperature_degc')
     }
     own = own._replace(**water)
-    pressure = pressure_of(own.depth_m, origin_deg[0])
-    density = density_of(own.salinity, own.temperature_degc, pressure, origin_deg)
+    latitude, longitude = origin_deg
+    pressure = gsw().p_from_z(-own.depth_m, latitude)
+    absolute = gsw().SA_from_SP(own.salinity, pressure, longitude, latitude)
+    density = gsw().rho_t_exact(absolute, own.temperature_degc, pressure)
     turns = _turns(own.depth_m)
     counts = np.zeros(len(own.time_s), bool)
     phase = np.zeros(len(own.time_s))

@@ -3,6 +3,7 @@
 """``./glider experiments``: the paper's figures, and what goes beyond them."""
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -13,7 +14,6 @@ from glider_bringup.console import (
     Json,
     Scheduler,
     Workers,
-    counter,
     messages,
     output,
     picked,
@@ -71,29 +71,28 @@ def experiments(
 
     groups = picked(only, Group)
     planned = paper.make_experiments(groups)
-    hunts, crosses = search.NAME in groups, routes.NAME in groups
-    total = paper.count_flights(planned) + hunts * flights + crosses * routes.count_tasks()
+    flown = paper.count_flights(planned)
+    others = []  # flights, loops that they need, and what flies and judges them
+    if search.NAME in groups:
+        hunt = partial(search.search, seed, flights)
+        others.append((flights, search.combinations(seed, flights), hunt))
+    if routes.NAME in groups:
+        crossing = partial(routes.cross, seed)
+        others.append((routes.TASKS, routes.combinations(), crossing))
+    total = flown + sum(count for count, _, _ in others)
     if out:
         make_result_folder(out, paper.RESULT_FILE)
-    what = 'flights and plans' if crosses else 'flights'
-    messages.print(f'{len(planned) + hunts + crosses} experiments, {total} {what}')
-    loops = paper.combinations(planned)
-    if hunts:
-        loops |= search.combinations(seed, flights)
-    if crosses:
-        loops |= routes.combinations()
-    with workers_at_work(workers, scheduler, loops) as pool, counter('flying', total) as update:
+    what = 'flights and plans' if routes.NAME in groups else 'flights'
+    messages.print(f'{len(planned) + len(others)} experiments, {total} {what}')
+    loops = paper.combinations(planned).union(*(needed for _, needed, _ in others))
+    with workers_at_work(workers, scheduler, loops, total) as (pool, update):
         rows, records = paper.fly(planned, pool, update)
         result = paper.report(planned, rows)
-        flown = paper.count_flights(planned)
-        if hunts:
-            found = search.search(seed, flights, pool, lambda done: update(flown + done))
+        for count, _, fly in others:
+            found = fly(pool, lambda done, before=flown: update(before + done))
+            flown += count
             result['experiments'].append(found)
-            result |= found['counts']
-        if crosses:
-            before = total - routes.count_tasks()
-            crossed = routes.cross(seed, pool, lambda done: update(before + done))
-            result['experiments'].append(crossed)
+            result |= found.get('counts', {})
     if out:
         with messages.status('drawing'):
             drawn = paper_figures.draw(planned, rows, records, out)

@@ -17,7 +17,6 @@ from glider_bringup.console import (
     Scheduler,
     Workers,
     changed_fields,
-    counter,
     messages,
     number,
     output,
@@ -78,10 +77,7 @@ def montecarlo(
         make_result_folder(out, study.RESULT_FILE)
     messages.print(f'{scenario}: {plants} plants, each by {" and by ".join(laws)}')
     loops = map(combination_of, scenarios.values())
-    with (
-        workers_at_work(workers, scheduler, loops) as pool,
-        counter('flying', len(scenarios)) as update,
-    ):
+    with workers_at_work(workers, scheduler, loops, len(scenarios)) as (pool, update):
         flights, airframes = study.fly_plants(scenarios, pool, update)
     whole = study.report(scenario, fields, seed, faults, flights, airframes)
     if out:

@@ -17,7 +17,6 @@ from glider_bringup.console import (
     Scheduler,
     Workers,
     changed_fields,
-    counter,
     messages,
     output,
     print_table,
@@ -75,10 +74,8 @@ def sweep(
         known = study.flown_cells(plan, journal)
         if not all(known):
             waits = partial(messages.print, 'no worker is connected: waiting for one')
-            with (
-                workers_at_work(workers, scheduler, plan.combinations, advice) as pool,
-                counter('flying', plan.cells) as update,
-            ):
+            loops = plan.combinations
+            with workers_at_work(workers, scheduler, loops, plan.cells, advice) as (pool, update):
                 study.fly_sweep(plan, journal, known, pool, update, waits)
         with messages.status('writing the result'):
             summary = study.write_result(plan, journal, folder / study.RESULT_FILE)

@@ -14,7 +14,7 @@ from glider_bringup.scoring.scores import largest, rms
 from glider_guidance.los import crab_heading
 from glider_mission.scenario import Scenario
 from glider_model.onboard.glide_polar import make_polar, steady_horizontal_speed
-from glider_model.vehicle.file import load_vehicle
+from glider_model.vehicle.file import Vehicle, load_vehicle
 
 #: Time between two samples of a `Record` (s).
 _SAMPLE_S = 1.0
@@ -118,9 +118,9 @@ def measure_crab(record: Record, scenario: Scenario) -> dict[str, Any]:
     return {'crab_error_deg': _mean(np.abs(error))}
 
 
-def horizontal_speed(scenario: Scenario) -> float:
-    """U_h (m/s) that the vehicle's polar gives for the scenario's pitch and net heaviness."""
-    polar = make_polar(load_vehicle(scenario.vehicle).params())
+def horizontal_speed(scenario: Scenario, vehicle: Vehicle | None = None) -> float:
+    """U_h (m/s) that the polar of its vehicle gives for a scenario's pitch and net heaviness."""
+    polar = make_polar((vehicle or load_vehicle(scenario.vehicle)).params())
     pitch = -math.radians(scenario.profile.pitch_deg)
     return steady_horizontal_speed(pitch, scenario.profile.net_heaviness_kg, polar)
 

@@ -24,7 +24,7 @@ LISTED = 12
 BETTER = '*'
 #: Largest steady cross-track error (m).
 STEADY = 'cross_track_m.max_steady'
-_LAW_NAMES = {'adaptive': 'adaptive', 'backstepping': "paper's law", 'pid': 'tuned PID'}
+LAW_NAMES = {'adaptive': 'adaptive', 'backstepping': "paper's law", 'pid': 'tuned PID'}
 
 
 def _number(value: float | str | None, digits: int = 2) -> str:
@@ -57,7 +57,7 @@ def _by_flight(figures: dict[str, str]) -> Callable[[list[dict]], Table]:
         adaptive = by_case(rows, 'adaptive')
         for row in rows:
             rival = adaptive.get((row['case'], row['guidance']))
-            texts = [row['case']] * cases + [_LAW_NAMES[row['controller']]]
+            texts = [row['case']] * cases + [LAW_NAMES[row['controller']]]
             texts += [row['guidance']] * ways + [row['status']] * flagged
             table.add_row(*texts, *(_marked(row, rival, name) for name in figures))
         return table
@@ -104,7 +104,7 @@ def _steering(rows: list[dict]) -> list[str]:
 def _survey(rows: list[dict]) -> Table:
     """Closest pass of each waypoint, and the heading in each leg."""
     legs = rows[0]['legs']
-    table = _table(['', *(_LAW_NAMES[row['controller']] for row in rows)], [])
+    table = _table(['', *(LAW_NAMES[row['controller']] for row in rows)], [])
     for i in range(len(rows[0]['waypoints_closest_m'])):
         passes = (f'{row["waypoints_closest_m"][i]:.2f} m' for row in rows)
         table.add_row(f'waypoint {i}, closest pass', *passes)
@@ -155,43 +155,6 @@ _TABLES: dict[str, Callable[[list[dict]], Table]] = {
     'survey': _survey,
     'ablation': _ablation,
     'envelope': _envelope,
-    'yaw': _by_flight(
-        {
-            'heading_error_deg.rms_steady': 'error\nrms (deg)',
-            'heading_fluctuation_deg.rms_steady': 'fluct.\nrms (deg)',
-            'cross_track_m.max_steady': 'max\nsteady (m)',
-            'cross_track_m.max_all': 'max\nall (m)',
-            'cross_track_m.max_run': 'max\nrun (m)',
-        }
-    ),
-    'profile': _by_flight(
-        {
-            'depth_m.max': 'deepest\n(m)',
-            'trim.pitch_dive_deg': 'dive\n(deg)',
-            'trim.pitch_climb_deg': 'climb\n(deg)',
-            'pitch_error_deg.rms_steady': 'error\nrms',
-            'pitch_error_deg.max_steady': 'max\n(deg)',
-            'roll_deg.rms_steady': 'roll\nrms',
-            'roll_deg.max_steady': 'max\n(deg)',
-        }
-    ),
-    'reckoned': _by_flight(
-        {
-            'navigation.error_m.p50': 'error\np50 (m)',
-            'navigation.error_m.worst': 'error\nworst',
-            'navigation.from_fourth.surfacing_cross_track_m': 'beside\nfrom 4th',
-            'navigation.from_fourth.under_water_rms_m': 'under\nwater rms',
-            'navigation.dac_error_mps.rms': 'DAC rms\n(m/s)',
-            'navigation.ellipse_95_share': 'inside\n95 %',
-        }
-    ),
-}
-_REMARKS = {
-    'reckoned': (
-        'Error: of the estimated position at surfacing. Cross-track: largest true distance from '
-        'the path at surfacings, from the fourth surfacing on; under water from then on. DAC: how '
-        'far the depth-averaged current, as estimated after its fixes, is off the true one.'
-    )
 }
 
 
@@ -205,16 +168,16 @@ def show(result: dict[str, Any], output: Console) -> None:
             _show_verdict(one, output)
             continue
         said = described(one['name'])
-        make = _TABLES.get(said.get('table')) or _by_flight(compared(one['rows']))
+        figures = said.get('figures') or compared(one['rows'])
+        make = _TABLES.get(said.get('table')) or _by_flight(figures)
         output.print(f'\n{head}\npaper: {one["paper"]}', soft_wrap=True)
         output.print(make(one['rows']))
         if one['pid_better'] and make is not _survey:
             output.print(f'{BETTER} the tuned PID is better than the adaptive law')
         for line in _steering(one['rows']):
             output.print(line)
-        remark = said.get('remark') or _REMARKS.get(said.get('table'))
-        if remark:
-            output.print(remark)
+        if 'remark' in said:
+            output.print(said['remark'])
         _show_verdict(one, output)
     verdicts = [one['verdict'] for one in result['experiments']]
     output.print(f'\n{verdicts.count(PASSED)} of {len(verdicts)} experiments passed')

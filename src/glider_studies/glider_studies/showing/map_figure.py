@@ -59,11 +59,6 @@ class Extent(NamedTuple):
     across_kn: tuple[float, float]  #: in view, left and right
     along_kn: tuple[float, float]  #: in view, bottom and top
 
-    @property
-    def rim_kn(self) -> float:
-        """Largest speed of a cell."""
-        return float(self.speed_kn[-1])
-
 
 def _edges(values: np.ndarray, alone: float) -> np.ndarray:
     """Bounds of cells around increasing values; the outer ones go half a step beyond them."""
@@ -80,9 +75,8 @@ def _extent(stability: StabilityMap) -> Extent:
     angle = _edges(angles, ALONE_DEG)
     if len(angles) > 1 and angles[0] >= 0.0 and angles[-1] <= 180.0:
         angle = np.clip(angle, 0.0, 180.0)  # beyond is the mirror image
-    arc = np.radians(np.linspace(angle[0], angle[-1], _ARC))
     rim = speed[-1]
-    across, along = rim * np.sin(arc), rim * np.cos(arc)
+    across, along = _arc(rim, angle[0], angle[-1])
     left, right = min(0.0, across.min()), max(0.0, across.max())
     bottom, top = min(0.0, along.min()), max(0.42 * rim, along.max())
     least = 0.25 * rim  # a map of currents along the path is narrow
@@ -141,14 +135,12 @@ def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray, extent: Exte
     """Cells, rays and circles, limits and the points of the paper."""
     from matplotlib.colors import ListedColormap
 
-    coarse = np.radians(extent.angle_deg)
-    fine = max(8, math.ceil(_ARC / (len(coarse) - 1)))  # chords for the arc of a cell
-    angle = np.interp(
-        np.arange(fine * (len(coarse) - 1) + 1) / fine, np.arange(len(coarse)), coarse
-    )
+    cells = len(extent.angle_deg) - 1
+    fine = max(8, math.ceil(_ARC / cells))  # chords for the arc of a cell
+    steps = np.arange(fine * cells + 1) / fine
+    angle_deg = np.interp(steps, np.arange(cells + 1), extent.angle_deg)
     axis.pcolormesh(
-        np.outer(extent.speed_kn, np.sin(angle)),
-        np.outer(extent.speed_kn, np.cos(angle)),
+        *_tip(extent.speed_kn[:, None], angle_deg),
         np.repeat(classes, fine, axis=1),
         cmap=ListedColormap([_COLOURS[name] for name in CLASSES]),
         vmin=-0.5,
@@ -156,7 +148,7 @@ def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray, extent: Exte
         rasterized=True,
     )
     _draw_rose(axis, extent)
-    _draw_limits(axis, extent.rim_kn, stability.horizontal_kn)
+    _draw_limits(axis, extent.speed_kn[-1], stability.horizontal_kn)
     for degrees, _, marker in PAPER_POINTS:
         across, along = _tip(PAPER_KN, degrees)
         axis.plot(across, along, marker, color='white', markeredgecolor='black', markersize=6.5)
@@ -167,8 +159,13 @@ def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray, extent: Exte
 
 
 def _tip(speed: float, angle_deg: float) -> tuple[float, float]:
-    """Where a current lies in the map: across and along the path."""
-    return speed * math.sin(math.radians(angle_deg)), speed * math.cos(math.radians(angle_deg))
+    """Where a current lies in the map: across and along the path; of numbers or arrays."""
+    return speed * np.sin(np.radians(angle_deg)), speed * np.cos(np.radians(angle_deg))
+
+
+def _arc(speed: float, first_deg: float, last_deg: float) -> tuple[np.ndarray, np.ndarray]:
+    """The same for a speed at all angles between two."""
+    return _tip(speed, np.linspace(first_deg, last_deg, _ARC))
 
 
 def _round_values(first: float, last: float, steps: tuple[float, ...]) -> np.ndarray:
@@ -184,7 +181,7 @@ def _round_values(first: float, last: float, steps: tuple[float, ...]) -> np.nda
 
 def _draw_rose(axis, extent: Extent) -> None:
     """Rays and circles by which angle and speed of a current can be read."""
-    first, last, rim = extent.angle_deg[0], extent.angle_deg[-1], extent.rim_kn
+    first, last, rim = extent.angle_deg[0], extent.angle_deg[-1], extent.speed_kn[-1]
     thin = {'color': 'black', 'linewidth': 0.4, 'alpha': 0.4}
     for degrees in _round_values(first, last, _RAYS):
         across, along = _tip(rim, degrees)
@@ -193,9 +190,8 @@ def _draw_rose(axis, extent: Extent) -> None:
         place = (1.06 * across if is_aside else 0.03 * rim, 1.06 * along)
         to = 'center' if is_aside else 'left'
         axis.annotate(f'{degrees:.0f}°', place, ha=to, va='center', fontsize='small')
-    arc = np.radians(np.linspace(first, last, _ARC))
     for speed in _round_values(1e-6, rim, _CIRCLES):
-        axis.plot(speed * np.sin(arc), speed * np.cos(arc), **thin)
+        axis.plot(*_arc(speed, first, last), **thin)
         axis.annotate(f' {speed:g} kn', _tip(speed, last), fontsize='x-small', va='center')
     look = {'arrowstyle': '-|>', 'linewidth': 2.0, 'color': 'black'}
     axis.annotate('', xy=(0.0, 0.42 * rim), xytext=(0.0, 0.0), arrowprops=look)
@@ -208,8 +204,7 @@ def _draw_limits(axis, rim: float, speed: float) -> None:
         top = math.sqrt(rim * rim - speed * speed)
         for side in (-speed, speed):
             axis.plot([side, side], [0.0, top], color='black', linewidth=2.0)
-    arc = np.radians(np.linspace(90.0, 270.0, _ARC))
-    axis.plot(speed * np.sin(arc), speed * np.cos(arc), '--', color='black', linewidth=2.0)
+    axis.plot(*_arc(speed, 90.0, 270.0), '--', color='black', linewidth=2.0)
 
 
 def _legend(stability: StabilityMap) -> list:

@@ -17,12 +17,12 @@ from glider_bringup.scoring.one_hertz import Record
 from glider_bringup.showing.figure import BLUE, GREEN, GREY, ORANGE, dress, new_figure
 from glider_mission.disk import save_figure
 from glider_studies.paper.experiments import Experiment
+from glider_studies.paper.tables import LAW_NAMES
 
 #: Flights by experiment, case, controller and guidance.
 Flights = dict[tuple[str, str, str, str], Record]
 
 _COLOURS = {'adaptive': BLUE, 'backstepping': GREEN, 'pid': ORANGE}
-_NAMES = {'adaptive': 'adaptive', 'backstepping': "paper's law", 'pid': 'tuned PID'}
 _STYLES = {'adaptive': '-', 'backstepping': ':', 'pid': '--'}
 _RED = '#c0392b'
 #: Figures 5 to 7 show this much of a flight (h).
@@ -50,13 +50,7 @@ def draw(
     records: list[list[Record | None]],
     folder: Path,
 ) -> list[Path]:
-    """Draw what was flown into PNG files.
-
-    Returns
-    -------
-    list of Path
-        Files, by number of the figure.
-    """
+    """Draw what was flown into PNG files; returns them, by number of the figure."""
     flights = {
         (one.name, case.case, case.controller, case.guidance): record
         for one, kept in zip(experiments, records, strict=True)
@@ -92,7 +86,7 @@ def _profiles(flights: Flights, drawing: Drawing) -> Iterator[tuple[str, Record,
 
 def _plot(axis, controller: str, x, y, style: str = '-', width: float = 1.0) -> None:
     """Curve of a flight, in the colour of its controller."""
-    look = {'color': _COLOURS[controller], 'label': _NAMES[controller], 'linewidth': width}
+    look = {'color': _COLOURS[controller], 'label': LAW_NAMES[controller], 'linewidth': width}
     axis.plot(x, y, style, **look)
 
 
@@ -178,7 +172,7 @@ def _draw_roll(figure, drawing: Drawing, flights: Flights, rows: list[dict]) -> 
 def _draw_yaw(figure, drawing: Drawing, flights: Flights, rows: list[dict]) -> None:
     """Heading and cross-track error with our guidance, heading with the paper's."""
     controller = drawing.experiment.removeprefix('yaw_10deg_')
-    colour, label = _COLOURS[controller], _NAMES[controller]
+    colour, label = _COLOURS[controller], LAW_NAMES[controller]
     ours, across, paper = figure.subplots(3, 1)
     for guidance, axis in (('los_zhang2021', paper), ('los_current', ours)):
         record = flights[drawing.experiment, _READING, controller, guidance]

@@ -19,8 +19,8 @@ from glider_bringup.door.netcdf import read_dataset
 from glider_guidance.los import crab_heading
 from glider_mission.scenario import Scenario
 from glider_model.ocean.current_settings import KNOT_MPS
-from glider_model.onboard.glide_polar import make_polar, steady_horizontal_speed
 from glider_model.vehicle.file import Vehicle
+from glider_studies.paper.measures import horizontal_speed
 
 #: Largest steady cross-track error of a stable and of a critical flight (m).
 STABLE_M, CRITICAL_M = 10.0, 50.0
@@ -130,9 +130,7 @@ def _horizontal_speed(file: Path, data: xarray.Dataset) -> tuple[float, str]:
         )
         for what, model in (('vehicle', Vehicle), ('scenario', Scenario))
     )
-    pitch, heaviness = scenario.profile.pitch_deg, scenario.profile.net_heaviness_kg
-    polar = make_polar(vehicle.params())
-    return steady_horizontal_speed(-math.radians(pitch), heaviness, polar), vehicle.name
+    return horizontal_speed(scenario, vehicle), vehicle.name
 
 
 def _classify(data: xarray.Dataset, measure: Measure) -> np.ndarray:

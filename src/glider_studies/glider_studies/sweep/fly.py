@@ -6,7 +6,6 @@ What is known of a cell goes into a journal as it comes, and from there into one
 depends on the inputs alone: not on the workers, their order, or interruptions.
 """
 
-import hashlib
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
@@ -28,16 +27,15 @@ from glider_model.vehicle.file import vehicle_path
 from glider_studies.sweep.journal import Journal
 from glider_studies.sweep.netcdf import (
     NOT_FIGURES,
+    STATUSES,
     VECTORS,
     make_dataset,
     variable_name,
 )
-from glider_studies.sweep.plan import Plan, vehicle_text
+from glider_studies.sweep.plan import Plan, vehicle_digest
 from glider_studies.workers import WORKER_DIED, Pool, Progress, WorkError
 
 JOURNAL_FILE, RESULT_FILE = 'journal.jsonl', 'sweep.nc'
-#: Those of before come first: a result keeps a status as its place among them.
-STATUSES = ('completed', 'infeasible', 'failed', 'surfaced', 'lost')
 FAILED = 'failed'
 
 #: A worker is given so much simulated time at once (s): seconds of work, milliseconds of overhead.
@@ -60,22 +58,16 @@ NOT_RESULTS = {
 }
 
 
-class Inputs(NamedTuple):
-    """What all cells have in common; a worker on another machine must have the same."""
-
-    source: ScenarioSource
-    vehicles: frozenset[str]  #: digests of vehicle files
-
-
 class Chunk(NamedTuple):
     """Cells that a worker flies one after the other."""
 
-    inputs: Inputs
+    source: ScenarioSource
+    vehicles: frozenset[str]  #: digests of vehicle files: another machine must have the same
     cells: list[tuple[int, dict[str, Any]]]  #: number and scenario fields
 
     def apart(self) -> list['Chunk']:
         """Each cell by itself."""
-        return [Chunk(self.inputs, [cell]) for cell in self.cells]
+        return [self._replace(cells=[cell]) for cell in self.cells]
 
 
 # ---------------------------------------------------------------------------------- in a worker
@@ -86,13 +78,13 @@ def fly_chunk(chunk: Chunk) -> list[dict[str, Any]]:
 
     Raises WorkError if this worker would fly another vehicle.
     """
-    return [{'cell': cell, **_fly_cell(chunk.inputs, changes)} for cell, changes in chunk.cells]
+    return [{'cell': cell, **_fly_cell(chunk, changes)} for cell, changes in chunk.cells]
 
 
-def _fly_cell(inputs: Inputs, changes: dict[str, Any]) -> dict[str, Any]:
+def _fly_cell(chunk: Chunk, changes: dict[str, Any]) -> dict[str, Any]:
     try:
-        scenario = make_scenario(inputs.source, changes)
-        if digest(vehicle_text(scenario.vehicle)) not in inputs.vehicles:
+        scenario = make_scenario(chunk.source, changes)
+        if vehicle_digest(scenario.vehicle) not in chunk.vehicles:
             name = vehicle_path(scenario.vehicle).stem
             raise WorkError(f'{gethostname()} has another file of {name}')
         flight, scores = fly_scored(scenario)
@@ -100,16 +92,11 @@ def _fly_cell(inputs: Inputs, changes: dict[str, Any]) -> dict[str, Any]:
     except WorkError:
         raise
     except Exception as error:  # whatever it is, it is the end of this cell only
-        text = str(error).replace(str(inputs.source.path), inputs.source.path.name)
+        text = str(error).replace(str(chunk.source.path), chunk.source.path.name)
         if not isinstance(error, ConfigurationError):
             text = f'{type(error).__name__}: {text}'
         return failure(text)
     return judge(card)
-
-
-def digest(text: str) -> str:
-    """Digest of a text."""
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def failure(reason: str) -> dict[str, Any]:
@@ -191,14 +178,12 @@ def flown_cells(plan: Plan, journal: Journal) -> bytearray:
 
 def make_chunks(plan: Plan, known: bytearray, threads: int) -> Iterator[Chunk]:
     """Chunks of all cells that are not known yet, in order, for so many threads at once."""
-    vehicles = frozenset(digest(text) for text in plan.vehicle_texts)
-    inputs = Inputs(plan.source, vehicles)
     cell_s = planned_ticks(plan.first) * TICK_S
     share = known.count(0) // (CHUNKS_EACH * max(1, threads))
     size = max(1, min(CHUNK_CELLS, share, int(CHUNK_S / cell_s)))
     unknown = (cell for cell in range(plan.cells) if not known[cell])
     while cells := [(cell, plan.changes(cell)) for cell in islice(unknown, size)]:
-        yield Chunk(inputs, cells)
+        yield Chunk(plan.source, plan.vehicle_digests, cells)
 
 
 def fly_sweep(
@@ -233,7 +218,7 @@ def write_result(plan: Plan, journal: Journal, file: Path) -> dict[str, Any]:
 
     Returns its summary: ``sweep``, ``file``, ``cells``, and how many of each status.
     """
-    dataset = make_dataset(plan, journal.records(), STATUSES)
+    dataset = make_dataset(plan, journal.records())
     with whole_file(file) as stream:
         write_dataset(dataset, Path(stream.name))
     status = dataset['status'].values.ravel()

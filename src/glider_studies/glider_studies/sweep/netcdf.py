@@ -38,6 +38,8 @@ VECTORS = {
     'final_state.attitude_rpy_rad': ('rpy', ('roll', 'pitch', 'yaw')),
     'final_state.velocity_mps': ('frd', ('forward', 'starboard', 'down')),
 }
+#: Those of before come first: a result keeps a status as its place among them.
+STATUSES = ('completed', 'infeasible', 'failed', 'surfaced', 'lost')
 #: Names in a result that are no figures, apart from its dimensions.
 NOT_FIGURES = {'status', 'reason', *(dimension for dimension, _ in VECTORS.values())}
 
@@ -85,20 +87,14 @@ def _coordinate(axis: Axis) -> tuple[str, np.ndarray, dict[str, str]]:
     return axis.name, values, attributes
 
 
-def make_dataset(
-    plan: Plan, records: Iterable[dict[str, Any]], statuses: tuple[str, ...]
-) -> xarray.Dataset:
-    """Dataset of a sweep.
-
-    Of what `glider_studies.sweep.fly.fly_chunk` says of every cell, in any order;
-    ``statuses`` are names of the values of the variable ``status``.
-    """
+def make_dataset(plan: Plan, records: Iterable[dict[str, Any]]) -> xarray.Dataset:
+    """Dataset of a sweep, of what `sweep.fly.fly_chunk` says of every cell, in any order."""
     status = np.full(plan.cells, -1, dtype=np.int8)
     reasons = np.full(plan.cells, '', dtype=object)
     figures: dict[str, np.ndarray] = {}
     for record in records:
         cell = record['cell']
-        status[cell] = statuses.index(record['status'])
+        status[cell] = STATUSES.index(record['status'])
         reasons[cell] = record['reason']
         for name, figure in record['figures'].items():
             if name not in figures:
@@ -109,8 +105,8 @@ def make_dataset(
     dimensions = [axis.name for axis in plan.axes]
     flags = {
         'long_name': 'how the flight ended',
-        'flag_values': np.arange(len(statuses), dtype=np.int8),
-        'flag_meanings': ' '.join(statuses),
+        'flag_values': np.arange(len(STATUSES), dtype=np.int8),
+        'flag_meanings': ' '.join(STATUSES),
     }
     why = {'long_name': 'why the cell failed; empty if it did not'}
     dataset = xarray.Dataset(

@@ -260,8 +260,7 @@ class Plan:
         vehicles: dict[Path, str] = {}  # one of every vehicle file
         for one in checked:
             vehicles.setdefault(vehicle_path(one.vehicle), one.vehicle)
-        #: texts of the vehicle files
-        self.vehicle_texts = [vehicle_text(vehicle) for vehicle in vehicles.values()]
+        self.vehicle_digests = frozenset(map(vehicle_digest, vehicles.values()))
         #: name and text of a vehicle of each file as it flies, the first cell's first
         self.vehicles = [
             (vehicle_path(vehicle).stem, vehicle_file(vehicle).decode('utf-8-sig'))
@@ -356,9 +355,9 @@ class Plan:
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
-def vehicle_text(vehicle: str) -> str:
-    """Text of the file of a vehicle given by name or path, without what is changed in it."""
-    return read_text(vehicle_path(vehicle))
+def vehicle_digest(vehicle: str) -> str:
+    """Digest of the file of a vehicle given by name or path, without what is changed in it."""
+    return hashlib.sha256(read_text(vehicle_path(vehicle)).encode()).hexdigest()
 
 
 def _axis(name: str, dimension: Dimension) -> Axis:
