@@ -305,6 +305,17 @@ def test_a_slow_yo_that_begins_in_a_stall_is_flown():
     assert flown.depth.max() < 30.0
 
 
+def test_a_stall_that_control_ends_is_no_frozen_depth():
+    """Half of the pump taken back, nose 40 deg down, and hardly deeper meanwhile."""
+    glide = {'profile.depth_m': 934.0, 'profile.pitch_deg': 20.3}
+    drags = {'K_D0': 1.16, 'K_D': 0.74, 'K_L': 1.18, 'K_M': 0.85, 'pitch_trim_m': -0.0087}
+    heavy = {'profile.net_heaviness_kg': 0.137, 'perturb': {**drags, 'net_heaviness_kg': 0.04}}
+    flown = fly('current_8deg', 3600.0, **glide, **heavy, **SEAGLIDER)
+    assert flown.depth[6000] < 10.0
+    assert flown.depth[-1] > 300.0
+    assert not flown.told.any()
+
+
 def test_a_turn_with_the_whole_pump_that_ends_in_a_stall_is_flown():
     """It slid tail first below the surface, and hung there until its depth was disbelieved."""
     steep = {'profile.depth_m': 200.0, 'profile.pitch_deg': 45.0, 'profile.top_depth_m': 5.0}

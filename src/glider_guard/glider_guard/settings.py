@@ -115,10 +115,11 @@ class GuardLimitSettings(Settings):
     )
     lag_m: float = Field(10.0, ge=1.0, le=1000.0, description='the same, at least this (m)')
     led_m: float = Field(
-        30.0,
+        60.0,
         ge=5.0,
         le=1000.0,
-        description='way that pump and pitch lead while the depth rests within a metre (m)',
+        description='way that pump and pitch lead while the depth rests within a metre (m); a '
+        'stall that is being ended takes up to 50',
     )
     jump_m: float = Field(
         5.0,
