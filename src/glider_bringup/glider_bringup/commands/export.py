@@ -81,7 +81,6 @@ def export(
 
 
 def _write_all(run: Path, kind: str, file: Path, start: str | None) -> None:
-    """Write every number of the bag."""
     from glider_bringup.door.export import WRITERS, dataset_of
     from glider_bringup.door.run import open_run
 

@@ -233,7 +233,6 @@ def _ranked(errors: list[tuple[str, float]]) -> str:
 
 
 def _panels(runs: list[FlownRun]) -> dict[str, list[Panel]]:
-    """Panels by heading."""
     flown = [(i, run) for i, run in enumerate(runs) if run.traces.ticks]
 
     def curves(name: str) -> tuple[Curve, ...]:

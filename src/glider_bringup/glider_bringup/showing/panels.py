@@ -139,7 +139,6 @@ def _desired(name: str, label: str = 'desired') -> Curve:
 
 
 def _flight_panels(run: FlownRun) -> list[Panel]:
-    """How it flew: depth, errors, attitude."""
     noisy = run.traces.has('measured_depth_m')
     told = 'estimated' if reckoned(run.card) else 'measured, with noise'
 
@@ -260,7 +259,6 @@ def _mean_current_panel(reports: list[dict], axis: int) -> Panel:
 
 
 def _actuator_panels(run: FlownRun) -> list[Panel]:
-    """What the actuators did."""
     panels = []
     for one, limit in actuators_of(run):
         used = run.traces.largest(one.position) / limit
