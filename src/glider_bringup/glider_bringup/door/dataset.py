@@ -49,6 +49,7 @@ _ANGLES = {
     'heading': 'heading, clockwise from north',
 }
 _AXES = ('north', 'east', 'down')
+_RATES = {'p': 'x axis', 'q': 'y axis', 'r': 'z axis'}
 _COVARIANCE = {
     'north_variance': 'variance to the north',
     'north_east_covariance': 'covariance of north and east',
@@ -92,9 +93,11 @@ class _Variable(NamedTuple):
         return attributes | ({'frame': self.frame} if self.frame else {})
 
 
-def _each(topic: str, unit: str, what: str, texts: dict[str, str]) -> list[_Variable]:
+def _each(
+    topic: str, unit: str, what: str, texts: dict[str, str], frame: str = NED
+) -> list[_Variable]:
     """A variable of each of these quantities; ``what`` begins what is said of it."""
-    return [_Variable(topic, name, unit, f'{what}{text}', NED) for name, text in texts.items()]
+    return [_Variable(topic, name, unit, f'{what}{text}', frame) for name, text in texts.items()]
 
 
 def _position(topic: str, what: str) -> list[_Variable]:
@@ -141,9 +144,7 @@ _TURNED = (
     _Variable('odom', 'u', 'm/s', 'velocity over ground, forward', FRD),
     _Variable('odom', 'v', 'm/s', 'velocity over ground, to starboard', FRD),
     _Variable('odom', 'w', 'm/s', 'velocity over ground, down', FRD),
-    _Variable('odom', 'p', 'rad/s', 'angular rate about the x axis', FRD),
-    _Variable('odom', 'q', 'rad/s', 'angular rate about the y axis', FRD),
-    _Variable('odom', 'r', 'rad/s', 'angular rate about the z axis', FRD),
+    *_each('odom', 'rad/s', 'angular rate about the ', _RATES, FRD),
     *_euler('odom', 'estimated'),
     *_position('reference', 'virtual target'),
     *_euler('reference', 'desired'),
@@ -182,10 +183,7 @@ def _water(topic: str, what: str) -> list[_Variable]:
 _BESIDE = {
     'imu': (
         *_euler('imu', 'measured'),
-        *(
-            _Variable('imu', rate, 'rad/s', f'measured angular rate about the {axis} axis', FRD)
-            for rate, axis in zip('pqr', 'xyz', strict=True)
-        ),
+        *_each('imu', 'rad/s', 'measured angular rate about the ', _RATES, FRD),
     ),
     'pressure': (
         _Variable('pressure', 'absolute', 'Pa', 'measured pressure, with the air above'),
