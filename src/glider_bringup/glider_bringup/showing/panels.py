@@ -115,21 +115,21 @@ def actuators_of(run: FlownRun) -> list[tuple[Actuator, float]]:
     return [(one, limit) for one, limit in found if limit > 0.0]
 
 
-#: Panels of one run and of several: title and axis.
-_FLOWN = {
-    'depth': ('Depth', 'depth (m)'),
-    'cross_track': ('Cross-track error', 'off the path (m)'),
-    'place_error': ('Navigation error', 'error (m)'),
-    'pitch': ('Pitch', 'pitch (deg)'),
-    'heading': ('Heading', 'heading (deg)'),
-    'roll': ('Roll', 'roll (deg)'),
+#: Panels of one run and of several: title, axis, and the curve in which runs are compared.
+FLOWN = {
+    'depth': ('Depth', 'depth (m)', 'depth_m'),
+    'cross_track': ('Cross-track error', 'off the path (m)', 'cross_track_m'),
+    'place_error': ('Navigation error', 'error (m)', 'place_error_m'),
+    'pitch': ('Pitch', 'pitch (deg)', 'pitch_deg'),
+    'heading': ('Heading', 'heading (deg)', 'heading_deg'),
+    'roll': ('Roll', 'roll (deg)', 'roll_deg'),
 }
 SPACE = Panel('space', 'In three dimensions', 'Drag to turn. Depth is stretched.', kind='space')
 
 
 def flown_panel(name: str, caption: str, curves: tuple[Curve, ...], **look) -> Panel:
-    """Panel of `_FLOWN`."""
-    title, axis = _FLOWN[name]
+    """Panel of `FLOWN`."""
+    title, axis, _ = FLOWN[name]
     return Panel(name, title, caption, axis, curves, inverted=name == 'depth', **look)
 
 
