@@ -107,7 +107,6 @@ class Scorer:
         To which fixes are relative.
     topics : tuple of str
         What there is of navigation in the run; empty of a vehicle that knows its place.
-    faults : sequence of FaultSettings
     vehicle : Vehicle, optional
         Its steering surface, battery, crush depth and drop weight; without it there are none.
     readings : Readings, optional
@@ -343,7 +342,6 @@ def windows(
         From the start of the run on (m).
     descending : bool[n]
         Whether the desired vertical rate points down.
-    rules : Rules
     step_s : float
         Time between two samples (s).
     """
