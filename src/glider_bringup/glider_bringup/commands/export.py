@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """``./glider export``: runs for other programs."""
 
-from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -23,7 +22,7 @@ SUFFIXES = {
     'gpx': '.gpx',
     'ma': '.ma',
 }
-Kind = Enum('Kind', {text: text for text in SUFFIXES})
+Kind = Literal[tuple(SUFFIXES)]
 
 
 @app.command(epilog='Example: ./glider export runs/20260101-120000-current_8deg --to mat')
@@ -57,31 +56,29 @@ def export(
     netcdf, csv and mat have every number of its bag, with names and units: world NED, body FRD, SI
     and radians, whatever the topics carry; docs/python.md has the names.
     """
-    kind = to.value
-    file = out or beside(run, f'run{SUFFIXES[kind]}')
-    if kind == 'og1':
+    file = out or beside(run, f'run{SUFFIXES[to]}')
+    if to == 'og1':
         from glider_bringup.door.og1 import write_og1
 
         with counter('reading the bag', None) as update:
             write_og1(run, start, file, update)
-    elif kind == 'ma':
+    elif to == 'ma':
         from glider_bringup.door.tracks import write_goto_list
         from glider_bringup.showing.flown_run import read_run
 
         write_goto_list(read_run(run, traced=False), file)
-    elif kind in ('geojson', 'kml', 'gpx'):
+    elif to in ('geojson', 'kml', 'gpx'):
         from glider_bringup.door.tracks import write_chart
         from glider_bringup.showing.flown_run import read_run
 
         with counter('reading', None) as update:
-            write_chart(kind, read_run(run, update), start, file)
+            write_chart(to, read_run(run, update), start, file)
     else:
-        _write_all(run, kind, file, start)
+        _write_all(run, to, file, start)
     print_written('written', run, file, as_json)
 
 
 def _write_all(run: Path, kind: str, file: Path, start: str | None) -> None:
-    """Write every number of the bag."""
     from glider_bringup.door.export import WRITERS, dataset_of
     from glider_bringup.door.run import open_run
 

@@ -58,6 +58,7 @@ def _told(made: Any, scenario: Scenario) -> dict[str, Any]:
     """What a plan says, for machines."""
     origin = scenario.origin.params()
     corners = [to_geodetic(*map(float, corner), origin) for corner in made.route.corners]
+    time_s = made.arrival_s(50.0)
     return {
         'scenario': scenario.name,
         'changed': scenario.changed,
@@ -67,16 +68,10 @@ def _told(made: Any, scenario: Scenario) -> dict[str, Any]:
         'straight_h': _hours(made.straight_s),
         'mission_h': scenario.duration_s / 3600.0,
         'wh': made.wh,
-        'surfacings': _surfacings(made),
+        'surfacings': math.ceil(time_s / made.pace.cycle_s) if math.isfinite(time_s) else None,
         'speed_mps': made.pace.speed,
         'route_latlon': [list(one) for one in corners],
     }
-
-
-def _surfacings(made: Any) -> int | None:
-    """How often it comes up on its way; None of one that does not get there."""
-    time_s = made.arrival_s(50.0)
-    return math.ceil(time_s / made.pace.cycle_s) if math.isfinite(time_s) else None
 
 
 def _rows(told: dict[str, Any]) -> list[tuple[str, str]]:

@@ -6,13 +6,14 @@ Topics are ENU and FLU; here everything is NED (world) and FRD (body), as in the
 books on marine craft, SI and radians. `glider_base.frames` turns one into the other.
 """
 
+from itertools import groupby
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
 from xarray.plot.accessor import DataArrayPlotAccessor
 
-from glider_base.block import Block, Telling
 from glider_base.frames import (
     euler_from_quaternion,
     from_geodetic,
@@ -25,7 +26,7 @@ from glider_base.frames import (
 from glider_base.kernel import kernel, source_digest
 from glider_base.signals import TICK_NS, Adaptation
 from glider_base.wiring import NO_ECHO
-from glider_control.block import CONTROL
+from glider_bringup.scoring.outcome import as_told
 from glider_control.control import (
     SATURATED_BUOYANCY,
     SATURATED_PITCH,
@@ -33,7 +34,6 @@ from glider_control.control import (
     SATURATED_SURFACE,
 )
 from glider_control.intake import REFUSED
-from glider_guard.block import GUARD
 from glider_guard.rows import ROWS
 from glider_guidance.yo.stage import STAGE_NAMES
 from glider_mission.blocks import COLUMNS
@@ -41,13 +41,20 @@ from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import steers_by
 
 NED, FRD, PATH = 'NED', 'FRD', 'path'
+#: Names of numbers, and what each is.
+_PLACE = {'north': 'north', 'east': 'east', 'depth': 'depth, positive down'}
+_ANGLES = {
+    'roll': 'roll, starboard side down is positive',
+    'pitch': 'pitch, nose up is positive',
+    'heading': 'heading, clockwise from north',
+}
 _AXES = ('north', 'east', 'down')
-_ANGLES = ('roll', 'pitch', 'heading')
-_ANGLE_TEXTS = (
-    'roll, starboard side down is positive',
-    'pitch, nose up is positive',
-    'heading, clockwise from north',
-)
+_RATES = {'p': 'x axis', 'q': 'y axis', 'r': 'z axis'}
+_COVARIANCE = {
+    'north_variance': 'variance to the north',
+    'north_east_covariance': 'covariance of north and east',
+    'east_variance': 'variance to the east',
+}
 _UNITS = {'_nm': 'N m', '_radps': 'rad/s'}
 #: What the battery says; less than nothing is not known.
 _BATTERY = (
@@ -86,24 +93,23 @@ class _Variable(NamedTuple):
         return attributes | ({'frame': self.frame} if self.frame else {})
 
 
+def _each(
+    topic: str, unit: str, what: str, texts: dict[str, str], frame: str = NED
+) -> list[_Variable]:
+    """A variable of each of these quantities; ``what`` begins what is said of it."""
+    return [_Variable(topic, name, unit, f'{what}{text}', frame) for name, text in texts.items()]
+
+
 def _position(topic: str, what: str) -> list[_Variable]:
-    texts = ('north', 'east', 'depth, positive down')
-    names = ('north', 'east', 'depth')
-    return [
-        _Variable(topic, name, 'm', f'{what}, {text}', NED)
-        for name, text in zip(names, texts, strict=True)
-    ]
+    return _each(topic, 'm', f'{what}, ', _PLACE)
 
 
 def _euler(topic: str, what: str) -> list[_Variable]:
-    return [
-        _Variable(topic, name, 'rad', f'{what} {text}', NED)
-        for name, text in zip(_ANGLES, _ANGLE_TEXTS, strict=True)
-    ]
+    return _each(topic, 'rad', f'{what} ', _ANGLES)
 
 
 def _velocity(topic: str, what: str, before: str = '') -> list[_Variable]:
-    return [_Variable(topic, f'{before}{axis}', 'm/s', f'{what}, {axis}', NED) for axis in _AXES]
+    return _each(topic, 'm/s', f'{what}, ', {f'{before}{axis}': axis for axis in _AXES})
 
 
 def _joints(topic: str, what: str, steers_by: str) -> list[_Variable]:
@@ -138,17 +144,12 @@ _TURNED = (
     _Variable('odom', 'u', 'm/s', 'velocity over ground, forward', FRD),
     _Variable('odom', 'v', 'm/s', 'velocity over ground, to starboard', FRD),
     _Variable('odom', 'w', 'm/s', 'velocity over ground, down', FRD),
-    _Variable('odom', 'p', 'rad/s', 'angular rate about the x axis', FRD),
-    _Variable('odom', 'q', 'rad/s', 'angular rate about the y axis', FRD),
-    _Variable('odom', 'r', 'rad/s', 'angular rate about the z axis', FRD),
+    *_each('odom', 'rad/s', 'angular rate about the ', _RATES, FRD),
     *_euler('odom', 'estimated'),
     *_position('reference', 'virtual target'),
     *_euler('reference', 'desired'),
     *_velocity('reference', 'desired velocity over ground', 'velocity_'),
-    *(
-        _Variable('reference', f'{angle}_rate', 'rad/s', f'desired rate of {angle}', NED)
-        for angle in _ANGLES
-    ),
+    *_each('reference', 'rad/s', 'desired rate of ', {f'{one}_rate': one for one in _ANGLES}),
     *_velocity('current_velocity', 'velocity of the water over ground'),
     *_velocity('current_estimate', 'velocity of the water, as guidance estimates it'),
     *_position('ground_truth/odom', 'true position'),
@@ -174,29 +175,15 @@ def _same(steers_by: str) -> list[_Variable]:
     ]
 
 
-def _covariance(topic: str, what: str, unit: str) -> list[_Variable]:
-    texts = ('variance to the north', 'covariance of north and east', 'variance to the east')
-    names = ('north_variance', 'north_east_covariance', 'east_variance')
-    return [
-        _Variable(topic, name, unit, f'{what}, {text}', NED)
-        for name, text in zip(names, texts, strict=True)
-    ]
-
-
 def _water(topic: str, what: str) -> list[_Variable]:
-    return [*_velocity(topic, what)[:2], *_covariance(topic, what, 'm2 s-2')]
+    return [*_velocity(topic, what)[:2], *_each(topic, 'm2 s-2', f'{what}, ', _COVARIANCE)]
 
 
-#: What the covariance of a believed place is called.
-_PLACE = _covariance('odom', 'estimated position', 'm2')
 #: What there is of sensors and beliefs, by topic: nothing of it where navigation has none.
 _BESIDE = {
     'imu': (
         *_euler('imu', 'measured'),
-        *(
-            _Variable('imu', rate, 'rad/s', f'measured angular rate about the {axis} axis', FRD)
-            for rate, axis in zip('pqr', 'xyz', strict=True)
-        ),
+        *_each('imu', 'rad/s', 'measured angular rate about the ', _RATES, FRD),
     ),
     'pressure': (
         _Variable('pressure', 'absolute', 'Pa', 'measured pressure, with the air above'),
@@ -244,11 +231,13 @@ def _numbers(log: np.ndarray, steers_by: str) -> dict[str, tuple]:
     out = np.empty((len(_TURNED), len(log)))
     _turn(log, out)
     found = dict(zip(_TURNED, out, strict=True))
-    place: dict[str, int] = {}
-    for variable in _same(steers_by):
-        first = COLUMNS[variable.topic].start
-        place[variable.topic] = place.get(variable.topic, first - 1) + 1
-        found[variable] = log[:, place[variable.topic]].copy()
+    for topic, variables in groupby(_same(steers_by), attrgetter('topic')):
+        found |= zip(variables, log[:, COLUMNS[topic]].T.copy(), strict=False)
+    return _named(found)
+
+
+def _named(found: dict[_Variable, np.ndarray]) -> dict[str, tuple]:
+    """Variables by their names, as xarray takes them."""
     return {
         variable.name: ('time', values, variable.attributes) for variable, values in found.items()
     }
@@ -256,19 +245,13 @@ def _numbers(log: np.ndarray, steers_by: str) -> dict[str, tuple]:
 
 def _beside(log: np.ndarray, scenario: Scenario) -> dict[str, tuple]:
     """Covariance of the place, and what there is of sensors and beliefs, as xarray takes them."""
-
-    def of(topic: str) -> np.ndarray:
-        return log[:, COLUMNS[topic]].T
-
-    xx, xy, _, yy = of('odom')[13:]
-    found = dict(zip(_PLACE, (yy, xy, xx), strict=True))
+    xx, xy, _, yy = log[:, COLUMNS['odom']].T[13:].copy()
+    place = _each('odom', 'm2', 'estimated position, ', _COVARIANCE)
+    found = dict(zip(place, (yy, xy, xx), strict=True))
     for topic in (topic for topic in _BESIDE if topic in scenario.topics):
-        values = _AS_NUMBERS[topic](of(topic), scenario)
-        found |= dict(zip(_BESIDE[topic], values, strict=True))
-    return {
-        variable.name: ('time', values.copy(), variable.attributes)
-        for variable, values in found.items()
-    }
+        values = _AS_NUMBERS[topic](log[:, COLUMNS[topic]].T.copy(), scenario)
+        found |= zip(_BESIDE[topic], values, strict=True)
+    return _named(found)
 
 
 def _imu(wire: np.ndarray, scenario: Scenario) -> tuple[np.ndarray, ...]:
@@ -305,17 +288,8 @@ _AS_NUMBERS = {
 }
 
 
-def _as_told(block: Block, flag: str, log: np.ndarray) -> np.ndarray:
-    """Bits of a flag, int32[n], as a bag has them: a change is told at most once a second."""
-    bits = log[:, COLUMNS[flag]].astype(np.int64)
-    told = Telling(block).among(bits[:, None], np.arange(len(bits)) * TICK_NS)
-    values = np.append(0, bits[told])
-    lengths = np.diff(np.concatenate(([0], told, [len(bits)])))
-    return np.repeat(values, lengths).astype(np.int32)
-
-
-def _bits(block: Block, flag: str, log: np.ndarray, what: str, names: dict[int, str]) -> tuple:
-    """Variable of a flag that is a sum of bits, with their names."""
+def _bits(flag: str, log: np.ndarray, what: str, names: dict[int, str]) -> tuple:
+    """Variable of a flag that is a sum of bits, with their names; as a bag has them."""
     about = {
         'units': '1',
         'topic': '/diagnostics',
@@ -323,13 +297,19 @@ def _bits(block: Block, flag: str, log: np.ndarray, what: str, names: dict[int, 
         'flag_masks': np.array(list(names), dtype=np.int32),
         'flag_meanings': ' '.join(names.values()),
     }
-    return 'time', _as_told(block, flag, log), about
+    return 'time', as_told(log[:, COLUMNS[flag]]).astype(np.int32), about
 
 
 def _flags(log: np.ndarray) -> dict[str, tuple]:
     """Variables that are states or bits, with what they mean by the conventions of CF."""
     stage = np.nan_to_num(log[:, COLUMNS['stage']], nan=_UNKNOWN_STAGE).astype(np.int8)
-    values = np.arange(_UNKNOWN_STAGE, len(STAGE_NAMES), dtype=np.int8)
+    names = ['unknown', *(name.replace(' ', '_') for name in STAGE_NAMES)]
+    stages = {
+        'long_name': 'stage of the mission',
+        'flag_values': np.arange(_UNKNOWN_STAGE, len(STAGE_NAMES), dtype=np.int8),
+        'flag_meanings': ' '.join(names),
+    }
+    course = {'long_name': '1 where the course cannot be held in this current'}
     bits = {
         SATURATED_BUOYANCY: 'buoyancy_engine_at_limit',
         SATURATED_PITCH: 'pitch_mass_at_limit',
@@ -337,28 +317,12 @@ def _flags(log: np.ndarray) -> dict[str, tuple]:
         SATURATED_SURFACE: 'steering_surface_at_limit',
         REFUSED: 'measurement_refused',
     }
-    names = ['unknown', *(name.replace(' ', '_') for name in STAGE_NAMES)]
     told = {'units': '1', 'topic': '/diagnostics'}
     return {
-        'stage': (
-            'time',
-            stage,
-            {
-                **told,
-                'long_name': 'stage of the mission',
-                'flag_values': values,
-                'flag_meanings': ' '.join(names),
-            },
-        ),
-        'infeasible': (
-            'time',
-            log[:, COLUMNS['infeasible']].astype(np.int8),
-            {**told, 'long_name': '1 where the course cannot be held in this current'},
-        ),
-        'saturation': _bits(CONTROL, 'saturation', log, 'what control notices', bits),
-        'guard': _bits(
-            GUARD, 'guard', log, 'what the guard tells', {row.bit: row.name for row in ROWS}
-        ),
+        'stage': ('time', stage, told | stages),
+        'infeasible': ('time', log[:, COLUMNS['infeasible']].astype(np.int8), told | course),
+        'saturation': _bits('saturation', log, 'what control notices', bits),
+        'guard': _bits('guard', log, 'what the guard tells', {row.bit: row.name for row in ROWS}),
     }
 
 

@@ -20,6 +20,7 @@ from glider_base.frames import on_chart, poses_from_wire
 from glider_base.signals import TICK_NS
 from glider_bringup.door.tracks import start_of
 from glider_bringup.scoring.card import read_score
+from glider_bringup.scoring.one_hertz import SECOND, Rows
 from glider_mission.blocks import COLUMNS
 from glider_mission.disk import whole_file
 from glider_mission.recording.bag_files import has_bag
@@ -30,8 +31,6 @@ from glider_mission.scenario import Scenario
 from glider_model.ocean.density import depth_at
 from glider_model.vehicle.file import load_vehicle, vehicle_file
 
-#: Time between two measurements in the file (ticks): 1 s.
-EVERY = 10
 #: Without a GPS in the scenario, it has a fix this often (s) where it is this shallow (m).
 FIX_EVERY_S, FIX_DEPTH_M = 60.0, 1.0
 #: Phases of OG1 by the stages of guidance.
@@ -42,12 +41,19 @@ DIMENSION = 'N_MEASUREMENTS'
 _SECONDS = {'units': 'seconds since 1970-01-01T00:00:00Z', 'calendar': 'gregorian'}
 _NORTH = {'units': 'degrees_north', 'standard_name': 'latitude'}
 _EAST = {'units': 'degrees_east', 'standard_name': 'longitude'}
-_ALONG = {'coordinates': 'TIME LATITUDE LONGITUDE DEPTH'}
+_WAY = {'coordinates': 'TIME LATITUDE LONGITUDE DEPTH'}
+_CURRENT = 'depth-averaged current of the dive, as the vehicle believed it'
 
 
 def _of(concept: str, long_name: str, **more: Any) -> dict[str, Any]:
     """Attributes of a measured variable."""
     return {'long_name': long_name, 'vocabulary': f'{VOCABULARY}/OG1/current/{concept}/', **more}
+
+
+def _along(concept: str, long_name: str, units: str, standard_name: str = '') -> dict[str, Any]:
+    """Attributes of a variable that is measured along the way."""
+    named = {'standard_name': standard_name} if standard_name else {}
+    return _of(concept, long_name, units=units, **named, **_WAY)
 
 
 #: Variables over the measurements, and what they are.
@@ -66,63 +72,20 @@ VARIABLES = {
     'TIME_GPS': _of('TIME', 'time of each GPS location', **_SECONDS),
     'LATITUDE_GPS': _of('LAT_GPS', 'latitude of each GPS location', **_NORTH),
     'LONGITUDE_GPS': _of('LON_GPS', 'longitude of each GPS location', **_EAST),
-    'PITCH': _of(
-        'PITCH',
-        'pitch, nose up positive',
-        units='degree',
-        standard_name='platform_pitch',
-        **_ALONG,
-    ),
-    'ROLL': _of(
-        'ROLL',
-        'roll, to starboard positive',
-        units='degree',
-        standard_name='platform_roll',
-        **_ALONG,
-    ),
-    'HEADING': _of('HEADING', 'heading from magnetic north', units='degree', **_ALONG),
-    'WCUR_X': _of(
-        'WCUR_X',
-        'depth-averaged current of the dive, as the vehicle believed it, eastward',
-        units='m s-1',
-        standard_name='eastward_sea_water_velocity',
-        **_ALONG,
-    ),
-    'WCUR_Y': _of(
-        'WCUR_Y',
-        'depth-averaged current of the dive, as the vehicle believed it, northward',
-        units='m s-1',
-        standard_name='northward_sea_water_velocity',
-        **_ALONG,
-    ),
+    'PITCH': _along('PITCH', 'pitch, nose up positive', 'degree', 'platform_pitch'),
+    'ROLL': _along('ROLL', 'roll, to starboard positive', 'degree', 'platform_roll'),
+    'HEADING': _along('HEADING', 'heading from magnetic north', 'degree'),
+    'WCUR_X': _along('WCUR_X', f'{_CURRENT}, eastward', 'm s-1', 'eastward_sea_water_velocity'),
+    'WCUR_Y': _along('WCUR_Y', f'{_CURRENT}, northward', 'm s-1', 'northward_sea_water_velocity'),
     'PHASE': _of(
         'PHASE',
         'behavior of the glider at sea',
         flag_values=np.arange(8, dtype=np.int8),
         flag_meanings=PHASE_NAMES,
         phase_calculation_method='stage of the mission by the guidance on board',
-        **_ALONG,
+        **_WAY,
     ),
 }
-
-
-class _Thinned:
-    """Takes rows of a bag as they come and keeps one in so many."""
-
-    topics = ('imu', 'pressure', 'fix', 'odom')
-
-    def __init__(self) -> None:
-        self._kept: list[np.ndarray] = []
-        self.ticks = 0
-
-    def add(self, log: np.ndarray) -> None:
-        self._kept.append(log[-self.ticks % EVERY :: EVERY].copy())
-        self.ticks += len(log)
-
-    def result(self) -> tuple[np.ndarray, np.ndarray]:
-        """Times since the start (s), shape (n,), and rows, shape (n, ROW)."""
-        rows = np.concatenate(self._kept)
-        return np.arange(len(rows)) * EVERY * TICK_NS / 1e9, rows
 
 
 def write_og1(
@@ -146,7 +109,7 @@ def write_og1(
         raise ConfigurationError(
             f'{run}: no bag in it (allowed: a run over nodes, or one flown with --bag)'
         )
-    bag, taker = Bag(run), _Thinned()
+    bag, taker = Bag(run), Rows(SECOND, ('imu', 'pressure', 'fix', 'odom'))
     with scenario_of(run, bag.attachments) as found:
         scenario, card = found.scenario, read_score(run) or {}
         began_s = start_of(scenario, start)
@@ -157,7 +120,7 @@ def write_og1(
             )
         total = int(scenario.duration_s / (TICK_NS / 1e9))
         read_back(bag, scenario.vehicle, [taker], lambda ticks: progress(ticks, total))
-        dataset = flight_dataset(*taker.result(), scenario, card, began_s)
+        dataset = flight_dataset(taker.result(), scenario, card, began_s)
     with whole_file(file) as stream:
         dataset.to_netcdf(
             stream.name,
@@ -175,9 +138,10 @@ def _encoding(variable: xarray.DataArray) -> dict[str, Any]:
 
 
 def flight_dataset(
-    time_s: np.ndarray, rows: np.ndarray, scenario: Scenario, card: dict, began_s: float
+    rows: np.ndarray, scenario: Scenario, card: dict, began_s: float
 ) -> xarray.Dataset:
-    """Dataset in OG1.0 of rows of a run, shape (n, ROW), at times since its start (s)."""
+    """Dataset in OG1.0 of a row for each second of a run, shape (n, ROW)."""
+    time_s = np.arange(len(rows)) * SECOND * TICK_NS / 1e9
     values = _measured(time_s, rows, scenario, card)
     for name in ('TIME', 'TIME_GPS'):
         values[name] = values[name] + began_s
@@ -282,7 +246,6 @@ def _compact(time_s: float) -> str:
 def _about(
     dataset: xarray.Dataset, scenario: Scenario, card: dict, serial: str, day: str
 ) -> dict[str, str]:
-    """Global attributes."""
     nobody, now = 'not given', _compact(datetime.now(timezone.utc).timestamp())
     return {
         'Conventions': 'CF-1.10, OG-1.0',

@@ -21,11 +21,11 @@ from glider_bringup.engines.compiling import told
 from glider_bringup.engines.flight import Outcome
 from glider_bringup.engines.flight import fly as fly_direct
 from glider_bringup.scoring.card import scorecard, write_score
+from glider_bringup.scoring.one_hertz import Rows
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_bringup.scoring.traces import make_tracer
 from glider_control.law import LawSettings
 from glider_control.own_law import own_law
-from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.choices import ENGINES, chosen_fields, combination_of
 from glider_mission.planned import planned_ticks
 from glider_mission.recording.bag_files import has_bag
@@ -47,25 +47,6 @@ from glider_mission.scenario import (
 
 if TYPE_CHECKING:
     import xarray
-
-
-class Rows:
-    """Takes log blocks as they come and keeps them all: 17 MB for each simulated hour."""
-
-    topics = tuple(name for name, columns in COLUMNS.items() if isinstance(columns, slice))
-
-    def __init__(self) -> None:
-        self._blocks: list[np.ndarray] = []
-
-    def add(self, log: np.ndarray) -> None:
-        """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
-        self._blocks.append(log.copy())
-
-    def result(self) -> np.ndarray:
-        """Everything taken in so far, float64[ticks, ROW]."""
-        if len(self._blocks) != 1:
-            self._blocks = [np.concatenate([np.empty((0, ROW)), *self._blocks])]
-        return self._blocks[0]
 
 
 @dataclass(frozen=True)

@@ -113,15 +113,7 @@ def fly(state, params, log, dt):
         rows = row + 1
         if finished:
             break
-    state = MissionState(
-        plant=plant,
-        current=current,
-        navigation=navigation,
-        guidance=guidance,
-        control=control,
-        guard=guard,
-    )
-    return state, rows, finished
+    return MissionState(plant, current, navigation, guidance, control, guard), rows, finished
 
 
 @structref.register

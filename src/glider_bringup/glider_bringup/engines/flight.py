@@ -86,7 +86,6 @@ class Held:
 
     Parameters
     ----------
-    scenario : Scenario
     mission : tuple, optional
         State and parameters to fly with, if they are not `mission_of` the scenario.
     """
@@ -236,10 +235,8 @@ def fly(
 
     Parameters
     ----------
-    scenario : Scenario
     takers : iterable of Taker
         Each is given every row, in this order.
-    progress : callable, optional
     mission : tuple, optional
         State and parameters to fly with, if they are not `mission_of` the scenario.
 

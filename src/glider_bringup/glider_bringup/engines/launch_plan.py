@@ -29,6 +29,7 @@ from glider_bringup.engines.processes import (
 )
 from glider_control.settings import LAWS
 from glider_guidance.settings import METHODS, OLD_NAMES
+from glider_mission.choices import chosen_fields
 from glider_mission.run_folder import (
     PARAMETERS_FILE,
     SCENARIO_FILE,
@@ -174,10 +175,6 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
         Where the parameter file goes if there is no recording. With one it lies in its folder,
         beside scenario and vehicle.
 
-    Returns
-    -------
-    LaunchPlan
-
     Raises
     ------
     ConfigurationError
@@ -243,7 +240,6 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
 def _nodes(
     simulate: bool, navigation: bool, autopilot: bool, record: bool, with_tf: bool
 ) -> tuple[LaunchedNode, ...]:
-    """Nodes to start."""
     modules, words = process_modules('autopilot' if autopilot else 'processes'), {}
     if not simulate:
         del modules[PLANT], modules[CURRENT]
@@ -263,16 +259,12 @@ def _nodes(
 
 def _changes(text: dict[str, str]) -> dict:
     """Scenario fields that the arguments change."""
-    fields = {}
-    if text['controller']:
-        fields['control.law'] = text['controller']
-    if text['guidance']:
-        fields['guidance.los.method'] = text['guidance']
-    if text['duration']:
-        fields['dives'] = 0
-        if text['duration'] != 'full':
-            fields['duration_s'] = _number('duration', text, TICK_S, 1e8, 'full')
-    return fields
+    controller, guidance, duration = (
+        text[name] or None for name in ('controller', 'guidance', 'duration')
+    )
+    if duration not in (None, 'full'):
+        duration = _number('duration', text, TICK_S, 1e8, 'full')
+    return chosen_fields({}, controller, guidance, duration=duration)
 
 
 def _number(name: str, text: dict[str, str], low: float, high: float, word: str) -> float:

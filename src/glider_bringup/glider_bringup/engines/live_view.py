@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from glider_base.errors import FATAL
 from glider_base.ros.places import NAMESPACE, domain_id
@@ -69,11 +69,9 @@ def live_view(port: int, namespace: str | None = None) -> Iterator[tuple[str, Ca
 
 def _begin(process: subprocess.Popen) -> None:
     """Let the view look at the topics; it may be gone, which is no reason to end a flight."""
-    try:
+    with suppress(OSError):
         process.stdin.write('look\n')
         process.stdin.flush()
-    except OSError:
-        pass
 
 
 def _end(process: subprocess.Popen) -> None:

@@ -28,10 +28,8 @@ def node_parameters(
 
     Parameters
     ----------
-    scenario : Scenario
     speed : float
         Times real time; 0.0: as fast as possible.
-    lockstep : bool
     record_to : Path, optional
         Folder of the recording. Without it there is no recorder.
     attachments : iterable of Path

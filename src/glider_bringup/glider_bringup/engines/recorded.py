@@ -77,11 +77,6 @@ def fly_nodes(
 
     Parameters
     ----------
-    scenario : Scenario
-    folder : Path
-        Run folder.
-    takers : iterable of Reader
-    progress : callable, optional
     speed : float
         In times real time; 0.0 is as fast as possible.
     namespace : str, optional
@@ -93,8 +88,7 @@ def fly_nodes(
     sync : str
         When the bag is synced to disk.
     layout : str
-        Which nodes share a process: 'together' all but the recorder, 'autopilot' those on board,
-        'processes' none.
+        Which nodes share a process; see `Layout`.
     """
     refuse_planned_route(scenario)
     attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)

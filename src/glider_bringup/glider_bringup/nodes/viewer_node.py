@@ -12,6 +12,7 @@ import struct
 import sys
 import time
 from collections import deque
+from types import SimpleNamespace
 
 import rclpy
 from pydantic import Field
@@ -44,17 +45,6 @@ class ViewerSettings(Settings):
     )
 
 
-class _Listener:
-    """Learns from the server which topics are looked at anew."""
-
-    def __init__(self) -> None:
-        self.asked: deque[str] = deque()
-
-    def on_subscribe(self, client, channel) -> None:
-        """Remember a topic that a client has just subscribed to; called in another thread."""
-        self.asked.append(channel.topic)
-
-
 class ViewerNode(Node):
     """Takes all topics raw, and passes them on to Foxglove."""
 
@@ -69,7 +59,10 @@ class ViewerNode(Node):
                 f'({error}); everything else works without it'
             ) from None
         foxglove.set_log_level('ERROR')
-        self.listener = _Listener()
+        self.asked: deque[str] = deque()  #: topics of new subscriptions, by another thread
+        listener = SimpleNamespace(
+            on_subscribe=lambda _, channel: self.asked.append(channel.topic)
+        )
         self.shown = foxglove.Context()  # the server serves it for as long as it is held
         self.channels = {}
         self.topics = {
@@ -94,7 +87,7 @@ class ViewerNode(Node):
                 host=self.settings.host,
                 port=self.settings.port,
                 capabilities=[foxglove.Capability.Time],
-                server_listener=self.listener,
+                server_listener=listener,
                 context=self.shown,
             )
         except RuntimeError as error:
@@ -120,8 +113,8 @@ class ViewerNode(Node):
 
     def pass_on(self) -> None:
         """Send what is new, and what a client has missed of topics that are latched."""
-        while self.listener.asked:
-            name = self.listener.asked.popleft()
+        while self.asked:
+            name = self.asked.popleft()
             for raw in self.held.get(name, ()):
                 self.send(name, raw)
         for name, subscription in self.incoming.items():

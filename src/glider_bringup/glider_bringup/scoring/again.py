@@ -23,18 +23,12 @@ Reading = Callable[[int, int], None]
 
 
 def score_again(run: Path, progress: Reading = lambda ticks, total: None) -> dict:
-    """Scorecard of a run, computed afresh from its bag if it has one.
+    """Scorecard of a run folder or MCAP file, computed afresh from the bag if there is one.
 
     How the run ended is what its `SCORE_FILE` says, or the bag where there is none: a recording
     made by the launch file, or the MCAP file alone. A run of which ticks are missing in its bag is
     not completed, whatever is said: its status is ``aborted``, and the reason names what is
     missing. Reports, figures and comparisons keep to that.
-
-    Parameters
-    ----------
-    run : Path
-        Run folder, or its MCAP file.
-    progress : callable, optional
 
     Raises
     ------

@@ -19,7 +19,7 @@ from pydantic import (
 
 from glider_base.files import is_file, read_json
 from glider_base.settings import ConfigurationError
-from glider_bringup.engines.flight import Outcome, Progress, Taker, fly
+from glider_bringup.engines.flight import Outcome, Taker, fly
 from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_mission.disk import write_whole
 from glider_mission.recording.bag_files import has_bag
@@ -32,12 +32,10 @@ STATUSES = ('completed', 'surfaced', 'lost', 'infeasible', 'aborted', 'failed')
 STOPPED = ('aborted', 'failed')
 
 
-def fly_scored(
-    scenario: Scenario, takers: Iterable[Taker] = (), progress: Progress | None = None
-) -> tuple[Outcome, dict]:
+def fly_scored(scenario: Scenario, takers: Iterable[Taker] = ()) -> tuple[Outcome, dict]:
     """Fly with the direct engine, as `fly` does, and give the scores too."""
     scorer = make_scorer(scenario)
-    flight = fly(scenario, [scorer, *takers], progress)
+    flight = fly(scenario, [scorer, *takers])
     return flight, scores_of(scenario, scorer)
 
 
@@ -139,21 +137,15 @@ class _Checked(BaseModel):
 
 
 class _Event(_Checked):
-    """What the guard told."""
-
     t_s: float
     message: str
 
 
 class _Guard(_Checked):
-    """What the guard told in a run."""
-
     events: list[_Event] = []
 
 
 class _Fault(_Checked):
-    """What broke in a run, and when."""
-
     t_s: _Figure
     end_s: _Figure
     kind: str
@@ -172,8 +164,6 @@ class _Energy(_Checked):
 
 
 class _Arrival(_Checked):
-    """When the end of the path was come to, or would be."""
-
     arrived: bool
     t_s: _Figure
     missed_m: _Figure
@@ -184,8 +174,6 @@ class _Arrival(_Checked):
 
 
 class _Bottom(_Checked):
-    """How near to the bottom of the sea it came."""
-
     touched: bool
     t_s: _Figure
     least_height_m: _Figure
@@ -209,8 +197,6 @@ class _Report(_Checked):
 
 
 class _Navigation(_Checked):
-    """What is shown of how well the vehicle knew its place."""
-
     method: str
     surfacings: int
     fixed: int
@@ -223,8 +209,6 @@ class _Navigation(_Checked):
 
 
 class _State(_Checked):
-    """Where the vehicle was at the end, and how it moved."""
-
     position_ned_m: _Triple
     attitude_rpy_rad: _Triple
     velocity_mps: _Triple

@@ -21,7 +21,6 @@ _J_PER_WH, _DAY_S = 3600.0, 86400.0
 
 @kernel
 def _joints_of(row):
-    """Actuators of a log row."""
     return Joints(row[_JOINTS], row[_JOINTS + 1], row[_JOINTS + 2], row[_JOINTS + 3])
 
 
@@ -38,13 +37,7 @@ def _spend_rows(ledger, surfacing, last, log, params):
 
 
 class EnergyScorer:
-    """Takes in log rows, and tells what was taken out of the battery.
-
-    Parameters
-    ----------
-    energy : EnergySettings, optional
-        Of the vehicle; without it nothing is known.
-    """
+    """Takes in log rows, and tells what was taken out of the battery, if that is known."""
 
     def __init__(self, energy: EnergySettings | None) -> None:
         self._params = energy.params() if energy else NO_ENERGY
@@ -68,14 +61,8 @@ class EnergyScorer:
         """The part ``energy`` of ``score.json``; None where nothing is known.
 
         Endurance and range are those of the usable part of a full battery at the mean power and
-        the pace of this flight.
-
-        Parameters
-        ----------
-        sim_time_s : float
-        dives : int
-        way_m : float or None
-            Along the path; None: the mission ended, and nothing goes on at this pace.
+        the pace of this flight, ``way_m`` along the path; where that is None the mission ended,
+        and nothing goes on at this pace.
         """
         names = ('pump', 'hotel', 'masses', 'calls')
         wh = spent(self._ledger) / _J_PER_WH

@@ -8,7 +8,7 @@ import numpy as np
 
 from glider_base.frames import odometry_from_wire, rotate_to_ned
 from glider_base.kernel import kernel
-from glider_base.signals import TICK_S
+from glider_bringup.scoring.scores import seconds
 from glider_mission.blocks import COLUMNS
 from glider_model.plant.faults.kinds import is_due, phase_of
 from glider_model.plant.faults.settings import FaultSettings, fault_params
@@ -34,12 +34,7 @@ def _note(log, first, tick, surfacing, params, began):
 
 
 class FaultTimes:
-    """Takes in log rows, and tells of every fault when it began.
-
-    Parameters
-    ----------
-    faults : sequence of FaultSettings
-    """
+    """Takes in log rows, and tells of every fault when it began."""
 
     def __init__(self, faults: Sequence[FaultSettings]) -> None:
         self._faults = list(faults)
@@ -63,8 +58,8 @@ class FaultTimes:
             end = began + fault.lasts
             told.append(
                 {
-                    't_s': round(began * TICK_S, 6) if began >= 0 else None,
-                    'end_s': round(end * TICK_S, 6) if 0 <= began and end < self._tick else None,
+                    't_s': seconds(began) if began >= 0 else None,
+                    'end_s': seconds(end) if 0 <= began and end < self._tick else None,
                     'kind': fault.kind,
                     'message': fault.words,
                     'when': fault.when,

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_base.frames import Origin, from_geodetic
-from glider_base.signals import TICK_S
-from glider_bringup.scoring.scores import largest, rms
+from glider_bringup.scoring.scores import largest, rms, seconds
 from glider_mission.blocks import COLUMNS
 from glider_navigation.phase import DIVES_M, SURFACES_M
 
@@ -65,8 +64,8 @@ class Surfacing(NamedTuple):
         """What ``score.json`` tells of it; pairs are north, east, as everywhere there."""
         xx, xy, yy = self.covariance
         return {
-            't_s': _seconds(self.tick),
-            'dive_t_s': _seconds(self.dive_tick),
+            't_s': seconds(self.tick),
+            'dive_t_s': seconds(self.dive_tick),
             'true_ned_m': _north_east(self.true),
             'believed_ned_m': _north_east(self.believed),
             'covariance_m2': [yy, xy, xx],
@@ -189,7 +188,7 @@ class NavigationScorer:
             },
             'surfacing_cross_track_m': beside.tolist(),
             'surfacing_error_m': errors.tolist(),
-            'surfacing_t_s': [_seconds(one.tick) for one in self.surfacings],
+            'surfacing_t_s': [seconds(one.tick) for one in self.surfacings],
             'under_water_rms_m': ways.tolist(),
             'from_fourth': {
                 'surfacing_cross_track_m': largest(beside[FOURTH:]),
@@ -206,11 +205,6 @@ class NavigationScorer:
 
 def _percentile(values: np.ndarray, share: float) -> float | None:
     return float(np.percentile(values, share)) if len(values) else None
-
-
-def _seconds(tick: int) -> float:
-    """Time of a tick, without the rounding of 0.1."""
-    return round(tick * TICK_S, 6)
 
 
 def _north_east(pair: tuple[float, float] | None) -> list[float] | None:

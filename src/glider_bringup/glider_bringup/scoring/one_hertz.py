@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""A log thinned to one row a second: what experiments measure and the paper's figures show."""
+"""Log rows that are kept: all of them, or one a second, as experiments and figures have them."""
 
 from copy import copy
 
@@ -10,38 +10,51 @@ from glider_base.frames import poses_from_wire
 from glider_base.signals import TICK_S
 from glider_mission.blocks import COLUMNS, ROW
 
-#: Of so many ticks one is kept.
-_EVERY = round(1.0 / TICK_S)
+#: Ticks of a second.
+SECOND = round(1.0 / TICK_S)
+#: All topics that have numbers.
+TOPICS = tuple(name for name, columns in COLUMNS.items() if isinstance(columns, slice))
 
 
-class Recorder:
-    """Takes log blocks as they come and keeps one row a second of them."""
+class Rows:
+    """Takes log blocks as they come and keeps a row of every so many ticks, with these topics.
 
-    def __init__(self) -> None:
-        self._rows: list[np.ndarray] = []
-        self._ticks = 0
+    All rows are 17 MB for each simulated hour.
+    """
+
+    def __init__(self, every: int = 1, topics: tuple[str, ...] = TOPICS) -> None:
+        self.topics = topics
+        self._every, self._ticks = every, 0
+        self._blocks: list[np.ndarray] = []
 
     def add(self, log: np.ndarray) -> None:
         """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
-        self._rows.append(log[-self._ticks % _EVERY :: _EVERY].copy())
+        self._blocks.append(log[-self._ticks % self._every :: self._every].copy())
         self._ticks += len(log)
+
+    def result(self) -> np.ndarray:
+        """Everything that was kept so far, float64[n, ROW]."""
+        if len(self._blocks) != 1:
+            self._blocks = [np.concatenate([np.empty((0, ROW)), *self._blocks])]
+        return self._blocks[0]
+
+
+class Recorder(Rows):
+    """Takes log blocks as they come and keeps one row a second of them."""
+
+    def __init__(self) -> None:
+        super().__init__(SECOND)
 
     def result(self) -> 'Record':
         """What was kept of everything taken in so far."""
-        return Record(np.concatenate([np.empty((0, ROW)), *self._rows]))
+        return Record(super().result())
 
 
 class Record:
-    """A log thinned to one row a second. Angles in deg, NED; attributes are arrays over time.
-
-    Parameters
-    ----------
-    log : float64[n, ROW]
-        One row a second.
-    """
+    """What a log of one row a second, float64[n, ROW], says: arrays over time, NED, in deg."""
 
     def __init__(self, log: np.ndarray) -> None:
-        self.time_s = np.arange(len(log)) * _EVERY * TICK_S
+        self.time_s = np.arange(len(log)) * SECOND * TICK_S
         odom = poses_from_wire(log[:, COLUMNS['odom']])
         reference = poses_from_wire(log[:, COLUMNS['reference']])
         self.north, self.east, self.depth = odom[:, 0], odom[:, 1], odom[:, 2]

@@ -13,8 +13,9 @@ import numpy as np
 from glider_base.block import changes_to_tell
 from glider_base.frames import to_geodetic
 from glider_base.signals import TICK_NS, TICK_S
+from glider_bringup.scoring.scores import seconds
 from glider_guard.block import TELL_EVERY_NS
-from glider_guard.rows import ALL, DROPS, ROWS, SURFACES
+from glider_guard.rows import DROPS, ROWS, SURFACES
 from glider_guard.witness import AFLOAT_M
 from glider_guidance.path.curve import path_closest, path_length, path_point
 from glider_mission.rules import Rules
@@ -34,19 +35,15 @@ class Outcome(NamedTuple):
     reason: str  #: in words; empty where there is nothing to say
 
 
-def told_by_guard(bits: np.ndarray) -> np.ndarray:
-    """Rows of the guard as it told them, which it does once a second at most, int64[ticks].
+def as_told(bits: np.ndarray) -> np.ndarray:
+    """Bits of guard or control as they are told, which is once a second at most, int64[ticks].
 
     The same from a bag, which has what was told, and from a log, which has what was noticed.
     """
-    bits = bits.astype(np.int64) & ALL
-    stamps_ns = np.arange(len(bits)) * TICK_NS
+    bits, stamps_ns = bits.astype(np.int64), np.arange(len(bits)) * TICK_NS
     before = np.zeros(1, np.int64)
     ticks = changes_to_tell(bits[:, None], stamps_ns, TELL_EVERY_NS, before, -TELL_EVERY_NS)
-    if not len(ticks):
-        return np.zeros(len(bits), np.int64)
-    last = np.searchsorted(ticks, np.arange(len(bits)), side='right') - 1
-    return np.where(last >= 0, bits[np.asarray(ticks)[last]], 0)
+    return np.repeat([0, *bits[ticks]], np.diff([0, *ticks, len(bits)]))
 
 
 def ends_mission(told: np.ndarray) -> np.ndarray:
@@ -64,7 +61,7 @@ def outcome_of(
     depth : float64[ticks]
         True one (m).
     told : int64[ticks]
-        See `told_by_guard`.
+        Rows of the guard; see `as_told`.
     crush_depth_m : float
         Infinite if nobody knows.
     infeasible : bool
@@ -107,8 +104,6 @@ def arrival_of(
         The point of the path that guidance had come to by then (m).
     tick : int
         Of the arrival, else ticks of the run.
-    has_arrived : bool
-    rules : Rules
 
     Returns
     -------
@@ -119,7 +114,7 @@ def arrival_of(
     """
     if rules.path is None or not rules.ends:
         return None
-    t_s, length = round(tick * TICK_S, 6), path_length(rules.path)
+    t_s, length = seconds(tick), path_length(rules.path)
     end = path_point(length, rules.path)
     left_m, eta_s = 0.0, t_s
     if not has_arrived:
@@ -157,7 +152,7 @@ class BottomWatch:
         if not math.isfinite(self._least_m):
             return None
         tick = self._touched_tick
-        at_s = None if tick is None else round(tick * TICK_S, 6)
+        at_s = None if tick is None else seconds(tick)
         return {'touched': tick is not None, 't_s': at_s, 'least_height_m': self._least_m}
 
 

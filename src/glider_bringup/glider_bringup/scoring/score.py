@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_base.block import changes_to_tell
 from glider_base.frames import (
     Origin,
     OriginSettings,
@@ -27,7 +26,7 @@ from glider_base.frames import (
     poses_from_wire,
 )
 from glider_base.kernel import kernel
-from glider_base.signals import TICK_NS, TICK_S, Odometry
+from glider_base.signals import TICK_S, Odometry
 from glider_bringup.scoring.energy import EnergyScorer
 from glider_bringup.scoring.faults import FaultTimes
 from glider_bringup.scoring.navigation import NavigationScorer
@@ -36,14 +35,13 @@ from glider_bringup.scoring.outcome import (
     INFEASIBLE,
     BottomWatch,
     arrival_of,
+    as_told,
     ends_mission,
     outcome_of,
-    told_by_guard,
 )
-from glider_bringup.scoring.scores import Flown, measured
+from glider_bringup.scoring.scores import Flown, measured, seconds
 from glider_bringup.scoring.true_motion import TrueMotion
 from glider_control.intake import REFUSED
-from glider_guard.block import TELL_EVERY_NS
 from glider_guard.rows import ALL, DROP, LATCHED, NOTE, REACTIONS, ROWS, SURFACE, reaction_of
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS
@@ -109,7 +107,6 @@ class Scorer:
         To which fixes are relative.
     topics : tuple of str
         What there is of navigation in the run; empty of a vehicle that knows its place.
-    faults : sequence of FaultSettings
     vehicle : Vehicle, optional
         Its steering surface, battery, crush depth and drop weight; without it there are none.
     readings : Readings, optional
@@ -190,7 +187,7 @@ class Scorer:
             to its end. A figure without data is None.
         """
         series, ticks = self._series, self.ticks
-        depth, told = series('depth'), told_by_guard(series('guard'))
+        depth, told = series('depth'), as_told(series('guard').astype(np.int64) & ALL)
         flies = ~ends_mission(told) & ~(np.maximum.accumulate(depth) > self._crush_depth_m)
         steady, scored = windows(depth, series('rate_ref') > 0.0, rules, TICK_S)
         steady &= flies
@@ -206,7 +203,7 @@ class Scorer:
         )
         believed = flown._replace(e2=series('told_e2'))
         dives = _count_dives(depth, *dive_depths(rules.depth_m))
-        way_m, time_s = self._along_path_m(), _round(ticks * TICK_S)
+        way_m, time_s = self._along_path_m(), seconds(ticks)
         held = ~(series('infeasible')[scored & flies] > 0.0)
         infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)
         ended = outcome_of(depth, told, self._crush_depth_m, infeasible)
@@ -239,7 +236,7 @@ class Scorer:
         courses = self._course_rad, self._course_rad + math.pi  # looking ahead, looking back
         ahead_m = _along_m(self._first, target, courses[0])
         behind_m = _along_m(self._last, target[::-1], courses[1])
-        return _length(target) - ahead_m - behind_m
+        return float(np.sum(np.hypot(*np.diff(target, axis=0).T))) - ahead_m - behind_m
 
     def _actuator_travel(self) -> dict:
         """Ways that the actuators have gone, to and fro."""
@@ -282,7 +279,6 @@ class Scorer:
 
 
 def _odometry_of(row: np.ndarray) -> Odometry:
-    """Odometry of a log row."""
     return odometry_from_wire(tuple(row[_ODOM].tolist()))
 
 
@@ -318,15 +314,13 @@ def _guard(mask: np.ndarray, has_weight: bool) -> dict:
     gravest = DROP if has_weight else SURFACE
     rows = {row.bit: (row.name, REACTIONS[min(row.reaction, gravest)], row.says) for row in ROWS}
     rows[REFUSED] = ('measurement_refused', REACTIONS[NOTE], REFUSED_SAYS)
-    bits = mask.astype(np.int64) & (ALL | REFUSED)
-    stamps_ns = np.arange(len(bits)) * TICK_NS
+    told = as_told(mask.astype(np.int64) & (ALL | REFUSED))
     events, before = [], 0
-    told = np.zeros(1, np.int64)
-    for tick in changes_to_tell(bits[:, None], stamps_ns, TELL_EVERY_NS, told, -TELL_EVERY_NS):
-        new = int(bits[tick]) & ~before
-        before = int(bits[tick])
+    for tick in np.flatnonzero(np.diff(told, prepend=0)).tolist():
+        new = int(told[tick]) & ~before
+        before = int(told[tick])
         events += [
-            {'t_s': _round(tick * TICK_S), 'row': row, 'reaction': reaction, 'message': says}
+            {'t_s': seconds(tick), 'row': row, 'reaction': reaction, 'message': says}
             for bit, (row, reaction, says) in rows.items()
             if new & bit
         ]
@@ -348,7 +342,6 @@ def windows(
         From the start of the run on (m).
     descending : bool[n]
         Whether the desired vertical rate points down.
-    rules : Rules
     step_s : float
         Time between two samples (s).
     """
@@ -390,11 +383,6 @@ def _count_dives(depth: np.ndarray, below_m: float, above_m: float) -> int:
     return int(np.count_nonzero((zone[:-1] == 1) & (zone[1:] == -1)))
 
 
-def _length(target: np.ndarray) -> float:
-    """Horizontal way of the virtual target, float64[n, 2], along the path (m)."""
-    return float(np.sum(np.hypot(*np.diff(target, axis=0).T)))
-
-
 def _along_m(row: np.ndarray, target: np.ndarray, course_rad: float) -> float:
     """How far the vehicle of a log row is from the first of some targets towards the others (m).
 
@@ -412,8 +400,3 @@ def _along_m(row: np.ndarray, target: np.ndarray, course_rad: float) -> float:
 def _travel(position: np.ndarray) -> float:
     """Way that an actuator has gone, to and fro."""
     return float(np.sum(np.abs(np.diff(position))))
-
-
-def _round(seconds: float) -> float:
-    """Seconds without the rounding of 0.1."""
-    return round(seconds, 6)

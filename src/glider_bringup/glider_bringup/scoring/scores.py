@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from glider_base.signals import TICK_S
 from glider_model.ocean.current_settings import KNOT_MPS
 
 
@@ -73,6 +74,11 @@ def reckoned(card: dict) -> dict | None:
     """What a card tells of navigation, where the vehicle had to reckon its place; else None."""
     told = card.get('navigation') or {'method': 'known'}
     return None if told['method'] == 'known' else told
+
+
+def seconds(ticks: int) -> float:
+    """Time (s) of so many ticks, without the rounding of 0.1."""
+    return round(ticks * TICK_S, 6)
 
 
 def rms(values: np.ndarray) -> float | None:

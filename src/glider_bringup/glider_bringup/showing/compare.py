@@ -11,23 +11,20 @@ from typing import Any, NamedTuple
 from glider_base.settings import ConfigurationError
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.scoring.scores import SCORES, Score, reckoned
-from glider_bringup.showing.panels import ACTUATORS, SPACE, SURFACE, flown_panel
+from glider_bringup.showing.panels import ACTUATORS, FLOWN, SPACE, SURFACE, flown_panel
 from glider_bringup.showing.scorecard import engine_text, flown_text, guard_texts, show
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page
 from glider_bringup.showing.words import small, span
 from glider_mission.scenario import told_fields
 
-#: Curves that are laid over each other: caption and curve, by panel.
+#: Captions of the panels of curves that are laid over each other.
 _OVERLAID = {
-    'depth': ('How deep each was.', 'depth_m'),
-    'cross_track': ('Distance from its own path, + to starboard of it.', 'cross_track_m'),
-    'place_error': (
-        'Horizontal distance between the true and the estimated position.',
-        'place_error_m',
-    ),
-    'pitch': ('Nose up is positive.', 'pitch_deg'),
-    'heading': ('Clockwise from north.', 'heading_deg'),
-    'roll': ('Starboard side down is positive.', 'roll_deg'),
+    'depth': 'How deep each was.',
+    'cross_track': 'Distance from its own path, + to starboard of it.',
+    'place_error': 'Horizontal distance between the true and the estimated position.',
+    'pitch': 'Nose up is positive.',
+    'heading': 'Clockwise from north.',
+    'roll': 'Starboard side down is positive.',
 }
 #: Colours before they come again, then dashed.
 _COLOURS = 8
@@ -233,7 +230,6 @@ def _ranked(errors: list[tuple[str, float]]) -> str:
 
 
 def _panels(runs: list[FlownRun]) -> dict[str, list[Panel]]:
-    """Panels by heading."""
     flown = [(i, run) for i, run in enumerate(runs) if run.traces.ticks]
 
     def curves(name: str) -> tuple[Curve, ...]:
@@ -245,7 +241,7 @@ def _panels(runs: list[FlownRun]) -> dict[str, list[Panel]]:
 
     if not flown:
         return {}
-    panels = [flown_panel(one, text, curves(name)) for one, (text, name) in _OVERLAID.items()]
+    panels = [flown_panel(one, text, curves(FLOWN[one][2])) for one, text in _OVERLAID.items()]
     tracks = Panel('track', 'Tracks', 'From above, to scale.', kind='track')
     panels += [one.panel('', curves(one.position)) for one in (*ACTUATORS, SURFACE)]
     return {

@@ -62,7 +62,6 @@ def _worst(card: dict[str, Any]) -> str:
 
 
 def _flown(card: dict[str, Any]) -> str:
-    """What was flown."""
     time, along = span(card['sim_time_s']), way(card['distance_along_path_m'])
     depth, dives = f'{card["depth_m"]["max"]:,.0f} m', card['dives']
     flown = f'{count(dives, "dive")} to {depth}' if dives else f'Down to {depth}'
@@ -97,12 +96,7 @@ def lost_since_s(traces: Traces) -> float | None:
 def navigation_notes(told: dict[str, Any], learns: bool) -> list[str]:
     """How well a vehicle knew where it was that reckons its place, in sentences.
 
-    Parameters
-    ----------
-    told : dict
-        Part ``navigation`` of a scorecard.
-    learns : bool
-        Whether it believes in a current.
+    By part ``navigation`` of a scorecard; it ``learns`` where it believes in a current.
     """
     off = [abs(value) for value in told['surfacing_cross_track_m']]
     if not off:

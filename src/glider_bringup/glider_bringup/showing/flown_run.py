@@ -32,15 +32,9 @@ if TYPE_CHECKING:
 def read_run(
     run: Path, progress: 'Reading' = lambda ticks, total: None, traced: bool = True
 ) -> FlownRun:
-    """A run as pages and figures show it: as it was kept when it was flown, else from its bag.
+    """A run folder or MCAP file as pages show it: as it was kept in flight, else from its bag.
 
-    Parameters
-    ----------
-    run : Path
-        Run folder, or its MCAP file.
-    progress : callable, optional
-    traced : bool
-        Whether its traces are wanted; if not, and it has a scorecard, its bag is not read.
+    Where it has a scorecard and is not to be ``traced``, its bag is not read.
 
     Raises
     ------

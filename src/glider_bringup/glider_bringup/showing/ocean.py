@@ -70,7 +70,7 @@ def look(file: Path) -> tuple[dict[str, Any], Sea | None]:
 
 def _extent(axes: Axes) -> dict[str, Any]:
     """How far the axes of a file go."""
-    times, depths, latitudes, longitudes = axes
+    times, *places = axes
     return {
         'times': {
             'first': told_time(times[0]),
@@ -78,12 +78,9 @@ def _extent(axes: Axes) -> dict[str, Any]:
             'count': len(times),
             'step_h': float(np.median(np.diff(times))) / 3600.0 if len(times) > 1 else None,
         },
-        'depth_m': {'first': depths[0], 'last': depths[-1], 'count': len(depths)},
-        'latitude_deg': {'first': latitudes[0], 'last': latitudes[-1], 'count': len(latitudes)},
-        'longitude_deg': {
-            'first': longitudes[0],
-            'last': longitudes[-1],
-            'count': len(longitudes),
+        **{
+            name: {'first': one[0], 'last': one[-1], 'count': len(one)}
+            for name, one in zip(('depth_m', 'latitude_deg', 'longitude_deg'), places, strict=True)
         },
     }
 
@@ -142,23 +139,15 @@ def draw_sea(sea: Sea, file: Path) -> None:
     share = np.gradient(levels) if len(levels) > 1 else np.ones(1)
     mean = np.tensordot(share / share.sum(), water, axes=1)
     north, east = (np.where(sea.loaded.land, np.nan, mean[..., k]) for k in (0, 1))
-    figure = new_figure(8.0, 6.5)
-    axis = figure.add_subplot()
-    drawn = axis.pcolormesh(axes.longitudes, axes.latitudes, np.hypot(north, east), cmap='Blues')
-    figure.colorbar(drawn, label='speed of the mean current (m/s)')
-    rows, columns = (slice(None, None, -(-len(one) // _ARROWS)) for one in axes[2:])
-    axis.quiver(
-        *(axes.longitudes[columns], axes.latitudes[rows]),
-        *(east[rows, columns], north[rows, columns]),
-        width=0.002,
-    )
+    depths = f'{levels[0]:g} m' if len(levels) == 1 else f'{levels[0]:g} to {levels[-1]:g} m'
+    label = 'speed of the mean current (m/s)'
+    axis = _draw_current(axes.latitudes, axes.longitudes, north, east, label)
+    axis.set_title(f'{sea.title}, {depths}')
+    axis.set_aspect(1.0 / math.cos(math.radians(float(np.mean(axes.latitudes)))))
+    axis.set_facecolor('#c9c2b8')
     if sea.scenario:
         _draw_path(axis, sea.scenario)
-    depths = f'{levels[0]:g} m' if len(levels) == 1 else f'{levels[0]:g} to {levels[-1]:g} m'
-    axis.set(title=f'{sea.title}, {depths}', xlabel='longitude (deg)', ylabel='latitude (deg)')
-    axis.set_facecolor('#c9c2b8')
-    axis.set_aspect(1.0 / math.cos(math.radians(float(np.mean(axes.latitudes)))))
-    save_figure(figure, file, 150)
+    save_figure(axis.figure, file, 150)
 
 
 def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
@@ -172,13 +161,10 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
     chart, origin = made.chart, scenario.origin.params()
     latitudes, longitudes = on_chart(chart.norths, chart.easts, origin)
     north, east = np.moveaxis(chart.current[0], -1, 0)
-    figure = new_figure(8.0, 6.5)
-    axis = figure.add_subplot()
-    drawn = axis.pcolormesh(longitudes, latitudes, np.hypot(north, east), cmap='Blues')
-    figure.colorbar(drawn, label='depth-averaged current at the start (m/s)')
-    rows, columns = (slice(None, None, -(-len(one) // _ARROWS)) for one in (latitudes, longitudes))
-    places = longitudes[columns], latitudes[rows]
-    axis.quiver(*places, east[rows, columns], north[rows, columns], width=0.002)
+    label = 'depth-averaged current at the start (m/s)'
+    axis = _draw_current(latitudes, longitudes, north, east, label)
+    axis.set_title(f'{scenario.name}: fronts every 12 h of each leg')
+    axis.set_aspect(1.0 / math.cos(math.radians(origin.latitude)))
     for arrivals in made.route.fronts:
         reached = np.ma.masked_invalid(arrivals / 3600.0)
         if reached.count():
@@ -188,14 +174,22 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
     latitude, longitude = on_chart(*made.route.corners.T, origin)
     axis.plot(longitude, latitude, color=GREEN, label='planned route')
     axis.legend(loc='upper right', fontsize='small')
-    title = f'{scenario.name}: fronts every 12 h of each leg'
-    axis.set(title=title, xlabel='longitude (deg)', ylabel='latitude (deg)')
-    axis.set_aspect(1.0 / math.cos(math.radians(origin.latitude)))
-    save_figure(figure, file, 150)
+    save_figure(axis.figure, file, 150)
+
+
+def _draw_current(latitudes, longitudes, north, east, label: str) -> Any:
+    """Axis of a new figure with a current (m/s): how fast it is, and arrows."""
+    figure = new_figure(8.0, 6.5)
+    axis = figure.add_subplot(xlabel='longitude (deg)', ylabel='latitude (deg)')
+    drawn = axis.pcolormesh(longitudes, latitudes, np.hypot(north, east), cmap='Blues')
+    figure.colorbar(drawn, label=label)
+    rows, columns = (slice(None, None, -(-len(one) // _ARROWS)) for one in (latitudes, longitudes))
+    places = longitudes[columns], latitudes[rows]
+    axis.quiver(*places, east[rows, columns], north[rows, columns], width=0.002)
+    return axis
 
 
 def _draw_path(axis: Any, scenario: Scenario) -> None:
-    """Draw the path of a mission."""
     north, east, *_ = scenario.path.points(200).T
     latitude, longitude = on_chart(north, east, scenario.origin.params())
     axis.plot(longitude, latitude, color=ORANGE, label=scenario.name)

@@ -115,21 +115,21 @@ def actuators_of(run: FlownRun) -> list[tuple[Actuator, float]]:
     return [(one, limit) for one, limit in found if limit > 0.0]
 
 
-#: Panels of one run and of several: title and axis.
-_FLOWN = {
-    'depth': ('Depth', 'depth (m)'),
-    'cross_track': ('Cross-track error', 'off the path (m)'),
-    'place_error': ('Navigation error', 'error (m)'),
-    'pitch': ('Pitch', 'pitch (deg)'),
-    'heading': ('Heading', 'heading (deg)'),
-    'roll': ('Roll', 'roll (deg)'),
+#: Panels of one run and of several: title, axis, and the curve in which runs are compared.
+FLOWN = {
+    'depth': ('Depth', 'depth (m)', 'depth_m'),
+    'cross_track': ('Cross-track error', 'off the path (m)', 'cross_track_m'),
+    'place_error': ('Navigation error', 'error (m)', 'place_error_m'),
+    'pitch': ('Pitch', 'pitch (deg)', 'pitch_deg'),
+    'heading': ('Heading', 'heading (deg)', 'heading_deg'),
+    'roll': ('Roll', 'roll (deg)', 'roll_deg'),
 }
 SPACE = Panel('space', 'In three dimensions', 'Drag to turn. Depth is stretched.', kind='space')
 
 
 def flown_panel(name: str, caption: str, curves: tuple[Curve, ...], **look) -> Panel:
-    """Panel of `_FLOWN`."""
-    title, axis = _FLOWN[name]
+    """Panel of `FLOWN`."""
+    title, axis, _ = FLOWN[name]
     return Panel(name, title, caption, axis, curves, inverted=name == 'depth', **look)
 
 
@@ -139,7 +139,6 @@ def _desired(name: str, label: str = 'desired') -> Curve:
 
 
 def _flight_panels(run: FlownRun) -> list[Panel]:
-    """How it flew: depth, errors, attitude."""
     noisy = run.traces.has('measured_depth_m')
     told = 'estimated' if reckoned(run.card) else 'measured, with noise'
 
@@ -260,7 +259,6 @@ def _mean_current_panel(reports: list[dict], axis: int) -> Panel:
 
 
 def _actuator_panels(run: FlownRun) -> list[Panel]:
-    """What the actuators did."""
     panels = []
     for one, limit in actuators_of(run):
         used = run.traces.largest(one.position) / limit

@@ -88,7 +88,6 @@ def _score_rows(card: dict, scores: Iterable[Score]) -> Iterator[tuple[str, str]
 
 
 def _text(card: dict, score: Score) -> str:
-    """Value and unit of a score."""
     return show(score.in_card(card), score.unit, score.digits)
 
 

@@ -77,7 +77,6 @@ def _ticks(run: Path) -> dict[str, Any]:
 
 
 def _print(found: dict[str, Any]) -> None:
-    """Print what there is, and what is missing, for a person."""
     if found['rebuilt']:
         output.print(f'recovered: {", ".join(found["rebuilt"])}', soft_wrap=True)
     else:
@@ -95,7 +94,6 @@ def _print(found: dict[str, Any]) -> None:
 
 
 def _missing(found: dict[str, Any]) -> list[str]:
-    """What is missing, in words."""
     missing = list(found['dropped'])
     if missing:
         missing[-1] += f'; {found["dropped_bytes"]:,} bytes in all'

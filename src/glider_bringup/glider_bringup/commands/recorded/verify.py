@@ -78,7 +78,6 @@ def verify(
 
 
 def _print(report: dict) -> None:
-    """Print what came out for a person."""
     rows = []
     for one in report['blocks']:
         compared, differing = (sum(one[key].values()) for key in ('compared', 'differing'))
