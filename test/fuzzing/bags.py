@@ -38,8 +38,7 @@ from glider_mission.recording.ros.republish import (
     recorded_messages,
 )
 from glider_mission.recording.ros.told import read_told
-from glider_mission.recording.ros.verify.every_block import verify
-from glider_mission.recording.ros.verify.report import report
+from glider_mission.recording.ros.verify.every_block import report, verify
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import Scenario, load_scenario
 

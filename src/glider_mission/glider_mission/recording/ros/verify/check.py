@@ -18,15 +18,15 @@ from glider_base.settings import ConfigurationError
 from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Event, Recording, Series
-from glider_mission.recording.ros.verify.messages import field_difference, message_difference
-from glider_mission.recording.ros.verify.ticks import TICKS_OF_THE_END, Track
-from glider_mission.recording.ros.verify.verdict import (
+from glider_mission.recording.ros.verify.differences import (
     DIFFERENT,
     IDENTICAL,
     NOT_RECORDED,
     WHOLE,
     Difference,
     Verdict,
+    field_difference,
+    message_difference,
     time_text,
 )
 from glider_model.plant.block import PLANT
@@ -35,6 +35,21 @@ from glider_model.plant.block import PLANT
 ORDERS = (ABORT, CLEAR, PARAMETERS_SET, SURFACE)
 #: Bytes in which an event may differ from what is expected, and still be taken for it.
 _BYTES_ALIKE = 16
+#: Ticks at the end that may lack in a topic: whoever recorded it left in the middle of one.
+TICKS_OF_THE_END = 10
+
+
+class Track:
+    """Which message of a topic belongs to each step of a block; -1 where there is none."""
+
+    def __init__(self, series: Series, index: np.ndarray) -> None:
+        self.series, self.index = series, index
+        present = np.flatnonzero(index >= 0)
+        self.end = int(present[-1]) + 1 if len(present) else 0  #: after the last step it has
+        unusable = np.isin(index, list(series.unusable))
+        gaps = np.flatnonzero((index < 0) | unusable)
+        #: first step without a message that a node could use
+        self.gap = int(gaps[0]) if len(gaps) else len(index)
 
 
 Tracks = dict[str, Track]
@@ -144,13 +159,8 @@ class Check:
             )
         for row in np.flatnonzero(index < 0):
             if start + row < track.end or track.end + TICKS_OF_THE_END < len(track.index):
-                self.miss(name, start + int(row))
-
-    def miss(self, name: str, step: int) -> None:
-        """Keep that the message of a step is not there."""
-        self.differing[name] += 1
-        stamp_ns = int(self.stamps_ns[step])
-        self.found.append(Difference(stamp_ns, name, WHOLE, 'a message', NOT_RECORDED))
+                stamp_ns = int(self.stamps_ns[start + row])
+                self.add(Difference(stamp_ns, name, WHOLE, 'a message', NOT_RECORDED))
 
     # .................................................................. events, path, verdict
 

@@ -8,9 +8,8 @@ import numpy as np
 
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording, Series
-from glider_mission.recording.ros.verify.check import Check, finish_events
-from glider_mission.recording.ros.verify.ticks import Track
-from glider_mission.recording.ros.verify.verdict import (
+from glider_mission.recording.ros.verify.check import Check, Track, finish_events
+from glider_mission.recording.ros.verify.differences import (
     NOT_RECORDED,
     SKIPPED,
     WHOLE,
