@@ -19,6 +19,7 @@ from glider_base.frames import OriginSettings, to_geodetic
 from glider_base.settings import (
     ConfigurationError,
     Settings,
+    beside,
     file_names,
     find_file,
     holder_of,
@@ -34,7 +35,6 @@ from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.chart import charted, in_metres
-from glider_mission.forecast import RouteForecast
 from glider_mission.rules import Rules
 from glider_model.ocean.bottom import BathymetrySettings
 from glider_model.ocean.current_settings import CurrentSettings, SumOfCurrents
@@ -75,6 +75,30 @@ _ALTERNATIVES = (
     ('descent_per_turn_m', 'slope_deg'),
     ('waypoints', 'waypoints_latlon'),
 )
+
+
+class RouteForecast(Settings):
+    """A forecast of the current for who plans the route: a file, or the truth with an error."""
+
+    file: str = Field(
+        '',
+        max_length=4000,
+        description='NetCDF file, relative to this one; without: the current of the scenario',
+    )
+    error_mps: float = Field(
+        0.0,
+        ge=0.0,
+        le=1.0,
+        description='rms of a random error of each part of the depth-averaged current (m/s)',
+    )
+    error_km: float = Field(
+        40.0, ge=5.0, le=1000.0, description='correlation length of the error (km)'
+    )
+    late_h: float = Field(
+        0.0, ge=0.0, le=240.0, description='by what its water comes too late: its age (h)'
+    )
+
+    _found = pydantic.field_validator('file')(beside)
 
 
 class Scenario(Settings):

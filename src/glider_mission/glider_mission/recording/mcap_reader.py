@@ -27,16 +27,19 @@ from glider_base.settings import ConfigurationError
 from glider_mission.recording.bag_files import bag_files
 from glider_mission.recording.mcap_records import (
     CHUNK_TIMES,
+    DEFINITIONS,
     HEAD,
     MAGIC,
     UNREADABLE,
+    Places,
+    find_defined,
+    gather,
     parse,
     read_summary,
     span,
     unpack,
     whole_records,
 )
-from glider_mission.recording.mcap_scan import Places, find, gather
 
 _DATA_END = HEAD.pack(Opcode.DATA_END, 4)
 _LOG_TIME_AT = 6  # in a message record: channel (2), sequence (4), log time (8), publish time (8)
@@ -143,7 +146,7 @@ class _File:
         self.channels |= {i: one for i, one in summary.channels.items() if i not in self.channels}
 
     def _take(self, opcode: int, at: int, data: bytes) -> None:
-        """Note a record, in a chunk or in none."""
+        """Note a record that is in no chunk."""
         if opcode == Opcode.CHUNK:
             start_ns, end_ns, unpacked = struct.unpack_from('<QQQ', data)
             self._chunks[at] = start_ns, end_ns
@@ -152,18 +155,21 @@ class _File:
                 self.parts.append(_Part(self._number, *place, start_ns, end_ns))
         elif opcode == Opcode.MESSAGE:
             self._take_loose(at, data)
-        elif opcode == Opcode.SCHEMA:
-            schema = parse(Schema, data)
-            self.schemas[schema.id] = schema
-        elif opcode == Opcode.CHANNEL:
-            channel = parse(Channel, data)
-            self.channels.setdefault(channel.id, channel)
+        elif opcode in DEFINITIONS:
+            self._define(parse(DEFINITIONS[opcode], data))
         elif opcode == Opcode.ATTACHMENT:
             one, told = parse(Attachment, data), int.from_bytes(data[-4:], 'little')
             if told and zlib.crc32(memoryview(data)[:-4]) != told:
                 raise self._harmed(f'the checksum (CRC) of the attachment {one.name!r} is wrong')
             self.attachments.setdefault(one.name, one.data)
             self._attached.add(at)
+
+    def _define(self, record: Schema | Channel) -> None:
+        """Note a type or a topic."""
+        if isinstance(record, Channel):
+            self.channels.setdefault(record.id, record)
+        else:
+            self.schemas[record.id] = record
 
     def _take_loose(self, at: int, data: bytes) -> None:
         """Note a message that is in no chunk, together with those before it."""
@@ -221,16 +227,8 @@ class _File:
             stream.seek(part.start)
             content = stream.read(part.length)
         try:
-            data = np.frombuffer(unpack(content) if part.number else content, np.uint8)
-            found = find(data)
-            for at in found.others:
-                opcode, length = HEAD.unpack_from(data, at)
-                if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                    body = int(at) + HEAD.size
-                    self._take(opcode, int(at), data[body : body + length].tobytes())
-            strange = set(np.unique(found.channel).tolist()).difference(self.channels)
-            if strange:
-                raise ValueError(f'messages of channel {min(strange)}, which is not defined')
+            content = unpack(content) if part.number else content
+            found = find_defined(content, self._define, self.channels)
             if len(found.channel):
                 times = int(found.log_ns.min()), int(found.log_ns.max())
                 if times != (part.start_ns, part.end_ns):
@@ -239,7 +237,7 @@ class _File:
             place = f'bytes {part.start - HEAD.size:,} to {part.start + part.length:,}'
             what = f'{error} ({place}, {span(part.start_ns, part.end_ns)})'
             raise self._harmed(what, f'chunk {part.number} is ') from None
-        return data, found
+        return np.frombuffer(content, np.uint8), found
 
     def _harmed(self, what: str, which: str = '') -> ConfigurationError:
         return ConfigurationError(f'{self.path}: {which}damaged: {what}')

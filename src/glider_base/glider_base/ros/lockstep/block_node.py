@@ -6,7 +6,6 @@ from glider_base.block import Block, Telling, optional_topics
 from glider_base.kernel import compiling_told
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.orders import CLEAR, PARAMETERS_SET, Orders
-from glider_base.ros.lockstep.pulse import Condition
 from glider_base.ros.lockstep.step_node import StepNode
 from glider_base.ros.parameters import changed_parameters, declare_settings
 from glider_base.settings import Settings
@@ -86,13 +85,13 @@ class BlockNode(StepNode):
         self.said, self.flags = (stamp_ns, outputs), flags
         self.repeat()
 
-    def condition(self) -> Condition:
+    def condition(self) -> health.Condition:
         """How this node is: what its block says."""
         condition = super().condition()
         if self.flags is None or not self.block.say or condition.level != health.OK:
             return condition
         said = self.block.say(*self.flags)
-        return Condition(health.LEVELS[said.level], said.message, said.values)
+        return health.Condition(health.LEVELS[said.level], said.message, said.values)
 
     def repeat(self) -> None:
         """Send the last answer, once more if no time has passed since."""

@@ -27,10 +27,8 @@ from glider_base.ros.lockstep import health, peers
 from glider_base.ros.lockstep.bad_line import BadLine
 from glider_base.ros.lockstep.executor import Gate, take_with_info
 from glider_base.ros.lockstep.health import Report, seconds
-from glider_base.ros.lockstep.peers import ALONE
+from glider_base.ros.lockstep.peers import ALONE, FAREWELL_S, REPORT_AFTER, Watch, wait_of
 from glider_base.ros.lockstep.process import Stop
-from glider_base.ros.lockstep.pulse import Condition, Pulse
-from glider_base.ros.lockstep.watch import FAREWELL_S, REPORT_AFTER, Watch, wait_of
 from glider_base.ros.message_fault import MessageFault
 from glider_base.ros.parameters import declare_settings, unknown_parameters
 from glider_base.ros.wire import qos, topics
@@ -96,7 +94,7 @@ class TickNode(Node):
         events, reports = TOPICS['/diagnostics'], TOPICS['lockstep']
         self._events, self._reports = self._publisher(events), self._publisher(reports)
         self.outputs[events.name] = (events, self._events)
-        self._pulse = Pulse(self)
+        self._pulse = health.Pulse(self, self._publisher(events._replace(qos=qos.REPEATED)))
         self._event_counts, self.events_told = self._publisher(TOPICS['told']), 0
         self._reports_in = self._subscription(reports, self._on_reports, raw=False)
         self.gate.awaited.add(self._reports_in)
@@ -180,9 +178,9 @@ class TickNode(Node):
         self.events_told += 1
         self._events.publish(to_cdr(array))
 
-    def condition(self) -> Condition:
+    def condition(self) -> health.Condition:
         """How this node is, as it repeats it on /diagnostics."""
-        return Condition(health.OK, 'running')
+        return health.Condition(health.OK, 'running')
 
     def count_events(self, stamp_ns: int) -> None:
         """Tell the recorder how many events there were up to a tick, so that it has them all."""

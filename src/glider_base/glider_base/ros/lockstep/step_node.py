@@ -5,7 +5,6 @@
 from glider_base.ros.hearing.inputs import Input
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.node import TickNode
-from glider_base.ros.lockstep.pulse import Condition
 from glider_base.signals import TICK_NS, TICK_S
 from glider_base.wiring import SAMPLED, SLOW_S, WHEN_SILENT
 
@@ -88,10 +87,10 @@ class StepNode(TickNode):
         stamp_ns = max(item.stamp_ns for item in self._ticking)
         return stamp_ns if stamp_ns >= 0 else self.get_clock().now().nanoseconds
 
-    def condition(self) -> Condition:
+    def condition(self) -> health.Condition:
         """How this node is: without its inputs it is not well."""
         if self._stale:
-            return Condition(health.ERROR, self._missing())
+            return health.Condition(health.ERROR, self._missing())
         return super().condition()
 
     def _missing(self) -> str:

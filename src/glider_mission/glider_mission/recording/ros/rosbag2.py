@@ -16,14 +16,14 @@ from rclpy.qos import QoSProfile
 
 from glider_base.ros.wire.topics import TOPICS, Topic
 from glider_base.signals import TICK_NS
-from glider_mission.recording.mcap_writer import McapWriter
-from glider_mission.recording.metadata import (
+from glider_mission.recording.bag_files import (
     METADATA_FILE,
     ROSBAG2,
     metadata_text,
     topic_counts,
     write_metadata,
 )
+from glider_mission.recording.mcap_writer import McapWriter
 
 #: Ticks per chunk of the file. A chunk is what can be lost when the recorder is killed.
 CHUNK_TICKS = 128
