@@ -114,11 +114,7 @@ def _reach(modules: Iterable[str], seen: dict[str, bytes]) -> None:
 def closure(modules: frozenset[str], bodies: int, holders: int) -> str:
     """Digest of all sources that code of some modules can come from.
 
-    Parameters
-    ----------
-    modules : frozenset of str
-    bodies, holders : int
-        How many of `BODIES` and `HOLDERS` there are: more may change the answer.
+    It is kept for so many of `BODIES` and `HOLDERS`: more may change it.
     """
     seen: dict[str, bytes] = {}
     _reach(modules, seen)

@@ -31,11 +31,7 @@ _TEXT = re.compile(
 def degrees(value: Any, axis: str) -> float:
     """Degrees of a number or a text: 47.508, '47.508 N', '47 30.5 N', "47°30.5'N".
 
-    Parameters
-    ----------
-    value : float or str
-    axis : str
-        latitude or longitude.
+    The axis is latitude or longitude.
 
     Raises
     ------

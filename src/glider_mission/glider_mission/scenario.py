@@ -406,12 +406,7 @@ class Scenario(Settings):
         """The scenario as a file that loads to the same scenario.
 
         It can be loaded where nobody has the laws and methods of others that do not fly in it, if
-        it says nothing of them.
-
-        Parameters
-        ----------
-        vehicle : str
-            What the file calls the vehicle, if something else than the scenario does.
+        it says nothing of them. It may call the ``vehicle`` something else than the scenario does.
         """
         left_out = {
             **({} if self.changed else {'changed': True}),

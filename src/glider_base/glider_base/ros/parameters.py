@@ -194,13 +194,8 @@ def declare_settings(
 ) -> SettingsT:
     """Declare the parameters of ``model`` on ``node`` and return the values they were given.
 
-    Parameters
-    ----------
-    node : Node
-    model : type of Settings
-    on_change : callable, optional
-        Called with the new settings after a tunable parameter was set at run time. A set that the
-        model refuses as a whole is rejected and changes nothing.
+    ``on_change`` is called with the new settings after a tunable parameter was set at run time. A
+    set that the model refuses as a whole is rejected and changes nothing.
 
     Raises
     ------
@@ -326,12 +321,7 @@ _ParameterDumper.add_representer(
 def parameters_yaml(nodes: dict[str, dict[str, Any]], namespace: str = '/glider') -> str:
     """Text of a parameter file for ``--params-file``.
 
-    Parameters
-    ----------
-    nodes : dict
-        Nested parameters (as of `to_parameters`) by node name.
-    namespace : str
-        Namespace the nodes run in.
+    Of nested parameters, as of `to_parameters`, by the names of nodes in a namespace.
     """
     prefix = '/' + namespace.strip('/') + '/' if namespace.strip('/') else '/'
     tree = {f'{prefix}{name}': {'ros__parameters': values} for name, values in nodes.items()}

@@ -122,13 +122,7 @@ class McapWriter:
     ) -> None:
         """Add n messages to each of several channels, interleaved by stamp.
 
-        Parameters
-        ----------
-        channel_ids : sequence of int
-        stamps_ns : int64[n]
-            Ascending stamps, common to all channels.
-        payloads : sequence of uint8[n, size]
-            One array per channel.
+        The ascending stamps int64[n] are common to all; payloads are uint8[n, size] per channel.
         """
         count = len(stamps_ns)
         if not count:

@@ -61,13 +61,7 @@ class Recovered(NamedTuple):
 
 
 def recover(path: Path, progress: Progress = lambda done, total: None) -> Recovered:
-    """Make a bag whole. What is whole is left as it is.
-
-    Parameters
-    ----------
-    path : Path
-        Folder of a run or a bag, or a single MCAP file.
-    progress : callable, optional
+    """Make a run, a bag or a single MCAP file whole. What is whole is left as it is.
 
     Raises
     ------

@@ -17,10 +17,7 @@ ABORT, PARAMETERS_SET, SURFACE, CLEAR = 'abort', 'parameters set', 'surface', 'c
 class Orders:
     """Orders that a node has followed since its last tick.
 
-    Parameters
-    ----------
-    node : Node
-        Anything with the method ``publish_event`` of `glider_base.ros.lockstep.node.TickNode`.
+    The node has a method ``publish_event``, as `glider_base.ros.lockstep.node.TickNode`.
     """
 
     def __init__(self, node: Node) -> None:

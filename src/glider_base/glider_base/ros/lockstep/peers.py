@@ -113,16 +113,9 @@ class Watch:
 
 
 def wait_of(missing: list[Input], count: int, due_ns: int) -> dict:
-    """Whom a node waits for, as the fields of its report.
+    """Whom a node waits for with some of its ``count`` inputs missing, as fields of its report.
 
-    Parameters
-    ----------
-    missing : list of Input
-        Inputs that are not there, at least one.
-    count : int
-        How many inputs the node has. As long as it has none of them it is idle, not held up.
-    due_ns : int
-        Stamp of the tick (ns).
+    As long as it has none of them it is idle, not held up.
     """
     idle = len(missing) == count
     names = {item.topic.publisher: item.topic.name for item in missing}

@@ -157,11 +157,7 @@ class StepNode(TickNode):
     def on_stale(self, stamp_ns: int, cycles: int) -> None:
         """Act in free-running mode while an input is stale; nothing by default.
 
-        Parameters
-        ----------
-        stamp_ns : int
-        cycles : int
-            Since the last cycle, this one included.
+        The cycles are those since the last one, this one included.
         """
 
     def close(self) -> None:

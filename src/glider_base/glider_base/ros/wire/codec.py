@@ -191,18 +191,9 @@ class Codec:
         return bytes(buffer)
 
     def encode_many(self, stamps_ns, values) -> np.ndarray:
-        """Bytes of n messages at once.
+        """Bytes uint8[n, size] of n messages at once.
 
-        Parameters
-        ----------
-        stamps_ns : int64[n]
-            Stamps in ns.
-        values : float64[n, m]
-            One row per message, the first columns in the order of ``fields``.
-
-        Returns
-        -------
-        uint8[n, size]
+        Of stamps int64[n] (ns), and of rows float64[n, m] that begin with the ``fields``.
         """
         stamps_ns = np.asarray(stamps_ns, np.int64)
         values = np.asarray(values, np.float64)
@@ -244,12 +235,7 @@ class Codec:
         return sec * _SECOND_NS + nanosec, values + self._absent
 
     def decode_many(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Stamps and numbers of n messages at once.
-
-        Parameters
-        ----------
-        rows : uint8[n, size]
-            Serialized messages.
+        """Stamps and numbers of n serialized messages uint8[n, size] at once.
 
         Returns
         -------

@@ -321,11 +321,7 @@ class _Count:
 class Replay:
     """Publishers for what is to be replayed. Use it as a context.
 
-    Parameters
-    ----------
-    plan : Plan
-    rate : float
-        Times real time; infinite: as fast as subscribers take it.
+    The rate is times real time; infinite: as fast as subscribers take it.
     """
 
     def __init__(self, plan: Plan, rate: float) -> None:
@@ -426,13 +422,8 @@ def recorded_messages(
 ) -> Iterator[tuple[int, int, bytes]]:
     """Log time, topic and payload of the messages to publish.
 
-    Those that a latched topic held at the start come first, under the time of the start.
-
-    Parameters
-    ----------
-    plan : Plan
-    profiles : dict of QoSProfile
-        Of every topic that is published, by its index.
+    Those that a latched topic held at the start come first, under the time of the start. Profiles
+    are those of every topic that is published, by its index.
     """
     chosen = np.array(list(profiles))
     held: dict[int, list[bytes]] = {}

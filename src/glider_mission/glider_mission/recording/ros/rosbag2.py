@@ -171,12 +171,7 @@ class BagWriter:
     def write_ticks(self, stamps_ns: Sequence[int], payloads: Mapping[str, np.ndarray]) -> None:
         """Add many whole ticks, interleaved by stamp and cut into chunks as a recorder does.
 
-        Parameters
-        ----------
-        stamps_ns : int64[n]
-            Stamps of the ticks, ascending.
-        payloads : dict of uint8[n, size]
-            Serialized messages by topic, as of `Codec.encode_many`.
+        Stamps int64[n] ascend; payloads are messages by topic, as of `Codec.encode_many`.
         """
         stamps_ns = np.asarray(stamps_ns, np.int64)
         chunk_of = stamps_ns // (CHUNK_TICKS * TICK_NS)

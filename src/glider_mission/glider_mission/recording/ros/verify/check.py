@@ -78,15 +78,7 @@ class Check:
         self.found.append(difference)
 
     def tracks(self, place: Place, why: str) -> Tracks:
-        """Tracks of the outputs that are recorded.
-
-        Parameters
-        ----------
-        place : callable
-            Gives the track of a topic, and the messages that have no place in it.
-        why : str
-            What is wrong with those, in words.
-        """
+        """Tracks of the outputs that are recorded; ``why`` tells of what has no place."""
         tracks = {}
         for name in self.block.outputs:
             series = self.recording.series.get(name)

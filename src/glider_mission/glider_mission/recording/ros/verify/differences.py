@@ -51,18 +51,9 @@ def time_text(stamp_ns: int) -> str:
 
 
 def field_difference(expected, recorded: bytes) -> tuple[str, str, str]:
-    """First field in which recorded bytes differ from a message.
+    """First field in which any bytes differ from a message, and what is computed and recorded.
 
-    Parameters
-    ----------
-    expected : message
-    recorded : bytes
-        Anything.
-
-    Returns
-    -------
-    field, computed, recorded : str
-        With the bits where two numbers print alike.
+    With the bits where two numbers print alike.
     """
     raw = to_cdr(expected)
     shared = min(len(raw), len(recorded))

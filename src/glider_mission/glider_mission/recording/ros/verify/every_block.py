@@ -66,22 +66,9 @@ def verify(
     only: list[str],
     progress: Callable[[str, float], None],
 ) -> Iterator[Verdict]:
-    """Compare every block of a recording.
+    """Compare the blocks of a recording, all or only some, in the order in which they act.
 
-    Parameters
-    ----------
-    recording : Recording
-    told : Told
-        What the nodes were told.
-    only : list of str
-        Blocks to compare; empty: all of them.
-    progress : callable
-        Called now and then with the name of a block and the share that is done, 0 to 1.
-
-    Yields
-    ------
-    Verdict
-        For each block, in the order in which they act in a tick.
+    ``progress`` is called now and then with a block's name and the share that is done, 0 to 1.
     """
     lockstep = is_lockstep(recording, told)
     for block in BLOCKS:
