@@ -80,15 +80,9 @@ def _counts(module: str) -> bool:
     return path is not None and (top in HOLDERS or not any(one in path for one in _INSTALLED))
 
 
-class _Source(NamedTuple):
-    """A module's digest, and the modules that it imports."""
-
-    digest: bytes
-    imports: frozenset[str]
-
-
 @cache
-def _source(module: str) -> _Source:
+def _source(module: str) -> tuple[bytes, frozenset[str]]:
+    """Digest of a module, and the modules that it imports."""
     data = Path(_file_of(module)).read_bytes()
     names = set()
     for origin, members, plain in _IMPORT.findall(data.decode('utf-8', 'replace')):
@@ -97,7 +91,7 @@ def _source(module: str) -> _Source:
             names |= {f'{origin}.{one}' for one in re.findall(r'\w+', members)}
         names |= {part.split()[0] for part in plain.split(',') if part.strip()}
     parents = {name[:at] for name in names for at in range(len(name)) if name[at] == '.'}
-    return _Source(hashlib.sha256(data).digest(), frozenset(names | parents))
+    return hashlib.sha256(data).digest(), frozenset(names | parents)
 
 
 def _reach(modules: Iterable[str], seen: dict[str, bytes]) -> None:

@@ -181,17 +181,13 @@ class Scenario(Settings):
     @pydantic.field_validator('orders', mode='before')
     @classmethod
     def _orders_in_metres(cls, orders: Any, info: pydantic.ValidationInfo) -> Any:
+        if not isinstance(orders, list):
+            return orders
         origin = info.data.get('origin', OriginSettings())
-        return (
-            [
-                {**one, 'path': in_metres(one.get('path'), origin)}
-                if isinstance(one, dict)
-                else one
-                for one in orders
-            ]
-            if isinstance(orders, list)
-            else orders
-        )
+        return [
+            {**one, 'path': in_metres(one.get('path'), origin)} if isinstance(one, dict) else one
+            for one in orders
+        ]
 
     @pydantic.field_validator('current')
     @classmethod
@@ -294,14 +290,12 @@ class Scenario(Settings):
         current = self.current_settings()
         if current.speed_mps is None:
             return 0.0, 0.0
-        direction = math.radians(current.direction_deg)
-        return (
-            current.speed_mps * math.cos(direction),
-            current.speed_mps * math.sin(direction),
-        )
+        speed, direction = current.speed_mps, math.radians(current.direction_deg)
+        return speed * math.cos(direction), speed * math.sin(direction)
 
     def navigation_settings(self) -> NavigationSettings:
         """What the navigation node is told."""
+        forecast = self.resolved_current(self.navigation.forecast)
         return NavigationSettings(
             vehicle=self.vehicle,
             origin=self.origin,
@@ -310,10 +304,7 @@ class Scenario(Settings):
             imu_period_s=self.sensors.imu_period_s,
             gyro=self.sensors.gyro,
             also_fitted=self.sensors.also_fitted,
-            **{
-                **dict(self.navigation),
-                'forecast': self.resolved_current(self.navigation.forecast),
-            },
+            **{**dict(self.navigation), 'forecast': forecast},
         )
 
     def guidance_settings(self) -> GuidanceSettings:
@@ -558,8 +549,8 @@ def _check_glide(scenario: Scenario) -> None:
 
 def _with_known_fields(scenario: Scenario) -> Scenario:
     """Scenario that says which files its currents are from, once they were read."""
-    currents = {'current': scenario.current, 'navigation.forecast': scenario.navigation.forecast}
-    for name, current in currents.items():
+    told = {'current': scenario.current, 'navigation.forecast': scenario.navigation.forecast}
+    for name, current in told.items():
         if current.field is None:
             continue
         try:
@@ -567,10 +558,7 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
             scenario.resolved_current(current).field.params()
         except ValueError as error:
             raise ConfigurationError(f'{name}.field.{error}') from None
-        currents[name] = current.model_copy(update={'field': field})
-    navigation = scenario.navigation.model_copy(
-        update={'forecast': currents['navigation.forecast']}
-    )
+        told[name] = current.model_copy(update={'field': field})
     bathymetry = scenario.bathymetry
     if bathymetry.file:
         try:
@@ -578,11 +566,9 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
             scenario.bottom()
         except ValueError as error:
             raise ConfigurationError(f'bathymetry.{error}') from None
-    changed = {
-        'current': currents['current'],
-        'navigation': navigation,
-        'bathymetry': bathymetry,
-    }
+    forecast = {'forecast': told['navigation.forecast']}
+    navigation = scenario.navigation.model_copy(update=forecast)
+    changed = {'current': told['current'], 'navigation': navigation, 'bathymetry': bathymetry}
     return scenario.model_copy(update=changed)
 
 

@@ -50,9 +50,6 @@ class BagTopic(NamedTuple):
 
     name: str
     type_name: str  #: such as nav_msgs/msg/Odometry
-    encoding: str  #: of the messages, 'cdr' in ROS 2
-    schema_encoding: str  #: 'ros2msg' or 'ros2idl'
-    schema: bytes  #: definition of the type
     qos: str  #: offered profiles as YAML, '' if not recorded
 
 
@@ -275,7 +272,9 @@ class Bag:
             self.attachments = file.attachments | self.attachments
             self.cut = file.cut or self.cut
             for channel in file.channels.values():
-                topic = _topic(channel, file.schemas.get(channel.schema_id))
+                schema = file.schemas.get(channel.schema_id)
+                qos = channel.metadata.get('offered_qos_profiles', '')
+                topic = BagTopic(channel.topic, schema.name if schema else '', qos)
                 known = topics.setdefault(topic.name, topic)
                 if known.type_name != topic.type_name:
                     raise ConfigurationError(
@@ -333,14 +332,3 @@ class Bag:
         for number in np.unique(found.channel):
             topic[found.channel == number] = self._index[file.channels[int(number)].topic]
         return Batch(data, topic, found.log_ns, found.start, found.size)
-
-
-def _topic(channel: Channel, schema: Schema | None) -> BagTopic:
-    return BagTopic(
-        name=channel.topic,
-        type_name=schema.name if schema else '',
-        encoding=channel.message_encoding,
-        schema_encoding=schema.encoding if schema else '',
-        schema=schema.data if schema else b'',
-        qos=channel.metadata.get('offered_qos_profiles', ''),
-    )

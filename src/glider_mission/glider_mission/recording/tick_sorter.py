@@ -80,12 +80,8 @@ class TickSorter:
         if self._events:
             self._write_events(stamp_ns)
 
-    def _write_events(self, until_ns: int | None = None) -> None:
-        later = []
-        for event in sorted(self._events):
-            stamp_ns, topic, payload = event
-            if until_ns is None or stamp_ns <= until_ns:
+    def _write_events(self, until_ns: float = math.inf) -> None:
+        for stamp_ns, topic, payload in sorted(self._events):
+            if stamp_ns <= until_ns:
                 self._write(topic, stamp_ns, payload)
-            else:
-                later.append(event)
-        self._events = later
+        self._events = [event for event in self._events if event[0] > until_ns]

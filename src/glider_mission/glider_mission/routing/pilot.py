@@ -38,13 +38,7 @@ _ODOM, _BELIEVED, _STAGE = COLUMNS['odom'].start, COLUMNS['believed_current'], C
 
 
 class Pilot:
-    """Gives the orders of a mission whose route is planned.
-
-    Raises
-    ------
-    ConfigurationError
-        If its forecast cannot be read, or does not cover the mission.
-    """
+    """Gives the orders of a mission whose route is planned; errors as `forecast_of`."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario, self._speed = scenario, pace_of(scenario).speed

@@ -205,12 +205,9 @@ def waypoints_of(scenario: Scenario) -> np.ndarray:
 
 
 def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None) -> Plan:
-    """Plan a mission by its forecast; ``progress`` gets how many of `MEMBERS` + 1 steps are done.
+    """Plan a mission by its forecast; errors as `forecast_of`.
 
-    Raises
-    ------
-    ConfigurationError
-        If its forecast cannot be read.
+    ``progress`` gets how many of `MEMBERS` + 1 steps are done.
     """
     chart, land = forecast_of(scenario)
     pace, end_s = pace_of(scenario), scenario.duration_s

@@ -52,7 +52,7 @@ def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
     lockstep = _lockstep(read_yaml(parameters)) if parameters.is_file() else None
     if file is not None:
         values = read_yaml(file)
-        if _is_parameters(values):
+        if _sections(values):
             return Told(_from_parameters(values, str(file)), str(file), _lockstep(values))
         return Told(_from_scenario(load_scenario(str(file), recorded=True)), str(file), lockstep)
     found = find_scenario(bag.files[0], folder, bag.attachments, scratch)
@@ -79,10 +79,6 @@ def _sections(values: dict) -> dict[str, dict]:
         for key, section in values.items()
         if isinstance(section, dict) and isinstance(section.get('ros__parameters'), dict)
     }
-
-
-def _is_parameters(values: dict) -> bool:
-    return bool(_sections(values))
 
 
 def _lockstep(values: dict) -> bool | None:

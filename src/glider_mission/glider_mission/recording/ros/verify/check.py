@@ -17,7 +17,7 @@ from glider_base.ros.wire.codec import to_cdr
 from glider_base.settings import ConfigurationError
 from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
 from glider_mission.recording.recorded_inputs import RecordedBlock
-from glider_mission.recording.ros.recorded_run import Event, Recording, Series
+from glider_mission.recording.ros.recorded_run import Recording, Series
 from glider_mission.recording.ros.verify.differences import (
     DIFFERENT,
     IDENTICAL,
@@ -52,7 +52,6 @@ class Track:
         self.gap = int(gaps[0]) if len(gaps) else len(index)
 
 
-Tracks = dict[str, Track]
 #: The track of a topic, and the messages that have no place in it.
 Place = Callable[[Series], tuple[Track, list[int]]]
 
@@ -70,14 +69,17 @@ class Check:
         self.ticks = 0
         #: paths that guidance followed, one after the other, and from when (ns)
         self.paths = [(block.settings.path, 0)] if block.block.wired == wiring.GUIDANCE else []
-        self._orders = _orders(recording.events, recording.node(block.block.wired.node))
+        node = recording.node(block.block.wired.node)
+        asked = [e for e in recording.events if e.node == node and e.message in ORDERS]
+        #: given in flight, in the order in which it followed them
+        self._orders = sorted(asked, key=lambda event: event.stamp_ns)
 
     def add(self, difference: Difference) -> None:
         """Keep a difference."""
         self.differing[difference.topic] += 1
         self.found.append(difference)
 
-    def tracks(self, place: Place, why: str) -> Tracks:
+    def tracks(self, place: Place, why: str) -> dict[str, Track]:
         """Tracks of the outputs that are recorded; ``why`` tells of what has no place."""
         tracks = {}
         for name in self.block.outputs:
@@ -222,12 +224,6 @@ class Check:
 
 def _alike(one: bytes, other: bytes) -> bool:
     return sum(a != b for a, b in zip(one, other, strict=True)) <= _BYTES_ALIKE
-
-
-def _orders(events: list[Event], node: str) -> list[Event]:
-    """Orders that a node was given in flight, in the order in which it followed them."""
-    asked = [e for e in events if e.node == node and e.message in ORDERS]
-    return sorted(asked, key=lambda event: event.stamp_ns)
 
 
 def finish_events(check: Check) -> None:

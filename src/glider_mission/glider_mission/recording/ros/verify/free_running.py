@@ -58,8 +58,11 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
     start, cuts = 0, check.cuts(len(stamps_ns))
     last = None
     while start < len(stamps_ns):
-        newest = {name: _newest(series[name], stamps_ns[start]) for name in block.inputs}
-        options = _options({name: _places(newest[name], last and last[name]) for name in newest})
+        choices = {}
+        for name in block.inputs:
+            behind = int(np.searchsorted(series[name].stamps_ns, stamps_ns[start], 'right'))
+            choices[name] = _places(behind - 1, last and last[name])
+        options = _options(choices)
         check.follow_orders(start)
         end = min([start + 1024, len(stamps_ns), *(cut for cut in cuts if cut > start)])
         for begin in options:
@@ -78,10 +81,6 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
     elif check.ticks:
         finish_events(check)
     return check.verdict()
-
-
-def _newest(series: Series, stamp_ns: int) -> int:
-    return int(np.searchsorted(series.stamps_ns, stamp_ns, 'right')) - 1
 
 
 def _places(newest: int, last: int | None) -> list[int]:
