@@ -28,6 +28,11 @@ STARTING, READY, WAITING, FINISHED, FAILED = 'starting', 'ready', 'waiting', 'fi
 #: What the plant says about a run that is finished.
 COMPLETE = 'the run is complete'
 
+#: Messages of the events by which a node tells what a person asked of it in flight, with the first
+#: tick that it acts on. Whoever computes a recorded run again needs them: a step is a function of
+#: state, inputs and parameters, and these change the last of them, or the state.
+ABORT, PARAMETERS_SET, SURFACE, CLEAR = 'abort', 'parameters set', 'surface', 'clear'
+
 _SECOND_NS = 1_000_000_000
 #: The stamp of a message with a header, after the 4 bytes that say how it is encoded.
 _STAMP, _STAMP_AT = struct.Struct('<iI'), 4

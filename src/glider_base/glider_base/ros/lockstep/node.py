@@ -27,7 +27,7 @@ from glider_base.ros.lockstep import health, peers
 from glider_base.ros.lockstep.bad_line import BadLine
 from glider_base.ros.lockstep.executor import Gate, take_with_info
 from glider_base.ros.lockstep.health import Report, seconds
-from glider_base.ros.lockstep.peers import ALONE, FAREWELL_S, REPORT_AFTER, Watch, wait_of
+from glider_base.ros.lockstep.peers import ALONE, FAREWELL_S, REPORT_AFTER, wait_of
 from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.message_fault import MessageFault
 from glider_base.ros.parameters import declare_settings, unknown_parameters
@@ -100,7 +100,8 @@ class TickNode(Node):
         self.gate.awaited.add(self._reports_in)
         self._awaited = None
         self._due_ns: int | None = None
-        self._wait = Watch()
+        self._seen_ns: int | None = None  #: the tick that was due when the watch looked last
+        self._seen_s = 0.0  #: wall time since when it has been
         self._startup_timer = None
         self._said = ''
         self._created_s = time.monotonic()
@@ -270,7 +271,6 @@ class TickNode(Node):
         self.destroy_timer(self._startup_timer)
         self.on_matched()
         self.running = True
-        self._wait.begin()
         self.report(health.READY)
         self.wall_timer(min(0.5, 0.1 * self.ticks.tick_timeout_s), self.watch)
         self.on_ready()
@@ -406,13 +406,19 @@ class TickNode(Node):
         elif self.ticks.lockstep:
             self.watch_tick()
 
+    def stuck_s(self) -> float:
+        """Wall time (s) for which the same tick has been due, as far as the watch has seen."""
+        if self._seen_ns != self._due_ns:
+            self._seen_ns, self._seen_s = self._due_ns, time.monotonic()
+        return time.monotonic() - self._seen_s
+
     def watch_tick(self) -> None:
         """Tell the peers if this node waits for one of them; the plant ends the run."""
         if self._due_ns is None:
             return
-        if self._wait.stuck_s(self._due_ns) < REPORT_AFTER * self.ticks.tick_timeout_s:
+        if self.stuck_s() < REPORT_AFTER * self.ticks.tick_timeout_s:
             return
-        self._wait.end_until_next_tick()
+        self._seen_s = float('inf')  # once for a tick
         missing = [item for item in self.inputs if not self._has(item)]
         if missing:
             self.report(health.WAITING, **wait_of(missing, len(self.inputs), self._due_ns))

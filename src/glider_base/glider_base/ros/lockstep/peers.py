@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who takes part: peers that are matched, missing or waited for, and rivals; and how long."""
 
-import time
 from collections.abc import Iterable
 
 from rclpy.node import Node
@@ -83,33 +82,6 @@ def _peers_among(node: Node, endpoints) -> set[str]:
     """Names of the nodes of this namespace that have some of these endpoints."""
     own = node.get_namespace()
     return {info.node_name for info in endpoints if info.node_namespace == own}
-
-
-class Watch:
-    """Wall time for which the tick that is due has not changed."""
-
-    def __init__(self) -> None:
-        self._due_ns: int | None = None
-        self._since_s = 0.0
-
-    def begin(self) -> None:
-        """Count from now on."""
-        self._since_s = time.monotonic()
-
-    def begin_at_next_look(self) -> None:
-        """Count from the next look on."""
-        self._due_ns = None
-
-    def end_until_next_tick(self) -> None:
-        """Count no more as long as the same tick is due."""
-        self._since_s = float('inf')
-
-    def stuck_s(self, due_ns: int | None) -> float:
-        """Look at the tick that is due: the time (s) since it became so."""
-        now = time.monotonic()
-        if self._due_ns != due_ns:
-            self._due_ns, self._since_s = due_ns, now
-        return now - self._since_s
 
 
 def wait_of(missing: list[Input], count: int, due_ns: int) -> dict:

@@ -10,7 +10,7 @@ import numpy as np
 
 from glider_base.block import Telling
 from glider_base.ros.lockstep import health
-from glider_base.ros.lockstep.orders import ABORT, PARAMETERS_SET
+from glider_base.ros.lockstep.health import ABORT, PARAMETERS_SET
 from glider_base.ros.parameters import changed_parameters
 from glider_base.ros.wire import topics
 from glider_base.ros.wire.codec import to_cdr

@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from glider_base import wiring
 from glider_base.block import Telling
 from glider_base.ros.lockstep import health
-from glider_base.ros.lockstep.orders import ABORT, CLEAR, PARAMETERS_SET, SURFACE
+from glider_base.ros.lockstep.health import ABORT, CLEAR, PARAMETERS_SET, SURFACE
 from glider_base.ros.parameters import with_parameters
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.settings import ConfigurationError
