@@ -448,13 +448,7 @@ def scenario_names() -> list[str]:
 
 
 def scenario_path(name: str) -> Path:
-    """File of a scenario given by name or by path.
-
-    Raises
-    ------
-    ConfigurationError
-        If there is neither a scenario of that name nor such a file.
-    """
+    """File of a scenario given by name or by path; errors as `find_file`."""
     return find_file('scenario', name, SCENARIO_FOLDER)
 
 
@@ -468,10 +462,7 @@ class ScenarioSource(NamedTuple):
 def read_scenario(name: str = DEFAULT_SCENARIO) -> ScenarioSource:
     """Read the file of a scenario given by name or by path; `make_scenario` validates it.
 
-    Raises
-    ------
-    ConfigurationError
-        If there is no such file, or it is not a YAML mapping.
+    Errors are those of `scenario_path` and `read_yaml`.
     """
     path = scenario_path(name)
     values = read_yaml(path)

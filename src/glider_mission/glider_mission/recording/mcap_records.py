@@ -61,10 +61,7 @@ def whole_records(stream: IO[bytes]) -> Iterator[tuple[int, int, bytes]]:
 def read_summary(stream: IO[bytes], is_checked: bool = True) -> Summary | None:
     """What the end of a file says is in it; None if the file was not completed.
 
-    Raises
-    ------
-    ValueError
-        Saying what is wrong with it.
+    A ValueError says what is wrong with it.
     """
     size, end_size = stream.seek(0, 2), _FOOTER.size + len(MAGIC)
     if size < end_size + len(MAGIC):
@@ -88,10 +85,7 @@ def read_summary(stream: IO[bytes], is_checked: bool = True) -> Summary | None:
 def unpack(data: bytes) -> bytes:
     """Records of a chunk, decompressed and checked, from the content of its own record.
 
-    Raises
-    ------
-    ValueError
-        Saying what is wrong with it.
+    A ValueError says what is wrong with it.
     """
     try:
         chunk = parse(Chunk, data)
@@ -127,14 +121,9 @@ def number_at(data, at, size):
 
 @kernel
 def scan(data, channel, log_ns, start, size, other):
-    """Find the messages of a chunk, and the places of its other records.
+    """Find the messages of a chunk, and the places of its other records; how many there are.
 
-    Returns
-    -------
-    int
-        Number of messages; -1 if a record is longer than what is left.
-    int
-        Number of other records.
+    Of messages -1 if a record is longer than what is left.
     """
     messages = others = at = 0
     while at < len(data):
@@ -174,14 +163,8 @@ class Places(NamedTuple):
     others: np.ndarray  #: where each of the other records begins
 
 
-def find(data: bytes | np.ndarray) -> Places:
-    """Records of a chunk, bytes or uint8[n].
-
-    Raises
-    ------
-    ValueError
-        If a record is longer than what is left.
-    """
+def find(data: bytes) -> Places:
+    """Records of a chunk; a ValueError if one is longer than what is left."""
     data = np.frombuffer(data, np.uint8)
     channel, log_ns, start, size, other = np.empty((5, len(data) // 9 + 1), np.int64)
     messages, others = scan(data, channel, log_ns, start, size, other)

@@ -173,7 +173,7 @@ class McapWriter:
 
     def _end_chunk(self) -> None:
         content, self._chunk = self._chunk, bytearray()
-        found = find(content)
+        found = find(bytes(content))
         start_ns, end_ns = int(found.log_ns.min()), int(found.log_ns.max())
         data = self._compressor.compress(content)
         chunk = Chunk(

@@ -371,7 +371,8 @@ class TickNode(Node):
 
     def _await(self, item: Input) -> None:
         if self._awaited is not item.subscription:
-            self.gate.replace(self._awaited, item.subscription)
+            self.gate.awaited.discard(self._awaited)
+            self.gate.awaited.add(item.subscription)
             self._awaited = item.subscription
 
     def _has(self, item: Input) -> bool:

@@ -19,14 +19,14 @@ REPORT_AFTER = 0.4
 #: What to do about a second glider.
 ALONE = 'each glider in a ROS domain needs a namespace and a clock of its own'
 #: What rclpy calls a node whose name has not been discovered yet.
-_UNKNOWN = '_NODE_NAME_UNKNOWN_'
+UNKNOWN = '_NODE_NAME_UNKNOWN_'
 
 
 def publishers(node: Node, topic: Topic) -> dict[bytes, str]:
     """Full names of the nodes that publish a topic, by gid; empty for one not known yet."""
     return {
         bytes(info.endpoint_gid): ''
-        if info.node_name == _UNKNOWN
+        if info.node_name == UNKNOWN
         else f'{info.node_namespace.rstrip("/")}/{info.node_name}'
         for info in node.get_publishers_info_by_topic(topic.name)
     }

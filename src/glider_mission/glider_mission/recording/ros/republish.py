@@ -20,6 +20,7 @@ from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.clock import MAX_TICKS_AHEAD
 from glider_base.ros.lockstep.executor import take
 from glider_base.ros.lockstep.node import COUNT_TICKS
+from glider_base.ros.lockstep.peers import UNKNOWN
 from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_base.ros.wire import topics
 from glider_base.ros.wire.codec import to_cdr
@@ -30,8 +31,6 @@ from glider_base.wiring import present
 from glider_mission.recording.mcap_reader import Bag, BagTopic, Batch
 from glider_mission.recording.ros.recorded_run import choose_namespace
 
-#: Name that rclpy gives to a node of which it knows the endpoints only.
-_NAME_UNKNOWN = '_NODE_NAME_UNKNOWN_'
 #: Sleeps and waits are cut into pieces of this length (s), so that Ctrl-C is heard.
 _PATIENCE_S = 0.1
 #: Nothing longer is replayed (s).
@@ -274,7 +273,7 @@ class _Brake:
         The name of a node can come later than its subscriptions.
         """
         return any(
-            info.node_name in (topics.RECORDER, _NAME_UNKNOWN)
+            info.node_name in (topics.RECORDER, UNKNOWN)
             and info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
             for info in self._node.get_subscriptions_info_by_topic(self._odom)
         )

@@ -53,14 +53,13 @@ def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
     if file is not None:
         values = read_yaml(file)
         if _sections(values):
-            return Told(_from_parameters(values, str(file)), str(file), _lockstep(values))
+            return _from_parameters(values, str(file))
         return Told(_from_scenario(load_scenario(str(file), recorded=True)), str(file), lockstep)
     found = find_scenario(bag.files[0], folder, bag.attachments, scratch)
     if found is not None:
         return Told(_from_scenario(found.scenario), found.source, lockstep)
     if parameters.is_file():
-        values = read_yaml(parameters)
-        return Told(_from_parameters(values, str(parameters)), str(parameters), lockstep)
+        return _from_parameters(read_yaml(parameters), str(parameters))
     raise ConfigurationError(
         f'{path}: it does not say what the nodes were told, neither {SCENARIO_FILE} nor '
         f'{PARAMETERS_FILE} is in it or attached: give --settings FILE'
@@ -88,7 +87,7 @@ def _lockstep(values: dict) -> bool | None:
     return all(said) if said else None
 
 
-def _from_parameters(values: dict, source: str) -> dict[str, Settings | None]:
+def _from_parameters(values: dict, source: str) -> Told:
     sections = _sections(values)
     found: dict[str, Settings | None] = {}
     for block in BLOCKS:
@@ -97,4 +96,4 @@ def _from_parameters(values: dict, source: str) -> dict[str, Settings | None]:
         told = node in sections or '**' in sections
         settings = from_parameters(block.settings, given, f'{source}: {node}') if told else None
         found[block.wired.name] = settings
-    return found
+    return Told(found, source, _lockstep(values))

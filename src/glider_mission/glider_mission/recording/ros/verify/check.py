@@ -27,7 +27,6 @@ from glider_mission.recording.ros.verify.differences import (
     Verdict,
     field_difference,
     message_difference,
-    time_text,
 )
 from glider_model.plant.block import PLANT
 
@@ -118,7 +117,7 @@ class Check:
                     self.paths.append((settings.path, order.stamp_ns))
                 self.block.tune(settings)
             except ConfigurationError as error:
-                self.notes.append(f'parameters set at {time_text(order.stamp_ns)}: {error}')
+                self.notes.append(f'parameters set at {health.seconds(order.stamp_ns)}: {error}')
 
     def run(self, start: int, end: int, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Outputs of the steps from start to end; rows are the messages of the inputs."""

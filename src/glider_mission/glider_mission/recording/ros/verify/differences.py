@@ -45,11 +45,6 @@ class Verdict(NamedTuple):
     notes: Sequence[str] = ()
 
 
-def time_text(stamp_ns: int) -> str:
-    """Time of a stamp as part of a sentence."""
-    return f't = {stamp_ns / 1e9:.1f} s'
-
-
 def field_difference(expected, recorded: bytes) -> tuple[str, str, str]:
     """First field in which any bytes differ from a message, and what is computed and recorded.
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from glider_base import wiring
 from glider_base.block import optional_topics
+from glider_base.ros.lockstep.health import seconds
 from glider_base.signals import TICK_NS
 from glider_base.wiring import WHEN_SILENT, WIRING, Wired, present
 from glider_mission.blocks import BLOCKS
@@ -23,7 +24,6 @@ from glider_mission.recording.ros.verify.differences import (
     IDENTICAL,
     SKIPPED,
     Verdict,
-    time_text,
 )
 from glider_mission.recording.ros.verify.free_running import free_running
 from glider_mission.recording.ros.verify.lockstep import in_lockstep
@@ -125,7 +125,7 @@ def _hints(one: Verdict, verdicts: list[Verdict]) -> list[str]:
         source = other.first
         if source and source.topic in wired.inputs and source.stamp_ns <= one.first.stamp_ns:
             hints.append(
-                f'its input {source.topic} differs at {time_text(source.stamp_ns)} from what '
+                f'its input {source.topic} differs at {seconds(source.stamp_ns)} from what '
                 f'{other.block} computes: if the recording is damaged there, this is why'
             )
     return hints

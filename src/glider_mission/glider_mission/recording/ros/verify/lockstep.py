@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 
+from glider_base.ros.lockstep.health import seconds
 from glider_base.signals import TICK_NS
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording, Series
@@ -21,7 +22,6 @@ from glider_mission.recording.ros.verify.differences import (
     WHOLE,
     Difference,
     Verdict,
-    time_text,
 )
 from glider_model.plant.block import PLANT
 
@@ -69,7 +69,7 @@ def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict
     late = [name for name, track in inputs.items() if track.index[0] < 0]
     if late:
         first_ns = int(series[late[0]].stamps_ns[0])
-        why = f'{late[0]} is recorded from {time_text(first_ns)} on, not from the first tick'
+        why = f'{late[0]} is recorded from {seconds(first_ns)} on, not from the first tick'
         return Verdict(wired.name, SKIPPED, f'its state is not known: {why}')
     check = Check(block, recording, np.arange(ticks, dtype=np.int64) * TICK_NS)
     count = min(track.gap for track in inputs.values())
