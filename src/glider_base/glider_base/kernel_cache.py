@@ -136,17 +136,6 @@ def _classes(kinds: Iterable) -> Iterator[type]:
             yield from _classes(set(kind.types))
 
 
-def _outlive(arguments: Iterable) -> bool:
-    """Whether all classes of arguments are there in the next session, too.
-
-    Those of a notebook, of the program itself and of functions are made anew in each.
-    """
-    return not any(
-        one.__module__ == '__main__' or '<locals>' in one.__qualname__
-        for one in _classes(arguments)
-    )
-
-
 def is_kept(function) -> bool:
     """Whether a function stands in a file, not in a notebook: then its code is kept."""
     path = _file_of(function.__module__)
@@ -203,19 +192,24 @@ class KernelCache(FunctionCache):
         self._ending = ending  #: of the names of its files
         HOLDERS.add(function.__module__.partition('.')[0])
 
-    def _select(self, sig) -> None:
-        """Turn to what is kept of the sources as they are, for a signature."""
-        arguments = getattr(sig, 'args', sig)
-        modules = {one.__module__ for one in _classes(arguments)} | {self._py_func.__module__}
+    def _select(self, sig) -> bool:
+        """Turn to what is kept of the sources as they are, for a signature; whether anything is.
+
+        Classes of a notebook, the program itself and functions are made anew in each session.
+        """
+        classes = list(_classes(getattr(sig, 'args', sig)))
+        if any(one.__module__ == '__main__' or '<locals>' in one.__qualname__ for one in classes):
+            return False
+        modules = {one.__module__ for one in classes} | {self._py_func.__module__}
         digest = closure(frozenset(modules), len(BODIES), len(HOLDERS))
         name = f'{self._impl.filename_base}{self._ending}.{digest}'
         self._cache_file = IndexDataCacheFile(self._cache_path, name, digest)
+        return True
 
     def load_overload(self, sig, target_context):
         """What was compiled for a signature, or None."""
-        if not _outlive(getattr(sig, 'args', sig)):
+        if not self._select(sig):
             return None
-        self._select(sig)
         found = super().load_overload(sig, target_context)
         if found is not None:
             path = self._cache_file._index_path
@@ -225,9 +219,8 @@ class KernelCache(FunctionCache):
 
     def save_overload(self, sig, data) -> None:
         """Save what was compiled for a signature, if it can be of use to another session."""
-        if not _outlive(getattr(sig, 'args', sig)):
+        if not self._select(sig):
             return
-        self._select(sig)
         os.makedirs(self.cache_path, exist_ok=True)
         with open(os.path.join(self.cache_path, 'lock'), 'w') as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)

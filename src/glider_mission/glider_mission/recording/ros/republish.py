@@ -284,15 +284,14 @@ class _Count:
 
     def __init__(self, node: Node, plan: Plan) -> None:
         topic, self._name = TOPICS['told'], _join(plan.namespace, topics.REPLAY)
-        self._events_on = {i for i, name in plan.names.items() if name == '/diagnostics'}
         self.publisher = node.create_publisher(
             topic.message_type, topic.full_name(plan.namespace), topic.qos
         )
         self._events, self._newest_ns, self._told_ns = 0, -TICK_NS, -TICK_NS
 
-    def add(self, index: int) -> None:
-        """Count a message of a topic, given by its index in the bag."""
-        self._events += index in self._events_on
+    def add(self, name: str) -> None:
+        """Count a message of a topic."""
+        self._events += name == '/diagnostics'
 
     def tell_before(self, log_ns: int) -> None:
         """Tell now and then, when a tick is over."""
@@ -382,7 +381,7 @@ class Replay:
             self._count.tell_before(log_ns)
             self._tell_time(log_ns)
             self._outputs[index].publish(raw)
-            self._count.add(index)
+            self._count.add(self._plan.names[index])
             now_s = time.monotonic()
             if now_s - shown_s > _PATIENCE_S:
                 shown_s = now_s
