@@ -73,7 +73,7 @@ def is_file(path: Path) -> bool:
 
 
 def read_text(path: Path) -> str:
-    """Text of a regular file, in UTF-8; errors as `read_bytes`, and for the line that is none."""
+    """Text of a regular file in UTF-8; errors as `read_bytes`, or naming the line that is none."""
     data = read_bytes(path)
     try:
         return data.decode('utf-8-sig')

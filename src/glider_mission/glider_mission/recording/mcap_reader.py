@@ -22,6 +22,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema
 from mcap.summary import Summary
+from numpy.lib.stride_tricks import sliding_window_view
 
 from glider_base.settings import ConfigurationError
 from glider_mission.recording.bag_files import bag_files
@@ -33,7 +34,6 @@ from glider_mission.recording.mcap_records import (
     UNREADABLE,
     Places,
     find_defined,
-    gather,
     parse,
     read_summary,
     span,
@@ -69,9 +69,8 @@ class Batch(NamedTuple):
 
     def rows(self, chosen: np.ndarray) -> np.ndarray:
         """Payloads of equal size, uint8[n, size], of the messages with these indices."""
-        rows = np.empty((len(chosen), int(self.size[chosen[0]])), np.uint8)
-        gather(self.data, self.start[chosen], rows)
-        return rows
+        windows = sliding_window_view(self.data, int(self.size[chosen[0]]))
+        return windows[self.start[chosen]]
 
 
 class _Part(NamedTuple):

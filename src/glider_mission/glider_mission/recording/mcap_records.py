@@ -146,13 +146,6 @@ def scan(data, channel, log_ns, start, size, other):
     return messages, others
 
 
-@kernel
-def gather(data, start, rows):
-    """Fill each row with what begins at its start."""
-    for i in range(rows.shape[0]):
-        rows[i] = data[start[i] : start[i] + rows.shape[1]]
-
-
 class Places(NamedTuple):
     """Where the records of a chunk are; int64 arrays."""
 

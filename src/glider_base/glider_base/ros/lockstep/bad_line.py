@@ -19,8 +19,6 @@ _STREAM_OFFSET = 2**34
 #: in lockstep the next one waits for it.
 _NO_NEXT_S = 0.05
 
-Send = Callable[[int, bytes], None]
-
 
 class BadLine:
     """What goes wrong with the messages of one topic of a node; a seed says which are struck."""
