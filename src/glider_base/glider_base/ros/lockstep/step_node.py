@@ -56,14 +56,12 @@ class StepNode(TickNode):
         due = self._cycles_since(now_s)
         self.cycles, self.missed = self.cycles + due, self.missed + due - 1
         self._count()
-        old = {
+        old = [
             item.topic.name
             for item in self.inputs
             if now_s - item.arrived_s > self.max_age_s(item.topic.name)
-        }
-        stale = [
-            item.topic.name for item in self.inputs if item.topic.name in old - {*WHEN_SILENT}
         ]
+        stale = [name for name in old if name not in WHEN_SILENT]
         stamp_ns = self._newest_ns()
         if stale != self._stale:
             self._stale = stale
