@@ -42,7 +42,7 @@ FLOORS = {
     'glider_model': (('vehicle', 'ocean'), ('onboard', 'plant'), ('nodes',)),
     'glider_mission': (
         ('goto_list',),
-        ('blocks', 'chart', 'disk', 'forecast', 'rules'),
+        ('blocks', 'chart', 'disk', 'rules'),
         ('scenario',),
         ('choices', 'planned', 'routing', 'run_folder'),
         ('recording',),

@@ -28,7 +28,7 @@ from glider_base.frames import (
     wrench_to_wire,
 )
 from glider_base.ros.lockstep import health
-from glider_base.ros.lockstep.orders import ABORT, PARAMETERS_SET
+from glider_base.ros.lockstep.health import ABORT, PARAMETERS_SET
 from glider_base.ros.places import NAMESPACE, domain_id
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.qos import EVENTS

@@ -34,12 +34,10 @@ from glider_mission.recording.ros.recorded_run import Recording
 from glider_mission.recording.ros.republish import (
     check_not_empty,
     plan_replay,
-    qos_of,
     recorded_messages,
 )
 from glider_mission.recording.ros.told import read_told
-from glider_mission.recording.ros.verify.every_block import verify
-from glider_mission.recording.ros.verify.report import report
+from glider_mission.recording.ros.verify.every_block import report, verify
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import Scenario, load_scenario
 
@@ -168,8 +166,7 @@ def _replay(folder: Path) -> Answer:
     bag = Bag(folder)
     plan = plan_replay(bag, [], 0.0, None, None)
     check_not_empty(plan)
-    profiles = {index: qos_of(bag.topics[index]) for index in plan.names}
-    return list(recorded_messages(plan, profiles)), bool(bag.cut)
+    return list(recorded_messages(plan)), bool(bag.cut)
 
 
 def _recover(folder: Path) -> Answer:

@@ -54,14 +54,11 @@ def block_tick(state, t_s, inputs, params, dt):
 
     Parameters
     ----------
-    state : NamedTuple
-    t_s : float
-        Time since the start (s).
+    state, params : NamedTuple
+    t_s, dt : float
+        Time since the start, and length of the tick (s).
     inputs : tuple of tuple of float
         Numbers of its input topics, as on the wire.
-    params : NamedTuple
-    dt : float
-        Length of the tick (s).
 
     Returns
     -------
@@ -90,14 +87,7 @@ def _rows_at(arrays, row):
 
 
 def put(table, row, start, tuples):
-    """Write tuples of numbers into a row, one after the other from a column on; in kernels only.
-
-    Parameters
-    ----------
-    table : float64[n, m]
-    row, start : int
-    tuples : tuple of tuple
-    """
+    """Write tuples of numbers into a row of float64[n, m] from a column on; in kernels only."""
     numbers = [number for values in tuples for number in values]
     table[row, start : start + len(numbers)] = numbers
 
@@ -119,22 +109,9 @@ def _put(table, row, start, tuples):
 
 @kernel
 def changes_to_tell(flags, stamps_ns, every_ns, told, told_ns):
-    """Where flags have changed, told at most once in ``every_ns``.
+    """Where flags int64[n, m] have changed, told at most once in ``every_ns``; indices int64[k].
 
-    Parameters
-    ----------
-    flags : int64[n, m]
-    stamps_ns : int64[n]
-    every_ns : int
-    told : int64[m]
-        The flags that were told last; changed in place.
-    told_ns : int
-        When that was.
-
-    Returns
-    -------
-    int64[k]
-        Indices.
+    The flags ``told`` last, int64[m], are changed in place.
     """
     found = np.empty(len(flags), np.int64)
     count = 0
@@ -147,14 +124,7 @@ def changes_to_tell(flags, stamps_ns, every_ns, told, told_ns):
 
 
 class Telling:
-    """Which changes of the flags of a block are told, and what was told last.
-
-    Parameters
-    ----------
-    block : Block
-    start_ns : int
-        When it begins.
-    """
+    """Which changes of the flags of a block are told from a time on, and what was told last."""
 
     def __init__(self, block: Block, start_ns: int = 0) -> None:
         self.block = block

@@ -37,8 +37,8 @@ _TAG_DIRECTIVE = re.compile('^%TAG', re.MULTILINE)
 Location = tuple[str, ...]
 
 
-def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
-    """Content of a regular file of at most ``limit`` bytes.
+def read_bytes(path: Path) -> bytes:
+    """Content of a regular file of at most `MAX_BYTES`.
 
     Raises
     ------
@@ -52,13 +52,15 @@ def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
         with open(
             path, 'rb', opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)
         ) as f:
-            data = f.read(limit + 1)
+            data = f.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         if isinstance(error, ConfigurationError):
             raise
         raise ConfigurationError(f'{path}: {getattr(error, "strerror", None) or error}') from None
-    if len(data) > limit:
-        raise ConfigurationError(f'{path}: larger than {limit:,} bytes (allowed: <= {limit:,})')
+    if len(data) > MAX_BYTES:
+        raise ConfigurationError(
+            f'{path}: larger than {MAX_BYTES:,} bytes (allowed: <= {MAX_BYTES:,})'
+        )
     return data
 
 
@@ -71,13 +73,7 @@ def is_file(path: Path) -> bool:
 
 
 def read_text(path: Path) -> str:
-    """Text of a regular file, in UTF-8.
-
-    Raises
-    ------
-    ConfigurationError
-        As `read_bytes`, and if it is no text; naming the line.
-    """
+    """Text of a regular file in UTF-8; errors as `read_bytes`, or naming the line that is none."""
     data = read_bytes(path)
     try:
         return data.decode('utf-8-sig')
@@ -232,13 +228,7 @@ def _parse(text: str) -> tuple[Any, dict[Location, int]]:
 
 
 def parse_yaml(text: str, source: str) -> Any:
-    """Value of a YAML text.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming ``source``, and the line if there are several.
-    """
+    """Value of a YAML text; a `ConfigurationError` names ``source``, and the line of several."""
     try:
         return deepcopy(_parse(text)[0])
     except _RefusedError as error:
@@ -247,13 +237,7 @@ def parse_yaml(text: str, source: str) -> Any:
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Read a YAML mapping.
-
-    Raises
-    ------
-    ConfigurationError
-        If the file is missing, unreadable, too large, not YAML, or not a mapping.
-    """
+    """Mapping of a YAML file; errors as `read_text` and `parse_yaml`, and if it is none."""
     values = parse_yaml(read_text(path), str(path))
     if not isinstance(values, dict):
         raise ConfigurationError(f'{path}: expected a mapping of fields, found {shown(values)}')
@@ -309,13 +293,7 @@ def _check_depth(value: Any) -> None:
 
 
 def parse_json(text: str | bytes, source: str) -> Any:
-    """Value of a JSON text.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming ``source``.
-    """
+    """Value of a JSON text; a `ConfigurationError` names its ``source``."""
     try:
         value = json.loads(text, parse_int=_number)
         _check_depth(value)
@@ -327,11 +305,5 @@ def parse_json(text: str | bytes, source: str) -> Any:
 
 
 def read_json(path: Path) -> Any:
-    """Read a file of JSON.
-
-    Raises
-    ------
-    ConfigurationError
-        If the file is missing, unreadable, too large, or not JSON.
-    """
+    """Value of a file of JSON; errors as `read_text` and `parse_json`."""
     return parse_json(read_text(path), str(path))

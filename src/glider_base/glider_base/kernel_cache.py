@@ -80,15 +80,9 @@ def _counts(module: str) -> bool:
     return path is not None and (top in HOLDERS or not any(one in path for one in _INSTALLED))
 
 
-class _Source(NamedTuple):
-    """A module's digest, and the modules that it imports."""
-
-    digest: bytes
-    imports: frozenset[str]
-
-
 @cache
-def _source(module: str) -> _Source:
+def _source(module: str) -> tuple[bytes, frozenset[str]]:
+    """Digest of a module, and the modules that it imports."""
     data = Path(_file_of(module)).read_bytes()
     names = set()
     for origin, members, plain in _IMPORT.findall(data.decode('utf-8', 'replace')):
@@ -97,7 +91,7 @@ def _source(module: str) -> _Source:
             names |= {f'{origin}.{one}' for one in re.findall(r'\w+', members)}
         names |= {part.split()[0] for part in plain.split(',') if part.strip()}
     parents = {name[:at] for name in names for at in range(len(name)) if name[at] == '.'}
-    return _Source(hashlib.sha256(data).digest(), frozenset(names | parents))
+    return hashlib.sha256(data).digest(), frozenset(names | parents)
 
 
 def _reach(modules: Iterable[str], seen: dict[str, bytes]) -> None:
@@ -114,11 +108,7 @@ def _reach(modules: Iterable[str], seen: dict[str, bytes]) -> None:
 def closure(modules: frozenset[str], bodies: int, holders: int) -> str:
     """Digest of all sources that code of some modules can come from.
 
-    Parameters
-    ----------
-    modules : frozenset of str
-    bodies, holders : int
-        How many of `BODIES` and `HOLDERS` there are: more may change the answer.
+    It is kept for so many of `BODIES` and `HOLDERS`: more may change it.
     """
     seen: dict[str, bytes] = {}
     _reach(modules, seen)
@@ -146,17 +136,6 @@ def _classes(kinds: Iterable) -> Iterator[type]:
             yield from _classes(set(kind.types))
         if isinstance(kind, types.StructRef):
             yield from _classes(kind.field_dict.values())
-
-
-def _outlive(arguments: Iterable) -> bool:
-    """Whether all classes of arguments are there in the next session, too.
-
-    Those of a notebook, of the program itself and of functions are made anew in each.
-    """
-    return not any(
-        one.__module__ == '__main__' or '<locals>' in one.__qualname__
-        for one in _classes(arguments)
-    )
 
 
 def is_kept(function) -> bool:
@@ -215,19 +194,24 @@ class KernelCache(FunctionCache):
         self._ending = ending  #: of the names of its files
         HOLDERS.add(function.__module__.partition('.')[0])
 
-    def _select(self, sig) -> None:
-        """Turn to what is kept of the sources as they are, for a signature."""
-        arguments = getattr(sig, 'args', sig)
-        modules = {one.__module__ for one in _classes(arguments)} | {self._py_func.__module__}
+    def _select(self, sig) -> bool:
+        """Turn to what is kept of the sources as they are, for a signature; whether anything is.
+
+        Classes of a notebook, the program itself and functions are made anew in each session.
+        """
+        classes = list(_classes(getattr(sig, 'args', sig)))
+        if any(one.__module__ == '__main__' or '<locals>' in one.__qualname__ for one in classes):
+            return False
+        modules = {one.__module__ for one in classes} | {self._py_func.__module__}
         digest = closure(frozenset(modules), len(BODIES), len(HOLDERS))
         name = f'{self._impl.filename_base}{self._ending}.{digest}'
         self._cache_file = IndexDataCacheFile(self._cache_path, name, digest)
+        return True
 
     def load_overload(self, sig, target_context):
         """What was compiled for a signature, or None."""
-        if not _outlive(getattr(sig, 'args', sig)):
+        if not self._select(sig):
             return None
-        self._select(sig)
         found = super().load_overload(sig, target_context)
         if found is not None:
             path = self._cache_file._index_path
@@ -237,9 +221,8 @@ class KernelCache(FunctionCache):
 
     def save_overload(self, sig, data) -> None:
         """Save what was compiled for a signature, if it can be of use to another session."""
-        if not _outlive(getattr(sig, 'args', sig)):
+        if not self._select(sig):
             return
-        self._select(sig)
         os.makedirs(self.cache_path, exist_ok=True)
         with open(os.path.join(self.cache_path, 'lock'), 'w') as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)

@@ -5,7 +5,7 @@
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar, get_args, get_origin
+from typing import Any, TypeVar, get_args, get_origin
 
 import pydantic
 
@@ -92,14 +92,15 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
     context = error.get('ctx') or {}
     if error['type'] == 'extra_forbidden':
         names = ', '.join(name for m in holders for name in m.model_fields)
-        return f'allowed fields: {names}' + ''.join(_others(m.model_config) for m in holders)
+        extras = (model.model_config.get('json_schema_extra') for model in holders)
+        return f'allowed fields: {names}' + ''.join(map(_others, extras))
     if error['type'] in _NOT_A_MAPPING:
         models = _models(field.annotation) if field is not None else holders
         return f'allowed fields: {", ".join(name for m in models for name in m.model_fields)}'
     for key in ('expected', 'expected_tags'):
         if key in context:
             extra = field.json_schema_extra if field is not None else None
-            return f'allowed: {context[key]}' + _others({'json_schema_extra': extra})
+            return f'allowed: {context[key]}' + _others(extra)
     limits = [f'{word} {context[key]}' for key, word in _BOUNDS if key in context]
     if field is not None:
         limits = [
@@ -111,9 +112,8 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
     return f'allowed: {" and ".join(limits)}' if limits else ''
 
 
-def _others(about: dict[str, Any]) -> str:
+def _others(extra: Any) -> str:
     """Where words come from that a field, or fields that a model, does not accept here."""
-    extra = about.get('json_schema_extra')
     others = extra.get('others') if isinstance(extra, dict) else None
     return f'; {others}' if others else ''
 
@@ -170,11 +170,9 @@ def unit_of(field: pydantic.fields.FieldInfo) -> str:
     return brackets[1].partition(',')[0] if brackets else ''
 
 
-class Mistake(NamedTuple):
-    """One thing that is wrong with values."""
-
-    location: tuple[str, ...]  #: as the person wrote it
-    text: str  #: field, value, what is wrong, what is allowed
+#: One thing that is wrong with values: its location as the person wrote it, and in words its
+#: field, its value, what is wrong and what is allowed.
+Mistake = tuple[tuple[str, ...], str]
 
 
 def mistakes(error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> list[Mistake]:
@@ -182,7 +180,7 @@ def mistakes(error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -
     found = error.errors(include_url=False)
     told = [_mistake(item, model) for item in found[:MAX_LINES]]
     if len(found) > MAX_LINES:
-        told[-1:] = [Mistake((), f'and {len(found) - MAX_LINES + 1} more')]
+        told[-1:] = [((), f'and {len(found) - MAX_LINES + 1} more')]
     return told
 
 
@@ -204,7 +202,7 @@ def _mistake(item: dict, model: type[pydantic.BaseModel]) -> Mistake:
     allowed = _allowed(item, holders, field)
     where = '.'.join(clipped(part) for part in path) or '(file)'
     text = f'{where}{given}: {message}' + (f' ({allowed})' if allowed else '')
-    return Mistake(tuple(path), text)
+    return tuple(path), text
 
 
 def validate(

@@ -431,11 +431,11 @@ def test_plan_of_a_part(short_run):
     ],
 )
 def test_quality_of_service_in_words_and_in_the_numbers_of_older_bags(text, expected):
-    qos = qos_of(BagTopic('/a', 'std_msgs/msg/String', 'cdr', 'ros2msg', b'', text))
+    qos = qos_of(BagTopic('/a', 'std_msgs/msg/String', text))
     assert (qos.reliability.name, qos.durability.name, qos.depth) == expected
 
 
 @pytest.mark.parametrize('text', ['[1]', '- history: [', 'word'])
 def test_quality_of_service_that_is_garbled_is_named(text):
     with pytest.raises(ConfigurationError, match='/a: quality of service not readable'):
-        qos_of(BagTopic('/a', 'std_msgs/msg/String', 'cdr', 'ros2msg', b'', text))
+        qos_of(BagTopic('/a', 'std_msgs/msg/String', text))

@@ -31,16 +31,7 @@ _TEXT = re.compile(
 def degrees(value: Any, axis: str) -> float:
     """Degrees of a number or a text: 47.508, '47.508 N', '47 30.5 N', "47°30.5'N".
 
-    Parameters
-    ----------
-    value : float or str
-    axis : str
-        latitude or longitude.
-
-    Raises
-    ------
-    ValueError
-        Naming axis, value and what is allowed.
+    The axis is latitude or longitude. A ValueError names it, the value and what is allowed.
     """
     letters, low, high = _AXES[axis]
     found = _TEXT.fullmatch(value.strip()) if isinstance(value, str) else None
@@ -66,10 +57,7 @@ def degrees(value: Any, axis: str) -> float:
 def places(waypoints: Any) -> list[tuple[float, float]]:
     """Latitude and longitude (deg) of waypoints as a person wrote them, or of a list of a Slocum.
 
-    Raises
-    ------
-    ValueError
-        Naming the waypoint, its value and what is allowed.
+    A ValueError names the waypoint, its value and what is allowed.
     """
     if isinstance(waypoints, str) and waypoints.lower().endswith(SUFFIX):
         waypoints = read_goto_list(Path(waypoints))
@@ -96,10 +84,7 @@ def stretch(latitude: float, origin: Origin) -> float:
 def in_metres(path: Any, settings: OriginSettings) -> Any:
     """A path as a person wrote it, with waypoints in metres if it has them in degrees.
 
-    Raises
-    ------
-    ValueError
-        Naming a waypoint that is none, or at which the chart is too far off.
+    A ValueError names a waypoint that is none, or at which the chart is too far off.
     """
     if not isinstance(path, dict) or path.get('waypoints_latlon') is None:
         return path

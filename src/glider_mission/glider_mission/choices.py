@@ -39,16 +39,9 @@ def chosen_fields(
     seed: int | None = None,
     duration: float | Literal['full'] | None = None,
 ) -> dict[str, Any]:
-    """Values by dotted name, for `load_scenario`.
+    """Values by dotted name, for `load_scenario`: changes, and what is said by options.
 
-    Parameters
-    ----------
-    changes : dict
-        Values by dotted name.
-    controller, guidance, seed : optional
-        Instead of those of the scenario.
-    duration : float or 'full', optional
-        Simulated time (s), or that of the whole scenario; by default its dives.
+    A duration is simulated time (s), or that of the whole scenario; by default its dives.
     """
     fields = dict(changes)
     if controller is not None:

@@ -29,13 +29,7 @@ def vanished(file: Path) -> DiskError:
 
 
 def refuse_vanished(file: Path, stream: IO[bytes]) -> None:
-    """Refuse to go on writing a file that has been deleted, moved, or exchanged for another.
-
-    Raises
-    ------
-    DiskError
-        Naming it.
-    """
+    """Raise a `DiskError` about a file that has been deleted, moved, or exchanged for another."""
     try:
         is_there = os.path.samestat(os.stat(file), os.fstat(stream.fileno()))
     except OSError:

@@ -131,13 +131,7 @@ def _refuse_another(folder: Path, attachments: Mapping[str, bytes]) -> None:
 
 @contextmanager
 def scenario_of(run: Path, attachments: Mapping[str, bytes]) -> Iterator[FlownScenario]:
-    """Scenario of a run, see `find_scenario`: it can be used as long as the context is open.
-
-    Raises
-    ------
-    ConfigurationError
-        If there is none, or it is not valid.
-    """
+    """Scenario of a run, usable as long as the context is open; errors as `find_scenario`."""
     with TemporaryDirectory() as scratch:
         found = find_scenario(run, run, attachments, Path(scratch))
         if found is None:

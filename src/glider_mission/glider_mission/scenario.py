@@ -19,6 +19,7 @@ from glider_base.frames import OriginSettings, to_geodetic
 from glider_base.settings import (
     ConfigurationError,
     Settings,
+    beside,
     file_names,
     find_file,
     holder_of,
@@ -34,7 +35,6 @@ from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.chart import charted, in_metres
-from glider_mission.forecast import RouteForecast
 from glider_mission.rules import Rules
 from glider_model.ocean.bottom import BathymetrySettings
 from glider_model.ocean.current_settings import CurrentSettings, SumOfCurrents
@@ -75,6 +75,30 @@ _ALTERNATIVES = (
     ('descent_per_turn_m', 'slope_deg'),
     ('waypoints', 'waypoints_latlon'),
 )
+
+
+class RouteForecast(Settings):
+    """A forecast of the current for who plans the route: a file, or the truth with an error."""
+
+    file: str = Field(
+        '',
+        max_length=4000,
+        description='NetCDF file, relative to this one; without: the current of the scenario',
+    )
+    error_mps: float = Field(
+        0.0,
+        ge=0.0,
+        le=1.0,
+        description='rms of a random error of each part of the depth-averaged current (m/s)',
+    )
+    error_km: float = Field(
+        40.0, ge=5.0, le=1000.0, description='correlation length of the error (km)'
+    )
+    late_h: float = Field(
+        0.0, ge=0.0, le=240.0, description='by what its water comes too late: its age (h)'
+    )
+
+    _found = pydantic.field_validator('file')(beside)
 
 
 class Scenario(Settings):
@@ -157,17 +181,13 @@ class Scenario(Settings):
     @pydantic.field_validator('orders', mode='before')
     @classmethod
     def _orders_in_metres(cls, orders: Any, info: pydantic.ValidationInfo) -> Any:
+        if not isinstance(orders, list):
+            return orders
         origin = info.data.get('origin', OriginSettings())
-        return (
-            [
-                {**one, 'path': in_metres(one.get('path'), origin)}
-                if isinstance(one, dict)
-                else one
-                for one in orders
-            ]
-            if isinstance(orders, list)
-            else orders
-        )
+        return [
+            {**one, 'path': in_metres(one.get('path'), origin)} if isinstance(one, dict) else one
+            for one in orders
+        ]
 
     @pydantic.field_validator('current')
     @classmethod
@@ -270,14 +290,12 @@ class Scenario(Settings):
         current = self.current_settings()
         if current.speed_mps is None:
             return 0.0, 0.0
-        direction = math.radians(current.direction_deg)
-        return (
-            current.speed_mps * math.cos(direction),
-            current.speed_mps * math.sin(direction),
-        )
+        speed, direction = current.speed_mps, math.radians(current.direction_deg)
+        return speed * math.cos(direction), speed * math.sin(direction)
 
     def navigation_settings(self) -> NavigationSettings:
         """What the navigation node is told."""
+        forecast = self.resolved_current(self.navigation.forecast)
         return NavigationSettings(
             vehicle=self.vehicle,
             origin=self.origin,
@@ -286,10 +304,7 @@ class Scenario(Settings):
             imu_period_s=self.sensors.imu_period_s,
             gyro=self.sensors.gyro,
             also_fitted=self.sensors.also_fitted,
-            **{
-                **dict(self.navigation),
-                'forecast': self.resolved_current(self.navigation.forecast),
-            },
+            **{**dict(self.navigation), 'forecast': forecast},
         )
 
     def guidance_settings(self) -> GuidanceSettings:
@@ -382,12 +397,7 @@ class Scenario(Settings):
         """The scenario as a file that loads to the same scenario.
 
         It can be loaded where nobody has the laws and methods of others that do not fly in it, if
-        it says nothing of them.
-
-        Parameters
-        ----------
-        vehicle : str
-            What the file calls the vehicle, if something else than the scenario does.
+        it says nothing of them. It may call the ``vehicle`` something else than the scenario does.
         """
         left_out = {
             **({} if self.changed else {'changed': True}),
@@ -438,13 +448,7 @@ def scenario_names() -> list[str]:
 
 
 def scenario_path(name: str) -> Path:
-    """File of a scenario given by name or by path.
-
-    Raises
-    ------
-    ConfigurationError
-        If there is neither a scenario of that name nor such a file.
-    """
+    """File of a scenario given by name or by path; errors as `find_file`."""
     return find_file('scenario', name, SCENARIO_FOLDER)
 
 
@@ -458,10 +462,7 @@ class ScenarioSource(NamedTuple):
 def read_scenario(name: str = DEFAULT_SCENARIO) -> ScenarioSource:
     """Read the file of a scenario given by name or by path; `make_scenario` validates it.
 
-    Raises
-    ------
-    ConfigurationError
-        If there is no such file, or it is not a YAML mapping.
+    Errors are those of `scenario_path` and `read_yaml`.
     """
     path = scenario_path(name)
     values = read_yaml(path)
@@ -539,8 +540,8 @@ def _check_glide(scenario: Scenario) -> None:
 
 def _with_known_fields(scenario: Scenario) -> Scenario:
     """Scenario that says which files its currents are from, once they were read."""
-    currents = {'current': scenario.current, 'navigation.forecast': scenario.navigation.forecast}
-    for name, current in currents.items():
+    told = {'current': scenario.current, 'navigation.forecast': scenario.navigation.forecast}
+    for name, current in told.items():
         if current.field is None:
             continue
         try:
@@ -548,10 +549,7 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
             scenario.resolved_current(current).field.params()
         except ValueError as error:
             raise ConfigurationError(f'{name}.field.{error}') from None
-        currents[name] = current.model_copy(update={'field': field})
-    navigation = scenario.navigation.model_copy(
-        update={'forecast': currents['navigation.forecast']}
-    )
+        told[name] = current.model_copy(update={'field': field})
     bathymetry = scenario.bathymetry
     if bathymetry.file:
         try:
@@ -559,11 +557,9 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
             scenario.bottom()
         except ValueError as error:
             raise ConfigurationError(f'bathymetry.{error}') from None
-    changed = {
-        'current': currents['current'],
-        'navigation': navigation,
-        'bathymetry': bathymetry,
-    }
+    forecast = {'forecast': told['navigation.forecast']}
+    navigation = scenario.navigation.model_copy(update=forecast)
+    changed = {'current': told['current'], 'navigation': navigation, 'bathymetry': bathymetry}
     return scenario.model_copy(update=changed)
 
 

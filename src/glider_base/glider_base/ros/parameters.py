@@ -84,10 +84,6 @@ class _Leaf(NamedTuple):
         return (found.get('g', -largest), found.get('l', largest)) if found else None
 
 
-def _is_model(kind) -> bool:
-    return isinstance(kind, type) and issubclass(kind, pydantic.BaseModel)
-
-
 def _leaves(model: type[Settings], default: Settings | None, prefix: str = '') -> Iterator[_Leaf]:
     for name, field in model.model_fields.items():
         if default is not None:
@@ -95,8 +91,9 @@ def _leaves(model: type[Settings], default: Settings | None, prefix: str = '') -
         else:
             value = field.get_default(call_default_factory=True)
             value = None if field.is_required() else value
-        if _is_model(field.annotation):
-            yield from _leaves(field.annotation, value, f'{prefix}{name}.')
+        kind = field.annotation
+        if isinstance(kind, type) and issubclass(kind, pydantic.BaseModel):
+            yield from _leaves(kind, value, f'{prefix}{name}.')
         else:
             yield _Leaf(prefix + name, field, value)
 
@@ -194,13 +191,8 @@ def declare_settings(
 ) -> SettingsT:
     """Declare the parameters of ``model`` on ``node`` and return the values they were given.
 
-    Parameters
-    ----------
-    node : Node
-    model : type of Settings
-    on_change : callable, optional
-        Called with the new settings after a tunable parameter was set at run time. A set that the
-        model refuses as a whole is rejected and changes nothing.
+    ``on_change`` is called with the new settings after a tunable parameter was set at run time. A
+    set that the model refuses as a whole is rejected and changes nothing.
 
     Raises
     ------
@@ -237,13 +229,7 @@ def declare_settings(
 
 
 def refuse_unknown(node: Node) -> None:
-    """Refuse parameters that a node was given and has not declared; ROS would not say a word.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming them, and those that the node has.
-    """
+    """Refuse parameters that a node was given and has not declared; ROS would not say a word."""
     # rclpy has no public name for what the command line and parameter files give to a node
     given = sorted(node._parameter_overrides)
     reason = unknown_parameters(node, [x for x in given if not x.startswith('qos_overrides.')])
@@ -281,13 +267,7 @@ def changed_parameters(before: Settings, after: Settings) -> dict[str, str]:
 
 
 def with_parameters(settings: SettingsT, values: dict[str, str]) -> SettingsT:
-    """Settings with some parameters changed, given as JSON by dotted name.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming the parameter, its value and what is allowed.
-    """
+    """Settings with some parameters changed, as JSON by dotted name; errors as `validate`."""
     kept = {leaf.name: leaf.default for leaf in _leaves(type(settings), settings)}
     try:
         given = {name: json.loads(text) for name, text in values.items()}
@@ -297,12 +277,9 @@ def with_parameters(settings: SettingsT, values: dict[str, str]) -> SettingsT:
 
 
 def from_parameters(model: type[SettingsT], values: dict[str, Any], source: str) -> SettingsT:
-    """Settings from nested parameters as of `to_parameters`; parameters of others are left out.
+    """Settings from nested parameters as of `to_parameters`, without those of others.
 
-    Raises
-    ------
-    ConfigurationError
-        Naming ``source``, the parameter, its value and what is allowed.
+    Errors are those of `validate`.
     """
     tree = {}
     for leaf in _leaves(model, None):
@@ -326,12 +303,7 @@ _ParameterDumper.add_representer(
 def parameters_yaml(nodes: dict[str, dict[str, Any]], namespace: str = '/glider') -> str:
     """Text of a parameter file for ``--params-file``.
 
-    Parameters
-    ----------
-    nodes : dict
-        Nested parameters (as of `to_parameters`) by node name.
-    namespace : str
-        Namespace the nodes run in.
+    Of nested parameters, as of `to_parameters`, by the names of nodes in a namespace.
     """
     prefix = '/' + namespace.strip('/') + '/' if namespace.strip('/') else '/'
     tree = {f'{prefix}{name}': {'ros__parameters': values} for name, values in nodes.items()}

@@ -33,13 +33,7 @@ def absolute_namespace(text: str) -> str | None:
 
 
 def given_domain() -> int | None:
-    """ROS domain that $ROS_DOMAIN_ID says; None if it says nothing.
-
-    Raises
-    ------
-    ConfigurationError
-        If it is none.
-    """
+    """ROS domain that $ROS_DOMAIN_ID says; None if it says nothing, an error if it is none."""
     text = os.environ.get('ROS_DOMAIN_ID')
     if not text:
         return None

@@ -21,9 +21,8 @@ from glider_base.ros.hearing.inputs import Input
 from glider_base.ros.lockstep import health, peers
 from glider_base.ros.lockstep.executor import take, take_with_info
 from glider_base.ros.lockstep.node import TickNode
+from glider_base.ros.lockstep.peers import FAREWELL_S
 from glider_base.ros.lockstep.process import Stop, run
-from glider_base.ros.lockstep.pulse import Condition
-from glider_base.ros.lockstep.watch import FAREWELL_S
 from glider_base.ros.parameters import declare_settings
 from glider_base.ros.wire import qos, topics
 from glider_base.ros.wire.codec import MessageError, to_cdr
@@ -123,9 +122,9 @@ class RecorderNode(TickNode):
     def tell_successor(self, item: Input, silent_s: float) -> None:
         """Nothing: those who need the topic tell."""
 
-    def condition(self) -> Condition:
+    def condition(self) -> health.Condition:
         """How this node is."""
-        return Condition(health.OK, 'recording')
+        return health.Condition(health.OK, 'recording')
 
     def on_signal(self, number, frame) -> None:
         """Remember to stop; `drain` does it, with everything that is under way."""

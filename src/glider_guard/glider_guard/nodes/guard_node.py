@@ -8,7 +8,6 @@ from std_srvs.srv import Trigger
 
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
-from glider_base.ros.lockstep.orders import SURFACE
 from glider_base.ros.lockstep.process import run
 from glider_base.signals import TICK_S, Joints
 from glider_guard.ascent import INITIAL_ASCENT, come_up
@@ -72,7 +71,7 @@ class GuardNode(BlockNode):
         """Command what surfaces the vehicle, after a while for good."""
         before, self.stale_ticks = self.stale_ticks, self.stale_ticks + cycles
         if before < round(self.settings.lost_after_s / TICK_S) <= self.stale_ticks:
-            self.surface(SURFACE)
+            self.surface(health.SURFACE)
             said = f'input lost for {self.settings.lost_after_s:g} s: surfacing for good'
             self.event(stamp_ns, health.ERROR, said)
         publish_command = self.senders[0]

@@ -12,7 +12,6 @@ from std_srvs.srv import Trigger
 from glider_base.frames import water_to_wire
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
-from glider_base.ros.lockstep.orders import ABORT
 from glider_base.ros.lockstep.process import run
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS, Water
@@ -59,7 +58,7 @@ class GuidanceNode(BlockNode):
         """Do what an order says."""
         if order.abort:
             self.waiting.clear()
-            self.surface(ABORT)
+            self.surface(health.ABORT)
             return
         values = {
             name: value if isinstance(value, float | bool) else value.model_dump_json()
@@ -77,7 +76,7 @@ class GuidanceNode(BlockNode):
 
     def on_abort(self, request, response):
         """Serve ``abort``."""
-        self.surface(ABORT)
+        self.surface(health.ABORT)
         response.success = True
         response.message = 'surfacing'
         return response

@@ -22,21 +22,24 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema
 from mcap.summary import Summary
+from numpy.lib.stride_tricks import sliding_window_view
 
 from glider_base.settings import ConfigurationError
 from glider_mission.recording.bag_files import bag_files
 from glider_mission.recording.mcap_records import (
     CHUNK_TIMES,
+    DEFINITIONS,
     HEAD,
     MAGIC,
     UNREADABLE,
+    Places,
+    find_defined,
     parse,
     read_summary,
     span,
     unpack,
     whole_records,
 )
-from glider_mission.recording.mcap_scan import Places, find, gather
 
 _DATA_END = HEAD.pack(Opcode.DATA_END, 4)
 _LOG_TIME_AT = 6  # in a message record: channel (2), sequence (4), log time (8), publish time (8)
@@ -47,9 +50,6 @@ class BagTopic(NamedTuple):
 
     name: str
     type_name: str  #: such as nav_msgs/msg/Odometry
-    encoding: str  #: of the messages, 'cdr' in ROS 2
-    schema_encoding: str  #: 'ros2msg' or 'ros2idl'
-    schema: bytes  #: definition of the type
     qos: str  #: offered profiles as YAML, '' if not recorded
 
 
@@ -69,9 +69,8 @@ class Batch(NamedTuple):
 
     def rows(self, chosen: np.ndarray) -> np.ndarray:
         """Payloads of equal size, uint8[n, size], of the messages with these indices."""
-        rows = np.empty((len(chosen), int(self.size[chosen[0]])), np.uint8)
-        gather(self.data, self.start[chosen], rows)
-        return rows
+        windows = sliding_window_view(self.data, int(self.size[chosen[0]]))
+        return windows[self.start[chosen]]
 
 
 class _Part(NamedTuple):
@@ -143,7 +142,7 @@ class _File:
         self.channels |= {i: one for i, one in summary.channels.items() if i not in self.channels}
 
     def _take(self, opcode: int, at: int, data: bytes) -> None:
-        """Note a record, in a chunk or in none."""
+        """Note a record that is in no chunk."""
         if opcode == Opcode.CHUNK:
             start_ns, end_ns, unpacked = struct.unpack_from('<QQQ', data)
             self._chunks[at] = start_ns, end_ns
@@ -152,18 +151,21 @@ class _File:
                 self.parts.append(_Part(self._number, *place, start_ns, end_ns))
         elif opcode == Opcode.MESSAGE:
             self._take_loose(at, data)
-        elif opcode == Opcode.SCHEMA:
-            schema = parse(Schema, data)
-            self.schemas[schema.id] = schema
-        elif opcode == Opcode.CHANNEL:
-            channel = parse(Channel, data)
-            self.channels.setdefault(channel.id, channel)
+        elif opcode in DEFINITIONS:
+            self._define(parse(DEFINITIONS[opcode], data))
         elif opcode == Opcode.ATTACHMENT:
             one, told = parse(Attachment, data), int.from_bytes(data[-4:], 'little')
             if told and zlib.crc32(memoryview(data)[:-4]) != told:
                 raise self._harmed(f'the checksum (CRC) of the attachment {one.name!r} is wrong')
             self.attachments.setdefault(one.name, one.data)
             self._attached.add(at)
+
+    def _define(self, record: Schema | Channel) -> None:
+        """Note a type or a topic."""
+        if isinstance(record, Channel):
+            self.channels.setdefault(record.id, record)
+        else:
+            self.schemas[record.id] = record
 
     def _take_loose(self, at: int, data: bytes) -> None:
         """Note a message that is in no chunk, together with those before it."""
@@ -221,16 +223,8 @@ class _File:
             stream.seek(part.start)
             content = stream.read(part.length)
         try:
-            data = np.frombuffer(unpack(content) if part.number else content, np.uint8)
-            found = find(data)
-            for at in found.others:
-                opcode, length = HEAD.unpack_from(data, at)
-                if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                    body = int(at) + HEAD.size
-                    self._take(opcode, int(at), data[body : body + length].tobytes())
-            strange = set(np.unique(found.channel).tolist()).difference(self.channels)
-            if strange:
-                raise ValueError(f'messages of channel {min(strange)}, which is not defined')
+            content = unpack(content) if part.number else content
+            found = find_defined(content, self._define, self.channels)
             if len(found.channel):
                 times = int(found.log_ns.min()), int(found.log_ns.max())
                 if times != (part.start_ns, part.end_ns):
@@ -239,7 +233,7 @@ class _File:
             place = f'bytes {part.start - HEAD.size:,} to {part.start + part.length:,}'
             what = f'{error} ({place}, {span(part.start_ns, part.end_ns)})'
             raise self._harmed(what, f'chunk {part.number} is ') from None
-        return data, found
+        return np.frombuffer(content, np.uint8), found
 
     def _harmed(self, what: str, which: str = '') -> ConfigurationError:
         return ConfigurationError(f'{self.path}: {which}damaged: {what}')
@@ -277,7 +271,9 @@ class Bag:
             self.attachments = file.attachments | self.attachments
             self.cut = file.cut or self.cut
             for channel in file.channels.values():
-                topic = _topic(channel, file.schemas.get(channel.schema_id))
+                schema = file.schemas.get(channel.schema_id)
+                qos = channel.metadata.get('offered_qos_profiles', '')
+                topic = BagTopic(channel.topic, schema.name if schema else '', qos)
                 known = topics.setdefault(topic.name, topic)
                 if known.type_name != topic.type_name:
                     raise ConfigurationError(
@@ -335,14 +331,3 @@ class Bag:
         for number in np.unique(found.channel):
             topic[found.channel == number] = self._index[file.channels[int(number)].topic]
         return Batch(data, topic, found.log_ns, found.start, found.size)
-
-
-def _topic(channel: Channel, schema: Schema | None) -> BagTopic:
-    return BagTopic(
-        name=channel.topic,
-        type_name=schema.name if schema else '',
-        encoding=channel.message_encoding,
-        schema_encoding=schema.encoding if schema else '',
-        schema=schema.data if schema else b'',
-        qos=channel.metadata.get('offered_qos_profiles', ''),
-    )

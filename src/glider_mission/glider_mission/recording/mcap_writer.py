@@ -37,8 +37,7 @@ from mcap.records import (
 from mcap.summary import Summary
 
 from glider_mission.disk import not_written, refuse_vanished
-from glider_mission.recording.mcap_records import MAGIC
-from glider_mission.recording.mcap_scan import find
+from glider_mission.recording.mcap_records import MAGIC, find
 
 _MESSAGE = struct.Struct('<BQHIQQ')
 _LIBRARY = 'glider_bringup'
@@ -59,6 +58,7 @@ class McapWriter:
         self._handed, self._checksum = 0, 0  #: length of what was, and its CRC
         self._compressor = zstandard.ZstdCompressor(level=3)
         self._summary = Summary()
+        self.channels = self._summary.channels  #: that are defined, by their ids
         self._counts: Counter[int] = Counter()  #: of messages in chunks that are finished
         self._chunk = bytearray()
         self._put(Header(profile, _LIBRARY))
@@ -86,12 +86,11 @@ class McapWriter:
             raise not_written(self._path, error) from None
 
     def define(self, record: Schema | Channel) -> None:
-        """Define a message type or a topic."""
-        if isinstance(record, Channel):
-            self._summary.channels[record.id] = record
-        else:
-            self._summary.schemas[record.id] = record
-        self._put(record)
+        """Define a message type or a topic; one that comes again is not needed."""
+        known = self.channels if isinstance(record, Channel) else self._summary.schemas
+        if record.id not in known:
+            known[record.id] = record
+            self._put(record)
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
         """Store a file beside the messages."""
@@ -123,13 +122,7 @@ class McapWriter:
     ) -> None:
         """Add n messages to each of several channels, interleaved by stamp.
 
-        Parameters
-        ----------
-        channel_ids : sequence of int
-        stamps_ns : int64[n]
-            Ascending stamps, common to all channels.
-        payloads : sequence of uint8[n, size]
-            One array per channel.
+        The ascending stamps int64[n] are common to all; payloads are uint8[n, size] per channel.
         """
         count = len(stamps_ns)
         if not count:
@@ -150,10 +143,14 @@ class McapWriter:
             column = end + size
         self._chunk += rows.data
 
-    def write_chunk(self, content: bytes) -> None:
-        """Add the records of a chunk as they are, not compressed, and finish it."""
+    def add(self, content: bytes) -> None:
+        """Add records that are a chunk, or a part of one, as they are."""
         self._chunk += content
-        self.flush()
+
+    @property
+    def waiting(self) -> int:
+        """Bytes of the chunk at hand."""
+        return len(self._chunk)
 
     # ------------------------------------------------------------------ chunks
 
@@ -176,7 +173,7 @@ class McapWriter:
 
     def _end_chunk(self) -> None:
         content, self._chunk = self._chunk, bytearray()
-        found = find(np.frombuffer(bytes(content), np.uint8))
+        found = find(bytes(content))
         start_ns, end_ns = int(found.log_ns.min()), int(found.log_ns.max())
         data = self._compressor.compress(content)
         chunk = Chunk(
@@ -246,7 +243,7 @@ class McapWriter:
     def summary(self) -> Summary:
         """What is in the file; messages are counted that wait for their chunk, too."""
         summary = self._summary
-        waiting = find(np.frombuffer(bytes(self._chunk), np.uint8)).channel.tolist()
+        waiting = find(bytes(self._chunk)).channel.tolist()
         counts = self._counts + Counter(waiting)
         starts_ns = [index.message_start_time for index in summary.chunk_indexes]
         ends_ns = [index.message_end_time for index in summary.chunk_indexes]

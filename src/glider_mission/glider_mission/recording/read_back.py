@@ -29,10 +29,7 @@ def read_back(
 ) -> RecordedLog:
     """Give the rows of a bag of a vehicle to takers; ``progress`` gets the ticks read.
 
-    Raises
-    ------
-    ConfigurationError
-        If the bag is damaged.
+    A `ConfigurationError` says where the bag is damaged.
     """
     takers = tuple(takers)
     also = {topic for taker in takers for topic in taker.topics}

@@ -40,15 +40,7 @@ def _move(state, params, inputs, table, dt):
 
 
 class RecordedBlock:
-    """A block between two ticks.
-
-    Attributes
-    ----------
-    block : Block
-    settings : Settings
-    state : NamedTuple
-        May be kept and put back.
-    """
+    """A block between two ticks; its ``state`` may be kept and put back."""
 
     def __init__(self, block: Block, settings: Settings) -> None:
         self.block = block
@@ -81,19 +73,9 @@ class RecordedBlock:
     def run(
         self, stamps_ns: np.ndarray, inputs: dict[str, np.ndarray]
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        """Work through some ticks.
+        """Outputs float64[n, m] by topic, and flags int64[n, k], of the ticks at stamps int64[n].
 
-        Parameters
-        ----------
-        stamps_ns : int64[n]
-        inputs : dict of float64[n, m]
-            Numbers by topic; of the plant's, the last row may lack.
-
-        Returns
-        -------
-        outputs : dict of float64[n, m]
-            Numbers by topic.
-        flags : int64[n, k]
+        Inputs are float64[n, m] by topic; of the plant's, the last row may lack.
         """
         wired = self.block.wired
         widths = {name: len(FIELDS[name]) for name in wired.outputs}

@@ -12,35 +12,35 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, NamedTuple
 
-import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Header, Metadata, Schema
+from mcap.records import Attachment, Header, Metadata
 from mcap.summary import Summary
 
 from glider_base.settings import ConfigurationError
 from glider_mission.disk import not_written
-from glider_mission.recording.bag_files import bag_files
+from glider_mission.recording.bag_files import (
+    METADATA_FILE,
+    ROSBAG2,
+    bag_files,
+    metadata_text,
+    topic_counts,
+    write_metadata,
+)
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.mcap_records import (
     CHUNK_TIMES,
+    DEFINITIONS,
     HEAD,
     MAGIC,
     UNREADABLE,
+    find_defined,
     parse,
     read_summary,
     span,
     unpack,
     whole_records,
 )
-from glider_mission.recording.mcap_scan import find
 from glider_mission.recording.mcap_writer import McapWriter
-from glider_mission.recording.metadata import (
-    METADATA_FILE,
-    ROSBAG2,
-    metadata_text,
-    topic_counts,
-    write_metadata,
-)
 
 #: Messages that are in no chunk are put into chunks of about this size (B).
 _LOOSE_BYTES = 1 << 20
@@ -61,13 +61,7 @@ class Recovered(NamedTuple):
 
 
 def recover(path: Path, progress: Progress = lambda done, total: None) -> Recovered:
-    """Make a bag whole. What is whole is left as it is.
-
-    Parameters
-    ----------
-    path : Path
-        Folder of a run or a bag, or a single MCAP file.
-    progress : callable, optional
+    """Make a run, a bag or a single MCAP file whole. What is whole is left as it is.
 
     Raises
     ------
@@ -149,8 +143,6 @@ class _Rebuilt:
     def __init__(self, file: Path, draft: Path) -> None:
         self._file, self._draft = file, draft
         self._writer: McapWriter | None = None
-        self._loose = bytearray()  #: messages that are in no chunk
-        self._known: set[tuple[type, int]] = set()  #: definitions, by their kinds and ids
         self._end = len(MAGIC)  #: of what was taken, in the old file
         self._dropped: list[tuple[int, str]] = []  #: size, and what it is
 
@@ -160,15 +152,17 @@ class _Rebuilt:
             raise self._damaged(at, 'no header')
         try:
             self._take(opcode, at, data)
-        except UNREADABLE as error:
+        except ConfigurationError:
+            raise
+        except (ValueError, *UNREADABLE) as error:
             raise self._damaged(at, str(error)) from None
         self._end = at + HEAD.size + len(data)
 
     def _take(self, opcode: int, at: int, data: bytes) -> None:
         if opcode == Opcode.HEADER:
             self._writer = McapWriter(self._draft, parse(Header, data).profile)
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            self._define(opcode, data)
+        elif opcode in DEFINITIONS:
+            self._writer.define(parse(DEFINITIONS[opcode], data))
         elif opcode == Opcode.ATTACHMENT:
             one = parse(Attachment, data)
             self._writer.add_attachment(one.name, one.media_type, one.data)
@@ -177,47 +171,29 @@ class _Rebuilt:
             if one.name != ROSBAG2:
                 self._writer.add_metadata(one.name, one.metadata)
         elif opcode == Opcode.MESSAGE:
-            self._loose += HEAD.pack(opcode, len(data)) + data
-            if len(self._loose) > _LOOSE_BYTES:
-                self._write_loose()
+            self._write(HEAD.pack(opcode, len(data)) + data)
+            if self._writer.waiting > _LOOSE_BYTES:
+                self._writer.flush()
         elif opcode == Opcode.CHUNK:
-            self._write_loose()
+            self._writer.flush()
             try:
                 self._write(unpack(data))
             except ValueError as error:
                 times = span(*CHUNK_TIMES.unpack_from(data))
                 what = f'the chunk ({times}) at byte {at:,}: {error}'
                 self._dropped.append((len(data), what))
-
-    def _define(self, opcode: int, data: bytes) -> None:
-        """Take a definition; those that come again are not needed."""
-        record = parse(Schema if opcode == Opcode.SCHEMA else Channel, data)
-        if (type(record), record.id) not in self._known:
-            self._known.add((type(record), record.id))
-            self._writer.define(record)
-
-    def _write_loose(self) -> None:
-        content, self._loose = bytes(self._loose), bytearray()
-        self._write(content)
+            self._writer.flush()
 
     def _write(self, content: bytes) -> None:
         """Write the records of a chunk; raise ValueError if they are none."""
-        found = find(np.frombuffer(content, np.uint8))
-        for at in map(int, found.others):
-            opcode, length = HEAD.unpack_from(content, at)
-            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._define(opcode, content[at + HEAD.size : at + HEAD.size + length])
-        strange = {one for one in found.channel.tolist() if (Channel, one) not in self._known}
-        if strange:
-            raise ValueError(f'messages of channel {min(strange)}, which is not defined')
+        found = find_defined(content, self._writer.define, self._writer.channels)
         if len(found.channel):
-            self._writer.write_chunk(content)
+            self._writer.add(content)
 
     def close(self, stream: IO[bytes]) -> list[tuple[int, str]]:
         """Complete the new file, on disk; sizes of what was dropped, and what it is."""
         if self._writer is None:
             raise self._damaged(len(MAGIC), 'nothing is left of it')
-        self._write_loose()
         self._drop_rest(stream)
         text = metadata_text({self._file.name: self._writer.summary()})
         self._writer.add_metadata(ROSBAG2, {'serialized_metadata': text})

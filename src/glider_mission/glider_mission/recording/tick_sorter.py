@@ -11,15 +11,8 @@ class TickSorter:
     """Holds messages back until their tick is complete, then hands them on in a fixed order.
 
     Two recordings of one run thereby have the same bytes, whatever the order of arrival was.
-
-    Parameters
-    ----------
-    topics : iterable of str
-        Per-tick topics, in the order in which a tick is written.
-    period_ns : int
-        Length of a tick.
-    write : callable
-        Called with (topic, stamp_ns, payload).
+    Topics are the per-tick ones in the order in which a tick is written, by calls of ``write``
+    with (topic, stamp_ns, payload).
     """
 
     def __init__(
@@ -58,19 +51,10 @@ class TickSorter:
         self._events.append((max(0, stamp_ns), topic, payload))
 
     def write_complete(self, end_tick: Callable[[int], bool], until_ns: float = math.inf) -> bool:
-        """Hand on every tick that is complete, with its events.
+        """Hand on every tick that is complete, with its events; whether anything went to disk.
 
-        Parameters
-        ----------
-        end_tick : callable
-            Called with the stamp after each tick; says whether it is on disk.
-        until_ns : float
-            Newest tick of which no event is under way any more.
-
-        Returns
-        -------
-        bool
-            Whether anything went to disk.
+        ``end_tick`` is called with the stamp after each, and says whether it is on disk. After
+        ``until_ns`` events may be under way.
         """
         on_disk = False
         while all(self._queues.values()) and self._next_ns() <= until_ns:
@@ -96,12 +80,8 @@ class TickSorter:
         if self._events:
             self._write_events(stamp_ns)
 
-    def _write_events(self, until_ns: int | None = None) -> None:
-        later = []
-        for event in sorted(self._events):
-            stamp_ns, topic, payload = event
-            if until_ns is None or stamp_ns <= until_ns:
+    def _write_events(self, until_ns: float = math.inf) -> None:
+        for stamp_ns, topic, payload in sorted(self._events):
+            if stamp_ns <= until_ns:
                 self._write(topic, stamp_ns, payload)
-            else:
-                later.append(event)
-        self._events = later
+        self._events = [event for event in self._events if event[0] > until_ns]

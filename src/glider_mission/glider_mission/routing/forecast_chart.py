@@ -92,17 +92,9 @@ def forecast_of(scenario: Scenario) -> tuple[Chart, np.ndarray]:
 
 
 def erroneous(chart: Chart, error_mps: float, error_km: float, seed: int, member: int) -> Chart:
-    """A chart with a random error of its own: eddies that are not there.
+    """A chart with a random error of its own, by seed and member: eddies that are not there.
 
-    Parameters
-    ----------
-    chart : Chart
-    error_mps : float
-        Its rms, of each part (m/s).
-    error_km : float
-        Its correlation length (km).
-    seed, member : int
-        Which error.
+    It has an rms of each part of ``error_mps``, and a correlation length of ``error_km``.
     """
     from scipy.ndimage import gaussian_filter
 

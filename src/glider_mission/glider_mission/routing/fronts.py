@@ -91,14 +91,13 @@ def line_arrival(chart, t_s, north, east, to_n, to_e, speed):
     part = length / pieces
     for k in range(pieces):
         n, e = north + (k + 0.5) * part * c_n, east + (k + 0.5) * part * c_e
-        v_n, v_e = current_on(chart, t_s, n, e)
-        rate = made_good(v_n, v_e, c_n, c_e, speed)
-        if rate < _SLOWEST:
-            return math.inf
-        v_n, v_e = current_on(chart, t_s + 0.5 * part / rate, n, e)
-        rate = made_good(v_n, v_e, c_n, c_e, speed)
-        if rate < _SLOWEST:
-            return math.inf
+        at_s = t_s
+        for _ in range(2):
+            v_n, v_e = current_on(chart, at_s, n, e)
+            rate = made_good(v_n, v_e, c_n, c_e, speed)
+            if rate < _SLOWEST:
+                return math.inf
+            at_s = t_s + 0.5 * part / rate
         t_s += part / rate
     return t_s
 

@@ -38,17 +38,7 @@ _ODOM, _BELIEVED, _STAGE = COLUMNS['odom'].start, COLUMNS['believed_current'], C
 
 
 class Pilot:
-    """Gives the orders of a mission whose route is planned.
-
-    Parameters
-    ----------
-    scenario : Scenario
-
-    Raises
-    ------
-    ConfigurationError
-        If its forecast cannot be read, or does not cover the mission.
-    """
+    """Gives the orders of a mission whose route is planned; errors as `forecast_of`."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario, self._speed = scenario, pace_of(scenario).speed
@@ -63,14 +53,9 @@ class Pilot:
         self.orders: list[Order] = []  #: that it gave
 
     def order(self, tick: int, row: np.ndarray | None) -> Order | None:
-        """What the vehicle is told at a tick, if anything.
+        """What the vehicle is told at a tick, a multiple of `LOOK_TICKS`, if anything.
 
-        Parameters
-        ----------
-        tick : int
-            A multiple of `LOOK_TICKS`.
-        row : float64[ROW] or None
-            Log row of the tick before; None: it begins.
+        The row float64[ROW] is that of the tick before in the log; None: it begins.
         """
         t_s = round(tick * TICK_S, 1)
         if row is None:

@@ -150,20 +150,10 @@ def _cycle_wh(
 def route_through(
     chart: Chart, waypoints: np.ndarray, t_s: float, speed: float, end_s: float
 ) -> Route:
-    """Fastest way from the first of some places to the others, one after the other.
+    """Fastest way from the first of some places, float64[n, 2] (m), to one after the other.
 
-    Parameters
-    ----------
-    chart : Chart
-    waypoints : float64[n, 2]
-        North and east (m); the first is where it starts.
-    t_s, speed, end_s : float
-        Start (s), speed through the water (m/s), and the end of the time (s).
-
-    Returns
-    -------
-    Route
-        Straight on from where it does not get on any more.
+    At a speed through the water (m/s), from a start to the end of the time (s); straight on from
+    where it does not get on any more.
     """
     corners, passed, found = [waypoints[0]], [], []
     columns = len(chart.easts)
@@ -215,18 +205,9 @@ def waypoints_of(scenario: Scenario) -> np.ndarray:
 
 
 def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None) -> Plan:
-    """Plan a mission by its forecast.
+    """Plan a mission by its forecast; errors as `forecast_of`.
 
-    Parameters
-    ----------
-    scenario : Scenario
-    progress : callable, optional
-        Called with how many of `MEMBERS` + 1 steps are done.
-
-    Raises
-    ------
-    ConfigurationError
-        If its forecast cannot be read.
+    ``progress`` gets how many of `MEMBERS` + 1 steps are done.
     """
     chart, land = forecast_of(scenario)
     pace, end_s = pace_of(scenario), scenario.duration_s

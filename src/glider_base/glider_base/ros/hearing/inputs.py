@@ -34,13 +34,7 @@ class Input:
         self.used_ns = -1
 
     def accept(self, raw: bytes) -> None:
-        """Keep a message.
-
-        Raises
-        ------
-        MessageError
-            Naming topic and publisher, if it cannot be used.
-        """
+        """Keep a message; a `MessageError` names topic and publisher if it cannot be used."""
         try:
             stamp_ns, values = self.topic.codec.decode(raw, check_frames=True)
             if self.topic.name == 'imu' and abs(math.hypot(*values[:4]) - 1.0) > NOT_UNIT:
@@ -54,12 +48,7 @@ class Input:
         """Keep a message in free-running mode, unless it was overtaken on its way.
 
         A stamp that stands still does not refresh the input. One that is older than any input may
-        be means that the clock of the vehicle has been set back.
-
-        Raises
-        ------
-        MessageError
-            As `accept`, or if the message has no stamp.
+        be means that the clock of the vehicle has been set back. Errors are those of `accept`.
         """
         before = self.stamp_ns
         since_ns = self.topic.codec.decode_stamp(raw) - before

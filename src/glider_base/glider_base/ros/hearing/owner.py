@@ -32,15 +32,7 @@ class Verdict(Enum):
 
 
 class Owner:
-    """Whose a topic is.
-
-    Parameters
-    ----------
-    topic : Topic
-    lockstep : bool
-    stand_in : str
-        Node that may be in the place of the publisher.
-    """
+    """Whose a topic is; a node ``stand_in`` may be in the place of its publisher."""
 
     def __init__(self, topic: Topic, lockstep: bool, stand_in: str = '') -> None:
         self._lockstep = lockstep
@@ -75,18 +67,10 @@ class Owner:
         now_s: float,
         patience_s: float,
     ) -> Verdict:
-        """Look who somebody is that is not the owner.
+        """Look who somebody is that is not the owner, which may be silent for ``patience_s``.
 
-        Parameters
-        ----------
-        gid : bytes
-        names : mapping
-            Full names of the nodes that publish the topic, by gid; empty if not known yet.
-        namespace : str
-            Of the node that has the message.
-        now_s : float
-        patience_s : float
-            For so long (s) an owner may be silent.
+        ``names`` are the full names of the nodes that publish the topic, by gid; empty if not
+        known yet. The ``namespace`` is that of the node that has the message.
         """
         if self.is_strange(gid):
             return Verdict.STRANGE
@@ -123,10 +107,7 @@ class Owner:
     def follow(self, before: bytes, now: bytes) -> None:
         """Be that of the next of the owner's name, if the owner was of a process that is gone.
 
-        Parameters
-        ----------
-        before, now : bytes
-            Owners of another topic, which has been taken over.
+        Another topic was owned by ``before``, and has been taken over.
         """
         was = gids.are_of_one_process(self.gid, before)
         if was and not gids.are_of_one_process(before, now):

@@ -19,24 +19,9 @@ _STREAM_OFFSET = 2**34
 #: in lockstep the next one waits for it.
 _NO_NEXT_S = 0.05
 
-Send = Callable[[int, bytes], None]
-
 
 class BadLine:
-    """What goes wrong with the messages of one topic.
-
-    Parameters
-    ----------
-    node : Node
-        That publishes it.
-    topic : Topic
-    faults : sequence of MessageFault
-        Those of this topic, at least one.
-    seed : int
-        By which messages are struck.
-    publish : callable
-        Publishes the bytes of a message.
-    """
+    """What goes wrong with the messages of one topic of a node; a seed says which are struck."""
 
     def __init__(
         self,

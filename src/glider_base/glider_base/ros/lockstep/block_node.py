@@ -5,8 +5,6 @@
 from glider_base.block import Block, Telling, optional_topics
 from glider_base.kernel import compiling_told
 from glider_base.ros.lockstep import health
-from glider_base.ros.lockstep.orders import CLEAR, PARAMETERS_SET, Orders
-from glider_base.ros.lockstep.pulse import Condition
 from glider_base.ros.lockstep.step_node import StepNode
 from glider_base.ros.parameters import changed_parameters, declare_settings
 from glider_base.settings import Settings
@@ -35,7 +33,7 @@ class BlockNode(StepNode):
         ]
         self.params = self.settings.params()
         self.state = self.settings.initial_state()
-        self.orders = Orders(self)
+        self.orders: dict[str, dict[str, str]] = {}  #: that it has followed since the last tick
         self.telling = Telling(block)
         self.said = (0, ())  #: stamp and numbers of the last answer
         self.flags: tuple[int, ...] | None = None  #: and its flags
@@ -45,7 +43,8 @@ class BlockNode(StepNode):
 
     def on_settings(self, settings: Settings) -> None:
         """Fly on with tunable parameters that were set at run time."""
-        self.orders.add(PARAMETERS_SET, changed_parameters(self.settings, settings))
+        changed = changed_parameters(self.settings, settings)
+        self.orders.setdefault(health.PARAMETERS_SET, {}).update(changed)
         self.settings = settings
         self.params = settings.params()
 
@@ -65,16 +64,18 @@ class BlockNode(StepNode):
     def surface(self, order: str) -> None:
         """Ask for the surface, for good; ``order`` says on /diagnostics who wanted it."""
         self.state = self.block.surface(self.state)
-        self.orders.add(order)
+        self.orders.setdefault(order, {})
 
     def clear(self) -> None:
         """Forget what has latched."""
         self.state = self.block.clear(self.state)
-        self.orders.add(CLEAR)
+        self.orders.setdefault(health.CLEAR, {})
 
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
         """Answer one tick."""
-        self.orders.tell(stamp_ns)
+        for order, values in self.orders.items():
+            self.event(stamp_ns, health.OK, order, **values)
+        self.orders.clear()
         for place, values in self.absent:
             inputs = (*inputs[:place], values, *inputs[place:])
         for tick in range(stamp_ns // TICK_NS + 1 - self.passed, stamp_ns // TICK_NS + 1):
@@ -86,13 +87,13 @@ class BlockNode(StepNode):
         self.said, self.flags = (stamp_ns, outputs), flags
         self.repeat()
 
-    def condition(self) -> Condition:
+    def condition(self) -> health.Condition:
         """How this node is: what its block says."""
         condition = super().condition()
         if self.flags is None or not self.block.say or condition.level != health.OK:
             return condition
         said = self.block.say(*self.flags)
-        return Condition(health.LEVELS[said.level], said.message, said.values)
+        return health.Condition(health.LEVELS[said.level], said.message, said.values)
 
     def repeat(self) -> None:
         """Send the last answer, once more if no time has passed since."""

@@ -255,8 +255,8 @@ class ClockNode(TickNode):
         """End the run, and name the culprit, if a tick takes too long."""
         waits_for_time = self._published != self.tick and self._held_by is None
         if self._paused or waits_for_time:
-            self._wait.begin_at_next_look()
-        elif self._wait.stuck_s(self._due_ns) > self.ticks.tick_timeout_s:
+            self._seen_ns = None  # it counts from the next look on
+        elif self.stuck_s() > self.ticks.tick_timeout_s:
             self.fail(self._blame())
 
     def _blame(self) -> str:

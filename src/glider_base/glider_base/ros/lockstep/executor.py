@@ -67,11 +67,6 @@ class Gate(CallbackGroup):
     def ending_execution(self, entity) -> None:
         """Nothing to let go."""
 
-    def replace(self, old, new) -> None:
-        """Await ``new`` instead of ``old``."""
-        self.awaited.discard(old)
-        self.awaited.add(new)
-
 
 def take_with_info(subscription: Subscription) -> tuple | None:
     """Oldest message of a `Gate` subscription that no callback has had, and what is known of it.

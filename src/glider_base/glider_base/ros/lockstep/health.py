@@ -4,14 +4,19 @@
 
 Two kinds of status: events of the flight (stage, saturation, failsafe) on /diagnostics, which are
 recorded, and the state of a node as a member of the lockstep (`Report`) on ``lockstep``, by which
-the peers of one namespace find each other.
+the peers of one namespace find each other. What changes is told as an event. A `Pulse` repeats
+what holds once in a second, for tools that take silence for a failure, and is not recorded.
 """
 
-from typing import NamedTuple
+import struct
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.publisher import Publisher
 
 from glider_base.block import Said
+from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import PLANT
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -22,6 +27,15 @@ STARTING, READY, WAITING, FINISHED, FAILED = 'starting', 'ready', 'waiting', 'fi
 
 #: What the plant says about a run that is finished.
 COMPLETE = 'the run is complete'
+
+#: Messages of the events by which a node tells what a person asked of it in flight, with the first
+#: tick that it acts on. Whoever computes a recorded run again needs them: a step is a function of
+#: state, inputs and parameters, and these change the last of them, or the state.
+ABORT, PARAMETERS_SET, SURFACE, CLEAR = 'abort', 'parameters set', 'surface', 'clear'
+
+_SECOND_NS = 1_000_000_000
+#: The stamp of a message with a header, after the 4 bytes that say how it is encoded.
+_STAMP, _STAMP_AT = struct.Struct('<iI'), 4
 
 
 def seconds(stamp_ns: int) -> str:
@@ -45,7 +59,7 @@ class Report(NamedTuple):
 def status_array(stamp_ns: int, name: str, level: bytes, message: str, values: dict):
     """DiagnosticArray with one status, stamped with a tick."""
     array = DiagnosticArray()
-    array.header.stamp.sec, array.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
+    array.header.stamp.sec, array.header.stamp.nanosec = divmod(stamp_ns, _SECOND_NS)
     pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
     array.status = [DiagnosticStatus(level=level, name=name, message=message, values=pairs)]
     return array
@@ -93,7 +107,7 @@ def told_in(array: DiagnosticArray) -> Told | None:
 
 def stamp_of(array: DiagnosticArray) -> int:
     """Stamp (ns) of the tick that a message is about."""
-    return array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec
+    return array.header.stamp.sec * _SECOND_NS + array.header.stamp.nanosec
 
 
 def reports_in(array: DiagnosticArray) -> list[Report]:
@@ -126,3 +140,37 @@ def concerns(array: DiagnosticArray, namespace: str) -> bool:
         not status.name.startswith('/') or status.name.rpartition('/')[0] == namespace.rstrip('/')
         for status in array.status
     )
+
+
+class Condition(NamedTuple):
+    """How a node is."""
+
+    level: bytes
+    message: str
+    values: dict[str, Any] = {}
+
+
+class Pulse:
+    """Repeats how a node is.
+
+    The node has a method ``condition``, as `glider_base.ros.lockstep.node.TickNode`.
+    """
+
+    def __init__(self, node: Node, publisher: Publisher) -> None:
+        self._node, self._publisher = node, publisher
+        self._second = -1
+        self._said: Condition | None = None
+        self._raw = bytearray()
+
+    def beat(self, now_ns: int, stamp_ns: int) -> None:
+        """Say it with a stamp if a second has begun since, by the clock that the node goes by."""
+        if now_ns // _SECOND_NS == self._second:
+            return
+        self._second = now_ns // _SECOND_NS
+        condition = self._node.condition()
+        if condition != self._said:
+            name = self._node.get_fully_qualified_name()
+            self._said = condition
+            self._raw = bytearray(to_cdr(status_array(0, name, *condition)))
+        _STAMP.pack_into(self._raw, _STAMP_AT, *divmod(stamp_ns, _SECOND_NS))
+        self._publisher.publish(bytes(self._raw))

@@ -27,10 +27,8 @@ from glider_base.ros.lockstep import health, peers
 from glider_base.ros.lockstep.bad_line import BadLine
 from glider_base.ros.lockstep.executor import Gate, take_with_info
 from glider_base.ros.lockstep.health import Report, seconds
-from glider_base.ros.lockstep.peers import ALONE
+from glider_base.ros.lockstep.peers import ALONE, FAREWELL_S, REPORT_AFTER, wait_of
 from glider_base.ros.lockstep.process import Stop
-from glider_base.ros.lockstep.pulse import Condition, Pulse
-from glider_base.ros.lockstep.watch import FAREWELL_S, REPORT_AFTER, Watch, wait_of
 from glider_base.ros.message_fault import MessageFault
 from glider_base.ros.parameters import declare_settings, unknown_parameters
 from glider_base.ros.wire import qos, topics
@@ -96,13 +94,14 @@ class TickNode(Node):
         events, reports = TOPICS['/diagnostics'], TOPICS['lockstep']
         self._events, self._reports = self._publisher(events), self._publisher(reports)
         self.outputs[events.name] = (events, self._events)
-        self._pulse = Pulse(self)
+        self._pulse = health.Pulse(self, self._publisher(events._replace(qos=qos.REPEATED)))
         self._event_counts, self.events_told = self._publisher(TOPICS['told']), 0
         self._reports_in = self._subscription(reports, self._on_reports, raw=False)
         self.gate.awaited.add(self._reports_in)
         self._awaited = None
         self._due_ns: int | None = None
-        self._wait = Watch()
+        self._seen_ns: int | None = None  #: the tick that was due when the watch looked last
+        self._seen_s = 0.0  #: wall time since when it has been
         self._startup_timer = None
         self._said = ''
         self._created_s = time.monotonic()
@@ -180,9 +179,9 @@ class TickNode(Node):
         self.events_told += 1
         self._events.publish(to_cdr(array))
 
-    def condition(self) -> Condition:
+    def condition(self) -> health.Condition:
         """How this node is, as it repeats it on /diagnostics."""
-        return Condition(health.OK, 'running')
+        return health.Condition(health.OK, 'running')
 
     def count_events(self, stamp_ns: int) -> None:
         """Tell the recorder how many events there were up to a tick, so that it has them all."""
@@ -272,7 +271,6 @@ class TickNode(Node):
         self.destroy_timer(self._startup_timer)
         self.on_matched()
         self.running = True
-        self._wait.begin()
         self.report(health.READY)
         self.wall_timer(min(0.5, 0.1 * self.ticks.tick_timeout_s), self.watch)
         self.on_ready()
@@ -373,7 +371,8 @@ class TickNode(Node):
 
     def _await(self, item: Input) -> None:
         if self._awaited is not item.subscription:
-            self.gate.replace(self._awaited, item.subscription)
+            self.gate.awaited.discard(self._awaited)
+            self.gate.awaited.add(item.subscription)
             self._awaited = item.subscription
 
     def _has(self, item: Input) -> bool:
@@ -408,13 +407,19 @@ class TickNode(Node):
         elif self.ticks.lockstep:
             self.watch_tick()
 
+    def stuck_s(self) -> float:
+        """Wall time (s) for which the same tick has been due, as far as the watch has seen."""
+        if self._seen_ns != self._due_ns:
+            self._seen_ns, self._seen_s = self._due_ns, time.monotonic()
+        return time.monotonic() - self._seen_s
+
     def watch_tick(self) -> None:
         """Tell the peers if this node waits for one of them; the plant ends the run."""
         if self._due_ns is None:
             return
-        if self._wait.stuck_s(self._due_ns) < REPORT_AFTER * self.ticks.tick_timeout_s:
+        if self.stuck_s() < REPORT_AFTER * self.ticks.tick_timeout_s:
             return
-        self._wait.end_until_next_tick()
+        self._seen_s = float('inf')  # once for a tick
         missing = [item for item in self.inputs if not self._has(item)]
         if missing:
             self.report(health.WAITING, **wait_of(missing, len(self.inputs), self._due_ns))

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who takes part: peers that are matched or missing, and rivals that should not be there."""
+"""Who takes part: peers that are matched, missing or waited for, and rivals; and how long."""
 
 from collections.abc import Iterable
 
@@ -8,21 +8,25 @@ from rclpy.node import Node
 
 from glider_base.ros.hearing.gids import shown
 from glider_base.ros.hearing.inputs import Input
-from glider_base.ros.wire.topics import Topic
+from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.health import seconds
+from glider_base.ros.wire.topics import PLANT, Topic
 
+#: A node waits this long (wall time, s) for the recorder and its peers at the end of a run.
+FAREWELL_S = 5.0
+#: A node tells whom it waits for after this share of the time-out of a tick.
+REPORT_AFTER = 0.4
 #: What to do about a second glider.
 ALONE = 'each glider in a ROS domain needs a namespace and a clock of its own'
-
-
 #: What rclpy calls a node whose name has not been discovered yet.
-_UNKNOWN = '_NODE_NAME_UNKNOWN_'
+UNKNOWN = '_NODE_NAME_UNKNOWN_'
 
 
 def publishers(node: Node, topic: Topic) -> dict[bytes, str]:
     """Full names of the nodes that publish a topic, by gid; empty for one not known yet."""
     return {
         bytes(info.endpoint_gid): ''
-        if info.node_name == _UNKNOWN
+        if info.node_name == UNKNOWN
         else f'{info.node_namespace.rstrip("/")}/{info.node_name}'
         for info in node.get_publishers_info_by_topic(topic.name)
     }
@@ -78,3 +82,20 @@ def _peers_among(node: Node, endpoints) -> set[str]:
     """Names of the nodes of this namespace that have some of these endpoints."""
     own = node.get_namespace()
     return {info.node_name for info in endpoints if info.node_namespace == own}
+
+
+def wait_of(missing: list[Input], count: int, due_ns: int) -> dict:
+    """Whom a node waits for with some of its ``count`` inputs missing, as fields of its report.
+
+    As long as it has none of them it is idle, not held up.
+    """
+    idle = len(missing) == count
+    names = {item.topic.publisher: item.topic.name for item in missing}
+    peer = PLANT if idle and PLANT in names else missing[0].topic.publisher
+    return {
+        'message': f'waits for {names[peer]} of {peer} at {seconds(due_ns)}',
+        'stamp_ns': due_ns,
+        'peer': peer,
+        'topic': names[peer],
+        'level': health.OK if idle else health.WARN,
+    }

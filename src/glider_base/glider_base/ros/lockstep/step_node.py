@@ -5,7 +5,6 @@
 from glider_base.ros.hearing.inputs import Input
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.node import TickNode
-from glider_base.ros.lockstep.pulse import Condition
 from glider_base.signals import TICK_NS, TICK_S
 from glider_base.wiring import SAMPLED, SLOW_S, WHEN_SILENT
 
@@ -57,14 +56,12 @@ class StepNode(TickNode):
         due = self._cycles_since(now_s)
         self.cycles, self.missed = self.cycles + due, self.missed + due - 1
         self._count()
-        old = {
+        old = [
             item.topic.name
             for item in self.inputs
             if now_s - item.arrived_s > self.max_age_s(item.topic.name)
-        }
-        stale = [
-            item.topic.name for item in self.inputs if item.topic.name in old - {*WHEN_SILENT}
         ]
+        stale = [name for name in old if name not in WHEN_SILENT]
         stamp_ns = self._newest_ns()
         if stale != self._stale:
             self._stale = stale
@@ -88,10 +85,10 @@ class StepNode(TickNode):
         stamp_ns = max(item.stamp_ns for item in self._ticking)
         return stamp_ns if stamp_ns >= 0 else self.get_clock().now().nanoseconds
 
-    def condition(self) -> Condition:
+    def condition(self) -> health.Condition:
         """How this node is: without its inputs it is not well."""
         if self._stale:
-            return Condition(health.ERROR, self._missing())
+            return health.Condition(health.ERROR, self._missing())
         return super().condition()
 
     def _missing(self) -> str:
@@ -158,11 +155,7 @@ class StepNode(TickNode):
     def on_stale(self, stamp_ns: int, cycles: int) -> None:
         """Act in free-running mode while an input is stale; nothing by default.
 
-        Parameters
-        ----------
-        stamp_ns : int
-        cycles : int
-            Since the last cycle, this one included.
+        The cycles are those since the last one, this one included.
         """
 
     def close(self) -> None:

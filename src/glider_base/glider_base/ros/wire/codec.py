@@ -13,12 +13,14 @@ covariances filled) is deserialized and its fields are read by name: slower, sam
 import math
 import operator
 import struct
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 from rclpy.serialization import deserialize_message
 
 _SECOND_NS = 1_000_000_000
+_CDR_HEADER = b'\x00\x01\x00\x00'  #: of little-endian bytes, which are aligned from behind it on
 #: Fields that name frames.
 _FRAMES = ('header.frame_id', 'child_frame_id')
 _PRIMITIVES = {
@@ -70,42 +72,38 @@ def cdr_places(message) -> list[Place]:
 
 
 def _serialize(message) -> tuple[bytes, list[Place]]:
-    body, places = bytearray(), []
-    _write_fields(body, places, message, '')
-    shifted = [place._replace(start=place.start + 4, end=place.end + 4) for place in places]
-    return b'\x00\x01\x00\x00' + bytes(body), shifted
+    raw, places = bytearray(_CDR_HEADER), []
+    for path, code, value in _fields(message, ''):
+        text, number = (value, len(value)) if code == 's' else (b'', value)
+        number_code = '<I' if code == 's' else f'<{code}'
+        raw += bytes((len(_CDR_HEADER) - len(raw)) % struct.calcsize(number_code))
+        start = len(raw)
+        raw += struct.pack(number_code, number) + text
+        places.append(Place(path, code, start, len(raw)))
+    return bytes(raw), places
 
 
-def _write_fields(body: bytearray, places: list[Place], message, owner: str) -> None:
+def _fields(message, owner: str) -> Iterator[tuple[str, str, Any]]:
+    """Path, code as in `Place`, and value of all that is in a message, one after the other."""
     for name, kind in message.get_fields_and_field_types().items():
-        _write(body, places, getattr(message, name), kind, owner + name)
+        yield from _parts(getattr(message, name), kind, owner + name)
 
 
-def _write(body: bytearray, places: list[Place], value, kind: str, path: str) -> None:
+def _parts(value, kind: str, path: str) -> Iterator[tuple[str, str, Any]]:
     if kind.endswith(('>', ']')):
         item = kind[len('sequence<') : -1].split(',')[0]
         if kind.endswith(']'):
             item = kind[: kind.rindex('[')]
         else:
-            _pack(body, places, 'I', len(value), f'len({path})')
+            yield f'len({path})', 'I', len(value)
         for index, element in enumerate(value):
-            _write(body, places, element, item, f'{path}[{index}]')
+            yield from _parts(element, item, f'{path}[{index}]')
     elif kind.startswith('string'):
-        text = value.encode() + b'\0'
-        _pack(body, places, 'I', len(text), path)
-        body += text
-        places[-1] = places[-1]._replace(code='s', end=len(body))
+        yield path, 's', value.encode() + b'\0'
     elif kind in _PRIMITIVES:
-        _pack(body, places, _PRIMITIVES[kind], value, path)
+        yield path, _PRIMITIVES[kind], value
     else:
-        _write_fields(body, places, value, path + '.')
-
-
-def _pack(body: bytearray, places: list[Place], code: str, value, path: str) -> None:
-    body += bytes(-len(body) % struct.calcsize(code))
-    start = len(body)
-    body += struct.pack('<' + code, value)
-    places.append(Place(path, code, start, len(body)))
+        yield from _fields(value, f'{path}.')
 
 
 class Codec:
@@ -191,18 +189,9 @@ class Codec:
         return bytes(buffer)
 
     def encode_many(self, stamps_ns, values) -> np.ndarray:
-        """Bytes of n messages at once.
+        """Bytes uint8[n, size] of n messages at once.
 
-        Parameters
-        ----------
-        stamps_ns : int64[n]
-            Stamps in ns.
-        values : float64[n, m]
-            One row per message, the first columns in the order of ``fields``.
-
-        Returns
-        -------
-        uint8[n, size]
+        Of stamps int64[n] (ns), and of rows float64[n, m] that begin with the ``fields``.
         """
         stamps_ns = np.asarray(stamps_ns, np.int64)
         values = np.asarray(values, np.float64)
@@ -244,12 +233,7 @@ class Codec:
         return sec * _SECOND_NS + nanosec, values + self._absent
 
     def decode_many(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Stamps and numbers of n messages at once.
-
-        Parameters
-        ----------
-        rows : uint8[n, size]
-            Serialized messages.
+        """Stamps and numbers of n serialized messages uint8[n, size] at once.
 
         Returns
         -------
@@ -282,13 +266,7 @@ class Codec:
         return self._stamp_of(self.message(raw))
 
     def message(self, raw: bytes):
-        """Message of these bytes, whatever its layout.
-
-        Raises
-        ------
-        MessageError
-            If they are none of this type.
-        """
+        """Message of these bytes, whatever its layout; a `MessageError` if they are none."""
         try:
             return deserialize_message(raw, self.message_type)
         except Exception:  # rclpy has no name for its error, and wants no more of it to be known

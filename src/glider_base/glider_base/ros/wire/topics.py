@@ -22,10 +22,15 @@ from glider_base.ros.wire.codec import Codec, set_field
 from glider_base.wiring import PORTS, SURFACE, WIRING, Port, present
 
 
+def message_class(type_name: str) -> type:
+    """Message type of a ROS name, such as nav_msgs/msg/Odometry."""
+    package, *_, name = type_name.split('/')
+    return getattr(import_module(f'{package}.msg'), name)
+
+
 def _codec(port: Port, steers_by: str = '') -> Codec:
     """Codec of a per-tick message, from what the wiring and the vehicle say of it."""
-    package, _, name = port.message.partition('/msg/')
-    message = getattr(import_module(f'{package}.msg'), name)()
+    message = message_class(port.message)()
     if port.frame:
         message.header.frame_id = port.frame
     if port.child_frame:

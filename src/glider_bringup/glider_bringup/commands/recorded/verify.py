@@ -53,8 +53,8 @@ def verify(
     from glider_mission.recording.mcap_reader import Bag
     from glider_mission.recording.ros.recorded_run import Recording
     from glider_mission.recording.ros.told import read_told
+    from glider_mission.recording.ros.verify.every_block import report as report_of
     from glider_mission.recording.ros.verify.every_block import verify as verify_blocks
-    from glider_mission.recording.ros.verify.report import report as report_of
 
     wanted = picked(only, BlockName)
     told_compiling = partial(

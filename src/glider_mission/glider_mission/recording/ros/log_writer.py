@@ -10,7 +10,7 @@ import numpy as np
 
 from glider_base.block import Telling
 from glider_base.ros.lockstep import health
-from glider_base.ros.lockstep.orders import ABORT, PARAMETERS_SET
+from glider_base.ros.lockstep.health import ABORT, PARAMETERS_SET
 from glider_base.ros.parameters import changed_parameters
 from glider_base.ros.wire import topics
 from glider_base.ros.wire.codec import to_cdr
@@ -31,15 +31,9 @@ _PER_TICK = [topic.name for topic in TOPICS.values() if topic.per_tick]
 class LogWriter:
     """Writes the log rows of a direct run as the messages that the nodes would have published.
 
-    Parameters
-    ----------
-    bag : BagWriter
-    settings : GuidanceSettings
-        What guidance is told before the first tick, and its orders.
-    topics : iterable of str
-        Those of the topics that not every run has that there are in this one.
-    steers_by : str
-        Name of the vehicle's steering surface; empty without.
+    The settings are what guidance is told before the first tick, and its orders; ``topics`` are
+    those that not every run has and this one does; ``steers_by`` names the vehicle's steering
+    surface, and is empty without.
     """
 
     def __init__(

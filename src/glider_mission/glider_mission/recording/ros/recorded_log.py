@@ -124,15 +124,8 @@ class RecordedLog:
     def blocks(self) -> Iterator[np.ndarray]:
         """Rows of consecutive ticks, until the first tick that lacks one of `SCORED`.
 
-        Yields
-        ------
-        float64[n, ROW]
-            Valid until the next are asked for.
-
-        Raises
-        ------
-        ConfigurationError
-            If the bag is damaged.
+        They are float64[n, ROW], valid until the next are asked for. A `ConfigurationError` says
+        where the bag is damaged.
         """
         names = {i: _known_name(topic.name) for i, topic in enumerate(self._bag.topics)}
         for batch in self._bag.batches():
@@ -216,10 +209,7 @@ class RecordedLog:
     def missing(self, ticks: int | None) -> str:
         """What lacks of a run, in words; empty if nothing does.
 
-        Parameters
-        ----------
-        ticks : int, optional
-            How many were flown, if anybody knows: else what the plant said in the bag counts.
+        Where nobody knows how many ticks were flown, what the plant said in the bag counts.
         """
         if ticks is None and self.end and self.end.phase == health.FINISHED:
             ticks = self.end.stamp_ns // TICK_NS + 1
@@ -236,24 +226,20 @@ class RecordedLog:
         which is not a loss: a node that ended within a tick may have let the others begin the
         next one.
         """
-        ticks, per_tick = self._per_tick()
-        expected = ticks if complete else ticks - 2
-        return sum(max(0, expected - count) for count in per_tick.values())
+        counts = self.recorded()
+        expected = max(counts.values()) - (0 if complete else 2)
+        return sum(max(0, expected - count) for count in counts.values())
 
     def lacking(self) -> dict[str, int]:
         """Messages that per-tick topics have less than the one that has most, by topic."""
-        ticks, per_tick = self._per_tick()
-        return {name: ticks - count for name, count in per_tick.items() if count < ticks}
+        counts = self.recorded()
+        ticks = max(counts.values())
+        return {name: ticks - count for name, count in counts.items() if count < ticks}
 
     def recorded(self) -> dict[str, int]:
         """Messages of every topic that ought to have one per tick, by topic."""
-        return self._per_tick()[1]
-
-    def _per_tick(self) -> tuple[int, dict[str, int]]:
-        """Messages of the topic that has most, and of each that there ought to be."""
         left_out = {*SENSORS, *BELIEFS, *WHEN_SILENT} - self._recorded
         if not self.counts['ground_truth/odom']:
             left_out |= {'ground_truth/odom'}
         names = (topic.name for topic in _PER_TICK if topic.name not in left_out)
-        counts = {name: self.counts[name] for name in names}
-        return max(counts.values()), counts
+        return {name: self.counts[name] for name in names}

@@ -82,15 +82,9 @@ class Event(NamedTuple):
 class Recording:
     """A bag in memory.
 
-    Parameters
-    ----------
-    bag : Bag
-    namespace : str, optional
-        Namespace of the nodes; may be left out if there is only one.
-    progress : callable
-        Called now and then with the share that is read, 0 to 1.
-    steers_by : str
-        Name of the vehicle's steering surface; empty without.
+    The namespace of the nodes may be left out if there is only one. ``progress`` is called now and
+    then with the share that is read, 0 to 1. ``steers_by`` names the vehicle's steering surface,
+    and is empty without.
 
     Raises
     ------

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Publishes a recording again: the same bytes, on the same topics, in the same order."""
 
-import importlib
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -21,18 +20,17 @@ from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.clock import MAX_TICKS_AHEAD
 from glider_base.ros.lockstep.executor import take
 from glider_base.ros.lockstep.node import COUNT_TICKS
+from glider_base.ros.lockstep.peers import UNKNOWN
 from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_base.ros.wire import topics
 from glider_base.ros.wire.codec import to_cdr
-from glider_base.ros.wire.topics import TOPICS
+from glider_base.ros.wire.topics import TOPICS, message_class
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_base.wiring import present
-from glider_mission.recording.mcap_reader import Bag, BagTopic
+from glider_mission.recording.mcap_reader import Bag, BagTopic, Batch
 from glider_mission.recording.ros.recorded_run import choose_namespace
 
-#: Name that rclpy gives to a node of which it knows the endpoints only.
-_NAME_UNKNOWN = '_NODE_NAME_UNKNOWN_'
 #: Sleeps and waits are cut into pieces of this length (s), so that Ctrl-C is heard.
 _PATIENCE_S = 0.1
 #: Nothing longer is replayed (s).
@@ -53,6 +51,11 @@ class Plan(NamedTuple):
     start_ns: int  #: log times (ns) from and to which messages are published
     end_ns: int
     asked: frozenset[str]  #: names of the topics that were asked for; /clock may come unasked
+
+    def has(self, batch: Batch) -> np.ndarray:
+        """Which messages of a batch are published."""
+        inside = (batch.log_ns >= self.start_ns) & (batch.log_ns <= self.end_ns)
+        return inside & np.isin(batch.topic, list(self.names))
 
 
 class Played(NamedTuple):
@@ -91,10 +94,8 @@ def plan_replay(
     """
     recorded = _recorded_namespace(bag, namespace)
     names = [topic.name for topic in bag.topics]
-    wanted = [_find_topic(bag, name, recorded) for name in topics] or names
-    asked = frozenset(wanted)
-    if '/clock' in names:
-        wanted = [*wanted, '/clock']
+    asked = [_find_topic(bag, name, recorded) for name in topics] or names
+    wanted = {*asked, '/clock'}.intersection(names)
     length_s = (bag.end_ns - bag.start_ns) / 1e9
     if start_s > length_s:
         raise ConfigurationError(
@@ -192,18 +193,10 @@ def _policy(profile: dict, name: str, unknown):
     return kind.__members__.get(told.upper(), unknown)
 
 
-def message_class(topic: BagTopic) -> type:
-    """Message type of a recorded topic.
-
-    Raises
-    ------
-    ConfigurationError
-        If its package is not installed.
-    """
-    package, _, name = topic.type_name.partition('/')
+def _message_class(topic: BagTopic) -> type:
+    """Message type of a recorded topic; a `ConfigurationError` if it is not installed."""
     try:
-        module = importlib.import_module(f'{package}.msg')
-        return getattr(module, name.rpartition('/')[2])
+        return message_class(topic.type_name)
     except (ImportError, AttributeError, ValueError):
         raise ConfigurationError(
             f'{topic.name}: its type {topic.type_name!r} is not installed here; choose others '
@@ -219,10 +212,9 @@ class _Output:
 
     def __init__(self, node: Node, name: str, topic: BagTopic) -> None:
         self.name, self.qos = name, qos_of(topic)
-        self.publisher = node.create_publisher(message_class(topic), name, self.qos)
+        self.publisher = node.create_publisher(_message_class(topic), name, self.qos)
         self.count = 0
         self._on_the_way = 0
-        self._reliable = self.qos.reliability is ReliabilityPolicy.RELIABLE
 
     def publish(self, raw: bytes) -> None:
         """Publish a message, once there is room for it."""
@@ -234,7 +226,7 @@ class _Output:
 
     def wait(self) -> None:
         """Wait until every subscriber has what was published."""
-        if self._reliable:
+        if self.qos.reliability is ReliabilityPolicy.RELIABLE:
             _wait_for_acks(self.publisher)
         self._on_the_way = 0
 
@@ -281,7 +273,7 @@ class _Brake:
         The name of a node can come later than its subscriptions.
         """
         return any(
-            info.node_name in (topics.RECORDER, _NAME_UNKNOWN)
+            info.node_name in (topics.RECORDER, UNKNOWN)
             and info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
             for info in self._node.get_subscriptions_info_by_topic(self._odom)
         )
@@ -292,15 +284,14 @@ class _Count:
 
     def __init__(self, node: Node, plan: Plan) -> None:
         topic, self._name = TOPICS['told'], _join(plan.namespace, topics.REPLAY)
-        self._events_on = {i for i, name in plan.names.items() if name == '/diagnostics'}
         self.publisher = node.create_publisher(
             topic.message_type, topic.full_name(plan.namespace), topic.qos
         )
         self._events, self._newest_ns, self._told_ns = 0, -TICK_NS, -TICK_NS
 
-    def add(self, index: int) -> None:
-        """Count a message of a topic, given by its index in the bag."""
-        self._events += index in self._events_on
+    def add(self, name: str) -> None:
+        """Count a message of a topic."""
+        self._events += name == '/diagnostics'
 
     def tell_before(self, log_ns: int) -> None:
         """Tell now and then, when a tick is over."""
@@ -321,11 +312,7 @@ class _Count:
 class Replay:
     """Publishers for what is to be replayed. Use it as a context.
 
-    Parameters
-    ----------
-    plan : Plan
-    rate : float
-        Times real time; infinite: as fast as subscribers take it.
+    The rate is times real time; infinite: as fast as subscribers take it.
     """
 
     def __init__(self, plan: Plan, rate: float) -> None:
@@ -349,7 +336,6 @@ class Replay:
                 self._own_clock = self._node.create_publisher(
                     clock.message_type, clock.name, clock.qos
                 )
-            self._clock_ns = -TICK_NS
             self._count = _Count(self._node, plan)
             self._brake = _Brake(self._node, plan)
         except BaseException:
@@ -387,8 +373,7 @@ class Replay:
         self._clock_ns = -TICK_NS
         span_s = (self._plan.end_ns - self._plan.start_ns) / 1e9
         shown_s = 0.0
-        profiles = {index: output.qos for index, output in self._outputs.items()}
-        for log_ns, index, raw in recorded_messages(self._plan, profiles):
+        for log_ns, index, raw in recorded_messages(self._plan):
             passed_s = (log_ns - self._plan.start_ns) / 1e9
             if math.isfinite(self._rate):
                 self._sleep_until(began_s + passed_s / self._rate, passed_s, progress)
@@ -396,7 +381,7 @@ class Replay:
             self._count.tell_before(log_ns)
             self._tell_time(log_ns)
             self._outputs[index].publish(raw)
-            self._count.add(index)
+            self._count.add(self._plan.names[index])
             now_s = time.monotonic()
             if now_s - shown_s > _PATIENCE_S:
                 shown_s = now_s
@@ -421,21 +406,13 @@ class Replay:
             self._own_clock.publish(TOPICS['/clock'].codec.encode(log_ns, ()))
 
 
-def recorded_messages(
-    plan: Plan, profiles: dict[int, QoSProfile]
-) -> Iterator[tuple[int, int, bytes]]:
+def recorded_messages(plan: Plan) -> Iterator[tuple[int, int, bytes]]:
     """Log time, topic and payload of the messages to publish.
 
     Those that a latched topic held at the start come first, under the time of the start.
-
-    Parameters
-    ----------
-    plan : Plan
-    profiles : dict of QoSProfile
-        Of every topic that is published, by its index.
     """
-    chosen = np.array(list(profiles))
     held: dict[int, list[bytes]] = {}
+    profiles = {index: qos_of(plan.bag.topics[index]) for index in plan.names}
     latched = [
         index
         for index, profile in profiles.items()
@@ -449,8 +426,7 @@ def recorded_messages(
             kept = held.setdefault(index, [])
             kept.append(batch.payload(i))
             del kept[: -profiles[index].depth]
-        inside = (batch.log_ns >= plan.start_ns) & (batch.log_ns <= plan.end_ns)
-        for i in np.flatnonzero(inside & np.isin(batch.topic, chosen)):
+        for i in np.flatnonzero(plan.has(batch)):
             for index, kept in held.items():
                 yield from ((plan.start_ns, index, raw) for raw in kept)
             held = {}
@@ -458,20 +434,11 @@ def recorded_messages(
 
 
 def check_not_empty(plan: Plan) -> None:
-    """Refuse a plan by which nothing is published.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming the topics and the time.
-    """
-    for batch in plan.bag.batches():
-        inside = (batch.log_ns >= plan.start_ns) & (batch.log_ns <= plan.end_ns)
-        if np.any(inside & np.isin(batch.topic, list(plan.names))):
-            return
-    span = f'{(plan.start_ns - plan.bag.start_ns) / 1e9:.1f} s to '
-    span += f'{(plan.end_ns - plan.bag.start_ns) / 1e9:.1f} s'
+    """Refuse a plan by which nothing is published, by a `ConfigurationError`."""
+    if any(plan.has(batch).any() for batch in plan.bag.batches()):
+        return
+    start_s, end_s = ((at - plan.bag.start_ns) / 1e9 for at in (plan.start_ns, plan.end_ns))
     raise ConfigurationError(
         f'nothing to replay: no message on {", ".join(plan.names.values()) or "any topic"} '
-        f'from {span} of the recording'
+        f'from {start_s:.1f} s to {end_s:.1f} s of the recording'
     )

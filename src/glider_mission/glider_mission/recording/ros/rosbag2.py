@@ -14,27 +14,22 @@ from ament_index_python.packages import get_package_share_directory
 from mcap.records import Channel, Schema
 from rclpy.qos import QoSProfile
 
-from glider_base.ros.wire.topics import TOPICS, Topic
+from glider_base.ros.wire.topics import TOPICS, Topic, message_class
 from glider_base.signals import TICK_NS
-from glider_mission.recording.mcap_writer import McapWriter
-from glider_mission.recording.metadata import (
+from glider_mission.recording.bag_files import (
     METADATA_FILE,
     ROSBAG2,
     metadata_text,
     topic_counts,
     write_metadata,
 )
+from glider_mission.recording.mcap_writer import McapWriter
 
 #: Ticks per chunk of the file. A chunk is what can be lost when the recorder is killed.
 CHUNK_TICKS = 128
 #: When a recording is synced to disk: never, when it is complete, or with every chunk too.
 Sync = Literal['never', 'end', 'chunk']
 
-_FIELD_TYPE = re.compile(r'(?:^|\n)\s*([a-zA-Z0-9_/]+)(?:\[[^\]]*\])?(?:<=[0-9]+)?\s+')
-_PRIMITIVES = {
-    *('bool', 'byte', 'char', 'float32', 'float64', 'string', 'wstring'),
-    *(f'{sign}int{bits}' for sign in ('', 'u') for bits in (8, 16, 32, 64)),
-}
 _DELIMITER = 80 * '=' + '\n'
 _INFINITE_NS = 2**63 - 1
 
@@ -53,13 +48,8 @@ def message_definition(type_name: str) -> str:
 
     def text_of(name: str) -> str:
         text = _interface_file(name, '.msg').read_text(encoding='utf-8')
-        package = name.split('/')[0]
-        needed = {
-            found if '/' in found else f'{package}/{found}'
-            for found in _FIELD_TYPE.findall(text)
-            if found not in _PRIMITIVES
-        }
-        for need in sorted(needed):
+        kinds = message_class(name).get_fields_and_field_types().values()
+        for need in sorted(set(re.findall(r'\w+/\w+', ' '.join(kinds)))):
             if need not in seen:
                 seen.add(need)
                 text += f'\n{_DELIMITER}MSG: {need}\n{text_of(need)}'
@@ -171,12 +161,7 @@ class BagWriter:
     def write_ticks(self, stamps_ns: Sequence[int], payloads: Mapping[str, np.ndarray]) -> None:
         """Add many whole ticks, interleaved by stamp and cut into chunks as a recorder does.
 
-        Parameters
-        ----------
-        stamps_ns : int64[n]
-            Stamps of the ticks, ascending.
-        payloads : dict of uint8[n, size]
-            Serialized messages by topic, as of `Codec.encode_many`.
+        Stamps int64[n] ascend; payloads are messages by topic, as of `Codec.encode_many`.
         """
         stamps_ns = np.asarray(stamps_ns, np.int64)
         chunk_of = stamps_ns // (CHUNK_TICKS * TICK_NS)

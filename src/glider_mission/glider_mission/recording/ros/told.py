@@ -52,15 +52,14 @@ def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
     lockstep = _lockstep(read_yaml(parameters)) if parameters.is_file() else None
     if file is not None:
         values = read_yaml(file)
-        if _is_parameters(values):
-            return Told(_from_parameters(values, str(file)), str(file), _lockstep(values))
+        if _sections(values):
+            return _from_parameters(values, str(file))
         return Told(_from_scenario(load_scenario(str(file), recorded=True)), str(file), lockstep)
     found = find_scenario(bag.files[0], folder, bag.attachments, scratch)
     if found is not None:
         return Told(_from_scenario(found.scenario), found.source, lockstep)
     if parameters.is_file():
-        values = read_yaml(parameters)
-        return Told(_from_parameters(values, str(parameters)), str(parameters), lockstep)
+        return _from_parameters(read_yaml(parameters), str(parameters))
     raise ConfigurationError(
         f'{path}: it does not say what the nodes were told, neither {SCENARIO_FILE} nor '
         f'{PARAMETERS_FILE} is in it or attached: give --settings FILE'
@@ -81,10 +80,6 @@ def _sections(values: dict) -> dict[str, dict]:
     }
 
 
-def _is_parameters(values: dict) -> bool:
-    return bool(_sections(values))
-
-
 def _lockstep(values: dict) -> bool | None:
     """Whether the nodes of a parameter file keep step; None if it does not say."""
     said = [section.get('lockstep') for section in _sections(values).values()]
@@ -92,7 +87,7 @@ def _lockstep(values: dict) -> bool | None:
     return all(said) if said else None
 
 
-def _from_parameters(values: dict, source: str) -> dict[str, Settings | None]:
+def _from_parameters(values: dict, source: str) -> Told:
     sections = _sections(values)
     found: dict[str, Settings | None] = {}
     for block in BLOCKS:
@@ -101,4 +96,4 @@ def _from_parameters(values: dict, source: str) -> dict[str, Settings | None]:
         told = node in sections or '**' in sections
         settings = from_parameters(block.settings, given, f'{source}: {node}') if told else None
         found[block.wired.name] = settings
-    return found
+    return Told(found, source, _lockstep(values))

@@ -11,23 +11,22 @@ from diagnostic_msgs.msg import DiagnosticArray
 from glider_base import wiring
 from glider_base.block import Telling
 from glider_base.ros.lockstep import health
-from glider_base.ros.lockstep.orders import ABORT, CLEAR, PARAMETERS_SET, SURFACE
+from glider_base.ros.lockstep.health import ABORT, CLEAR, PARAMETERS_SET, SURFACE
 from glider_base.ros.parameters import with_parameters
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.settings import ConfigurationError
 from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
 from glider_mission.recording.recorded_inputs import RecordedBlock
-from glider_mission.recording.ros.recorded_run import Event, Recording, Series
-from glider_mission.recording.ros.verify.messages import field_difference, message_difference
-from glider_mission.recording.ros.verify.ticks import TICKS_OF_THE_END, Track
-from glider_mission.recording.ros.verify.verdict import (
+from glider_mission.recording.ros.recorded_run import Recording, Series
+from glider_mission.recording.ros.verify.differences import (
     DIFFERENT,
     IDENTICAL,
     NOT_RECORDED,
     WHOLE,
     Difference,
     Verdict,
-    time_text,
+    field_difference,
+    message_difference,
 )
 from glider_model.plant.block import PLANT
 
@@ -35,9 +34,23 @@ from glider_model.plant.block import PLANT
 ORDERS = (ABORT, CLEAR, PARAMETERS_SET, SURFACE)
 #: Bytes in which an event may differ from what is expected, and still be taken for it.
 _BYTES_ALIKE = 16
+#: Ticks at the end that may lack in a topic: whoever recorded it left in the middle of one.
+TICKS_OF_THE_END = 10
 
 
-Tracks = dict[str, Track]
+class Track:
+    """Which message of a topic belongs to each step of a block; -1 where there is none."""
+
+    def __init__(self, series: Series, index: np.ndarray) -> None:
+        self.series, self.index = series, index
+        present = np.flatnonzero(index >= 0)
+        self.end = int(present[-1]) + 1 if len(present) else 0  #: after the last step it has
+        unusable = np.isin(index, list(series.unusable))
+        gaps = np.flatnonzero((index < 0) | unusable)
+        #: first step without a message that a node could use
+        self.gap = int(gaps[0]) if len(gaps) else len(index)
+
+
 #: The track of a topic, and the messages that have no place in it.
 Place = Callable[[Series], tuple[Track, list[int]]]
 
@@ -55,23 +68,18 @@ class Check:
         self.ticks = 0
         #: paths that guidance followed, one after the other, and from when (ns)
         self.paths = [(block.settings.path, 0)] if block.block.wired == wiring.GUIDANCE else []
-        self._orders = _orders(recording.events, recording.node(block.block.wired.node))
+        node = recording.node(block.block.wired.node)
+        asked = [e for e in recording.events if e.node == node and e.message in ORDERS]
+        #: given in flight, in the order in which it followed them
+        self._orders = sorted(asked, key=lambda event: event.stamp_ns)
 
     def add(self, difference: Difference) -> None:
         """Keep a difference."""
         self.differing[difference.topic] += 1
         self.found.append(difference)
 
-    def tracks(self, place: Place, why: str) -> Tracks:
-        """Tracks of the outputs that are recorded.
-
-        Parameters
-        ----------
-        place : callable
-            Gives the track of a topic, and the messages that have no place in it.
-        why : str
-            What is wrong with those, in words.
-        """
+    def tracks(self, place: Place, why: str) -> dict[str, Track]:
+        """Tracks of the outputs that are recorded; ``why`` tells of what has no place."""
         tracks = {}
         for name in self.block.outputs:
             series = self.recording.series.get(name)
@@ -109,7 +117,7 @@ class Check:
                     self.paths.append((settings.path, order.stamp_ns))
                 self.block.tune(settings)
             except ConfigurationError as error:
-                self.notes.append(f'parameters set at {time_text(order.stamp_ns)}: {error}')
+                self.notes.append(f'parameters set at {health.seconds(order.stamp_ns)}: {error}')
 
     def run(self, start: int, end: int, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Outputs of the steps from start to end; rows are the messages of the inputs."""
@@ -144,13 +152,8 @@ class Check:
             )
         for row in np.flatnonzero(index < 0):
             if start + row < track.end or track.end + TICKS_OF_THE_END < len(track.index):
-                self.miss(name, start + int(row))
-
-    def miss(self, name: str, step: int) -> None:
-        """Keep that the message of a step is not there."""
-        self.differing[name] += 1
-        stamp_ns = int(self.stamps_ns[step])
-        self.found.append(Difference(stamp_ns, name, WHOLE, 'a message', NOT_RECORDED))
+                stamp_ns = int(self.stamps_ns[start + row])
+                self.add(Difference(stamp_ns, name, WHOLE, 'a message', NOT_RECORDED))
 
     # .................................................................. events, path, verdict
 
@@ -220,12 +223,6 @@ class Check:
 
 def _alike(one: bytes, other: bytes) -> bool:
     return sum(a != b for a, b in zip(one, other, strict=True)) <= _BYTES_ALIKE
-
-
-def _orders(events: list[Event], node: str) -> list[Event]:
-    """Orders that a node was given in flight, in the order in which it followed them."""
-    asked = [e for e in events if e.node == node and e.message in ORDERS]
-    return sorted(asked, key=lambda event: event.stamp_ns)
 
 
 def finish_events(check: Check) -> None:

@@ -12,15 +12,21 @@ import numpy as np
 
 from glider_base import wiring
 from glider_base.block import optional_topics
+from glider_base.ros.lockstep.health import seconds
 from glider_base.signals import TICK_NS
-from glider_base.wiring import WHEN_SILENT, Wired, present
+from glider_base.wiring import WHEN_SILENT, WIRING, Wired, present
 from glider_mission.blocks import BLOCKS
+from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording
 from glider_mission.recording.ros.told import Told
+from glider_mission.recording.ros.verify.differences import (
+    IDENTICAL,
+    SKIPPED,
+    Verdict,
+)
 from glider_mission.recording.ros.verify.free_running import free_running
 from glider_mission.recording.ros.verify.lockstep import in_lockstep
-from glider_mission.recording.ros.verify.verdict import SKIPPED, Verdict
 
 
 def is_lockstep(recording: Recording, told: Told) -> bool:
@@ -60,22 +66,9 @@ def verify(
     only: list[str],
     progress: Callable[[str, float], None],
 ) -> Iterator[Verdict]:
-    """Compare every block of a recording.
+    """Compare the blocks of a recording, all or only some, in the order in which they act.
 
-    Parameters
-    ----------
-    recording : Recording
-    told : Told
-        What the nodes were told.
-    only : list of str
-        Blocks to compare; empty: all of them.
-    progress : callable
-        Called now and then with the name of a block and the share that is done, 0 to 1.
-
-    Yields
-    ------
-    Verdict
-        For each block, in the order in which they act in a tick.
+    ``progress`` is called now and then with a block's name and the share that is done, 0 to 1.
     """
     lockstep = is_lockstep(recording, told)
     for block in BLOCKS:
@@ -90,3 +83,49 @@ def verify(
         work = in_lockstep if lockstep else free_running
         recorded = RecordedBlock(block, settings)
         yield work(recorded, recording, lambda share, name=name: progress(name, share))
+
+
+def report(bag: Bag, recording: Recording, told: Told, verdicts: list[Verdict]) -> dict:
+    """Verdicts as one JSON object, with hints for whoever looks for a cause."""
+    lockstep = is_lockstep(recording, told)
+    compared = [verdict for verdict in verdicts if verdict.result != SKIPPED]
+    notes = [bag.cut] if bag.cut else []
+    if not compared:
+        notes.append('nothing could be compared')
+    if not lockstep:
+        notes.append(
+            'recorded free-running: a message that was lost, or a node that was started before '
+            'the recording, looks like a difference'
+        )
+    return {
+        'identical': bool(compared) and all(one.result == IDENTICAL for one in compared),
+        'settings': told.source,
+        'lockstep': lockstep,
+        'namespace': recording.namespace,
+        'blocks': [_block_report(one, verdicts) for one in verdicts],
+        'notes': notes,
+        'ignored_topics': recording.ignored,
+    }
+
+
+def _block_report(one: Verdict, verdicts: list[Verdict]) -> dict:
+    first = one.first
+    return {
+        **one._asdict(),
+        'first': first and {'tick': first.tick, 't_s': first.stamp_ns / 1e9, **first._asdict()},
+        'notes': [*one.notes, *(_hints(one, verdicts) if first else ())],
+    }
+
+
+def _hints(one: Verdict, verdicts: list[Verdict]) -> list[str]:
+    """What else may have led to the first difference of a block."""
+    hints = []
+    (wired,) = [wired for wired in WIRING if wired.name == one.block]
+    for other in verdicts:
+        source = other.first
+        if source and source.topic in wired.inputs and source.stamp_ns <= one.first.stamp_ns:
+            hints.append(
+                f'its input {source.topic} differs at {seconds(source.stamp_ns)} from what '
+                f'{other.block} computes: if the recording is damaged there, this is why'
+            )
+    return hints

@@ -8,9 +8,8 @@ import numpy as np
 
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording, Series
-from glider_mission.recording.ros.verify.check import Check, finish_events
-from glider_mission.recording.ros.verify.ticks import Track
-from glider_mission.recording.ros.verify.verdict import (
+from glider_mission.recording.ros.verify.check import Check, Track, finish_events
+from glider_mission.recording.ros.verify.differences import (
     NOT_RECORDED,
     SKIPPED,
     WHOLE,
@@ -59,8 +58,11 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
     start, cuts = 0, check.cuts(len(stamps_ns))
     last = None
     while start < len(stamps_ns):
-        newest = {name: _newest(series[name], stamps_ns[start]) for name in block.inputs}
-        options = _options({name: _places(newest[name], last and last[name]) for name in newest})
+        choices = {}
+        for name in block.inputs:
+            behind = int(np.searchsorted(series[name].stamps_ns, stamps_ns[start], 'right'))
+            choices[name] = _places(behind - 1, last and last[name])
+        options = _options(choices)
         check.follow_orders(start)
         end = min([start + 1024, len(stamps_ns), *(cut for cut in cuts if cut > start)])
         for begin in options:
@@ -79,10 +81,6 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
     elif check.ticks:
         finish_events(check)
     return check.verdict()
-
-
-def _newest(series: Series, stamp_ns: int) -> int:
-    return int(np.searchsorted(series.stamps_ns, stamp_ns, 'right')) - 1
 
 
 def _places(newest: int, last: int | None) -> list[int]:

@@ -6,23 +6,55 @@ import itertools
 
 import numpy as np
 
+from glider_base.ros.lockstep.health import seconds
 from glider_base.signals import TICK_NS
 from glider_mission.recording.recorded_inputs import RecordedBlock
-from glider_mission.recording.ros.recorded_run import Recording
-from glider_mission.recording.ros.verify.check import Check, finish_events
-from glider_mission.recording.ros.verify.ticks import TICKS_OF_THE_END, by_tick, place_ticks
-from glider_mission.recording.ros.verify.verdict import (
+from glider_mission.recording.ros.recorded_run import Recording, Series
+from glider_mission.recording.ros.verify.check import (
+    TICKS_OF_THE_END,
+    Check,
+    Track,
+    finish_events,
+)
+from glider_mission.recording.ros.verify.differences import (
     NOT_RECORDED,
     SKIPPED,
     WHOLE,
     Difference,
     Verdict,
-    time_text,
 )
 from glider_model.plant.block import PLANT
 
 #: Ticks that a block works through at a time.
 _TICKS_AT_ONCE = 8192
+
+
+def place_ticks(stamps_ns: np.ndarray) -> np.ndarray:
+    """Tick of every message of a topic, -1 where its stamp is no tick.
+
+    A message that stands alone between the ticks k - 1 and k + 1 is that of tick k, whatever its
+    stamp says: it is the stamp that is wrong.
+    """
+    ticks = np.where(stamps_ns % TICK_NS == 0, stamps_ns // TICK_NS, -1)
+    before = np.concatenate(([-1], ticks[:-1]))
+    last = len(ticks) - 1
+    for i in np.flatnonzero(ticks != before + 1):
+        expected = (ticks[i - 1] if i else -1) + 1
+        if i == last or (i < last and ticks[i + 1] == expected + 1):
+            ticks[i] = expected
+    return ticks
+
+
+def by_tick(series: Series, ticks: int) -> tuple[Track, list[int]]:
+    """Track of a topic in lockstep, and messages that have no place in it."""
+    placed = place_ticks(series.stamps_ns)
+    index = np.full(ticks, -1)
+    inside = (placed >= 0) & (placed < ticks)
+    backwards = np.flatnonzero(inside)[::-1]
+    index[placed[backwards]] = backwards  # the first of several stays
+    taken = np.zeros(len(series), bool)
+    taken[index[index >= 0]] = True
+    return Track(series, index), [int(i) for i in np.flatnonzero(~taken)]
 
 
 def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict:
@@ -37,7 +69,7 @@ def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict
     late = [name for name, track in inputs.items() if track.index[0] < 0]
     if late:
         first_ns = int(series[late[0]].stamps_ns[0])
-        why = f'{late[0]} is recorded from {time_text(first_ns)} on, not from the first tick'
+        why = f'{late[0]} is recorded from {seconds(first_ns)} on, not from the first tick'
         return Verdict(wired.name, SKIPPED, f'its state is not known: {why}')
     check = Check(block, recording, np.arange(ticks, dtype=np.int64) * TICK_NS)
     count = min(track.gap for track in inputs.values())

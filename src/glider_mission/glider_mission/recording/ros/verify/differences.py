@@ -1,28 +1,54 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""One message: the first field in which recorded bytes differ from what is computed."""
+"""What verification says: where recorded bytes differ, and a verdict for each block."""
 
 import struct
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from rclpy.serialization import deserialize_message
 
 from glider_base.ros.wire.codec import Codec, cdr_places, to_cdr
-from glider_mission.recording.ros.verify.verdict import WHOLE, Difference
+from glider_base.signals import TICK_NS
+
+IDENTICAL, DIFFERENT, SKIPPED = 'identical', 'different', 'skipped'
+
+#: What stands where there is no field, and no message.
+NOT_RECORDED, WHOLE = 'not recorded', '(message)'
+
+
+class Difference(NamedTuple):
+    """Where a recording and today's code differ."""
+
+    stamp_ns: int
+    topic: str
+    field: str
+    computed: str
+    recorded: str
+
+    @property
+    def tick(self) -> int:
+        """Number of the tick; of a vehicle's own clock, that many tenths of a second."""
+        return self.stamp_ns // TICK_NS
+
+
+class Verdict(NamedTuple):
+    """What came out for one block."""
+
+    block: str
+    result: str  #: IDENTICAL, DIFFERENT or SKIPPED
+    reason: str = ''  #: why it was skipped
+    ticks: int = 0  #: that were computed
+    compared: Mapping[str, int] = {}  #: messages by topic
+    differing: Mapping[str, int] = {}  #: those of them that differ, by topic
+    first: Difference | None = None
+    notes: Sequence[str] = ()
 
 
 def field_difference(expected, recorded: bytes) -> tuple[str, str, str]:
-    """First field in which recorded bytes differ from a message.
+    """First field in which any bytes differ from a message, and what is computed and recorded.
 
-    Parameters
-    ----------
-    expected : message
-    recorded : bytes
-        Anything.
-
-    Returns
-    -------
-    field, computed, recorded : str
-        With the bits where two numbers print alike.
+    With the bits where two numbers print alike.
     """
     raw = to_cdr(expected)
     shared = min(len(raw), len(recorded))
