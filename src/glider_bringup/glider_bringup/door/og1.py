@@ -96,7 +96,7 @@ def write_og1(
     Raises
     ------
     ConfigurationError
-        If it has no bag or nobody knows when it was, or the file cannot be written.
+        If it has no bag, or no tick in it, or nobody knows when it was, or the file cannot be written.
     """
     try:
         import h5netcdf  # noqa: F401 - xarray writes NetCDF 4 through it
@@ -120,7 +120,10 @@ def write_og1(
             )
         total = int(scenario.duration_s / (TICK_NS / 1e9))
         read_back(bag, scenario.vehicle, [taker], lambda ticks: progress(ticks, total))
-        dataset = flight_dataset(taker.result(), scenario, card, began_s)
+        rows = taker.result()
+        if not len(rows):
+            raise ConfigurationError(f'{run}: no tick was recorded (allowed: one and more)')
+        dataset = flight_dataset(rows, scenario, card, began_s)
     with whole_file(file) as stream:
         dataset.to_netcdf(
             stream.name,

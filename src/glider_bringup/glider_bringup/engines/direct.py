@@ -113,7 +113,15 @@ def fly(state, params, log, dt):
         rows = row + 1
         if finished:
             break
-    return MissionState(plant, current, navigation, guidance, control, guard), rows, finished
+    state = MissionState(
+        plant=plant,
+        current=current,
+        navigation=navigation,
+        guidance=guidance,
+        control=control,
+        guard=guard,
+    )
+    return state, rows, finished
 
 
 @structref.register

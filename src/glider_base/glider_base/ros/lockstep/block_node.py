@@ -74,7 +74,8 @@ class BlockNode(StepNode):
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
         """Answer one tick."""
         for order, values in self.orders.items():
-            self.event(stamp_ns, health.OK, order, **values)
+            name = self.get_fully_qualified_name()
+            self.publish_event(health.status_array(stamp_ns, name, health.OK, order, values))
         self.orders.clear()
         for place, values in self.absent:
             inputs = (*inputs[:place], values, *inputs[place:])
