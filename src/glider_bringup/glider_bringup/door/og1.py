@@ -96,7 +96,8 @@ def write_og1(
     Raises
     ------
     ConfigurationError
-        If it has no bag, or no tick in it, or nobody knows when it was, or the file cannot be written.
+        If it has no bag, or no tick in it, if nobody knows when it was, or the file cannot be
+        written.
     """
     try:
         import h5netcdf  # noqa: F401 - xarray writes NetCDF 4 through it
