@@ -28,8 +28,6 @@ RISES_MPS = 0.02
 SUNK_M = 3.0
 #: The depth by which it sinks, or stays where it is, is averaged over this time (s).
 MEAN_S = 10.0
-#: A mean depth that changes faster than this is not standing still (m/s), though it comes back.
-MOVES_MPS = 0.1
 #: A depth that changes by no more than this rests (m).
 AT_REST_M = 1.0
 #: For longer than this (s) the depth lags behind the vertical rate before it is told.
@@ -60,6 +58,7 @@ class DepthLimits(NamedTuple):
     led_m: float  #: by pump and pitch, where the depth stays the same
     stalled_m: float
     stalled_s: float
+    stall_mean_s: float  #: the depth is averaged over this, so that noise is no motion
     under_s: float  #: infinite: never too long
     lag_m: float
     lag_share: float  #: of the way that the vertical rate says
@@ -81,7 +80,8 @@ class Depths(NamedTuple):
     mark: float  #: depth from which progress upward is counted (m)
     climbs_s: float  #: time without progress while rising is commanded
     mean: float  #: depth, averaged (m)
-    top: float  #: the least that it has been while it stayed the same (m)
+    near: float  #: the same, averaged over `DepthLimits.stall_mean_s` (m)
+    top: float  #: the least that this has been while it stayed the same (m)
     bottom: float  #: and the most
     stalled_s: float
     rest: float  #: depth at which it may be at rest (m)
@@ -98,7 +98,7 @@ class Depths(NamedTuple):
     apart_s: float  #: for which two measured depths have differed
 
 
-INITIAL_DEPTHS = Depths(*(24 * (0.0,)))
+INITIAL_DEPTHS = Depths(*(25 * (0.0,)))
 
 
 class Sounding(NamedTuple):
@@ -163,6 +163,7 @@ def begin_at(depth):
         mark=depth,
         climbs_s=none,
         mean=depth,
+        near=depth,
         top=depth,
         bottom=depth,
         stalled_s=none,
@@ -218,13 +219,13 @@ def sound(state, at, limits, dt):
     if progress:
         mark = depth
     mean, before = state.mean + dt / MEAN_S * (depth - state.mean), state.least
+    near = state.near + dt / limits.stall_mean_s * (depth - state.near)
     if abs(depth - state.depth) > limits.jump_m:  # it was set anew
-        mean, before = depth, depth
-    top, bottom = min(state.top, mean), max(state.bottom, mean)
+        mean, near, before = depth, depth, depth
+    top, bottom = min(state.top, near), max(state.bottom, near)
     is_stalled = under and bottom - top < limits.stalled_m
-    is_stalled = is_stalled and abs(depth - mean) < MOVES_MPS * MEAN_S
     if not is_stalled:
-        top, bottom = mean, mean
+        top, bottom = near, near
     is_counted = at.surfaces and at.is_pumped and not at.is_out
     least = min(before, mean) if is_counted else mean
     rest, led_m = state.rest, state.led_m + dt * at.led
@@ -244,6 +245,7 @@ def sound(state, at, limits, dt):
         mark=mark,
         climbs_s=_count(no_way_up, state.climbs_s, dt),
         mean=mean,
+        near=near,
         top=top,
         bottom=bottom,
         stalled_s=_count(is_stalled, state.stalled_s, dt),

@@ -152,7 +152,7 @@ ROWS = (
     Row(
         STALLED,
         'stalled',
-        'under water at the same depth, and not moving up and down about it',
+        'under water at the same depth',
         'stalled_m, stalled_s',
         SURFACE,
         True,

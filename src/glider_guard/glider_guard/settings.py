@@ -22,6 +22,10 @@ from glider_model.onboard.moving_mass import make_moving_mass
 from glider_model.vehicle.actuators import doubt
 from glider_model.vehicle.file import load_vehicle
 
+#: Whether the depth stays the same is seen in its average over this time (s), and so many samples:
+#: longer than noise lasts, and shorter than a yo by a pump that is too slow for it, whose swing
+#: would be lost.
+STALL_MEAN_S, STALL_SAMPLES = 3.0, 2.0
 #: What is as improbable as this does not happen.
 RARE = 1e-9
 
@@ -239,6 +243,7 @@ class GuardSettings(GuardLimitSettings):
                 led_m=self.led_m + 6.0 * self.depth_resolution_m,
                 stalled_m=self.stalled_m,
                 stalled_s=self.stalled_s or math.inf,
+                stall_mean_s=max(STALL_MEAN_S, STALL_SAMPLES * self.imu_period_s),
                 under_s=self.under_water_s or math.inf,
                 lag_m=self.lag_m,
                 lag_share=self.lag_share,

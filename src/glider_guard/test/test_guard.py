@@ -279,15 +279,22 @@ def test_a_depth_that_jumps_at_the_surface_has_an_offset():
     assert now == rows.DEPTH_OFFSET
 
 
-@pytest.mark.parametrize(('period_s', 'told'), [(60.0, False), (600.0, True)])
-def test_who_moves_within_a_few_metres_does_not_stand_still(period_s, told):
-    """A yo whose pump is too slow for it, 4 m from top to bottom; and one that hangs."""
-    vehicle = Vehicle(depth_m=20.0)
-    now = 0
+@pytest.mark.parametrize(('swing_m', 'told'), [(4.6, True), (5.6, False)])
+def test_who_moves_by_more_than_a_few_metres_does_not_stand_still(swing_m, told):
+    """A yo of a minute by a pump that is too slow for it; one that hangs may swing, too."""
+    vehicle, now, turns = Vehicle(depth_m=20.0), 0, 2.0 * math.pi / 60.0
     for second in range(2400):
-        rate = 4.0 * math.pi / period_s * math.cos(2.0 * math.pi * second / period_s)
-        now |= vehicle.go(1.0, rate=rate)
+        now |= vehicle.go(1.0, rate=0.5 * swing_m * turns * math.cos(turns * second))
     assert bool(now & rows.STALLED) == told
+
+
+def test_who_stands_still_is_seen_through_the_noise_of_seldom_samples():
+    """Noise of 1 m, a sample every 6 s, and no way up or down for an hour."""
+    vehicle, draw, now = Vehicle(imu_period_s=6.0), np.random.default_rng(3), 0
+    for _ in range(600):
+        vehicle.depth = 590.0 + draw.normal()
+        now |= vehicle.go(6.0, rate=0.0)
+    assert now & rows.STALLED
 
 
 @pytest.mark.parametrize(('pitch_deg', 'demand'), [(-25.0, DIVES), (25.0, RISES)])
