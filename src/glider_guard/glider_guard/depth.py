@@ -223,7 +223,8 @@ def sound(state, at, limits, dt):
     if abs(depth - state.depth) > limits.jump_m:  # it was set anew
         mean, near, before = depth, depth, depth
     top, bottom = min(state.top, near), max(state.bottom, near)
-    is_stalled = under and bottom - top < limits.stalled_m
+    # by the average: noise shows the surface to one that hangs a few metres below it
+    is_stalled = near > SURFACE_M and bottom - top < limits.stalled_m
     if not is_stalled:
         top, bottom = near, near
     is_counted = at.surfaces and at.is_pumped and not at.is_out

@@ -288,12 +288,13 @@ def test_who_moves_by_more_than_a_few_metres_does_not_stand_still(swing_m, told)
     assert bool(now & rows.STALLED) == told
 
 
-def test_who_stands_still_is_seen_through_the_noise_of_seldom_samples():
-    """Noise of 1 m, a sample every 6 s, and no way up or down for an hour."""
-    vehicle, draw, now = Vehicle(imu_period_s=6.0), np.random.default_rng(3), 0
-    for _ in range(600):
-        vehicle.depth = 590.0 + draw.normal()
-        now |= vehicle.go(6.0, rate=0.0)
+@pytest.mark.parametrize(('depth_m', 'period_s'), [(590.0, 6.0), (8.2, 0.1)])
+def test_who_stands_still_is_seen_through_noise(depth_m, period_s):
+    """Noise of 1 m, a sample now and then or a few metres deep, and no way up or down."""
+    vehicle, draw, now = Vehicle(imu_period_s=period_s), np.random.default_rng(3), 0
+    for _ in range(round(3000.0 / period_s)):
+        vehicle.depth = depth_m + draw.normal()
+        now |= vehicle.go(period_s, rate=0.0)
     assert now & rows.STALLED
 
 
