@@ -210,9 +210,9 @@ def sound(state, at, limits, dt):
     astray_m = _lag(state.astray_m, at.led, at, limits.jump_m, dt)
     going = abs(at.odom_rate) + TILT * at.odom_speed
     gone_m = state.gone_m + dt * (going - state.gone_m / LAG_FADES_S)
-    lags = abs(lag_m) > max(limits.lag_m, limits.lag_share * gone_m)
-    if at.led != 0.0 and abs(astray_m) < 0.5 * abs(astray_m - lag_m):
-        lags = False  # it is the vertical rate that is wrong
+    # where pump and pitch led it to this depth, it is the vertical rate that is wrong
+    is_led = at.led != 0.0 and abs(astray_m) < 0.5 * abs(astray_m - lag_m)
+    lags = not is_led and abs(lag_m) > max(limits.lag_m, limits.lag_share * gone_m)
     climbs = at.ascends or at.surfaces
     mark = max(state.mark, depth) if climbs and under else depth
     progress = mark - depth >= limits.progress_m
@@ -229,9 +229,8 @@ def sound(state, at, limits, dt):
         top, bottom = near, near
     is_counted = at.surfaces and at.is_pumped and not at.is_out
     least = min(before, mean) if is_counted else mean
-    rest, led_m = state.rest, state.led_m + dt * at.led
-    if not under or abs(depth - rest) > AT_REST_M:
-        rest, led_m = depth, 0.0
+    is_gone = not under or abs(depth - state.rest) > AT_REST_M
+    rest, led_m = (depth, 0.0) if is_gone else (state.rest, state.led_m + dt * at.led)
     waits_up = at.surfaces and not at.is_afloat
     up_from = state.up_from if waits_up and state.up_s > 0.0 else depth
     is_near = 0.0 < at.altitude < limits.altitude_m and at.rate > -RISES_MPS
