@@ -34,9 +34,9 @@ def flight(depth_at, told_s: float = np.inf) -> Truth:
     return truth
 
 
-def kind_of(truth: Truth, faults=(), status='completed') -> str:
+def kind_of(truth: Truth, faults=(), status='completed', **others) -> str:
     name, changes = SCENARIO
-    loaded = load_scenario(name, {**changes, 'faults': list(faults)})
+    loaded = load_scenario(name, {**changes, 'faults': list(faults), **others})
     begun = [fault['at_s'] for fault in faults]
     return judge(loaded, truth, status, '', begun).kind
 
@@ -67,6 +67,15 @@ def test_who_has_no_means_left_is_not_lost_but_has_to_be_told():
     assert kind_of(flight(SINKS), [flood]) == 'untold'
     assert kind_of(flight(SINKS, told_s=3000.0), [flood], 'lost') == ''
     assert kind_of(flight(SINKS, told_s=3000.0), [flood], 'surfaced') == 'untold'
+
+
+def test_who_fills_up_at_the_surface_with_all_done_is_not_lost():
+    """Flight 224 of seed 5786: early on all that can be done brings it up, and later it fills."""
+    depth = flight([(0.0, 0.0), (400.0, 20.0), (3600.0, 0.0), (8000.0, 0.0), (9000.0, 400.0)])
+    leak = {'kind': 'leak', 'rate_kgps': 1e-4, 'at_s': 400.0, 'detected': False}
+    g2 = {'vehicle': 'slocum_g2', 'profile.depth_m': 20.0, 'profile.net_heaviness_kg': 0.2}
+    assert kind_of(depth, [{**leak, 'limit_kg': 2.0}], **g2) != 'lost'
+    assert kind_of(depth, [{**leak, 'limit_kg': 0.1}], **g2) == 'lost'
 
 
 def test_who_stays_down_after_it_was_sent_up_is_late():

@@ -157,7 +157,8 @@ def _lost(scenario: Scenario, truth: Truth) -> str:
     if too_deep.any():
         moments.append(float(np.argmax(too_deep)))
     for moment in moments:
-        done = _all_done(scenario, moment, due_s(crush))
+        # for as long as it lived: a leak may fill up one that has done all, at the surface
+        done = _all_done(scenario, moment, max(due_s(crush), crossed_s - moment))
         if any(depths.max() <= crush and _comes_up(depths) for depths in done):
             return f'{truth.deepest:.0f} m deep (crush depth {crush:g}), saved at {moment:.0f} s'
     return ''
