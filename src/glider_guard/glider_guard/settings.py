@@ -122,8 +122,8 @@ class GuardLimitSettings(Settings):
         60.0,
         ge=5.0,
         le=1000.0,
-        description='way that pump and pitch lead while the depth rests within a metre (m), as in a '
-        'stall that control ends',
+        description='way that pump and pitch lead while the depth rests within a metre (m), as in '
+        'a stall that control ends',
     )
     jump_m: float = Field(
         5.0,
