@@ -71,11 +71,12 @@ def test_who_has_no_means_left_is_not_lost_but_has_to_be_told():
 
 def test_who_fills_up_at_the_surface_with_all_done_is_not_lost():
     """Flight 224 of seed 5786: early on all that can be done brings it up, and later it fills."""
-    depth = flight([(0.0, 0.0), (400.0, 20.0), (3600.0, 0.0), (8000.0, 0.0), (9000.0, 400.0)])
+    fills = [(0.0, 0.0), (400.0, 20.0), (3600.0, 0.0), (8000.0, 0.0), (9000.0, 400.0)]
+    depth = flight(fills, told_s=3400.0)
     leak = {'kind': 'leak', 'rate_kgps': 1e-4, 'at_s': 400.0, 'detected': False}
     g2 = {'vehicle': 'slocum_g2', 'profile.depth_m': 20.0, 'profile.net_heaviness_kg': 0.2}
-    assert kind_of(depth, [{**leak, 'limit_kg': 2.0}], **g2) != 'lost'
-    assert kind_of(depth, [{**leak, 'limit_kg': 0.1}], **g2) == 'lost'
+    assert kind_of(depth, [{**leak, 'limit_kg': 2.0}], 'lost', **g2) == ''
+    assert kind_of(depth, [{**leak, 'limit_kg': 0.1}], 'lost', **g2) == 'lost'
 
 
 def test_who_stays_down_after_it_was_sent_up_is_late():
