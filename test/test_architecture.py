@@ -60,7 +60,7 @@ FLOORS = {
         ('random_faults', 'workers'),
         ('montecarlo', 'sweep'),
         ('paper',),
-        ('hunt', 'routes', 'showing', 'at_work'),
+        ('hunt', 'routes', 'forecasts', 'showing', 'at_work'),
         ('door', 'commands'),
     ),
 }

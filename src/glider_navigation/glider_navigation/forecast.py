@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A forecast of the current, as a vehicle takes it along on its mission.
 
-It is said in the words of the current of a scenario. What fixes tell is by how much it is off.
+It is said in the words of the current of a scenario. Fixes tell two things of it: by how much it
+is off, and what share of it there is in the sea. The second is learnt from how the current changed
+from one way to the next, beside how that was forecast (recursive least squares): a forecast of
+eddies that are not there comes to be left out, and the last mean holds, as without a forecast.
 """
 
 from typing import NamedTuple
@@ -20,6 +23,9 @@ from glider_model.ocean.current import (
 )
 from glider_model.ocean.current_settings import SumOfCurrents
 
+#: No more of a forecast is believed than this share.
+MOST_SHARE = 1.5
+
 
 class ForecastSettings(SumOfCurrents):
     """Current that was forecast, and how far its mean over a way may be off."""
@@ -29,6 +35,13 @@ class ForecastSettings(SumOfCurrents):
         gt=0.0,
         le=1.0,
         description='standard deviation of the forecast, of its north and of its east part (m/s)',
+    )
+    share_std: float = Field(
+        0.5,
+        ge=0.0,
+        le=2.0,
+        description='how far the share of the forecast that there is in the sea may be off 1, at '
+        'first (-); 0.0: it is taken whole, whatever fixes tell',
     )
 
     @pydantic.model_validator(mode='after')
@@ -54,6 +67,13 @@ class Forecast(NamedTuple):
     nothing: CurrentState  #: no part of it remembers anything
 
 
+class Trust(NamedTuple):
+    """What share of a forecast is believed."""
+
+    share: float
+    variance: float  #: of it
+
+
 def make_forecast(settings: ForecastSettings, is_believed: bool) -> Forecast:
     """Forecast of some settings, or of none."""
     params = (settings if is_believed else ForecastSettings()).params()
@@ -68,3 +88,29 @@ def forecast_at(forecast, place, depth, t_s):
     position = (place.n, place.e, depth)
     _, water = current_step_in_place(forecast.nothing, position, t_s, forecast.params, TICK_S)
     return Vector(water.v_n, water.v_e)
+
+
+@kernel
+def weigh(trust, off, change, variance):
+    """What share of a forecast is believed after a way.
+
+    Parameters
+    ----------
+    trust : Trust
+        Before the way.
+    off : Vector
+        Mean current over the way less what was believed (m/s).
+    change : Vector
+        Mean of the forecast over the way less that of the way before (m/s).
+    variance : float
+        Of ``off``, were the share known, of its north and of its east part (m^2/s^2).
+    """
+    gain = trust.variance / (variance + trust.variance * squared(change))
+    share = trust.share + gain * (change.n * off.n + change.e * off.e)
+    return Trust(min(MOST_SHARE, max(0.0, share)), trust.variance * (1.0 - gain * squared(change)))
+
+
+@kernel
+def squared(v):
+    """Square of the length of a vector."""
+    return v.n * v.n + v.e * v.e

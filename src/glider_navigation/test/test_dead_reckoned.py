@@ -13,6 +13,7 @@ from glider_base.signals import TICK_S, Imu, Joints, Vector
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation.current_belief import Uncertainty, initial_belief
+from glider_navigation.forecast import Trust, weigh
 from glider_navigation.method import Fix, Heard, method_step
 from glider_navigation.methods.dead_reckoned import Drift, Way, place_covariance
 from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
@@ -178,6 +179,45 @@ def test_a_forecast_changes_with_time_and_depth_as_it_says(dives):
     assert led[1] == pytest.approx(0.2 * 0.75 * WAY_S, rel=0.02)
 
 
+def test_a_forecast_of_changes_that_do_not_come_is_left_out(dives):
+    """The sea is steady. The forecast of its first way holds, and swings from way to way."""
+    truth = dives([30.0, 40.0, 200.0, 120.0, 310.0, 75.0, 20.0, 250.0])
+    swings = [(0.0, 0.15), (0.12, 0.0), (-0.1, 0.1), (0.0, -0.15), (0.1, 0.1)]
+    steps = [
+        {'at_s': way * (STAY_S + WAY_S), 'north_mps': n, 'east_mps': e}
+        for way, (n, e) in enumerate([*swings, *swings[:2]], 1)
+    ]
+    forecast = {'components': [*FORECAST['components'], {'kind': 'steps', 'steps': steps}]}
+
+    def last_error(**more):
+        track = navigate(truth, current='forecast', forecast={**forecast, **more})
+        end = truth.end(7)
+        return np.linalg.norm(truth.places[end] - track.place(end)), track.state.trust
+
+    believed, whole = last_error(share_std=0.0)
+    left_out, trust = last_error()
+    assert believed > 0.1 * WAY_S
+    assert left_out < 0.1 * believed
+    assert whole == (1.0, 0.0)
+    assert trust.share < 0.05
+    assert trust.variance < 0.1**2
+
+
+def test_a_forecast_of_changes_that_come_is_believed_and_more_surely():
+    """What each way is off by, drawn by lot: the share that there is in the sea is found."""
+    rng, trust = np.random.default_rng(3), Trust(1.0, 0.25)
+    shares = []
+    for true in rng.uniform(0.3, 1.2, 300):
+        weighed = trust
+        for change in rng.normal(0.0, 0.1, (6, 2)):
+            off = (true - weighed.share) * change + rng.normal(0.0, 0.02, 2)
+            weighed = weigh(weighed, Vector(*off), Vector(*change), 0.02**2)
+        shares.append((weighed.share - true, weighed.variance))
+    errors, told = np.array(shares).T
+    assert np.var(errors) == pytest.approx(np.mean(told), rel=0.2)
+    assert np.mean(told) < 0.1**2
+
+
 @pytest.mark.parametrize(
     'forecast',
     [{}, {'components': [{'kind': 'gauss_markov', 'std_mps': 0.1, 'time_constant_s': 9.0}]}],
@@ -249,7 +289,7 @@ def test_depth_and_phase_are_those_of_the_dives(dives):
 
 @pytest.mark.parametrize('tide', [True, False], ids=['tidal', 'persistence'])
 def test_covariance_of_a_place_is_that_of_its_errors_drawn_by_lot(tide):
-    """Where a way began, mean and tide, how far the sea wandered, speed and compass.
+    """Where a way began, mean and tide, how far the sea wandered, the forecast, speed, compass.
 
     Errors of speed and compass were in the way before, too, and were taken for current then: what
     they do to this way is what they do to both, less that.
@@ -268,7 +308,19 @@ def test_covariance_of_a_place_is_that_of_its_errors_drawn_by_lot(tide):
     )
     through = Vector(*(t_s * glide).tolist())
     still = Vector(0.0, 0.0)
-    way = Way(still, 900.0, Drift(still, 1.0), through, still, t_s, h[1] * t_s, h[2] * t_s)
+    told_now, told_before, trust = (0.12, -0.05), Vector(-0.04, 0.02), Trust(0.8, 0.09)
+    forecast = Vector(*(t_s * told for told in told_now))
+    way = Way(
+        begun=still,
+        variance=900.0,
+        drift=Drift(still, 1.0),
+        through=through,
+        believed=still,
+        forecast=forecast,
+        t_s=t_s,
+        cos_s=h[1] * t_s,
+        sin_s=h[2] * t_s,
+    )
 
     rng, count = np.random.default_rng(8), 400_000
     start = rng.normal(0.0, 30.0, (count, 2))
@@ -281,9 +333,10 @@ def test_covariance_of_a_place_is_that_of_its_errors_drawn_by_lot(tide):
         wrong = (1.0 + share) * np.exp(1j * turn) * (velocity[0] + 1j * velocity[1])
         return np.stack([wrong.real, wrong.imag], axis=1) - velocity
 
-    errors = start + t_s * (sea + flown(glide) - flown(before))
+    holds = rng.normal(0.0, 0.3, (count, 1)) * (np.array(told_now) - told_before)
+    errors = start + t_s * (sea + holds + flown(glide) - flown(before))
     drawn = np.cov(errors.T)
-    told = place_covariance(way, belief, params)
+    told = place_covariance(way, belief, trust, told_before, params)
     assert [told.nn, told.ee] == pytest.approx(np.diag(drawn), rel=0.012)
     scale = math.sqrt(told.nn * told.ee)
     assert told.ne == pytest.approx(drawn[0, 1], abs=0.01 * scale)

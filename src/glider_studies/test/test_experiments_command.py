@@ -25,7 +25,7 @@ from glider_mission.run_folder import make_result_folder
 from glider_mission.scenario import load_scenario, parse_assignment
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle
-from glider_studies import routes
+from glider_studies import forecasts, routes
 from glider_studies.commands.experiments import Group
 from glider_studies.hunt import search
 from glider_studies.paper import experiments, measures
@@ -66,7 +66,7 @@ def planned():
 
 
 def test_command_line_knows_every_group():
-    assert get_args(Group) == (*catalogue(), search.NAME, routes.NAME)
+    assert get_args(Group) == (*catalogue(), search.NAME, routes.NAME, forecasts.NAME)
 
 
 def test_every_experiment_can_be_flown(planned):

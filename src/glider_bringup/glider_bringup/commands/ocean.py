@@ -36,6 +36,15 @@ def ocean(
     rms: Annotated[
         float, typer.Option(min=0.0, max=1.0, help='rms of what --make makes, at the top (m/s).')
     ] = 0.18,
+    error: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=1.0,
+            help='It makes a forecast of that sea instead, whose depth-averaged current is off '
+            'by this rms (m/s).',
+        ),
+    ] = 0.0,
     as_json: Json = False,
 ) -> None:
     """Tell what is in a file of currents, whether it covers a mission, and draw it.
@@ -43,7 +52,7 @@ def ocean(
     Exit code 2: it is no grid of currents, or does not cover the mission.
     """
     if make is not None:
-        _make(file, make, rms)
+        _make(file, EddyingSea(seed=make, rms_mps=rms, error_mps=error))
     with messages.status('reading'):
         told, sea, refused = _told(file, mission)
         if out and sea:
@@ -59,11 +68,11 @@ def ocean(
         output.print(f'drawn: {out}', soft_wrap=True)
 
 
-def _make(file: Path, seed: int, rms_mps: float) -> None:
+def _make(file: Path, sea: EddyingSea) -> None:
     """Make a sea full of eddies, in the layout of CMEMS."""
     if file.exists():
         raise ConfigurationError(f'{file}: is there already (allowed: a new file)')
-    write_sea(EddyingSea(seed=seed, rms_mps=rms_mps), file)
+    write_sea(sea, file)
 
 
 def _told(file: Path, mission: str | None) -> tuple[dict[str, Any], Sea | None, str]:

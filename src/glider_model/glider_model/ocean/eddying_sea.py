@@ -21,6 +21,8 @@ _STEP_DEG, _UNIT = 1.0 / 6.0, 2e-4
 _DEGREE_KM = 111.2
 #: Eddies on a square degree, and how far beyond the sea there are some (km).
 _A_DEGREE, _BEYOND_KM = 4.0, 60.0
+#: The seed of the eddies of a forecast's error is so much larger.
+_ERROR_SEED = 2**32
 
 
 class EddyingSea(Settings):
@@ -28,6 +30,13 @@ class EddyingSea(Settings):
 
     seed: int = Field(0, ge=0, le=2**31 - 1, description='seed of its eddies (1)')
     rms_mps: float = Field(0.18, ge=0.0, le=1.0, description='rms of each part at the top (m/s)')
+    error_mps: float = Field(
+        0.0,
+        ge=0.0,
+        le=1.0,
+        description='rms of each part of the depth mean of more eddies, which are not in the sea '
+        'of the same seed: a forecast of it (m/s)',
+    )
     radius_km: float = Field(35.0, ge=10.0, le=200.0, description='R of its eddies, about (km)')
     decay_m: float = Field(600.0, ge=50.0, le=5000.0, description='depth of 1/e (m)')
     days: int = Field(16, ge=1, le=400, description='days from its first time to its last (1)')
@@ -40,6 +49,8 @@ class EddyingSea(Settings):
 
 def currents(sea: EddyingSea) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
     """Axes of a sea by name, and its velocities to the east and to the north (m/s).
+
+    With an error they are those of a forecast of the sea.
 
     Returns
     -------
@@ -71,7 +82,14 @@ def currents(sea: EddyingSea) -> tuple[dict[str, np.ndarray], np.ndarray, np.nda
     scale = sea.rms_mps / max(1e-12, math.sqrt(0.5 * np.mean(east**2 + north**2)))
     weaker = np.exp(-depth / sea.decay_m)[None, :, None, None]
     axes = {'time': 24.0 * days, 'depth': depth, 'latitude': latitude, 'longitude': longitude}
-    return axes, scale * east[:, None] * weaker, scale * north[:, None] * weaker
+    east, north = scale * east[:, None] * weaker, scale * north[:, None] * weaker
+    if sea.error_mps:
+        deepest = _DEPTHS[-1] / sea.decay_m
+        mean = -math.expm1(-deepest) / deepest  # of what is 1 at the top, over depth
+        more = {'seed': sea.seed + _ERROR_SEED, 'rms_mps': sea.error_mps / mean, 'error_mps': 0.0}
+        _, wrong_east, wrong_north = currents(sea.model_copy(update=more))
+        east, north = east + wrong_east, north + wrong_north
+    return axes, east, north
 
 
 def write_sea(sea: EddyingSea, path: Path) -> None:

@@ -40,7 +40,14 @@ from glider_navigation.flight_model import (
     set_anew,
     weigh_speed,
 )
-from glider_navigation.forecast import Forecast, forecast_at, make_forecast
+from glider_navigation.forecast import (
+    Forecast,
+    Trust,
+    forecast_at,
+    make_forecast,
+    squared,
+    weigh,
+)
 from glider_navigation.method import (
     Believed,
     NavigationMethodSettings,
@@ -109,14 +116,16 @@ class DeadReckonedSettings(NavigationMethodSettings):
             drift=drift,
             through=still,
             believed=still,
+            forecast=still,
             t_s=0.0,
             cos_s=0.0,
             sin_s=0.0,
         )
         stay = launched(place, self.start_std_m**2)
-        current = initial_belief(start.current == 'tidal')
+        current, trust = initial_belief(start.current == 'tidal'), Trust(1.0, 0.0)
         if start.current == 'forecast':
             current = initial_belief(False, start.forecast.error_std_mps)
+            trust = Trust(1.0, start.forecast.share_std**2)
         return DeadReckonedState(
             tick=0,
             attitude=initial_attitude(start.vehicle),
@@ -126,6 +135,7 @@ class DeadReckonedSettings(NavigationMethodSettings):
             way=way,
             stay=stay,
             current=current,
+            trust=trust,
             column=still,
             depth=0.0,
             zero=INITIAL_ZERO,
@@ -159,6 +169,7 @@ class Way(NamedTuple):
     drift: Drift  #: there
     through: Vector  #: way through the water, and by drift where nothing fixed it (m)
     believed: Vector  #: way by the current that was believed (m)
+    forecast: Vector  #: way by the current that was forecast (m)
     t_s: float  #: time under water
     cos_s: float  #: integrals of cos(w t) and sin(w t) over it (s)
     sin_s: float
@@ -174,7 +185,8 @@ class DeadReckonedState(NamedTuple):
     place: Vector  #: where the vehicle believes it is (m)
     way: Way
     stay: Stay
-    current: CurrentBelief
+    current: CurrentBelief  #: beside what is believed of the forecast
+    trust: Trust
     column: Vector  #: mean of the forecast over the last way that told something (m/s)
     depth: float  #: that was shown last (m)
     zero: Zero  #: what is shown at the surface
@@ -195,7 +207,14 @@ def _unlike(way, current):
 
 
 @kernel
-def place_covariance(way, current, params):
+def _change_of_forecast(way, column):
+    """Mean of the forecast over a way less that of the last way (m/s)."""
+    t = max(1.0, way.t_s)
+    return Vector(way.forecast.n / t - column.n, way.forecast.e / t - column.e)
+
+
+@kernel
+def place_covariance(way, current, trust, column, params):
     """Covariance of the place after a way (m^2)."""
     t = way.t_s
     known = way.variance + t * t * (
@@ -204,34 +223,37 @@ def place_covariance(way, current, params):
     unlike = _unlike(way, current)
     n, e = t * unlike.n, t * unlike.e
     along, across = params.speed_variance, params.heading_variance
+    change, unsure = _change_of_forecast(way, column), t * t * trust.variance
     return Covariance(
-        known + along * n * n + across * e * e,
-        (along - across) * n * e,
-        known + along * e * e + across * n * n,
+        known + along * n * n + across * e * e + unsure * change.n * change.n,
+        (along - across) * n * e + unsure * change.n * change.e,
+        known + along * e * e + across * n * n + unsure * change.e * change.e,
     )
 
 
 @kernel
-def _learn(current, way, stay, params):
-    """What is believed of the current after the fixes of a stay."""
+def _learn(current, trust, column, way, stay, params):
+    """What is believed of current and forecast after the fixes of a stay."""
     if way.t_s < SHORTEST_WAY_S or not params.believes_current:
-        return current
+        return current, trust
     t = way.t_s
     off = Vector(
         (stay.came_up.n - way.begun.n - way.through.n - way.believed.n) / t,
         (stay.came_up.e - way.begun.e - way.through.e - way.believed.e) / t,
     )
-    unlike = _unlike(way, current)
+    h, variance = _regressors(way), (way.variance + stay.known.cc) / (t * t)
     bias = 0.5 * (params.speed_variance + params.heading_variance)
-    return take_in(
-        current,
-        off,
-        _regressors(way),
-        t,
-        Vector(way.through.n / t, way.through.e / t),
-        (way.variance + stay.known.cc) / (t * t),
-        bias * (unlike.n * unlike.n + unlike.e * unlike.e),
-    )
+    bias *= squared(_unlike(way, current))
+    if trust.variance > 0.0 and current.way_s > 0.0:
+        change = _change_of_forecast(way, column)
+        noise = mean_variance(current, h) + wandered(current, t) + bias + variance
+        weighed = weigh(trust, off, change, noise)
+        more = weighed.share - trust.share
+        off = Vector(off.n - more * change.n, off.e - more * change.e)
+        mean = Vector(current.mean.n - more * column.n, current.mean.e - more * column.e)
+        current, trust = replace(current, mean=mean), weighed
+    through = Vector(way.through.n / t, way.through.e / t)
+    return take_in(current, off, h, t, through, variance, bias), trust
 
 
 @kernel
@@ -246,6 +268,7 @@ def _dive(way, stay):
             drift=drift,
             through=still,
             believed=still,
+            forecast=still,
             t_s=0.0,
             cos_s=0.0,
             sin_s=0.0,
@@ -259,12 +282,13 @@ def _dive(way, stay):
 
 
 @kernel
-def _go_on(way, through, current, t_s, dt):
-    """The way a tick later, at velocities through the water and of the current (m/s)."""
+def _go_on(way, through, current, told, t_s, dt):
+    """The way a tick later, at velocities through the water, of current and forecast (m/s)."""
     return replace(
         way,
         through=Vector(way.through.n + dt * through.n, way.through.e + dt * through.e),
         believed=Vector(way.believed.n + dt * current.n, way.believed.e + dt * current.e),
+        forecast=Vector(way.forecast.n + dt * told.n, way.forecast.e + dt * told.e),
         t_s=way.t_s + dt,
         cos_s=way.cos_s + dt * math.cos(TIDE * t_s),
         sin_s=way.sin_s + dt * math.sin(TIDE * t_s),
@@ -272,28 +296,27 @@ def _go_on(way, through, current, t_s, dt):
 
 
 @kernel
-def _forecast_mean(way, current):
-    """Mean (m/s) of the forecast over a way, of what was believed in it."""
-    learnt = current_at(current, 0.0)
-    return Vector(way.believed.n / way.t_s - learnt.n, way.believed.e / way.t_s - learnt.e)
+def _water(learnt, told, trust):
+    """Current (m/s) that is believed, of what was learnt and what is forecast."""
+    return Vector(learnt.n + trust.share * told.n, learnt.e + trust.share * told.e)
 
 
 @kernel
-def _water_at(place, depth, t_s, current, params):
-    """Current (m/s) that is believed for a place (m), depth (m) and time since the start (s)."""
-    learnt, told = current_at(current, t_s), forecast_at(params.forecast, place, depth, t_s)
-    return Vector(learnt.n + told.n, learnt.e + told.e)
+def _at_the_top(place, t_s, current, trust, params):
+    """Current (m/s) that is believed for a place at the surface (m) and a time (s)."""
+    told = forecast_at(params.forecast, place, 0.0, t_s)
+    return _water(current_at(current, t_s), told, trust)
 
 
 @kernel
-def _unforeseen(drift, place, t_s, current, params):
+def _unforeseen(drift, place, t_s, current, trust, params):
     """A drift (m/s) at a place (m) and time (s), less the water that is believed to be there."""
-    water = _water_at(place, 0.0, t_s, current, params)
+    water = _at_the_top(place, t_s, current, trust, params)
     return Vector(drift.n - water.n, drift.e - water.e)
 
 
 @kernel
-def _carry(current, way, stay, t_s, params):
+def _carry(current, trust, way, stay, t_s, params):
     """What is believed of the current as a stay ends, by how the drift has changed since the way.
 
     The drift of the way is that at both of its ends, where that at the first is as well known.
@@ -301,10 +324,11 @@ def _carry(current, way, stay, t_s, params):
     if current.way_s <= 0.0:
         return current
     early, up_s = stay.early, t_s - stay.t_s
-    now = _unforeseen(stay.drift, stay.place, t_s, current, params)
-    then = _unforeseen(early.drift, stay.came_up, up_s + early.t_s, current, params)
+    now = _unforeseen(stay.drift, stay.place, t_s, current, trust, params)
+    then = _unforeseen(early.drift, stay.came_up, up_s + early.t_s, current, trust, params)
     if way.drift.variance <= KNOWN_ALIKE * early.variance:
-        first = _unforeseen(way.drift.velocity, way.begun, up_s - way.t_s, current, params)
+        drift, begun_s = way.drift.velocity, up_s - way.t_s
+        first = _unforeseen(drift, way.begun, begun_s, current, trust, params)
         then = Vector(0.5 * (then.n + first.n), 0.5 * (then.e + first.e))
     change = Vector(now.n - then.n, now.e - then.e)
     return carry(current, change, stay.t_s, stay.known.vv + early.variance)
@@ -321,7 +345,7 @@ def _end_of(way):
 
 @kernel
 def _change_over(state, under, t_s, params):
-    """Way, stay and what is believed of the current, after a dive or a surfacing if there is one.
+    """Way, stay, current and trust in the forecast, after a dive or a surfacing if there is one.
 
     Parameters
     ----------
@@ -335,27 +359,28 @@ def _change_over(state, under, t_s, params):
 
     Returns
     -------
-    Way, Stay, CurrentBelief
+    Way, Stay, CurrentBelief, Trust
     Vector
         Mean of the forecast over the last way that told something (m/s).
     """
-    way, stay, current, column = state.way, state.stay, state.current, state.column
+    way, stay, current = state.way, state.stay, state.current
+    trust, column = state.trust, state.column
     if state.tick == 0:
         column = forecast_at(params.forecast, state.place, 0.0, t_s)
     if under and not state.under:
         if stay.fixes > 0:
-            if params.forecast.is_believed and way.t_s >= SHORTEST_WAY_S:
-                column = _forecast_mean(way, current)
-            current = _learn(current, way, stay, params)
-            current = _carry(current, way, stay, t_s, params)
+            current, trust = _learn(current, trust, column, way, stay, params)
+            if way.t_s >= SHORTEST_WAY_S:
+                column = Vector(way.forecast.n / way.t_s, way.forecast.e / way.t_s)
+            current = _carry(current, trust, way, stay, t_s, params)
         way = _dive(way, stay)
     elif state.under and not under:
-        covariance = place_covariance(way, current, params)
+        covariance = place_covariance(way, current, trust, column, params)
         drift = stay.drift
         if stay.fixes <= 1:
-            drift = _water_at(state.place, 0.0, t_s, current, params)
+            drift = _at_the_top(state.place, t_s, current, trust, params)
         stay = begin(state.place, 0.5 * (covariance.nn + covariance.ee), drift)
-    return way, stay, current, column
+    return way, stay, current, trust, column
 
 
 @kernel
@@ -401,14 +426,16 @@ def dead_reckoned_step(state, heard, params, dt):
     else:
         flight = reckon_speed(flight, attitude.angles.theta, params.polar, dt)
     under = flight.depth > (SURFACES_M if state.under else DIVES_M)
-    way, stay, current, column = _change_over(state, under, t_s, params)
+    way, stay, current, trust, column = _change_over(state, under, t_s, params)
     if under:
         psi = attitude.angles.psi
         through = Vector(flight.speed * math.cos(psi), flight.speed * math.sin(psi))
-        water = _water_at(state.place, flight.depth, t_s, current, params)
-        way = _go_on(way, through, water, t_s, dt)
+        told = forecast_at(params.forecast, state.place, flight.depth, t_s)
+        water = _water(current_at(current, t_s), told, trust)
+        way = _go_on(way, through, water, told, t_s, dt)
         place, velocity = _end_of(way), Vector(through.n + water.n, through.e + water.e)
-        covariance, phase = place_covariance(way, current, params), UNDER_WATER
+        covariance = place_covariance(way, current, trust, column, params)
+        phase = UNDER_WATER
     else:
         stay = wait(stay, dt)
         if counts(stay, heard.fix):
@@ -416,12 +443,11 @@ def dead_reckoned_step(state, heard, params, dt):
         place, velocity, variance = stay.place, stay.drift, stay.known.pp
         covariance = Covariance(variance, 0.0, variance)
         phase = FIXED if stay.fixes > 0 else AT_SURFACE
-    learnt = last_mean(current, t_s)
     wandering = current.p.mm + wandered(current, current.way_s)
     believed = Believed(
         odom=_odometry(place, attitude, flight, velocity),
         place=covariance,
-        current=Vector(learnt.n + column.n, learnt.e + column.e),
+        current=_water(last_mean(current, t_s), column, trust),
         current_covariance=Covariance(wandering, 0.0, wandering),
         surface=stay.drift,
         surface_covariance=Covariance(stay.known.vv, 0.0, stay.known.vv),
@@ -436,6 +462,7 @@ def dead_reckoned_step(state, heard, params, dt):
         way=way,
         stay=stay,
         current=current,
+        trust=trust,
         column=column,
         depth=heard.depth,
         zero=zero,

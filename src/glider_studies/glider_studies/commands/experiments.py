@@ -25,7 +25,7 @@ from glider_studies.at_work import workers_at_work
 app = typer.Typer()
 GROUPS = (
     *('current', 'yaw', 'profile', 'robustness', 'ablation', 'vehicles', 'paths', 'envelope'),
-    *('navigation', 'faults', 'random_faults', 'routes'),
+    *('navigation', 'faults', 'random_faults', 'routes', 'forecasts'),
 )
 Group = Literal[GROUPS]
 
@@ -44,7 +44,7 @@ def experiments(
         typer.Option(
             min=0,
             max=2**31 - 1,
-            help='Seed of the missions of random_faults, and of the seas of routes.',
+            help='Seed of the missions of random_faults, and of the seas of routes and forecasts.',
         ),
     ] = 0,
     workers: Workers = None,
@@ -60,10 +60,11 @@ def experiments(
     engine; the flights of the paper last 30 hours. ablation turns off one piece of the law after
     another, and asks of each whether it earns its place. random_faults breaks random missions in
     two or three random ways, and judges them by their true motion alone. routes crosses twelve
-    seas full of eddies by straight legs and along planned routes.
+    seas full of eddies by straight legs and along planned routes; forecasts reckons its way
+    through four by forecasts that err.
     """
     from glider_mission.run_folder import make_result_folder
-    from glider_studies import routes
+    from glider_studies import forecasts, routes
     from glider_studies.hunt import search
     from glider_studies.paper import experiments as paper
     from glider_studies.paper import tables
@@ -79,6 +80,9 @@ def experiments(
     if routes.NAME in groups:
         crossing = partial(routes.cross, seed)
         others.append((routes.TASKS, routes.combinations(), crossing))
+    if forecasts.NAME in groups:
+        reckoning = partial(forecasts.fly, seed)
+        others.append((forecasts.TASKS, forecasts.combinations(), reckoning))
     total = flown + sum(count for count, _, _ in others)
     if out:
         make_result_folder(out, paper.RESULT_FILE)

@@ -214,8 +214,25 @@ def _show_routes(one: dict[str, Any], output: Console) -> None:
     )
 
 
+def _show_forecasts(one: dict[str, Any], output: Console) -> None:
+    """Print how far off a vehicle came up, by what it believed of which forecast."""
+    table = _table(['reckoned by'], ['forecast off\nby (m/s)', 'surfacings', 'p50 (m)', 'p90 (m)'])
+    for row in one['rows']:
+        figures = (_number(row[name], 0) for name in ('surfacings', 'p50_m', 'p90_m'))
+        table.add_row(row['way'], _number(row['error_mps']), *figures)
+    output.print(table)
+    output.print(
+        'Persistence: the mean of the way before, and no forecast. How far off the estimated '
+        'position is at surfacings, from the fourth on.'
+    )
+
+
 #: What is no experiment of the catalogue.
-_OTHERS = {'random_faults': _show_search, 'routes': _show_routes}
+_OTHERS = {
+    'random_faults': _show_search,
+    'routes': _show_routes,
+    'forecasts': _show_forecasts,
+}
 
 
 def _show_verdict(one: dict[str, Any], output: Console) -> None:

@@ -1,0 +1,54 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""Dead reckoning by forecasts that err: what is asked of it, and what is flown."""
+
+import numpy as np
+import pytest
+
+from glider_model.ocean.eddying_sea import EddyingSea, currents, write_sea
+from glider_studies.forecasts import CASES, ERRORS, PERSISTENCE, WAYS, judge, scenario_in
+
+
+def rows(**shares):
+    """Persistence is off by 100 m, a whole forecast by 60, 90, 200 m; its share by these."""
+    off = {(PERSISTENCE, 0.0): 100.0}
+    off |= dict(
+        zip([('whole forecast', error) for error in ERRORS], (60.0, 90.0, 200.0), strict=True)
+    )
+    off |= {('its share', error): shares[f'off_{k}'] for k, error in enumerate(ERRORS)}
+    return [
+        {'way': way, 'error_mps': error, 'p50_m': off[way, error], 'p90_m': 3.0 * off[way, error]}
+        for way, error in CASES
+    ]
+
+
+@pytest.mark.parametrize(
+    ('shares', 'failed'),
+    [
+        ((65.0, 95.0, 105.0), set()),
+        ((67.0, 95.0, 105.0), {0, 1}),
+        ((65.0, 100.0, 105.0), {2, 3}),
+        ((65.0, 95.0, 111.0), {4, 5}),
+    ],
+)
+def test_its_share_is_held_to_the_better_of_both_at_every_error(shares, failed):
+    checks = judge(rows(**{f'off_{k}': off for k, off in enumerate(shares)}))
+    assert {number for number, check in enumerate(checks) if not check.passed} == failed
+
+
+def test_a_forecast_is_off_by_what_it_says_and_its_sea_is_the_same(tmp_path):
+    sea = EddyingSea(seed=2000, rms_mps=0.42)
+    told = {error: currents(sea.model_copy(update={'error_mps': error})) for error in ERRORS}
+    depths = told[0.0][0]['depth']
+    for error in ERRORS[1:]:
+        off = [told[error][k] - told[0.0][k] for k in (1, 2)]
+        means = [np.trapezoid(one, depths, axis=1) / np.ptp(depths) for one in off]
+        assert np.sqrt(np.mean(np.square(means))) == pytest.approx(error, rel=0.02)
+    for file in 'sea.nc', 'forecast.nc':
+        write_sea(sea, tmp_path / file)
+    for way in WAYS:
+        flown = scenario_in(tmp_path / 'sea.nc', tmp_path / 'forecast.nc', way)
+        settings = flown.navigation_settings()
+        assert settings.forecast.share_std == WAYS[way]
+        assert settings.params().method.forecast.is_believed
+        assert flown.current.field.file != settings.forecast.field.file
