@@ -20,7 +20,7 @@ SHALLOW = {'profile.depth_m': 200.0, 'dives': 0}
 EAST = {'kind': 'straight', 'course_deg': 90.0, 'length_m': 5000.0}
 #: Orders at odd times, one of each kind.
 ORDERS = [
-    {'at_s': 900.0, 'depth_m': 100.0, 'pitch_deg': 25.0},
+    {'at_s': 900.0, 'depth_m': 100.0, 'pitch_deg': 25.0, 'wait_s': 60.0},
     {'at_s': 1000.0, 'path': EAST, 'when': 'surfacing'},
     {'at_s': 1700.3, 'hold': True},
     {'at_s': 2600.0, 'resume': True},
@@ -63,6 +63,39 @@ def test_another_pitch_is_flown():
     flight = ordered({'pitch_deg': 45.0}, start_s=400.0)
     flight.until(t_s=700.0)
     assert np.degrees(flight.now['ground_truth_odom_pitch']) == pytest.approx(-45.0, abs=3.0)
+
+
+@pytest.mark.parametrize('in_flight', [False, True], ids=['known before', 'in flight'])
+def test_two_hours_of_waiting_are_waited_and_the_mission_goes_on(in_flight):
+    fields = {**SHALLOW, 'profile.depth_m': 50.0, 'dives': 2}
+    fields |= {'profile.surface_every_dives': 1, 'profile.wait_s': 600.0}
+
+    def stay_s(**order):
+        """Time near the surface between the two dives (s)."""
+        known = [{'at_s': 300.0, **order}] if order and not in_flight else []
+        flight = glider.Flight('current_8deg', {**fields, 'orders': known})
+        flight.until(t_s=300.0)
+        if order and in_flight:
+            flight.order(**order)
+        depth = depths(flight, 12000.0)
+        assert flight.is_over
+        up, down = np.flatnonzero(np.diff((depth > 5.0).astype(int)))[-3:-1]
+        return 10.0 * (down - up)
+
+    assert stay_s(wait_s=7200.0) - stay_s() == pytest.approx(7200.0 - 600.0, abs=20.0)
+
+
+@pytest.mark.parametrize('depth_m', [30.0, 300.0])
+def test_dives_are_counted_after_a_change_of_depth(depth_m):
+    """The mission ends after as many as it has, and the score says how many that were."""
+    orders = [{'at_s': 400.0, 'depth_m': depth_m}]
+    run = glider.fly('current_8deg', {**SHALLOW, 'dives': 3, 'orders': orders})
+    assert (run.score['status'], run.score['dives']) == ('completed', 3)
+    flight = glider.Flight('current_8deg', {**SHALLOW, 'dives': 3})
+    flight.until(t_s=400.0)
+    flight.order(depth_m=depth_m)
+    assert flight.until('end').name == 'end'
+    assert flight.t_s == run.score['sim_time_s']
 
 
 def test_who_holds_waits_at_the_surface_until_it_is_told_to_resume():

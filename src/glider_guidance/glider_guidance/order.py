@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""An order to a vehicle in flight: another path, depth or pitch; to hold, to resume, to abort."""
+"""An order to a vehicle in flight: another path, depth, pitch or wait; hold, resume, abort."""
 
 from typing import Any, Literal
 
@@ -12,7 +12,7 @@ from glider_base.signals import TICK_S
 from glider_guidance.path.settings import PathSettings
 
 #: Orders that are given alone, and those that may be given together.
-ALONE, TOGETHER = ('hold', 'resume', 'abort'), ('path', 'depth_m', 'pitch_deg')
+ALONE, TOGETHER = ('hold', 'resume', 'abort'), ('path', 'depth_m', 'pitch_deg', 'wait_s')
 
 
 class Order(Settings):
@@ -31,6 +31,9 @@ class Order(Settings):
     )
     pitch_deg: float | None = Field(
         None, ge=8.0, le=60.0, description='another pitch of the glides (deg)'
+    )
+    wait_s: float | None = Field(
+        None, ge=0.0, le=864000.0, description='another wait on the surface between dives (s)'
     )
     hold: bool = Field(False, description='come up and wait at the surface')
     resume: bool = Field(False, description='dive on after a hold')
@@ -61,6 +64,7 @@ class Order(Settings):
             'path': self.path,
             'profile.depth_m': self.depth_m,
             'profile.pitch_deg': self.pitch_deg,
+            'profile.wait_s': self.wait_s,
             'hold': self.hold if self.hold or self.resume else None,
         }
         return {name: value for name, value in asked.items() if value is not None}

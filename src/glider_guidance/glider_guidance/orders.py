@@ -26,7 +26,7 @@ def changed(settings: GuidanceSettings, order: Order) -> GuidanceSettings:
         Naming the order, and why it makes no sense.
     """
     follows = settings.profile.mode == 'path'
-    for name in ('depth_m', 'pitch_deg', 'hold'):
+    for name in ('depth_m', 'pitch_deg', 'wait_s', 'hold'):
         if follows and getattr(order, name):
             raise ConfigurationError(
                 f'{name} = {getattr(order, name)}: a path in three dimensions says it itself '
@@ -37,8 +37,8 @@ def changed(settings: GuidanceSettings, order: Order) -> GuidanceSettings:
     if order.resume and not settings.hold:
         raise ConfigurationError('resume: the vehicle does not hold (allowed: after a hold)')
     changes = order.changes()
-    of_profile = {name: changes.pop(f'profile.{name}', None) for name in ('depth_m', 'pitch_deg')}
-    kept = {name: value for name, value in of_profile.items() if value is not None}
+    of_profile = [name for name in changes if name.startswith('profile.')]
+    kept = {name.removeprefix('profile.'): changes.pop(name) for name in of_profile}
     profile = settings.profile.model_copy(update=kept)
     told = settings.model_copy(update={**changes, 'profile': profile})
     told.check()

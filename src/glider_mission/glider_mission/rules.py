@@ -26,6 +26,7 @@ class Rules(NamedTuple):
     ends: bool = False  #: at the end of the path
     duration_s: float = math.inf  #: time that the mission has (s)
     origin: Origin | None = None  #: of its chart, if people read its places in degrees
+    shallowest_m: float = math.inf  #: depth of dives by which they are counted, if less (m)
 
     @property
     def margin_s(self) -> float:

@@ -227,7 +227,7 @@ class Scenario(Settings):
             initial=self.initial,
             duration_s=self.duration_s,
             dives=0 if self._holds else self.dives,
-            dive_depth_m=self.profile.depth_m,
+            dive_depth_m=self.shallowest_m,
             afloat_s=self._afloat_s(),
             seed=self.seed,
             sensors=self.sensors,
@@ -248,13 +248,19 @@ class Scenario(Settings):
         """Whether the vehicle is told to hold: such a mission ends by its time alone."""
         return any(order.hold for order in self.orders)
 
+    @property
+    def shallowest_m(self) -> float:
+        """Depth of the shallowest dives that the vehicle is told to make (m)."""
+        return min([self.profile.depth_m, *(one.depth_m for one in self.orders if one.depth_m)])
+
     def _afloat_s(self) -> float:
         """Time (s) afloat that ends a run: longer than any wait of its mission; 0: never."""
         if self.path.at_end == 'continue' or self._holds:
             return 0.0
-        profile = self.profile
-        waits_s = profile.wait_s + profile.prepare_s if profile.surface_every_dives else 0.0
-        return waits_s + SURFACE_S
+        if not self.profile.surface_every_dives:
+            return SURFACE_S
+        longest_s = max([self.profile.wait_s, *(one.wait_s or 0.0 for one in self.orders)])
+        return longest_s + self.profile.prepare_s + SURFACE_S
 
     def current_settings(self) -> CurrentSettings:
         """What the current node is told: directions absolute, the scenario's seed."""
@@ -378,6 +384,7 @@ class Scenario(Settings):
             self.path.at_end == 'stop',
             self.duration_s,
             self.origin.params() if self.is_charted else None,
+            self.shallowest_m,
         )
 
     def _glide_s(self) -> float:

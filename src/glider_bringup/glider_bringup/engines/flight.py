@@ -77,7 +77,7 @@ class Kept(NamedTuple):
     tick: int  #: ticks flown
     stage: int  #: of guidance, at the last one; -1: there was none
     settings: GuidanceSettings  #: by the orders that hold
-    has_held: bool  #: by one of them: from then on it ends by its time alone
+    followed: tuple[Order, ...]  #: those that were given in flight, and held until now
     waiting: tuple[Order, ...]  #: those to come
 
 
@@ -96,7 +96,8 @@ class Held:
         state, self._params = mission or mission_of(scenario)
         self._held = hold(state, self._params)
         self.tick, self._stage = 0, -1
-        self._settings, self._has_held = scenario.guidance_settings(), False
+        self._scenario, self._settings = scenario, scenario.guidance_settings()
+        self._followed: tuple[Order, ...] = ()
         self._waiting = tuple(scenario.orders)
         fly_held(self._held, np.empty((0, ROW)), TICK_S)
 
@@ -107,7 +108,7 @@ class Held:
             tick=self.tick,
             stage=self._stage,
             settings=self._settings,
-            has_held=self._has_held,
+            followed=self._followed,
             waiting=self._waiting,
         )
 
@@ -115,7 +116,7 @@ class Held:
         """Go on from there."""
         set_held(self._held, kept.mission)
         self.tick, self._stage, self._waiting = kept.tick, kept.stage, kept.waiting
-        self._tell(kept.settings, kept.has_held)
+        self._tell(kept.settings, kept.followed)
 
     def order(self, order: Order) -> None:
         """Take an order in.
@@ -163,18 +164,16 @@ class Held:
             state = held_state(self._held)
             set_held(self._held, state._replace(guidance=guidance_abort(state.guidance)))
             return
-        self._tell(changed(self._settings, order), self._has_held or order.hold)
+        self._tell(changed(self._settings, order), (*self._followed, order))
 
-    def _tell(self, settings: GuidanceSettings, has_held: bool) -> None:
-        """Fly on with other settings of guidance."""
-        if (settings, has_held) == (self._settings, self._has_held):
+    def _tell(self, settings: GuidanceSettings, followed: tuple[Order, ...]) -> None:
+        """Fly on with other settings of guidance, by orders that were followed."""
+        if (settings, followed) == (self._settings, self._followed):
             return
-        self._settings, self._has_held = settings, has_held
-        params = self._params._replace(guidance=settings.params())
-        if has_held:
-            plant = params.plant._replace(stop_after_dives=0, stop_afloat_ticks=0)
-            params = params._replace(plant=plant)
-        set_held_params(self._held, params)
+        self._settings, self._followed = settings, followed
+        ends = self._scenario.with_orders(followed).plant_settings().ends()
+        plant = self._params.plant._replace(**ends)
+        set_held_params(self._held, self._params._replace(guidance=settings.params(), plant=plant))
 
 
 def ended(complete: bool, reason: str) -> str:

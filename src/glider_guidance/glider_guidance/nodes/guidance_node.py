@@ -27,7 +27,7 @@ PATH_POINTS = 500
 class GuidanceNode(BlockNode):
     """Where to go. The service abort brings the vehicle to the surface for good.
 
-    Other orders are parameters: path, profile.depth_m, profile.pitch_deg, hold.
+    Other orders are parameters: path, profile.depth_m, profile.pitch_deg, profile.wait_s, hold.
     """
 
     def __init__(self, **kwargs) -> None:

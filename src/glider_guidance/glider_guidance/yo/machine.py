@@ -91,7 +91,11 @@ class ProfileSettings(Settings):
         0, ge=0, le=100000, description='dives between waits on the surface; 0: after the last'
     )
     wait_s: float = Field(
-        600.0, ge=0.0, le=864000.0, description='waiting on the surface between dives (s)'
+        600.0,
+        ge=0.0,
+        le=864000.0,
+        description='waiting on the surface between dives (s)',
+        json_schema_extra=TUNABLE,
     )
 
     def params(

@@ -180,20 +180,28 @@ class PlantSettings(Settings):
         vehicle = load_vehicle(self.vehicle)
         real = perturbed(vehicle.params(), self.perturb)
         return PlantParams(
-            real,
-            self.water.params(),
-            self.water.wind_drift(),
-            max(1, round(self.duration_s / TICK_S)),
-            self.dives,
-            round(self.surface_s / TICK_S),
-            round(self.afloat_s / TICK_S),
-            *dive_depths(self.dive_depth_m),
-            self.sensors.params(self.seed, self.origin, tuple(self.fitted)),
-            fault_params(self.faults, self.seed),
-            vehicle.energy.params() if vehicle.energy else NO_ENERGY,
-            make_readings(real, self.seed),
-            self.bottom(),
+            vehicle=real,
+            density=self.water.params(),
+            wind_drift=self.water.wind_drift(),
+            max_ticks=max(1, round(self.duration_s / TICK_S)),
+            stop_surface_ticks=round(self.surface_s / TICK_S),
+            **self.ends(),
+            sensors=self.sensors.params(self.seed, self.origin, tuple(self.fitted)),
+            faults=fault_params(self.faults, self.seed),
+            energy=vehicle.energy.params() if vehicle.energy else NO_ENERGY,
+            readings=make_readings(real, self.seed),
+            bottom=self.bottom(),
         )
+
+    def ends(self) -> dict[str, int | float]:
+        """Kernel parameters, by name, of what an order in flight changes: when the run ends."""
+        below, above = dive_depths(self.dive_depth_m)
+        return {
+            'stop_after_dives': self.dives,
+            'stop_afloat_ticks': round(self.afloat_s / TICK_S),
+            'dive_below': below,
+            'dive_above': above,
+        }
 
     def bottom(self) -> NamedTuple:
         """Kernel parameters of the bottom: on a chart, flat, or none."""
