@@ -16,7 +16,8 @@ from glider_model.onboard.moving_mass import MovingMass, mass_place
 #: A vehicle that rises faster than this (m/s) turns its nose up; one that sinks faster lies level.
 RISES_MPS = 0.05
 #: One that rises nose up more slowly than this (m/s), for so long (s), is held level for
-#: as long: it may lie in a stall that it rises out of.
+#: as long: it may lie in a stall that it rises out of. One that hangs, level, where its pump makes
+#: it light, turns its nose up for as long: the water may sink.
 SLOW_MPS, SLOW_S = 0.03, 300.0
 #: Its vertical rate is averaged over this time (s): a turn throws it up for a moment.
 AVERAGE_S = 20.0
@@ -37,7 +38,7 @@ class Ascent(NamedTuple):
     waits_s: float  #: since it was sent up
     rate: float  #: averaged (m/s, + down)
     turned: bool  #: nose up
-    #: for which it has risen too slowly so; less than 0: is still held level for that
+    #: for which it has risen too slowly so; less than 0: the other way is tried for as long
     slow_s: float
 
 
@@ -78,11 +79,14 @@ def come_up(state, rate, sees, moves, under, m_b, limits, dt):
     elif sees and average > RISES_MPS:
         turned = False
     slow_s = min(0.0, state.slow_s + dt) if state.slow_s < 0.0 else 0.0
+    hangs = is_done and m_b < 0.0 and average <= RISES_MPS
     if slow_s < 0.0:
-        turned = False
-    elif turned and moves and under:
+        turned = state.turned and not (sees and average > RISES_MPS)
+    elif moves and under and (turned or hangs):
         slower = dt if average > -SLOW_MPS else -dt  # a rate that errs is now this, now that
-        slow_s = max(0.0, state.slow_s + slower) if state.slow_s < SLOW_S else -SLOW_S
+        slow_s = max(0.0, state.slow_s + slower)
+        if slow_s >= SLOW_S:
+            turned, slow_s = not turned, -SLOW_S
     safe = limits.safe
     x_p = safe.x_p if turned else mass_place(0.0, m_b, -safe.x_p, limits.mass)
     return Ascent(waits_s, average, turned, slow_s), Joints(safe.m_b, x_p, 0.0, 0.0)

@@ -397,6 +397,23 @@ def test_a_vehicle_that_hardly_rises_with_its_nose_up_is_held_level_for_a_while(
         assert vehicle.out.command == SAFE
 
 
+@pytest.mark.parametrize(('pump_kg', 'up'), [(-0.18, -0.08), (-0.18, 0.2), (0.18, -0.08)])
+def test_a_light_vehicle_that_hangs_in_sinking_water_turns_its_nose_up(pump_kg, up):
+    """Level it sinks by 4 mm/s. Nose up it rises, which it does until it is up, or slides down."""
+    vehicle, pump = Vehicle(depth_m=50.0, stall_s=3600.0), Joints(pump_kg, 0.0, 0.0, 0.0)
+    vehicle.target, asked = SURFACE_TARGET, []
+    for _ in range(120):
+        turned = bool(asked) and asked[-1]
+        vehicle.go(20.0, rate=up if turned else 0.004, joints=pump)
+        asked.append(vehicle.out.command == SAFE)
+    if pump_kg > 0.0:
+        assert not any(asked)
+    elif up < 0.0:
+        assert sum(asked) > 60 and all(asked[asked.index(True) :])
+    else:  # one that it makes slide is level again within a minute, and tries no more often
+        assert 2 <= sum(asked) <= 15
+
+
 def test_a_vehicle_that_cannot_see_turns_nose_up_when_its_pump_had_the_time():
     vehicle = Vehicle(depth_m=200.0, stall_s=3600.0)
     vehicle.go(1.0)
