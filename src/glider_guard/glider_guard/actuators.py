@@ -23,10 +23,11 @@ class ActuatorLimits(NamedTuple):
 
 
 class Follower(NamedTuple):
-    """Where an actuator was when it last followed its command, and the time since (s)."""
+    """Where an actuator is, and since when it does not follow its command."""
 
     position: float
-    waits_s: float
+    way: float  #: towards its command since it last followed, wherever that went meanwhile
+    waits_s: float  #: time since then
 
 
 class Followers(NamedTuple):
@@ -38,7 +39,7 @@ class Followers(NamedTuple):
     surface: Follower  #: the steering surface
 
 
-_STILL = Follower(0.0, 0.0)
+_STILL = Follower(0.0, 0.0, 0.0)
 INITIAL_FOLLOWERS = Followers(_STILL, _STILL, _STILL, _STILL)
 
 
@@ -62,9 +63,11 @@ def make_limits(vehicle, follow_share: float, stall_s: float) -> ActuatorLimits:
 @kernel
 def _follow(state, position, command, tolerance, progress, dt):
     """Whether an actuator follows: `Follower` of the next tick."""
-    if abs(command - position) <= tolerance or abs(position - state.position) > progress:
-        return Follower(position, 0.0)
-    return Follower(state.position, state.waits_s + dt)
+    moved = position - state.position
+    way = max(0.0, state.way + (moved if command > state.position else -moved))
+    if abs(command - position) <= tolerance or way > progress:
+        return Follower(position, 0.0, 0.0)
+    return Follower(position, way, state.waits_s + dt)
 
 
 @kernel

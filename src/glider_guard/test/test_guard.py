@@ -15,6 +15,7 @@ from glider_base.settings import ConfigurationError
 from glider_base.signals import SURFACE_TARGET, TICK_S, Battery, Health, Joints, Odometry
 from glider_base.wiring import NO_ECHO
 from glider_guard import rows
+from glider_guard.actuators import INITIAL_FOLLOWERS, follow
 from glider_guard.ascent import INITIAL_ASCENT, come_up
 from glider_guard.block import GUARD, guard_surface, say
 from glider_guard.guard import GuardOutput, GuardParams, GuardState, Heard, guard_step
@@ -145,6 +146,28 @@ def test_what_latches_stays_and_the_rest_goes(name):
     vehicle.go(case.quiet_s + 60.0, **flown)
     vehicle.depth, vehicle.target = 100.0, 300.0
     assert bool(vehicle.go(5.0) & row.bit) == row.latches
+
+
+@pytest.mark.parametrize(
+    ('pump', 'is_told'),
+    [('follows', False), ('stuck', True), ('runs away', True)],
+)
+def test_a_pump_that_chases_a_demand_that_swings_is_not_stuck(pump, is_told):
+    """By 0.15 kg to and fro, every 4 s: too fast for a pump of 0.004 kg/s."""
+    limits = Vehicle().params.actuators
+    at, state, told = 0.37, INITIAL_FOLLOWERS, 0
+    step = {'follows': 0.004, 'stuck': 0.0, 'runs away': -0.004}[pump] * TICK_S
+    for demand in 50 * (0.52, 0.22):
+        for _ in range(40):
+            state, now = follow(state, at_rest(at), at_rest(demand), limits, TICK_S)
+            told |= now
+            at += math.copysign(step, (demand - at) * step) if step else 0.0
+    assert told == (rows.STUCK_BUOYANCY if is_told else 0)
+
+
+def at_rest(pump_kg):
+    """Actuators, of which the pump alone is anywhere."""
+    return Joints(pump_kg, 0.0, 0.0, 0.0)
 
 
 def test_a_fin_that_does_not_move_is_held():
