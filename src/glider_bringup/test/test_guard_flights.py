@@ -358,3 +358,30 @@ def test_way_over_ground_that_a_tilt_shows_as_way_up_is_none():
     assert not flown.told.any()
     assert flown.depth.max() < 40.0
     assert np.count_nonzero(np.diff(flown.depth > 15.0)) > 6
+
+
+def test_a_light_vehicle_in_sinking_water_comes_up():
+    """Its pump stuck by 0.18 kg light; held level it sank with the water (468 of seed 17902)."""
+    sinks = {'north_mps': 0.8001, 'east_mps': -0.4968, 'down_mps': 0.06231, 'at_s': 7306.4}
+    faults = [
+        broken('gust', 360.0, 'climb', **sinks),
+        broken('stuck', actuator='buoyancy_engine', at_s=11046.5) | {'phase': 'turn'},
+    ]
+    yo = {'profile.depth_m': 738.5, 'profile.top_depth_m': 5.0, 'profile.pitch_deg': 18.7}
+    slow = {'profile.net_heaviness_kg': 0.243, 'profile.surface_every_dives': 2, 'dives': 0}
+    reckons = {'vehicle': 'seaglider', 'seed': 547776703, 'navigation.method': 'dead_reckoned'}
+    flown = fly('yaw_10deg', 14000.0, faults, **reckons, **yo, **slow)
+    assert flown.depth[118000] > 10.0
+    assert flown.depth[-1] < AT_SURFACE_M
+
+
+def test_a_pump_that_chases_what_sensors_err_by_is_no_fault():
+    """Demands swing by 0.15 kg between samples of attitude (763 of seed 45869)."""
+    errs = {**NOISE, 'compass_bias_deg': 1.7734, 'compass_deviation_deg': 1.4326}
+    errs |= {'compass_deviation_phase_deg': -174.9206, 'roll_bias_deg': 1.2025}
+    errs |= {'pitch_scale': 1.0481, 'pitch_offset_deg': -0.9337, 'depth_offset_m': -0.1607}
+    errs |= {'gps_std_m': 7.5027, 'gps_first_fix_s': 102.3732, 'imu_period_s': 5.1}
+    yo = {'navigation.method': 'dead_reckoned', 'profile.surface_every_dives': 3, 'dives': 0}
+    flown = fly('spline', 4000.0, seed=1818021652, sensors=errs, **yo)
+    assert flown.depth.max() > 900.0
+    assert flown.first(rows.STUCK_BUOYANCY) == np.inf

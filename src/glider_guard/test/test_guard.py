@@ -148,16 +148,17 @@ def test_what_latches_stays_and_the_rest_goes(name):
     assert bool(vehicle.go(5.0) & row.bit) == row.latches
 
 
+@pytest.mark.parametrize('demands', [(0.52, 0.22), (0.52,)], ids=['swings', 'stands'])
 @pytest.mark.parametrize(
     ('pump', 'is_told'),
     [('follows', False), ('stuck', True), ('runs away', True)],
 )
-def test_a_pump_that_chases_a_demand_that_swings_is_not_stuck(pump, is_told):
-    """By 0.15 kg to and fro, every 4 s: too fast for a pump of 0.004 kg/s."""
+def test_a_pump_follows_that_goes_towards_its_command(pump, is_told, demands):
+    """A demand that swings by 0.15 kg every 4 s is too fast for a pump of 0.004 kg/s."""
     limits = Vehicle().params.actuators
     at, state, told = 0.37, INITIAL_FOLLOWERS, 0
     step = {'follows': 0.004, 'stuck': 0.0, 'runs away': -0.004}[pump] * TICK_S
-    for demand in 50 * (0.52, 0.22):
+    for demand in 50 * demands:
         for _ in range(40):
             state, now = follow(state, at_rest(at), at_rest(demand), limits, TICK_S)
             told |= now
