@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from glider_bringup.scoring.card import fly_scored
-from glider_mission.choices import Combination, combination_of
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.eddying_sea import EddyingSea, write_sea
 from glider_studies.paper.experiments import Experiment, told
@@ -53,11 +52,6 @@ def fly_one(task: tuple[int, float, str, float]) -> list[float]:
             write_sea(EddyingSea(seed=seed, rms_mps=rms_mps, error_mps=off), file)
         _, scores = fly_scored(scenario_in(sea, forecast, way))
     return scores['navigation']['surfacing_error_m'][_SETTLED:]
-
-
-def combinations() -> set[Combination]:
-    """What loops the flights need."""
-    return {combination_of(load_scenario('eddies_10d', {'orders': []}))}
 
 
 def judge(rows: list[dict[str, Any]]) -> list[Check]:

@@ -71,7 +71,7 @@ def _hours(time_s: float) -> float | None:
 
 
 def combinations() -> set[Combination]:
-    """What loops the flights need."""
+    """What loops flights of the mission need, whatever it believes of a forecast."""
     return {combination_of(load_scenario('eddies_10d', {'orders': []}))}
 
 

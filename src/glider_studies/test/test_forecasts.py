@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from glider_model.ocean.eddying_sea import EddyingSea, currents, write_sea
+from glider_studies import forecasts
 from glider_studies.forecasts import CASES, ERRORS, PERSISTENCE, WAYS, judge, scenario_in
 
 
@@ -52,3 +53,12 @@ def test_a_forecast_is_off_by_what_it_says_and_its_sea_is_the_same(tmp_path):
         assert settings.forecast.share_std == WAYS[way]
         assert settings.params().method.forecast.is_believed
         assert flown.current.field.file != settings.forecast.field.file
+
+
+def test_a_perfect_forecast_leads_a_vehicle_nearer_than_none(monkeypatch):
+    monkeypatch.setattr(forecasts, 'DURATION_S', 36.0 * 3600.0)
+    monkeypatch.setattr(forecasts, '_SETTLED', 1)
+    off = {way: forecasts.fly_one((2000, 0.42, way, 0.0)) for way in (PERSISTENCE, *WAYS)}
+    assert min(map(len, off.values())) >= 5
+    for way in WAYS:
+        assert np.median(off[way]) < 0.7 * np.median(off[PERSISTENCE])

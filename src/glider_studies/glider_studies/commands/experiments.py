@@ -82,7 +82,7 @@ def experiments(
         others.append((routes.TASKS, routes.combinations(), crossing))
     if forecasts.NAME in groups:
         reckoning = partial(forecasts.fly, seed)
-        others.append((forecasts.TASKS, forecasts.combinations(), reckoning))
+        others.append((forecasts.TASKS, routes.combinations(), reckoning))
     total = flown + sum(count for count, _, _ in others)
     if out:
         make_result_folder(out, paper.RESULT_FILE)
