@@ -139,6 +139,35 @@ def test_a_leak_that_outgrows_the_pump_takes_nobody_below_where_it_began():
     assert flown.depth[-1] < AT_SURFACE_M
 
 
+@pytest.mark.parametrize(('taken_kg', 'is_too_much'), [(0.13, True), (0.06, False)])
+def test_water_that_came_in_between_two_dives_is_weighed_before_the_next_turn(
+    taken_kg, is_too_much
+):
+    """Of 0.06 kg a Seaglider still turns at 1000 m; of 0.13 kg it does not, and has no weight."""
+    leak = {'kind': 'leak', 'rate_kgps': 0.0002, 'limit_kg': taken_kg, 'detected': False}
+    deep = {'profile.depth_m': 1000.0, 'profile.top_depth_m': 5.0, 'profile.pitch_deg': 45.0}
+    changes = {**deep, 'profile.net_heaviness_kg': 0.34, 'profile.surface_every_dives': 1}
+    fields = {'vehicle': 'seaglider', 'dives': 0, 'navigation.method': 'known', **changes}
+    sensors = {**NOISE, 'pitch_scale': 0.95, 'pitch_offset_deg': -0.3}
+    flown = fly('noisy_sensors', 10000.0, [{**leak, 'at_s': 4300.0}], **fields, sensors=sensors)
+    assert bool(flown.first(rows.TOO_HEAVY) < 10000.0) == is_too_much
+    assert (flown.depth[50000:].max() < 990.0) == is_too_much
+    assert flown.depth[-1] < AT_SURFACE_M
+
+
+def test_a_pump_with_little_left_that_turns_the_vehicle_is_enough():
+    """Heavier than its file says, and by its hull, it just rises from where it is sent."""
+    shear = {'kind': 'shear', 'speed_mps': 1.0, 'direction_deg': 322.0, 'depth_m': 200.0}
+    glide = {'profile.net_heaviness_kg': 0.02, 'profile.pitch_deg': 24.1, **RECKONED}
+    glide |= {'profile.depth_m': 881.2, 'profile.top_depth_m': 5.0, 'vehicle': 'seaglider'}
+    water = {'current.components': [{**shear, 'law': 'exponential'}]}
+    weight = {'perturb.net_heaviness_kg': 0.136}
+    flown = fly('current_10deg', 24000.0, [], dives=0, **glide, **water, **weight)
+    assert not (flown.told & rows.TOO_HEAVY).any()
+    assert flown.depth.max() > 880.0
+    assert flown.depth[-1] < 750.0
+
+
 def test_a_pump_that_still_turns_the_vehicle_spares_the_weight():
     """0.5 kg more at 950 m, of 0.6 kg that the pump has left."""
     flown = fly('current_8deg', 9000.0, [broken('mass', 950.0, mass_kg=0.5)])

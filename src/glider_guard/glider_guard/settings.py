@@ -138,7 +138,7 @@ class GuardLimitSettings(Settings):
         description='so much a depth may be off at the surface, and is corrected (m)',
     )
     weight_share: float = Field(
-        0.95,
+        0.98,
         ge=0.05,
         le=10.0,
         description='share of the range of the pump by which the vehicle may be heavier than pump '

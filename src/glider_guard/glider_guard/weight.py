@@ -28,6 +28,10 @@ STEADY_S, LINE_S, NEWER_S = 300.0, 600.0, 1800.0
 #: What is more than this share of the range of the pump it cannot take off, though the polar errs,
 #: as it does most in a steep dive with the whole pump and a pitch that errs.
 SURELY = 1.1
+#: What the polar errs by shows after the turn, when the pump has made it nearly neutral: there a
+#: polar has little to err by. So long (s) after it glides up, it is weighed again, at the depth
+#: where the dive ended; from then on it cannot take off more than its range.
+WEIGHED_AGAIN_S = 4.0 * SOON_S
 #: A vehicle that is held level sinks on by no more than this (m), as it does broadside until its
 #: pump has made it light, and this (s) times the rate it had, until it lies level.
 LEVEL_M, LEVEL_S = 12.0, 45.0
@@ -47,6 +51,14 @@ class WeightLimits(NamedTuple):
     range: float  #: of the pump, either way from its middle (kg)
 
 
+class Ended(NamedTuple):
+    """The line of a dive where it ended, until the climb after it has shown what it errs by."""
+
+    weight: float  #: (kg)
+    depth: float  #: (m); 0.0: there is none
+    per_m: float  #: by what it grew (kg/m)
+
+
 class Weight(NamedTuple):
     """What is known of the weight, between two ticks."""
 
@@ -60,6 +72,8 @@ class Weight(NamedTuple):
     growth: float  #: slope of that line (kg/s)
     line_s: float  #: length of that line (s)
     begun: float  #: depth at which it begins (m)
+    ended: Ended
+    can: float  #: by the line of a dive, the pump can take off so much (kg), or as good as
 
 
 class Glide(NamedTuple):
@@ -76,7 +90,8 @@ class Glide(NamedTuple):
     under: bool  #: under water
 
 
-INITIAL_WEIGHT = Weight(*(10 * (0.0,)))
+NO_END = Ended(0.0, 0.0, 0.0)
+INITIAL_WEIGHT = Weight(*(10 * (0.0,)), NO_END, math.inf)
 
 
 @kernel
@@ -179,12 +194,21 @@ def weigh(state, at, limits, dt):
         if glides_s > STEADY_S:
             line_s = state.line_s + dt
             line, growth = _least_squares(line, growth, shown - known, line_s, dt)
+    ended, can = state.ended, min(state.can, SURELY * limits.range)
     if line_s == 0.0:
         begun = at.depth
+        if state.line_s > LINE_S and at.depth > state.begun:
+            per_m = state.growth * state.line_s / (at.depth - state.begun)
+            ended = Ended(state.line, at.depth, per_m)
+    elif mean > LEAST_RATE:  # another dive: the climb after this one tells of it
+        ended = NO_END
+    if ended.depth > 0.0 and mean < -LEAST_RATE and glides_s > WEIGHED_AGAIN_S:
+        errs = ended.weight + ended.per_m * (at.depth - ended.depth) - soon
+        ended, can = NO_END, limits.range + errs
     is_heavy = least > limits.most
     if line_s > LINE_S and mean > LEAST_RATE and at.target > at.depth > begun:
         ahead = min(1.0, (at.target - at.depth) / (at.depth - begun))
-        is_heavy = is_heavy or line + growth * line_s * ahead > SURELY * limits.range
+        is_heavy = is_heavy or line + growth * line_s * ahead > can
     state = Weight(
         off=off,
         soon=soon,
@@ -196,5 +220,7 @@ def weigh(state, at, limits, dt):
         growth=growth,
         line_s=line_s,
         begun=begun,
+        ended=ended,
+        can=can,
     )
     return state, TOO_HEAVY if is_heavy else 0
