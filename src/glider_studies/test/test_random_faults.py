@@ -6,15 +6,17 @@ import json
 import shlex
 
 import numpy as np
+import pytest
 from typer.testing import CliRunner
 
-from glider_guard.rows import ORDERED
+from glider_bringup.engines.flight import fly
+from glider_guard.rows import LATCHED, ORDERED, TOO_HEAVY
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.scenario import load_scenario, parse_assignment
 from glider_studies.commands.experiments import app
-from glider_studies.hunt import search
+from glider_studies.hunt import oracle, search
 from glider_studies.hunt.missions import draw_mission, due_s
-from glider_studies.hunt.oracle import Truth, Verdict, _shown_s, judge
+from glider_studies.hunt.oracle import Truth, Verdict, _shown_s, judge, unfounded
 
 #: zhang2021 is rated for 1000 m, its hull bears 1250 m.
 SCENARIO = ('current_8deg', {'dives': 0, 'duration_s': 20000.0})
@@ -55,11 +57,11 @@ def test_a_fault_shows_where_it_first_changes_the_flight():
     name, changes = SCENARIO
     for faults in ([cut], [cut, cut], [cut, leak], [leak, cut]):
         loaded = load_scenario(name, {**changes, 'faults': faults})
-        kinds = (fault['kind'] for fault in faults)
-        shown_s = dict(zip(kinds, _shown_s(loaded, 4500.0), strict=False))
+        shown_s = zip(faults, _shown_s(loaded, 4500.0), strict=True)
+        shown_s = {fault['kind']: one for fault, one in shown_s if one < np.inf}
         assert 3900.0 < shown_s['partial'] < 4000.0
         assert 1000.0 <= shown_s.get('leak', 1000.0) < 1001.0
-        assert _shown_s(loaded, 600.0) == []
+        assert _shown_s(loaded, 600.0) == [np.inf] * len(faults)
 
 
 def test_who_has_no_means_left_is_not_lost_but_has_to_be_told():
@@ -77,6 +79,45 @@ def test_who_fills_up_at_the_surface_with_all_done_is_not_lost():
     g2 = {'vehicle': 'slocum_g2', 'profile.depth_m': 20.0, 'profile.net_heaviness_kg': 0.2}
     assert kind_of(depth, [{**leak, 'limit_kg': 2.0}], 'lost', **g2) == ''
     assert kind_of(depth, [{**leak, 'limit_kg': 0.1}], 'lost', **g2) == 'lost'
+
+
+def test_who_is_struck_too_fast_is_not_lost_for_a_fault_that_harms_nobody():
+    """Flight 196 of seed 91670: growth, and an hour later a leak that sinks it within 300 s."""
+    mission = draw_mission(91670, 196)
+    assert {fault['kind'] for fault in mission.faults} == {'leak', 'fouling'}
+    assert search._verdict(mission.load()).kind == ''
+
+
+@pytest.mark.parametrize(('alone', 'verdict'), [('sinks', 'lost'), ('comes up', '')])
+def test_who_is_struck_too_fast_is_lost_if_the_faults_before_would_have_lost_it(
+    monkeypatch, alone, verdict
+):
+    """By what becomes of the flight without the last one, whatever the guard told of both."""
+    up = [(0.0, 0.0), (2500.0, 700.0), (6000.0, 0.0), (20000.0, 0.0)]
+    without = []
+
+    def fly_made_up(scenario, takers):
+        without.extend(scenario.faults)
+        made_up = flight(SINKS if alone == 'sinks' else up)
+        vars(takers[0]).update(vars(made_up))
+
+    monkeypatch.setattr(oracle, 'fly', fly_made_up)
+    flood = {'kind': 'leak', 'rate_kgps': 1.0, 'limit_kg': 50.0, 'at_s': 4300.0}
+    told = flight(SINKS, told_s=3000.0)
+    assert kind_of(told, [PUMP_STUCK, flood], 'lost') == verdict
+    assert [fault.kind for fault in without] == ['stuck']
+
+
+def test_a_reaction_is_right_where_the_pump_does_not_bring_the_vehicle_up():
+    """Without a fault: one that its ballast and its hull make heavier than its pump, or nearly."""
+    for seed, number, share, rows in ((91670, 273, 0.98, 0), (84464, 101, 0.95, TOO_HEAVY)):
+        mission = draw_mission(seed, number)
+        fields = {**mission.changes, 'guard.weight_share': share, 'faults': mission.aging}
+        clean = load_scenario(mission.scenario, fields)
+        truth = Truth()
+        fly(clean, [truth])
+        assert (truth.rows & TOO_HEAVY).any()
+        assert unfounded(clean, truth, LATCHED) & TOO_HEAVY == rows
 
 
 def test_who_stays_down_after_it_was_sent_up_is_late():

@@ -15,8 +15,8 @@ import numpy as np
 
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_S
-from glider_bringup.engines.direct import fly
-from glider_bringup.engines.flight import mission_of
+from glider_bringup.engines import direct
+from glider_bringup.engines.flight import fly, mission_of
 from glider_guard.rows import DROPS, SURFACES
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.scenario import Scenario
@@ -77,35 +77,37 @@ class Verdict(NamedTuple):
 
 
 @kernel
-def _rise(plant, params, water, command, mass, mode, depths, dt):
-    """Fill ``depths`` (float64[n]) with what the plant alone does under a command, weight let go.
+def _rise(plant, params, water, command, mass, mode, drop, depths, dt):
+    """Fill ``depths`` (float64[n]) with what the plant alone does under a command.
 
-    ``mode`` says where the pitch mass is: 0 in balance, 1 at its climb stop, 2 there once the
-    vehicle rises by 0.05 m/s.
+    ``drop`` is 1.0 if the weight is let go, else 0.0. ``mode`` says where the pitch mass is: 0 in
+    balance, 1 at its climb stop, 2 there once the vehicle rises by 0.05 m/s.
     """
     before = plant.motion.p_d
     rising = mode == 1
     for i in range(len(depths)):
         level = mass_place(0.0, plant.joints.m_b, -command[1], mass)
         target = (command[0], command[1] if rising else level, 0.0, 0.0)
-        plant = plant_move(plant, (target, water, (1.0,)), params, dt)
+        plant = plant_move(plant, (target, water, (drop,)), params, dt)
         depths[i] = plant.motion.p_d
         rising = rising or (mode == 2 and before - plant.motion.p_d > 0.05 * dt)
         before = plant.motion.p_d
 
 
-def _all_done(scenario: Scenario, from_s: float, for_s: float) -> list[np.ndarray]:
+def _all_done(
+    scenario: Scenario, from_s: float, for_s: float, drops: bool = True
+) -> list[np.ndarray]:
     """Depths (m), float64[ticks] from a time on, if all is done then; one for each mode."""
     state, params = mission_of(scenario)
     log = np.empty((max(1, round(from_s / TICK_S)), ROW))
-    state, rows, _ = fly(state, params, log, TICK_S)
+    state, rows, _ = direct.fly(state, params, log, TICK_S)
     water = tuple(log[rows - 1, COLUMNS['current_velocity']])
     vehicle = params.plant.vehicle
     command, mass = (-vehicle.m_b_max, -vehicle.x_p_max), make_moving_mass(vehicle)
-    flown = []
+    drop, flown = float(drops), []
     for mode in range(3):
         depths = np.empty(round(for_s / TICK_S))
-        _rise(state.plant, params.plant, water, command, mass, mode, depths, TICK_S)
+        _rise(state.plant, params.plant, water, command, mass, mode, drop, depths, TICK_S)
         flown.append(depths)
     return flown
 
@@ -120,12 +122,12 @@ def _flown(scenario: Scenario, for_s: float) -> np.ndarray:
     """Log of a flight, float64[ticks, ROW], that ends after a time (s) at the latest."""
     state, params = mission_of(scenario)
     log = np.empty((round(for_s / TICK_S), ROW))
-    _, rows, _ = fly(state, params, log, TICK_S)
+    _, rows, _ = direct.fly(state, params, log, TICK_S)
     return log[:rows]
 
 
 def _shown_s(scenario: Scenario, until_s: float) -> list[float]:
-    """When (s) each fault showed that did so by then: the first tick at which it changed a bit.
+    """When (s) each fault showed: the first tick at which it changed a bit; inf: not by then.
 
     Each is compared with the flight that has only those before it, so that one of two that do the
     same shows.
@@ -138,8 +140,7 @@ def _shown_s(scenario: Scenario, until_s: float) -> list[float]:
     for without, flown in pairwise(flights):
         ticks = min(len(flown), len(without))
         differs = (flown[:ticks] != without[:ticks]).any(axis=1)
-        if differs.any():
-            shown_s.append(float(np.argmax(differs)) * TICK_S)
+        shown_s.append(float(np.argmax(differs)) * TICK_S if differs.any() else np.inf)
     return shown_s
 
 
@@ -151,8 +152,9 @@ def _lost(scenario: Scenario, truth: Truth) -> str:
         return ''
     depth = truth.depth
     crossed_s = float(np.argmax(depth > crush)) if (depth > crush).any() else len(depth) - 1.0
-    before = [one for one in _shown_s(scenario, crossed_s) if one + GRACE_S < crossed_s]
-    moments = [max(before) + GRACE_S] if before else []
+    shown_s = _shown_s(scenario, crossed_s)
+    in_time = [one + GRACE_S < crossed_s for one in shown_s]
+    moments = [max(shown_s) + GRACE_S] if shown_s and all(in_time) else []
     too_deep = depth > (1.0 + BELOW_RATED) * vehicle.rated_depth_m
     if too_deep.any():
         moments.append(float(np.argmax(too_deep)))
@@ -161,6 +163,13 @@ def _lost(scenario: Scenario, truth: Truth) -> str:
         done = _all_done(scenario, moment, max(due_s(crush), crossed_s - moment))
         if any(depths.max() <= crush and _comes_up(depths) for depths in done):
             return f'{truth.deepest:.0f} m deep (crush depth {crush:g}), saved at {moment:.0f} s'
+    if any(in_time) and not all(in_time):
+        # the last left nobody the time to act; are the others what somebody had to act on?
+        faults = [fault for fault, one in zip(scenario.faults, in_time, strict=True) if one]
+        without = scenario.model_copy(update={'faults': faults})
+        alone = Truth()
+        fly(without, [alone])
+        return _lost(without, alone)
     return ''
 
 
@@ -215,14 +224,22 @@ def _hangs(depth: np.ndarray) -> bool:
     return bool(depth.min() > AT_SURFACE_M and np.ptp(depth) < HANGS_M)
 
 
-def unfounded(truth: Truth, rows: int) -> int:
-    """Those of some rows that were told of a vehicle that truly went up or down."""
+def unfounded(scenario: Scenario, truth: Truth, rows: int) -> int:
+    """Those of some rows that were told of a vehicle that truly went up or down.
+
+    None is, where the first was told of one that its whole pump does not bring up.
+    """
     found, told, stands_s = 0, truth.rows, round(STANDS_S)
     for bit in (1 << at for at in range(rows.bit_length()) if rows & 1 << at):
         if (told & bit).any():
             at = int(np.argmax((told & bit) != 0))
             if at < stands_s or not _hangs(truth.depth[at - stands_s : at]):
                 found |= bit
+    if found:
+        first = int(np.argmax((told & found) != 0))
+        done = _all_done(scenario, first + 1.0, due_s(truth.deepest), drops=False)
+        if not any(map(_comes_up, done)):
+            return 0
     return found
 
 

@@ -60,8 +60,9 @@ def _fly_mission(place: tuple[int, int]) -> Flown:
     if verdict.kind:
         verdict, faults = _shrunk(mission, verdict)
     truth = Truth()
-    flight = fly(mission.load([]), [truth])
-    rows = unfounded(truth, LATCHED)
+    clean = mission.load([])
+    flight = fly(clean, [truth])
+    rows = unfounded(clean, truth, LATCHED)
     latched = ', '.join(row.name for row in ROWS if rows & row.bit)
     if flight.status == 'failed':
         latched = flight.reason
