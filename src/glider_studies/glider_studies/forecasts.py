@@ -76,7 +76,7 @@ def fly(seed: int, pool: Pool, progress: Progress) -> dict[str, Any]:
     rows = []
     for way, error in CASES:
         off = np.concatenate([misses for key, misses in found.items() if key[1:] == (way, error)])
-        p50, p90 = np.quantile(off, (0.5, 0.9))
+        p50, p90 = np.quantile(off, (0.5, 0.9)).tolist()
         rows.append(
             {'way': way, 'error_mps': error, 'surfacings': len(off), 'p50_m': p50, 'p90_m': p90}
         )

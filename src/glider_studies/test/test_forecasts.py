@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Dead reckoning by forecasts that err: what is asked of it, and what is flown."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,19 @@ def test_its_share_is_held_to_the_better_of_both_at_every_error(shares, failed):
     assert {number for number, check in enumerate(checks) if not check.passed} == failed
 
 
+def test_the_study_can_be_printed_as_json():
+    """Its seas flown by nobody: each came up 10, 20 and 30 m off."""
+
+    class Pool:
+        def results(self, function, tasks, progress):
+            return {key: [10.0, 20.0, 30.0] for key in tasks}
+
+    entry = json.loads(json.dumps(forecasts.fly(0, Pool(), None)))
+    assert entry['verdict'] == 'passed'
+    assert {(row['surfacings'], row['p50_m']) for row in entry['rows']} == {(12, 20.0)}
+    assert [check['value'] for check in entry['checks']] == [1.0] * (2 * len(ERRORS))
+
+
 def test_a_forecast_is_off_by_what_it_says_and_its_sea_is_the_same(tmp_path):
     sea = EddyingSea(seed=2000, rms_mps=0.42)
     told = {error: currents(sea.model_copy(update={'error_mps': error})) for error in ERRORS}
@@ -58,7 +73,8 @@ def test_a_forecast_is_off_by_what_it_says_and_its_sea_is_the_same(tmp_path):
 def test_a_perfect_forecast_leads_a_vehicle_nearer_than_none(monkeypatch):
     monkeypatch.setattr(forecasts, 'DURATION_S', 36.0 * 3600.0)
     monkeypatch.setattr(forecasts, '_SETTLED', 1)
-    off = {way: forecasts.fly_one((2000, 0.42, way, 0.0)) for way in (PERSISTENCE, *WAYS)}
-    assert min(map(len, off.values())) >= 5
-    for way in WAYS:
-        assert np.median(off[way]) < 0.7 * np.median(off[PERSISTENCE])
+    without, with_it = (
+        forecasts.fly_one((2000, 0.42, way, 0.0)) for way in (PERSISTENCE, 'its share')
+    )
+    assert min(len(without), len(with_it)) >= 5
+    assert np.median(with_it) < 0.7 * np.median(without)
