@@ -58,32 +58,37 @@ def kernel(function: Callable) -> numba.core.dispatcher.Dispatcher:
     by number at every call.
 
     What unpacks the arguments of a call from Python is long to compile, and kernels do not need
-    it of each other: they get a twin without, by a dispatcher of its own behind that of Python.
+    it of each other: they get a twin without, by a dispatcher of its own behind that of Python,
+    which is made when a kernel that calls it is compiled. Where all is compiled there is none.
     With NUMBA_DISABLE_JIT=1 it stays what it was, for a debugger and for tests of mutants.
     """
     if numba.config.DISABLE_JIT:
         return function
-    compiled = _compiled_once(function, forceinline=True)
-    inlined = numba.njit(no_cpython_wrapper=True, forceinline=True, **_OPTIONS)(function)
-    if is_kept(function):
-        inlined._cache = KernelCache(function, '.inlined')
-    compiled.get_call_template = inlined.get_call_template
-    compiled.get_overload = inlined.get_overload
+    compiled = _compiled(function, forceinline=True)
+
+    @cache
+    def inlined() -> numba.core.dispatcher.Dispatcher:
+        return _compiled(function, '.inlined', no_cpython_wrapper=True, forceinline=True)
+
+    compiled.get_call_template = lambda *arguments: inlined().get_call_template(*arguments)
+    compiled.get_overload = lambda signature: inlined().get_overload(signature)
     return compiled
 
 
 def loop(function: Callable) -> numba.core.dispatcher.Dispatcher:
-    """Compile a pure function that takes so long to compile that it is not done twice.
+    """Compile a pure function that is so long that it is done once, and not inlined.
 
-    It is called by kernels as it is by Python, and not inlined.
+    Kernels call it, and nobody else: it has nothing that unpacks the arguments of a call from
+    Python, which is long to compile.
     """
-    return function if numba.config.DISABLE_JIT else _compiled_once(function)
+    return function if numba.config.DISABLE_JIT else _compiled(function, no_cpython_wrapper=True)
 
 
-def _compiled_once(function: Callable, **options) -> numba.core.dispatcher.Dispatcher:
+def _compiled(function: Callable, ending: str = '', **options) -> numba.core.dispatcher.Dispatcher:
+    """What compiles a function when it is called, and finds again what it compiled before."""
     compiled = numba.njit(**_OPTIONS, **options)(function)
     if is_kept(function):
-        compiled._cache = KernelCache(function)  # as its enable_caching() does
+        compiled._cache = KernelCache(function, ending)  # as its enable_caching() does
     return compiled
 
 
@@ -98,7 +103,7 @@ def replace(values: Values, **changes) -> Values:
 
 
 @overload(replace, jit_options={'error_model': 'numpy', 'forceinline': True}, strict=False)
-def _compiled(values, **changes):
+def _replaced(values, **changes):
     """Write the constructor out, as numba has it: all fields, in their order."""
     made = values.instance_class
     if unknown := set(changes) - set(made._fields):

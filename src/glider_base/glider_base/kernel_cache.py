@@ -140,15 +140,19 @@ def _classes(kinds: Iterable) -> Iterator[type]:
 
 def is_kept(function) -> bool:
     """Whether a function stands in a file, not in a notebook: then its code is kept."""
-    path = _file_of(function.__module__)
-    own = os.path.realpath(function.__code__.co_filename)
-    return path is not None and os.path.realpath(path) == own
+    return _is_of(function.__code__.co_filename, _file_of(function.__module__))
+
+
+@cache
+def _is_of(own: str, path: str | None) -> bool:
+    """Whether code of a file is that of a module's source."""
+    return path is not None and os.path.realpath(path) == os.path.realpath(own)
 
 
 def folder() -> Path:
     """Folder of the compiled kernels, in ``$GLIDER_CACHE`` or ``~/.cache/glider``."""
-    default = Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / 'glider'
-    return Path(os.environ.get('GLIDER_CACHE') or default) / 'kernels'
+    default = f'{os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")}/glider'
+    return Path(os.environ.get('GLIDER_CACHE') or default, 'kernels')
 
 
 class _Locator:

@@ -59,7 +59,7 @@ def start(tmp_path):
 def test_processes_that_compile_for_different_types_do_not_get_each_others_code(start):
     both = [start(COMPILE, number) for number in ('3', '0.25')]
     assert [one.wait(60.0) for one in both] == [0, 0]
-    found, _ = start(FIND).communicate(timeout=60.0)
+    found, _ = start(FIND).communicate(timeout=300.0)
     assert found.split() == ['6', '0.5', '0']
 
 

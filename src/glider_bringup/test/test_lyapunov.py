@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from glider_base.signals import TICK_S, Adaptation
-from glider_bringup.engines.direct import fly
+from glider_bringup.engines.direct import fly_ticks
 from glider_bringup.engines.flight import mission_of
 from glider_control.allocation import moments
 from glider_control.laws.backstepping import (
@@ -59,7 +59,7 @@ def record(state, params, out):
         joints = state.plant.joints
         channels = state.control.law.channels
         th_p, th_q = channels.roll_theta, channels.pitch_theta
-        state, _, finished = fly(state, params, log, TICK_S)
+        state, _, finished = fly_ticks(state, params, log, TICK_S)
         measured, channels = state.control.measured, state.control.law.channels
         roll, pitch, polar = channels.roll, channels.pitch, params.control.polar
         phi, theta = measured.phi, measured.theta

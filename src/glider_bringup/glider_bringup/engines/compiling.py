@@ -10,7 +10,7 @@ import numpy as np
 
 from glider_base.kernel import compiling_told
 from glider_base.signals import TICK_S
-from glider_bringup.engines.direct import fly
+from glider_bringup.engines.direct import fly_held, hold
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.interrupts import interrupts_noted
 from glider_mission.blocks import ROW
@@ -60,6 +60,6 @@ def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
                 changes['profile.net_heaviness_kg'] = 0.5 * vehicle.params().m_b_max
             state, params = mission_of(load_scenario(changes=changes))
             with told(one, tell):
-                fly(state, params, nothing, TICK_S)
+                fly_held(hold(state, params), nothing, TICK_S)
             if interrupts:
                 raise KeyboardInterrupt

@@ -61,27 +61,10 @@ class MissionState(NamedTuple):
 
 
 @loop
-def fly(state, params, log, dt):
-    """Fly until the log is full or the mission ends.
+def fly_ticks(state, params, log, dt):
+    """Fly until the log is full or the mission ends: what `fly` does, by kernels alone.
 
-    Parameters
-    ----------
-    state : MissionState
-        Used up: the values of its current are changed where they lie.
-    params : MissionParams
-    log : float64[n, ROW]
-        One row is filled for each tick.
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    MissionState
-        State after the last tick that was filled in.
-    int
-        Number of rows filled.
-    bool
-        Whether the mission has ended.
+    The values of the state's current are changed where they lie.
     """
     plant, current, navigation, guidance, control, guard = state
     rows, finished = 0, False
@@ -156,8 +139,8 @@ def apart(state):
 
 @kernel
 def fly_held(held, log, dt):
-    """Fly on what is held, as `fly` does; rows filled, and whether the mission has ended."""
-    held.state, rows, finished = fly(held.state, held.params, log, dt)
+    """Fly on what is held; rows filled, and whether the mission has ended."""
+    held.state, rows, finished = fly_ticks(held.state, held.params, log, dt)
     return rows, finished
 
 
@@ -177,6 +160,34 @@ def set_held(held, state):
 def set_held_params(held, params):
     """Fly on with other parameters."""
     held.params = params
+
+
+def fly(
+    state: MissionState, params: MissionParams, log: np.ndarray, dt: float
+) -> tuple[MissionState, int, bool]:
+    """Fly until the log is full or the mission ends.
+
+    Parameters
+    ----------
+    state, params
+        The mission; neither is changed.
+    log : float64[n, ROW]
+        One row is filled for each tick.
+    dt : float
+        Length of the tick (s).
+
+    Returns
+    -------
+    MissionState
+        State after the last tick that was filled in.
+    int
+        Number of rows filled.
+    bool
+        Whether the mission has ended.
+    """
+    held = hold(state, params)
+    rows, finished = fly_held(held, log, dt)
+    return held_state(held), rows, finished
 
 
 def finite_rows(log: np.ndarray) -> int:
@@ -223,12 +234,5 @@ def blocks_of(advance: Callable[[np.ndarray], tuple[int, bool]]) -> Iterator[np.
 
 def fly_blocks(state: MissionState, params: MissionParams) -> Iterator[np.ndarray]:
     """Fly a mission block by block; see `blocks_of`. No orders are followed."""
-    current = CurrentState(state.current.tick, state.current.values.copy())
-    state = state._replace(current=current)
-
-    def advance(log: np.ndarray) -> tuple[int, bool]:
-        nonlocal state
-        state, rows, finished = fly(state, params, log, TICK_S)
-        return rows, finished
-
-    return blocks_of(advance)
+    held = hold(state, params)
+    return blocks_of(lambda log: fly_held(held, log, TICK_S))
