@@ -3,7 +3,6 @@
 """What became of a vehicle: the same word wherever it is told, by its true depth."""
 
 import json
-from functools import partial
 
 import numpy as np
 import pytest
@@ -153,9 +152,7 @@ def test_way_along_the_path_is_that_of_the_vehicle(speed):
 # ------------------------------------------------------------------------------------ told
 
 
-glider = partial(command_line.glider, FORCE_COLOR='1')
-
-
+glider = command_line.glider
 DEEP = ('--set', 'profile.depth_m=800', '--set', 'initial.depth_m=600')
 LEAKS = {
     # of what the pump takes off, and of more than pump and weight together
@@ -191,6 +188,8 @@ def test_card_and_report_say_the_same_word_first(ended):
     badge, verdict = page.partition(f'<span class="badge {status}">')[2].split('</span>', 1)
     assert status in badge.lower()
     assert verdict.startswith(f'{status.capitalize()}: ')
+    deepest = page.partition('deepest point')[2].partition('</div>')[0]
+    assert ('beyond' in deepest) == (status == 'lost')
     first = page.partition('<ul class="findings">')[2].partition('</li>')[0]
     assert 'class="problem"' in first
     assert f'{status.capitalize()}: ' in first

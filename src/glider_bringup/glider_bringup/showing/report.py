@@ -47,7 +47,9 @@ def _tiles(run: FlownRun) -> list[tuple[str, str, str]]:
     time_s, way_m, dives = card['sim_time_s'], card['distance_along_path_m'], card['dives']
     track, depth = card['cross_track_m'], card['depth_m']
     rms, whole = _number(track['rms_steady'], 3, 'm'), _number(track.get('max_run'), 2, 'm')
-    beyond = f'{_number(depth["overshoot"], 1, "m")} beyond {_number(depth_m, 0, "m")}'
+    asked = _number(depth_m, 0, 'm')
+    beyond = f'{_number(depth["overshoot"], 1, "m")} beyond {asked}'
+    against = beyond if (depth['max'] or 0.0) > depth_m else f'of {asked}'
     speed = f'{way_m / max(TICK_S, time_s):.2f} m/s on average'
     (pitch, most_pitch), (heading, most_heading) = (
         [_number(card[of][name], digits, 'deg') for name in ('rms_steady', 'max_steady')]
@@ -59,7 +61,7 @@ def _tiles(run: FlownRun) -> list[tuple[str, str, str]]:
         ('simulated time', span(time_s), count(dives, 'dive') if dives else ''),
         ('along the path', way(way_m), speed),
         ('cross-track, steady', _number(track['max_steady'], 2, 'm'), steady),
-        ('deepest point', _number(depth['max'], 1, 'm'), beyond if is_profile else ''),
+        ('deepest point', _number(depth['max'], 1, 'm'), against if is_profile else ''),
         ('pitch error, steady', pitch, f'rms; largest {most_pitch}'),
         ('heading, steady', heading, f'fluctuation, rms; largest {most_heading}'),
     ]
