@@ -33,12 +33,12 @@ def glider(*arguments, columns=160, timeout=300.0, preexec_fn=None, **variables)
     preexec_fn : callable, optional
         Called in the process before the command; can be pickled.
     variables : str
-        Of its environment, beside those of this process.
+        Of its environment, beside those of this process; with another PYTHONPATH it is not forked.
     """
     words = list(map(str, arguments))
     env = {name: value for name, value in os.environ.items() if name != 'ROS_DOMAIN_ID'}
     env |= {'COLUMNS': str(columns), 'PYTHONUTF8': '1', **variables}
-    if not variables:
+    if 'PYTHONPATH' not in variables:
         return _forked(words, env, timeout, preexec_fn)
     return subprocess.run(
         [sys.executable, '-m', 'glider_bringup.cli', *words],

@@ -87,7 +87,7 @@ def judge():
 
 def test_a_sign_or_a_limit_of_the_allocation_is_noticed(judge):
     """By the tests of that file alone."""
-    known = judge(change=None)
+    known = judge(change=None, fly=False)
     assert len(known['times']) > 10
     found = changes('glider_control.allocation', ALLOCATION)
     of_sign = [one for one in found if ' + ' in one.before or ' - ' in one.before]

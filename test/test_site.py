@@ -108,9 +108,12 @@ def test_search_finds_a_page(site):
             )
             page = browser.new_page()
             page.goto(f'http://127.0.0.1:{server.server_port}/')
-            page.fill('input.md-search__input', 'drop weight')
+            # Typed as by a person, once the index is read: the page looks when a key goes up.
+            index_is_read = page.locator('.md-search-result__meta', has_text='Type to start')
+            index_is_read.wait_for(state='attached', timeout=120_000)
+            page.locator('input.md-search__input').press_sequentially('drop weight')
             results = page.locator('.md-search-result__link')
-            results.first.wait_for(timeout=30_000)
+            results.first.wait_for(timeout=120_000)
             found = [one.get_attribute('href') for one in results.all()]
             browser.close()
         server.shutdown()

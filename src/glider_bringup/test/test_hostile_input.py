@@ -161,7 +161,7 @@ def process(words: str, redirection: str = '') -> subprocess.CompletedProcess:
         ['bash', '-c', f'{sys.executable} -m glider_bringup.cli {words} {redirection}'],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=False,
     )
 
@@ -190,7 +190,7 @@ def test_too_few_files(tmp_path):
         ['bash', '-c', f'ulimit -n 14; {sys.executable} -m glider_bringup.cli run --duration 0.5'],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=False,
         cwd=tmp_path,
     )
@@ -207,6 +207,6 @@ def test_interrupt_while_loading():
         'runpy.run_module("glider_bringup.cli", run_name="__main__")'
     )
     found = subprocess.run(
-        [sys.executable, '-c', program], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, '-c', program], capture_output=True, text=True, timeout=300, check=False
     )
     assert (found.returncode, found.stderr) == (130, '')

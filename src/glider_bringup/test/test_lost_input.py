@@ -26,7 +26,7 @@ LEVEL = (0.0, 0.0, -50.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 #: Covariance of the place that navigation believes (m^2).
 CERTAIN = (1.0, 0.0, 0.0, 1.0)
 INPUTS = {'odom': (*LEVEL, *CERTAIN), 'joint_states': (0.4, 0.0, 0.0), 'reference': LEVEL}
-DEADLINE_S = 60.0
+DEADLINE_S = 200.0
 #: The mass holds it level: the pump of this vehicle does not move, and nobody sees it rise.
 SAFE = (GuardSettings().params().ascent.safe.m_b, 0.0, 0.0)
 

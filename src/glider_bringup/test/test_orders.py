@@ -18,14 +18,17 @@ from glider_bringup.cli import app
 STORE = get_typestore(Stores.ROS2_JAZZY)
 SHALLOW = {'profile.depth_m': 200.0, 'dives': 0}
 EAST = {'kind': 'straight', 'course_deg': 90.0, 'length_m': 5000.0}
-#: Orders at odd times, one of each kind.
+#: Orders at odd times, one of each kind: in the first dive, held, resumed, aborted in the next
+#: dive. Short, as nodes fly it too.
 ORDERS = [
-    {'at_s': 900.0, 'depth_m': 100.0, 'pitch_deg': 25.0, 'wait_s': 60.0},
-    {'at_s': 1000.0, 'path': EAST, 'when': 'surfacing'},
-    {'at_s': 1700.3, 'hold': True},
-    {'at_s': 2600.0, 'resume': True},
-    {'at_s': 3400.0, 'abort': True},
+    {'at_s': 60.0, 'depth_m': 15.0, 'pitch_deg': 25.0, 'wait_s': 30.0},
+    {'at_s': 70.0, 'path': EAST, 'when': 'surfacing'},
+    {'at_s': 300.3, 'hold': True},
+    {'at_s': 480.0, 'resume': True},
+    {'at_s': 690.0, 'abort': True},
 ]
+ORDERED_S = 900.0
+YO = {'profile.depth_m': 20.0, 'profile.prepare_s': 0.0, 'dives': 0}
 
 
 def depths(flight, end_s: float) -> np.ndarray:
@@ -191,20 +194,28 @@ def test_an_order_is_refused_that_would_leave_one_to_come_without_sense():
 @pytest.fixture(scope='module')
 def flown():
     """All orders as data, flown at once, row by row."""
-    run = glider.fly('current_8deg', {**SHALLOW, 'orders': ORDERS}, duration=4000.0)
+    run = glider.fly('current_8deg', {**YO, 'orders': ORDERS}, duration=ORDERED_S)
     return run.to_xarray()
+
+
+def test_they_are_followed(flown):
+    """Turned at 15 m, up while held, down again when resumed, up for good when aborted."""
+    depth = flown['ground_truth_odom_depth'].sel(time=slice(0.0, ORDERED_S))
+    at = {t_s: depth.sel(time=t_s, method='nearest').item() for t_s in (470.0, 690.0, 899.0)}
+    assert 14.5 < depth.max() < 17.5
+    assert at[470.0] < 1.0 < 4.0 < at[690.0] and at[899.0] < 1.0
 
 
 def test_given_in_flight_they_have_the_bits_of_those_in_the_scenario(flown):
     """And of a flight whose state is kept and restored while an order waits for the surface."""
-    flight = glider.Flight('current_8deg', SHALLOW, duration=4000.0)
+    flight = glider.Flight('current_8deg', YO, duration=ORDERED_S)
     for one in ORDERS:
         flight.until(t_s=one['at_s'])
         flight.order(**{name: value for name, value in one.items() if name != 'at_s'})
         kept = pickle.dumps(flight.state)
-        flight.until(t_s=one['at_s'] + 100.0)
+        flight.until(t_s=one['at_s'] + 15.0)
         flight.restore(pickle.loads(kept))
-    flight.until(t_s=4000.0)
+    flight.until(t_s=ORDERED_S)
     assert flight.orders == ORDERS
     last = flown.isel(time=-1)
     for name in last.data_vars:
@@ -212,15 +223,13 @@ def test_given_in_flight_they_have_the_bits_of_those_in_the_scenario(flown):
 
 
 def test_nodes_follow_them_to_the_same_bits_and_verify_says_so(flown, tmp_path):
-    fields = {**SHALLOW, 'orders': ORDERS}
-    run = glider.fly(
-        'current_8deg', fields, duration=4000.0, engine='nodes', bag=True, out=tmp_path / 'run'
-    )
+    flight = {'scenario': 'current_8deg', 'set': {**YO, 'orders': ORDERS}, 'duration': ORDERED_S}
+    run = glider.fly(**flight, engine='nodes', bag=True, out=tmp_path / 'run')
     nodes = run.to_xarray()
     for name in flown.data_vars:
         assert flown[name].values.tobytes() == nodes[name].values.tobytes(), name
     direct = tmp_path / 'direct'
-    glider.fly('current_8deg', fields, duration=4000.0, bag=True, out=direct)
+    glider.fly(**flight, bag=True, out=direct)
     told = []
     for folder in (tmp_path / 'run', direct):
         done = CliRunner().invoke(app, ['verify', str(folder), '--json'])

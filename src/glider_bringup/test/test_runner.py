@@ -215,8 +215,8 @@ def test_no_node_survives_the_runner(tmp_path, number):
         if '] up ' in line:
             pids.append(int(line.split()[-1]))
     process.send_signal(number)
-    process.communicate(timeout=20)
-    deadline = time.monotonic() + 10.0
+    process.communicate(timeout=120)
+    deadline = time.monotonic() + 60.0
     while any(is_alive(pid) for pid in pids):
         assert time.monotonic() < deadline
         threading.Event().wait(0.02)

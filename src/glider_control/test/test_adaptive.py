@@ -3,12 +3,14 @@
 """The adaptive law on plants that are known exactly, so that its Lyapunov function is too."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from glider_base.kernel import kernel, replace
 from glider_base.signals import Reference
 from glider_control.law import Bank, Seen
 from glider_control.laws.adaptive import DISTURBANCE_MAX, AdaptiveSettings, adaptive_step
@@ -39,50 +41,62 @@ def step(state, now, wanted, applied=(0.0, 0.0), held=(False, False)):
     return adaptive_step(state, seen, PARAMS, DT)
 
 
+class Pitch(NamedTuple):
+    """State of the plant in pitch."""
+
+    theta: float
+    q: float
+    tau: float
+
+
+@kernel
+def lyapunov(channel, theta, theta_star, params):
+    """V2 = 1/2 B1 K1bar^2 + 1/2 M K2bar^2 + 1/2 theta_tilde^2 / Gamma."""
+    wrong = 0.0
+    for i in range(len(theta)):
+        wrong += (theta_star[i] - theta[i]) ** 2
+    v = 0.5 * params.b1 * channel.k1**2 + 0.5 * params.inertia * channel.k2**2
+    return v + 0.5 * wrong / params.gamma
+
+
+@kernel
+def fly_pitch(state, pitch, now, wanted, theta_star, params, log):
+    """M q' = tau + Phi^T theta*, tick by tick: V2, pitch error, and whether the tick learns."""
+    theta, q, tau = pitch
+    for tick in range(len(log)):
+        before = state.channels.pitch_theta
+        measured = replace(now, theta=theta, theta_dot=q)
+        seen = Seen(measured, wanted, SPEED, ALPHA, 0.4, 0.0, tau, False, False, 0.0)
+        state, _, tau = adaptive_step(state, seen, params, DT)
+        known = state.channels.pitch_theta
+        log[tick, 0] = lyapunov(state.channels.pitch, known, theta_star, params.pitch)
+        log[tick, 1] = theta - wanted.theta
+        log[tick, 2] = known != before
+        rates = state.channels.pitch.rate.value / SCALE_PITCH_RATE
+        a, b, c, d = theta_star
+        made = a + b * SPEED**2 * ALPHA / SCALE_ALPHA + c * SPEED**2 / SCALE_V2 + d * rates
+        for _ in range(20):
+            rate = (tau + made) / params.pitch.inertia
+            theta += DT / 20 * q
+            q += DT / 20 * rate
+    return state, Pitch(theta, q, tau)
+
+
 class PitchPlant:
-    """M q' = tau + Phi^T theta*: the plant that the law assumes, with an ideal actuator."""
+    """The plant that the law assumes, with an ideal actuator."""
 
     def __init__(self, theta_star, error=0.0):
-        self.theta_star = np.array(theta_star)
-        self.theta, self.q = -0.5 + error, 0.0
-        self.tau = 0.0
-        self.learnt = []  #: of each tick, whether it changed the parameters
+        self.theta_star = tuple(map(float, theta_star))
+        self.pitch = Pitch(-0.5 + error, 0.0, 0.0)
         self.state = SETTINGS.initial_state()
 
-    def fly(self, seconds, wanted=None):
-        """Lyapunov function V2, parameters and pitch errors of every tick."""
-        values, errors = [], []
-        for tick in range(round(seconds / DT)):
-            target = wanted(tick * DT) if wanted else reference()
-            now = measured(theta=self.theta, theta_dot=self.q)
-            before = self.state.channels.pitch_theta
-            self.state, _, self.tau = step(self.state, now, target, (0.0, self.tau))
-            self.learnt.append(self.state.channels.pitch_theta != before)
-            values.append(self.lyapunov())
-            errors.append(self.theta - target.theta)
-            phi = np.array(
-                [
-                    1.0,
-                    SPEED**2 * ALPHA / SCALE_ALPHA,
-                    SPEED**2 / SCALE_V2,
-                    self.state.channels.pitch.rate.value / SCALE_PITCH_RATE,
-                ]
-            )
-            for _ in range(20):
-                rate = (self.tau + phi @ self.theta_star) / PARAMS.pitch.inertia
-                self.theta += DT / 20 * self.q
-                self.q += DT / 20 * rate
-        return np.array(values), np.array(errors)
-
-    def lyapunov(self):
-        """V2 = 1/2 B1 K1bar^2 + 1/2 M K2bar^2 + 1/2 theta_tilde^2 / Gamma."""
-        channel = self.state.channels.pitch
-        wrong = self.theta_star - np.array(self.state.channels.pitch_theta)
-        return (
-            0.5 * PARAMS.pitch.b1 * channel.k1**2
-            + 0.5 * PARAMS.pitch.inertia * channel.k2**2
-            + 0.5 * float(wrong @ wrong) / PARAMS.pitch.gamma
+    def fly(self, seconds):
+        """Lyapunov function V2, pitch errors, and whether it learns, of every tick."""
+        log = np.empty((round(seconds / DT), 3))
+        self.state, self.pitch = fly_pitch(
+            self.state, self.pitch, measured(), reference(), self.theta_star, PARAMS, log
         )
+        return log[:, 0], log[:, 1], log[:, 2] > 0.0
 
 
 parameters = st.tuples(*(st.floats(-1.0, 1.0) for _ in range(3)), st.floats(-1.5, 0.0))
@@ -97,10 +111,9 @@ def test_lyapunov_function_never_grows_on_an_unknown_plant(theta_star, error):
     Adaptation begins after LEARN_AFTER_S; from then on V2 with the true parameter errors falls in
     the ticks that learn. In the dead zone nothing is learnt, and nothing is promised.
     """
-    plant = PitchPlant(theta_star, error)
-    values, _ = plant.fly(600.0)
+    values, _, learnt = PitchPlant(theta_star, error).fly(600.0)
     begun = round(30.0 / DT)
-    rises = np.diff(values[begun:])[np.array(plant.learnt[begun + 1 :])]
+    rises = np.diff(values[begun:])[learnt[begun + 1 :]]
     assert np.max(rises, initial=0.0) < 1e-4 * values[begun] + 1e-7
     assert np.sum(rises) <= 1e-9
 
@@ -109,7 +122,7 @@ def test_lyapunov_function_never_grows_on_an_unknown_plant(theta_star, error):
 @given(parameters)
 def test_pitch_error_ends_inside_the_ultimate_bound(theta_star):
     """0.1 deg after 30 min: the dead zone of learning over L1, doubled."""
-    _, errors = PitchPlant(theta_star).fly(1800.0)
+    _, errors, _ = PitchPlant(theta_star).fly(1800.0)
     bound = 2.0 * PARAMS.pitch.dead_zone / PARAMS.pitch.l1
     assert np.max(np.abs(errors[-1000:])) < bound
     assert bound < math.radians(0.1)

@@ -53,7 +53,7 @@ def step(state, e2, course=0.0, is_gliding=True, heading=0.0):
     return state, asked.heading
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.floats(-60.0, 60.0), st.floats(0.2, 0.5), st.floats(-0.7, 0.7), st.floats(-3.0, 3.0))
 def test_it_follows_its_differential_equations(start, speed, crab, course):
     """y' = U sin(psi + beta - pi_h) within 1 %, beta the crab; and comes to the path."""

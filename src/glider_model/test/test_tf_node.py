@@ -69,7 +69,7 @@ def fly(context, node, others=(), ticks=40, every_s=0.01) -> None:
     executor = SingleThreadedExecutor(context=context)
     for one in (node, *others):
         executor.add_node(one)
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 60.0
     while not publisher.get_subscription_count() and time.monotonic() < deadline:
         executor.spin_once(timeout_sec=0.02)
     for tick in range(ticks):

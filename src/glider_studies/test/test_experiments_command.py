@@ -473,7 +473,7 @@ def test_interrupt_ends_the_command():
         assert process.stderr.readline() == '3 experiments, 18 flights\n'
         time.sleep(3.0)
         os.killpg(process.pid, signal.SIGINT)
-        out, error = process.communicate(timeout=60.0)
+        out, error = process.communicate(timeout=300.0)
         assert (process.returncode, out) == (130, '')
         assert 'stopped by SIGINT' in error
         assert 'Traceback' not in error
