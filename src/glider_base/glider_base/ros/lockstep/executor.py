@@ -32,6 +32,10 @@ except ImportError:
 _RARE = {'timers': 'timer', 'services': 'service', 'clients': 'client'}
 _GUARDS = ('_guard', '_sigint_gc')
 _MESSAGE_ONLY = Subscription.CallbackType.MessageOnly
+#: Waits no longer (s) than this, then looks whether its context is still good. rclpy answers a
+#: signal by waking executors first and shutting contexts down after: one that was quicker would
+#: wait for ever where no message comes any more.
+_LOOK_S = 1.0
 
 
 @cache
@@ -164,7 +168,7 @@ class TickExecutor(SingleThreadedExecutor):
             wait_set.add_subscription(item.handle)
         for add, handle in self._others:
             add(handle)
-        wait_set.wait(-1 if timeout_sec is None else int(timeout_sec * 1e9))
+        wait_set.wait(int(1e9 * (_LOOK_S if timeout_sec is None else timeout_sec)))
         pointers = set(wait_set.get_ready_entities('subscription'))
         ready = [item for item in gated if item.handle.pointer in pointers]
         is_other_ready = len(ready) < len(pointers) or any(
