@@ -20,7 +20,7 @@ import pytest
 import xarray
 import yaml
 
-from glider_base import kernel_cache
+from glider_base.kernels import cache as kernel_cache
 from glider_base.ros.wire.topics import recorded_topics
 from glider_mission.recording.mcap_reader import Bag
 

@@ -14,7 +14,8 @@ import numba
 from numba.core import event
 from numba.extending import overload
 
-from glider_base.kernel_cache import KernelCache, is_kept
+from glider_base.kernels import compiler
+from glider_base.kernels.cache import KernelCache, is_kept
 from glider_base.plugins import registered, sources
 
 #: Packages whose kernels call each other.
@@ -27,7 +28,7 @@ Values = TypeVar('Values', bound=NamedTuple)
 
 
 #: What all are compiled with: IEEE arithmetic, and no wrapper for C.
-_OPTIONS = {'error_model': 'numpy', 'no_cfunc_wrapper': True}
+_OPTIONS = {'error_model': 'numpy', 'no_cfunc_wrapper': True, **compiler.OPTIONS}
 
 
 @cache

@@ -21,7 +21,7 @@ from typing import Any
 
 from numba.extending import overload
 
-from glider_base.kernel_cache import BODIES, Body
+from glider_base.kernels.cache import BODIES, Body
 
 
 def slot(stub: Callable) -> Callable:

@@ -2,6 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiling: whoever waits for it is told."""
 
+import os
+import subprocess
+import sys
+
 import numba
 
 from glider_base.kernel import compiling_told
@@ -26,3 +30,45 @@ def test_compiling_is_told_before_it_begins_once_and_only_then():
     quarter(1j)
     assert seen == [1.0, 1.0, 2.0]
     assert told == [0]
+
+
+LAW = """
+import sys
+from glider_base.kernel import kernel
+
+@kernel
+def inner(x):
+    if x < 0.0:
+        raise ValueError('below zero', x)
+    print('inner', x, 'of two')
+    return 2.0 * x
+
+@kernel
+def outer(x):
+    return inner(x) + 1.0
+
+if __name__ == '__main__':
+    import law
+    print(law.outer(3.0))
+    try:
+        law.outer(-1.0)
+    except ValueError as error:
+        print(error.args)
+    print(len(law.outer.stats.cache_hits))
+"""
+
+
+def test_what_is_inlined_prints_and_raises_as_it_would_alone(tmp_path):
+    """It has no machine code of its own, compiled or from the cache: nothing of it is lost."""
+    (tmp_path / 'law.py').write_text(LAW, encoding='utf-8')
+    env = {**os.environ, 'GLIDER_CACHE': str(tmp_path / 'cache')}
+    said = [
+        subprocess.run(
+            [sys.executable, 'law.py'], cwd=tmp_path, env=env, capture_output=True, text=True
+        ).stdout.splitlines()
+        for _ in range(2)
+    ]
+    assert [lines[:-1] for lines in said] == [
+        ['inner 3.0 of two', '7.0', "('below zero', -1.0)"]
+    ] * 2
+    assert [lines[-1] for lines in said] == ['0', '1']

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from glider_base import kernel_cache
+from glider_base.kernels import cache as kernel_cache
 
 #: A kernel in a file of its own.
 KERNEL = """

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import glider_bringup
-from glider_base.kernel_cache import forget_old
+from glider_base.kernels.cache import forget_old
 from glider_base.signals import TICK_S
 from glider_base.wiring import at_rest
 from glider_bringup.engines.direct import fly

@@ -1,0 +1,116 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""What numba does for kernels in vain, and is spared here: a quarter of the time it compiles.
+
+A kernel that others call is inlined by them, so that no machine code of its own is ever run. numba
+makes it all the same. And for each tuple that is bound to a name numba takes apart all numbers in
+it, to count references, though there are none in most.
+
+All of it stands on what is not public in numba. With any other numba than the one that it was
+written for, kernels are compiled as numba does it.
+"""
+
+import numba
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, ll
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.environment import lookup_environment
+from numba.core.runtime.context import NRTContext
+from numba.core.typed_passes import NativeLowering
+
+WRITTEN_FOR = '0.61.'
+#: Kind of a library in the cache; how names of environments of functions begin in a module.
+_BITCODE, _ENVIRONMENT = 'inlined', '_ZN08NumbaEnv'
+
+
+class _Library(JITCodeLibrary):
+    """Code of a kernel. The engine that makes machine code never gets one that is inlined."""
+
+    is_inlined = False
+
+    def _finalize_final_module(self):
+        if not self.is_inlined:
+            return super()._finalize_final_module()
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name):
+        """Address of a function; 0 of one that is inlined, for there is none."""
+        return 0 if self.is_inlined else super().get_pointer_to_function(name)
+
+    @property
+    def codegen(self):
+        """What sets environments of functions: one that is inlined gets its with its caller."""
+        return self if self.is_inlined else super().codegen
+
+    def set_env(self, name, env):
+        """Nothing to set before it is inlined."""
+
+    def serialize_using_object_code(self):
+        """What goes to the cache."""
+        if not self.is_inlined:
+            return super().serialize_using_object_code()
+        self._ensure_finalized()
+        return self.name, _BITCODE, self._get_module_for_linking().as_bitcode()
+
+    @classmethod
+    def _unserialize(cls, codegen, state):
+        name, kind, data = state
+        if kind != _BITCODE:
+            return super()._unserialize(codegen, state)
+        library = cls(codegen, name)
+        library.is_inlined = library._finalized = True
+        library._shared_module = ll.parse_bitcode(data)
+        return library
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Lowering(NativeLowering):
+    """Makes code of a kernel whose types are known."""
+
+    _name = 'kernel_lowering'
+
+    def run_pass(self, state):
+        codegen, flags = state.targetctx.codegen(), state.flags
+        library = state.library = codegen.create_library(state.func_id.func_qualname)
+        library.enable_object_caching()
+        library.is_inlined = bool(flags.forceinline and flags.no_cpython_wrapper)
+        changed = super().run_pass(state)
+        if not library.is_inlined:
+            for name in (one.name for one in library._final_module.global_variables):
+                env = lookup_environment(name) if name.startswith(_ENVIRONMENT) else None
+                if env is not None:
+                    codegen.set_env(name, env)
+        return changed
+
+
+class KernelCompiler(CompilerBase):
+    """Compiles kernels: an option of `numba.njit`."""
+
+    def define_pipelines(self):
+        """As numba has them, but for the last step."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [
+            (_Lowering if one is NativeLowering else one, text) for one, text in passes.passes
+        ]
+        passes.finalize()
+        return [passes]
+
+
+_meminfos = NRTContext.get_meminfos
+
+
+def _meminfos_if_any(self, builder, kind, value):
+    """What is counted in a value, without taking it apart where nothing is."""
+    if not self._context.data_model_manager[kind].contains_nrt_meminfo():
+        return []
+    return _meminfos(self, builder, kind, value)
+
+
+#: Options of `numba.njit` for kernels.
+OPTIONS = {}
+if numba.__version__.startswith(WRITTEN_FOR):
+    OPTIONS['pipeline_class'] = KernelCompiler
+    JITCPUCodegen._library_class = _Library  # also of what is read from the cache
+    NRTContext.get_meminfos = _meminfos_if_any
