@@ -177,6 +177,7 @@ def package(tmp_path):
 
         def call(self, folder: str) -> list[tuple[float, int]]:
             env = dict(os.environ, GLIDER_CACHE=str(tmp_path / 'cache'))
+            env['PYTHONDONTWRITEBYTECODE'] = '1'  # what is written within a second looks the same
             path = [str(tmp_path / folder), env.get('PYTHONPATH', '')]
             env['PYTHONPATH'] = os.pathsep.join(path)
             command = [sys.executable, '-c', CALL]
