@@ -291,7 +291,7 @@ def _after_telling(state, faults, whole, params):
 @_after_telling.body(FaultParams)
 @kernel
 def _remember_what_was_told(state, faults, whole, params):
-    return remembered(faults, tell(state, whole), whole.sensors)
+    return remembered(faults, tell(state, whole), whole.sensors) if params.repeats else faults
 
 
 @kernel

@@ -64,6 +64,7 @@ class FaultParams(NamedTuple):
     phase: np.ndarray  #: int64[n]
     ticks: np.ndarray  #: int64[n]: how long it lasts
     stream: np.ndarray  #: uint64[n]: start of its random stream
+    repeats: bool  #: a sensor shows what it showed before, so that this is to be remembered
 
 
 class NoFaultState(NamedTuple):
@@ -74,7 +75,7 @@ class FaultState(NamedTuple):
     """What is remembered of faults. The arrays are never changed, but replaced."""
 
     began: np.ndarray  #: int64[n]: tick at which each began; -1: not yet
-    shown: np.ndarray  #: float64[SHOWN]: what sensors showed at the tick before
+    shown: np.ndarray  #: float64[SHOWN]: what sensors showed at the tick before, if one repeats it
 
 
 @slot
@@ -129,6 +130,15 @@ def is_due(i, tick, depth, phase, params):
     if wanted == CLIMB:
         return depth <= params.depth[i]
     return depth >= params.depth[i]
+
+
+@kernel
+def any_begun(faults):
+    """Whether there is anything to see of faults."""
+    for began in faults.began:
+        if began >= 0:
+            return True
+    return False
 
 
 @slot

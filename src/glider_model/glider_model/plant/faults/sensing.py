@@ -28,6 +28,7 @@ from glider_model.plant.faults.kinds import (
     VELOCITY,
     FaultParams,
     FaultState,
+    any_begun,
     begun,
     summed,
 )
@@ -59,6 +60,8 @@ def told(numbers, state, sensors, params):
 @kernel
 def _told(numbers, state, sensors, params):
     faults = begun(state, params)
+    if not any_begun(faults):
+        return numbers
     total = summed(faults, state.tick, params)
     truth, position, imu, pressure, fix, altitude, health, battery, joints = numbers
     if total[kinds.NO_FIXES] > 0.0:
@@ -192,10 +195,10 @@ def _imu(imu, seen, right):
 def _health(health, total):
     """What the health sensors say of it."""
     well = Health(health[0], health[1], health[2])
-    return (
-        1.0 if total[kinds.WATER] >= NOTICED_KG else well.leak,
-        max(0.0, well.vacuum_pa - total[kinds.PASCALS]),
-        max(well.contact_age_s, total[kinds.ALONE_S]),
+    return Health(
+        leak=1.0 if total[kinds.WATER] >= NOTICED_KG else well.leak,
+        vacuum_pa=max(0.0, well.vacuum_pa - total[kinds.PASCALS]),
+        contact_age_s=max(well.contact_age_s, total[kinds.ALONE_S]),
     )
 
 
@@ -206,4 +209,4 @@ def _battery(battery, total):
     voltage = x.voltage
     if total[kinds.VOLTS] > 0.0:
         voltage = np.float64(np.float32(max(0.0, voltage - total[kinds.VOLTS])))
-    return voltage, x.current, x.charge, x.capacity, x.percentage
+    return Battery(voltage, x.current, x.charge, x.capacity, x.percentage)

@@ -442,6 +442,7 @@ def fault_params(faults: Sequence[FaultSettings], seed: int) -> NamedTuple:
         phase=np.array([PHASES.index(fault.phase) for fault in faults], np.int64),
         ticks=np.array([fault.lasts for fault in faults], np.int64),
         stream=np.array(streams, np.uint64),
+        repeats=any(one.kind == kinds.DROPOUT for one in packed),
     )
 
 
