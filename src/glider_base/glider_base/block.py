@@ -86,27 +86,6 @@ def _rows_at(arrays, row):
     return lambda arrays, row: (arrays[0][row], *rows_at(arrays[1:], row))
 
 
-def put(table, row, start, tuples):
-    """Write tuples of numbers into a row of float64[n, m] from a column on; in kernels only."""
-    numbers = [number for values in tuples for number in values]
-    table[row, start : start + len(numbers)] = numbers
-
-
-@overload(put)
-def _put(table, row, start, tuples):
-    if len(tuples) == 0:
-        return lambda table, row, start, tuples: None
-    if len(tuples[0]) == 0:
-        return lambda table, row, start, tuples: put(table, row, start, tuples[1:])
-
-    def put_first(table, row, start, tuples):
-        for i, value in enumerate(tuples[0]):
-            table[row, start + i] = value
-        put(table, row, start + len(tuples[0]), tuples[1:])
-
-    return put_first
-
-
 @kernel
 def changes_to_tell(flags, stamps_ns, every_ns, told, told_ns):
     """Where flags int64[n, m] have changed, told at most once in ``every_ns``; indices int64[k].

@@ -29,6 +29,8 @@ Values = TypeVar('Values', bound=NamedTuple)
 
 #: What all are compiled with: IEEE arithmetic, and no wrapper for C.
 _OPTIONS = {'error_model': 'numpy', 'no_cfunc_wrapper': True, **compiler.OPTIONS}
+#: What functions that kernels alone call are compiled with beside that, to be inlined.
+INLINED = {**_OPTIONS, 'no_cpython_wrapper': True, 'forceinline': True}
 
 
 @cache
@@ -69,7 +71,7 @@ def kernel(function: Callable) -> numba.core.dispatcher.Dispatcher:
 
     @cache
     def inlined() -> numba.core.dispatcher.Dispatcher:
-        return _compiled(function, '.inlined', no_cpython_wrapper=True, forceinline=True)
+        return _compiled(function, '.inlined', **INLINED)
 
     compiled.get_call_template = lambda *arguments: inlined().get_call_template(*arguments)
     compiled.get_overload = lambda signature: inlined().get_overload(signature)
@@ -87,7 +89,7 @@ def loop(function: Callable) -> numba.core.dispatcher.Dispatcher:
 
 def _compiled(function: Callable, ending: str = '', **options) -> numba.core.dispatcher.Dispatcher:
     """What compiles a function when it is called, and finds again what it compiled before."""
-    compiled = numba.njit(**_OPTIONS, **options)(function)
+    compiled = numba.njit(**{**_OPTIONS, **options})(function)
     if is_kept(function):
         compiled._cache = KernelCache(function, ending)  # as its enable_caching() does
     return compiled
@@ -103,7 +105,7 @@ def replace(values: Values, **changes) -> Values:
     return values._replace(**changes)
 
 
-@overload(replace, jit_options={'error_model': 'numpy', 'forceinline': True}, strict=False)
+@overload(replace, jit_options=INLINED, strict=False)
 def _replaced(values, **changes):
     """Write the constructor out, as numba has it: all fields, in their order."""
     made = values.instance_class

@@ -136,6 +136,8 @@ def _classes(kinds: Iterable) -> Iterator[type]:
             yield from _classes(set(kind.types))
         if isinstance(kind, types.StructRef):
             yield from _classes(kind.field_dict.values())
+        if isinstance(kind, types.TypeRef):
+            yield from _classes([kind.instance_type])
 
 
 def is_kept(function) -> bool:

@@ -10,14 +10,14 @@ from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numba.core import types
 from numba.experimental import structref
+from numba.extending import overload
 
-from glider_base.block import put
 from glider_base.frames import odometry_from_wire, water_to_wire
-from glider_base.kernel import kernel, loop, replace
+from glider_base.kernel import INLINED, kernel, loop
+from glider_base.kernels.packing import packed, put, unpacked
 from glider_base.signals import TICK_S, Joints
 from glider_base.wiring import FIELDS, publisher
 from glider_control.block import control_tick
@@ -119,22 +119,40 @@ class HeldMission(structref.StructRefProxy):
     """
 
 
-structref.define_proxy(HeldMission, HeldType, ['state', 'params'])
-if numba.config.DISABLE_JIT:
-    HeldMission = SimpleNamespace
+structref.define_boxing(HeldType, HeldMission)
+
+
+def _held(state, params):
+    return SimpleNamespace(state=state, params=params)
+
+
+@overload(_held, jit_options=INLINED)
+def _new_held(state, params):
+    kind = HeldType([('state', state), ('params', params)])
+
+    def held(state, params):
+        made = structref.new(kind)
+        made.state, made.params = state, params
+        return made
+
+    return held
 
 
 @kernel
-def hold(state, params):
-    """Have a mission held: `HeldMission`. The state that was given does not change with it."""
-    return HeldMission(state=apart(state), params=params)
+def _hold(kind, numbers, others):
+    state, params = unpacked(kind, numbers, others)
+    return _held(state, params)
 
 
-@kernel
-def apart(state):
+def hold(state: MissionState, params: MissionParams) -> HeldMission:
+    """Have a mission held. The state that was given does not change with it."""
+    return _hold(*packed((apart(state), params)))
+
+
+def apart(state: MissionState) -> MissionState:
     """The same state, which a flight of the other one does not change."""
-    current = CurrentState(state.current.tick, state.current.values.copy())
-    return replace(state, current=current)
+    current = state.current
+    return state._replace(current=current._replace(values=current.values.copy()))
 
 
 @kernel
@@ -145,21 +163,33 @@ def fly_held(held, log, dt):
 
 
 @kernel
-def held_state(held):
+def _state_of(held):
+    return held.state
+
+
+def held_state(held: HeldMission) -> MissionState:
     """What is held: a state of one's own."""
-    return apart(held.state)
+    return apart(_state_of(held))
 
 
 @kernel
-def set_held(held, state):
+def _set_state(held, kind, numbers, others):
+    held.state = unpacked(kind, numbers, others)
+
+
+def set_held(held: HeldMission, state: MissionState) -> None:
     """Hold another state."""
-    held.state = apart(state)
+    _set_state(held, *packed(apart(state)))
 
 
 @kernel
-def set_held_params(held, params):
+def _set_params(held, kind, numbers, others):
+    held.params = unpacked(kind, numbers, others)
+
+
+def set_held_params(held: HeldMission, params: MissionParams) -> None:
     """Fly on with other parameters."""
-    held.params = params
+    _set_params(held, *packed(params))
 
 
 def fly(

@@ -8,8 +8,9 @@ computes from them what its node would have published.
 
 import numpy as np
 
-from glider_base.block import Block, block_tick, optional_topics, put, rows_at
+from glider_base.block import Block, block_tick, optional_topics, rows_at
 from glider_base.kernel import kernel
+from glider_base.kernels.packing import put
 from glider_base.settings import Settings
 from glider_base.signals import TICK_NS, TICK_S
 from glider_base.wiring import FIELDS, at_rest, present
