@@ -14,8 +14,10 @@ from numba.extending import intrinsic
 from numba.np import arrayobj
 
 #: Numbers by their type, each in an array of its own; all else is handed over as it is.
-_NUMBERS = {types.float64: np.float64, types.int64: np.int64, types.boolean: np.bool_}
-_NUMBERS[types.uint64] = np.uint64
+_NUMBERS = {
+    **{types.float64: np.float64, types.boolean: np.bool_},
+    **{types.int64: np.int64, types.uint64: np.uint64},
+}
 _ORDER = list(_NUMBERS)
 
 
@@ -46,21 +48,16 @@ def _sort(kind, value, numbers, others) -> None:
         others.append(value)
 
 
-def _arrays(context, builder, kinds, value) -> list:
-    """Arrays of a tuple, as numba has them in code."""
-    parts = cgutils.unpack_tuple(builder, value, len(kinds))
-    return [
-        context.make_array(kind)(context, builder, value=part)
-        for kind, part in zip(kinds, parts, strict=True)
-    ]
-
-
 def _unpacked(typing, kind, numbers, others):
     """Load each number, and put the tuple together."""
     made = kind.instance_type
 
     def code(context, builder, signature, arguments):
-        arrays = _arrays(context, builder, numbers.types, arguments[1])
+        parts = cgutils.unpack_tuple(builder, arguments[1], len(numbers.types))
+        arrays = [
+            context.make_array(of)(context, builder, value=part)
+            for of, part in zip(numbers.types, parts, strict=True)
+        ]
         left = iter(cgutils.unpack_tuple(builder, arguments[2], len(others.types)))
         taken = [0] * len(_ORDER)
 
