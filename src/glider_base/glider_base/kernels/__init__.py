@@ -1,3 +1,3 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is kept of compiled kernels, and how they are compiled."""
+"""How kernels are compiled, what is kept of them, and how tuples of numbers come to them."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What numba does for kernels in vain, and is spared here: a quarter of the time it compiles.
+"""What numba does for kernels in vain, and is spared here.
 
 A kernel that others call is inlined by them, so that no machine code of its own is ever run. numba
 makes it all the same. And for each tuple that is bound to a name numba takes apart all numbers in
