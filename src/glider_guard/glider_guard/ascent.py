@@ -4,14 +4,16 @@
 
 A vehicle that still sinks when its nose goes up slides down backward, faster than it dived: from
 0.36 to 0.69 m/s in zhang2021. Held level it lies across its way, and hardly sinks. So the mass
-is where it balances the rest as long as the vehicle sinks, and at its stop once it rises.
+is where it balances the rest as long as the vehicle sinks, and at its stop once it rises. What a
+scale does not know of the balance, a broken part or a hull that shrinks, the pitch shows.
 """
 
+import math
 from typing import NamedTuple
 
 from glider_base.kernel import kernel
 from glider_base.signals import Joints
-from glider_model.onboard.moving_mass import MovingMass, mass_place
+from glider_model.onboard.moving_mass import MovingMass, first_moments, mass_place
 
 #: A vehicle that rises faster than this (m/s) turns its nose up; one that sinks faster lies level.
 RISES_MPS = 0.05
@@ -21,6 +23,9 @@ RISES_MPS = 0.05
 SLOW_MPS, SLOW_S = 0.03, 300.0
 #: Its vertical rate is averaged over this time (s): a turn throws it up for a moment.
 AVERAGE_S = 20.0
+#: Held level, a moment that nobody knows of is averaged over this time (s). More than what turns
+#: the nose by this (rad) it is not: where the attitude errs, the mass stays near its balance.
+BALANCE_S, OFF_BALANCE = 100.0, math.radians(10.0)
 
 
 class AscentLimits(NamedTuple):
@@ -40,28 +45,42 @@ class Ascent(NamedTuple):
     turned: bool  #: nose up
     #: for which it has risen too slowly so; less than 0: the other way is tried for as long
     slow_s: float
+    moment: float  #: first moment that nobody knows of (kg m)
 
 
-INITIAL_ASCENT = Ascent(0.0, 0.0, False, 0.0)
+class Rise(NamedTuple):
+    """What a tick shows of it."""
+
+    rate: float  #: measured vertical rate (m/s, + down)
+    sees: bool  #: whether that is to be believed
+    moves: bool  #: whether it is shown at all: what is not believed tells of a stall still
+    under: bool  #: under water
+    theta: float  #: pitch (rad)
+    is_new: bool  #: whether that is measured anew
+    m_b: float  #: where the pump is (kg)
+    x_p: float  #: where the mass is (m)
+
+
+INITIAL_ASCENT = Ascent(0.0, 0.0, False, 0.0, 0.0)
 
 
 @kernel
-def come_up(state, rate, sees, moves, under, m_b, limits, dt):
+def _off_balance(moment, at, mass, dt):
+    """First moment (kg m) that nobody knows of, a tick later: the pitch shows it."""
+    s_x, _, s_z = first_moments(at.m_b, at.x_p, 0.0, mass)
+    most = s_z * math.tan(OFF_BALANCE)
+    shown = min(most, max(-most, -s_z * math.tan(at.theta) - s_x))
+    return moment + dt / BALANCE_S * (shown - moment)
+
+
+@kernel
+def come_up(state, at, limits, dt):
     """Command of a tick on the way up.
 
     Parameters
     ----------
     state : Ascent
-    rate : float
-        Measured vertical rate (m/s, + down).
-    sees : bool
-        Whether that is to be believed.
-    moves : bool
-        Whether it is shown at all: what is not believed tells of a stall still.
-    under : bool
-        Whether it is under water.
-    m_b : float
-        Where the pump is (kg).
+    at : Rise
     limits : AscentLimits
     dt : float
 
@@ -69,7 +88,9 @@ def come_up(state, rate, sees, moves, under, m_b, limits, dt):
     -------
     Ascent, Joints
     """
-    average = rate if state.waits_s == 0.0 else state.rate + dt / AVERAGE_S * (rate - state.rate)
+    sees, m_b, average = at.sees, at.m_b, at.rate
+    if state.waits_s > 0.0:
+        average = state.rate + dt / AVERAGE_S * (at.rate - state.rate)
     waits_s, turned = state.waits_s + dt, state.turned
     is_done = m_b <= limits.pumped or waits_s > limits.pump_s
     if is_done and not sees:
@@ -82,11 +103,14 @@ def come_up(state, rate, sees, moves, under, m_b, limits, dt):
     hangs = is_done and m_b < 0.0 and average <= RISES_MPS
     if slow_s < 0.0:
         turned = state.turned and not (sees and average > RISES_MPS)
-    elif moves and under and (turned or hangs):
+    elif at.moves and at.under and (turned or hangs):
         slower = dt if average > -SLOW_MPS else -dt  # a rate that errs is now this, now that
         slow_s = max(0.0, state.slow_s + slower)
         if slow_s >= SLOW_S:
             turned, slow_s = not turned, -SLOW_S
+    moment = state.moment
+    if at.is_new and not state.turned:
+        moment = _off_balance(moment, at, limits.mass, dt)
     safe = limits.safe
-    x_p = safe.x_p if turned else mass_place(0.0, m_b, -safe.x_p, limits.mass)
-    return Ascent(waits_s, average, turned, slow_s), Joints(safe.m_b, x_p, 0.0, 0.0)
+    x_p = safe.x_p if turned else mass_place(-moment, m_b, -safe.x_p, limits.mass)
+    return Ascent(waits_s, average, turned, slow_s, moment), Joints(safe.m_b, x_p, 0.0, 0.0)

@@ -13,7 +13,7 @@ from glider_base.frames import euler_from_quaternion, rotate_to_ned
 from glider_base.kernel import kernel
 from glider_base.signals import SURFACE_TARGET, Battery, Covariance, Health, Joints, Odometry
 from glider_guard.actuators import ActuatorLimits, Followers, follow
-from glider_guard.ascent import INITIAL_ASCENT, Ascent, AscentLimits, come_up
+from glider_guard.ascent import INITIAL_ASCENT, Ascent, AscentLimits, Rise, come_up
 from glider_guard.depth import (
     DepthLimits,
     Depths,
@@ -192,15 +192,22 @@ def _sent(last, demand, told):
 
 
 @kernel
-def _react(state, taken, told, sinking, witness, params, dt):
+def _react(state, taken, told, glide, is_same, witness, params, dt):
     """Ascent a tick later, and the command of this one: what is demanded, held level, or up."""
     demand = taken.demand
     if told & (SURFACES | DROPS):
-        sees, under = not told & BLIND, witness.depth > SURFACE_M
-        moves = witness.same_s < params.witness.same_s
-        rate = sinking if not state.told & BLIND else (witness.raw - state.witness.raw) / dt
-        m_b, limits = taken.joints.m_b, params.ascent
-        return come_up(state.ascent, rate, sees, moves, under, m_b, limits, dt)
+        seen = not state.told & BLIND
+        rise = Rise(
+            rate=glide.sinking if seen else (witness.raw - state.witness.raw) / dt,
+            sees=not told & BLIND,
+            moves=witness.same_s < params.witness.same_s,
+            under=glide.under,
+            theta=glide.theta,
+            is_new=not is_same,
+            m_b=glide.m_b,
+            x_p=taken.joints.x_p,
+        )
+        return come_up(state.ascent, rise, params.ascent, dt)
     if told & HOLDS:
         return INITIAL_ASCENT, Joints(demand.m_b, demand.x_p, 0.0, 0.0)
     return INITIAL_ASCENT, demand
@@ -325,7 +332,7 @@ def guard_step(state, heard, params, dt):
     weight, heavy = weigh(state.weight, glide, params.weight, dt)
     fixes = watch_fixes(state.fixes, heard.odometry, heard.known, dt)
     told |= fix_rows(fixes) | unwell | heavy | _intake_rows(taken, params) | (state.told & LATCHED)
-    ascent, command = _react(state, taken, told, sinking, witness, params, dt)
+    ascent, command = _react(state, taken, told, glide, shown.is_same, witness, params, dt)
     tick = state.tick + 1 if taken.gate.seen else 0
     output = GuardOutput(command, (told & DROPS) != 0, told)
     state = GuardState(

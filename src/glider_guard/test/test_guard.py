@@ -17,7 +17,7 @@ from glider_base.signals import SURFACE_TARGET, TICK_S, Battery, Health, Joints,
 from glider_base.wiring import NO_ECHO
 from glider_guard import rows
 from glider_guard.actuators import INITIAL_FOLLOWERS, follow
-from glider_guard.ascent import INITIAL_ASCENT, come_up
+from glider_guard.ascent import INITIAL_ASCENT, Rise, come_up
 from glider_guard.block import GUARD, guard_surface, say
 from glider_guard.guard import GuardOutput, GuardParams, GuardState, Heard, guard_step
 from glider_guard.settings import GuardSettings
@@ -26,7 +26,9 @@ from glider_model.vehicle.file import changed_vehicle, load_vehicle
 
 DIVES = Joints(0.4, 0.02, 0.1, 0.0)
 RISES = Joints(-0.4, -0.02, 0.1, 0.0)
-SAFE, LEVEL = (-1.0, -0.06, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0)
+SAFE = (-1.0, -0.06, 0.0, 0.0)
+#: Held level: the mass is within a few millimetres of its balance, by what the pitch shows.
+LEVEL = pytest.approx((-1.0, 0.0, 0.0, 0.0), abs=0.004)
 #: Vertical rate of a vehicle that is well (m/s).
 RATE = 0.2
 
@@ -172,7 +174,7 @@ def test_a_row_is_told_in_time_and_reacted_to_as_it_says(name):
     if rows.reaction_of(told) == rows.HOLD:
         assert vehicle.out.command == (demand.m_b, demand.x_p, 0.0, 0.0)
     else:  # the mass waits for the pump
-        assert vehicle.out.command in (SAFE, LEVEL)
+        assert vehicle.out.command == SAFE or vehicle.out.command == LEVEL
     assert vehicle.out.drops == (row.reaction == rows.DROP)
 
 
@@ -565,6 +567,11 @@ def test_a_slow_dive_with_the_pump_on_its_light_side_is_no_climb():
     assert not vehicle.go(1800.0, demand=DIVES._replace(m_b=-0.05), rate=0.04)
 
 
+HANGS = Rise(
+    rate=0.0, sees=True, moves=True, under=True, theta=0.0, is_new=True, m_b=-1.0, x_p=0.0
+)
+
+
 def test_a_slow_way_up_is_seen_through_what_the_rate_errs_by():
     """In a stall it rises at 0.012 m/s: held level it comes out of it, but not at 0.08 m/s."""
     draw = np.random.default_rng(2)
@@ -577,8 +584,42 @@ def test_a_slow_way_up_is_seen_through_what_the_rate_errs_by():
     ):
         state, sent = INITIAL_ASCENT, []
         for error in draw.normal(0.0, 0.4, 20000):
-            state, command = come_up(state, rate + error, sees, True, True, -1.0, limits, TICK_S)
+            at = HANGS._replace(rate=rate + error, sees=sees)
+            state, command = come_up(state, at, limits, TICK_S)
             sent.append(command.x_p != limits.safe.x_p)
         held = np.count_nonzero(sent[1000:])  # at first it lies level until it rises
         assert (held > 2000) == levels
         assert levels or not held
+
+
+@pytest.mark.parametrize('nose_deg', [-8.0, 3.0, 8.0])
+def test_a_vehicle_out_of_balance_is_held_level_by_its_pitch(nose_deg):
+    """A part that broke off turns its nose by so much where the scale says that it is level.
+
+    The pitch of a hull at rest, by its moments alone.
+    """
+    limits, state, x_p, theta = Vehicle().params.ascent, INITIAL_ASCENT, 0.0, 0.0
+    mass = limits.mass
+    s_z = mass.s_z + mass.m_p * mass.R_p
+    broken = -s_z * math.tan(math.radians(nose_deg))
+    for _ in range(6000):
+        s_x = broken + mass.s_x + mass.m_p * (mass.x_p0 + x_p) + 0.1 * mass.pump_x
+        theta = math.atan2(-s_x, s_z)
+        at = HANGS._replace(rate=0.1, theta=theta, m_b=0.1, x_p=x_p)
+        state, command = come_up(state, at, limits, TICK_S)
+        x_p += max(-0.002, min(0.002, command.x_p - x_p))
+    assert math.degrees(theta) == pytest.approx(0.0, abs=0.2)
+
+
+def test_a_pitch_that_errs_leaves_the_mass_near_its_balance():
+    """One that stands at 40 deg, and one that comes no more."""
+    limits = Vehicle().params.ascent
+    mass = limits.mass
+    within = (mass.s_z + mass.m_p * mass.R_p) * math.tan(math.radians(10.0)) / mass.m_p
+    for is_new, most in ((True, within), (False, 0.0)):
+        state = INITIAL_ASCENT
+        at = HANGS._replace(rate=0.1, theta=math.radians(40.0), is_new=is_new, m_b=0.0)
+        balance = -mass.s_x / mass.m_p - mass.x_p0
+        for _ in range(6000):
+            state, command = come_up(state, at, limits, TICK_S)
+        assert abs(command.x_p - balance) == pytest.approx(most, abs=1e-4)

@@ -10,7 +10,7 @@ from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.process import run
 from glider_base.signals import TICK_S, Joints
-from glider_guard.ascent import INITIAL_ASCENT, come_up
+from glider_guard.ascent import INITIAL_ASCENT, Rise, come_up
 from glider_guard.block import GUARD
 from glider_guard.depth import SURFACE_M
 
@@ -55,11 +55,19 @@ class GuardNode(BlockNode):
 
     def _come_up(self, cycles: int = 1) -> Joints:
         """Command of a cycle, or of some at once, in which nothing is seen."""
-        m_b, limits = self.state.taken.joints.m_b, self.params.ascent
+        joints = self.state.taken.joints
+        unseen = Rise(
+            rate=0.0,
+            sees=False,
+            moves=False,
+            under=True,
+            theta=0.0,
+            is_new=False,
+            m_b=joints.m_b,
+            x_p=joints.x_p,
+        )
         for _ in range(cycles):
-            self.ascent, command = come_up(
-                self.ascent, 0.0, False, False, True, m_b, limits, TICK_S
-            )
+            self.ascent, command = come_up(self.ascent, unseen, self.params.ascent, TICK_S)
         return command
 
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
