@@ -138,6 +138,12 @@ def test_who_stays_down_after_it_was_sent_up_is_late():
     hangs_again = [*up[:3], (11000.0, 0.0), (12000.0, 50.0), (20000.0, 50.0)]
     struck = [{**PUMP_STUCK, 'at_s': 11000.0}]
     assert kind_of(flight(hangs_again, told_s=1500.0), struck, 'surfaced') == 'late'
+    # a fault that takes 70 min to sink it: its time begins there
+    for back_s, verdict in ((16500.0, ''), (20000.0, 'late')):
+        later = [*up[:3], (15000.0, 0.0), (15500.0, 50.0), (back_s - 1.0, 50.0), (back_s, 0.0)]
+        slowly = flight([*later, (20000.0, 0.0)][: 6 if verdict else None], told_s=1500.0)
+        assert kind_of(slowly, struck, 'surfaced') == verdict
+        assert kind_of(slowly, [], 'surfaced') == 'late'
 
 
 def test_who_would_have_sunk_again_whatever_was_done_is_not_late():

@@ -176,14 +176,15 @@ def _lost(scenario: Scenario, truth: Truth) -> str:
 def _late(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
     """Why a vehicle is late that was told to surface for good and could have.
 
-    A fault that strikes one that is up, and sinks it again, gives it its time anew.
+    A fault that strikes one that is up gives it its time anew, from when it has sunk it again: a
+    slow leak takes hours to.
     """
     surfaces = (truth.rows & (SURFACES | DROPS)) != 0
     if not surfaces.any():
         return ''
     told, depth = int(np.argmax(surfaces)), truth.depth
     struck = [round(one) for one in sorted(begun_s) if told < one < len(depth) - 1.0]
-    struck = [one for one in struck if depth[one] < AT_SURFACE_M]
+    struck = [_sinks_s(depth, one) for one in struck if depth[one] < AT_SURFACE_M]
     for start, end in pairwise([told, *struck, len(depth)]):
         limit_s = due_s(float(depth[start]))
         late = depth[start + round(limit_s) : end]
@@ -193,6 +194,12 @@ def _late(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
         if any((depths[round(limit_s / TICK_S) :] < AT_SURFACE_M).all() for depths in best):
             return f'{late.max():.0f} m deep {limit_s:.0f} s after it was sent up at {start} s'
     return ''
+
+
+def _sinks_s(depth: np.ndarray, from_s: int) -> int:
+    """When (s) a vehicle that is up at some time (s) goes under; that time if it never does."""
+    under = depth[from_s:] > SINKS_AGAIN_M
+    return from_s + int(np.argmax(under))
 
 
 def _is_under(depth: np.ndarray) -> bool:
