@@ -107,7 +107,8 @@ def rivals(tmp_path_factory):
     and scorecard."""
     folder = tmp_path_factory.mktemp('rivals')
     with domain_id() as domain:
-        first = start(domain, 'current_8deg', folder / 'first', '--duration', 'full')
+        slow = ('--duration', 'full', '--speed', 20)  # what is flown meanwhile is flown again
+        first = start(domain, 'current_8deg', folder / 'first', *slow)
         try:
             wait_for_recording(folder / 'first', first)
             second = start(domain, 'rough_water', folder / 'second')
