@@ -35,6 +35,7 @@ class AscentLimits(NamedTuple):
     pumped: float  #: from here on the pump has done what it can (kg)
     pump_s: float  #: and after this time, wherever it is
     mass: MovingMass
+    there: float  #: the mass is this near to where it goes (m)
 
 
 class Ascent(NamedTuple):
@@ -59,6 +60,7 @@ class Rise(NamedTuple):
     is_new: bool  #: whether that is measured anew
     m_b: float  #: where the pump is (kg)
     x_p: float  #: where the mass is (m)
+    is_there: bool  #: where it was sent, or it goes no farther
 
 
 INITIAL_ASCENT = Ascent(0.0, 0.0, False, 0.0, 0.0)
@@ -99,12 +101,14 @@ def come_up(state, at, limits, dt):
         turned = True
     elif sees and average > RISES_MPS:
         turned = False
-    slow_s = min(0.0, state.slow_s + dt) if state.slow_s < 0.0 else 0.0
+    # what a way of lying does is seen once the mass is there: one may take an hour to its stop
+    seen_s = dt if at.is_there else 0.0
+    slow_s = min(0.0, state.slow_s + seen_s) if state.slow_s < 0.0 else 0.0
     hangs = is_done and m_b < 0.0 and average <= RISES_MPS
     if slow_s < 0.0:
         turned = state.turned and not (sees and average > RISES_MPS)
     elif at.moves and at.under and (turned or hangs):
-        slower = dt if average > -SLOW_MPS else -dt  # a rate that errs is now this, now that
+        slower = seen_s if average > -SLOW_MPS else -dt  # a rate that errs is now this, now that
         slow_s = max(0.0, state.slow_s + slower)
         if slow_s >= SLOW_S:
             turned, slow_s = not turned, -SLOW_S

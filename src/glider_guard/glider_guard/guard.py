@@ -35,6 +35,7 @@ from glider_guard.rows import (
     NO_DEMAND,
     ORDERED,
     STUCK_BUOYANCY,
+    STUCK_PITCH,
     SURFACES,
     TOO_HEAVY,
 )
@@ -196,7 +197,8 @@ def _react(state, taken, told, glide, is_same, witness, params, dt):
     """Ascent a tick later, and the command of this one: what is demanded, held level, or up."""
     demand = taken.demand
     if told & (SURFACES | DROPS):
-        seen = not state.told & BLIND
+        seen, x_p = not state.told & BLIND, taken.joints.x_p
+        is_stuck = ((told | state.told) & STUCK_PITCH) != 0
         rise = Rise(
             rate=glide.sinking if seen else (witness.raw - state.witness.raw) / dt,
             sees=not told & BLIND,
@@ -205,7 +207,8 @@ def _react(state, taken, told, glide, is_same, witness, params, dt):
             theta=glide.theta,
             is_new=not is_same,
             m_b=glide.m_b,
-            x_p=taken.joints.x_p,
+            x_p=x_p,
+            is_there=is_stuck or abs(x_p - state.command.x_p) <= params.ascent.there,
         )
         return come_up(state.ascent, rise, params.ascent, dt)
     if told & HOLDS:

@@ -13,7 +13,7 @@ from glider_guard.ascent import INITIAL_ASCENT, AscentLimits
 from glider_guard.depth import INITIAL_DEPTHS, DepthLimits
 from glider_guard.guard import GuardParams, GuardState, Taken
 from glider_guard.health import INITIAL_HEALTH, HealthLimits
-from glider_guard.weight import INITIAL_WEIGHT, PUMP_ARRIVED, WeightLimits
+from glider_guard.weight import ARRIVED, INITIAL_WEIGHT, WeightLimits
 from glider_guard.witness import INITIAL_WITNESS, WitnessLimits
 from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH
 from glider_model.onboard.gate import INITIAL_GATE, GateSettings
@@ -265,16 +265,17 @@ class GuardSettings(GuardLimitSettings):
                 ballast=limits.ballast,
                 most=self.weight_share * limits.m_b_max,
                 average_s=self.weight_s,
-                arrived=max(PUMP_ARRIVED * limits.m_b_max, off.m_b),
+                arrived=max(ARRIVED * limits.m_b_max, off.m_b),
                 rate=slowest,
                 range=limits.m_b_max,
             ),
             has_pressure=self.pressure,
             ascent=AscentLimits(
                 Joints(-limits.m_b_max, -limits.x_p_max, 0.0, 0.0),
-                max((PUMP_ARRIVED - 1.0) * limits.m_b_max, off.m_b - limits.m_b_max),
+                max((ARRIVED - 1.0) * limits.m_b_max, off.m_b - limits.m_b_max),
                 2.0 * limits.m_b_max / slowest,
                 make_moving_mass(limits),
+                max(ARRIVED * limits.x_p_max, off.x_p),
             ),
             witness=WitnessLimits(
                 same_s=self.still_s + self._gap_s,

@@ -16,8 +16,8 @@ from glider_model.onboard.glide_polar import Polar, glide_net_heaviness, glide_v
 #: Shallower (rad) or slower (m/s) than this it is no steady glide, nor so near (share) to the
 #: shallowest one that there is, where a little pitch makes all the difference.
 LEAST_PITCH, LEAST_RATE, LEAST_SHARE = math.radians(12.0), 0.03, 1.2
-#: The pump is this near (share of its range) to where it goes.
-PUMP_ARRIVED = 0.05
+#: The pump, or the mass, is this near (share of its range) to where it goes.
+ARRIVED = 0.05
 #: What a vehicle weighs now is averaged over this time (s), and so is its vertical rate: of the
 #: square of one that is measured badly there would be left what its errors make.
 SOON_S = 30.0

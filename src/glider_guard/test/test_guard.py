@@ -458,9 +458,11 @@ def test_a_vehicle_is_level_while_it_sinks_and_nose_up_while_it_rises(pump_kg):
 
 def test_a_vehicle_that_hardly_rises_with_its_nose_up_is_held_level_for_a_while():
     """It may be in a stall that it does not leave by itself: five minutes each way."""
-    vehicle, pump = Vehicle(depth_m=500.0, stall_s=3600.0), Joints(-0.96, 0.0, 0.0, 0.0)
+    vehicle = Vehicle(depth_m=500.0, stall_s=3600.0)
+    pump = Joints(-0.96, 0.0, 0.0, 0.0)
     vehicle.target, asked = SURFACE_TARGET, []
     for _ in range(120):
+        pump = pump._replace(x_p=vehicle.out.command.x_p)
         vehicle.go(20.0, rate=-0.012, joints=pump)
         asked.append(vehicle.out.command == SAFE)
     assert 0.4 < sum(asked) / len(asked) < 0.6
@@ -470,6 +472,17 @@ def test_a_vehicle_that_hardly_rises_with_its_nose_up_is_held_level_for_a_while(
     for _ in range(60):
         vehicle.go(20.0, rate=0.0, joints=pump)
         assert vehicle.out.command == SAFE
+
+
+def test_a_mass_that_takes_an_hour_to_its_stop_gets_there():
+    """At a hundredth of its rate: level again every five minutes it would be nowhere ever."""
+    vehicle, x_p = Vehicle(depth_m=500.0, stall_s=3600.0), 0.0
+    vehicle.target = SURFACE_TARGET
+    for _ in range(200):
+        pump = Joints(-0.96, x_p, 0.0, 0.0)
+        vehicle.go(20.0, rate=-0.012 if x_p > -0.05 else -0.2, joints=pump)
+        x_p += max(-0.0004, min(0.0004, vehicle.out.command.x_p - x_p))
+    assert x_p < -0.055 and vehicle.out.command == SAFE
 
 
 @pytest.mark.parametrize(('pump_kg', 'up'), [(-0.18, -0.08), (-0.18, 0.2), (0.18, -0.08)])
@@ -568,7 +581,15 @@ def test_a_slow_dive_with_the_pump_on_its_light_side_is_no_climb():
 
 
 HANGS = Rise(
-    rate=0.0, sees=True, moves=True, under=True, theta=0.0, is_new=True, m_b=-1.0, x_p=0.0
+    rate=0.0,
+    sees=True,
+    moves=True,
+    under=True,
+    theta=0.0,
+    is_new=True,
+    m_b=-1.0,
+    x_p=0.0,
+    is_there=True,
 )
 
 

@@ -65,6 +65,7 @@ class GuardNode(BlockNode):
             is_new=False,
             m_b=joints.m_b,
             x_p=joints.x_p,
+            is_there=False,
         )
         for _ in range(cycles):
             self.ascent, command = come_up(self.ascent, unseen, self.params.ascent, TICK_S)
