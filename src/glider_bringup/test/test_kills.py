@@ -55,7 +55,7 @@ time.sleep(600)
 
 def test_killed_flights_end_named_and_every_acknowledged_tick_can_be_read(monkeypatch):
     monkeypatch.setattr(kills, 'VICTIMS', ('fork_server', 'recorder_node', kills.ALL))
-    monkeypatch.setattr(kills, 'TICKS', kills.SPARED + 500)
+    monkeypatch.setattr(kills, 'KILLED_BY', 500)
     counter = Counter(lambda tried: None)
     kills.fuzz(7, 3, counter)
     found = counter.result()

@@ -101,7 +101,7 @@ def draw_map(stability: StabilityMap, file: Path) -> None:
     rows = math.ceil(count / columns)
     slope = np.diff(extent.along_kn)[0] / np.diff(extent.across_kn)[0]
     height = min(max(_WIDTH * slope, _HEIGHTS[0]), _HEIGHTS[1])
-    figure = new_figure(max(1.5 + _WIDTH * columns, 7.0), 2.8 + (0.6 + height) * rows)
+    figure = new_figure(max(1.5 + _WIDTH * columns, 7.0), 3.2 + (1.0 + height) * rows)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     panels = zip(axes.flat, stability.panels, stability.classes, shares(stability), strict=False)
     for axis, name, classes, share in panels:
