@@ -38,9 +38,10 @@ def watch_stall(stall_s, measured, reference, m_b, params, dt):
         return 0.0 if rises else min(0.0, stall_s + dt)
     is_asked = abs(reference.v_d) > LEAST_RATE and -sign * measured.theta > NOSE
     is_none = sign * measured.vertical_rate < NO_RATE * abs(reference.v_d)
+    if not (is_asked and is_none):
+        return 0.0
     glide = glide_net_heaviness(reference.theta, reference.v_d, params.polar)
-    much = min(TOO_MUCH * abs(glide), WHOLE * params.allocation.m_b_max)
-    if not (is_asked and is_none and sign * m_b > much):
+    if not sign * m_b > min(TOO_MUCH * abs(glide), WHOLE * params.allocation.m_b_max):
         return 0.0
     return stall_s + dt if stall_s < STALL_S else -REST_S
 

@@ -186,8 +186,10 @@ def weigh(state, at, limits, dt):
     sinks = state.sinking + dt / SOON_S * (at.sinking - state.sinking)
     if glides_s > SOON_S and abs(mean) > LEAST_RATE:
         known = at.m_b + limits.ballast
-        more = glide_net_heaviness(at.theta, mean, limits.polar) - known
-        shown = glide_net_heaviness(at.theta, min(mean, sinks), limits.polar)
+        glides = glide_net_heaviness(at.theta, mean, limits.polar)
+        more, shown = glides - known, glides
+        if sinks < mean:
+            shown = glide_net_heaviness(at.theta, sinks, limits.polar)
         least += (dt / limits.average_s) * (shown + min(0.0, shown) - known - least)
         off += (dt / limits.average_s) * (more - off)
         soon += (dt / SOON_S) * (more - soon)

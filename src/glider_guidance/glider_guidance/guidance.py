@@ -365,7 +365,7 @@ def observe(state, place, leg, params, dt):
         and abs(rate) > MODEL_VERTICAL_RATE
         and theta * rate < 0.0
     )
-    model_speed = glide_horizontal_speed(theta, rate, params.polar)
+    model_speed = glide_horizontal_speed(theta, rate, params.polar) if valid else 0.0
     observer = observer_step(
         state.observer,
         place.ground_n,
