@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of all packages have in common: pytest looks here from each of their folders."""
 
+import gc
 import signal
 
 import pytest
 from hypothesis import settings
 
+gc.set_threshold(100_000)  # what is imported and compiled stays
 # an example may wait for a compiler, or for a processor that others use
 settings.register_profile('glider', deadline=None)
 settings.load_profile('glider')

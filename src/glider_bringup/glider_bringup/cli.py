@@ -3,12 +3,15 @@
 """The command line: ``./glider COMMAND``, or ``glider COMMAND`` where wheels were installed."""
 
 import errno
+import gc
 import os
 import pkgutil
 import signal
 import sys
 from functools import partial
 from importlib import import_module
+
+gc.set_threshold(100_000)  # what is imported stays: to look through it again is a tenth of a start
 
 try:  # imports take a second, in which Ctrl-C may come, and many files
     # ./glider blocks it until there is someone to take it; workers, which import this too, leave
