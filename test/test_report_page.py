@@ -200,6 +200,26 @@ def pid_run(glider, tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope='module')
+def open_report(browser, default_run):
+    """Report of the default run for several tests: who zooms in zooms out again."""
+    page, said, asked = open_page(browser, default_run / 'report.html')
+    yield page
+    assert asked == [(default_run / 'report.html').as_uri()]
+    assert said == []
+    page.close()
+
+
+@pytest.fixture(scope='module')
+def open_reckoned(browser, reckoned_run):
+    """The same of the one that reckons its place, in a wide window."""
+    how = {'viewport': {'width': 1400, 'height': 900}, 'color_scheme': 'light'}
+    page, said, asked = open_page(browser, reckoned_run / 'report.html', **how)
+    yield page
+    assert (said, len(asked)) == ([], 1)
+    page.close()
+
+
 def finite(values):
     return [value for value in values if isinstance(value, (int, float))]
 
@@ -224,8 +244,8 @@ def check_drawn(panels):
             assert trace['name'] in SOMETIMES or finite(trace['y']), (panel['id'], trace['name'])
 
 
-def drag(page, panel, begin, end):
-    """Drag with the mouse over a panel, between two shares of its width."""
+def zoom(page, panel, begin, end):
+    """Drag with the mouse over a panel, between two shares of its width, and wait."""
     area = page.locator(f'#{panel} .nsewdrag').first
     area.scroll_into_view_if_needed()
     box = area.bounding_box()
@@ -234,15 +254,22 @@ def drag(page, panel, begin, end):
     page.mouse.down()
     page.mouse.move(box['x'] + end * box['width'], middle, steps=4)
     page.mouse.up()
+    page.wait_for_function("document.getElementById('whole').disabled === false")
+    page.wait_for_function(IS_READY)
+
+
+def zoom_out(page):
+    page.click('#whole')
+    page.wait_for_function("document.getElementById('whole').disabled === true")
+    page.wait_for_function(IS_READY)
 
 
 # ---------------------------------------------------------------------------------- tests
 
 
-def test_report_of_the_default_run(browser, default_run):
+def test_report_of_the_default_run(open_report, default_run):
     """Drawn whole, no request, no complaint; numbers are those of score.json."""
-    file = default_run / 'report.html'
-    page, said, asked = open_page(browser, file)
+    page = open_report
     panels = page.evaluate(DRAWN)
     check_drawn(panels)
     assert {panel['id'] for panel in panels} == {
@@ -275,10 +302,6 @@ def test_report_of_the_default_run(browser, default_run):
     assert len(depth['y']) < 3000
     assert max(depth['y']) == pytest.approx(card['depth_m']['max'], rel=1e-6)
 
-    assert asked == [file.as_uri()]
-    assert said == []
-    page.close()
-
 
 def _numbers(page):
     """First number of every tile."""
@@ -286,12 +309,10 @@ def _numbers(page):
     return [float(re.search(r'-?[\d,.]+', text)[0].replace(',', '')) for text in texts]
 
 
-def test_zoom_by_the_mouse_is_linked_and_refines(browser, default_run):
-    page, said, asked = open_page(browser, default_run / 'report.html')
+def test_zoom_by_the_mouse_is_linked_and_refines(open_report, default_run):
+    page = open_report
     before = page.evaluate(DRAWN)
-    drag(page, 'cross_track', 0.4, 0.5)
-    page.wait_for_function("document.getElementById('whole').disabled === false")
-    page.wait_for_function(IS_READY)
+    zoom(page, 'cross_track', 0.4, 0.5)
     after = page.evaluate(DRAWN)
     check_drawn(after)
     timed = [panel for panel in after if panel['kind'] == 'time']
@@ -307,14 +328,9 @@ def test_zoom_by_the_mouse_is_linked_and_refines(browser, default_run):
             assert not _zoomed_in(old)
             assert len(_zoomed_in(new)) > 10
 
-    page.click('#whole')
-    page.wait_for_function("document.getElementById('whole').disabled === true")
-    page.wait_for_function(IS_READY)
+    zoom_out(page)
     whole = page.evaluate(DRAWN)
     assert [panel['ranges'] for panel in whole] == [panel['ranges'] for panel in before]
-    assert len(asked) == 1
-    assert said == []
-    page.close()
 
 
 def _zoomed_in(panel):
@@ -343,13 +359,20 @@ def test_report_of_a_run_over_nodes_in_a_narrow_dark_window(browser, over_nodes)
     page.close()
 
 
-@pytest.mark.parametrize(('width', 'scheme'), [(1400, 'light'), (390, 'dark')])
-def test_report_of_a_run_that_reckons_its_place(browser, reckoned_run, width, scheme):
-    page, said, asked = open_page(
-        *(browser, reckoned_run / 'report.html'),
-        viewport={'width': width, 'height': 900},
-        color_scheme=scheme,
-    )
+def test_report_of_a_run_that_reckons_its_place(open_reckoned, reckoned_run):
+    check_reckoned(open_reckoned, reckoned_run, 1400)
+
+
+def test_the_same_in_a_narrow_dark_window(browser, reckoned_run):
+    how = {'viewport': {'width': 390, 'height': 900}, 'color_scheme': 'dark'}
+    page, said, asked = open_page(browser, reckoned_run / 'report.html', **how)
+    check_reckoned(page, reckoned_run, 390)
+    assert (said, len(asked)) == ([], 1)
+    page.close()
+
+
+def check_reckoned(page, reckoned_run, width):
+    """Places at surfacings, believed and true, and their ellipses, are those of score.json."""
     panels = page.evaluate(DRAWN)
     check_drawn(panels)
     assert page.evaluate('document.documentElement.scrollWidth') == width, 'nothing sticks out'
@@ -371,28 +394,21 @@ def test_report_of_a_run_that_reckons_its_place(browser, reckoned_run, width, sc
         assert metre['east'] == pytest.approx(metre['north'], rel=0.01), 'circles are round'
     assert page.locator('.many').first.locator('tbody tr').count() == len(reports)
     assert page.evaluate(LEGEND_IS_APART, 'plan')
-    assert (said, len(asked)) == ([], 1)
-    page.close()
 
 
-def test_plan_follows_the_zoom(browser, reckoned_run):
-    page, said, _ = open_page(browser, reckoned_run / 'report.html')
+def test_plan_follows_the_zoom(open_reckoned):
+    page = open_reckoned
     wide = page.evaluate(PLAN_RANGES)
-    drag(page, 'place_error', 0.4, 0.6)
-    page.wait_for_function("document.getElementById('whole').disabled === false")
-    page.wait_for_function(IS_READY)
+    zoom(page, 'place_error', 0.4, 0.6)
     near = page.evaluate(PLAN_RANGES)
     assert near[1] - near[0] < 0.6 * 1e3 * (wide[1] - wide[0]), 'now in metres'
-    assert said == []
-    page.close()
 
 
-def test_charts_follow_the_window(browser, default_run):
+def test_charts_follow_the_window(open_report):
     """Made narrow while zoomed in: each chart is as wide as its place, and the zoom stays."""
-    page, said, _ = open_page(browser, default_run / 'report.html')
-    drag(page, 'cross_track', 0.4, 0.5)
-    page.wait_for_function("document.getElementById('whole').disabled === false")
-    page.wait_for_function(IS_READY)
+    page = open_report
+    wide = page.viewport_size
+    zoom(page, 'cross_track', 0.4, 0.5)
     before = {panel['id']: panel for panel in page.evaluate(DRAWN)}
     page.set_viewport_size({'width': 390, 'height': 844})
     page.wait_for_function(FILLED)
@@ -402,8 +418,8 @@ def test_charts_follow_the_window(browser, default_run):
     for panel in after:
         assert panel['ranges'] == before[panel['id']]['ranges']
         assert panel['place'] < before[panel['id']]['place']
-    assert said == []
-    page.close()
+    page.set_viewport_size(wide)
+    zoom_out(page)
 
 
 def test_report_on_paper(browser, default_run, tmp_path):
@@ -508,9 +524,7 @@ def test_comparison(browser, glider, default_run, pid_run, tmp_path):
     for run in json.loads(done.stdout)['runs']:
         assert f'{run["score"]["cross_track_m"]["max_steady"]:.3f} m' in rows
     assert 'control.law' in page.locator('table').nth(1).inner_text()
-    drag(page, 'pitch', 0.2, 0.4)
-    page.wait_for_function("document.getElementById('whole').disabled === false")
-    page.wait_for_function(IS_READY)
+    zoom(page, 'pitch', 0.2, 0.4)
     ranges = [panel['ranges'] for panel in page.evaluate(DRAWN) if panel['kind'] == 'time']
     assert all(one == ranges[0] for one in ranges)
     assert ranges[0][0] > 0.0
