@@ -202,9 +202,9 @@ class Tracer:
         if not len(log):
             return
         true = self._truth.of(log)
-        curves = _curves(true, self._limits, self._heading)
+        curves = _curves(true, _poses(true, self._heading), self._limits)
         if true is not log:
-            measured = _curves(log, self._limits, self._heading)
+            measured = _motion(log, _poses(log, self._heading))
             curves.update({f'measured_{name}': measured[name] for name in _MEASURED})
         if self._reckons:
             curves.update(_place(log))
@@ -254,15 +254,33 @@ def make_tracer(scenario: Scenario) -> Tracer:
     return Tracer(load_vehicle(scenario.vehicle).params(), scenario.navigation.jumps)
 
 
-def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[str, np.ndarray]:
-    """Quantities of log rows by their names, float64[n] each.
+def _poses(log: np.ndarray, heading_before: float) -> np.ndarray:
+    """Poses of log rows, float64[n, 6], as `poses_from_wire` gives them.
 
     Headings go on through +-180 deg from ``heading_before`` (rad), NaN if there was none.
     """
     odom = poses_from_wire(log[:, COLUMNS['odom']])
+    _unwrap(odom[:, 5], heading_before)
+    return odom
+
+
+def _motion(log: np.ndarray, odom: np.ndarray) -> dict[str, np.ndarray]:
+    """Quantities of the motion of log rows with such poses, by their names, float64[n] each."""
+    return {
+        'depth_m': odom[:, 2],
+        'cross_track_m': log[:, COLUMNS['tracking_error']][:, 1],
+        'roll_deg': np.degrees(odom[:, 3]),
+        'pitch_deg': np.degrees(odom[:, 4]),
+        'heading_deg': np.degrees(odom[:, 5]),
+    }
+
+
+def _curves(log: np.ndarray, odom: np.ndarray, limits: np.ndarray) -> dict[str, np.ndarray]:
+    """Those and all others but what was measured or is believed."""
     reference = poses_from_wire(log[:, COLUMNS['reference']])
+    _bring_near(reference[:, 5], odom[:, 5])
     rising = log[:, COLUMNS['reference']][:, 9]
-    error, joints = log[:, COLUMNS['tracking_error']], log[:, COLUMNS['joint_states']]
+    joints = log[:, COLUMNS['joint_states']]
     current = log[:, COLUMNS['current_velocity']] / KNOT_MPS
     estimate = log[:, COLUMNS['current_estimate']] / KNOT_MPS
     command = log[:, COLUMNS['command']]
@@ -277,16 +295,11 @@ def _curves(log: np.ndarray, limits: np.ndarray, heading_before: float) -> dict[
     left = log[:, COLUMNS['battery']][:, -1]
     if np.any(left >= 0.0):  # less than nothing is not known
         battery = {'battery_percent': np.where(left >= 0.0, 100.0 * left, np.nan)}
-    _unwrap(odom[:, 5], reference[:, 5], heading_before)
     return {
-        'depth_m': odom[:, 2],
+        **_motion(log, odom),
         'depth_ref_m': np.maximum(0.0, reference[:, 2]),  # an order to surface points above
-        'cross_track_m': error[:, 1],
-        'vertical_error_m': error[:, 2],
-        'roll_deg': np.degrees(odom[:, 3]),
-        'pitch_deg': np.degrees(odom[:, 4]),
+        'vertical_error_m': log[:, COLUMNS['tracking_error']][:, 2],
         'pitch_ref_deg': np.degrees(reference[:, 4]),
-        'heading_deg': np.degrees(odom[:, 5]),
         'heading_ref_deg': np.degrees(reference[:, 5]),
         'current_north_kn': current[:, 1],
         'current_east_kn': current[:, 0],
@@ -331,13 +344,19 @@ def _samples(log: np.ndarray, told: np.ndarray | None) -> np.ndarray:
 
 
 @kernel
-def _unwrap(heading, reference, before):
-    """Make headings (rad) go on from ``before``, and references be near them; in place."""
+def _unwrap(heading, before):
+    """Make headings (rad) go on from ``before``; in place."""
     for i in range(len(heading)):
         if math.isfinite(heading[i]):
             if math.isfinite(before):
                 heading[i] = before + wrap_angle(heading[i] - before)
             before = heading[i]
+
+
+@kernel
+def _bring_near(reference, heading):
+    """Make angles (rad) be near headings; in place."""
+    for i in range(len(heading)):
         reference[i] = heading[i] + wrap_angle(reference[i] - heading[i])
 
 
