@@ -4,15 +4,15 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 from scipy import stats
 
+from glider_base.kernel import kernel
 from glider_base.noise import normal_pair, random_stream, splitmix64
 
 
-@numba.njit
+@kernel
 def series(stream, first, count):
     """Pairs of ``count`` ticks from ``first`` on."""
     pairs = np.empty((count, 2))

@@ -46,7 +46,7 @@ def numbers_for(topic, data):
 
 @pytest.mark.parametrize('topic', PER_TICK, ids=lambda topic: topic.name)
 @given(data=st.data(), stamp_ns=STAMPS)
-@settings(max_examples=50)
+@settings(max_examples=20)
 def test_decoding_gives_back_what_was_encoded(topic, data, stamp_ns):
     numbers = numbers_for(topic, data)
     stamp, decoded = topic.codec.decode(topic.codec.encode(stamp_ns, numbers))
@@ -56,7 +56,7 @@ def test_decoding_gives_back_what_was_encoded(topic, data, stamp_ns):
 
 @pytest.mark.parametrize('topic', PER_TICK, ids=lambda topic: topic.name)
 @given(data=st.data(), stamp_ns=STAMPS)
-@settings(max_examples=50)
+@settings(max_examples=20)
 def test_foreign_bytes_of_the_same_message_give_the_same_numbers(topic, data, stamp_ns):
     numbers = numbers_for(topic, data)
     message = deserialize_message(topic.codec.encode(stamp_ns, numbers), topic.message_type)
@@ -69,7 +69,7 @@ def test_foreign_bytes_of_the_same_message_give_the_same_numbers(topic, data, st
 
 @pytest.mark.parametrize('topic', PER_TICK, ids=lambda topic: topic.name)
 @given(data=st.data(), stamps=st.lists(STAMPS, min_size=1, max_size=5))
-@settings(max_examples=25)
+@settings(max_examples=10)
 def test_encoding_many_is_encoding_each(topic, data, stamps):
     rows = [numbers_for(topic, data) for _ in stamps]
     many = topic.codec.encode_many(stamps, np.array(rows).reshape(len(rows), -1))
@@ -244,7 +244,7 @@ def test_our_serialization_of_a_path():
 
 @pytest.mark.parametrize('topic', PER_TICK, ids=lambda topic: topic.name)
 @given(data=st.data(), stamps=st.lists(STAMPS, min_size=1, max_size=5))
-@settings(max_examples=25)
+@settings(max_examples=10)
 def test_decoding_many_gives_back_what_was_encoded(topic, data, stamps):
     numbers = np.array([numbers_for(topic, data) for _ in stamps]).reshape(len(stamps), -1)
     decoded, values, own = topic.codec.decode_many(topic.codec.encode_many(stamps, numbers))
@@ -255,7 +255,7 @@ def test_decoding_many_gives_back_what_was_encoded(topic, data, stamps):
 
 @pytest.mark.parametrize('topic', PER_TICK, ids=lambda topic: topic.name)
 @given(data=st.data(), stamp_ns=STAMPS)
-@settings(max_examples=100)
+@settings(max_examples=40)
 def test_bytes_that_count_as_own_are_those_of_the_stamp_and_numbers(topic, data, stamp_ns):
     """Whatever bit is flipped: either it is told, or encoding gives it back."""
     row = topic.codec.encode_many([stamp_ns], [numbers_for(topic, data)])

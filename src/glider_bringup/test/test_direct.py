@@ -68,8 +68,8 @@ def test_two_flights_agree_to_the_last_bit(rough):
 
 @pytest.mark.parametrize('block_ticks', [1, 7, 999, 14999, 15000, 15001])
 def test_length_of_a_block_changes_no_bit(rough, block_ticks):
-    log = flown(*mission('rough_water'), block_ticks, most=1500)
-    assert len(log) == min(len(rough), 1500 * block_ticks)
+    log = flown(*mission('rough_water'), block_ticks, most=400)
+    assert len(log) == min(len(rough), 400 * block_ticks)
     assert np.array_equal(log, rough[: len(log)])
 
 
@@ -101,11 +101,10 @@ print(json.dumps(digests))
 """
 
 
-def test_one_mission_is_the_same_bits_as_in_a_batch_in_any_process():
+def test_one_mission_is_the_same_bits_wherever_in_a_batch_in_any_process():
     batches = [
         ('rough_water', 'noisy_sensors', 'spline'),
         ('spline', 'noisy_sensors', 'rough_water'),
-        ('rough_water',),
     ]
     command = [sys.executable, '-c', BATCH, json.dumps(SHALLOW)]
     processes = [
@@ -115,7 +114,6 @@ def test_one_mission_is_the_same_bits_as_in_a_batch_in_any_process():
     printed = [json.loads(process.communicate(timeout=300)[0]) for process in processes]
     assert len(set(printed[0].values())) == 3
     assert printed[0] == printed[1]
-    assert printed[2]['rough_water'] == printed[0]['rough_water']
 
 
 def test_flight_lasts_as_many_ticks_as_asked(rough):
@@ -153,11 +151,10 @@ def test_mirrored_current_mirrors_the_flight(method):
     east, north, up = column(starboard, 'odom')[:, :3].T
     assert np.max(np.abs(east)) > 5.0
     expected = np.stack([-east, north, up], axis=1)
-    assert column(port, 'odom')[:, :3] == pytest.approx(expected, abs=1e-6)
-    heading = yaw(starboard) - math.pi / 2.0
-    assert yaw(port) - math.pi / 2.0 == pytest.approx(-heading, abs=1e-6)
+    assert np.abs(column(port, 'odom')[:, :3] - expected).max() < 1e-6
+    assert np.abs(yaw(port) + yaw(starboard) - math.pi).max() < 1e-6
     mass = column(starboard, 'command')
-    assert column(port, 'command') == pytest.approx(mass * [1.0, 1.0, -1.0, 1.0], abs=1e-6)
+    assert np.abs(column(port, 'command') - mass * [1.0, 1.0, -1.0, 1.0]).max() < 1e-6
 
 
 @pytest.mark.parametrize('course_deg', [90.0, 180.0, 225.0])
@@ -166,8 +163,8 @@ def test_turned_world_gives_the_same_flight(course_deg):
     changes = {'path__course_deg': course_deg, 'initial__heading_deg': course_deg}
     north, turned = flown(*mission('current_8deg')), flown(*mission('current_8deg', **changes))
     for name, tolerance in (('tracking_error', 1e-3), ('command', 1e-5), ('joint_states', 1e-5)):
-        assert column(turned, name) == pytest.approx(column(north, name), abs=tolerance), name
-    assert turned[:, UP] == pytest.approx(north[:, UP], abs=1e-3)
+        assert np.abs(column(turned, name) - column(north, name)).max() < tolerance, name
+    assert np.abs(turned[:, UP] - north[:, UP]).max() < 1e-3
 
 
 def test_still_vehicle_drifts_with_the_current():
@@ -224,7 +221,7 @@ def test_position_is_the_integral_of_the_velocity():
     way = np.cumsum(0.5 * TICK_S * (world[1:] + world[:-1]), axis=0)
     # the first velocity does not know of the water yet
     start = odom[1, :3] - way[0]
-    assert odom[2:, :3] == pytest.approx(start + way[1:], abs=0.01)
+    assert np.abs(odom[2:, :3] - start - way[1:]).max() < 0.01
 
 
 def test_mission_of_one_dive_ends_by_itself_at_the_surface():
@@ -241,7 +238,7 @@ import signal
 from glider_bringup.engines.flight import fly
 from glider_mission.scenario import load_scenario
 
-scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 36000.0})
+scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 10800.0})
 flown = []
 signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
 for shot in range(10):
@@ -259,4 +256,4 @@ def test_ctrl_c_within_compiled_code_ends_the_flight_as_aborted():
         [sys.executable, '-c', INTERRUPTED], capture_output=True, text=True, timeout=300
     )
     assert (done.returncode, done.stderr) == (0, '')
-    assert ast.literal_eval(done.stdout) == [('completed', 10), *9 * [('aborted', 1)]]
+    assert ast.literal_eval(done.stdout) == [('completed', 3), *9 * [('aborted', 1)]]

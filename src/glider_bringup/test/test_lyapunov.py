@@ -15,10 +15,10 @@ that its mass makes, and d1 from the motion of the angles, not from the law's ow
 
 import math
 
-import numba
 import numpy as np
 import pytest
 
+from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Adaptation
 from glider_bringup.engines.direct import fly_ticks
 from glider_bringup.engines.flight import mission_of
@@ -51,7 +51,7 @@ W, RATE, K1, K2, J3 = 0, [1, 7], [2, 8], [3, 9], [4, 10]
 APPLIED, MODEL, CROSS = [5, 11], [6, 12], 13
 
 
-@numba.njit
+@kernel
 def record(state, params, out):
     """Fly tick by tick until the mission ends or ``out`` is full; ticks that were flown."""
     log = np.empty((1, ROW))

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""A week in which fixes are missed, one in two and three in a row, in a sea that changes.
+"""Three days in which fixes are missed, one in two and three in a row, in a sea that changes.
 
 What is believed jumps by hundreds of metres where a fix comes after all. Nothing that is commanded
 does: a jump of odom is legal (REP-105), and the filters of guidance are what the vehicle follows.
@@ -20,7 +20,7 @@ from glider_mission.blocks import COLUMNS
 from glider_mission.scenario import load_scenario
 from glider_navigation.phase import FIXED
 
-WEEK_S = 604800.0
+DURATION_S = 259200.0
 #: Surfacings without a fix are marked by 1.
 PATTERN = '010111'
 CHANGES = {
@@ -30,7 +30,7 @@ CHANGES = {
     'profile.surface_every_dives': 1,
     'path.length_m': 200000.0,
     'dives': 0,
-    'duration_s': WEEK_S,
+    'duration_s': DURATION_S,
 }
 #: A jump of what is believed, which no vehicle makes in a tick (m).
 JUMP_M = 100.0
@@ -70,12 +70,12 @@ def steps_of(log):
     )
 
 
-class Week(NamedTuple):
-    """A week, as far as it is asked for here."""
+class Flown(NamedTuple):
+    """The flight, as far as it is asked for here."""
 
     jumps: Step  #: those at which what is believed jumps
     calm: np.ndarray  #: largest steps of the commands on the surface without one
-    turn: float  #: largest steps of the reference in all the week, pitch and heading (rad)
+    turn: float  #: largest steps of the reference at all, pitch and heading (rad)
     turn_heading: float
     ends: np.ndarray  #: variance when it comes up, and when it dives again (m^2), shape (n, 2)
     fixed: np.ndarray  #: whether there was a fix in between
@@ -87,7 +87,7 @@ def scenario():
 
 
 @pytest.fixture(scope='module')
-def week(scenario):
+def flown(scenario):
     jumps, calm, pitch, heading = [], np.zeros(3), 0.0, 0.0
     before, phases, variances = None, [], []
     for log in fly_blocks(*mission_of(scenario)):
@@ -106,7 +106,7 @@ def week(scenario):
     up = edges[phase[edges] == 1]
     down = [int(edges[edges > one][0]) for one in up if (edges > one).any()]
     up = up[: len(down)]
-    return Week(
+    return Flown(
         Step(*map(np.concatenate, zip(*jumps, strict=True))),
         calm,
         pitch,
@@ -116,40 +116,40 @@ def week(scenario):
     )
 
 
-def test_the_week_had_the_surfacings_it_was_to_have(week):
+def test_it_had_the_surfacings_it_was_to_have(flown):
     """The first number of the pattern is for the launch."""
-    missed = [PATTERN[(1 + n) % len(PATTERN)] == '1' for n in range(len(week.fixed))]
-    assert len(week.fixed) > 60
-    assert week.fixed.tolist() == [not one for one in missed]
+    missed = [PATTERN[(1 + n) % len(PATTERN)] == '1' for n in range(len(flown.fixed))]
+    assert len(flown.fixed) > 30
+    assert flown.fixed.tolist() == [not one for one in missed]
 
 
-def test_what_is_believed_jumps_by_hundreds_of_metres_and_is_taken_at_once(week):
+def test_what_is_believed_jumps_by_hundreds_of_metres_and_is_taken_at_once(flown):
     """The gates of guidance and control are for wild samples: nothing is refused at a fix."""
-    jumps = week.jumps
-    assert len(jumps.place) > 20
+    jumps = flown.jumps
+    assert len(jumps.place) >= 10
     assert np.max(jumps.place) > 1000.0
     assert np.all(jumps.stage == WAITING_ON_SURFACE)
     assert jumps.error == pytest.approx(jumps.place, abs=1.0)
 
 
-def test_no_command_jumps_at_a_fix(week, scenario):
-    """Neither at the tick of the fix nor, by the filters, at any tick of the week."""
-    assert np.all(week.jumps.command <= week.calm)
+def test_no_command_jumps_at_a_fix(flown, scenario):
+    """Neither at the tick of the fix nor, by the filters, at any other tick."""
+    assert np.all(flown.jumps.command <= flown.calm)
     filters = scenario.guidance.filters
-    assert week.turn <= filters.pitch_rate_radps * TICK_S * (1.0 + 1e-6)
-    assert week.turn_heading <= filters.heading_rate_radps * TICK_S * (1.0 + 1e-6)
-    assert np.all(week.jumps.heading <= week.turn_heading)
+    assert flown.turn <= filters.pitch_rate_radps * TICK_S * (1.0 + 1e-6)
+    assert flown.turn_heading <= filters.heading_rate_radps * TICK_S * (1.0 + 1e-6)
+    assert np.all(flown.jumps.heading <= flown.turn_heading)
 
 
-def test_covariance_grows_from_one_missed_fix_to_the_next_and_comes_back(week):
-    came_up, dived = week.ends.T
-    assert np.all(dived[week.fixed] < 200.0)
+def test_covariance_grows_from_one_missed_fix_to_the_next_and_comes_back(flown):
+    came_up, dived = flown.ends.T
+    assert np.all(dived[flown.fixed] < 200.0)
     in_a_row = 0
     for number in range(1, len(came_up)):
-        in_a_row = 0 if week.fixed[number - 1] else in_a_row + 1
+        in_a_row = 0 if flown.fixed[number - 1] else in_a_row + 1
         if in_a_row:
             assert came_up[number] > dived[number - 1] > 0.9 * came_up[number - 1]
     assert np.all(came_up > 100.0 * 2.0)
-    assert np.all(week.jumps.variance[:, 1] < 0.05 * week.jumps.variance[:, 0])
+    assert np.all(flown.jumps.variance[:, 1] < 0.05 * flown.jumps.variance[:, 0])
     # a jump lies within what it said of itself: chi squared of two numbers, 95 %
-    assert np.mean(week.jumps.place**2 < 5.991 / 2.0 * week.jumps.variance[:, 0]) > 0.85
+    assert np.mean(flown.jumps.place**2 < 5.991 / 2.0 * flown.jumps.variance[:, 0]) > 0.85

@@ -4,13 +4,13 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glider_base.frames import euler_from_quaternion, quaternion_from_euler, rotate_to_ned
+from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Joints, Odometry, Reference, Water
 from glider_control.control import (
     SATURATED_BUOYANCY,
@@ -33,8 +33,7 @@ COLUMNS = 'phi theta psi down m_b x_p mu c_m_b c_x_p c_mu saturation'.split()
 GLIDES = {'zhang2021': (0.4, 30.0), 'seawing': (0.3, 35.0)}
 
 
-# Not kept between runs, as in the tests of the model.
-@numba.njit(error_model='numpy')
+@kernel
 def _fly(plant, control, references, noise, ballast, plant_params, params, rows, dt):
     """Closed loop; ``ballast`` (kg) is missing from what the buoyancy engine says of itself."""
     still = Water(0.0, 0.0, 0.0)

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Flights of the plant: the tick loop compiled, rows as arrays."""
 
-import numba
 import numpy as np
 import pytest
 
 from glider_base.frames import quaternion_from_euler
+from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Joints, Water
 from glider_model.ocean.water import WaterSettings
 from glider_model.plant.energy import FULL
@@ -19,9 +19,7 @@ from glider_model.vehicle.energy import NO_ENERGY
 from glider_model.vehicle.file import load_vehicle
 
 
-# Not kept between runs: a cached function remembers the name of its module, and that depends on
-# the folder pytest is started in.
-@numba.njit(error_model='numpy')
+@kernel
 def _fly(state, commands, waters, params, dt):
     count = len(commands)
     rows = np.empty((count + 1, 17))

@@ -4,13 +4,13 @@
 
 import math
 
-import numba
 import numpy as np
 import pydantic
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_base.kernel import kernel
 from glider_model.ocean.current import current_initial, current_step
 from glider_model.ocean.current_profile import MAX_SPEED_MPS
 from glider_model.ocean.current_settings import KNOT_MPS, M2_PERIOD_S, CurrentSettings
@@ -34,7 +34,7 @@ def water(current: CurrentSettings, depth_m=0.0, t_s=0.0, seed=0) -> np.ndarray:
     return np.array(current_step(state, (0.0, 0.0, float(depth_m)), float(t_s), params, DT)[1])
 
 
-@numba.njit
+@kernel
 def history(count, params, dt):
     """North and east velocity of ``count`` steps (m/s)."""
     state = current_initial(params)

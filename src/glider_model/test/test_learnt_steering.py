@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a vehicle steers, learnt: the estimator, and which way of steering it is for."""
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_base.kernel import kernel
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.learnt_steering import (
     AT_LIMIT,
@@ -42,7 +42,7 @@ def turns(seconds: float, seed: int):
     return np.sin(roll), np.gradient(roll, DT)
 
 
-@numba.njit
+@kernel
 def _learn_all(state, bank, roll_rate, yaw_rate, params):
     for i in range(len(bank)):
         state = learn_steering(state, bank[i], bank[i] ** 3, roll_rate[i], yaw_rate[i], params, DT)

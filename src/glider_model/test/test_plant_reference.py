@@ -165,19 +165,19 @@ class Reference:
 
 
 def manoeuvre():
-    """Commands and water velocity of 600 s: both ways in pitch, roll and buoyancy."""
-    ticks = 6000
+    """Commands and water velocity of 330 s: both ways in pitch, roll and buoyancy."""
+    ticks = 3300
     t = TICK_S * np.arange(ticks)
     commands = np.empty((ticks, 3))
     # A dive and a climb, their apogee without a stall: at no speed the forces have no derivative,
     # and a fixed step loses its order. 3 mm/s and 6 deg/s end inside a tick.
-    commands[:, 0] = np.select([t < 180, t < 400], [0.35, -0.30], -0.18)
-    commands[:, 1] = np.select([t < 150, t < 330, t < 520], [0.0185, 0.0052, -0.0171], -0.0083)
-    commands[:, 2] = np.select([t < 60, t < 210, t < 390], [0.0, 0.40, -0.55], 0.22)
+    commands[:, 0] = np.select([t < 100, t < 220], [0.35, -0.30], -0.18)
+    commands[:, 1] = np.select([t < 80, t < 180, t < 290], [0.0185, 0.0052, -0.0171], -0.0083)
+    commands[:, 2] = np.select([t < 35, t < 115, t < 215], [0.0, 0.40, -0.55], 0.22)
     # constant, turning within 30 s, constant, changing within 2 s, constant
     slow, fast = (
         np.clip((t - begin) / seconds, 0.0, 1.0)[:, None]
-        for begin, seconds in ((100.0, 30.0), (500.0, 2.0))
+        for begin, seconds in ((50.0, 30.0), (275.0, 2.0))
     )
     waters = np.array([0.20, -0.10, 0.0]) + slow * [-0.35, 0.25, 0.0] + fast * [0.1, -0.1, 0.0]
     return commands, waters
@@ -212,7 +212,7 @@ def reference_flight(name, flight, waters, tolerance=1e-10):
 def both(request, fly, plant_params, start):
     commands, waters = manoeuvre()
     state = start((10.0, -20.0, 150.0), (0.05, -0.3, 2.0), (0.4, 0.01, -0.02, 0.01, -0.02, 0.03))
-    flight = fly(plant_params(request.param), state, 600.0, commands, waters)
+    flight = fly(plant_params(request.param), state, 330.0, commands, waters)
     ends, rows = reference_flight(request.param, flight, waters)
     return flight.rows[ends, :13], rows
 

@@ -4,7 +4,6 @@
 
 import math
 
-import numba
 import numpy as np
 import pydantic
 import pytest
@@ -19,6 +18,7 @@ from glider_base.frames import (
     odometry_to_wire,
     quaternion_from_euler,
 )
+from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Joints, Odometry
 from glider_base.wiring import PLANT
 from glider_model.ocean.density import depth_at
@@ -61,7 +61,7 @@ def odometry(phi=0.0, theta=-0.5, psi=1.0, position=(4000.0, -300.0, 500.0)):
     return Odometry(*position, *attitude, 0.8, -0.1, 0.05, 0.01, -0.02, 0.03)
 
 
-@numba.njit
+@kernel
 def series(params, count):
     """Noise of ticks 0 to ``count``: float64[count, 9]."""
     rows = np.empty((count, 9))

@@ -4,12 +4,12 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
+from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Imu, Joints
 from glider_model.onboard.moving_mass import make_moving_mass
 from glider_model.vehicle.file import SteeringSettings, load_vehicle
@@ -25,7 +25,7 @@ D, LISTS, NOSE_UP = math.radians(0.02), math.radians(1.5), math.radians(2.0)
 TILTS_S = 2.0
 
 
-@numba.njit(error_model='numpy')
+@kernel
 def _follow(state, q, rates, has_rates, x_p, mu, mass, dt):
     rows = np.empty((len(q), 7))
     for i in range(len(q)):

@@ -4,11 +4,11 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 
 from glider_base.frames import odometry_from_wire
+from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Imu, Joints, Vector
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
@@ -27,7 +27,7 @@ STAY_S, WAY_S, FIX_VARIANCE = 600.0, 5000.0, 25.0
 COLUMNS = ('n', 'e', 'depth', 'nn', 'ne', 'ee', 'current_n', 'current_e', 'current_nn', 'phase')
 
 
-@numba.njit(error_model='numpy')
+@kernel
 def _navigate(state, q, depths, has_fix, places, variance, params, dt):
     rows = np.empty((len(q), 10))
     odom = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -4,12 +4,12 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.signal import lfilter
 
+from glider_base.kernel import kernel
 from glider_base.signals import TICK_S
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
@@ -28,7 +28,7 @@ RATE_S, FADES_S = 4.0, 7.5
 periods = pytest.mark.parametrize('period_s', [0.1, 4.0, 10.0])
 
 
-@numba.njit(error_model='numpy')
+@kernel
 def _follow(depths, every, dt):
     flight = INITIAL_FLIGHT
     rows = np.empty((len(depths), 2))

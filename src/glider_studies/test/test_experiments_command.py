@@ -8,8 +8,6 @@ import math
 import os
 import shlex
 import signal
-import subprocess
-import sys
 import time
 from functools import partial
 from typing import get_args
@@ -360,7 +358,7 @@ def test_dithering_shows_in_the_legs():
 # --------------------------------------------------------------------------- flights
 
 
-SHORT = {'duration_s': 2400.0, 'profile.depth_m': 100.0, 'settle_s': 60.0}
+SHORT = {'duration_s': 1200.0, 'profile.depth_m': 50.0, 'settle_s': 60.0}
 
 
 def test_results_do_not_depend_on_workers():
@@ -460,27 +458,22 @@ def test_a_failed_verdict_is_exit_code_one(tmp_path, monkeypatch):
         assert (out / RESULT_FILE).is_file()
 
 
-def test_interrupt_ends_the_command():
+def test_interrupt_ends_the_command(tmp_path):
     options = ['experiments', '--only', 'current', '--workers', '1']
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'glider_bringup.cli', *options],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    process = command_line.Started(options, {**os.environ}, tmp_path)
     try:
-        assert process.stderr.readline() == '3 experiments, 18 flights\n'
-        time.sleep(3.0)
-        os.killpg(process.pid, signal.SIGINT)
+        while not (tmp_path / 'stderr').exists() or not (tmp_path / 'stderr').read_text():
+            assert process.poll() is None
+            time.sleep(0.05)
+        time.sleep(1.5)
+        process.send_signal(signal.SIGINT)
         out, error = process.communicate(timeout=300.0)
         assert (process.returncode, out) == (130, '')
+        assert error.startswith('3 experiments, 18 flights\n')
         assert 'stopped by SIGINT' in error
         assert 'Traceback' not in error
     finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.communicate()
+        process.kill()
 
 
 def test_every_vehicle_flies_with_position_known_and_reckoned(planned):

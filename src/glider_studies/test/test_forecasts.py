@@ -71,10 +71,10 @@ def test_a_forecast_is_off_by_what_it_says_and_its_sea_is_the_same(tmp_path):
 
 
 def test_a_perfect_forecast_leads_a_vehicle_nearer_than_none(monkeypatch):
-    monkeypatch.setattr(forecasts, 'DURATION_S', 36.0 * 3600.0)
+    monkeypatch.setattr(forecasts, 'DURATION_S', 20.0 * 3600.0)
     monkeypatch.setattr(forecasts, '_SETTLED', 1)
     without, with_it = (
         forecasts.fly_one((2000, 0.42, way, 0.0)) for way in (PERSISTENCE, 'its share')
     )
-    assert min(len(without), len(with_it)) >= 5
+    assert min(len(without), len(with_it)) >= 3
     assert np.median(with_it) < 0.7 * np.median(without)

@@ -50,8 +50,8 @@ from glider_studies.montecarlo import (
     spread,
 )
 
-#: A dive to 600 m and back, scored from its first minute on.
-SHORT = {'profile.depth_m': 600.0, 'settle_s': 60.0, 'duration_s': 5400.0}
+#: A dive to 200 m and back, scored from its first minute on.
+SHORT = {'profile.depth_m': 200.0, 'settle_s': 60.0, 'duration_s': 2400.0}
 OPTIONS = [f'--set={field}={value}' for field, value in SHORT.items()]
 LAWS = ['adaptive', 'backstepping', 'pid']
 #: Topics whose numbers are compared.
@@ -75,7 +75,7 @@ def study(tmp_path_factory):
     """Finished process of a short study by two workers, and what it wrote."""
     folder = tmp_path_factory.mktemp('study')
     process = glider(
-        *('montecarlo', 'current_8deg', '--plants', 3, '--seed', 40, '--workers', 2, '--json'),
+        *('montecarlo', 'current_8deg', '--plants', 2, '--seed', 40, '--workers', 2, '--json'),
         *(*OPTIONS, '--out', folder),
     )
     assert process.returncode == 0, process.stderr
@@ -213,7 +213,7 @@ def test_result_is_one_json_object_of_the_promised_shape(study):
     process, _ = study
     assert process.stdout.count('\n') == 1
     result = json.loads(process.stdout)
-    assert (result['scenario'], result['plants'], result['seed']) == ('current_8deg', 3, 40)
+    assert (result['scenario'], result['plants'], result['seed']) == ('current_8deg', 2, 40)
     assert [row['controller'] for row in result['rows']] == LAWS
     for row in result['rows']:
         assert list(row)[: 2 + len(SPREADS)] == ['controller', 'diverged', *SPREADS]
@@ -226,7 +226,7 @@ def test_result_is_one_json_object_of_the_promised_shape(study):
 
 def test_number_of_workers_changes_nothing(study):
     process = glider(
-        *('montecarlo', 'current_8deg', '--plants', 3, '--seed', 40, '--workers', 1, '--json'),
+        *('montecarlo', 'current_8deg', '--plants', 2, '--seed', 40, '--workers', 1, '--json'),
         *OPTIONS,
     )
     assert process.stdout == study[0].stdout
@@ -234,7 +234,7 @@ def test_number_of_workers_changes_nothing(study):
 
 def test_folder_tells_of_every_plant(study, vehicle):
     _, result = study
-    assert [one['plant'] for one in result['flown']] == [0, 1, 2]
+    assert [one['plant'] for one in result['flown']] == [0, 1]
     for one in result['flown']:
         sampled = sample_plant(40 + one['plant'], vehicle)
         assert {name: one[name] for name in sampled} == sampled
@@ -309,7 +309,7 @@ def _descendants(pid):
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
 def test_no_worker_outlives_the_command(number):
     """Ctrl-C goes to the whole group, as from a terminal; SIGKILL to the command alone."""
-    command = [sys.executable, '-m', 'glider_bringup.cli', 'montecarlo', '--plants', '50']
+    command = [sys.executable, '-m', 'glider_bringup.cli', 'montecarlo', '--controller', 'pid']
     process = subprocess.Popen(
         command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -410,7 +410,7 @@ def test_nodes_and_direct_engine_agree_with_noise_on_a_perturbed_plant(vehicle, 
     for engine in ('nodes', 'direct'):
         folder = tmp_path / engine
         process = glider(
-            *('run', 'current_8deg', '--engine', engine, '--bag', '--duration', 300, '--json'),
+            *('run', 'current_8deg', '--engine', engine, '--bag', '--duration', 60, '--json'),
             *('--set', 'settle_s=10', '--out', folder, *options),
         )
         assert process.returncode == 0, process.stderr

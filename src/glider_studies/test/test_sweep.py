@@ -8,7 +8,6 @@ import os
 import random
 import shlex
 import signal
-import subprocess
 import sys
 import time
 import tracemalloc
@@ -54,7 +53,7 @@ MINE = {
     'name': 'mine',
     'description': 'Strömung [/red]',
     'scenario': 'current_8deg',
-    'set': {'dives': 0, 'settle_s': 60.0, 'profile.depth_m': 600.0, 'duration_s': 12000.0},
+    'set': {'dives': 0, 'settle_s': 60.0, 'profile.depth_m': 300.0, 'duration_s': 6000.0},
     'dimensions': {
         'who': {
             'kind': 'variants',
@@ -69,30 +68,19 @@ MINE = {
 }
 
 
-def command(*arguments):
-    return [sys.executable, '-m', 'glider_bringup.cli', *map(str, arguments)]
-
-
 glider = partial(command_line.glider, columns=200, timeout=DEADLINE_S)
 
 
 @contextmanager
-def started(*arguments):
-    """A process of its own group, which is killed at the end."""
-    process = subprocess.Popen(
-        [*map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, 'PYTHONUTF8': '1'},
-        start_new_session=True,
-    )
+def started(folder, *arguments, module='glider_bringup.cli'):
+    """A process that is killed at the end; what it prints lies in a folder."""
+    folder.mkdir()
+    env = {**os.environ, 'COLUMNS': '200', 'PYTHONUTF8': '1'}
+    process = command_line.Started(arguments, env, folder, module)
     try:
         yield process
     finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
+        process.kill()
 
 
 def wait_for(what, process):
@@ -172,7 +160,7 @@ def test_file_tells_what_it_is_and_what_made_it(flown):
     with xarray.load_dataset(flown.out / RESULT_FILE) as data:
         assert data.attrs['sweep_yaml'] == flown.file.read_text(encoding='utf-8')
         assert data.attrs['title'] == MINE['description']
-        assert yaml.safe_load(data.attrs['scenario_yaml'])['profile']['depth_m'] == 600.0
+        assert yaml.safe_load(data.attrs['scenario_yaml'])['profile']['depth_m'] == 300.0
         assert [data.attrs['vehicle_yaml'], data.attrs['vehicle_seawing_yaml']] == [
             text for _, text in plan.vehicles
         ]
@@ -204,10 +192,10 @@ def test_file_opens_without_xarray(flown):
 
 def test_interrupted_and_half_a_line_later_the_file_is_the_same(flown, result, tmp_path):
     out = tmp_path / 'out'
-    words = command('sweep', flown.file, '--workers', 2, '--out', out)
-    with started(*words) as process:
+    words = 'sweep', flown.file, '--workers', 1, '--out', out
+    with started(tmp_path / 'first', *words) as process:
         wait_for(lambda: lines(out / JOURNAL_FILE) > 1, process)
-        os.killpg(process.pid, signal.SIGINT)
+        process.send_signal(signal.SIGINT)
         printed, error = process.communicate(timeout=DEADLINE_S)
     kept = lines(out / JOURNAL_FILE) - 1
     assert 1 <= kept < 12, 'interrupted in the middle'
@@ -219,7 +207,7 @@ def test_interrupted_and_half_a_line_later_the_file_is_the_same(flown, result, t
 
     journal = (out / JOURNAL_FILE).read_bytes()
     (out / JOURNAL_FILE).write_bytes(journal[:-30])
-    done = glider(*shlex.split(again)[1:], '--workers', 1, '--json')
+    done = glider(*shlex.split(again)[1:], '--workers', 2, '--json')
     assert done.returncode == 0, done.stderr
     assert (out / RESULT_FILE).read_bytes() == result
     before = (out / JOURNAL_FILE).read_bytes()
@@ -231,25 +219,25 @@ def test_interrupted_and_half_a_line_later_the_file_is_the_same(flown, result, t
 @contextmanager
 def cluster(folder):
     """A Dask scheduler and two workers, started by hand; yields address and workers."""
-    dask = [sys.executable, '-m', 'dask']
-    file = folder / 'scheduler.json'
+    dask, file = partial(started, module='dask'), folder / 'scheduler.json'
     options = ['--scheduler-file', file, '--host', '127.0.0.1']
-    with started(
-        *(*dask, 'scheduler', *options, '--port', 0, '--dashboard-address', '127.0.0.1:0')
-    ) as scheduler:
+    here = [*options, '--port', 0, '--dashboard-address', '127.0.0.1:0']
+    with dask(folder / 'scheduler', 'scheduler', *here) as scheduler:
         wait_for(lambda: file.exists() and file.read_text().endswith('}'), scheduler)
-        worker = [*dask, 'worker', *options, '--nthreads', 1, '--no-dashboard', '--no-nanny']
+        worker = ['worker', *options, '--nthreads', 1, '--no-dashboard', '--no-nanny']
         worker += ['--local-directory', folder]
-        with started(*worker) as first, started(*worker) as second:
+        with (
+            dask(folder / 'first', *worker) as first,
+            dask(folder / 'second', *worker) as second,
+        ):
             yield json.loads(file.read_text())['address'], [first, second]
 
 
 def test_worker_of_a_cluster_is_killed_and_the_file_is_the_same(flown, result, tmp_path):
     out = tmp_path / 'out'
     with cluster(tmp_path) as (address, workers):
-        with started(
-            *command('sweep', flown.file, '--scheduler', address, '--out', out)
-        ) as process:
+        words = 'sweep', flown.file, '--scheduler', address, '--out', out
+        with started(tmp_path / 'command', *words) as process:
             wait_for(lambda: lines(out / JOURNAL_FILE) > 1, process)
             workers[0].kill()
             assert lines(out / JOURNAL_FILE) < 13, 'killed in the middle'
@@ -300,7 +288,7 @@ def test_worker_with_another_vehicle_file_is_refused(flown):
 @pytest.mark.parametrize(
     ('change', 'words'),
     [
-        (lambda path: path.write_text(path.read_text().replace('12000', '12001')), ['inputs']),
+        (lambda path: path.write_text(path.read_text().replace('6000', '6001')), ['inputs']),
         (lambda path: path.write_text(path.read_text() + '# a remark\n'), ['inputs']),
         (lambda path: path.write_text(path.read_text().replace('name: mine', 'name: x')), 'sweep'),
     ],
@@ -433,7 +421,7 @@ def test_result_of_the_largest_sweep_fits_into_memory(flown, tmp_path):
     values = {'kind': 'grid', 'start': 0, 'step': 1}
     dimensions = {
         'a': {**values, 'field': 'initial.north_m', 'stop': 99},
-        'b': {**values, 'field': 'initial.east_m', 'stop': 199},
+        'b': {**values, 'field': 'initial.east_m', 'stop': 99},
     }
     path.write_text(yaml.safe_dump({'dimensions': dimensions}))
     plan, journal = load_sweep(str(path)), flown.out / JOURNAL_FILE
