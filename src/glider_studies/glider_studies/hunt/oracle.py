@@ -8,6 +8,7 @@ where it balances, at the climb stop, or there once the vehicle rises. Nobody ca
 before it shows: while the flight is, to the last bit, the one without that fault.
 """
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -96,20 +97,18 @@ def _rise(plant, params, water, command, mass, mode, drop, depths, dt):
 
 def _all_done(
     scenario: Scenario, from_s: float, for_s: float, drops: bool = True
-) -> list[np.ndarray]:
-    """Depths (m), float64[ticks] from a time on, if all is done then; one for each mode."""
+) -> Iterator[np.ndarray]:
+    """Depths (m), float64[ticks] from a time on, if all is done then: of each mode, as asked."""
     state, params = mission_of(scenario)
     log = np.empty((max(1, round(from_s / TICK_S)), ROW))
     state, rows, _ = direct.fly(state, params, log, TICK_S)
     water = tuple(log[rows - 1, COLUMNS['current_velocity']])
     vehicle = params.plant.vehicle
     command, mass = (-vehicle.m_b_max, -vehicle.x_p_max), make_moving_mass(vehicle)
-    drop, flown = float(drops), []
     for mode in range(3):
-        depths = np.empty(round(for_s / TICK_S))
+        depths, drop = np.empty(round(for_s / TICK_S)), float(drops)
         _rise(state.plant, params.plant, water, command, mass, mode, drop, depths, TICK_S)
-        flown.append(depths)
-    return flown
+        yield depths
 
 
 def _comes_up(depths: np.ndarray) -> bool:
