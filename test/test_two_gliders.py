@@ -18,7 +18,7 @@ from glider_base.ros.wire.topics import recorded_topics
 from glider_bringup.engines.processes import node_environment
 
 DEADLINE_S = 300.0
-DURATION_S = 200
+DURATION_S = 80
 FLOWN_BYTES = 300_000  #: of recording: several chunks are on disk
 #: Scenario by namespace.
 GLIDERS = {'alpha': 'rough_water', 'beta': 'current_8deg'}
@@ -107,7 +107,7 @@ def rivals(tmp_path_factory):
     and scorecard."""
     folder = tmp_path_factory.mktemp('rivals')
     with domain_id() as domain:
-        slow = ('--duration', 'full', '--speed', 20)  # what is flown meanwhile is flown again
+        slow = ('--duration', 'full', '--speed', 10)  # what is flown meanwhile is flown again
         first = start(domain, 'current_8deg', folder / 'first', *slow)
         try:
             wait_for_recording(folder / 'first', first)

@@ -16,7 +16,7 @@ from std_srvs.srv import SetBool
 
 from glider_base.errors import EXIT_PEER
 from glider_base.ros.hearing.inputs import Input
-from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep import health, peers
 from glider_base.ros.lockstep.executor import take
 from glider_base.ros.lockstep.health import Report, seconds
 from glider_base.ros.lockstep.node import TickNode, TickSettings
@@ -33,8 +33,9 @@ from glider_base.wiring import WIRING
 #: not by a node that is killed: what it had said would be lost with it.
 MAX_TICKS_AHEAD = {'recorded': 256, 'heard': 20}
 
-#: Nodes of a run that is just over are out of sight within this time (s).
-_RIVALS_LEAVE_S = 5.0
+#: Nodes of a run that is just over are out of sight within this time (s), and a plant that was
+#: there before is in sight: of two, the one that has just begun leaves.
+_RIVALS_LEAVE_S = _RIVALS_SHOW_S = 5.0
 
 
 class ClockSettings(TickSettings):
@@ -92,7 +93,7 @@ class ClockNode(TickNode):
         self._pace = _Pace(self.ticks.speed)
         self._pace_timer = self.wall_timer(1.0, self._on_pace)
         self._pace_timer.cancel()
-        self._clock_started_s = time.monotonic()
+        self._since_s = time.monotonic()  #: looking for its peers, then flying
         self._leads: list[_Lead] = []
         self._held_by: _Lead | None = None
         for name in MAX_TICKS_AHEAD if self.ticks.record else ():
@@ -116,39 +117,47 @@ class ClockNode(TickNode):
 
     def start_up(self) -> None:
         """Start looking for the peers, for a limited time."""
-        self._clock_started_s = time.monotonic()
+        self._since_s = time.monotonic()
         super().start_up()
         if self.ticks.lockstep:
-            self.wall_timer(0.25, self._on_startup_watch)
+            self._rivals_timer = self.wall_timer(0.25, self._look_for_rivals)
 
     def _peers(self) -> list[str]:
-        peers = [wired.node for wired in WIRING if wired.node != self.get_name()]
-        return [*peers, topics.RECORDER] if self.ticks.record else peers
+        names = [wired.node for wired in WIRING if wired.node != self.get_name()]
+        return [*names, topics.RECORDER] if self.ticks.record else names
 
     def unmatched(self) -> list[str]:
         """What is missing before time can start, in words."""
-        peers = self._peers()
-        absent = [peer for peer in peers if peer not in self.reports]
+        names = self._peers()
+        absent = [name for name in names if name not in self.reports]
         if absent:
-            return [f'{peer} has not appeared' for peer in absent]
-        starting = [peer for peer in peers if self.reports[peer].phase == health.STARTING]
+            return [f'{name} has not appeared' for name in absent]
+        starting = [name for name in names if self.reports[name].phase == health.STARTING]
         return super().unmatched() or [
-            f'{peer} is not ready: {self.reports[peer].message}' for peer in starting
+            f'{name} is not ready: {self.reports[name].message}' for name in starting
         ]
 
-    def _on_startup_watch(self) -> None:
+    def _look_for_rivals(self) -> None:
+        """Leave to another plant, before the first tick or soon after it."""
+        passed_s = time.monotonic() - self._since_s
+        found = []
         if self.running:
-            return
-        waited_s = time.monotonic() - self._clock_started_s
-        if waited_s > _RIVALS_LEAVE_S and (rivals := self.rivals()):
+            others = peers.rivals(self, [TOPICS['/clock']])
+            found = [other for other in others if peers.NOBODY not in other]  # it has one soon
+            if passed_s > _RIVALS_SHOW_S:
+                self.destroy_timer(self._rivals_timer)
+        elif passed_s > _RIVALS_LEAVE_S:
+            found = self.rivals()
+        if found:
             # No report: in one namespace it would end the other run too.
-            raise Stop(EXIT_PEER, f'{rivals[0]}; {ALONE}')
-        if waited_s > self.ticks.startup_timeout_s:
+            raise Stop(EXIT_PEER, f'{found[0]}; {ALONE}')
+        if not self.running and passed_s > self.ticks.startup_timeout_s:
             missing = '; '.join(self.unmatched())
             self.fail(f'not ready after {self.ticks.startup_timeout_s:g} s: {missing}')
 
     def on_ready(self) -> None:
         """Start time."""
+        self._since_s = time.monotonic()
         self._due_ns = 0
         self._pace.restart(0)
         if self.ticks.lockstep:

@@ -125,6 +125,10 @@ class TickExecutor(SingleThreadedExecutor):
             self._scatter()
             super().spin_once(timeout_sec=0.0)
 
+    def can_execute(self, entity) -> bool:
+        """Whether rclpy may see to it: not to what is in a gate, it would not tell by whom."""
+        return not isinstance(entity.callback_group, Gate) and super().can_execute(entity)
+
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """Stop executing callbacks."""
         self._scatter()

@@ -20,6 +20,8 @@ REPORT_AFTER = 0.4
 ALONE = 'each glider in a ROS domain needs a namespace and a clock of its own'
 #: What rclpy calls a node whose name has not been discovered yet.
 UNKNOWN = '_NODE_NAME_UNKNOWN_'
+#: What a node is called in messages until then.
+NOBODY = 'somebody without a name'
 
 
 def publishers(node: Node, topic: Topic) -> dict[bytes, str]:
@@ -42,7 +44,8 @@ def rivals(node: Node, topics: Iterable[Topic]) -> list[str]:
         if node.get_fully_qualified_name() in names:
             names.remove(node.get_fully_qualified_name())
         found += [
-            f'{node.resolve_topic_name(topic.name)} is published by {name} too' for name in names
+            f'{node.resolve_topic_name(topic.name)} is published by {name or NOBODY} too'
+            for name in names
         ]
     return found
 
@@ -50,7 +53,7 @@ def rivals(node: Node, topics: Iterable[Topic]) -> list[str]:
 def stranger(node: Node, topic: Topic, gid: bytes) -> str:
     """Who publishes a topic that is not its own, in words; by gid too if that is not the name."""
     names = publishers(node, topic)
-    name = names.get(gid) or 'somebody without a name'
+    name = names.get(gid) or NOBODY
     if list(names.values()).count(name) != 1:
         name += f' ({shown(gid)})'
     return f'{node.resolve_topic_name(topic.name)} is published by {name} too'
