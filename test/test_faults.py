@@ -104,6 +104,12 @@ def flying(starting) -> Flying:
     return starting.take_off()
 
 
+@pytest.fixture
+def flying_together(start_glider, tmp_path) -> Flying:
+    """The same with all nodes but the recorder in one process."""
+    return Flying(start_glider, tmp_path, 'together').take_off()
+
+
 # ---------------------------------------------------------------------- recordings
 
 
@@ -167,8 +173,9 @@ def check_complete(flying: Flying, card: dict, culprit: str = '') -> None:
 # ---------------------------------------------------------------------- nodes that die
 
 
-@pytest.mark.parametrize('name', sorted({*MODULES, FORK_SERVER} - {'recorder_node'}))
+@pytest.mark.parametrize('name', ['current_node', 'guard_node', PLANT, FORK_SERVER])
 def test_killed_node_ends_the_run_and_is_named(flying, name):
+    """The first and the last that answer the plant, the plant, and who starts them."""
     os.kill(flying.nodes[name], signal.SIGKILL)
     code, card = flying.end()
     assert code == 1
@@ -178,17 +185,13 @@ def test_killed_node_ends_the_run_and_is_named(flying, name):
     check_complete(flying, card, name)
 
 
-@pytest.mark.parametrize('name', [STACK, FORK_SERVER, 'recorder_node'])
-def test_killed_process_of_all_nodes_ends_the_run_and_is_named(start_glider, tmp_path, name):
-    flying = Flying(start_glider, tmp_path, 'together').take_off()
-    os.kill(flying.nodes[name], signal.SIGKILL)
+def test_killed_process_of_all_nodes_ends_the_run_and_is_named(flying_together):
+    flying = flying_together
+    os.kill(flying.nodes[STACK], signal.SIGKILL)
     code, card = flying.end()
     assert (code, card['status']) == (1, 'aborted')
-    assert card['reason'] == f'{name} was killed by SIGKILL'
-    if name == 'recorder_node':
-        check_ticks(messages_on_disk(flying.recording), dict.fromkeys(PER_TICK, 0))
-    else:
-        check_complete(flying, card)
+    assert card['reason'] == f'{STACK} was killed by SIGKILL'
+    check_complete(flying, card)
 
 
 def test_what_a_node_said_before_it_was_killed_is_recorded_by_a_recorder_that_lags(flying):
@@ -200,7 +203,8 @@ def test_what_a_node_said_before_it_was_killed_is_recorded_by_a_recorder_that_la
     check_complete(flying, card, 'guidance_node')
 
 
-def test_killed_recorder_ends_the_run_and_leaves_what_was_on_disk(flying):
+def test_killed_recorder_ends_the_run_and_leaves_what_was_on_disk(flying_together):
+    flying = flying_together
     on_disk = flying.recording.stat().st_size
     os.kill(flying.nodes['recorder_node'], signal.SIGKILL)
     code, card = flying.end()
@@ -223,8 +227,11 @@ def test_node_that_hangs_is_named_by_the_plant(flying):
     check_complete(flying, card, 'guidance_node')
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_interrupted_run_is_aborted_with_a_complete_bag(flying, number):
+@pytest.mark.parametrize(
+    ('number', 'layout'), [(signal.SIGINT, 'flying'), (signal.SIGTERM, 'flying_together')]
+)
+def test_interrupted_run_is_aborted_with_a_complete_bag(request, number, layout):
+    flying = request.getfixturevalue(layout)
     flying.process.send_signal(number)
     code, card = flying.end()
     assert code == 130

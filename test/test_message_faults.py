@@ -20,15 +20,15 @@ from glider_base.wiring import publisher
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.engines.processes import node_commands, run_nodes
+from glider_bringup.engines.processes import AUTOPILOT, node_commands, run_nodes
 from glider_mission.blocks import COLUMNS
 from glider_mission.scenario import load_scenario
 
 #: One topic of each node.
 STRUCK = ('measured_odom', 'current_velocity', 'odom', 'reference', 'demand', 'command')
-DURATION_S = 100
+DURATION_S = 60
 #: Free-running: so many times real time, simulated time of the flight, and how it begins.
-SPEED, FREE_S = 4.0, 80.0
+SPEED, FREE_S = 4.0, 60.0
 GLIDING = {
     **{'dives': 0, 'duration_s': FREE_S, 'initial.depth_m': 50.0, 'profile.prepare_s': 0.0},
     **{'initial.pitch_deg': -30.0, 'initial.speed_mps': 0.5, 'initial.net_heaviness_kg': 0.4},
@@ -121,10 +121,10 @@ def test_free_running_it_flies_on(tmp_path):
     write_parameters(node_parameters(struck, speed=SPEED, lockstep=False, record_to=folder), file)
     commands = {
         name: [*command, '-p', 'use_sim_time:=true', '-p', 'input_max_age_s:=2.0']
-        for name, command in node_commands(file).items()
+        for name, command in node_commands(file, layout='autopilot').items()
     }
     # a starved machine is no bad line: at four times real time, 15 s are a minute
-    commands['guard_node'] += ['-p', 'lost_after_s:=60.0']
+    commands[AUTOPILOT] += ['-p', 'guard_node:lost_after_s:=60.0']
     result = run_nodes(commands, tmp_path / 'nodes.log', on_log=lambda line: None)
     assert result.status == 'completed', result.reason
     (bag,) = folder.glob('*.mcap')

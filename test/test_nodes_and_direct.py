@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
 from glider_base.signals import TICK_S
 from glider_base.wiring import BELIEFS
-from glider_bringup.engines.processes import MODULES, RECORDER, node_commands, run_nodes
+from glider_bringup.engines.processes import RECORDER, Layout, node_commands, run_nodes
 from glider_mission.blocks import COLUMNS
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.recorded_log import RecordedLog
@@ -26,7 +26,7 @@ from glider_mission.run_folder import PARAMETERS_FILE
 PER_TICK = [
     topic.full_name('/glider') for topic in recorded_topics(['measured_odom']) if topic.per_tick
 ]
-#: A flight by dead reckoning, with three surfacings, and what is set for it.
+#: A flight by dead reckoning, a dive between two stays at the surface, and what is set for it.
 RECKONED = {
     'navigation.method': 'dead_reckoned',
     'sensors.compass_bias_deg': 1.0,
@@ -42,7 +42,7 @@ RECKONED = {
     'profile.surface_every_dives': 1,
     'profile.wait_s': 130.0,
 }
-RECKONED_S = 600
+RECKONED_S = 500
 
 #: What tells how a result came about, not what it is.
 HOW = {'engine', 'wall_time_s', 'real_time_factor', 'messages_recorded'}
@@ -194,25 +194,28 @@ def test_payloads_are_the_same_without_the_internals_of_rclpy(glider, over_nodes
         over_nodes.folder,
         tmp_path / 'public',
         30.0,
-        lambda name: ['-c', WITHOUT_INTERNALS, MODULES[name]],
+        'autopilot',
+        lambda name, module: ['-c', WITHOUT_INTERNALS, module],
     )
     assert flown == digests(tmp_path / 'direct')
     assert all(count == 300 for count, _ in flown.values())
 
 
 def test_first_ticks_are_recorded_though_the_recorder_is_slow(over_nodes, tmp_path):
-    slow = {RECORDER: ['-c', SLOW_RECORDER]}
     flown = flown_by(
         over_nodes.folder,
         tmp_path / 'slow',
         20.0,
-        lambda name: slow.get(name, ['-m', MODULES[name]]),
+        'together',
+        lambda name, module: ['-c', SLOW_RECORDER] if name == RECORDER else ['-m', module],
     )
     assert all(count == 200 for count, _ in flown.values())
     assert len(flown) == len(PER_TICK)
 
 
-def flown_by(of: Path, folder: Path, duration_s: float, program) -> dict[str, tuple[int, str]]:
+def flown_by(
+    of: Path, folder: Path, duration_s: float, layout: Layout, program
+) -> dict[str, tuple[int, str]]:
     """Digests of a flight by nodes that are other programs, with the parameters of a run."""
     folder.mkdir()
     parameters = yaml.safe_load((of / PARAMETERS_FILE).read_text())
@@ -220,9 +223,10 @@ def flown_by(of: Path, folder: Path, duration_s: float, program) -> dict[str, tu
     parameters['/glider/guidance_node']['ros__parameters']['duration_s'] = duration_s
     parameters['/glider/recorder_node']['ros__parameters']['folder'] = str(folder)
     (folder / PARAMETERS_FILE).write_text(yaml.safe_dump(parameters))
+    commands = node_commands(folder / PARAMETERS_FILE, layout=layout)
     commands = {
-        name: [sys.executable, *program(name), *command[3:]]
-        for name, command in node_commands(folder / PARAMETERS_FILE).items()
+        name: [sys.executable, *program(name, module), *ros]
+        for name, (_, _, module, *ros) in commands.items()
     }
     result = run_nodes(commands, folder / 'log.txt')
     assert (result.status, result.reason) == ('completed', '')

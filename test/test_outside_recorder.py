@@ -3,7 +3,6 @@
 """A recorder that knows nothing of the lockstep, such as ``ros2 bag record``, gets a whole run."""
 
 import os
-import subprocess
 import time
 from collections import Counter
 
@@ -14,6 +13,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import SetBool
 
+from command_line import Started
 from glider_base.ros.places import domain_id
 from glider_base.ros.wire.topics import (
     CONTROL,
@@ -108,8 +108,11 @@ def fly(tmp_path, monkeypatch):
     commands = node_commands(tmp_path / 'parameters.yaml')
     processes = []
 
-    def start(*names) -> list[subprocess.Popen]:
-        processes.extend(subprocess.Popen(commands[name]) for name in names)
+    def start(*names) -> list[Started]:
+        for name in names:
+            _, _, module, *words = commands[name]
+            (tmp_path / name).mkdir()
+            processes.append(Started(words, {**os.environ}, tmp_path / name, module))
         return processes
 
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
@@ -121,7 +124,6 @@ def fly(tmp_path, monkeypatch):
         yield context, folder, start
         for process in processes:
             process.kill()
-            process.wait()
         rclpy.try_shutdown(context=context)
 
 

@@ -7,8 +7,10 @@ process of its own, with its own clock, twice as fast as real time. Its line del
 and, for three seconds, is silent.
 """
 
+import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -28,6 +30,7 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
+from command_line import Started
 from glider_base.ros.lockstep import health
 from glider_base.ros.places import domain_id
 from glider_base.ros.wire import qos
@@ -66,13 +69,11 @@ GLIDING = {'heading_deg': 30.0, 'pitch_deg': -30.0, 'speed_mps': 0.5, 'net_heavi
 #: All the buoyancy there is; the mass holds it level for the pump.
 SAFE = {'buoyancy_engine': -1.0, 'pitch_mass': 0.0, 'roll_mass': 0.0}
 DEADLINE_S = 200.0
-#: Flights by their names: whether the vehicle navigates itself, and whether by the autopilot.
-FLIGHTS = {
-    'odom': (True, False),
-    'odom_autopilot': (True, True),
-    'sensors': (False, False),
-    'sensors_autopilot': (False, True),
-}
+#: Flights by their names: whether the vehicle navigates itself, and whether by the autopilot;
+#: both ways of both.
+FLIGHTS = {'odom_autopilot': (True, True), 'sensors': (False, False)}
+#: Flights start their nodes one after the other.
+STARTING = threading.Lock()
 
 
 def stamp_s(message) -> float:
@@ -164,26 +165,23 @@ class Flown(NamedTuple):
     navigates: bool
 
 
-def commands_on_board(file: Path, navigates: bool, autopilot: bool) -> list[list[str]]:
-    """What is started on board."""
+def commands_on_board(file: Path, navigates: bool, autopilot: bool) -> dict[str, list[str]]:
+    """What is started on board, by name."""
     commands = node_commands(file, layout='autopilot' if autopilot else 'processes')
     parts = [wired for wired in ON_BOARD if not (navigates and wired == NAVIGATION)]
     if not autopilot:
-        return [commands[wired.node] for wired in parts]
+        return {wired.node: commands[wired.node] for wired in parts}
     python, _, module, *ros = commands[AUTOPILOT]
-    return [[python, '-m', module, *(wired.name for wired in parts), *ros]]
+    return {AUTOPILOT: [python, '-m', module, *(wired.name for wired in parts), *ros]}
 
 
 @pytest.fixture(scope='module')
 def flights(tmp_path_factory):
-    """All flights by their names, two at a time: each waits more than it computes.
-
-    With all of them under way a busy machine is late for their ticks, and they fly worse for it.
-    """
-    folder = tmp_path_factory.mktemp('free')
-    with ThreadPoolExecutor(2) as pool:
+    """All flights by their names, at the same time: each waits more than it computes."""
+    with ThreadPoolExecutor(len(FLIGHTS)) as pool:
         yield {
-            name: pool.submit(fly, *how, folder / f'{name}.yaml') for name, how in FLIGHTS.items()
+            name: pool.submit(fly, *how, tmp_path_factory.mktemp(name))
+            for name, how in FLIGHTS.items()
         }
 
 
@@ -193,8 +191,9 @@ def flown(request, flights) -> Flown:
     return flights[request.param].result()
 
 
-def fly(navigates: bool, autopilot: bool, file: Path) -> Flown:
+def fly(navigates: bool, autopilot: bool, folder: Path) -> Flown:
     """A flight: a silence, a gain changed on the way, an abort."""
+    file = folder / 'nodes.yaml'
     scenario = load_scenario('current_8deg', {**FLIGHT, **({} if navigates else RECKONED)})
     write_parameters(node_parameters(scenario, lockstep=False), file)
     nodes = {wired.node for wired in ON_BOARD if not (navigates and wired == NAVIGATION)}
@@ -207,9 +206,12 @@ def fly(navigates: bool, autopilot: bool, file: Path) -> Flown:
         )
         watch = Watch(context)
         try:
-            for command in commands_on_board(file, navigates, autopilot):
-                free = options(use_sim_time='true', input_max_age_s=MAX_AGE_S)
-                processes.append(subprocess.Popen([*command, *free], env=environment))
+            for name, command in commands_on_board(file, navigates, autopilot).items():
+                _, _, module, *words = command
+                words += options(use_sim_time='true', input_max_age_s=MAX_AGE_S)
+                (folder / name).mkdir()
+                with STARTING:
+                    processes.append(Started(words, environment, folder / name, module))
             watch.until(lambda: watch.ready == nodes)
             stand_in = [sys.executable, STAND_IN, '--ros-args', '-r', '__ns:=/glider']
             stand_in += options(**faults, duration_s=END_S, listeners=7 if navigates else 8)
@@ -224,7 +226,7 @@ def fly(navigates: bool, autopilot: bool, file: Path) -> Flown:
             assert watch.call(Trigger, 'abort', Trigger.Request()).success
             watch.until(lambda: processes[-1].poll() is not None)
             for process in processes[:-1]:
-                process.terminate()
+                process.send_signal(signal.SIGTERM)
             assert {process.wait(DEADLINE_S) for process in processes} == {0}
         finally:
             for process in processes:

@@ -23,11 +23,11 @@ EAST = {'kind': 'straight', 'course_deg': 90.0, 'length_m': 5000.0}
 ORDERS = [
     {'at_s': 60.0, 'depth_m': 15.0, 'pitch_deg': 25.0, 'wait_s': 30.0},
     {'at_s': 70.0, 'path': EAST, 'when': 'surfacing'},
-    {'at_s': 300.3, 'hold': True},
-    {'at_s': 480.0, 'resume': True},
-    {'at_s': 690.0, 'abort': True},
+    {'at_s': 160.3, 'hold': True},
+    {'at_s': 260.0, 'resume': True},
+    {'at_s': 425.0, 'abort': True},
 ]
-ORDERED_S = 900.0
+ORDERED_S = 640.0
 YO = {'profile.depth_m': 20.0, 'profile.prepare_s': 0.0, 'dives': 0}
 
 
@@ -201,9 +201,9 @@ def flown():
 def test_they_are_followed(flown):
     """Turned at 15 m, up while held, down again when resumed, up for good when aborted."""
     depth = flown['ground_truth_odom_depth'].sel(time=slice(0.0, ORDERED_S))
-    at = {t_s: depth.sel(time=t_s, method='nearest').item() for t_s in (470.0, 690.0, 899.0)}
+    at = {t_s: depth.sel(time=t_s, method='nearest').item() for t_s in (255.0, 425.0, 639.0)}
     assert 14.5 < depth.max() < 17.5
-    assert at[470.0] < 1.0 < 4.0 < at[690.0] and at[899.0] < 1.0
+    assert at[255.0] < 1.0 < 4.0 < at[425.0] and at[639.0] < 1.0
 
 
 def test_given_in_flight_they_have_the_bits_of_those_in_the_scenario(flown):

@@ -6,11 +6,8 @@ import json
 import os
 import random
 import signal
-import subprocess
-import sys
 import time
 from collections import defaultdict
-from pathlib import Path
 
 import pytest
 import rclpy
@@ -22,6 +19,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from typer.testing import CliRunner
 
+from command_line import Started
 from glider_base.ros.lockstep import health
 from glider_base.ros.places import domain_id
 from glider_base.ros.wire.topics import REPLAY, TOPICS, recorded_topics
@@ -53,28 +51,37 @@ def context(monkeypatch):
 
 
 @pytest.fixture
-def start(context):
-    """Start a process; it does not outlive the test."""
+def start(context, tmp_path_factory):
+    """Start a module with words; it does not outlive the test."""
     processes = []
 
-    def run(*command) -> subprocess.Popen:
-        pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
-        processes.append(subprocess.Popen([*map(str, command)], env={**os.environ}, **pipes))
+    def run(module: str, *words) -> Started:
+        folder = tmp_path_factory.mktemp('said')
+        processes.append(Started(words, {**os.environ}, folder, module))
         return processes[-1]
 
     yield run
     for process in processes:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
+        process.kill()
 
 
 @pytest.fixture
 def replay(start):
     """Start a replay."""
-    return lambda *arguments: start(
-        sys.executable, '-m', 'glider_bringup.cli', 'replay', *arguments
-    )
+    return lambda *arguments: start('glider_bringup.cli', 'replay', *arguments)
+
+
+@pytest.fixture
+def start_recorder(start, tmp_path):
+    """Start a recorder that writes to a folder of a name, with parameters."""
+
+    def run(name: str, **options) -> Started:
+        parameters = node_parameters(load_scenario(), record_to=tmp_path / name, **options)
+        write_parameters(parameters, tmp_path / f'{name}.yaml')
+        _, _, *module_and_words = node_commands(tmp_path / f'{name}.yaml')[RECORDER]
+        return start(*module_and_words)
+
+    return run
 
 
 class Listener:
@@ -164,11 +171,9 @@ def test_subscriber_gets_every_message_once_and_in_order(
 
 
 def test_second_recording_at_full_speed_is_byte_identical(
-    short_run, recorded, read_bag, start, replay, tmp_path
+    short_run, recorded, read_bag, start_recorder, replay, tmp_path
 ):
-    parameters = node_parameters(load_scenario(), record_to=tmp_path / 'again')
-    write_parameters(parameters, tmp_path / 'parameters.yaml')
-    recorder = start(*node_commands(tmp_path / 'parameters.yaml')[RECORDER])
+    recorder = start_recorder('again')
     process = replay(short_run, '--rate', 'max', '--wait-for', 1)
     _, error = process.communicate(timeout=DEADLINE_S)
     assert process.returncode == 0, error
@@ -181,31 +186,18 @@ def test_second_recording_at_full_speed_is_byte_identical(
     assert again == recorded
 
 
-@pytest.fixture
-def record(start, tmp_path):
-    """Start a recorder; gives its process and the file that it will write."""
-
-    def begin(name: str) -> tuple[subprocess.Popen, Path]:
-        parameters = node_parameters(load_scenario(), record_to=tmp_path / name)
-        write_parameters(parameters, tmp_path / f'{name}.yaml')
-        process = start(*node_commands(tmp_path / f'{name}.yaml')[RECORDER])
-        return process, tmp_path / name / f'{load_scenario().name}_0.mcap'
-
-    return begin
-
-
 def test_events_that_come_late_are_recorded_with_their_tick(
-    short_run, recorded, context, record, replay, listen
+    short_run, recorded, context, start_recorder, replay, listen, tmp_path
 ):
     """All messages of a minute, then all its events: the file is that of a replay in order."""
-    process, usual = record('usual')
+    process = start_recorder('usual')
     replayed = replay(short_run, '--rate', 'max', '--wait-for', 1, '--duration', 60)
     _, error = replayed.communicate(timeout=DEADLINE_S)
     assert replayed.returncode == 0, error
     process.send_signal(signal.SIGINT)
     assert process.wait(DEADLINE_S) == 0
 
-    process, late = record('late')
+    process = start_recorder('late')
     node = Node(REPLAY, context=context, namespace='/glider')
     publishers = {
         name: node.create_publisher(topic.message_type, name, topic.qos)
@@ -244,15 +236,15 @@ def test_events_that_come_late_are_recorded_with_their_tick(
     process.send_signal(signal.SIGINT)
     assert process.wait(DEADLINE_S) == 0
     node.destroy_node()
+    usual, late = (next((tmp_path / name).glob('*.mcap')) for name in ('usual', 'late'))
+    assert late.name == usual.name
     assert late.read_bytes() == usual.read_bytes()
 
 
 @pytest.mark.parametrize('sync', ['end', 'chunk'])
 def test_what_a_killed_recorder_has_acknowledged_can_be_read(
-    short_run, start, replay, listen, tmp_path, sync
+    short_run, start_recorder, replay, listen, tmp_path, sync
 ):
-    parameters = node_parameters(load_scenario(), record_to=tmp_path / 'again', sync=sync)
-    write_parameters(parameters, tmp_path / 'parameters.yaml')
     listener, topic, acknowledged = listen(), TOPICS['recorded'], []
     listener.node.create_subscription(
         topic.message_type,
@@ -260,13 +252,12 @@ def test_what_a_killed_recorder_has_acknowledged_can_be_read(
         lambda header: acknowledged.append(header.stamp.sec * 10**9 + header.stamp.nanosec),
         topic.qos,
     )
-    recorder = start(*node_commands(tmp_path / 'parameters.yaml')[RECORDER])
+    recorder = start_recorder('again', sync=sync)
     process = replay(short_run, '--rate', 100, '--wait-for', 1)
     enough, wait_s = random.randint(1, 5), random.uniform(0.0, 0.05)
     listener.listen_until(lambda: len(acknowledged) >= enough, process)
     time.sleep(wait_s)
     recorder.kill()
-    recorder.wait(DEADLINE_S)
     bag = Bag(tmp_path / 'again')
     assert 'ends early' in bag.cut
     log = RecordedLog(bag)
@@ -276,11 +267,9 @@ def test_what_a_killed_recorder_has_acknowledged_can_be_read(
 
 
 def test_recorder_that_does_not_keep_step_does_not_hold_a_replay_up(
-    short_run, start, replay, tmp_path
+    short_run, start_recorder, replay
 ):
-    parameters = node_parameters(load_scenario(), lockstep=False, record_to=tmp_path / 'again')
-    write_parameters(parameters, tmp_path / 'parameters.yaml')
-    start(*node_commands(tmp_path / 'parameters.yaml')[RECORDER])
+    start_recorder('again', lockstep=False)
     process = replay(short_run, '--rate', 'max', '--wait-for', 1)
     _, error = process.communicate(timeout=DEADLINE_S)
     assert process.returncode == 0, error

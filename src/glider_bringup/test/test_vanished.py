@@ -39,8 +39,7 @@ def exchange_bag(folder: Path) -> None:
     ('engine', 'happens'),
     [
         ('nodes', delete_bag),
-        ('nodes', rename),
-        ('direct', delete_bag),
+        ('direct', rename),
         ('direct', shutil.rmtree),
         ('direct', exchange_bag),
     ],
