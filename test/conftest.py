@@ -12,8 +12,8 @@ import pytest
 
 import command_line
 
-#: The flight that tests share: every kind of current, and a descent to 100 m.
-SCENARIO, DURATION_S = 'rough_water', 600
+#: The flight that tests share: every kind of current, and a descent to 60 m.
+SCENARIO, DURATION_S = 'rough_water', 400
 
 
 class Recorded(NamedTuple):
