@@ -4,14 +4,14 @@
 
 from pathlib import Path
 
-from glider_mission.scenario import load_scenario, scenario_names
+from glider_mission.scenario import read_scenario, scenario_names
 from glider_model.plant.trim import Trim, solve_trim
 from glider_model.vehicle.file import load_vehicle, vehicle_names
 
 
 def scenarios() -> dict[str, str]:
     """Names of the scenarios that come with the stack, and what each shows."""
-    return {name: load_scenario(name).description for name in scenario_names()}
+    return {name: read_scenario(name).values['description'] for name in scenario_names()}
 
 
 def vehicles() -> dict[str, str]:
