@@ -258,6 +258,29 @@ def test_a_plant_of_a_second_glider_does_not_end_the_run(make_graph, context, is
     assert (stop is None) == is_rival
 
 
+@pytest.mark.parametrize('has_just_begun', [True, False])
+def test_of_two_plants_the_one_that_has_just_begun_leaves(
+    make_graph, context, monkeypatch, has_just_begun
+):
+    """Both clocks lie in the same place; the other one comes in sight after the first tick."""
+    monkeypatch.setattr(clock, '_RIVALS_SHOW_S', 60.0 if has_just_begun else 0.0)
+    graph = make_graph(last_tick=10**9)
+    begun_s = time.monotonic()
+    assert graph.spin(lambda: time.monotonic() > begun_s + 1.0 and graph.plant.tick > 10) is None
+    other, topic = rclpy.create_node(PLANT, namespace='/other', context=context), TOPICS['/clock']
+    graph.nodes.append(other)
+    other.create_publisher(topic.message_type, topic.name, topic.qos)
+    until = time.monotonic() + 2.0
+    stop = graph.spin(lambda: time.monotonic() > until)
+    if has_just_begun:
+        assert (stop.code, str(stop)) == (
+            3,
+            f'/clock is published by /other/{PLANT} too; {peers.ALONE}',
+        )
+    else:
+        assert stop is None
+
+
 class Recorder(StepNode):
     """Stands in for the recorder: takes nothing, and says what it has when it is told."""
 

@@ -20,7 +20,6 @@ from glider_base.ros.lockstep import health, peers
 from glider_base.ros.lockstep.executor import take
 from glider_base.ros.lockstep.health import Report, seconds
 from glider_base.ros.lockstep.node import TickNode, TickSettings
-from glider_base.ros.lockstep.peers import ALONE
 from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.wire import topics
 from glider_base.ros.wire.topics import TOPICS
@@ -33,9 +32,10 @@ from glider_base.wiring import WIRING
 #: not by a node that is killed: what it had said would be lost with it.
 MAX_TICKS_AHEAD = {'recorded': 256, 'heard': 20}
 
-#: Nodes of a run that is just over are out of sight within this time (s), and a plant that was
-#: there before is in sight: of two, the one that has just begun leaves.
-_RIVALS_LEAVE_S = _RIVALS_SHOW_S = 5.0
+#: Nodes of a run that is just over are out of sight within this time (s).
+_RIVALS_LEAVE_S = 5.0
+#: Another plant that was there before the first tick is in sight within this time (s) after it.
+_RIVALS_SHOW_S = 5.0
 
 
 class ClockSettings(TickSettings):
@@ -93,7 +93,7 @@ class ClockNode(TickNode):
         self._pace = _Pace(self.ticks.speed)
         self._pace_timer = self.wall_timer(1.0, self._on_pace)
         self._pace_timer.cancel()
-        self._since_s = time.monotonic()  #: looking for its peers, then flying
+        self._clock_started_s = self._flies_since_s = time.monotonic()
         self._leads: list[_Lead] = []
         self._held_by: _Lead | None = None
         for name in MAX_TICKS_AHEAD if self.ticks.record else ():
@@ -117,10 +117,10 @@ class ClockNode(TickNode):
 
     def start_up(self) -> None:
         """Start looking for the peers, for a limited time."""
-        self._since_s = time.monotonic()
+        self._clock_started_s = time.monotonic()
         super().start_up()
         if self.ticks.lockstep:
-            self._rivals_timer = self.wall_timer(0.25, self._look_for_rivals)
+            self._startup_watch = self.wall_timer(0.25, self._on_startup_watch)
 
     def _peers(self) -> list[str]:
         names = [wired.node for wired in WIRING if wired.node != self.get_name()]
@@ -137,27 +137,32 @@ class ClockNode(TickNode):
             f'{name} is not ready: {self.reports[name].message}' for name in starting
         ]
 
-    def _look_for_rivals(self) -> None:
-        """Leave to another plant, before the first tick or soon after it."""
-        passed_s = time.monotonic() - self._since_s
-        found = []
+    def _on_startup_watch(self) -> None:
         if self.running:
-            others = peers.rivals(self, [TOPICS['/clock']])
-            found = [other for other in others if peers.NOBODY not in other]  # it has one soon
-            if passed_s > _RIVALS_SHOW_S:
-                self.destroy_timer(self._rivals_timer)
-        elif passed_s > _RIVALS_LEAVE_S:
-            found = self.rivals()
-        if found:
-            # No report: in one namespace it would end the other run too.
-            raise Stop(EXIT_PEER, f'{found[0]}; {ALONE}')
-        if not self.running and passed_s > self.ticks.startup_timeout_s:
+            self._look_for_another_plant()
+            return
+        waited_s = time.monotonic() - self._clock_started_s
+        if waited_s > _RIVALS_LEAVE_S and (rivals := self.rivals()):
+            self._leave_to(rivals[0])
+        if waited_s > self.ticks.startup_timeout_s:
             missing = '; '.join(self.unmatched())
             self.fail(f'not ready after {self.ticks.startup_timeout_s:g} s: {missing}')
 
+    def _look_for_another_plant(self) -> None:
+        """Leave to one that was there before, as soon as it is in sight and has a name."""
+        clock = TOPICS['/clock']
+        for name in filter(None, peers.others(self, clock)):
+            self._leave_to(peers.published_by(self, clock, name))
+        if time.monotonic() - self._flies_since_s > _RIVALS_SHOW_S:
+            self.destroy_timer(self._startup_watch)
+
+    def _leave_to(self, rival: str) -> None:
+        """Stop without a report: in one namespace it would end the other run too."""
+        raise Stop(EXIT_PEER, f'{rival}; {peers.ALONE}')
+
     def on_ready(self) -> None:
         """Start time."""
-        self._since_s = time.monotonic()
+        self._flies_since_s = time.monotonic()
         self._due_ns = 0
         self._pace.restart(0)
         if self.ticks.lockstep:
@@ -219,7 +224,7 @@ class ClockNode(TickNode):
         return (
             f'{self.resolve_topic_name(item.topic.name)} is published by '
             f'{place}/{item.topic.publisher} for {seconds(item.stamp_ns)} when '
-            f'{seconds(self._due_ns)} is due: it follows another plant, or is wrong; {ALONE}'
+            f'{seconds(self._due_ns)} is due: it follows another plant, or is wrong; {peers.ALONE}'
         )
 
     def _is_ahead(self, lead: _Lead) -> bool:

@@ -21,7 +21,7 @@ ALONE = 'each glider in a ROS domain needs a namespace and a clock of its own'
 #: What rclpy calls a node whose name has not been discovered yet.
 UNKNOWN = '_NODE_NAME_UNKNOWN_'
 #: What a node is called in messages until then.
-NOBODY = 'somebody without a name'
+_NOBODY = 'somebody without a name'
 
 
 def publishers(node: Node, topic: Topic) -> dict[bytes, str]:
@@ -34,29 +34,32 @@ def publishers(node: Node, topic: Topic) -> dict[bytes, str]:
     }
 
 
+def others(node: Node, topic: Topic) -> list[str]:
+    """Full names of who else publishes a topic of this node; empty for one not known yet."""
+    names = list(publishers(node, topic).values())
+    if node.get_fully_qualified_name() in names:
+        names.remove(node.get_fully_qualified_name())
+    return names
+
+
+def published_by(node: Node, topic: Topic, name: str) -> str:
+    """That somebody publishes a topic who should not, in words."""
+    return f'{node.resolve_topic_name(topic.name)} is published by {name or _NOBODY} too'
+
+
 def rivals(node: Node, topics: Iterable[Topic]) -> list[str]:
     """Who else publishes those of the topics that only this node may publish, in words."""
-    found = []
-    for topic in topics:
-        if topic.publisher != node.get_name():
-            continue
-        names = list(publishers(node, topic).values())
-        if node.get_fully_qualified_name() in names:
-            names.remove(node.get_fully_qualified_name())
-        found += [
-            f'{node.resolve_topic_name(topic.name)} is published by {name or NOBODY} too'
-            for name in names
-        ]
-    return found
+    own = (topic for topic in topics if topic.publisher == node.get_name())
+    return [published_by(node, topic, name) for topic in own for name in others(node, topic)]
 
 
 def stranger(node: Node, topic: Topic, gid: bytes) -> str:
     """Who publishes a topic that is not its own, in words; by gid too if that is not the name."""
     names = publishers(node, topic)
-    name = names.get(gid) or NOBODY
+    name = names.get(gid) or _NOBODY
     if list(names.values()).count(name) != 1:
         name += f' ({shown(gid)})'
-    return f'{node.resolve_topic_name(topic.name)} is published by {name} too'
+    return published_by(node, topic, name)
 
 
 def missing_readers(node: Node, topic: Topic, publisher, readers: list[str]) -> list[str]:
