@@ -50,6 +50,7 @@ def test_no_package_has_a_root_of_its_own():
     """Else pytest would not look further up, where the profile is."""
     names = 'pytest.ini', '.pytest.ini', 'pyproject.toml', 'tox.ini', 'conftest.py'
     assert [path for name in names for path in ROOT.glob(f'src/*/{name}')] == []
+    assert not any('[tool:pytest]' in path.read_text() for path in ROOT.glob('src/*/setup.cfg'))
 
 
 def test_elsewhere_they_have_one(tmp_path):

@@ -279,6 +279,14 @@ def test_its_fields_are_axes_of_a_sweep(direct, sweep):
     assert 'sliding' in sweep.attrs['scenario_yaml']
 
 
+def test_montecarlo_flies_it(machine, direct):
+    flown = [*MINE[:2], '--plants', 2, '--duration', 90, '--workers', 1, '--json']
+    changes = ['--set', 'guidance.los.method=vector_field', '--set', 'profile.prepare_s=0']
+    study = json.loads(machine.glider('montecarlo', 'current_8deg', *flown, *changes).stdout)
+    (row,) = study['rows']
+    assert (row['controller'], study['plants'], row['diverged']) == ('sliding', 2, 0)
+
+
 def test_all_laws_are_flown_by_montecarlo_and_it_is_one_of_them(known):
     assert known['laws'] == ['adaptive', 'backstepping', 'pid', 'sliding']
 

@@ -73,7 +73,7 @@ def broken(kind, depth_m=None, phase='dive', **fields):
 def test_a_pressure_that_freezes_in_the_dive_brings_a_vehicle_up_that_reckons(
     name, depth_m, within_m
 ):
-    flown = fly(name, 6000.0, [broken('frozen', depth_m, sensor='depth')], **RECKONED)
+    flown = fly(name, 9000.0, [broken('frozen', depth_m, sensor='depth')], **RECKONED)
     began_s = float(np.argmax(flown.depth >= depth_m)) * TICK_S
     assert flown.first(rows.SURFACES) - began_s < 120.0
     assert flown.depth.max() < depth_m + within_m
@@ -83,7 +83,7 @@ def test_a_pressure_that_freezes_in_the_dive_brings_a_vehicle_up_that_reckons(
 
 @pytest.mark.parametrize('changes', [RECKONED, {}])
 def test_a_pressure_that_freezes_before_the_dive_is_no_reason_to_dive(changes):
-    flown = fly('current_8deg', 2500.0, [broken('frozen', sensor='depth', at_s=20.0)], **changes)
+    flown = fly('current_8deg', 4000.0, [broken('frozen', sensor='depth', at_s=20.0)], **changes)
     assert flown.depth.max() < 60.0
     assert flown.depth[-1] < AT_SURFACE_M
 
@@ -126,7 +126,7 @@ def test_samples_that_repeat_by_nature_are_no_alarm(sensors):
     ],
 )
 def test_the_weight_goes_before_the_crush_depth_and_not_after_it(name, crush_m, faults):
-    flown = fly(name, 7500.0, faults)
+    flown = fly(name, 9000.0, faults)
     assert flown.dropped_at() < crush_m
     assert flown.depth.max() < crush_m
     assert flown.depth[-1] < AT_SURFACE_M
@@ -134,7 +134,7 @@ def test_the_weight_goes_before_the_crush_depth_and_not_after_it(name, crush_m, 
 
 def test_a_leak_that_outgrows_the_pump_takes_nobody_below_where_it_began():
     leak = broken('leak', 590.0, rate_kgps=0.0009, limit_kg=1.6)
-    flown = fly('current_8deg', 6000.0, [leak], **{'profile.depth_m': 600.0})
+    flown = fly('current_8deg', 12000.0, [leak], **{'profile.depth_m': 600.0})
     assert flown.depth.max() < 640.0
     assert flown.depth[-1] < AT_SURFACE_M
 
@@ -178,7 +178,7 @@ def test_a_pump_that_still_turns_the_vehicle_spares_the_weight():
 @pytest.mark.parametrize('changes', [RECKONED, {}])
 def test_a_depth_that_is_60_m_off_at_launch_is_no_depth_to_dive_by(changes):
     bias = broken('biased', sensor='depth', error=-60.0)
-    flown = fly('slocum_shelf', 2000.0, [bias], **changes)
+    flown = fly('slocum_shelf', 4000.0, [bias], **changes)
     assert flown.first(rows.DEPTH_WRONG) < 60.0
     assert flown.depth.max() < AT_SURFACE_M
 
@@ -187,7 +187,7 @@ def test_a_depth_that_is_60_m_off_at_launch_is_no_depth_to_dive_by(changes):
 def test_an_offset_is_taken_off_at_the_surface_and_told(error):
     """Dives go to 200 m of water, and not to 215 or 188."""
     bias = broken('biased', sensor='depth', error=error)
-    flown = fly('slocum_shelf', 5000.0, [bias], **RECKONED)
+    flown = fly('slocum_shelf', 9000.0, [bias], **RECKONED)
     assert flown.first(rows.DEPTH_OFFSET) < 60.0
     assert not (flown.told & rows.SURFACES).any()
     assert 195.0 < flown.depth.max() < 204.0
@@ -202,7 +202,7 @@ def test_a_depth_that_jumps_and_stays_there_is_not_set_anew_quietly(
     name, at_m, error, least_m, changes
 ):
     bias = broken('biased', at_m, sensor='depth', error=error)
-    flown = fly(name, 5000.0, [bias], **changes)
+    flown = fly(name, 9000.0, [bias], **changes)
     assert flown.depth.max() < least_m
     assert flown.first(rows.DEPTH_WRONG) < np.inf
     assert flown.depth[-1] < AT_SURFACE_M
@@ -228,7 +228,7 @@ def test_a_vehicle_that_is_held_level_sinks_on_by_no_more_than_is_reckoned_with(
     most = load_vehicle(vehicle).params().m_b_max
     flown = fly(
         'current_8deg',
-        3000.0,
+        7000.0,
         [{'kind': 'vacuum', 'rate_paps': 5000.0, 'at_s': 1000.0}],
         vehicle=vehicle,
         **{
@@ -258,7 +258,7 @@ def test_who_floats_with_a_leak_stays_up_when_the_water_outgrows_the_pump(
     if not is_detected:
         faults.append({'kind': 'vacuum', 'rate_paps': 5000.0, 'at_s': 700.0})
     shelf = {'profile.depth_m': 50.0, 'profile.net_heaviness_kg': 0.1, 'dives': 0}
-    flown = fly('current_8deg', 13000.0, faults, vehicle=vehicle, sensors=NOISE, **shelf)
+    flown = fly('current_8deg', 16000.0, faults, vehicle=vehicle, sensors=NOISE, **shelf)
     up = np.argmax((flown.depth < 1.0) & ((flown.told & rows.SURFACES) != 0))
     assert 0 < up and flown.drops[-1]
     assert flown.depth[up:].max() < 5.0
@@ -372,7 +372,7 @@ def test_a_pitch_that_freezes_over_fast_ground_does_not_freeze_the_depth():
     ]
     dive = {'profile.depth_m': 270.0, 'profile.pitch_deg': 28.8, 'profile.net_heaviness_kg': 0.27}
     water = {'current.speed_mps': 2.5, 'current.direction_deg': 51.3}
-    flown = fly('yaw_10deg', 5000.0, faults, **dive, **water)
+    flown = fly('yaw_10deg', 9000.0, faults, **dive, **water)
     assert flown.depth.max() < 500.0
     assert flown.depth[-1] < AT_SURFACE_M
 
