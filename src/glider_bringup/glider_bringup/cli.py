@@ -11,7 +11,7 @@ import sys
 from functools import partial
 from importlib import import_module
 
-gc.set_threshold(100_000)  # what is imported stays: to look through it again is a tenth of a start
+gc.set_threshold(100_000)  # what is imported stays: no use in looking through it again
 
 try:  # imports take a second, in which Ctrl-C may come, and many files
     # ./glider blocks it until there is someone to take it; workers, which import this too, leave

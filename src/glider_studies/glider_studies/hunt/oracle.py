@@ -106,8 +106,8 @@ def _all_done(
     vehicle = params.plant.vehicle
     command, mass = (-vehicle.m_b_max, -vehicle.x_p_max), make_moving_mass(vehicle)
     for mode in range(3):
-        depths, drop = np.empty(round(for_s / TICK_S)), float(drops)
-        _rise(state.plant, params.plant, water, command, mass, mode, drop, depths, TICK_S)
+        depths = np.empty(round(for_s / TICK_S))
+        _rise(state.plant, params.plant, water, command, mass, mode, float(drops), depths, TICK_S)
         yield depths
 
 
