@@ -3,12 +3,12 @@
 """The benchmarks: their floor in C is the plant's arithmetic, and the command prints figures."""
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from glider_mission.scenario import load_scenario
 
@@ -80,20 +80,16 @@ def test_a_floor_with_other_arithmetic_is_refused(modules, library):
         floor.compare(engine, in_c)
 
 
-def bench(section: str) -> dict:
-    """Figures of a section, as the command prints them."""
-    done = subprocess.run(
-        [sys.executable, FOLDER / 'bench.py', '--only', section, '--json'],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+def test_bench_prints_one_object_of_figures(modules, monkeypatch):
+    """Of shorter flights than the figures are of, which are named after 30 h."""
+    import bench
+    import memory
 
-
-def test_bench_prints_one_object_of_figures():
-    figures = bench('memory')
+    monkeypatch.setattr(memory, 'FLIGHT_S', 20.0)
+    monkeypatch.setattr(memory, '_FLY', memory._FLY.replace('108000.0', '1000.0'))
+    done = CliRunner().invoke(bench.app, ['--only', 'memory', '--json'])
+    assert done.exit_code == 0, done.output
+    figures = json.loads(done.stdout)
     assert figures['mission_30h_peak_rss_mb'] > figures['imported_rss_mb'] > 30.0
 
 
