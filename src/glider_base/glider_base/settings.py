@@ -39,6 +39,22 @@ def beside(file: str, info: pydantic.ValidationInfo) -> str:
 
 #: ``json_schema_extra`` of a field that can be set on a node while it flies.
 TUNABLE = {'tunable': True}
+
+
+def number(default: Any, between: tuple[float, float], words: str, tunable: bool = False) -> Any:
+    """Field for a number within limits; with ``...`` as its default it must be given."""
+    extra = TUNABLE if tunable else None
+    return pydantic.Field(
+        default, ge=between[0], le=between[1], description=words, json_schema_extra=extra
+    )
+
+
+def positive(default: Any, most: float, words: str, tunable: bool = False) -> Any:
+    """Field for a number above 0 and up to a limit; see `number`."""
+    extra = TUNABLE if tunable else None
+    return pydantic.Field(default, gt=0.0, le=most, description=words, json_schema_extra=extra)
+
+
 #: Numeric limits as pydantic calls them, and in a person's words.
 _BOUNDS = (('ge', '>='), ('gt', '>'), ('le', '<='), ('lt', '<'))
 _NOT_A_MAPPING = ('dict_type', 'model_type', 'model_attributes_type')

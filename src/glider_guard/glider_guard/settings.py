@@ -6,7 +6,7 @@ import math
 
 from pydantic import Field
 
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number, positive
 from glider_base.signals import Joints
 from glider_guard.actuators import INITIAL_FOLLOWERS, make_limits
 from glider_guard.ascent import INITIAL_ASCENT, AscentLimits
@@ -34,146 +34,94 @@ class GuardLimitSettings(Settings):
     """When the guard acts, whatever the vehicle: the guard section of a scenario."""
 
     gate: GateSettings = Field(GateSettings(), description='odometry that is refused')
-    follow_share: float = Field(
-        0.02,
-        gt=0.0,
-        le=1.0,
-        description='an actuator is where it was sent within this share of its range (-)',
+    follow_share: float = positive(
+        0.02, 1.0, 'an actuator is where it was sent within this share of its range (-)'
     )
-    stall_s: float = Field(
+    stall_s: float = number(
         60.0,
-        ge=1.0,
-        le=3600.0,
-        description='time in which an actuator has to go as much, or a tenth of what its rate '
-        'allows (s)',
+        (1.0, 3600.0),
+        'time in which an actuator has to go as much, or a tenth of what its rate allows (s)',
     )
-    depth_margin_share: float = Field(
-        0.04,
-        ge=0.0,
-        le=1.0,
-        description='share of rated_depth by which a turn may overshoot it (-)',
+    depth_margin_share: float = number(
+        0.04, (0.0, 1.0), 'share of rated_depth by which a turn may overshoot it (-)'
     )
-    depth_margin_m: float = Field(
-        15.0, ge=0.0, le=1000.0, description='the same, at least this (m)'
+    depth_margin_m: float = number(15.0, (0.0, 1000.0), 'the same, at least this (m)')
+    overdepth_share: float = number(
+        0.25, (0.0, 10.0), 'share of the deepest target that is overdepth (-)'
     )
-    overdepth_share: float = Field(
-        0.25, ge=0.0, le=10.0, description='share of the deepest target that is overdepth (-)'
-    )
-    overdepth_m: float = Field(
-        100.0, ge=1.0, le=12000.0, description='the same, at least this (m)'
-    )
-    overdepth_s: float = Field(30.0, ge=0.0, le=3600.0, description='for longer than this (s)')
-    altitude_min_m: float = Field(
+    overdepth_m: float = number(100.0, (1.0, 12000.0), 'the same, at least this (m)')
+    overdepth_s: float = number(30.0, (0.0, 3600.0), 'for longer than this (s)')
+    altitude_min_m: float = number(
         3.0,
-        ge=0.0,
-        le=100.0,
-        description='least height over the bottom, where there is an altimeter (m); 0.0: any',
+        (0.0, 100.0),
+        'least height over the bottom, where there is an altimeter (m); 0.0: any',
     )
-    altitude_s: float = Field(
-        2.0, ge=0.0, le=3600.0, description='an echo of the bottom lasts longer than this (s)'
+    altitude_s: float = number(
+        2.0, (0.0, 3600.0), 'an echo of the bottom lasts longer than this (s)'
     )
-    climb_progress_m: float = Field(
-        5.0, ge=0.5, le=100.0, description='way upward that counts as progress (m)'
-    )
-    no_climb_s: float = Field(
+    climb_progress_m: float = number(5.0, (0.5, 100.0), 'way upward that counts as progress (m)')
+    no_climb_s: float = number(
         900.0,
-        ge=60.0,
-        le=86400.0,
-        description='a vehicle sent up that makes no progress for so long does not climb (s)',
+        (60.0, 86400.0),
+        'a vehicle sent up that makes no progress for so long does not climb (s)',
     )
-    drop_after_s: float = Field(
+    drop_after_s: float = number(
+        1200.0, (600.0, 86400.0), 'the same, surfacing for good: the weight is let go (s)'
+    )
+    drop_blind_s: float = number(
         1200.0,
-        ge=600.0,
-        le=86400.0,
-        description='the same, surfacing for good: the weight is let go (s)',
+        (600.0, 86400.0),
+        'the same where the depth is not to be trusted, beside the time of the way up (s)',
     )
-    drop_blind_s: float = Field(
-        1200.0,
-        ge=600.0,
-        le=86400.0,
-        description='the same where the depth is not to be trusted, beside the time of the way '
-        'up (s)',
-    )
-    climb_mps: float = Field(
+    climb_mps: float = number(
         0.15,
-        ge=0.01,
-        le=1.0,
-        description='surfacing for good it is up in the time that its depth takes at this rate, '
-        'and one of those two (m/s)',
+        (0.01, 1.0),
+        'surfacing for good it is up in the time that its depth takes at this rate, and one of '
+        'those two (m/s)',
     )
-    stalled_m: float = Field(
-        5.0, ge=0.5, le=100.0, description='depth that changes by less stays the same (m)'
-    )
-    stalled_s: float = Field(
-        1800.0, ge=0.0, le=1e6, description='longest time at the same depth (s); 0.0: any'
-    )
-    under_water_s: float = Field(
-        0.0, ge=0.0, le=1e8, description='longest time under water (s); 0.0: any'
-    )
-    lag_share: float = Field(
+    stalled_m: float = number(5.0, (0.5, 100.0), 'depth that changes by less stays the same (m)')
+    stalled_s: float = number(1800.0, (0.0, 1e6), 'longest time at the same depth (s); 0.0: any')
+    under_water_s: float = number(0.0, (0.0, 1e8), 'longest time under water (s); 0.0: any')
+    lag_share: float = number(
         0.5,
-        ge=0.05,
-        le=1.0,
-        description='share of the way by the measured vertical rate that the depth may lag behind '
-        '(-)',
+        (0.05, 1.0),
+        'share of the way by the measured vertical rate that the depth may lag behind (-)',
     )
-    lag_m: float = Field(10.0, ge=1.0, le=1000.0, description='the same, at least this (m)')
-    led_m: float = Field(
+    lag_m: float = number(10.0, (1.0, 1000.0), 'the same, at least this (m)')
+    led_m: float = number(
         60.0,
-        ge=5.0,
-        le=1000.0,
-        description='way that pump and pitch lead while the depth rests within a metre (m), as in '
-        'a stall that control ends',
+        (5.0, 1000.0),
+        'way that pump and pitch lead while the depth rests within a metre (m), as in a stall '
+        'that control ends',
     )
-    jump_m: float = Field(
-        5.0,
-        ge=1.0,
-        le=1000.0,
-        description='under water a depth that jumps by more, and stays there, is wrong (m)',
+    jump_m: float = number(
+        5.0, (1.0, 1000.0), 'under water a depth that jumps by more, and stays there, is wrong (m)'
     )
-    offset_max_m: float = Field(
-        20.0,
-        ge=2.0,
-        le=1000.0,
-        description='so much a depth may be off at the surface, and is corrected (m)',
+    offset_max_m: float = number(
+        20.0, (2.0, 1000.0), 'so much a depth may be off at the surface, and is corrected (m)'
     )
-    weight_share: float = Field(
+    weight_share: float = number(
         0.98,
-        ge=0.05,
-        le=10.0,
-        description='share of the range of the pump by which the vehicle may be heavier than pump '
-        'and ballast make it (-)',
+        (0.05, 10.0),
+        'share of the range of the pump by which the vehicle may be heavier than pump and ballast '
+        'make it (-)',
     )
-    weight_s: float = Field(
-        300.0, ge=10.0, le=1e5, description='time over which its weight is averaged (s)'
+    weight_s: float = number(300.0, (10.0, 1e5), 'time over which its weight is averaged (s)')
+    still_s: float = number(30.0, (1.0, 1e5), 'under water nothing measured moves for so long (s)')
+    disagree_m: float = number(20.0, (1.0, 1000.0), 'by so much odom and pressure may differ (m)')
+    disagree_s: float = number(30.0, (0.0, 3600.0), 'for no longer than this (s)')
+    vacuum_min_pa: float = number(
+        13500.0, (0.0, 101325.0), 'least vacuum in the hull (Pa); 4 inHg'
     )
-    still_s: float = Field(
-        30.0, ge=1.0, le=1e5, description='under water nothing measured moves for so long (s)'
+    vacuum_max_pa: float = number(
+        40600.0, (0.0, 101325.0), 'most vacuum in the hull (Pa); 12 inHg'
     )
-    disagree_m: float = Field(
-        20.0, ge=1.0, le=1000.0, description='by so much odom and pressure may differ (m)'
+    battery_min_v: float = number(10.0, (0.0, 1000.0), 'least voltage of the battery (V)')
+    health_s: float = number(
+        10.0, (0.0, 3600.0), 'leak, vacuum and battery are trusted after so long (s)'
     )
-    disagree_s: float = Field(30.0, ge=0.0, le=3600.0, description='for no longer than this (s)')
-    vacuum_min_pa: float = Field(
-        13500.0, ge=0.0, le=101325.0, description='least vacuum in the hull (Pa); 4 inHg'
-    )
-    vacuum_max_pa: float = Field(
-        40600.0, ge=0.0, le=101325.0, description='most vacuum in the hull (Pa); 12 inHg'
-    )
-    battery_min_v: float = Field(
-        10.0, ge=0.0, le=1000.0, description='least voltage of the battery (V)'
-    )
-    health_s: float = Field(
-        10.0,
-        ge=0.0,
-        le=3600.0,
-        description='leak, vacuum and battery are trusted after so long (s)',
-    )
-    contact_s: float = Field(
-        259200.0,
-        ge=0.0,
-        le=1e8,
-        description='longest time without the antenna out of the water (s); 0.0: any',
+    contact_s: float = number(
+        259200.0, (0.0, 1e8), 'longest time without the antenna out of the water (s); 0.0: any'
     )
 
 
@@ -183,21 +131,16 @@ class GuardSettings(GuardLimitSettings):
     vehicle: str = Field('zhang2021', description='vehicle: ranges and rates, depths, weight')
     pressure: bool = Field(False, description='there is a depth apart from that of odom')
     altitude: bool = Field(False, description='there is an altimeter')
-    imu_period_s: float = Field(
-        0.1, ge=0.1, le=30.0, description='time between two samples of the pressure (s)'
+    imu_period_s: float = number(0.1, (0.1, 30.0), 'time between two samples of the pressure (s)')
+    imu_missed_share: float = number(0.0, (0.0, 0.9), 'share of those samples that drop out (-)')
+    depth_resolution_m: float = number(
+        0.0, (0.0, 10.0), 'steps in which depth is measured (m); 0: none'
     )
-    imu_missed_share: float = Field(
-        0.0, ge=0.0, le=0.9, description='share of those samples that drop out (-)'
-    )
-    depth_resolution_m: float = Field(
-        0.0, ge=0.0, le=10.0, description='steps in which depth is measured (m); 0: none'
-    )
-    lost_after_s: float = Field(
+    lost_after_s: float = number(
         10.0,
-        ge=0.1,
-        le=3600.0,
-        description='free-running: an input that has been stale for so long is lost, and the '
-        'vehicle surfaces for good (s)',
+        (0.1, 3600.0),
+        'free-running: an input that has been stale for so long is lost, and the vehicle surfaces '
+        'for good (s)',
     )
 
     @property

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import pydantic
 from pydantic import Field
 
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number
 from glider_base.signals import TICK_S
 from glider_guidance.path.settings import PathSettings
 
@@ -18,7 +18,7 @@ ALONE, TOGETHER = ('hold', 'resume', 'abort'), ('path', 'depth_m', 'pitch_deg', 
 class Order(Settings):
     """What a vehicle is told in flight, and when."""
 
-    at_s: float = Field(ge=0.0, le=1e8, description='time from which it holds (s)')
+    at_s: float = number(..., (0.0, 1e8), 'time from which it holds (s)')
     when: Literal['once', 'surfacing'] = Field(
         'once',
         description='once: from then on; surfacing: from when the vehicle is at the surface next',
@@ -26,14 +26,12 @@ class Order(Settings):
     path: PathSettings | None = Field(
         None, description='another path: it is entered at its nearest point'
     )
-    depth_m: float | None = Field(
-        None, ge=10.0, le=12000.0, description='another depth of the lower turn, of this dive on'
+    depth_m: float | None = number(
+        None, (10.0, 12000.0), 'another depth of the lower turn, of this dive on'
     )
-    pitch_deg: float | None = Field(
-        None, ge=8.0, le=60.0, description='another pitch of the glides (deg)'
-    )
-    wait_s: float | None = Field(
-        None, ge=0.0, le=864000.0, description='another wait on the surface between dives (s)'
+    pitch_deg: float | None = number(None, (8.0, 60.0), 'another pitch of the glides (deg)')
+    wait_s: float | None = number(
+        None, (0.0, 864000.0), 'another wait on the surface between dives (s)'
     )
     hold: bool = Field(False, description='come up and wait at the surface')
     resume: bool = Field(False, description='dive on after a hold')

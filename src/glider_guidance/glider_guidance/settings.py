@@ -10,7 +10,7 @@ import pydantic
 from pydantic import Field
 
 from glider_base import plugins
-from glider_base.settings import TUNABLE, ConfigurationError, Settings
+from glider_base.settings import TUNABLE, ConfigurationError, Settings, number, positive
 from glider_guidance import methods
 from glider_guidance.current_observer import ObserverParams, ObserverState
 from glider_guidance.guidance import Commanded, Followed, GuidanceParams, GuidanceState, WaterState
@@ -72,20 +72,8 @@ class LosSettings(LosGains, _MethodChoice):
 class ObserverSettings(Settings):
     """Current observer."""
 
-    k3_per_s: float = Field(
-        0.02,
-        gt=0.0,
-        le=1.0,
-        description='K3, gain on position (1/s)',
-        json_schema_extra=TUNABLE,
-    )
-    k4_per_s2: float = Field(
-        1e-4,
-        gt=0.0,
-        le=0.1,
-        description='K4, gain on the current (1/s^2)',
-        json_schema_extra=TUNABLE,
-    )
+    k3_per_s: float = positive(0.02, 1.0, 'K3, gain on position (1/s)', tunable=True)
+    k4_per_s2: float = positive(1e-4, 0.1, 'K4, gain on the current (1/s^2)', tunable=True)
 
     @pydantic.model_validator(mode='after')
     def _is_stable(self):
@@ -100,18 +88,14 @@ class ObserverSettings(Settings):
 class CommandFilterSettings(Settings):
     """Command filters of heading and pitch."""
 
-    heading_frequency_radps: float = Field(
-        0.07, gt=0.0, le=2.0, description='natural frequency of the heading filter (rad/s)'
+    heading_frequency_radps: float = positive(
+        0.07, 2.0, 'natural frequency of the heading filter (rad/s)'
     )
-    heading_rate_radps: float = Field(
-        0.012, gt=0.0, le=1.0, description='largest rate of the desired heading (rad/s)'
+    heading_rate_radps: float = positive(0.012, 1.0, 'largest rate of the desired heading (rad/s)')
+    pitch_frequency_radps: float = positive(
+        0.12, 2.0, 'natural frequency of the pitch filter (rad/s)'
     )
-    pitch_frequency_radps: float = Field(
-        0.12, gt=0.0, le=2.0, description='natural frequency of the pitch filter (rad/s)'
-    )
-    pitch_rate_radps: float = Field(
-        0.03, gt=0.0, le=1.0, description='largest rate of the desired pitch (rad/s)'
-    )
+    pitch_rate_radps: float = positive(0.03, 1.0, 'largest rate of the desired pitch (rad/s)')
 
 
 class GuidanceLawSettings(_MethodGains):
@@ -167,14 +151,9 @@ class GuidanceSettings(GuidanceLawSettings):
         json_schema_extra=TUNABLE,
     )
     profile: ProfileSettings = Field(ProfileSettings(), description='sawtooth')
-    dives: int = Field(
-        0, ge=0, le=100000, description='dives before waiting on the surface; 0: no end'
-    )
-    duration_s: float = Field(
-        0.0,
-        ge=0.0,
-        le=1e8,
-        description='time at which the mission ends (s), no later turn is led; 0.0: never',
+    dives: int = number(0, (0, 100000), 'dives before waiting on the surface; 0: no end')
+    duration_s: float = number(
+        0.0, (0.0, 1e8), 'time at which the mission ends (s), no later turn is led; 0.0: never'
     )
     hold: bool = Field(
         False,

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pydantic
-from pydantic import Field
 
 from glider_base.kernel import kernel
+from glider_base.settings import number, positive
 from glider_base.signals import TICK_S, Vector
 from glider_model.ocean.current import (
     CurrentParams,
@@ -30,26 +30,22 @@ MOST_SHARE = 1.5
 class ForecastSettings(SumOfCurrents):
     """Current that was forecast, and how far its mean over a way may be off."""
 
-    error_std_mps: float = Field(
-        0.1,
-        gt=0.0,
-        le=1.0,
-        description='standard deviation of the forecast, of its north and of its east part (m/s)',
+    error_std_mps: float = positive(
+        0.1, 1.0, 'standard deviation of the forecast, of its north and of its east part (m/s)'
     )
-    share_std: float = Field(
+    share_std: float = number(
         0.5,
-        ge=0.0,
-        le=2.0,
-        description='how far the share of the forecast that there is in the sea may be off 1, at '
-        'first (-); 0.0: it is taken whole, whatever fixes tell',
+        (0.0, 2.0),
+        'how far the share of the forecast that there is in the sea may be off 1, at first (-); '
+        '0.0: it is taken whole, whatever fixes tell',
     )
 
     @pydantic.model_validator(mode='after')
     def _check_forecast(self):
-        for number, component in enumerate(self.components):
+        for i, component in enumerate(self.components):
             if component.kind == 'gauss_markov':
                 raise ValueError(
-                    f"components.{number}.kind = 'gauss_markov': nobody forecasts what is random"
+                    f"components.{i}.kind = 'gauss_markov': nobody forecasts what is random"
                 )
         return self
 

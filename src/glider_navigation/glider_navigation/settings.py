@@ -9,7 +9,7 @@ from pydantic import Field
 
 from glider_base import plugins
 from glider_base.frames import Origin, OriginSettings
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number
 from glider_base.signals import Joints
 from glider_base.wiring import SENSORS
 from glider_model.onboard.gate import GateSettings
@@ -98,11 +98,9 @@ class NavigationSettings(NavigationLawSettings):
     origin: OriginSettings = Field(
         OriginSettings(), description='where the origin of map lies on the Earth'
     )
-    north_m: float = Field(0.0, ge=-1e7, le=1e7, description='place of the launch, north (m)')
-    east_m: float = Field(0.0, ge=-1e7, le=1e7, description='place of the launch, east (m)')
-    imu_period_s: float = Field(
-        0.1, ge=0.1, le=30.0, description='time between two samples of attitude (s)'
-    )
+    north_m: float = number(0.0, (-1e7, 1e7), 'place of the launch, north (m)')
+    east_m: float = number(0.0, (-1e7, 1e7), 'place of the launch, east (m)')
+    imu_period_s: float = number(0.1, (0.1, 30.0), 'time between two samples of attitude (s)')
     gyro: bool = Field(True, description='angular rates are measured')
     also_fitted: list[Literal[SENSORS]] = Field(
         [], description='topics of sensors beside those that the method reads'

@@ -10,7 +10,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number
 from glider_guidance.path.curve import CUBIC, HELIX, SAMPLES_PER_PIECE, PathParams, path_point
 
 #: Paths stay this close to the origin (m, horizontally) and above this depth (m).
@@ -137,13 +137,10 @@ class StraightPath(_PathSettings):
     start: tuple[float, ...] = Field(
         default=(0.0, 0.0, 0.0), description='Start [north, east] or [north, east, depth] (m).'
     )
-    course_deg: float = Field(
-        default=0.0,
-        ge=-360.0,
-        le=360.0,
-        description='Course of the leg (deg, clockwise from north).',
+    course_deg: float = number(
+        0.0, (-360.0, 360.0), 'Course of the leg (deg, clockwise from north).'
     )
-    length_m: float = Field(ge=MIN_LEG_M, le=MAX_DISTANCE_M, description='Length of the leg (m).')
+    length_m: float = number(..., (MIN_LEG_M, MAX_DISTANCE_M), 'Length of the leg (m).')
 
     @pydantic.field_validator('start')
     @classmethod
@@ -226,28 +223,21 @@ class HelixPath(_PathSettings):
         default=(0.0, 0.0, 0.0),
         description='Axis [north, east], or [north, east, depth] with the depth of the start (m).',
     )
-    radius_m: float = Field(ge=1.0, le=10_000.0, description='Radius (m).')
-    course_deg: float = Field(
-        default=0.0,
-        ge=-360.0,
-        le=360.0,
-        description='Course at the start (deg, clockwise from north).',
+    radius_m: float = number(..., (1.0, 10_000.0), 'Radius (m).')
+    course_deg: float = number(
+        0.0, (-360.0, 360.0), 'Course at the start (deg, clockwise from north).'
     )
     direction: Literal['cw', 'ccw'] = Field(
         default='cw', description='Clockwise (to starboard) or counterclockwise, from above.'
     )
-    turns: float = Field(ge=0.01, le=1000.0, description='Number of turns (1).')
-    descent_per_turn_m: float | None = Field(
-        default=None,
-        ge=-MAX_DEPTH_M,
-        le=MAX_DEPTH_M,
-        description='Depth gained in a turn (m, + down); or give slope_deg.',
+    turns: float = number(..., (0.01, 1000.0), 'Number of turns (1).')
+    descent_per_turn_m: float | None = number(
+        None, (-MAX_DEPTH_M, MAX_DEPTH_M), 'Depth gained in a turn (m, + down); or give slope_deg.'
     )
-    slope_deg: float | None = Field(
-        default=None,
-        ge=-MAX_SLOPE_DEG,
-        le=MAX_SLOPE_DEG,
-        description='Descent angle (deg, + down); or give descent_per_turn_m.',
+    slope_deg: float | None = number(
+        None,
+        (-MAX_SLOPE_DEG, MAX_SLOPE_DEG),
+        'Descent angle (deg, + down); or give descent_per_turn_m.',
     )
 
     @pydantic.field_validator('centre')

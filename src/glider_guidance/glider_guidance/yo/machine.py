@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 from pydantic import Field
 
 from glider_base.kernel import kernel, replace
-from glider_base.settings import TUNABLE, Settings
+from glider_base.settings import Settings, number, positive
 from glider_base.signals import TICK_S
 from glider_base.wiring import NO_ECHO
 from glider_guidance.yo.end_of_path import WayLeft, lower_turn, next_dive
@@ -48,54 +48,32 @@ class ProfileSettings(Settings):
         'profile',
         description='profile: sawtooth at fixed pitch over the path; path: full 3-D line of sight',
     )
-    depth_m: float = Field(
-        1000.0,
-        ge=10.0,
-        le=12000.0,
-        description='depth of the lower turn (m)',
-        json_schema_extra=TUNABLE,
+    depth_m: float = number(1000.0, (10.0, 12000.0), 'depth of the lower turn (m)', tunable=True)
+    top_depth_m: float = number(10.0, (2.0, 1000.0), 'depth of the upper turn between dives (m)')
+    pitch_deg: float = number(
+        30.0, (8.0, 60.0), 'glide pitch, nose down diving and up climbing (deg)', tunable=True
     )
-    top_depth_m: float = Field(
-        10.0, ge=2.0, le=1000.0, description='depth of the upper turn between dives (m)'
+    net_heaviness_kg: float = positive(
+        0.4, 20.0, 'net buoyancy that sets the speed, - when climbing (kg)'
     )
-    pitch_deg: float = Field(
-        30.0,
-        ge=8.0,
-        le=60.0,
-        description='glide pitch, nose down diving and up climbing (deg)',
-        json_schema_extra=TUNABLE,
+    climb_pitch_deg: float | None = number(
+        None, (8.0, 60.0), 'glide pitch of the climb, if another one (deg)'
     )
-    net_heaviness_kg: float = Field(
-        0.4,
-        gt=0.0,
-        le=20.0,
-        description='net buoyancy that sets the speed, - when climbing (kg)',
+    climb_net_heaviness_kg: float | None = positive(
+        None, 20.0, 'magnitude for the climb, if another one (kg)'
     )
-    climb_pitch_deg: float | None = Field(
-        None, ge=8.0, le=60.0, description='glide pitch of the climb, if another one (deg)'
-    )
-    climb_net_heaviness_kg: float | None = Field(
-        None, gt=0.0, le=20.0, description='magnitude for the climb, if another one (kg)'
-    )
-    clearance_m: float = Field(
+    clearance_m: float = number(
         0.0,
-        ge=0.0,
-        le=80.0,
-        description='height over the bottom at which a dive is turned, by the altimeter that the '
-        'vehicle then has (m); 0.0: none',
+        (0.0, 80.0),
+        'height over the bottom at which a dive is turned, by the altimeter that the vehicle then '
+        'has (m); 0.0: none',
     )
-    prepare_s: float = Field(
-        60.0, ge=0.0, le=86400.0, description='surface preparation before a dive (s)'
+    prepare_s: float = number(60.0, (0.0, 86400.0), 'surface preparation before a dive (s)')
+    surface_every_dives: int = number(
+        0, (0, 100000), 'dives between waits on the surface; 0: after the last'
     )
-    surface_every_dives: int = Field(
-        0, ge=0, le=100000, description='dives between waits on the surface; 0: after the last'
-    )
-    wait_s: float = Field(
-        600.0,
-        ge=0.0,
-        le=864000.0,
-        description='waiting on the surface between dives (s)',
-        json_schema_extra=TUNABLE,
+    wait_s: float = number(
+        600.0, (0.0, 864000.0), 'waiting on the surface between dives (s)', tunable=True
     )
 
     def params(

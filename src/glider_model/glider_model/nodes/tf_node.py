@@ -20,7 +20,7 @@ from glider_base.ros.lockstep.executor import Gate, take
 from glider_base.ros.lockstep.process import run
 from glider_base.ros.parameters import declare_settings
 from glider_base.ros.wire import qos
-from glider_base.settings import ConfigurationError, Settings
+from glider_base.settings import ConfigurationError, Settings, number
 
 #: What tf2's own broadcasters offer.
 TF_QOS = QoSProfile(depth=100)
@@ -34,9 +34,7 @@ class TfSettings(Settings):
         pattern=r'^[A-Za-z0-9_/]*$',
         description='put before base_link, such as one/; the frame map is common to all vehicles',
     )
-    rate_hz: float = Field(
-        50.0, ge=0.1, le=1000.0, description='most transforms in a second of wall time (1/s)'
-    )
+    rate_hz: float = number(50.0, (0.1, 1000.0), 'most transforms in a second of wall time (1/s)')
 
 
 def transform_of(odometry: Odometry, frame_prefix: str) -> TransformStamped:

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from glider_base import plugins
 from glider_base.noise import random_stream
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number
 from glider_model.ocean import fields
 from glider_model.ocean.columns import MAX_DEPTH_M, MAX_ROWS
 from glider_model.ocean.current import (
@@ -59,28 +59,22 @@ class _Packed(NamedTuple):
 class _Flow(Settings):
     """A horizontal velocity, as a speed and the direction the water flows towards."""
 
-    speed_kn: float | None = Field(
-        default=None, ge=0.0, le=5.8, description='Speed of the water (knots); or give speed_mps.'
+    speed_kn: float | None = number(
+        None, (0.0, 5.8), 'Speed of the water (knots); or give speed_mps.'
     )
-    speed_mps: float | None = Field(
-        default=None,
-        ge=0.0,
-        le=MAX_SPEED_MPS,
-        description='Speed of the water (m/s); or give speed_kn.',
+    speed_mps: float | None = number(
+        None, (0.0, MAX_SPEED_MPS), 'Speed of the water (m/s); or give speed_kn.'
     )
-    angle_deg: float | None = Field(
-        default=None,
-        ge=-360.0,
-        le=360.0,
-        description='Direction the water flows towards, relative to the first leg of the path '
-        '(deg, + to starboard); or give direction_deg.',
+    angle_deg: float | None = number(
+        None,
+        (-360.0, 360.0),
+        'Direction the water flows towards, relative to the first leg of the path (deg, + to '
+        'starboard); or give direction_deg.',
     )
-    direction_deg: float | None = Field(
-        default=None,
-        ge=-360.0,
-        le=360.0,
-        description='Direction the water flows towards (deg, clockwise from north); '
-        'or give angle_deg.',
+    direction_deg: float | None = number(
+        None,
+        (-360.0, 360.0),
+        'Direction the water flows towards (deg, clockwise from north); or give angle_deg.',
     )
 
     def _given(self, *names: str) -> list[str]:
@@ -169,15 +163,12 @@ class ShearCurrent(_FlowComponent):
     law: Literal['power', 'exponential'] = Field(
         default='power', description='How the speed decays with depth.'
     )
-    depth_m: float = Field(
-        ge=1.0,
-        le=MAX_DEPTH_M,
-        description='Depth (m) where a power law reaches zero, or where an exponential has '
-        'fallen to 1/e.',
+    depth_m: float = number(
+        ...,
+        (1.0, MAX_DEPTH_M),
+        'Depth (m) where a power law reaches zero, or where an exponential has fallen to 1/e.',
     )
-    exponent: float = Field(
-        default=1.0, ge=0.1, le=10.0, description='Exponent n of the power law (1), 1 is linear.'
-    )
+    exponent: float = number(1.0, (0.1, 10.0), 'Exponent n of the power law (1), 1 is linear.')
 
     def _pack(self) -> _Packed:
         north, east = self._north_east()
@@ -238,20 +229,12 @@ class TidalCurrent(_FlowComponent):
     """A tidal ellipse; the speed is its amplitude and the direction its major axis."""
 
     kind: Literal['tidal']
-    ellipticity: float = Field(
-        default=0.0,
-        ge=-1.0,
-        le=1.0,
-        description='Minor over major axis (1); + turns clockwise seen from above.',
+    ellipticity: float = number(
+        0.0, (-1.0, 1.0), 'Minor over major axis (1); + turns clockwise seen from above.'
     )
-    period_s: float = Field(
-        default=M2_PERIOD_S, ge=60.0, le=4e7, description='Period (s); the default is M2.'
-    )
-    phase_deg: float = Field(
-        default=0.0,
-        ge=-360.0,
-        le=360.0,
-        description='Phase at the start (deg); 0 is full flow along the direction.',
+    period_s: float = number(M2_PERIOD_S, (60.0, 4e7), 'Period (s); the default is M2.')
+    phase_deg: float = number(
+        0.0, (-360.0, 360.0), 'Phase at the start (deg); 0 is full flow along the direction.'
     )
 
     def _pack(self) -> _Packed:
@@ -265,17 +248,14 @@ class GaussMarkovCurrent(Settings):
     """Random velocity of zero mean and exponential autocorrelation, north and east independent."""
 
     kind: Literal['gauss_markov']
-    std_mps: float = Field(
-        ge=0.0, le=1.0, description='Standard deviation of the north and of the east part (m/s).'
+    std_mps: float = number(
+        ..., (0.0, 1.0), 'Standard deviation of the north and of the east part (m/s).'
     )
-    time_constant_s: float = Field(
-        ge=1.0, le=1e7, description='Time in which the autocorrelation falls to 1/e (s).'
+    time_constant_s: float = number(
+        ..., (1.0, 1e7), 'Time in which the autocorrelation falls to 1/e (s).'
     )
-    seed_offset: int = Field(
-        default=0,
-        ge=0,
-        le=2**31 - 1,
-        description='Chooses another random history under the same seed (1).',
+    seed_offset: int = number(
+        0, (0, 2**31 - 1), 'Chooses another random history under the same seed (1).'
     )
 
     def resolved(self, course_rad: float):
@@ -290,18 +270,14 @@ class GaussMarkovCurrent(Settings):
 class CurrentStep(_Flow):
     """From ``at_s`` on the water has this velocity."""
 
-    at_s: float = Field(ge=0.0, le=1e8, description='Time since the start (s).')
-    north_mps: float | None = Field(
-        default=None,
-        ge=-MAX_SPEED_MPS,
-        le=MAX_SPEED_MPS,
-        description='Velocity to the north (m/s), with east_mps; or give a speed and a direction.',
+    at_s: float = number(..., (0.0, 1e8), 'Time since the start (s).')
+    north_mps: float | None = number(
+        None,
+        (-MAX_SPEED_MPS, MAX_SPEED_MPS),
+        'Velocity to the north (m/s), with east_mps; or give a speed and a direction.',
     )
-    east_mps: float | None = Field(
-        default=None,
-        ge=-MAX_SPEED_MPS,
-        le=MAX_SPEED_MPS,
-        description='Velocity to the east (m/s), with north_mps.',
+    east_mps: float | None = number(
+        None, (-MAX_SPEED_MPS, MAX_SPEED_MPS), 'Velocity to the east (m/s), with north_mps.'
     )
 
     @pydantic.model_validator(mode='after')
@@ -340,10 +316,10 @@ class StepsCurrent(Settings):
 
     @pydantic.model_validator(mode='after')
     def _check_times(self):
-        for number, (one, after) in enumerate(pairwise(self.steps)):
+        for i, (one, after) in enumerate(pairwise(self.steps)):
             if after.at_s <= one.at_s:
                 raise ValueError(
-                    f'steps.{number + 1}.at_s = {after.at_s!r}: times must increase '
+                    f'steps.{i + 1}.at_s = {after.at_s!r}: times must increase '
                     f'(allowed: > {one.at_s!r})'
                 )
         return self
@@ -469,9 +445,7 @@ class SumOfCurrents(_Flow):
 class CurrentSettings(SumOfCurrents):
     """The water of a mission."""
 
-    seed: int = Field(
-        default=0, ge=0, le=2**63 - 1, description='Seed of the random components (1).'
-    )
+    seed: int = number(0, (0, 2**63 - 1), 'Seed of the random components (1).')
 
     def params(self, seed: int | None = None) -> CurrentParams:
         """Arrays that `current_step` reads; ``seed`` instead of that of the settings."""

@@ -9,10 +9,8 @@ by three numbers, in `glider_model.ocean.cast` a measured one.
 import math
 from typing import NamedTuple
 
-from pydantic import Field
-
 from glider_base.kernel import kernel
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number
 from glider_base.signals import SEA_WATER_DENSITY
 from glider_base.slot import slot
 
@@ -23,27 +21,20 @@ SURFACE_PRESSURE, SPECIFIC_WEIGHT = 101325.0, SEA_WATER_DENSITY * 9.81
 class DensitySettings(Settings):
     """Density of the water relative to the depth at which the vehicle was ballasted (surface)."""
 
-    pycnocline_rise: float = Field(
-        0.0,
-        ge=0.0,
-        le=0.05,
-        description='relative density rise across the pycnocline (-); 0.004 is 4 kg/m^3',
+    pycnocline_rise: float = number(
+        0.0, (0.0, 0.05), 'relative density rise across the pycnocline (-); 0.004 is 4 kg/m^3'
     )
-    pycnocline_depth_m: float = Field(
-        100.0, ge=1.0, le=5000.0, description='e-folding depth of the pycnocline (m)'
+    pycnocline_depth_m: float = number(
+        100.0, (1.0, 5000.0), 'e-folding depth of the pycnocline (m)'
     )
-    compression_per_m: float = Field(
-        0.0,
-        ge=0.0,
-        le=1e-4,
-        description='relative density rise by pressure (1/m); sea water 4.5e-6',
+    compression_per_m: float = number(
+        0.0, (0.0, 1e-4), 'relative density rise by pressure (1/m); sea water 4.5e-6'
     )
-    hull_compression_per_m: float = Field(
+    hull_compression_per_m: float = number(
         0.0,
-        ge=0.0,
-        le=1e-4,
-        description='relative loss of hull volume with depth (1/m); aluminium 3e-6 to 5e-6. Of no '
-        'account for a vehicle whose file has a volume',
+        (0.0, 1e-4),
+        'relative loss of hull volume with depth (1/m); aluminium 3e-6 to 5e-6. Of no account for '
+        'a vehicle whose file has a volume',
     )
 
     def params(self) -> 'DensityParams':

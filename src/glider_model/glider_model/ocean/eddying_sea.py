@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import Field
 
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number
 
 #: Levels (m), steps of grid (deg) and time (s), and what an integer of the file stands for (m/s).
 _DEPTHS = (0.5, 10.0, 30.0, 75.0, 150.0, 300.0, 500.0, 750.0, 1050.0)
@@ -28,23 +28,22 @@ _ERROR_SEED = 2**32
 class EddyingSea(Settings):
     """What a made-up sea is like."""
 
-    seed: int = Field(0, ge=0, le=2**31 - 1, description='seed of its eddies (1)')
-    rms_mps: float = Field(0.18, ge=0.0, le=1.0, description='rms of each part at the top (m/s)')
-    error_mps: float = Field(
+    seed: int = number(0, (0, 2**31 - 1), 'seed of its eddies (1)')
+    rms_mps: float = number(0.18, (0.0, 1.0), 'rms of each part at the top (m/s)')
+    error_mps: float = number(
         0.0,
-        ge=0.0,
-        le=1.0,
-        description='rms of each part of the depth mean of more eddies, which are not in the sea '
-        'of the same seed: a forecast of it (m/s)',
+        (0.0, 1.0),
+        'rms of each part of the depth mean of more eddies, which are not in the sea of the same '
+        'seed: a forecast of it (m/s)',
     )
-    radius_km: float = Field(35.0, ge=10.0, le=200.0, description='R of its eddies, about (km)')
-    decay_m: float = Field(600.0, ge=50.0, le=5000.0, description='depth of 1/e (m)')
-    days: int = Field(16, ge=1, le=400, description='days from its first time to its last (1)')
+    radius_km: float = number(35.0, (10.0, 200.0), 'R of its eddies, about (km)')
+    decay_m: float = number(600.0, (50.0, 5000.0), 'depth of 1/e (m)')
+    days: int = number(16, (1, 400), 'days from its first time to its last (1)')
     start: str = Field('2026-03-01', pattern=r'^\d{4}-\d\d-\d\d$', description='its first time')
-    south_deg: float = Field(34.9, ge=-80.0, le=80.0, description='its edges (deg)')
-    north_deg: float = Field(37.7, ge=-80.0, le=80.0, description='its edges (deg)')
-    west_deg: float = Field(120.3, ge=-180.0, le=360.0, description='its edges (deg)')
-    east_deg: float = Field(123.5, ge=-180.0, le=360.0, description='its edges (deg)')
+    south_deg: float = number(34.9, (-80.0, 80.0), 'its edges (deg)')
+    north_deg: float = number(37.7, (-80.0, 80.0), 'its edges (deg)')
+    west_deg: float = number(120.3, (-180.0, 360.0), 'its edges (deg)')
+    east_deg: float = number(123.5, (-180.0, 360.0), 'its edges (deg)')
 
 
 def currents(sea: EddyingSea) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:

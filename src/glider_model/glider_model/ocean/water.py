@@ -15,6 +15,7 @@ from pydantic import Field
 
 from glider_base.errors import ConfigurationError
 from glider_base.kernel import kernel
+from glider_base.settings import number
 from glider_base.signals import Vector, Water
 from glider_model.ocean.bottom import NO_BOTTOM, FlatBottom
 from glider_model.ocean.cast import CastParams, cast_params, check_cast, read_cast
@@ -45,24 +46,13 @@ class WaterSettings(DensitySettings):
         'NetCDF cast (.nc); or rows of [depth (m), density (kg/m^3)] and optionally temperature '
         '(degC), by increasing depth',
     )
-    bottom_m: float = Field(
-        0.0,
-        ge=0.0,
-        le=12000.0,
-        description='depth of a flat bottom (m); 0: none',
+    bottom_m: float = number(0.0, (0.0, 12000.0), 'depth of a flat bottom (m); 0: none')
+    wind_mps: float = number(0.0, (0.0, 40.0), 'speed of the wind (m/s)')
+    wind_from_deg: float = number(
+        0.0, (-360.0, 360.0), 'where the wind comes from (deg, clockwise from north)'
     )
-    wind_mps: float = Field(0.0, ge=0.0, le=40.0, description='speed of the wind (m/s)')
-    wind_from_deg: float = Field(
-        0.0,
-        ge=-360.0,
-        le=360.0,
-        description='where the wind comes from (deg, clockwise from north)',
-    )
-    leeway_share: float = Field(
-        0.02,
-        ge=0.0,
-        le=0.05,
-        description='drift by wind and waves of a vehicle at the surface, over the wind (-)',
+    leeway_share: float = number(
+        0.02, (0.0, 0.05), 'drift by wind and waves of a vehicle at the surface, over the wind (-)'
     )
 
     @pydantic.field_validator('profile', mode='before')

@@ -11,11 +11,9 @@ world has jumped (a fix, a new source); without one the measurement is lost.
 import math
 from typing import NamedTuple
 
-from pydantic import Field
-
 from glider_base.frames import rotate_to_ned
 from glider_base.kernel import kernel, replace
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number, positive
 from glider_base.signals import Odometry
 
 #: Actuators that say they are farther out than this many ranges are not believed (-).
@@ -27,31 +25,20 @@ NORM_SCALED, NORM_REFUSED = 1e-9, 0.02
 class GateSettings(Settings):
     """Which samples of odometry are refused, and for how long the last good one serves."""
 
-    rate_max_radps: float = Field(
-        6.0, gt=0.0, le=100.0, description='largest angular rate about any axis (rad/s)'
+    rate_max_radps: float = positive(6.0, 100.0, 'largest angular rate about any axis (rad/s)')
+    speed_max_mps: float = positive(10.0, 1000.0, 'largest speed over ground (m/s)')
+    rate_jump_radps: float = positive(
+        1.0, 200.0, 'largest change of a rate between samples (rad/s)'
     )
-    speed_max_mps: float = Field(
-        10.0, gt=0.0, le=1000.0, description='largest speed over ground (m/s)'
+    speed_jump_mps: float = positive(
+        1.0, 2000.0, 'largest change of velocity between samples (m/s)'
     )
-    rate_jump_radps: float = Field(
-        1.0, gt=0.0, le=200.0, description='largest change of a rate between samples (rad/s)'
+    attitude_jump_deg: float = positive(60.0, 360.0, 'largest turn between samples (deg)')
+    position_jump_m: float = positive(
+        100.0, 1e8, 'farthest from where the last sample leads, horizontally (m)'
     )
-    speed_jump_mps: float = Field(
-        1.0, gt=0.0, le=2000.0, description='largest change of velocity between samples (m/s)'
-    )
-    attitude_jump_deg: float = Field(
-        60.0, gt=0.0, le=360.0, description='largest turn between samples (deg)'
-    )
-    position_jump_m: float = Field(
-        100.0,
-        gt=0.0,
-        le=1e8,
-        description='farthest from where the last sample leads, horizontally (m)',
-    )
-    depth_jump_m: float = Field(20.0, gt=0.0, le=1e5, description='the same for the depth (m)')
-    hold_s: float = Field(
-        1.0, ge=0.0, le=60.0, description='time for which the last good sample serves (s)'
-    )
+    depth_jump_m: float = positive(20.0, 1e5, 'the same for the depth (m)')
+    hold_s: float = number(1.0, (0.0, 60.0), 'time for which the last good sample serves (s)')
 
     def params(self) -> 'GateParams':
         """Kernel parameters."""

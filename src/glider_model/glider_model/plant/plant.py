@@ -9,7 +9,7 @@ from pydantic import Field
 
 from glider_base.frames import OriginSettings, quaternion_from_euler, rotate_to_body
 from glider_base.kernel import kernel
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number
 from glider_base.signals import TICK_S, Joints, Odometry, Vector, Water, not_finite
 from glider_base.slot import default, slot
 from glider_base.wiring import SENSORS
@@ -116,15 +116,13 @@ def dive_depths(depth_m: float) -> tuple[float, float]:
 class InitialSettings(Settings):
     """State at the start of a run."""
 
-    north_m: float = Field(0.0, ge=-1e7, le=1e7, description='start position, north (m)')
-    east_m: float = Field(0.0, ge=-1e7, le=1e7, description='start position, east (m)')
-    depth_m: float = Field(0.0, ge=0.0, le=12000.0, description='start depth (m)')
-    heading_deg: float = Field(0.0, ge=-360.0, le=360.0, description='start heading (deg)')
-    pitch_deg: float = Field(0.0, ge=-80.0, le=80.0, description='start pitch (deg, + nose up)')
-    speed_mps: float = Field(0.0, ge=0.0, le=3.0, description='start speed through water (m/s)')
-    net_heaviness_kg: float = Field(
-        0.0, ge=-50.0, le=50.0, description='start net buoyancy (kg, + sinks)'
-    )
+    north_m: float = number(0.0, (-1e7, 1e7), 'start position, north (m)')
+    east_m: float = number(0.0, (-1e7, 1e7), 'start position, east (m)')
+    depth_m: float = number(0.0, (0.0, 12000.0), 'start depth (m)')
+    heading_deg: float = number(0.0, (-360.0, 360.0), 'start heading (deg)')
+    pitch_deg: float = number(0.0, (-80.0, 80.0), 'start pitch (deg, + nose up)')
+    speed_mps: float = number(0.0, (0.0, 3.0), 'start speed through water (m/s)')
+    net_heaviness_kg: float = number(0.0, (-50.0, 50.0), 'start net buoyancy (kg, + sinks)')
 
 
 class PlantSettings(Settings):
@@ -138,26 +136,21 @@ class PlantSettings(Settings):
         BathymetrySettings(), description='chart of the bottom, instead of a flat one'
     )
     initial: InitialSettings = Field(InitialSettings(), description='state at the start')
-    duration_s: float = Field(
-        108000.0, ge=0.1, le=1e8, description='the run ends after this simulated time (s)'
+    duration_s: float = number(108000.0, (0.1, 1e8), 'the run ends after this simulated time (s)')
+    dives: int = number(0, (0, 100000), 'the run ends at the surface after this many; 0: never')
+    surface_s: float = number(
+        SURFACE_S, (0.0, 86400.0), 'time at the surface after the last dive (s)'
     )
-    dives: int = Field(
-        0, ge=0, le=100000, description='the run ends at the surface after this many; 0: never'
+    dive_depth_m: float = number(
+        1000.0, (1.0, 12000.0), 'depth of the dives, by which they are counted (m)'
     )
-    surface_s: float = Field(
-        SURFACE_S, ge=0.0, le=86400.0, description='time at the surface after the last dive (s)'
-    )
-    dive_depth_m: float = Field(
-        1000.0, ge=1.0, le=12000.0, description='depth of the dives, by which they are counted (m)'
-    )
-    afloat_s: float = Field(
+    afloat_s: float = number(
         0.0,
-        ge=0.0,
-        le=1e6,
-        description='the run ends once the vehicle, having dived, has been at the surface so long '
-        'without filling its pump (s); 0.0: never',
+        (0.0, 1e6),
+        'the run ends once the vehicle, having dived, has been at the surface so long without '
+        'filling its pump (s); 0.0: never',
     )
-    seed: int = Field(0, ge=0, le=2**63 - 1, description='seed of the noise')
+    seed: int = number(0, (0, 2**63 - 1), 'seed of the noise')
     sensors: SensorSettings = Field(SensorSettings(), description='errors of the sensors')
     fitted: list[Literal[SENSORS]] = Field(
         ['measured_odom'], description='topics of the sensors that the vehicle has'

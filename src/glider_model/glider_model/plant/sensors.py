@@ -38,7 +38,7 @@ from glider_base.frames import (
 )
 from glider_base.kernel import kernel, replace
 from glider_base.noise import normal_pair, random_stream, uniform
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number
 from glider_base.signals import TICK_S, Imu
 from glider_base.wiring import NO_ECHO, SENSORS
 from glider_model.ocean.density import pressure_at
@@ -59,86 +59,57 @@ NO_FIX, HAS_FIX = -1.0, 0.0
 class SensorSettings(Settings):
     """Errors of the sensors. Standard deviations are those of white noise."""
 
-    attitude_std_deg: float = Field(
-        0.0, ge=0.0, le=10.0, description='noise of roll and of pitch (deg)'
+    attitude_std_deg: float = number(0.0, (0.0, 10.0), 'noise of roll and of pitch (deg)')
+    heading_std_deg: float = number(0.0, (0.0, 45.0), 'noise of the heading (deg)')
+    rate_std_dps: float = number(0.0, (0.0, 10.0), 'noise of each angular rate (deg/s)')
+    position_std_m: float = number(
+        0.0, (0.0, 1000.0), 'noise of depth and, where they are measured, of north and of east (m)'
     )
-    heading_std_deg: float = Field(0.0, ge=0.0, le=45.0, description='noise of the heading (deg)')
-    rate_std_dps: float = Field(
-        0.0, ge=0.0, le=10.0, description='noise of each angular rate (deg/s)'
+    compass_bias_deg: float = number(0.0, (-180.0, 180.0), 'error of the heading that stays (deg)')
+    compass_deviation_deg: float = number(
+        0.0, (-45.0, 45.0), 'error that goes as the sine of the magnetic heading (deg)'
     )
-    position_std_m: float = Field(
+    compass_deviation_phase_deg: float = number(0.0, (-180.0, 180.0), 'phase of that sine (deg)')
+    declination_deg: float = number(
         0.0,
-        ge=0.0,
-        le=1000.0,
-        description='noise of depth and, where they are measured, of north and of east (m)',
+        (-180.0, 180.0),
+        'declination where it flies: magnetic north lies so far east of north (deg)',
     )
-    compass_bias_deg: float = Field(
-        0.0,
-        ge=-180.0,
-        le=180.0,
-        description='error of the heading that stays (deg)',
-    )
-    compass_deviation_deg: float = Field(
-        0.0,
-        ge=-45.0,
-        le=45.0,
-        description='error that goes as the sine of the magnetic heading (deg)',
-    )
-    compass_deviation_phase_deg: float = Field(
-        0.0, ge=-180.0, le=180.0, description='phase of that sine (deg)'
-    )
-    declination_deg: float = Field(
-        0.0,
-        ge=-180.0,
-        le=180.0,
-        description='declination where it flies: magnetic north lies so far east of north (deg)',
-    )
-    chart_declination_deg: float | None = Field(
+    chart_declination_deg: float | None = number(
         None,
-        ge=-180.0,
-        le=180.0,
-        description='declination that the vehicle goes by (deg); by default the true one',
+        (-180.0, 180.0),
+        'declination that the vehicle goes by (deg); by default the true one',
     )
-    pitch_scale: float = Field(1.0, ge=0.5, le=1.5, description='measured pitch over true (-)')
-    pitch_offset_deg: float = Field(
-        0.0, ge=-10.0, le=10.0, description='error of pitch that stays (deg, + nose up)'
+    pitch_scale: float = number(1.0, (0.5, 1.5), 'measured pitch over true (-)')
+    pitch_offset_deg: float = number(
+        0.0, (-10.0, 10.0), 'error of pitch that stays (deg, + nose up)'
     )
-    roll_bias_deg: float = Field(
-        0.0, ge=-10.0, le=10.0, description='error of roll that stays (deg)'
+    roll_bias_deg: float = number(0.0, (-10.0, 10.0), 'error of roll that stays (deg)')
+    imu_period_s: float = number(
+        0.1, (0.1, 30.0), 'time between two samples of attitude and pressure (s)'
     )
-    imu_period_s: float = Field(
-        0.1, ge=0.1, le=30.0, description='time between two samples of attitude and pressure (s)'
-    )
-    imu_missed_share: float = Field(
-        0.0, ge=0.0, le=0.9, description='share of those samples that drop out (-)'
-    )
+    imu_missed_share: float = number(0.0, (0.0, 0.9), 'share of those samples that drop out (-)')
     gyro: bool = Field(True, description='angular rates are measured')
-    depth_offset_m: float = Field(
-        0.0, ge=-50.0, le=50.0, description='error of depth that stays (m)'
+    depth_offset_m: float = number(0.0, (-50.0, 50.0), 'error of depth that stays (m)')
+    depth_resolution_m: float = number(
+        0.0, (0.0, 10.0), 'steps in which depth is measured (m); 0: none'
     )
-    depth_resolution_m: float = Field(
-        0.0, ge=0.0, le=10.0, description='steps in which depth is measured (m); 0: none'
+    gps_std_m: float = number(4.0, (0.0, 1000.0), 'error of a fix, north and east each (m)')
+    gps_first_fix_s: float = number(
+        60.0, (0.0, 3600.0), 'time with the antenna out until the first fix (s)'
     )
-    gps_std_m: float = Field(
-        4.0, ge=0.0, le=1000.0, description='error of a fix, north and east each (m)'
-    )
-    gps_first_fix_s: float = Field(
-        60.0, ge=0.0, le=3600.0, description='time with the antenna out until the first fix (s)'
-    )
-    fix_missed_share: float = Field(
-        0.0, ge=0.0, le=1.0, description='share of surfacings without a fix, at random (-)'
+    fix_missed_share: float = number(
+        0.0, (0.0, 1.0), 'share of surfacings without a fix, at random (-)'
     )
     fix_missed_pattern: str = Field(
         '0',
         pattern='^[01]{1,60}$',
         description='which surfacings have no fix, over and over from the launch on: 1 has none',
     )
-    altimeter_period_s: float = Field(
-        1.0, ge=0.1, le=600.0, description='time from one echo of the altimeter to the next (s)'
+    altimeter_period_s: float = number(
+        1.0, (0.1, 600.0), 'time from one echo of the altimeter to the next (s)'
     )
-    altimeter_std_m: float = Field(
-        0.0, ge=0.0, le=10.0, description='noise of the height over the bottom (m)'
-    )
+    altimeter_std_m: float = number(0.0, (0.0, 10.0), 'noise of the height over the bottom (m)')
     also_fitted: list[Literal[SENSORS]] = Field(
         [], description='topics of sensors beside those that navigation reads'
     )

@@ -11,7 +11,7 @@ import math
 import pydantic
 from pydantic import Field
 
-from glider_base.settings import ConfigurationError, Settings
+from glider_base.settings import ConfigurationError, Settings, number, positive
 from glider_model.vehicle.file import VehicleParams, mass_fault
 
 #: What may be scaled, by the names of `VehicleParams`. A static moment may change its sign; drag,
@@ -37,28 +37,18 @@ _Factors = pydantic.create_model(
 class PerturbSettings(_Factors):
     """What a plant differs in from its vehicle file; by default in nothing."""
 
-    pump_rate: float = Field(
-        1.0, gt=0.0, le=10.0, description='factor on the rate of the buoyancy engine (-)'
+    pump_rate: float = positive(1.0, 10.0, 'factor on the rate of the buoyancy engine (-)')
+    roll_range: float = number(1.0, (0.0, 2.0), 'factor on the range of the roll mass (-)')
+    pitch_trim_m: float = number(
+        0.0, (-0.1, 0.1), 'how far forward of neutral the pitch mass really is (m, + nose down)'
     )
-    roll_range: float = Field(
-        1.0, ge=0.0, le=2.0, description='factor on the range of the roll mass (-)'
-    )
-    pitch_trim_m: float = Field(
+    roll_bias_deg: float = number(
         0.0,
-        ge=-0.1,
-        le=0.1,
-        description='how far forward of neutral the pitch mass really is (m, + nose down)',
+        (-45.0, 45.0),
+        'roll at rest with the roll mass at 0, by a hull that is heavier on one side (deg, + '
+        'starboard side down)',
     )
-    roll_bias_deg: float = Field(
-        0.0,
-        ge=-45.0,
-        le=45.0,
-        description='roll at rest with the roll mass at 0, by a hull that is heavier on one side '
-        '(deg, + starboard side down)',
-    )
-    net_heaviness_kg: float = Field(
-        0.0, ge=-5.0, le=5.0, description='error of the ballast (kg, + sinks)'
-    )
+    net_heaviness_kg: float = number(0.0, (-5.0, 5.0), 'error of the ballast (kg, + sinks)')
 
 
 def perturbed(vehicle: VehicleParams, settings: PerturbSettings) -> VehicleParams:

@@ -15,6 +15,7 @@ from pydantic import Field
 
 from glider_base.frames import odometry_to_wire, quaternion_from_euler, rotate_to_body
 from glider_base.kernel import kernel, replace
+from glider_base.settings import number
 from glider_base.signals import Covariance, Odometry, Vector
 from glider_model.onboard.glide_polar import Polar, make_polar
 from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
@@ -78,15 +79,11 @@ class DeadReckonedSettings(NavigationMethodSettings):
     reads: ClassVar[tuple[str, ...]] = ('imu', 'pressure', 'fix')
     tells: ClassVar[tuple[str, ...]] = ('believed_current', 'believed_surface_current')
 
-    start_std_m: float = Field(
-        5.0, ge=0.1, le=1e5, description='error of the place where the vehicle is launched (m)'
+    start_std_m: float = number(
+        5.0, (0.1, 1e5), 'error of the place where the vehicle is launched (m)'
     )
-    speed_error_share: float = Field(
-        0.05, ge=0.0, le=1.0, description='error of the speed through the water (-)'
-    )
-    heading_error_deg: float = Field(
-        2.0, ge=0.0, le=90.0, description='error of the compass (deg)'
-    )
+    speed_error_share: float = number(0.05, (0.0, 1.0), 'error of the speed through the water (-)')
+    heading_error_deg: float = number(2.0, (0.0, 90.0), 'error of the compass (deg)')
     speed_by: Literal['rate', 'buoyancy'] = Field(
         'rate',
         description='what tells the speed with the pitch. rate: the vertical rate; buoyancy: that '

@@ -10,9 +10,8 @@ flow goes round in circles, so that no water is made or lost at any depth.
 import math
 from typing import Literal, NamedTuple
 
-from pydantic import Field
-
 from glider_base.kernel import kernel
+from glider_base.settings import number
 from glider_model.ocean.field import FieldSettings, field_velocity
 
 #: a, for which the largest speed is at the radius: exp(a) = 1 + 2 a.
@@ -23,30 +22,17 @@ class EddySettings(FieldSettings):
     """An eddy: water that turns round a centre, weaker with depth."""
 
     kind: Literal['eddy'] = 'eddy'
-    north_m: float = Field(
-        0.0, ge=-1e6, le=1e6, description='Centre at the start, north of the origin (m).'
+    north_m: float = number(0.0, (-1e6, 1e6), 'Centre at the start, north of the origin (m).')
+    east_m: float = number(0.0, (-1e6, 1e6), 'Centre at the start, east of the origin (m).')
+    radius_m: float = number(
+        10000.0, (100.0, 1e6), 'Distance of the largest speed from the centre (m).'
     )
-    east_m: float = Field(
-        0.0, ge=-1e6, le=1e6, description='Centre at the start, east of the origin (m).'
+    peak_mps: float = number(
+        0.3, (-3.0, 3.0), 'Largest speed at the surface, + clockwise seen from above (m/s).'
     )
-    radius_m: float = Field(
-        10000.0, ge=100.0, le=1e6, description='Distance of the largest speed from the centre (m).'
-    )
-    peak_mps: float = Field(
-        0.3,
-        ge=-3.0,
-        le=3.0,
-        description='Largest speed at the surface, + clockwise seen from above (m/s).',
-    )
-    depth_m: float = Field(
-        500.0, ge=1.0, le=12000.0, description='Depth where the speed has fallen to 1/e (m).'
-    )
-    drift_north_mps: float = Field(
-        0.0, ge=-1.0, le=1.0, description='Velocity of the centre to the north (m/s).'
-    )
-    drift_east_mps: float = Field(
-        0.0, ge=-1.0, le=1.0, description='Velocity of the centre to the east (m/s).'
-    )
+    depth_m: float = number(500.0, (1.0, 12000.0), 'Depth where the speed has fallen to 1/e (m).')
+    drift_north_mps: float = number(0.0, (-1.0, 1.0), 'Velocity of the centre to the north (m/s).')
+    drift_east_mps: float = number(0.0, (-1.0, 1.0), 'Velocity of the centre to the east (m/s).')
 
     def params(self) -> 'EddyParams':
         """Kernel parameters."""

@@ -8,9 +8,8 @@ v(y) = V sech^2(y / L) at a distance y from the middle of the band (Bickley, Phi
 import math
 from typing import Literal, NamedTuple
 
-from pydantic import Field
-
 from glider_base.kernel import kernel
+from glider_base.settings import number
 from glider_model.ocean.field import FieldSettings, field_velocity
 
 
@@ -18,24 +17,16 @@ class JetSettings(FieldSettings):
     """A jet: a straight band of fast water, weaker with depth."""
 
     kind: Literal['jet'] = 'jet'
-    north_m: float = Field(
-        0.0, ge=-1e6, le=1e6, description='A place in its middle, north of the origin (m).'
+    north_m: float = number(0.0, (-1e6, 1e6), 'A place in its middle, north of the origin (m).')
+    east_m: float = number(0.0, (-1e6, 1e6), 'A place in its middle, east of the origin (m).')
+    direction_deg: float = number(
+        0.0, (-360.0, 360.0), 'Where it flows to (deg, clockwise from north).'
     )
-    east_m: float = Field(
-        0.0, ge=-1e6, le=1e6, description='A place in its middle, east of the origin (m).'
+    width_m: float = number(
+        5000.0, (10.0, 1e6), 'Distance where the speed has fallen to 0.42 (m).'
     )
-    direction_deg: float = Field(
-        0.0, ge=-360.0, le=360.0, description='Where it flows to (deg, clockwise from north).'
-    )
-    width_m: float = Field(
-        5000.0, ge=10.0, le=1e6, description='Distance where the speed has fallen to 0.42 (m).'
-    )
-    peak_mps: float = Field(
-        0.3, ge=0.0, le=3.0, description='Speed in its middle at the surface (m/s).'
-    )
-    depth_m: float = Field(
-        500.0, ge=1.0, le=12000.0, description='Depth where the speed has fallen to 1/e (m).'
-    )
+    peak_mps: float = number(0.3, (0.0, 3.0), 'Speed in its middle at the surface (m/s).')
+    depth_m: float = number(500.0, (1.0, 12000.0), 'Depth where the speed has fallen to 1/e (m).')
 
     def params(self) -> 'JetParams':
         """Kernel parameters."""

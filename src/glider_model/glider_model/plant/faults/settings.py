@@ -12,7 +12,7 @@ from pydantic import Field
 
 from glider_base.noise import random_stream
 from glider_base.ros.message_fault import MessageFault
-from glider_base.settings import ConfigurationError, Settings
+from glider_base.settings import ConfigurationError, Settings, number, positive
 from glider_base.signals import TICK_S
 from glider_model.plant.faults import kinds
 from glider_model.plant.faults.kinds import FaultParams, FaultState, NoFaults, NoFaultState
@@ -60,19 +60,16 @@ class Packed(NamedTuple):
 class FaultSettings(Settings):
     """When a fault begins: at the first tick at which all of its conditions hold."""
 
-    at_s: float = Field(0.0, ge=0.0, le=1e8, description='not before this time (s)')
-    at_depth_m: float | None = Field(
-        None,
-        ge=0.0,
-        le=12000.0,
-        description='not before it is as deep as this, or in a climb as shallow (m)',
+    at_s: float = number(0.0, (0.0, 1e8), 'not before this time (s)')
+    at_depth_m: float | None = number(
+        None, (0.0, 12000.0), 'not before it is as deep as this, or in a climb as shallow (m)'
     )
     phase: Literal[PHASES] = Field(
         'any',
         description='only while it sinks (dive), rises (climb), does neither at depth (turn), or '
         'is at the surface after a dive',
     )
-    for_s: float = Field(0.0, ge=0.0, le=1e8, description='how long it lasts (s); 0: to the end')
+    for_s: float = number(0.0, (0.0, 1e8), 'how long it lasts (s); 0: to the end')
 
     def _pack(self) -> Packed:
         """The fault in numbers."""
@@ -111,8 +108,8 @@ class Leak(FaultSettings):
     """Water runs into the hull and makes the vehicle heavier; what is in it stays."""
 
     kind: Literal['leak']
-    rate_kgps: float = Field(gt=0.0, le=10.0, description='water taken in (kg/s)')
-    limit_kg: float = Field(100.0, gt=0.0, le=100.0, description='and no more than this (kg)')
+    rate_kgps: float = positive(..., 10.0, 'water taken in (kg/s)')
+    limit_kg: float = positive(100.0, 100.0, 'and no more than this (kg)')
     detected: bool = Field(True, description='the leak detector tells it, from 0.01 kg on')
 
     def _pack(self) -> Packed:
@@ -123,7 +120,7 @@ class Mass(FaultSettings):
     """The vehicle is heavier, or lighter: something was picked up, or lost."""
 
     kind: Literal['mass']
-    mass_kg: float = Field(ge=-50.0, le=50.0, description='added net buoyancy (kg, + sinks)')
+    mass_kg: float = number(..., (-50.0, 50.0), 'added net buoyancy (kg, + sinks)')
 
     def _pack(self) -> Packed:
         return Packed(kinds.MASS, 0, 1, (self.mass_kg,))
@@ -133,9 +130,9 @@ class Fouling(FaultSettings):
     """Growth on hull and wings, or a lost wing: drag and lift change."""
 
     kind: Literal['fouling']
-    drag: float = Field(1.5, ge=0.1, le=20.0, description='factor on the drag (-)')
-    lift: float = Field(1.0, ge=0.0, le=5.0, description='factor on the lift that turns (-)')
-    over_s: float = Field(0.0, ge=0.0, le=1e8, description='time in which that comes about (s)')
+    drag: float = number(1.5, (0.1, 20.0), 'factor on the drag (-)')
+    lift: float = number(1.0, (0.0, 5.0), 'factor on the lift that turns (-)')
+    over_s: float = number(0.0, (0.0, 1e8), 'time in which that comes about (s)')
 
     def _pack(self) -> Packed:
         return Packed(kinds.FOULING, 0, 1, (self.drag, self.lift, self.over_s))
@@ -154,12 +151,10 @@ class Gust(FaultSettings):
     """Water that moves beside the current of the scenario, where the vehicle is."""
 
     kind: Literal['gust']
-    north_mps: float = Field(0.0, ge=-3.0, le=3.0, description='velocity to the north (m/s)')
-    east_mps: float = Field(0.0, ge=-3.0, le=3.0, description='velocity to the east (m/s)')
-    down_mps: float = Field(0.0, ge=-1.0, le=1.0, description='velocity downward (m/s)')
-    over_s: float = Field(
-        60.0, ge=1.0, le=1e6, description='time in which it rises, and falls (s)'
-    )
+    north_mps: float = number(0.0, (-3.0, 3.0), 'velocity to the north (m/s)')
+    east_mps: float = number(0.0, (-3.0, 3.0), 'velocity to the east (m/s)')
+    down_mps: float = number(0.0, (-1.0, 1.0), 'velocity downward (m/s)')
+    over_s: float = number(60.0, (1.0, 1e6), 'time in which it rises, and falls (s)')
 
     def _pack(self) -> Packed:
         return Packed(
@@ -189,7 +184,7 @@ class Slow(_ActuatorFault):
     """The actuator moves slower than it should."""
 
     kind: Literal['slow']
-    rate: float = Field(0.2, ge=0.001, le=1.0, description='factor on its rate (-)')
+    rate: float = number(0.2, (0.001, 1.0), 'factor on its rate (-)')
 
     def _pack(self) -> Packed:
         return self._packed(kinds.SLOW, self.rate)
@@ -199,7 +194,7 @@ class Offset(_ActuatorFault):
     """The actuator is somewhere else than where it says."""
 
     kind: Literal['offset']
-    offset: float = Field(ge=-1.0, le=1.0, description='how far, as a share of its range (-)')
+    offset: float = number(..., (-1.0, 1.0), 'how far, as a share of its range (-)')
 
     def _pack(self) -> Packed:
         return self._packed(kinds.OFFSET, self.offset)
@@ -209,8 +204,8 @@ class Partial(_ActuatorFault):
     """The actuator reaches a part of its range."""
 
     kind: Literal['partial']
-    low: float = Field(-1.0, ge=-1.0, le=1.0, description='from this share of its range (-)')
-    high: float = Field(1.0, ge=-1.0, le=1.0, description='to this share (-)')
+    low: float = number(-1.0, (-1.0, 1.0), 'from this share of its range (-)')
+    high: float = number(1.0, (-1.0, 1.0), 'to this share (-)')
 
     @pydantic.model_validator(mode='after')
     def _check_order(self):
@@ -228,8 +223,8 @@ class Jam(_ActuatorFault):
     """The actuator jams and comes free, over and over."""
 
     kind: Literal['jam']
-    period_s: float = Field(60.0, ge=0.2, le=1e6, description='from jam to jam (s)')
-    share: float = Field(0.5, ge=0.0, le=1.0, description='share of it that it is jammed for (-)')
+    period_s: float = number(60.0, (0.2, 1e6), 'from jam to jam (s)')
+    share: float = number(0.5, (0.0, 1.0), 'share of it that it is jammed for (-)')
 
     def _pack(self) -> Packed:
         return self._packed(kinds.JAM, self.period_s, self.share)
@@ -278,7 +273,7 @@ class Spike(_SensorFault):
 
     kind: Literal['spike']
     error: float = _error('added or taken away')
-    share: float = Field(0.01, ge=0.0, le=1.0, description='share of the ticks at which it is (-)')
+    share: float = number(0.01, (0.0, 1.0), 'share of the ticks at which it is (-)')
 
     def _pack(self) -> Packed:
         return self._packed(kinds.SPIKE, self._si(self.error), self.share)
@@ -288,9 +283,7 @@ class Dropout(_SensorFault):
     """It has no new sample now and then, at random, and shows the last one."""
 
     kind: Literal['dropout']
-    share: float = Field(
-        0.5, ge=0.0, le=1.0, description='share of the ticks at which it has none'
-    )
+    share: float = number(0.5, (0.0, 1.0), 'share of the ticks at which it has none')
 
     def _pack(self) -> Packed:
         return self._packed(kinds.DROPOUT, self.share)
@@ -300,10 +293,8 @@ class Noisier(_SensorFault):
     """White noise is added to each number."""
 
     kind: Literal['noisier']
-    std: float = Field(
-        ge=0.0,
-        le=1e6,
-        description='standard deviation (deg, deg/s, m or m/s, by what is measured)',
+    std: float = number(
+        ..., (0.0, 1e6), 'standard deviation (deg, deg/s, m or m/s, by what is measured)'
     )
 
     def _pack(self) -> Packed:
@@ -314,8 +305,8 @@ class Compass(FaultSettings):
     """The deviation of the compass jumps: an error that goes as the sine of the heading."""
 
     kind: Literal['compass']
-    deviation_deg: float = Field(ge=-90.0, le=90.0, description='its largest error (deg)')
-    phase_deg: float = Field(0.0, ge=-180.0, le=180.0, description='phase of the sine (deg)')
+    deviation_deg: float = number(..., (-90.0, 90.0), 'its largest error (deg)')
+    phase_deg: float = number(0.0, (-180.0, 180.0), 'phase of the sine (deg)')
 
     def _pack(self) -> Packed:
         size, phase = math.radians(self.deviation_deg), math.radians(self.phase_deg)
@@ -335,8 +326,8 @@ class Battery(FaultSettings):
     """The voltage of the battery sags."""
 
     kind: Literal['battery']
-    drop_v: float = Field(ge=0.0, le=15.0, description='by so much (V)')
-    over_s: float = Field(0.0, ge=0.0, le=1e8, description='in this time (s)')
+    drop_v: float = number(..., (0.0, 15.0), 'by so much (V)')
+    over_s: float = number(0.0, (0.0, 1e8), 'in this time (s)')
 
     def _pack(self) -> Packed:
         return Packed(kinds.BATTERY, 0, 1, (self.drop_v, self.over_s))
@@ -346,7 +337,7 @@ class Vacuum(FaultSettings):
     """The vacuum of the hull is lost."""
 
     kind: Literal['vacuum']
-    rate_paps: float = Field(100.0, gt=0.0, le=1e6, description='in a second (Pa/s)')
+    rate_paps: float = positive(100.0, 1e6, 'in a second (Pa/s)')
 
     def _pack(self) -> Packed:
         return Packed(kinds.VACUUM, 0, 1, (self.rate_paps,))
