@@ -270,7 +270,7 @@ def tell(state, params):
         params.sensors,
     )
     health, battery = health_of(state), battery_of(state.ledger, params.energy)
-    numbers = (*numbers[:-1], tuple(health), tuple(battery), numbers[-1])
+    numbers = (*numbers[:-1], health, battery, numbers[-1])
     return told(numbers, state, params.sensors, params.faults)
 
 

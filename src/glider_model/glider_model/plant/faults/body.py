@@ -7,18 +7,13 @@ Each function is a slot, whose body without faults hands on what it is given.
 
 from typing import NamedTuple
 
-from glider_base.kernel import kernel
+from glider_base.kernel import kernel, replace
 from glider_base.signals import Joints, Water
 from glider_base.slot import default, slot
 from glider_model.plant.faults import kinds
 from glider_model.plant.faults.kinds import FaultParams
 from glider_model.vehicle.actuators import actuators_step, pump_rate, toward
 from glider_model.vehicle.file import VehicleParams
-
-_DRAG = VehicleParams._fields.index('K_D0')
-_AFTER_LIFT = VehicleParams._fields.index('K_L') + 1
-_BALLAST = VehicleParams._fields.index('ballast')
-_AFTER_BALLAST = _BALLAST + 1
 
 
 class Felt(NamedTuple):
@@ -109,9 +104,13 @@ def felt(whole, total, params):
 @felt.body(FaultParams)
 @kernel
 def _felt(whole, total, params):
-    v = whole.vehicle
-    drag, lift = total[kinds.DRAG], total[kinds.LIFT]
-    changed = (v.K_D0 * drag, v.K_D * drag, v.K_L0 * lift, v.K_L * lift)
-    heavier = (v.ballast + total[kinds.HEAVY],)
-    fields = v[:_DRAG] + changed + v[_AFTER_LIFT:_BALLAST] + heavier + v[_AFTER_BALLAST:]
-    return Felt(VehicleParams(*fields), whole.density)
+    v, drag, lift = whole.vehicle, total[kinds.DRAG], total[kinds.LIFT]
+    vehicle = replace(
+        v,
+        K_D0=v.K_D0 * drag,
+        K_D=v.K_D * drag,
+        K_L0=v.K_L0 * lift,
+        K_L=v.K_L * lift,
+        ballast=v.ballast + total[kinds.HEAVY],
+    )
+    return Felt(vehicle, whole.density)

@@ -21,8 +21,13 @@ LEAK, MASS, FOULING, LOOSE, GUST = range(5)
 SLOW, OFFSET, PARTIAL, JAM = range(5, 9)
 DROPOUT, BIASED, SPIKE, NOISIER = range(9, 13)
 COMPASS, GPS_SILENT, BATTERY, VACUUM, NO_CONTACT = range(13, 18)
-#: Of messages between nodes; the vehicle knows nothing of it.
-MESSAGE = 18
+#: What a person calls them. Of messages, the last one, the vehicle knows nothing.
+KINDS = (
+    *('leak', 'mass', 'fouling', 'loose_roll_mass', 'gust'),
+    *('slow', 'offset', 'partial', 'jam'),
+    *('dropout', 'biased', 'spike', 'noisier'),
+    *('compass', 'gps_silent', 'battery', 'vacuum', 'no_contact', 'message'),
+)
 #: Phases.
 ANY, DIVE, TURN, CLIMB, SURFACE = range(5)
 #: A vehicle that sinks or rises slower than this does neither (m/s),

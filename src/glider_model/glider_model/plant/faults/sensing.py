@@ -9,13 +9,8 @@ import math
 
 import numpy as np
 
-from glider_base.frames import (
-    euler_from_quaternion,
-    quaternion_from_euler,
-    swap_world,
-)
-from glider_base.kernel import kernel
-from glider_base.signals import Battery, Health
+from glider_base.frames import euler_from_quaternion, quaternion_from_euler, swap_world
+from glider_base.kernel import kernel, replace
 from glider_base.slot import default, slot
 from glider_model.ocean.density import depth_at, pressure_at
 from glider_model.plant.faults import kinds
@@ -92,17 +87,15 @@ def _seen(numbers, sensors):
     """What the sensors show, by the places of `kinds`."""
     _, position, imu, pressure, fix = numbers
     seen = np.zeros(kinds.SHOWN)
-    q_w, q_x, q_y, q_z = imu[0], imu[1], imu[2], imu[3]
-    rates, depth = (imu[4], imu[5], imu[6]), 0.0
+    q, rates, depth = imu[:4], imu[4:7], 0.0
     if sensors.has_position:
-        q_w, q_x, q_y, q_z = position[3], position[4], position[5], position[6]
-        rates, depth = (position[10], position[11], position[12]), -position[2]
+        q, rates, depth = position[3:7], position[10:], -position[2]
         seen[PLACE], seen[PLACE + 1] = position[1], position[0]
         seen[VELOCITY] = position[7]
         seen[VELOCITY + 1], seen[VELOCITY + 2] = -position[8], -position[9]
     elif sensors.has_parts:
         depth = depth_at(pressure[0])
-    q = swap_world(q_w, q_x, q_y, q_z)
+    q = swap_world(q[0], q[1], q[2], q[3])
     seen[0], seen[1], seen[2] = euler_from_quaternion(q[0], q[1], q[2], q[3])
     seen[RATES], seen[RATES + 1], seen[RATES + 2] = rates[0], -rates[1], -rates[2]
     seen[DEPTH] = depth
@@ -136,77 +129,50 @@ def _of_fix(k, error, right):
 
 
 @kernel
-def _attitude(seen):
-    """Quaternion (ENU / FLU) of the attitude that is shown."""
-    q = quaternion_from_euler(seen[0], seen[1], seen[2])
-    return swap_world(q[0], q[1], q[2], q[3])
+def _attitude(q, seen, right):
+    """Quaternion (ENU / FLU) that is shown for ``q``; without a fault the very same."""
+    for k in range(ATTITUDE, ATTITUDE + 3):
+        if seen[k] != right[k]:
+            x = quaternion_from_euler(seen[0], seen[1], seen[2])
+            return swap_world(x[0], x[1], x[2], x[3])
+    return q
 
 
 @kernel
-def _has_turned(seen, right):
-    for k in range(ATTITUDE, ATTITUDE + 3):
-        if seen[k] != right[k]:
-            return True
-    return False
+def _flu(seen, first):
+    """Three numbers of the body axes as on the wire."""
+    return seen[first], -seen[first + 1], -seen[first + 2]
 
 
 @kernel
 def _position(position, seen, right):
     """Numbers of measured_odom; those without a fault are the very same."""
-    q = (position[3], position[4], position[5], position[6])
-    if _has_turned(seen, right):
-        q = _attitude(seen)
-    return (
-        seen[PLACE + 1],
-        seen[PLACE],
-        -seen[DEPTH],
-        q[0],
-        q[1],
-        q[2],
-        q[3],
-        seen[VELOCITY],
-        -seen[VELOCITY + 1],
-        -seen[VELOCITY + 2],
-        seen[RATES],
-        -seen[RATES + 1],
-        -seen[RATES + 2],
-    )
+    place = (seen[PLACE + 1], seen[PLACE], -seen[DEPTH])
+    q = _attitude(position[3:7], seen, right)
+    return place + q + _flu(seen, VELOCITY) + _flu(seen, RATES)
 
 
 @kernel
 def _imu(imu, seen, right):
     """Numbers of imu; those without a fault are the very same."""
-    q = (imu[0], imu[1], imu[2], imu[3])
-    if _has_turned(seen, right):
-        q = _attitude(seen)
-    return (
-        q[0],
-        q[1],
-        q[2],
-        q[3],
-        seen[RATES],
-        -seen[RATES + 1],
-        -seen[RATES + 2],
-        imu[7],
-    )
+    return _attitude(imu[:4], seen, right) + _flu(seen, RATES) + imu[7:]
 
 
 @kernel
 def _health(health, total):
     """What the health sensors say of it."""
-    well = Health(health[0], health[1], health[2])
-    return Health(
-        leak=1.0 if total[kinds.WATER] >= NOTICED_KG else well.leak,
-        vacuum_pa=max(0.0, well.vacuum_pa - total[kinds.PASCALS]),
-        contact_age_s=max(well.contact_age_s, total[kinds.ALONE_S]),
+    return replace(
+        health,
+        leak=1.0 if total[kinds.WATER] >= NOTICED_KG else health.leak,
+        vacuum_pa=max(0.0, health.vacuum_pa - total[kinds.PASCALS]),
+        contact_age_s=max(health.contact_age_s, total[kinds.ALONE_S]),
     )
 
 
 @kernel
 def _battery(battery, total):
     """What the battery says of itself; without a fault the very same."""
-    x = Battery(battery[0], battery[1], battery[2], battery[3], battery[4])
-    voltage = x.voltage
+    voltage = battery.voltage
     if total[kinds.VOLTS] > 0.0:
         voltage = np.float64(np.float32(max(0.0, voltage - total[kinds.VOLTS])))
-    return Battery(voltage, x.current, x.charge, x.capacity, x.percentage)
+    return replace(battery, voltage=voltage)

@@ -4,7 +4,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Union
 
 import numpy as np
 import pydantic
@@ -40,21 +40,6 @@ SENSED = {
     'velocity': (9, 3, 1.0),
     'fix': (12, 3, 1.0),
 }
-Sensed = Literal[tuple(SENSED)]
-_SENSOR = Field(
-    description='what is measured: attitude (roll and pitch) or one of the two, heading, rates, '
-    'depth (pressure too), position (north and east of measured_odom), velocity, fix'
-)
-_ACTUATOR = Field(description='which actuator; steering_surface where the vehicle has one')
-
-
-class Packed(NamedTuple):
-    """A fault in numbers, beside when it is."""
-
-    kind: int
-    target: int = 0  #: actuator, or the first of the numbers of a sensor
-    count: int = 1  #: of them
-    numbers: tuple[float, ...] = ()  #: four at most, by kind
 
 
 class FaultSettings(Settings):
@@ -71,9 +56,29 @@ class FaultSettings(Settings):
     )
     for_s: float = number(0.0, (0.0, 1e8), 'how long it lasts (s); 0: to the end')
 
-    def _pack(self) -> Packed:
-        """The fault in numbers."""
-        raise NotImplementedError
+    #: The kind that it is to the kernels, if another one.
+    acts_as: ClassVar[str] = ''
+
+    @property
+    def code(self) -> int:
+        """Number of its kind."""
+        return kinds.KINDS.index(self.acts_as or self.kind)
+
+    @property
+    def own(self) -> dict[str, Any]:
+        """Its own fields, which say neither its kind nor when it is."""
+        common = {*FaultSettings.model_fields, 'kind'}
+        return {name: value for name, value in self if name not in common}
+
+    @property
+    def target(self) -> tuple[int, int]:
+        """Actuator, or the first of the numbers of a sensor; and how many of them."""
+        return 0, 1
+
+    @property
+    def numbers(self) -> Sequence[float]:
+        """What the kernels are told of it, four at most: its own numbers."""
+        return [float(value) for value in self.own.values() if not isinstance(value, str)]
 
     @property
     def lasts(self) -> int:
@@ -83,14 +88,10 @@ class FaultSettings(Settings):
     @property
     def words(self) -> str:
         """What it is, in a few words."""
-        own = {
-            name: getattr(self, name)
-            for name, field in type(self).model_fields.items()
-            if name not in {*FaultSettings.model_fields, 'kind'}
-            and getattr(self, name) != field.default
-        }
         told = ', '.join(
-            value if isinstance(value, str) else f'{name} {value:g}' for name, value in own.items()
+            value if isinstance(value, str) else f'{name} {value:g}'
+            for name, value in self.own.items()
+            if value != type(self).model_fields[name].default
         )
         return f'{self.kind}: {told}' if told else self.kind
 
@@ -112,18 +113,12 @@ class Leak(FaultSettings):
     limit_kg: float = positive(100.0, 100.0, 'and no more than this (kg)')
     detected: bool = Field(True, description='the leak detector tells it, from 0.01 kg on')
 
-    def _pack(self) -> Packed:
-        return Packed(kinds.LEAK, 0, 1, (self.rate_kgps, self.limit_kg, float(self.detected)))
-
 
 class Mass(FaultSettings):
     """The vehicle is heavier, or lighter: something was picked up, or lost."""
 
     kind: Literal['mass']
     mass_kg: float = number(..., (-50.0, 50.0), 'added net buoyancy (kg, + sinks)')
-
-    def _pack(self) -> Packed:
-        return Packed(kinds.MASS, 0, 1, (self.mass_kg,))
 
 
 class Fouling(FaultSettings):
@@ -134,17 +129,11 @@ class Fouling(FaultSettings):
     lift: float = number(1.0, (0.0, 5.0), 'factor on the lift that turns (-)')
     over_s: float = number(0.0, (0.0, 1e8), 'time in which that comes about (s)')
 
-    def _pack(self) -> Packed:
-        return Packed(kinds.FOULING, 0, 1, (self.drag, self.lift, self.over_s))
-
 
 class LooseRollMass(FaultSettings):
     """The roll mass has come off its drive and hangs straight down: no roll moment."""
 
     kind: Literal['loose_roll_mass']
-
-    def _pack(self) -> Packed:
-        return Packed(kinds.LOOSE)
 
 
 class Gust(FaultSettings):
@@ -156,28 +145,26 @@ class Gust(FaultSettings):
     down_mps: float = number(0.0, (-1.0, 1.0), 'velocity downward (m/s)')
     over_s: float = number(60.0, (1.0, 1e6), 'time in which it rises, and falls (s)')
 
-    def _pack(self) -> Packed:
-        return Packed(
-            kinds.GUST, 0, 1, (self.north_mps, self.east_mps, self.down_mps, self.over_s)
-        )
-
 
 class _ActuatorFault(FaultSettings):
     """Something about one actuator."""
 
-    actuator: Literal[ACTUATORS] = _ACTUATOR
+    actuator: Literal[ACTUATORS] = Field(
+        description='which actuator; steering_surface where the vehicle has one'
+    )
 
-    def _packed(self, kind: int, *numbers: float) -> Packed:
-        return Packed(kind, ACTUATORS.index(self.actuator), 1, numbers)
+    @property
+    def target(self) -> tuple[int, int]:
+        """Number of the actuator."""
+        return ACTUATORS.index(self.actuator), 1
 
 
 class Stuck(_ActuatorFault):
     """The actuator does not move."""
 
     kind: Literal['stuck']
-
-    def _pack(self) -> Packed:
-        return self._packed(kinds.SLOW, 0.0)
+    acts_as: ClassVar[str] = 'slow'
+    numbers: ClassVar[Sequence[float]] = (0.0,)
 
 
 class Slow(_ActuatorFault):
@@ -186,18 +173,12 @@ class Slow(_ActuatorFault):
     kind: Literal['slow']
     rate: float = number(0.2, (0.001, 1.0), 'factor on its rate (-)')
 
-    def _pack(self) -> Packed:
-        return self._packed(kinds.SLOW, self.rate)
-
 
 class Offset(_ActuatorFault):
     """The actuator is somewhere else than where it says."""
 
     kind: Literal['offset']
     offset: float = number(..., (-1.0, 1.0), 'how far, as a share of its range (-)')
-
-    def _pack(self) -> Packed:
-        return self._packed(kinds.OFFSET, self.offset)
 
 
 class Partial(_ActuatorFault):
@@ -215,9 +196,6 @@ class Partial(_ActuatorFault):
             )
         return self
 
-    def _pack(self) -> Packed:
-        return self._packed(kinds.PARTIAL, self.low, self.high)
-
 
 class Jam(_ActuatorFault):
     """The actuator jams and comes free, over and over."""
@@ -226,36 +204,38 @@ class Jam(_ActuatorFault):
     period_s: float = number(60.0, (0.2, 1e6), 'from jam to jam (s)')
     share: float = number(0.5, (0.0, 1.0), 'share of it that it is jammed for (-)')
 
-    def _pack(self) -> Packed:
-        return self._packed(kinds.JAM, self.period_s, self.share)
-
 
 class _SensorFault(FaultSettings):
     """Something about what is measured."""
 
-    sensor: Sensed = _SENSOR
-
-    def _packed(self, kind: int, *numbers: float) -> Packed:
-        first, count, _ = SENSED[self.sensor]
-        return Packed(kind, first, count, numbers)
-
-    def _si(self, value: float) -> float:
-        return value * SENSED[self.sensor][2]
-
-
-def _error(description: str):
-    return Field(
-        ge=-1e6, le=1e6, description=f'{description} (deg, deg/s, m or m/s, by what is measured)'
+    sensor: Literal[tuple(SENSED)] = Field(
+        description='what is measured: attitude (roll and pitch) or one of the two, heading, '
+        'rates, depth (pressure too), position (north and east of measured_odom), velocity, fix'
     )
+
+    @property
+    def target(self) -> tuple[int, int]:
+        """Numbers of the sensor."""
+        return SENSED[self.sensor][:2]
+
+    @property
+    def numbers(self) -> Sequence[float]:
+        """Its own numbers in SI."""
+        si = {name: SENSED[self.sensor][2] for name in ('error', 'std')}
+        own = self.own.items()
+        return [value * si.get(name, 1.0) for name, value in own if name != 'sensor']
+
+
+def _error(words: str, least: float = -1e6):
+    return number(..., (least, 1e6), f'{words} (deg, deg/s, m or m/s, by what is measured)')
 
 
 class Frozen(_SensorFault):
     """It shows what it showed last; stamps go on."""
 
     kind: Literal['frozen']
-
-    def _pack(self) -> Packed:
-        return self._packed(kinds.DROPOUT, 1.0)
+    acts_as: ClassVar[str] = 'dropout'
+    numbers: ClassVar[Sequence[float]] = (1.0,)
 
 
 class Biased(_SensorFault):
@@ -263,9 +243,6 @@ class Biased(_SensorFault):
 
     kind: Literal['biased']
     error: float = _error('added to each number')
-
-    def _pack(self) -> Packed:
-        return self._packed(kinds.BIASED, self._si(self.error))
 
 
 class Spike(_SensorFault):
@@ -275,9 +252,6 @@ class Spike(_SensorFault):
     error: float = _error('added or taken away')
     share: float = number(0.01, (0.0, 1.0), 'share of the ticks at which it is (-)')
 
-    def _pack(self) -> Packed:
-        return self._packed(kinds.SPIKE, self._si(self.error), self.share)
-
 
 class Dropout(_SensorFault):
     """It has no new sample now and then, at random, and shows the last one."""
@@ -285,20 +259,12 @@ class Dropout(_SensorFault):
     kind: Literal['dropout']
     share: float = number(0.5, (0.0, 1.0), 'share of the ticks at which it has none')
 
-    def _pack(self) -> Packed:
-        return self._packed(kinds.DROPOUT, self.share)
-
 
 class Noisier(_SensorFault):
     """White noise is added to each number."""
 
     kind: Literal['noisier']
-    std: float = number(
-        ..., (0.0, 1e6), 'standard deviation (deg, deg/s, m or m/s, by what is measured)'
-    )
-
-    def _pack(self) -> Packed:
-        return self._packed(kinds.NOISIER, self._si(self.std))
+    std: float = _error('standard deviation', least=0.0)
 
 
 class Compass(FaultSettings):
@@ -308,18 +274,17 @@ class Compass(FaultSettings):
     deviation_deg: float = number(..., (-90.0, 90.0), 'its largest error (deg)')
     phase_deg: float = number(0.0, (-180.0, 180.0), 'phase of the sine (deg)')
 
-    def _pack(self) -> Packed:
+    @property
+    def numbers(self) -> Sequence[float]:
+        """Its parts with the sine and the cosine of the heading (rad)."""
         size, phase = math.radians(self.deviation_deg), math.radians(self.phase_deg)
-        return Packed(kinds.COMPASS, 0, 1, (size * math.cos(phase), size * math.sin(phase)))
+        return size * math.cos(phase), size * math.sin(phase)
 
 
 class GpsSilent(FaultSettings):
     """There is no fix."""
 
     kind: Literal['gps_silent']
-
-    def _pack(self) -> Packed:
-        return Packed(kinds.GPS_SILENT)
 
 
 class Battery(FaultSettings):
@@ -329,9 +294,6 @@ class Battery(FaultSettings):
     drop_v: float = number(..., (0.0, 15.0), 'by so much (V)')
     over_s: float = number(0.0, (0.0, 1e8), 'in this time (s)')
 
-    def _pack(self) -> Packed:
-        return Packed(kinds.BATTERY, 0, 1, (self.drop_v, self.over_s))
-
 
 class Vacuum(FaultSettings):
     """The vacuum of the hull is lost."""
@@ -339,17 +301,11 @@ class Vacuum(FaultSettings):
     kind: Literal['vacuum']
     rate_paps: float = positive(100.0, 1e6, 'in a second (Pa/s)')
 
-    def _pack(self) -> Packed:
-        return Packed(kinds.VACUUM, 0, 1, (self.rate_paps,))
-
 
 class NoContact(FaultSettings):
     """Nobody answers at the surface: the age of the last contact grows on."""
 
     kind: Literal['no_contact']
-
-    def _pack(self) -> Packed:
-        return Packed(kinds.NO_CONTACT)
 
 
 class Message(MessageFault, FaultSettings):
@@ -366,34 +322,13 @@ class Message(MessageFault, FaultSettings):
             )
         return self
 
-    def _pack(self) -> Packed:
-        return Packed(kinds.MESSAGE)
+
+def _kinds(model: type[FaultSettings]) -> list[type[FaultSettings]]:
+    """Models of kinds, in the order in which they stand here."""
+    return [kind for one in model.__subclasses__() for kind in _kinds(one)] or [model]
 
 
-Fault = Annotated[
-    Leak
-    | Mass
-    | Fouling
-    | LooseRollMass
-    | Gust
-    | Stuck
-    | Slow
-    | Offset
-    | Partial
-    | Jam
-    | Frozen
-    | Biased
-    | Spike
-    | Dropout
-    | Noisier
-    | Compass
-    | GpsSilent
-    | Battery
-    | Vacuum
-    | NoContact
-    | Message,
-    Field(discriminator='kind'),
-]
+Fault = Annotated[Union[tuple(_kinds(FaultSettings))], Field(discriminator='kind')]  # noqa: UP007
 #: A scenario's faults, as a field of settings.
 FAULTS = Field([], max_length=MAX_FAULTS, description='what breaks, and when')
 
@@ -417,23 +352,23 @@ def fault_params(faults: Sequence[FaultSettings], seed: int) -> NamedTuple:
     """Kernel parameters of faults: `NoFaults`, or `FaultParams`."""
     if not faults:
         return NoFaults()
-    packed = [fault._pack() for fault in faults]
     numbers = np.zeros((len(faults), 4))
-    for row, one in zip(numbers, packed, strict=True):
-        row[: len(one.numbers)] = one.numbers
+    for row, fault in zip(numbers, faults, strict=True):
+        row[: len(fault.numbers)] = fault.numbers
+    codes, targets = [fault.code for fault in faults], [fault.target for fault in faults]
     depths = [np.nan if fault.at_depth_m is None else fault.at_depth_m for fault in faults]
     streams = [random_stream(seed, _STREAM_OFFSET, i) for i in range(len(faults))]
     return FaultParams(
-        kind=np.array([one.kind for one in packed], np.int64),
-        target=np.array([one.target for one in packed], np.int64),
-        count=np.array([one.count for one in packed], np.int64),
+        kind=np.array(codes, np.int64),
+        target=np.array([first for first, _ in targets], np.int64),
+        count=np.array([count for _, count in targets], np.int64),
         numbers=numbers,
         from_tick=np.array([round(fault.at_s / TICK_S) for fault in faults], np.int64),
         depth=np.array(depths, np.float64),
         phase=np.array([PHASES.index(fault.phase) for fault in faults], np.int64),
         ticks=np.array([fault.lasts for fault in faults], np.int64),
         stream=np.array(streams, np.uint64),
-        repeats=any(one.kind == kinds.DROPOUT for one in packed),
+        repeats=kinds.DROPOUT in codes,
     )
 
 
