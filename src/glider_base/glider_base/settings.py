@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Base of everything a person configures, and how its errors read."""
 
+import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin
 
 import pydantic
 
 from glider_base.errors import MAX_LINES, ConfigurationError, clipped, shown
 
 SettingsT = TypeVar('SettingsT', bound='Settings')
+ParamsT = TypeVar('ParamsT', bound=NamedTuple)
 
 
 class Settings(pydantic.BaseModel):
@@ -29,6 +31,49 @@ class Settings(pydantic.BaseModel):
         ConfigurationError
             Naming field, value and allowed range.
         """
+
+
+#: Units at the end of a setting's name that kernels leave out; those of degrees become radians.
+_UNITS = (
+    '',
+    '_m',
+    '_s',
+    '_kg',
+    '_pa',
+    '_v',
+    '_mps',
+    '_radps',
+    '_per_s',
+    '_per_s2',
+    '_deg',
+    '_dps',
+)
+
+
+def derived(params: type[ParamsT], settings: Settings, **computed: Any) -> ParamsT:
+    """Kernel parameters of settings.
+
+    Parameters
+    ----------
+    params : type of NamedTuple
+        Its fields are those of the settings of the same name, or of that name and a unit; numbers
+        in degrees become radians.
+    settings : Settings
+    computed
+        The fields that are not, by name.
+
+    Raises
+    ------
+    TypeError
+        If a field is missing, or there is none of a name that is given.
+    """
+    fields = type(settings).model_fields
+    for name in params._fields:
+        unit = next((unit for unit in _UNITS if name + unit in fields), None)
+        if unit is not None and name not in computed:
+            value = getattr(settings, name + unit)
+            computed[name] = math.radians(value) if unit in ('_deg', '_dps') else value
+    return params(**computed)
 
 
 def beside(file: str, info: pydantic.ValidationInfo) -> str:

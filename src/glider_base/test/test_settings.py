@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a person reads who configured something wrong."""
 
-from typing import Annotated, Literal
+import math
+from typing import Annotated, Literal, NamedTuple
 
 import pydantic
 import pytest
@@ -10,7 +11,7 @@ from pydantic import Field
 
 from glider_base.errors import ConfigurationError
 from glider_base.files import read_yaml
-from glider_base.settings import Settings, validate
+from glider_base.settings import Settings, derived, number, positive, validate
 
 
 class Cat(Settings):
@@ -184,3 +185,40 @@ def test_bytes_that_are_no_text_are_refused(tmp_path):
     path.write_bytes(b'\xff\xfe\x00')
     with pytest.raises(ConfigurationError, match=r'a.yaml:1: not UTF-8 text, byte 0xff'):
         read_yaml(path)
+
+
+class Turned(Settings):
+    depth_m: float = number(5.0, (0.0, 10.0), 'a depth (m)')
+    pitch_deg: float = positive(..., 60.0, 'a pitch (deg)', tunable=True)
+    hold_s: float = 2.0
+
+
+class TurnedParams(NamedTuple):
+    depth: float
+    pitch: float
+    hold_s: float
+    rate: float
+
+
+def test_params_are_the_numbers_of_their_settings():
+    settings = Turned(pitch_deg=30.0)
+    assert derived(TurnedParams, settings, rate=1.0) == (5.0, math.radians(30.0), 2.0, 1.0)
+    assert derived(TurnedParams, settings, rate=1.0, depth=7.0).depth == 7.0
+    for wrong in ({}, {'rate': 1.0, 'speed': 1.0}):
+        with pytest.raises(TypeError):
+            derived(TurnedParams, settings, **wrong)
+
+
+@pytest.mark.parametrize(
+    ('fields', 'allowed'),
+    [
+        ({'depth_m': 10.1, 'pitch_deg': 1.0}, '>= 0.0 and <= 10.0'),
+        ({'pitch_deg': 0.0}, '> 0.0 and <= 60.0'),
+        ({}, 'pitch_deg: missing'),
+    ],
+)
+def test_numbers_stay_within_their_limits(fields, allowed):
+    with pytest.raises(ConfigurationError) as caught:
+        validate(Turned, fields, 'a.yaml')
+    assert allowed in str(caught.value)
+    assert Turned.model_fields['pitch_deg'].json_schema_extra == {'tunable': True}

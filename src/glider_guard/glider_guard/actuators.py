@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from glider_base.kernel import kernel
 from glider_base.signals import Joints
-from glider_guard.rows import STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, STUCK_SURFACE
+from glider_guard.rows import STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, STUCK_SURFACE, row
 from glider_model.vehicle.actuators import MOST_NOISE, doubt
 
 #: Of the way that its rate allows an actuator, the share that it goes at least if it follows.
@@ -71,23 +71,12 @@ def _follow(state, position, command, tolerance, progress, dt):
 
 
 @kernel
-def follow(state, joints, command, limits, dt):
+def follow(
+    state: Followers, joints: Joints, command: Joints, limits: ActuatorLimits, dt: float
+) -> tuple[Followers, int]:
     """All actuators a tick later, and the rows of those that do not follow.
 
-    Parameters
-    ----------
-    state : Followers
-    joints : Joints
-        Where they are.
-    command : Joints
-        What they were last told.
-    limits : ActuatorLimits
-    dt : float
-
-    Returns
-    -------
-    Followers
-    int
+    ``joints`` is where they are, ``command`` what they were last told.
     """
     off, least = limits.tolerance, limits.progress
     state = Followers(
@@ -96,13 +85,7 @@ def follow(state, joints, command, limits, dt):
         _follow(state.roll, joints.mu, command.mu, off.mu, least.mu, dt),
         _follow(state.surface, joints.delta, command.delta, off.delta, least.delta, dt),
     )
-    told = 0
-    if state.buoyancy.waits_s > limits.stall_s:
-        told |= STUCK_BUOYANCY
-    if state.pitch.waits_s > limits.stall_s:
-        told |= STUCK_PITCH
-    if state.roll.waits_s > limits.stall_s:
-        told |= STUCK_ROLL
-    if state.surface.waits_s > limits.stall_s:
-        told |= STUCK_SURFACE
-    return state, told
+    told = row(STUCK_BUOYANCY, state.buoyancy.waits_s > limits.stall_s)
+    told |= row(STUCK_PITCH, state.pitch.waits_s > limits.stall_s)
+    told |= row(STUCK_ROLL, state.roll.waits_s > limits.stall_s)
+    return state, told | row(STUCK_SURFACE, state.surface.waits_s > limits.stall_s)

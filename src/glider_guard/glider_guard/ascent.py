@@ -76,20 +76,8 @@ def _off_balance(moment, at, mass, dt):
 
 
 @kernel
-def come_up(state, at, limits, dt):
-    """Command of a tick on the way up.
-
-    Parameters
-    ----------
-    state : Ascent
-    at : Rise
-    limits : AscentLimits
-    dt : float
-
-    Returns
-    -------
-    Ascent, Joints
-    """
+def come_up(state: Ascent, at: Rise, limits: AscentLimits, dt: float) -> tuple[Ascent, Joints]:
+    """Command of a tick on the way up."""
     sees, m_b, average = at.sees, at.m_b, at.rate
     if state.waits_s > 0.0:
         average = state.rate + dt / AVERAGE_S * (at.rate - state.rate)

@@ -4,7 +4,7 @@
 
 from typing import NamedTuple
 
-from glider_base.kernel import kernel
+from glider_base.kernel import kernel, replace
 from glider_guard.rows import (
     CRUSHING,
     DISAGREES,
@@ -16,6 +16,7 @@ from glider_guard.rows import (
     STALLED,
     TOO_DEEP,
     UNDER_LONG,
+    row,
 )
 from glider_guard.witness import SURFACE_M
 
@@ -45,12 +46,12 @@ class DepthLimits(NamedTuple):
     margin: float  #: sinking on to deeper than rated by this is too deep whatever is commanded (m)
     crush: float  #: (m); infinite if nobody says
     drop_margin: float  #: sinking on to nearer than this to it is deep enough for the weight (m)
-    over_share: float  #: of the deepest target
-    over_m: float
-    over_s: float
-    altitude_m: float  #: least height over the bottom
+    overdepth_share: float  #: of the deepest target
+    overdepth_m: float
+    overdepth_s: float
+    altitude_min_m: float  #: least height over the bottom
     altitude_s: float
-    progress_m: float  #: upward, in a climb
+    climb_progress_m: float  #: upward, in a climb
     no_climb_s: float
     drop_after_s: float
     drop_blind_s: float  #: the same where no depth is to be believed
@@ -59,7 +60,7 @@ class DepthLimits(NamedTuple):
     stalled_m: float
     stalled_s: float
     stall_mean_s: float  #: the depth is averaged over this, so that noise is no motion
-    under_s: float  #: infinite: never too long
+    under_water_s: float  #: infinite: never too long
     lag_m: float
     lag_share: float  #: of the way that the vertical rate says
     still_s: float
@@ -152,51 +153,24 @@ def sinking_rate(state):
 @kernel
 def begin_at(depth):
     """Nothing has lasted yet, at a depth (m)."""
-    none = 0.0
-    return Depths(
+    return replace(
+        INITIAL_DEPTHS,
         depth=depth,
         target=depth,
-        deep_s=none,
-        crush_s=none,
-        over_s=none,
-        bottom_s=none,
         mark=depth,
-        climbs_s=none,
         mean=depth,
         near=depth,
         top=depth,
         bottom=depth,
-        stalled_s=none,
         rest=depth,
-        led_m=none,
-        up_s=none,
         up_from=depth,
         least=depth,
-        under_s=none,
-        lag_m=none,
-        gone_m=none,
-        astray_m=none,
-        lag_s=none,
-        still_s=none,
-        apart_s=none,
     )
 
 
 @kernel
-def sound(state, at, limits, dt):
-    """Take in the depth of a tick.
-
-    Parameters
-    ----------
-    state : Depths
-    at : Sounding
-    limits : DepthLimits
-    dt : float
-
-    Returns
-    -------
-    Depths
-    """
+def sound(state: Depths, at: Sounding, limits: DepthLimits, dt: float) -> Depths:
+    """Take in the depth of a tick."""
     depth = at.depth
     target = max(state.target, at.target)
     under = depth > SURFACE_M
@@ -205,7 +179,7 @@ def sound(state, at, limits, dt):
     crushed = depth > limits.crush
     if at.surfaces and at.rate > RISES_MPS:
         crushed = crushed or depth + at.drop_way > limits.crush - limits.drop_margin
-    over = max(limits.over_m, limits.over_share * target)
+    over = max(limits.overdepth_m, limits.overdepth_share * target)
     lag_m = _lag(state.lag_m, at.odom_rate, at, limits.jump_m, dt)
     astray_m = _lag(state.astray_m, at.led, at, limits.jump_m, dt)
     going = abs(at.odom_rate) + TILT * at.odom_speed
@@ -215,7 +189,7 @@ def sound(state, at, limits, dt):
     lags = not is_led and abs(lag_m) > max(limits.lag_m, limits.lag_share * gone_m)
     climbs = at.ascends or at.surfaces
     mark = max(state.mark, depth) if climbs and under else depth
-    progress = mark - depth >= limits.progress_m
+    progress = mark - depth >= limits.climb_progress_m
     if progress:
         mark = depth
     mean, before = state.mean + dt / MEAN_S * (depth - state.mean), state.least
@@ -233,7 +207,7 @@ def sound(state, at, limits, dt):
     rest, led_m = (depth, 0.0) if is_gone else (state.rest, state.led_m + dt * at.led)
     waits_up = at.surfaces and not at.is_afloat
     up_from = state.up_from if waits_up and state.up_s > 0.0 else depth
-    is_near = 0.0 < at.altitude < limits.altitude_m and at.rate > -RISES_MPS
+    is_near = 0.0 < at.altitude < limits.altitude_min_m and at.rate > -RISES_MPS
     no_way_up, is_still = climbs and under and not progress, under and at.is_same
     return Depths(
         depth=depth,
@@ -278,27 +252,13 @@ def _weight_goes(state, sees, floods, limits):
 @kernel
 def depth_rows(state, surfaces, sees, floods, limits):
     """Rows that hold for a vehicle that is to surface for good, sees its depth, floods, or not."""
-    told = 0
-    if state.deep_s > TOO_DEEP_S:
-        told |= TOO_DEEP
-    if state.crush_s > TOO_DEEP_S:
-        told |= CRUSHING
-    if state.over_s > limits.over_s:
-        told |= OVERDEPTH
-    if state.bottom_s > limits.altitude_s:
-        told |= NEAR_BOTTOM
-    if state.climbs_s > limits.no_climb_s:
-        told |= NOT_CLIMBING
-    if surfaces and _weight_goes(state, sees, floods, limits):
-        told |= NOT_RISING
-    if state.stalled_s > limits.stalled_s:
-        told |= STALLED
-    if state.under_s > limits.under_s:
-        told |= UNDER_LONG
-    if state.lag_s > LAG_S or state.still_s > limits.still_s:
-        told |= FROZEN
-    if not surfaces and abs(state.led_m) > limits.led_m:
-        told |= FROZEN
-    if state.apart_s > limits.disagree_s:
-        told |= DISAGREES
-    return told
+    told = row(TOO_DEEP, state.deep_s > TOO_DEEP_S) | row(CRUSHING, state.crush_s > TOO_DEEP_S)
+    told |= row(OVERDEPTH, state.over_s > limits.overdepth_s)
+    told |= row(NEAR_BOTTOM, state.bottom_s > limits.altitude_s)
+    told |= row(NOT_CLIMBING, state.climbs_s > limits.no_climb_s)
+    told |= row(NOT_RISING, surfaces and _weight_goes(state, sees, floods, limits))
+    told |= row(STALLED, state.stalled_s > limits.stalled_s)
+    told |= row(UNDER_LONG, state.under_s > limits.under_water_s)
+    told |= row(FROZEN, state.lag_s > LAG_S or state.still_s > limits.still_s)
+    told |= row(FROZEN, not surfaces and abs(state.led_m) > limits.led_m)
+    return told | row(DISAGREES, state.apart_s > limits.disagree_s)

@@ -38,6 +38,7 @@ from glider_guard.rows import (
     STUCK_PITCH,
     SURFACES,
     TOO_HEAVY,
+    row,
 )
 from glider_guard.weight import (
     Glide,
@@ -127,18 +128,21 @@ class GuardOutput(NamedTuple):
 
 
 @kernel
+def _serves(heard, is_good, last, last_s, dt):
+    """What is heard, or what was before and the time since (s)."""
+    return (heard, 0.0) if is_good else (last, last_s + dt)
+
+
+@kernel
 def take_in(state, heard, params, dt):
     """What is believed at this tick: `Taken`."""
     limits = params.actuators.range
-    demand, demand_s = heard.demand, 0.0
-    if not are_believed(demand, limits):
-        demand, demand_s = state.demand, state.demand_s + dt
-    joints, joints_s = heard.joints, 0.0
-    if not are_believed(joints, limits):
-        joints, joints_s = state.joints, state.joints_s + dt
-    target, target_s = heard.target, 0.0
-    if not abs(target) < 1e6:
-        target, target_s = state.target, state.target_s + dt
+    is_good = are_believed(heard.demand, limits)
+    demand, demand_s = _serves(heard.demand, is_good, state.demand, state.demand_s, dt)
+    is_good = are_believed(heard.joints, limits)
+    joints, joints_s = _serves(heard.joints, is_good, state.joints, state.joints_s, dt)
+    is_good = abs(heard.target) < 1e6
+    target, target_s = _serves(heard.target, is_good, state.target, state.target_s, dt)
     gate = gate_step(state.gate, heard.odometry, params.gate, dt)
     return Taken(
         gate=gate,
@@ -152,36 +156,12 @@ def take_in(state, heard, params, dt):
 
 
 @kernel
-def _is_same(a, b):
-    """Whether two samples of odometry are equal in every number."""
-    return (
-        a.p_n == b.p_n
-        and a.p_e == b.p_e
-        and a.p_d == b.p_d
-        and a.q_w == b.q_w
-        and a.q_x == b.q_x
-        and a.q_y == b.q_y
-        and a.q_z == b.q_z
-        and a.u == b.u
-        and a.v == b.v
-        and a.w == b.w
-        and a.p == b.p
-        and a.q == b.q
-        and a.r == b.r
-    )
-
-
-@kernel
 def _intake_rows(taken, params):
     """Rows of what is asked for, and of what is not heard any more."""
-    told, hold_s = 0, params.gate.hold_s
-    if taken.target <= SURFACE_TARGET:
-        told |= ORDERED
-    if is_lost(taken.gate, params.gate) or taken.joints_s > hold_s or taken.target_s > hold_s:
-        told |= LOST
-    if taken.demand_s > hold_s:
-        told |= NO_DEMAND
-    return told
+    hold_s = params.gate.hold_s
+    lost = is_lost(taken.gate, params.gate) or taken.joints_s > hold_s or taken.target_s > hold_s
+    told = row(ORDERED, taken.target <= SURFACE_TARGET) | row(LOST, lost)
+    return told | row(NO_DEMAND, taken.demand_s > hold_s)
 
 
 @kernel
@@ -220,20 +200,8 @@ def _react(state, taken, told, glide, is_same, witness, params, dt):
 def _sounding(state, taken, before, heard, shown, witness, last, told, params):
     """What a tick tells of the depth: `Sounding`.
 
-    Parameters
-    ----------
-    state : GuardState
-    taken : Taken
-    before : Odometry
-        That was believed a tick before.
-    heard : Heard
-    shown : Shown
-    witness : Witness
-    last : Joints
-        Where the actuators were sent last.
-    told : int
-        Rows that hold by now.
-    params : GuardParams
+    ``before`` is the odometry that was believed a tick before, ``last`` where the actuators were
+    sent last, ``told`` the rows that hold by now.
     """
     x, m_b, rate = taken.gate.odometry, taken.joints.m_b, witness.rate
     north, east, down = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
@@ -273,22 +241,10 @@ def _sounding(state, taken, before, heard, shown, witness, last, told, params):
 
 
 @kernel
-def guard_step(state, heard, params, dt):
-    """One tick of the guard.
-
-    Parameters
-    ----------
-    state : GuardState
-    heard : Heard
-        Anything may be in it.
-    params : GuardParams
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    GuardState, GuardOutput
-    """
+def guard_step(
+    state: GuardState, heard: Heard, params: GuardParams, dt: float
+) -> tuple[GuardState, GuardOutput]:
+    """One tick of the guard, of ``dt`` s; anything may be in what is heard."""
     first = state.tick == 0
     taken = take_in(state.taken, heard, params, dt)
     last = taken.joints if first else state.command
@@ -308,7 +264,7 @@ def guard_step(state, heard, params, dt):
         rate=rate,
         led=led,
         is_glide=is_glide,
-        is_same=_is_same(x, before),
+        is_same=x == before,
     )
     witness, depths = state.witness, state.depths
     if first:

@@ -5,7 +5,7 @@
 from typing import NamedTuple
 
 from glider_base.kernel import kernel
-from glider_guard.rows import BATTERY, LEAK, NO_CONTACT, VACUUM
+from glider_guard.rows import BATTERY, LEAK, NO_CONTACT, VACUUM, row
 
 
 class HealthLimits(NamedTuple):
@@ -15,8 +15,8 @@ class HealthLimits(NamedTuple):
     vacuum_max: float
     battery_min: float  #: (V)
     reserve: float  #: share of the battery that is kept for coming home (-)
-    contact: float  #: (s); infinite: any
-    lasts: float  #: for so long it may be otherwise (s)
+    contact_s: float  #: infinite: any
+    health_s: float  #: for so long it may be otherwise
 
 
 class HealthState(NamedTuple):
@@ -42,13 +42,7 @@ def check_health(state, health, battery, limits, dt):
         state.vacuum_s + dt if is_off else 0.0,
         state.battery_s + dt if is_low else 0.0,
     )
-    told = 0
-    if state.leak_s > limits.lasts:
-        told |= LEAK
-    if state.vacuum_s > limits.lasts:
-        told |= VACUUM
-    if state.battery_s > limits.lasts:
-        told |= BATTERY
-    if health.contact_age_s > limits.contact:
-        told |= NO_CONTACT
-    return state, told
+    told = row(LEAK, state.leak_s > limits.health_s)
+    told |= row(VACUUM, state.vacuum_s > limits.health_s)
+    told |= row(BATTERY, state.battery_s > limits.health_s)
+    return state, told | row(NO_CONTACT, health.contact_age_s > limits.contact_s)

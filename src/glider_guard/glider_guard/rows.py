@@ -8,6 +8,8 @@ reaction of the vehicle is the gravest among the rows that are told.
 
 from typing import NamedTuple
 
+from glider_base.kernel import kernel
+
 #: Reactions by gravity. note: tell it; hold: no roll and no rudder, the dive goes on; surface: the
 #: whole pump and the mass at its climb stop, open loop; drop: and let the weight go.
 NONE, NOTE, HOLD, SURFACE, DROP = range(5)
@@ -21,9 +23,13 @@ class Row(NamedTuple):
     name: str
     trigger: str  #: in words
     parameter: str  #: settings and fields of the vehicle that say when; empty: none do
-    reaction: int
-    latches: bool
     says: str  #: on /diagnostics
+    reaction: int = SURFACE
+
+    @property
+    def latches(self) -> bool:
+        """Whether it stays until a person clears it: what ends a mission does."""
+        return self.reaction >= SURFACE
 
 
 STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, STUCK_SURFACE = 8, 16, 32, 2048
@@ -35,51 +41,30 @@ TOO_HEAVY, NEAR_BOTTOM = 1 << 25, 1 << 26
 DEPTH_OFFSET, DEPTH_WRONG = 1 << 28, 1 << 29
 ASTRAY, CONTRADICTED = 1 << 27, 1 << 30
 
+
+def _stuck(bit: int, part: str, reaction: int) -> Row:
+    """Row of an actuator that does not follow its command."""
+    return Row(
+        bit,
+        f'{part.replace(" ", "_")}_stuck',
+        f'the {part} is off its command and does not go there',
+        'follow_share, stall_s',
+        f'the {part} does not follow its command',
+        reaction,
+    )
+
+
 #: Every row, in the order in which they are told.
 ROWS = (
-    Row(
-        STUCK_BUOYANCY,
-        'buoyancy_engine_stuck',
-        'the buoyancy engine is off its command and does not go there',
-        'follow_share, stall_s',
-        SURFACE,
-        True,
-        'the buoyancy engine does not follow its command',
-    ),
-    Row(
-        STUCK_PITCH,
-        'pitch_mass_stuck',
-        'the pitch mass is off its command and does not go there',
-        'follow_share, stall_s',
-        SURFACE,
-        True,
-        'the pitch mass does not follow its command',
-    ),
-    Row(
-        STUCK_ROLL,
-        'roll_mass_stuck',
-        'the roll mass is off its command and does not go there',
-        'follow_share, stall_s',
-        HOLD,
-        False,
-        'the roll mass does not follow its command',
-    ),
-    Row(
-        STUCK_SURFACE,
-        'steering_surface_stuck',
-        'the steering surface is off its command and does not go there',
-        'follow_share, stall_s',
-        HOLD,
-        False,
-        'the steering surface does not follow its command',
-    ),
+    _stuck(STUCK_BUOYANCY, 'buoyancy engine', SURFACE),
+    _stuck(STUCK_PITCH, 'pitch mass', SURFACE),
+    _stuck(STUCK_ROLL, 'roll mass', HOLD),
+    _stuck(STUCK_SURFACE, 'steering surface', HOLD),
     Row(
         ORDERED,
         'surface_ordered',
         'guidance asks for the surface: its service abort, or an input that was lost',
         'lost_after_s',
-        SURFACE,
-        True,
         'ordered to the surface',
     ),
     Row(
@@ -87,27 +72,22 @@ ROWS = (
         'too_deep',
         'deeper than rated_depth and still sent down, or sinking on to deeper by a margin',
         'rated_depth, depth_margin_share, depth_margin_m',
-        SURFACE,
-        True,
         'deeper than the vehicle is rated for',
     ),
     Row(
         CRUSHING,
         'crush_depth',
-        'deeper than crush_depth, or surfacing for good and sinking to nearer than drop_margin '
-        'to it before the pump, if it still can, or the weight stops that',
+        'deeper than crush_depth, or surfacing for good and sinking to nearer than drop_margin to '
+        'it before the pump, if it still can, or the weight stops that',
         'crush_depth, drop_margin',
-        DROP,
-        True,
         'deeper than its hull may bear, or about to be',
+        DROP,
     ),
     Row(
         NEAR_BOTTOM,
         'near_bottom',
         'an altimeter hears the bottom closer than this, and the vehicle does not rise',
         'altitude_min_m, altitude_s',
-        SURFACE,
-        True,
         'too close to the bottom',
     ),
     Row(
@@ -115,8 +95,6 @@ ROWS = (
         'overdepth',
         'deeper than any target so far, by a margin',
         'overdepth_share, overdepth_m, overdepth_s',
-        SURFACE,
-        True,
         'deeper than it was sent',
     ),
     Row(
@@ -124,8 +102,6 @@ ROWS = (
         'not_climbing',
         'asked up and sent up, or with the whole pump out, and no progress upward',
         'climb_progress_m, no_climb_s',
-        SURFACE,
-        True,
         'does not climb',
     ),
     Row(
@@ -135,9 +111,8 @@ ROWS = (
         'known, by the time that climb_mps takes, and some more; or it sinks with the pump out, '
         'and leaks, is too heavy or was up before; or it leaks, and nobody knows',
         'climb_progress_m, drop_after_s, drop_blind_s, climb_mps',
-        DROP,
-        True,
         'does not rise though all is done for it',
+        DROP,
     ),
     Row(
         TOO_HEAVY,
@@ -145,8 +120,6 @@ ROWS = (
         'sinks faster, or rises more slowly, than pump and ballast would have it, or will by the '
         'end of its dive',
         'weight_share, weight_s',
-        SURFACE,
-        True,
         'heavier than its pump says: water in the hull, growth, or a wing that is lost',
     ),
     Row(
@@ -154,8 +127,6 @@ ROWS = (
         'stalled',
         'under water at the same depth',
         'stalled_m, stalled_s',
-        SURFACE,
-        True,
         'stays at one depth',
     ),
     Row(
@@ -163,8 +134,6 @@ ROWS = (
         'under_too_long',
         'under water without a break',
         'under_water_s',
-        SURFACE,
-        True,
         'has been under water for too long',
     ),
     Row(
@@ -173,8 +142,6 @@ ROWS = (
         'the measured depth does not go where the vertical rate, or pump and pitch, lead, shows '
         'the same to the last bit, or nothing measured moves',
         'lag_share, lag_m, led_m, still_s',
-        SURFACE,
-        True,
         'the measured depth, or all that is measured, stands still, or the vehicle lies aground',
     ),
     Row(
@@ -182,9 +149,8 @@ ROWS = (
         'depth_offset',
         'with the antenna out of the water the depth is not 0: that is taken off',
         'offset_max_m',
-        NOTE,
-        False,
         'the depth is not 0 at the surface, and is corrected',
+        NOTE,
     ),
     Row(
         DEPTH_WRONG,
@@ -192,8 +158,6 @@ ROWS = (
         'at the surface the depth is not 0 by more than that, or under water it jumps and stays '
         'there',
         'offset_max_m, jump_m, gate.hold_s',
-        SURFACE,
-        True,
         'the measured depth is wrong at the surface, or has jumped',
     ),
     Row(
@@ -201,28 +165,23 @@ ROWS = (
         'depth_disagrees',
         'pressure and odom tell different depths',
         'disagree_m, disagree_s',
-        SURFACE,
-        True,
         'pressure and odom tell different depths',
     ),
     Row(
         CONTRADICTED,
         'fixes_contradict',
         'one of the last six surfacings was farther from where navigation had it than its '
-        'covariance and the change of drift at the surface explain: guidance surfaces after '
-        'every dive',
+        'covariance and the change of drift at the surface explain: guidance surfaces after every '
+        'dive',
         '',
-        NOTE,
-        False,
         'a fix contradicts navigation',
+        NOTE,
     ),
     Row(
         ASTRAY,
         'astray',
         'two of the last six were',
         '',
-        SURFACE,
-        True,
         'fixes contradict navigation again and again: a compass or its declination is wrong',
     ),
     Row(
@@ -230,8 +189,6 @@ ROWS = (
         'measurement_lost',
         'no usable odom, joint_states or reference',
         'gate.hold_s',
-        SURFACE,
-        True,
         'nothing usable is measured',
     ),
     Row(
@@ -239,26 +196,14 @@ ROWS = (
         'demand_lost',
         'no usable demand of control',
         'gate.hold_s',
-        SURFACE,
-        True,
         'control demands nothing usable',
     ),
-    Row(
-        LEAK,
-        'leak',
-        'water in the hull',
-        'health_s',
-        SURFACE,
-        True,
-        'there is water in the hull',
-    ),
+    Row(LEAK, 'leak', 'water in the hull', 'health_s', 'there is water in the hull'),
     Row(
         VACUUM,
         'vacuum',
         'the hull does not hold its vacuum',
         'vacuum_min_pa, vacuum_max_pa, health_s',
-        SURFACE,
-        True,
         'the vacuum in the hull is not what it should be',
     ),
     Row(
@@ -266,8 +211,6 @@ ROWS = (
         'battery',
         'the battery gives less than it should, or what is left is less than is not usable',
         'battery_min_v, energy, health_s',
-        SURFACE,
-        True,
         'the battery is low',
     ),
     Row(
@@ -275,11 +218,15 @@ ROWS = (
         'no_contact',
         'nobody has heard of the vehicle',
         'contact_s',
-        SURFACE,
-        True,
         'nobody has heard of it for too long',
     ),
 )
+
+
+@kernel
+def row(bit, holds):
+    """What is told of a row: its bit, if it holds."""
+    return bit if holds else 0
 
 
 def bits_of(reaction: int) -> int:

@@ -6,7 +6,7 @@ import math
 
 from pydantic import Field
 
-from glider_base.settings import Settings, number, positive
+from glider_base.settings import Settings, derived, number, positive
 from glider_base.signals import Joints
 from glider_guard.actuators import INITIAL_FOLLOWERS, make_limits
 from glider_guard.ascent import INITIAL_ASCENT, AscentLimits
@@ -168,40 +168,24 @@ class GuardSettings(GuardLimitSettings):
         return GuardParams(
             gate=gate,
             actuators=make_limits(limits, self.follow_share, self.stall_s),
-            depth=DepthLimits(
+            depth=derived(
+                DepthLimits,
+                self,
                 rated=rated_m,
                 margin=self._margin_m(rated_m),
                 crush=vehicle.crush_depth_m,
                 drop_margin=vehicle.drop_margin_m,
-                over_share=self.overdepth_share,
-                over_m=self.overdepth_m,
-                over_s=self.overdepth_s,
-                altitude_m=self.altitude_min_m,
-                altitude_s=self.altitude_s,
-                progress_m=self.climb_progress_m,
-                no_climb_s=self.no_climb_s,
-                drop_after_s=self.drop_after_s,
-                drop_blind_s=self.drop_blind_s,
-                climb_mps=self.climb_mps,
                 led_m=self.led_m + 6.0 * self.depth_resolution_m,
-                stalled_m=self.stalled_m,
                 stalled_s=self.stalled_s or math.inf,
                 stall_mean_s=max(STALL_MEAN_S, STALL_SAMPLES * self.imu_period_s),
-                under_s=self.under_water_s or math.inf,
-                lag_m=self.lag_m,
-                lag_share=self.lag_share,
-                still_s=self.still_s,
+                under_water_s=self.under_water_s or math.inf,
                 jump_m=gate.depth_jump,
-                disagree_m=self.disagree_m,
-                disagree_s=self.disagree_s,
             ),
-            health=HealthLimits(
-                vacuum_min=self.vacuum_min_pa,
-                vacuum_max=self.vacuum_max_pa,
-                battery_min=self.battery_min_v,
+            health=derived(
+                HealthLimits,
+                self,
                 reserve=1.0 - vehicle.energy.usable.value if vehicle.energy else 0.0,
-                contact=self.contact_s or math.inf,
-                lasts=self.health_s,
+                contact_s=self.contact_s or math.inf,
             ),
             weight=WeightLimits(
                 polar=make_polar(limits),

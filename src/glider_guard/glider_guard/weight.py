@@ -156,25 +156,12 @@ def _least_squares(line, growth, more, since_s, dt):
 
 
 @kernel
-def weigh(state, at, limits, dt):
-    """Take in what a tick shows.
+def weigh(state: Weight, at: Glide, limits: WeightLimits, dt: float) -> tuple[Weight, int]:
+    """Take in what a tick shows; also the rows that hold.
 
     At the surface nothing glides. Twice the drag, as growth makes it, takes half of the speed's
     square from a climb: what the vehicle still rises by is taken off again. In a dive it is
     told, too, where at the end of it the pump could not take off what it weighs.
-
-    Parameters
-    ----------
-    state : Weight
-    at : Glide
-    limits : WeightLimits
-    dt : float
-
-    Returns
-    -------
-    Weight
-    int
-        Rows that hold.
     """
     off, soon, least, line, growth = state.off, state.soon, state.least, state.line, state.growth
     begun, line_s = state.begun, 0.0

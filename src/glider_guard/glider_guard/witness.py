@@ -11,7 +11,7 @@ it is reckoned by pump, pitch and polar from the last one that was.
 
 from typing import NamedTuple
 
-from glider_base.kernel import kernel
+from glider_base.kernel import kernel, replace
 from glider_guard.rows import DEPTH_OFFSET, DEPTH_WRONG, FROZEN
 
 #: Above this the vehicle is at the surface, and nothing of its depth is watched (m).
@@ -86,20 +86,7 @@ INITIAL_WITNESS = Witness(*(12 * (0.0,)))
 def begin_watch(raw, odom):
     """Nothing is known yet but a sample of the sensor and of odom (m)."""
     shown = raw if abs(raw) < FARTHEST_M else odom
-    return Witness(
-        raw=shown,
-        same_s=0.0,
-        led_m=0.0,
-        own=shown,
-        own_s=0.0,
-        far_s=0.0,
-        out_s=0.0,
-        own_zero=0.0,
-        odom_zero=0.0,
-        depth=odom,
-        rate=0.0,
-        apart_m=0.0,
-    )
+    return replace(INITIAL_WITNESS, raw=shown, own=shown, depth=odom)
 
 
 @kernel
@@ -124,23 +111,12 @@ def is_out(state):
 
 
 @kernel
-def watch(state, shown, sees, limits, dt):
-    """Take in what a tick shows.
+def watch(
+    state: Witness, shown: Shown, sees: bool, limits: WitnessLimits, dt: float
+) -> tuple[Witness, int]:
+    """Take in what a tick shows; also the rows that hold.
 
-    Parameters
-    ----------
-    state : Witness
-    shown : Shown
-    sees : bool
-        Whether the depth has been believed so far.
-    limits : WitnessLimits
-    dt : float
-
-    Returns
-    -------
-    Witness
-    int
-        Rows that hold.
+    ``sees`` says whether the depth has been believed so far.
     """
     told, raw = 0, shown.raw
     is_one = abs(raw) < FARTHEST_M

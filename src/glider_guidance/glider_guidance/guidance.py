@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from glider_base.frames import euler_from_quaternion, rotate_to_ned
 from glider_base.kernel import kernel, replace
-from glider_base.signals import SURFACE_TARGET, TICK_S, Reference, TrackingError, Water
+from glider_base.signals import SURFACE_TARGET, TICK_S, Odometry, Reference, TrackingError, Water
 from glider_guidance.current_observer import ObserverParams, ObserverState, observer_step
 from glider_guidance.los import target_rate
 from glider_guidance.method import Leg, Situation, method_step
@@ -292,14 +292,12 @@ def _way_left(state, e1, params):
 
 
 @kernel
-def advance(state, place, altitude, params, dt):
+def advance(
+    state: GuidanceState, place: Place, altitude: float, params: GuidanceParams, dt: float
+) -> tuple[ProfileState, Doing]:
     """Stage of the yo at this tick, and what the vehicle is to do in it.
 
     ``altitude`` is the measured height over the bottom (m); 0.0 where there is no echo.
-
-    Returns
-    -------
-    ProfileState, Doing
     """
     before, depth, rate = state.profile, place.depth, place.ground_d
     left = _way_left(state, place.error.e1, params)
@@ -439,23 +437,13 @@ def refer(state, place, doing, asked, aborted, params, dt):
 
 
 @kernel
-def guidance_step(state, odometry, altitude, params, dt):
-    """One tick of guidance.
+def guidance_step(
+    state: GuidanceState, odometry: Odometry, altitude: float, params: GuidanceParams, dt: float
+) -> tuple[GuidanceState, GuidanceOutput]:
+    """One tick of guidance, of ``dt`` s.
 
-    Parameters
-    ----------
-    state : GuidanceState
-    odometry : Odometry
-        Measured pose and velocity over ground; what the gate refuses is not acted on.
-    altitude : float
-        Measured height over the bottom (m); 0.0 where there is no echo.
-    params : GuidanceParams
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    GuidanceState, GuidanceOutput
+    Of the odometry, pose and velocity over ground, what the gate refuses is not acted on.
+    ``altitude`` is the measured height over the bottom (m); 0.0 where there is no echo.
     """
     gate = gate_step(state.gate, odometry, params.gate, dt)
     odometry = gate.odometry

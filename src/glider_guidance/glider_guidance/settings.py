@@ -185,13 +185,7 @@ class GuidanceSettings(GuidanceLawSettings):
         self._check_profile()
 
     def _check_depth(self) -> None:
-        """Refuse to go deeper than the vehicle is rated for.
-
-        Raises
-        ------
-        ConfigurationError
-            If the lower turn or the path is too deep, or the vehicle's file has no rating.
-        """
+        """Refuse to go deeper than the vehicle is rated for, or with one that has no rating."""
         vehicle = load_vehicle(self.vehicle)
         if vehicle.rated_depth is None:
             raise ConfigurationError(
@@ -208,13 +202,7 @@ class GuidanceSettings(GuidanceLawSettings):
             )
 
     def _check_pitch(self) -> None:
-        """Refuse a glide that the vehicle does not have.
-
-        Raises
-        ------
-        ConfigurationError
-            If a pitch of the profile is shallower than its file says it glides at.
-        """
+        """Refuse a glide that is shallower than the vehicle has it."""
         shallowest = math.degrees(load_vehicle(self.vehicle).params().shallowest_glide)
         for name in ('pitch_deg', 'climb_pitch_deg'):
             pitch = getattr(self.profile, name)
@@ -225,12 +213,7 @@ class GuidanceSettings(GuidanceLawSettings):
                 )
 
     def _check_profile(self) -> None:
-        """Refuse dives that turn no deeper than they begin, and a weight that no pump makes.
-
-        Raises
-        ------
-        ConfigurationError
-        """
+        """Refuse dives that turn no deeper than they begin, and a weight that no pump makes."""
         profile = self.profile
         if profile.mode == 'profile' and profile.top_depth_m >= profile.depth_m:
             raise ConfigurationError(

@@ -211,18 +211,10 @@ def take_in(belief, off, h, way_s, glide, variance, bias):
 
 @kernel
 def carry(belief, change, stay_s, variance):
-    """What is believed after a stay at the surface.
+    """What is believed after a stay at the surface of ``stay_s`` s.
 
-    Parameters
-    ----------
-    belief : CurrentBelief
-        After the way before it.
-    change : Vector
-        Of the drift in the stay, beyond what was believed to change (m/s).
-    stay_s : float
-        Time at the surface (s).
-    variance : float
-        Of ``change``, by that of the fixes (m^2/s^2).
+    ``belief`` is that after the way before it. ``change`` (m/s) is that of the drift in the stay,
+    beyond what was believed to change, ``variance`` that of it by the fixes (m^2/s^2).
     """
     share = 0.0
     if stay_s >= LONG_STAY_S:

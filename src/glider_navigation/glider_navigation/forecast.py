@@ -88,18 +88,11 @@ def forecast_at(forecast, place, depth, t_s):
 
 @kernel
 def weigh(trust, off, change, variance):
-    """What share of a forecast is believed after a way.
+    """What share of a forecast is believed after a way; ``trust`` is that before it.
 
-    Parameters
-    ----------
-    trust : Trust
-        Before the way.
-    off : Vector
-        Mean current over the way less what was believed (m/s).
-    change : Vector
-        Mean of the forecast over the way less that of the way before (m/s).
-    variance : float
-        Of ``off``, were the share known, of its north and of its east part (m^2/s^2).
+    ``off`` is the mean current over the way less what was believed (m/s), and ``variance`` that of
+    its north and of its east part, were the share known (m^2/s^2). ``change`` is the mean of the
+    forecast over the way less that of the way before (m/s).
     """
     gain = trust.variance / (variance + trust.variance * squared(change))
     share = trust.share + gain * (change.n * off.n + change.e * off.e)

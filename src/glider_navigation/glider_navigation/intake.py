@@ -110,23 +110,12 @@ def _is_fix(fix):
 
 
 @kernel
-def take_in(state, heard, params, dt):
-    """Take in what the sensors say at a tick.
+def take_in(
+    state: IntakeState, heard: Heard, params: IntakeParams, dt: float
+) -> tuple[IntakeState, Heard]:
+    """Take in what the sensors say at a tick of ``dt`` s; anything may be in it.
 
-    Parameters
-    ----------
-    state : IntakeState
-    heard : Heard
-        Anything may be in it.
-    params : IntakeParams
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    IntakeState
-    Heard
-        With numbers that can be worked with; its ``odom`` is as it was heard.
+    What comes out has numbers that can be worked with; its ``odom`` is as it was heard.
     """
     odometry = gate_step(state.odometry, heard.odometry, params.gate, dt)
     refused = params.reads_odometry and odometry.age_s > 0.0

@@ -97,18 +97,9 @@ def path_piece(s, params):
 
 @kernel
 def path_point(s, params):
-    """Point of the path.
+    """Point of the path (m, NED; 3 numbers).
 
-    Parameters
-    ----------
-    s : float
-        Path parameter (m); before 0 and beyond `path_length` the path goes on straight.
-    params : PathParams
-
-    Returns
-    -------
-    p_n, p_e, p_d : float
-        (m, NED)
+    ``s`` (m) is the path parameter; before 0 and beyond `path_length` the path goes on straight.
     """
     i, inside = path_piece(s, params)
     n, e, d, dn, de, dd = _piece(i, inside, params)
@@ -118,18 +109,9 @@ def path_point(s, params):
 
 @kernel
 def path_tangent(s, params):
-    """Tangent of the path: the derivative of `path_point` by s, of a length near 1.
+    """Tangent of the path (m/m, NED; 3 numbers), of a length near 1.
 
-    Parameters
-    ----------
-    s : float
-        Path parameter (m). At a corner the leg that follows counts.
-    params : PathParams
-
-    Returns
-    -------
-    dn, de, dd : float
-        (m/m, NED)
+    The derivative of `path_point` by s; at a corner the leg that follows counts.
     """
     i, inside = path_piece(s, params)
     _, _, _, dn, de, dd = _piece(i, inside, params)
@@ -138,20 +120,10 @@ def path_tangent(s, params):
 
 @kernel
 def path_angles(dn, de, dd):
-    """Course and elevation of a tangent.
+    """Course and elevation (rad; clockwise from north, + climbing) of a tangent of any length.
 
-    Parameters
-    ----------
-    dn, de, dd : float
-        Tangent (NED), of any length.
-
-    Returns
-    -------
-    gamma_d : float
-        Course (rad, clockwise from north), atan2(y', x').
-    rho_d : float
-        Elevation (rad, + climbing), atan2(-z', hypot(x', y')). Zhang et al. (2021) eq. 4 prints
-        both with the position in place of the tangent.
+    atan2(y', x') and atan2(-z', hypot(x', y')): Zhang et al. (2021) eq. 4 prints both with the
+    position in place of the tangent.
     """
     return math.atan2(de, dn), math.atan2(-dd, math.hypot(dn, de))
 
@@ -169,20 +141,9 @@ def path_turn(s, params):
 def path_errors(p_n, p_e, p_d, s, gamma_d, rho_d, params):
     """Position of the vehicle in the path frame, e = Q^T (p - p_d(s)).
 
-    Parameters
-    ----------
-    p_n, p_e, p_d : float
-        Position of the vehicle p_NB (m, NED).
-    s : float
-        Parameter of the virtual target on the path (m).
-    gamma_d, rho_d : float
-        Course and elevation of the path frame (rad); ``rho_d = 0`` for a horizontal frame.
-    params : PathParams
-
-    Returns
-    -------
-    TrackingError
-        e1 ahead of the target, e2 to starboard of the path, e3 below it (m).
+    e1 is ahead of the target at s (m), e2 to starboard of the path, e3 below it (m). The position
+    p_NB is in m, NED; gamma_d and rho_d are course and elevation of the path frame (rad), rho_d =
+    0 for a horizontal frame.
     """
     n, e, d = path_point(s, params)
     dn, de, dd = p_n - n, p_e - e, p_d - d
@@ -217,20 +178,10 @@ def _nearest_between(i, low, high, p_n, p_e, p_d, horizontal, params):
 
 @kernel
 def path_closest(p_n, p_e, p_d, horizontal, params):
-    """Parameter of the point of the path that is closest to a position.
+    """Parameter s (m) of the point of the path that is closest to a position (m, NED).
 
-    Parameters
-    ----------
-    p_n, p_e, p_d : float
-        Position (m, NED).
-    horizontal : bool
-        Measure the distance in the horizontal plane only.
-    params : PathParams
-
-    Returns
-    -------
-    float
-        s within [0, `path_length`] (m); the smallest one where several are equally close.
+    Within [0, `path_length`]; the smallest one where several are equally close. ``horizontal``
+    says that the distance is that in the horizontal plane.
     """
     best_s, best = 0.0, math.inf
     # Every local minimum lies where the distance stops falling: between two samples, at a corner,

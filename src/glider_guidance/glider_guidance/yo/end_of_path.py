@@ -124,16 +124,8 @@ def next_dive(left, depth, surfaced, lead_s, dives, params):
 def lower_turn(planned, left, depth, lead_s, params):
     """Depth (m) at which a dive turns: as planned, or where the rest of the path takes it up.
 
-    Parameters
-    ----------
-    planned : float
-        What `next_dive` said (m).
-    left : WayLeft
-    depth : float
-        Where the vehicle is (m).
-    lead_s : float
-        Lead of the turn (s).
-    params : ProfileParams
+    ``planned`` (m) is what `next_dive` said, ``depth`` (m) where the vehicle is, ``lead_s`` (s)
+    the lead of the turn.
     """
     if math.isinf(left.glide_s):
         return planned

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 from pydantic import Field
 
 from glider_base.kernel import kernel, replace
-from glider_base.settings import Settings, number, positive
+from glider_base.settings import Settings, derived, number, positive
 from glider_base.signals import TICK_S
 from glider_base.wiring import NO_ECHO
 from glider_guidance.yo.end_of_path import WayLeft, lower_turn, next_dive
@@ -89,18 +89,16 @@ class ProfileSettings(Settings):
             climb_rate = dive_rate
         rate = _mean_rate(dive_rate, climb_rate)
         top_depth = min(self.top_depth_m, 0.5 * self.depth_m)
-        return ProfileParams(
+        return derived(
+            ProfileParams,
+            self,
             follows_path=self.mode == 'path',
-            depth=self.depth_m,
             top_depth=top_depth,
-            pitch=pitch,
             climb_pitch=climb_pitch,
-            net_heaviness=heavy,
             climb_net_heaviness=light,
             dive_rate=dive_rate,
             climb_rate=climb_rate,
             glide_rate=rate,
-            clearance=self.clearance_m,
             dives=dives,
             surface_every=self.surface_every_dives,
             prepare_ticks=round(self.prepare_s / TICK_S),
@@ -260,19 +258,18 @@ def _near_ticks(state, vertical_rate, altitude, params):
 
 
 @kernel
-def profile_step(state, depth, vertical_rate, altitude, left, params):
+def profile_step(
+    state: ProfileState,
+    depth: float,
+    vertical_rate: float,
+    altitude: float,
+    left: WayLeft,
+    params: ProfileParams,
+) -> ProfileState:
     """Advance the stage by one tick.
 
-    Parameters
-    ----------
-    state : ProfileState
-    depth, vertical_rate : float
-        Measured (m, m/s, + down).
-    altitude : float
-        Measured height over the bottom (m); 0.0 where there is no echo.
-    left : WayLeft
-        What is left of the path; ``NO_END`` if the mission does not end with it.
-    params : ProfileParams
+    Measured are depth (m), vertical rate (m/s, + down) and height over the bottom (m, 0.0 where
+    there is no echo). ``left`` of the path is `NO_END` if the mission does not end with it.
     """
     if state.depth != params.depth and is_descending(state.stage):  # another one since it began
         state = replace(state, turn_depth=params.depth)

@@ -107,12 +107,7 @@ def _loaded(file: str, mission: Mission) -> LoadedBottom:
 def least_height(n, e, depth, params):
     """Least height over the bottom (m) along a track, and the index of it.
 
-    Parameters
-    ----------
-    n, e, depth : float64[ticks]
-        (m)
-    params : NamedTuple
-        The bottom.
+    ``n``, ``e`` and ``depth`` are float64[ticks] (m), ``params`` those of the bottom.
     """
     least, where = math.inf, 0
     for i in range(len(depth)):
@@ -124,17 +119,9 @@ def least_height(n, e, depth, params):
 
 @kernel
 def aground(motion, water, bottom):
-    """The motion of a vehicle, stopped by the bottom if it would be below it.
+    """The motion of a vehicle, stopped by the bottom (m) if it would be below it.
 
     It lies where it touched: the mud holds it against the current, and lets it go upward.
-
-    Parameters
-    ----------
-    motion : Motion
-    water : Water
-        Velocity of the water (m/s).
-    bottom : float
-        Its depth there (m).
     """
     x = motion
     if not x.p_d > bottom:

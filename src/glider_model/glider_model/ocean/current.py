@@ -43,17 +43,8 @@ class CurrentState(NamedTuple):
 
 
 @kernel
-def current_initial(params):
-    """State before the first step, Gauss-Markov parts drawn from their stationary distribution.
-
-    Parameters
-    ----------
-    params : CurrentParams
-
-    Returns
-    -------
-    CurrentState
-    """
+def current_initial(params: CurrentParams) -> CurrentState:
+    """State before the first step, Gauss-Markov parts drawn from their stationary distribution."""
     count = 0
     for i in range(len(params.kind)):
         if params.kind[i] == GAUSS_MARKOV:
@@ -101,27 +92,13 @@ def _latest_step(t_s, table, first, last):
 
 
 @kernel
-def current_step(state, position, t_s, params, dt):
-    """Water velocity at a place and time, and the state of the field one step later.
+def current_step(
+    state: CurrentState, position, t_s, params: CurrentParams, dt
+) -> tuple[CurrentState, Water]:
+    """Water velocity (m/s, NED) at a place and time, and the state of the field ``dt`` s later.
 
-    Parameters
-    ----------
-    state : CurrentState
-        State of the field at ``t_s``.
-    position : tuple of 3 float
-        Place p_NB (m, NED); above the surface counts as the surface.
-    t_s : float
-        Time since the start (s).
-    params : CurrentParams
-    dt : float
-        Time to the next step (s).
-
-    Returns
-    -------
-    state : CurrentState
-        State at ``t_s + dt``.
-    water : Water
-        Velocity of the water over ground at ``t_s`` (m/s, NED).
+    The position p_NB is 3 numbers (m, NED), and above the surface counts as the surface; ``t_s``
+    is the time since the start (s), of which is the state.
     """
     fresh = CurrentState(state.tick, state.values.copy())
     return current_step_in_place(fresh, position, t_s, params, dt)

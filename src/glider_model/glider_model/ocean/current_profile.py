@@ -14,13 +14,7 @@ _COLUMNS = ('depth_m', 'north_mps', 'east_mps', 'down_mps')
 
 
 def check_speed(speed_mps: float, where: str) -> None:
-    """Refuse a speed that no water has.
-
-    Raises
-    ------
-    ValueError
-        Naming the place ``where``.
-    """
+    """Refuse, by a ValueError that names the place ``where``, a speed that no water has."""
     if speed_mps > MAX_SPEED_MPS:
         raise ValueError(
             f'{where}: the speed is {speed_mps:.3f} m/s (allowed: <= {MAX_SPEED_MPS} m/s)'

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from glider_base.frames import rotate_to_ned
 from glider_base.kernel import kernel, replace
-from glider_base.signals import Covariance, Vector
+from glider_base.signals import Covariance, Odometry, Vector
 
 #: A vehicle that has been below the first depth dives, above the second it has come up (m).
 DIVES_M, SURFACES_M = 3.0, 1.5
@@ -141,21 +141,10 @@ def _dive(watch):
 
 
 @kernel
-def watch_fixes(watch, odometry, known, dt):
-    """Take in odometry and the covariance of its place, `Covariance` (m^2); what can be believed.
+def watch_fixes(watch: FixWatch, odometry: Odometry, known: Covariance, dt: float) -> FixWatch:
+    """Take in odometry and the covariance of its place (m^2) at a tick of ``dt`` s.
 
-    Parameters
-    ----------
-    watch : FixWatch
-    odometry : Odometry
-        Anything may be in it.
-    known : Covariance
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    FixWatch
+    Anything may be in them; what cannot be believed changes nothing.
     """
     x = odometry
     if not _is_plausible(x, known):

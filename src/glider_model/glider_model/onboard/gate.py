@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from glider_base.frames import rotate_to_ned
 from glider_base.kernel import kernel, replace
-from glider_base.settings import Settings, number, positive
+from glider_base.settings import Settings, derived, number, positive
 from glider_base.signals import Odometry
 
 #: Actuators that say they are farther out than this many ranges are not believed (-).
@@ -42,15 +42,13 @@ class GateSettings(Settings):
 
     def params(self) -> 'GateParams':
         """Kernel parameters."""
-        return GateParams(
-            rate_max=self.rate_max_radps,
+        return derived(
+            GateParams,
+            self,
             speed_max2=self.speed_max_mps**2,
-            rate_jump=self.rate_jump_radps,
             speed_jump2=self.speed_jump_mps**2,
             attitude_cosine=math.cos(0.5 * math.radians(self.attitude_jump_deg)),
             position_jump2=self.position_jump_m**2,
-            depth_jump=self.depth_jump_m,
-            hold_s=self.hold_s,
         )
 
 
@@ -143,22 +141,10 @@ def _scaled(odometry):
 
 
 @kernel
-def gate_step(state, odometry, params, dt):
-    """Take in a sample, or let the last good one serve.
+def gate_step(state: GateState, odometry: Odometry, params: GateParams, dt: float) -> GateState:
+    """Take in a sample ``dt`` s after the one before, in which anything may be.
 
-    Parameters
-    ----------
-    state : GateState
-    odometry : Odometry
-        As measured; anything may be in it.
-    params : GateParams
-    dt : float
-        Time since the sample before (s).
-
-    Returns
-    -------
-    GateState
-        Its odometry is the sample, if that is good, else the last good one.
+    Its odometry is the sample, if that is good, else the last good one.
     """
     age_s = state.age_s + dt
     good = is_plausible(odometry, params)

@@ -47,24 +47,10 @@ def _pumped(heavier, depth, params):
 
 @kernel
 def spend(ledger, before, after, depths, surfacings, params, dt):
-    """Ledger a tick later.
+    """Ledger after a tick of ``dt`` s.
 
-    Parameters
-    ----------
-    ledger : Ledger
-    before, after : Joints
-        Where the actuators were and where they are.
-    depths : tuple of float
-        Depth before and after (m).
-    surfacings : tuple of Surfacing
-        Before and after.
-    params : EnergyParams
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    Ledger
+    ``before`` and ``after`` are `Joints`: where the actuators were and are. Of depths (m) and
+    surfacings (`Surfacing`) there are two, before and after.
     """
     if params.capacity <= 0.0:
         return ledger

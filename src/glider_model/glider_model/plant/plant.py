@@ -288,25 +288,19 @@ def _remember_what_was_told(state, faults, whole, params):
 
 
 @kernel
-def plant_step(state, command, water, params, dt, drops=False):
-    """Advance the plant by one tick.
+def plant_step(
+    state: PlantState,
+    command: Joints,
+    water: Water,
+    params: PlantParams,
+    dt: float,
+    drops: bool = False,
+) -> PlantState:
+    """Advance the plant by one tick of ``dt`` s.
 
-    Parameters
-    ----------
-    state : PlantState
-    command : Joints
-        Targets of the actuators.
-    water : Water
-        Water velocity at the vehicle, NED (m/s), held during the tick.
-    params : PlantParams
-    dt : float
-        Length of the tick (s).
-    drops : bool
-        The drop weight, if there is one, is let go.
-
-    Returns
-    -------
-    PlantState
+    ``command`` is where the actuators are to go, ``water`` the velocity of the water at the
+    vehicle (NED, m/s), held during the tick. With ``drops`` the drop weight, if there is one, is
+    let go.
     """
     faults = begun(state, params.faults)
     total = summed(faults, state.tick, params.faults)

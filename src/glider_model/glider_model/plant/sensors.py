@@ -38,8 +38,8 @@ from glider_base.frames import (
 )
 from glider_base.kernel import kernel, replace
 from glider_base.noise import normal_pair, random_stream, uniform
-from glider_base.settings import Settings, number
-from glider_base.signals import TICK_S, Imu
+from glider_base.settings import Settings, derived, number
+from glider_base.signals import TICK_S, Imu, Odometry
 from glider_base.wiring import NO_ECHO, SENSORS
 from glider_model.ocean.density import pressure_at
 from glider_model.plant.altimeter import AltimeterParams, echo
@@ -117,13 +117,11 @@ class SensorSettings(Settings):
     def _imu_errors(self) -> 'ImuErrors':
         charted = self.chart_declination_deg
         wrong = 0.0 if charted is None else charted - self.declination_deg
-        return ImuErrors(
+        return derived(
+            ImuErrors,
+            self,
             compass_bias=math.radians(self.compass_bias_deg + wrong),
-            compass_deviation=math.radians(self.compass_deviation_deg),
             compass_phase=math.radians(self.compass_deviation_phase_deg - self.declination_deg),
-            pitch_scale=self.pitch_scale,
-            pitch_offset=math.radians(self.pitch_offset_deg),
-            roll_bias=math.radians(self.roll_bias_deg),
         )
 
     def params(
@@ -141,18 +139,12 @@ class SensorSettings(Settings):
             np.uint64(random_stream(seed, _STREAM_OFFSET, 2)),
         )
         waits = altimeter.is_fitted and altimeter.period_ticks > 1
-        return SensorParams(
+        return derived(
+            SensorParams,
+            self,
             stream=np.uint64(random_stream(seed, _STREAM_OFFSET, 0)),
-            attitude=math.radians(self.attitude_std_deg),
-            heading=math.radians(self.heading_std_deg),
-            rate=math.radians(self.rate_std_dps),
-            position=self.position_std_m,
             errors=self._imu_errors(),
             period_ticks=round(self.imu_period_s / TICK_S),
-            missed_share=self.imu_missed_share,
-            gyro=self.gyro,
-            depth_offset=self.depth_offset_m,
-            depth_resolution=self.depth_resolution_m,
             gps=GpsParams(
                 stream=np.uint64(random_stream(seed, _STREAM_OFFSET, 1)),
                 std=self.gps_std_m,
@@ -196,13 +188,13 @@ class SensorParams(NamedTuple):
     """Sensors as the kernels see them."""
 
     stream: np.uint64  #: start of the random stream
-    attitude: float  #: standard deviations (rad, rad, rad/s, m)
-    heading: float
-    rate: float
-    position: float
+    attitude_std: float  #: standard deviations (rad, rad, rad/s, m)
+    heading_std: float
+    rate_std: float
+    position_std: float
     errors: ImuErrors
     period_ticks: int  #: from sample to sample
-    missed_share: float
+    imu_missed_share: float
     gyro: bool
     depth_offset: float  #: (m)
     depth_resolution: float
@@ -251,9 +243,8 @@ class Noise(NamedTuple):
 @kernel
 def is_noisy(params):
     """Whether there is any noise."""
-    return (
-        params.attitude > 0.0 or params.heading > 0.0 or params.rate > 0.0 or params.position > 0.0
-    )
+    angles = params.attitude_std > 0.0 or params.heading_std > 0.0
+    return angles or params.rate_std > 0.0 or params.position_std > 0.0
 
 
 @kernel
@@ -266,15 +257,15 @@ def noise_of_tick(tick, params):
     n_7, n_8 = normal_pair(params.stream, first + np.uint64(3))
     n_9, _ = normal_pair(params.stream, first + np.uint64(4))
     return Noise(
-        p_n=params.position * n_1,
-        p_e=params.position * n_2,
-        p_d=params.position * n_3,
-        phi=params.attitude * n_4,
-        theta=params.attitude * n_5,
-        psi=params.heading * n_6,
-        p=params.rate * n_7,
-        q=params.rate * n_8,
-        r=params.rate * n_9,
+        p_n=params.position_std * n_1,
+        p_e=params.position_std * n_2,
+        p_d=params.position_std * n_3,
+        phi=params.attitude_std * n_4,
+        theta=params.attitude_std * n_5,
+        psi=params.heading_std * n_6,
+        p=params.rate_std * n_7,
+        q=params.rate_std * n_8,
+        r=params.rate_std * n_9,
     )
 
 
@@ -290,20 +281,8 @@ def _product(a, b):
 
 
 @kernel
-def add_noise(odometry, tick, params):
-    """Odometry with the noise of a tick; without noise the very same numbers.
-
-    Parameters
-    ----------
-    odometry : Odometry
-        Where the vehicle is.
-    tick : int
-    params : SensorParams
-
-    Returns
-    -------
-    Odometry
-    """
+def add_noise(odometry: Odometry, tick: int, params: SensorParams) -> Odometry:
+    """Odometry of the vehicle with the noise of a tick; without noise the very same numbers."""
     if not is_noisy(params):
         return odometry
     x, n = odometry, noise_of_tick(tick, params)
@@ -350,25 +329,18 @@ def _is_sampled(tick, params):
     """Whether attitude and pressure are sampled at a tick."""
     if tick % params.period_ticks != 0:
         return False
-    if params.missed_share <= 0.0 or tick == 0:
+    if params.imu_missed_share <= 0.0 or tick == 0:
         return True
-    return uniform(params.gps.stream, np.uint64(2 * tick + 1)) >= params.missed_share
+    return uniform(params.gps.stream, np.uint64(2 * tick + 1)) >= params.imu_missed_share
 
 
 @kernel
-def take_sample(measured, height, sample, tick, params):
-    """What of a `Sample` is shown at a tick: each part is new, or that of ``sample``.
+def take_sample(
+    measured: Odometry, height: float, sample: Sample, tick: int, params: SensorParams
+) -> Sample:
+    """What of a `Sample` is shown at a tick: each part is new, or that of the tick before.
 
-    Parameters
-    ----------
-    measured : Odometry
-        With noise.
-    height : float
-        The true one over the bottom (m).
-    sample : Sample
-        That of the tick before.
-    tick : int
-    params : SensorParams
+    ``measured`` has noise, ``height`` is the true one over the bottom (m).
     """
     altitude = sample.altitude
     if params.altimeter.is_fitted and tick % params.altimeter.period_ticks == 0:
@@ -382,13 +354,8 @@ def take_sample(measured, height, sample, tick, params):
         shown += params.depth_offset
     if params.depth_resolution > 0.0:
         shown = params.depth_resolution * math.floor(shown / params.depth_resolution + 0.5)
-    if not params.gyro:
-        return Sample(
-            q_w=q_w, q_x=q_x, q_y=q_y, q_z=q_z, p=0.0, q=0.0, r=0.0, p_d=shown, altitude=altitude
-        )
-    return Sample(
-        q_w=q_w, q_x=q_x, q_y=q_y, q_z=q_z, p=x.p, q=x.q, r=x.r, p_d=shown, altitude=altitude
-    )
+    p, q, r = (x.p, x.q, x.r) if params.gyro else (0.0, 0.0, 0.0)
+    return Sample(q_w=q_w, q_x=q_x, q_y=q_y, q_z=q_z, p=p, q=q, r=r, p_d=shown, altitude=altitude)
 
 
 @kernel
@@ -435,37 +402,15 @@ def sense(odometry, height, joints, sample, out_ticks, surfacings, tick, params)
     """
     truth = odometry_to_wire(odometry)
     measured = add_noise(odometry, tick, params)
-    sample = x = take_sample(measured, height, sample, tick, params)
+    x = take_sample(measured, height, sample, tick, params)
     position, imu, pressure = NO_POSITION, NO_IMU, 0.0
     fix = (NO_FIX, 0.0, 0.0, 0.0, 0.0)
     if params.has_position:
-        position = odometry_to_wire(
-            replace(
-                measured,
-                p_d=x.p_d,
-                q_w=x.q_w,
-                q_x=x.q_x,
-                q_y=x.q_y,
-                q_z=x.q_z,
-                p=x.p,
-                q=x.q,
-                r=x.r,
-            )
-        )
+        shown = replace(measured, p_d=x.p_d, q_w=x.q_w, q_x=x.q_x, q_y=x.q_y, q_z=x.q_z)
+        position = odometry_to_wire(replace(shown, p=x.p, q=x.q, r=x.r))
     if params.has_parts:
-        imu = imu_to_wire(
-            Imu(
-                q_w=x.q_w,
-                q_x=x.q_x,
-                q_y=x.q_y,
-                q_z=x.q_z,
-                p=x.p,
-                q=x.q,
-                r=x.r,
-                has_rates=params.gyro,
-            )
-        )
-        pressure = pressure_at(sample.p_d)
+        imu = imu_to_wire(Imu(x.q_w, x.q_x, x.q_y, x.q_z, x.p, x.q, x.r, params.gyro))
+        pressure = pressure_at(x.p_d)
         fix = _take_fix(odometry, out_ticks, surfacings, tick, params)
     return (
         truth,
@@ -473,6 +418,6 @@ def sense(odometry, height, joints, sample, out_ticks, surfacings, tick, params)
         imu,
         (pressure,),
         fix,
-        (sample.altitude,),
+        (x.altitude,),
         (joints.m_b, joints.x_p, joints.mu, joints.delta),
     )

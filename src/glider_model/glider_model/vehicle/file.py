@@ -221,44 +221,26 @@ class Vehicle(_Steered):
         body, mass, added = self.rigid_body, self.moving_mass, self.added_mass
         hydro, pump = self.hydrodynamics, self.buoyancy_engine
         coefficients = 'K_D0 K_D K_L0 K_L K_beta K_MR K_p K_M0 K_M K_q K_MY K_r'.split()
-        r_s = body.hull_center_of_mass.value
         surface = getattr(self, self.steers_by) if self.steers_by else None
         return VehicleParams(
             m=body.hull_mass.value + mass.mass.value,
-            s_x=body.hull_mass.value * r_s[0],
-            s_y=body.hull_mass.value * r_s[1],
-            s_z=body.hull_mass.value * r_s[2],
-            i_xx=body.hull_inertia.value[0],
-            i_yy=body.hull_inertia.value[1],
-            i_zz=body.hull_inertia.value[2],
+            **_named(
+                's_x s_y s_z', body.hull_mass.value * np.array(body.hull_center_of_mass.value)
+            ),
+            **_named('i_xx i_yy i_zz', body.hull_inertia.value),
             m_p=mass.mass.value,
             x_p0=mass.neutral_x.value,
             R_p=mass.radius.value,
-            i_px=mass.inertia.value[0],
-            i_py=mass.inertia.value[1],
-            i_pz=mass.inertia.value[2],
-            a_11=added.linear.value[0],
-            a_22=added.linear.value[1],
-            a_33=added.linear.value[2],
-            a_44=added.angular.value[0],
-            a_55=added.angular.value[1],
-            a_66=added.angular.value[2],
+            **_named('i_px i_py i_pz', mass.inertia.value),
+            **_named('a_11 a_22 a_33 a_44 a_55 a_66', added.linear.value + added.angular.value),
             a_26=added.sway_yaw.value,
             a_35=added.heave_pitch.value,
             **{name: getattr(hydro, name).value for name in coefficients},
             speed_exponent=_value(hydro.speed_exponent),
-            D_u=hydro.linear_damping.value[0],
-            D_v=hydro.linear_damping.value[1],
-            D_w=hydro.linear_damping.value[2],
-            D_p=hydro.linear_angular_damping.value[0],
-            D_q=hydro.linear_angular_damping.value[1],
-            D_r=hydro.linear_angular_damping.value[2],
-            D_uu=hydro.quadratic_damping.value[0],
-            D_vv=hydro.quadratic_damping.value[1],
-            D_ww=hydro.quadratic_damping.value[2],
-            D_pp=hydro.quadratic_angular_damping.value[0],
-            D_qq=hydro.quadratic_angular_damping.value[1],
-            D_rr=hydro.quadratic_angular_damping.value[2],
+            **_named('D_u D_v D_w', hydro.linear_damping.value),
+            **_named('D_p D_q D_r', hydro.linear_angular_damping.value),
+            **_named('D_uu D_vv D_ww', hydro.quadratic_damping.value),
+            **_named('D_pp D_qq D_rr', hydro.quadratic_angular_damping.value),
             hull_radius=0.5 * self.hull.diameter.value,
             m_b_max=pump.range.value,
             m_b_rate=pump.rate.value,
@@ -301,6 +283,11 @@ class Vehicle(_Steered):
             ),
             _value(pump.rate_per_m),
         )
+
+
+def _named(names: str, numbers) -> dict[str, float]:
+    """Numbers by their names."""
+    return dict(zip(names.split(), map(float, numbers), strict=True))
 
 
 def _value(number) -> float:

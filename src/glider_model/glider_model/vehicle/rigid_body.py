@@ -40,10 +40,7 @@ class Inertia(NamedTuple):
 def rigid_body(x_p, mu, vehicle):
     """First moment (3) and inertia matrix elements xx, yy, zz, xy, xz, yz for a mass position.
 
-    Parameters
-    ----------
-    x_p, mu : float
-        Pitch mass from neutral (m), roll mass rotation (rad).
+    The pitch mass is x_p (m) from neutral, the roll mass turned by mu (rad).
     """
     x = vehicle.x_p0 + x_p
     sine, cosine = math.sin(mu), math.cos(mu)

@@ -344,21 +344,9 @@ def _end_of(way):
 def _change_over(state, under, t_s, params):
     """Way, stay, current and trust in the forecast, after a dive or a surfacing if there is one.
 
-    Parameters
-    ----------
-    state : DeadReckonedState
-        At the tick before.
-    under : bool
-        Whether the vehicle is under water now.
-    t_s : float
-        Time since the start (s).
-    params : DeadReckonedParams
-
-    Returns
-    -------
-    Way, Stay, CurrentBelief, Trust
-    Vector
-        Mean of the forecast over the last way that told something (m/s).
+    Last comes the mean of the forecast over the last way that told something (m/s). ``under``
+    says whether the vehicle is under water now, ``state`` is of the tick before, ``t_s`` since
+    the start.
     """
     way, stay, current = state.way, state.stay, state.current
     trust, column = state.trust, state.column

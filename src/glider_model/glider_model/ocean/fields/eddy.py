@@ -11,7 +11,7 @@ import math
 from typing import Literal, NamedTuple
 
 from glider_base.kernel import kernel
-from glider_base.settings import number
+from glider_base.settings import derived, number
 from glider_model.ocean.field import FieldSettings, field_velocity
 
 #: a, for which the largest speed is at the radius: exp(a) = 1 + 2 a.
@@ -36,15 +36,7 @@ class EddySettings(FieldSettings):
 
     def params(self) -> 'EddyParams':
         """Kernel parameters."""
-        return EddyParams(
-            north=self.north_m,
-            east=self.east_m,
-            drift_n=self.drift_north_mps,
-            drift_e=self.drift_east_mps,
-            radius=self.radius_m,
-            speed=self.peak_mps * (1.0 + 0.5 / ALPHA),
-            depth=self.depth_m,
-        )
+        return derived(EddyParams, self, speed=self.peak_mps * (1.0 + 0.5 / ALPHA))
 
 
 class EddyParams(NamedTuple):
@@ -52,8 +44,8 @@ class EddyParams(NamedTuple):
 
     north: float  #: of the centre at the start (m)
     east: float
-    drift_n: float  #: of the centre (m/s)
-    drift_e: float
+    drift_north: float  #: of the centre (m/s)
+    drift_east: float
     radius: float  #: (m)
     speed: float  #: V_m (1 + 1/(2 a)) (m/s)
     depth: float  #: (m)
@@ -63,8 +55,8 @@ class EddyParams(NamedTuple):
 @kernel
 def eddy_velocity(position, t_s, params):
     """Velocity in an eddy (m/s): see `field_velocity`."""
-    north = position[0] - params.north - params.drift_n * t_s
-    east = position[1] - params.east - params.drift_e * t_s
+    north = position[0] - params.north - params.drift_north * t_s
+    east = position[1] - params.east - params.drift_east * t_s
     square = (north * north + east * east) / (params.radius * params.radius)
     # (1 - exp(-x)) / x has the limit 1 at the centre
     x = ALPHA * square

@@ -9,7 +9,7 @@ import math
 from typing import Literal, NamedTuple
 
 from glider_base.kernel import kernel
-from glider_base.settings import number
+from glider_base.settings import derived, number
 from glider_model.ocean.field import FieldSettings, field_velocity
 
 
@@ -31,15 +31,7 @@ class JetSettings(FieldSettings):
     def params(self) -> 'JetParams':
         """Kernel parameters."""
         direction = math.radians(self.direction_deg)
-        return JetParams(
-            north=self.north_m,
-            east=self.east_m,
-            along_n=math.cos(direction),
-            along_e=math.sin(direction),
-            width=self.width_m,
-            speed=self.peak_mps,
-            depth=self.depth_m,
-        )
+        return derived(JetParams, self, along_n=math.cos(direction), along_e=math.sin(direction))
 
 
 class JetParams(NamedTuple):
@@ -50,7 +42,7 @@ class JetParams(NamedTuple):
     along_n: float  #: where it flows to, a vector of length 1
     along_e: float
     width: float  #: (m)
-    speed: float  #: (m/s)
+    peak: float  #: speed in its middle at the surface (m/s)
     depth: float  #: (m)
 
 
@@ -61,5 +53,5 @@ def jet_velocity(position, t_s, params):
     north, east = position[0] - params.north, position[1] - params.east
     across = (east * params.along_n - north * params.along_e) / params.width
     tanh = math.tanh(across)
-    speed = params.speed * (1.0 - tanh * tanh) * math.exp(-position[2] / params.depth)
+    speed = params.peak * (1.0 - tanh * tanh) * math.exp(-position[2] / params.depth)
     return speed * params.along_n, speed * params.along_e, 0.0

@@ -149,15 +149,7 @@ def any_begun(faults):
 @slot
 @default
 def summed(faults, tick, params):
-    """What all faults add up to at a tick, float64[_SUM] by the places above.
-
-    Parameters
-    ----------
-    faults : FaultState
-        As of `begun`.
-    tick : int
-    params : FaultParams
-    """
+    """What all faults, as of `begun`, add up to at a tick, float64[_SUM] by the places above."""
     return ()
 
 

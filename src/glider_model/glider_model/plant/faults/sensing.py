@@ -40,13 +40,7 @@ _METRES_PER_DEG = 111195.0
 def told(numbers, state, sensors, params):
     """Numbers of the topics of a tick, in the order of the plant's outputs, as faults make them.
 
-    Parameters
-    ----------
-    numbers : tuple of tuple of float
-        As they are without.
-    state : PlantState
-    sensors : SensorParams
-    params : FaultParams or NoFaults
+    ``numbers`` are as without. ``state`` is that of the plant.
     """
     return numbers
 
