@@ -6,7 +6,7 @@ import math
 
 from glider_base.settings import Settings
 from glider_base.signals import SEA_WATER_DENSITY
-from glider_model.vehicle.quantity import meaning, quantity
+from glider_model.vehicle.quantity import required
 
 #: Coefficients of lift and drag, with their units: what a set stands for.
 LIFT_AND_DRAG = {
@@ -26,11 +26,11 @@ class MerckelbachSettings(Settings):
     Merckelbach et al. (2010, 2019).
     """
 
-    Cd0: meaning(quantity('-', gt=0.0, le=10.0), 'drag at no angle of attack')
-    Cd1: meaning(quantity('1/rad^2', ge=0.0, le=1000.0), 'drag over alpha^2, all of it')
-    S: meaning(quantity('m^2', gt=0.0, le=10.0), 'reference area')
-    aw: meaning(quantity('1/rad', ge=0.0, le=100.0), 'lift over alpha, of the wings')
-    ah: meaning(quantity('1/rad', ge=0.0, le=100.0), 'lift over alpha, of the hull')
+    Cd0: required('-', 'drag at no angle of attack', gt=0.0, le=10.0)
+    Cd1: required('1/rad^2', 'drag over alpha^2, all of it', ge=0.0, le=1000.0)
+    S: required('m^2', 'reference area', gt=0.0, le=10.0)
+    aw: required('1/rad', 'lift over alpha, of the wings', ge=0.0, le=100.0)
+    ah: required('1/rad', 'lift over alpha, of the hull', ge=0.0, le=100.0)
 
     def coefficients(self) -> dict[str, float]:
         """Coefficients K (kg/m, rad) by their names."""
@@ -50,10 +50,10 @@ class EriksenSettings(Settings):
     Eriksen et al. (2001): alpha in degrees, as in ``hd_a``, ``hd_b`` and ``hd_c`` of its files.
     """
 
-    a: meaning(quantity('1/deg', gt=0.0, le=1.0), 'lift over alpha, hd_a')
-    b: meaning(quantity('Pa^(1/4)', gt=0.0, le=1.0), 'drag at no angle of attack, hd_b')
-    c: meaning(quantity('1/deg^2', ge=0.0, le=0.1), 'drag over alpha^2, hd_c')
-    l: meaning(quantity('m', gt=0.0, le=20.0), 'length of the glider')  # noqa: E741
+    a: required('1/deg', 'lift over alpha, hd_a', gt=0.0, le=1.0)
+    b: required('Pa^(1/4)', 'drag at no angle of attack, hd_b', gt=0.0, le=1.0)
+    c: required('1/deg^2', 'drag over alpha^2, hd_c', ge=0.0, le=0.1)
+    l: required('m', 'length of the glider', gt=0.0, le=20.0)  # noqa: E741
 
     def coefficients(self) -> dict[str, float]:
         """Coefficients K (kg/m, rad) by their names."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from glider_base.settings import Settings
 from glider_base.signals import SEA_WATER_DENSITY
-from glider_model.vehicle.quantity import meaning, quantity
+from glider_model.vehicle.quantity import optional, required
 
 #: Oil (cc) that makes as much net heaviness (kg).
 CC_PER_KG = 1e6 / SEA_WATER_DENSITY
@@ -25,26 +25,24 @@ class EnergySettings(Settings):
     never less than nothing. A mass takes as much as it moves, to and fro.
     """
 
-    capacity: meaning(quantity('Wh', gt=0.0, le=1e6), 'of a fresh battery')
-    usable: meaning(quantity('-', gt=0.0, le=1.0), 'share of it; the guard surfaces on the rest')
-    voltage: meaning(quantity('V', gt=0.0, le=1000.0), 'of a battery in service')
-    pump_out: meaning(quantity('J/cc', **_Line), 'taken by a volume pumped out at the surface')
-    pump_out_per_m: meaning(quantity('J/cc/m', **_Line), 'and more for every metre of depth')
-    pump_in: meaning(
-        quantity('J/cc', **_Line), 'the same of a volume let in; never less than nothing in all'
+    capacity: required('Wh', 'of a fresh battery', gt=0.0, le=1e6)
+    usable: required('-', 'share of it; the guard surfaces on the rest', gt=0.0, le=1.0)
+    voltage: required('V', 'of a battery in service', gt=0.0, le=1000.0)
+    pump_out: required('J/cc', 'taken by a volume pumped out at the surface', **_Line)
+    pump_out_per_m: required('J/cc/m', 'and more for every metre of depth', **_Line)
+    pump_in: required(
+        'J/cc', 'the same of a volume let in; never less than nothing in all', **_Line
     )
-    pump_in_per_m: meaning(quantity('J/cc/m', **_Line), 'and more for every metre of depth')
-    hotel_dive: meaning(quantity('W', **_Power), 'electronics and sensors in the dive')
-    hotel_climb: meaning(quantity('W', **_Power), 'the same in the climb')
-    hotel_surface: meaning(quantity('W', **_Power), 'the same at the surface')
-    pitch_mass: meaning(quantity('J/m', ge=0.0, le=1e6), 'by as much as it moves, to and fro')
-    roll_mass: meaning(quantity('J/deg', ge=0.0, le=1e4), 'the same')
-    steering_surface: meaning(quantity('J/deg', ge=0.0, le=1e4) | None, 'the same; 0 without') = (
-        None
-    )
-    call_start: meaning(quantity('J', ge=0.0, le=1e6), 'once at each surfacing')
-    call_power: meaning(quantity('W', **_Power), 'of a call, above hotel_surface')
-    call_duration: meaning(quantity('s', ge=0.0, le=86400.0), 'of a call')
+    pump_in_per_m: required('J/cc/m', 'and more for every metre of depth', **_Line)
+    hotel_dive: required('W', 'electronics and sensors in the dive', **_Power)
+    hotel_climb: required('W', 'the same in the climb', **_Power)
+    hotel_surface: required('W', 'the same at the surface', **_Power)
+    pitch_mass: required('J/m', 'by as much as it moves, to and fro', ge=0.0, le=1e6)
+    roll_mass: required('J/deg', 'the same', ge=0.0, le=1e4)
+    steering_surface: optional('J/deg', 'the same; 0 without', ge=0.0, le=1e4)
+    call_start: required('J', 'once at each surfacing', ge=0.0, le=1e6)
+    call_power: required('W', 'of a call, above hotel_surface', **_Power)
+    call_duration: required('s', 'of a call', ge=0.0, le=86400.0)
 
     def params(self) -> 'EnergyParams':
         """Kernel parameters."""

@@ -28,7 +28,7 @@ from glider_base.wiring import JOINTS
 from glider_model.vehicle import surfaces
 from glider_model.vehicle.actuators import ActuatorErrors
 from glider_model.vehicle.energy import EnergySettings
-from glider_model.vehicle.quantity import LITRE, meaning, quantity
+from glider_model.vehicle.quantity import LITRE, optional
 from glider_model.vehicle.rigid_body import mass_matrix
 from glider_model.vehicle.sections import (
     AddedMassSettings,
@@ -65,47 +65,49 @@ class _Body(Settings):
     buoyancy_engine: BuoyancyEngineSettings
     hull: HullSettings
     # Recordings made before there was this field lack it.
-    rated_depth: meaning(
-        quantity('m', gt=0.0, le=12000.0) | None,
+    rated_depth: optional(
+        'm',
         'deepest that the hull is meant to go; without it the vehicle does not fly',
-    ) = None
-    crush_depth: meaning(
-        quantity('m', gt=0.0, le=15000.0) | None, 'deeper than this the hull may give way'
-    ) = None
-    drop_weight: meaning(
-        quantity('kg', gt=0.0, le=100.0) | None, 'weight in water of what is let go in need'
-    ) = None
-    drop_margin: meaning(
-        quantity('m', gt=0.0, le=5000.0) | None,
+        gt=0.0,
+        le=12000.0,
+    )
+    crush_depth: optional('m', 'deeper than this the hull may give way', gt=0.0, le=15000.0)
+    drop_weight: optional('kg', 'weight in water of what is let go in need', gt=0.0, le=100.0)
+    drop_margin: optional(
+        'm',
         'it is let go where the vehicle would come as near as this to its crush depth; a fifth of '
         'what lies between that and its rating without',
-    ) = None
-    volume: meaning(
-        quantity('m^3', also=LITRE, gt=0.0, le=10.0) | None,
+        gt=0.0,
+        le=5000.0,
+    )
+    volume: optional(
+        'm^3',
         'at the surface, at the reference temperature, with the pump at 0; without it the vehicle '
         'is neutral at the surface of any water',
-    ) = None
-    compressibility: meaning(
-        quantity('1/Pa', ge=0.0, le=1e-8) | None, 'share of the volume lost by a pascal'
-    ) = None
-    thermal_expansion: meaning(
-        quantity('1/K', ge=0.0, le=1e-3) | None, 'share of the volume gained by a degree'
-    ) = None
-    reference_temperature: meaning(
-        quantity('degC', ge=-5.0, le=50.0) | None, 'temperature at which it has its volume'
-    ) = None
-    shallowest_glide: meaning(
-        quantity('deg', ge=5.0, le=30.0) | None,
+        also=LITRE,
+        gt=0.0,
+        le=10.0,
+    )
+    compressibility: optional('1/Pa', 'share of the volume lost by a pascal', ge=0.0, le=1e-8)
+    thermal_expansion: optional('1/K', 'share of the volume gained by a degree', ge=0.0, le=1e-3)
+    reference_temperature: optional(
+        'degC', 'temperature at which it has its volume', ge=-5.0, le=50.0
+    )
+    shallowest_glide: optional(
+        'deg',
         'shallowest pitch that it glides at, about that of its best glide; 12 without',
-    ) = None
-    slowest_glide: meaning(
-        quantity('m/s', gt=0.0, le=0.12) | None,
+        ge=5.0,
+        le=30.0,
+    )
+    slowest_glide: optional(
+        'm/s',
         'vertical rate below which it turns over and is not steered by roll; 0.12 without',
-    ) = None
-    pump_x: meaning(
-        quantity('m', ge=-5.0, le=5.0) | None,
-        'where the oil acts, + forward of the centre of buoyancy; 0 without',
-    ) = None
+        gt=0.0,
+        le=0.12,
+    )
+    pump_x: optional(
+        'm', 'where the oil acts, + forward of the centre of buoyancy; 0 without', ge=-5.0, le=5.0
+    )
     added_mass: AddedMassSettings
     hydrodynamics: HydrodynamicsSettings
     steering: SteeringSettings | None = None

@@ -102,9 +102,14 @@ class Vector(Settings):
         return value
 
 
-def meaning(kind, words: str):
-    """Type of a field that says what it means."""
-    return Annotated[kind, Field(description=words)]
+def required(unit: str, words: str, **limits):
+    """Type of a field that has such a `quantity`, and says what it means."""
+    return Annotated[quantity(unit, **limits), Field(description=words)]
+
+
+def optional(unit: str, words: str, **limits):
+    """Type of a field that may have one; None without."""
+    return Annotated[quantity(unit, **limits) | None, Field(None, description=words)]
 
 
 def vector(unit: str, words: str, not_negative: bool = False):

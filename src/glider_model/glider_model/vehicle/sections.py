@@ -3,6 +3,7 @@
 """Sections of a vehicle file: every field with its unit, its range and what it means."""
 
 import pydantic
+from pydantic import Field
 
 from glider_base.settings import Settings
 from glider_model.vehicle.coefficients import (
@@ -16,8 +17,8 @@ from glider_model.vehicle.quantity import (
     NotNegative,
     Positive,
     Signed,
-    meaning,
-    quantity,
+    optional,
+    required,
     vector,
 )
 
@@ -25,7 +26,7 @@ from glider_model.vehicle.quantity import (
 class RigidBodySettings(Settings):
     """Hull without the moving mass. Origin at the centre of buoyancy, axes FRD."""
 
-    hull_mass: meaning(quantity('kg', **Positive), 'mass in air, without the moving mass')
+    hull_mass: required('kg', 'mass in air, without the moving mass', **Positive)
     hull_center_of_mass: vector('m', 'centre of mass of the hull; z > 0 keeps it upright')
     hull_inertia: vector('kg m^2', 'inertia of the hull about the origin', not_negative=True)
 
@@ -35,8 +36,8 @@ class AddedMassSettings(Settings):
 
     linear: vector('kg', 'water that moves along in surge, sway, heave', not_negative=True)
     angular: vector('kg m^2', 'the same in roll, pitch, yaw', not_negative=True)
-    sway_yaw: meaning(quantity('kg m', **Signed), 'of sway by yaw; 0 if alike fore and aft')
-    heave_pitch: meaning(quantity('kg m', **Signed), 'of heave by pitch; 0 if alike fore and aft')
+    sway_yaw: required('kg m', 'of sway by yaw; 0 if alike fore and aft', **Signed)
+    heave_pitch: required('kg m', 'of heave by pitch; 0 if alike fore and aft', **Signed)
 
 
 class HydrodynamicsSettings(Settings):
@@ -48,34 +49,41 @@ class HydrodynamicsSettings(Settings):
         }
     )
 
-    merckelbach: meaning(
-        MerckelbachSettings | None,
-        'lift and drag as Merckelbach et al. write them, instead of K_D0, K_D, K_L0 and K_L',
-    ) = None
-    eriksen: meaning(EriksenSettings | None, 'the same as Eriksen et al. write them') = None
-    K_D0: meaning(quantity('kg/m', **NotNegative), 'drag over V^2 at no angle of attack')
-    K_D: meaning(quantity('kg/m/rad^2', **NotNegative), 'drag over V^2 alpha^2')
-    K_L0: meaning(quantity('kg/m', **Signed), 'lift over V^2 at no angle of attack')
-    K_L: meaning(quantity('kg/m/rad', **Signed), 'lift over V^2 alpha')
-    K_beta: meaning(quantity('kg/m/rad', **Signed), 'side force over V^2 beta; < 0')
-    K_MR: meaning(quantity('kg/rad', **Signed), 'roll moment over V^2 beta; < 0 with dihedral')
-    K_p: meaning(quantity('kg s/rad', **Signed), 'roll moment over V^2 p; < 0 damps')
-    K_M0: meaning(quantity('kg', **Signed), 'pitch moment over V^2 at no angle of attack')
-    K_M: meaning(
-        quantity('kg/rad', **Signed),
-        'pitch moment over V^2 alpha, without a_33 - a_11 of the added mass; the sum is < 0',
+    merckelbach: MerckelbachSettings | None = Field(
+        None,
+        description='lift and drag as Merckelbach et al. write them, instead of K_D0, K_D, K_L0 '
+        'and K_L',
     )
-    K_q: meaning(quantity('kg s/rad', **Signed), 'pitch moment over V^2 q; < 0 damps')
-    K_MY: meaning(
-        quantity('kg/rad', **Signed),
+    eriksen: EriksenSettings | None = Field(
+        None, description='the same as Eriksen et al. write them'
+    )
+    K_D0: required('kg/m', 'drag over V^2 at no angle of attack', **NotNegative)
+    K_D: required('kg/m/rad^2', 'drag over V^2 alpha^2', **NotNegative)
+    K_L0: required('kg/m', 'lift over V^2 at no angle of attack', **Signed)
+    K_L: required('kg/m/rad', 'lift over V^2 alpha', **Signed)
+    K_beta: required('kg/m/rad', 'side force over V^2 beta; < 0', **Signed)
+    K_MR: required('kg/rad', 'roll moment over V^2 beta; < 0 with dihedral', **Signed)
+    K_p: required('kg s/rad', 'roll moment over V^2 p; < 0 damps', **Signed)
+    K_M0: required('kg', 'pitch moment over V^2 at no angle of attack', **Signed)
+    K_M: required(
+        'kg/rad',
+        'pitch moment over V^2 alpha, without a_33 - a_11 of the added mass; the sum is < 0',
+        **Signed,
+    )
+    K_q: required('kg s/rad', 'pitch moment over V^2 q; < 0 damps', **Signed)
+    K_MY: required(
+        'kg/rad',
         'yaw moment over V^2 beta, without a_22 - a_11 of the added mass; less that it is the '
         'weathercock, > 0',
+        **Signed,
     )
-    K_r: meaning(quantity('kg s/rad', **Signed), 'yaw moment over V^2 r; < 0 damps')
-    speed_exponent: meaning(
-        quantity('-', ge=-1.0, le=1.0) | None,
+    K_r: required('kg s/rad', 'yaw moment over V^2 r; < 0 damps', **Signed)
+    speed_exponent: optional(
+        '-',
         'K_D0 is that at 1 m/s and goes with this power of the speed; 0 without',
-    ) = None
+        ge=-1.0,
+        le=1.0,
+    )
     linear_damping: vector('kg/s', 'force over u, v, w; mostly none')
     linear_angular_damping: vector('kg m^2/s', 'moment over p, q, r; mostly none')
     quadratic_damping: vector('kg/m', 'force over u |u|, v |v|, w |w|; mostly none')
@@ -90,56 +98,46 @@ class HydrodynamicsSettings(Settings):
 class MovingMassSettings(Settings):
     """Mass that slides along x for pitch and turns about x for roll."""
 
-    mass: meaning(quantity('kg', **Positive), 'mass that moves, most often the battery')
-    neutral_x: meaning(quantity('m', ge=-10.0, le=10.0), 'where it trims level, + forward')
-    radius: meaning(quantity('m', gt=0.0, le=1.0), 'of its centre from the axis it turns about')
+    mass: required('kg', 'mass that moves, most often the battery', **Positive)
+    neutral_x: required('m', 'where it trims level, + forward', ge=-10.0, le=10.0)
+    radius: required('m', 'of its centre from the axis it turns about', gt=0.0, le=1.0)
     inertia: vector('kg m^2', 'about its own centre, turning with it', not_negative=True)
-    travel: meaning(quantity('m', gt=0.0, le=2.0), 'as far as it goes from neutral to each side')
-    rate: meaning(quantity('m/s', gt=0.0, le=1.0), 'how fast it slides')
-    rotation: meaning(
-        quantity('deg', ge=0.0, le=180.0), 'as far as it turns to each side; 0: it does not'
+    travel: required('m', 'as far as it goes from neutral to each side', gt=0.0, le=2.0)
+    rate: required('m/s', 'how fast it slides', gt=0.0, le=1.0)
+    rotation: required('deg', 'as far as it turns to each side; 0: it does not', ge=0.0, le=180.0)
+    rotation_rate: required('deg/s', 'how fast it turns', gt=0.0, le=180.0)
+    dead_band: optional(
+        'm', 'nearer than this to where it is sent it stops sliding', ge=0.0, le=0.1
     )
-    rotation_rate: meaning(quantity('deg/s', gt=0.0, le=180.0), 'how fast it turns')
-    dead_band: meaning(
-        quantity('m', ge=0.0, le=0.1) | None,
-        'nearer than this to where it is sent it stops sliding',
-    ) = None
-    noise: meaning(
-        quantity('m', ge=0.0, le=0.1) | None, 'standard deviation of where it says that it is'
-    ) = None
-    rotation_dead_band: meaning(
-        quantity('deg', ge=0.0, le=20.0) | None, 'nearer than this it stops turning'
-    ) = None
-    rotation_noise: meaning(
-        quantity('deg', ge=0.0, le=20.0) | None, 'standard deviation of the angle that it says'
-    ) = None
+    noise: optional('m', 'standard deviation of where it says that it is', ge=0.0, le=0.1)
+    rotation_dead_band: optional('deg', 'nearer than this it stops turning', ge=0.0, le=20.0)
+    rotation_noise: optional(
+        'deg', 'standard deviation of the angle that it says', ge=0.0, le=20.0
+    )
 
 
 class BuoyancyEngineSettings(Settings):
     """Oil pump: net heaviness within +-range; in cc, of sea water of 1025 kg/m^3."""
 
-    range: meaning(
-        quantity('kg', also=CC, gt=0.0, le=50.0),
-        'most that it makes light or heavy; half a stroke',
+    range: required(
+        'kg', 'most that it makes light or heavy; half a stroke', also=CC, gt=0.0, le=50.0
     )
-    rate: meaning(quantity('kg/s', also=CC_PER_S, gt=0.0, le=10.0), 'how fast')
-    rate_per_m: meaning(
-        quantity('1/m', ge=0.0, le=0.01) | None,
+    rate: required('kg/s', 'how fast', also=CC_PER_S, gt=0.0, le=10.0)
+    rate_per_m: optional(
+        '1/m',
         'share of the rate that a metre of depth takes off while it pumps out, against the water',
-    ) = None
-    dead_band: meaning(
-        quantity('kg', also=CC, ge=0.0, le=1.0) | None, 'nearer than this to its goal it stops'
-    ) = None
-    noise: meaning(
-        quantity('kg', also=CC, ge=0.0, le=1.0) | None, 'standard deviation of where it says it is'
-    ) = None
+        ge=0.0,
+        le=0.01,
+    )
+    dead_band: optional('kg', 'nearer than this to its goal it stops', also=CC, ge=0.0, le=1.0)
+    noise: optional('kg', 'standard deviation of where it says it is', also=CC, ge=0.0, le=1.0)
 
 
 class HullSettings(Settings):
     """Outer shape, used where the hull breaks the surface."""
 
-    length: meaning(quantity('m', gt=0.1, le=20.0), 'of the hull')
-    diameter: meaning(quantity('m', gt=0.01, le=5.0), 'of the hull')
+    length: required('m', 'of the hull', gt=0.1, le=20.0)
+    diameter: required('m', 'of the hull', gt=0.01, le=5.0)
 
 
 class SteeringSettings(Settings):
@@ -149,5 +147,5 @@ class SteeringSettings(Settings):
     it has that of `glider_model.vehicle.steering`.
     """
 
-    dive: meaning(quantity('rad/s', ge=-1.0, le=1.0), 'in the dive, at 0.5 m/s')
-    climb: meaning(quantity('rad/s', ge=-1.0, le=1.0), 'in the climb')
+    dive: required('rad/s', 'in the dive, at 0.5 m/s', ge=-1.0, le=1.0)
+    climb: required('rad/s', 'in the climb', ge=-1.0, le=1.0)

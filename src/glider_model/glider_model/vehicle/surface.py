@@ -13,20 +13,16 @@ from typing import NamedTuple
 from glider_base.kernel import kernel
 from glider_base.settings import Settings
 from glider_base.slot import slot
-from glider_model.vehicle.quantity import meaning, quantity
+from glider_model.vehicle.quantity import optional, required
 
 
 class SurfaceSettings(Settings):
     """A steering surface: as far as it goes to each side, and how fast."""
 
-    range: meaning(quantity('deg', gt=0.0, le=90.0), 'as far as it turns to each side')
-    rate: meaning(quantity('deg/s', gt=0.0, le=180.0), 'how fast it turns')
-    dead_band: meaning(
-        quantity('deg', ge=0.0, le=20.0) | None, 'nearer than this to where it is sent it stops'
-    ) = None
-    noise: meaning(
-        quantity('deg', ge=0.0, le=20.0) | None, 'standard deviation of the angle that it says'
-    ) = None
+    range: required('deg', 'as far as it turns to each side', gt=0.0, le=90.0)
+    rate: required('deg/s', 'how fast it turns', gt=0.0, le=180.0)
+    dead_band: optional('deg', 'nearer than this to where it is sent it stops', ge=0.0, le=20.0)
+    noise: optional('deg', 'standard deviation of the angle that it says', ge=0.0, le=20.0)
 
     def params(self) -> NamedTuple:
         """Kernel parameters, of a type of its own, for `surface_loads`."""

@@ -18,25 +18,24 @@ from typing import NamedTuple
 
 from glider_base.kernel import kernel
 from glider_base.signals import SEA_WATER_DENSITY
-from glider_model.vehicle.quantity import meaning, quantity
+from glider_model.vehicle.quantity import optional, required
 from glider_model.vehicle.surface import SurfaceSettings, surface_loads
 
 
 class FinSettings(SurfaceSettings):
     """Tail fin."""
 
-    area: meaning(quantity('m^2', gt=0.0, le=1.0), 'of one side')
-    lift_slope: meaning(
-        quantity('1/rad', gt=0.0, le=round(2.0 * math.pi, 4)),
-        '6.13 A / (A + 2.25) by aspect ratio A',
+    area: required('m^2', 'of one side', gt=0.0, le=1.0)
+    lift_slope: required(
+        '1/rad', '6.13 A / (A + 2.25) by aspect ratio A', gt=0.0, le=round(2.0 * math.pi, 4)
     )
-    x: meaning(quantity('m', ge=-10.0, lt=0.0), 'where it is, ahead of the centre of buoyancy')
-    z: meaning(quantity('m', ge=-2.0, le=2.0) | None, 'the same below; on the x axis without') = (
-        None
-    )
-    turn_rate: meaning(
-        quantity('rad s/m^2', gt=0.0, le=100.0),
+    x: required('m', 'where it is, ahead of the centre of buoyancy', ge=-10.0, lt=0.0)
+    z: optional('m', 'the same below; on the x axis without', ge=-2.0, le=2.0)
+    turn_rate: required(
+        'rad s/m^2',
         'turn rate over sin(angle) and squared speed in a steady turn; control begins with it',
+        gt=0.0,
+        le=100.0,
     )
 
     def params(self) -> 'FinParams':
