@@ -7,18 +7,11 @@ from glider_base.frames import covariance_from_wire, odometry_from_wire
 from glider_base.kernel import kernel, replace
 from glider_base.signals import Battery, Health, Joints
 from glider_base.wiring import GUARD as WIRED
-from glider_guard.actuators import INITIAL_FOLLOWERS
-from glider_guard.ascent import INITIAL_ASCENT
-from glider_guard.depth import INITIAL_DEPTHS
-from glider_guard.guard import GuardParams, Heard, guard_step
-from glider_guard.health import INITIAL_HEALTH
+from glider_guard.guard import INITIAL_GUARD, GuardParams, Heard, guard_step
 from glider_guard.rows import HOLD, ORDERED, REACTIONS, reaction_of
 from glider_guard.rows import say as said_of
 from glider_guard.settings import GuardSettings
-from glider_guard.weight import INITIAL_WEIGHT
-from glider_guard.witness import INITIAL_WITNESS
 from glider_model.ocean.density import depth_at
-from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH
 from glider_model.vehicle.file import steers_by
 
 #: A change of what is told is told at most once in this time (ns).
@@ -55,18 +48,7 @@ def guard_surface(state):
 @kernel
 def guard_clear(state):
     """Forget what has latched, and how long anything has lasted."""
-    return replace(
-        state,
-        tick=0,
-        followers=INITIAL_FOLLOWERS,
-        witness=INITIAL_WITNESS,
-        depths=INITIAL_DEPTHS,
-        health=INITIAL_HEALTH,
-        weight=INITIAL_WEIGHT,
-        ascent=INITIAL_ASCENT,
-        fixes=INITIAL_FIX_WATCH,
-        told=0,
-    )
+    return replace(INITIAL_GUARD, taken=state.taken, command=state.command)
 
 
 def say(told: int) -> Said:

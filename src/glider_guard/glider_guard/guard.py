@@ -12,9 +12,10 @@ from typing import NamedTuple
 from glider_base.frames import euler_from_quaternion, rotate_to_ned
 from glider_base.kernel import kernel
 from glider_base.signals import SURFACE_TARGET, Battery, Covariance, Health, Joints, Odometry
-from glider_guard.actuators import ActuatorLimits, Followers, follow
+from glider_guard.actuators import INITIAL_FOLLOWERS, ActuatorLimits, Followers, follow
 from glider_guard.ascent import INITIAL_ASCENT, Ascent, AscentLimits, Rise, come_up
 from glider_guard.depth import (
+    INITIAL_DEPTHS,
     DepthLimits,
     Depths,
     Sounding,
@@ -24,7 +25,7 @@ from glider_guard.depth import (
     sound,
 )
 from glider_guard.fixes import fix_rows
-from glider_guard.health import HealthLimits, HealthState, check_health
+from glider_guard.health import INITIAL_HEALTH, HealthLimits, HealthState, check_health
 from glider_guard.rows import (
     BLIND,
     DROPS,
@@ -41,6 +42,7 @@ from glider_guard.rows import (
     row,
 )
 from glider_guard.weight import (
+    INITIAL_WEIGHT,
     Glide,
     Weight,
     WeightLimits,
@@ -52,6 +54,7 @@ from glider_guard.weight import (
 )
 from glider_guard.witness import (
     AFLOAT_M,
+    INITIAL_WITNESS,
     SURFACE_M,
     Shown,
     Witness,
@@ -60,8 +63,15 @@ from glider_guard.witness import (
     is_out,
     watch,
 )
-from glider_model.onboard.fix_watch import FixWatch, watch_fixes
-from glider_model.onboard.gate import GateParams, GateState, are_believed, gate_step, is_lost
+from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH, FixWatch, watch_fixes
+from glider_model.onboard.gate import (
+    INITIAL_GATE,
+    GateParams,
+    GateState,
+    are_believed,
+    gate_step,
+    is_lost,
+)
 
 
 class GuardParams(NamedTuple):
@@ -91,32 +101,38 @@ class Heard(NamedTuple):
     known: Covariance = Covariance(0.0, 0.0, 0.0)  #: of the place of the odometry (m^2)
 
 
+_REST = Joints(0.0, 0.0, 0.0, 0.0)
+
+
 class Taken(NamedTuple):
     """The last of it that could be believed, and the time since (s)."""
 
-    gate: GateState  #: odometry
-    demand: Joints
-    demand_s: float
-    joints: Joints
-    joints_s: float
-    target: float
-    target_s: float
+    gate: GateState = INITIAL_GATE  #: odometry
+    demand: Joints = _REST
+    demand_s: float = 0.0
+    joints: Joints = _REST
+    joints_s: float = 0.0
+    target: float = 0.0
+    target_s: float = 0.0
 
 
 class GuardState(NamedTuple):
     """The guard between two ticks."""
 
-    tick: int
-    taken: Taken
-    followers: Followers
-    witness: Witness
-    depths: Depths
-    health: HealthState
-    weight: Weight
-    ascent: Ascent
-    fixes: FixWatch
-    command: Joints  #: the last one
-    told: int  #: rows
+    tick: int = 0
+    taken: Taken = Taken()
+    followers: Followers = INITIAL_FOLLOWERS
+    witness: Witness = INITIAL_WITNESS
+    depths: Depths = INITIAL_DEPTHS
+    health: HealthState = INITIAL_HEALTH
+    weight: Weight = INITIAL_WEIGHT
+    ascent: Ascent = INITIAL_ASCENT
+    fixes: FixWatch = INITIAL_FIX_WATCH
+    command: Joints = _REST  #: the last one
+    told: int = 0  #: rows
+
+
+INITIAL_GUARD = GuardState()
 
 
 class GuardOutput(NamedTuple):

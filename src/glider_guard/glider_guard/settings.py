@@ -8,15 +8,14 @@ from pydantic import Field
 
 from glider_base.settings import Settings, derived, number, positive
 from glider_base.signals import Joints
-from glider_guard.actuators import INITIAL_FOLLOWERS, make_limits
-from glider_guard.ascent import INITIAL_ASCENT, AscentLimits
-from glider_guard.depth import INITIAL_DEPTHS, DepthLimits
-from glider_guard.guard import GuardParams, GuardState, Taken
-from glider_guard.health import INITIAL_HEALTH, HealthLimits
-from glider_guard.weight import ARRIVED, INITIAL_WEIGHT, WeightLimits
-from glider_guard.witness import INITIAL_WITNESS, WitnessLimits
-from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH
-from glider_model.onboard.gate import INITIAL_GATE, GateSettings
+from glider_guard.actuators import make_limits
+from glider_guard.ascent import AscentLimits
+from glider_guard.depth import DepthLimits
+from glider_guard.guard import INITIAL_GUARD, GuardParams, GuardState
+from glider_guard.health import HealthLimits
+from glider_guard.weight import ARRIVED, WeightLimits
+from glider_guard.witness import WitnessLimits
+from glider_model.onboard.gate import GateSettings
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.onboard.moving_mass import make_moving_mass
 from glider_model.vehicle.actuators import doubt
@@ -218,26 +217,4 @@ class GuardSettings(GuardLimitSettings):
 
     def initial_state(self) -> GuardState:
         """State before the first tick."""
-        rest = Joints(0.0, 0.0, 0.0, 0.0)
-        taken = Taken(
-            gate=INITIAL_GATE,
-            demand=rest,
-            demand_s=0.0,
-            joints=rest,
-            joints_s=0.0,
-            target=0.0,
-            target_s=0.0,
-        )
-        return GuardState(
-            tick=0,
-            taken=taken,
-            followers=INITIAL_FOLLOWERS,
-            witness=INITIAL_WITNESS,
-            depths=INITIAL_DEPTHS,
-            health=INITIAL_HEALTH,
-            weight=INITIAL_WEIGHT,
-            ascent=INITIAL_ASCENT,
-            fixes=INITIAL_FIX_WATCH,
-            command=rest,
-            told=0,
-        )
+        return INITIAL_GUARD

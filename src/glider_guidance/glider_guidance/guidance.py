@@ -27,6 +27,7 @@ from glider_guidance.path.curve import (
 )
 from glider_guidance.yo.end_of_path import WayLeft, way_left
 from glider_guidance.yo.machine import (
+    INITIAL_PROFILE,
     ProfileParams,
     ProfileState,
     coming_turn,
@@ -48,8 +49,8 @@ from glider_guidance.yo.stage import (
 from glider_guidance.yo.turns import time_to_turn, turn_lead_s
 from glider_model.onboard.attitude_filter import Measured, measure
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_angle
-from glider_model.onboard.fix_watch import FixWatch, contradictions, watch_fixes
-from glider_model.onboard.gate import GateParams, GateState, gate_step
+from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH, FixWatch, contradictions, watch_fixes
+from glider_model.onboard.gate import INITIAL_GATE, GateParams, GateState, gate_step
 from glider_model.onboard.glide_polar import (
     Polar,
     glide_alpha,
@@ -116,17 +117,17 @@ class Commanded(NamedTuple):
 class GuidanceState(NamedTuple):
     """Guidance between two ticks."""
 
-    tick: int
-    gate: GateState  #: the odometry that serves
-    profile: ProfileState
-    s: float  #: path parameter of the virtual target (m)
-    path_id: int  #: of the path that is followed
-    followed: Followed
-    water: WaterState
     method: NamedTuple  #: of the method that was chosen
-    commanded: Commanded
-    infeasible_ticks: int
-    fixes: FixWatch
+    followed: Followed
+    tick: int = 0
+    gate: GateState = INITIAL_GATE  #: the odometry that serves
+    profile: ProfileState = INITIAL_PROFILE
+    s: float = 0.0  #: path parameter of the virtual target (m)
+    path_id: int = 0  #: of the path that is followed
+    water: WaterState = WaterState(ObserverState(0.0, 0.0, 0.0, 0.0), 0.0)
+    commanded: Commanded = Commanded(Filtered(0.0, 0.0), Filtered(0.0, 0.0), 0.0)
+    infeasible_ticks: int = 0
+    fixes: FixWatch = INITIAL_FIX_WATCH
 
 
 class GuidanceOutput(NamedTuple):

@@ -12,16 +12,15 @@ from pydantic import Field
 from glider_base import plugins
 from glider_base.settings import TUNABLE, ConfigurationError, Settings, number, positive
 from glider_guidance import methods
-from glider_guidance.current_observer import ObserverParams, ObserverState
-from glider_guidance.guidance import Commanded, Followed, GuidanceParams, GuidanceState, WaterState
+from glider_guidance.current_observer import ObserverParams
+from glider_guidance.guidance import Followed, GuidanceParams, GuidanceState
 from glider_guidance.method import LosGains, MethodSettings
 from glider_guidance.order import Order
 from glider_guidance.path.settings import PathSettings, StraightPath
-from glider_guidance.yo.machine import INITIAL_PROFILE, ProfileSettings
+from glider_guidance.yo.machine import ProfileSettings
 from glider_model.onboard.attitude_filter import Measured
-from glider_model.onboard.command_filter import Filtered, FilterParams
-from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH
-from glider_model.onboard.gate import INITIAL_GATE, GateSettings
+from glider_model.onboard.command_filter import FilterParams
+from glider_model.onboard.gate import GateSettings
 from glider_model.onboard.glide_polar import glide_horizontal_speed, make_polar
 from glider_model.onboard.learnt_steering import SteeringLearningSettings
 from glider_model.vehicle.file import load_vehicle, vehicle_path
@@ -258,28 +257,5 @@ class GuidanceSettings(GuidanceLawSettings):
 
     def initial_state(self) -> GuidanceState:
         """State before the first tick."""
-        level = Filtered(0.0, 0.0)
-        return GuidanceState(
-            tick=0,
-            gate=INITIAL_GATE,
-            profile=INITIAL_PROFILE,
-            s=0.0,
-            path_id=0,
-            followed=Followed(
-                Measured(
-                    phi=0.0,
-                    theta=0.0,
-                    psi=0.0,
-                    phi_dot=0.0,
-                    theta_dot=0.0,
-                    psi_dot=0.0,
-                    vertical_rate=0.0,
-                ),
-                self.steering.initial_state(),
-            ),
-            water=WaterState(ObserverState(0.0, 0.0, 0.0, 0.0), 0.0),
-            method=self.chosen.initial_state(),
-            commanded=Commanded(level, level, 0.0),
-            infeasible_ticks=0,
-            fixes=INITIAL_FIX_WATCH,
-        )
+        followed = Followed(Measured(*(7 * (0.0,))), self.steering.initial_state())
+        return GuidanceState(self.chosen.initial_state(), followed)

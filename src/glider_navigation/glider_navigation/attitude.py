@@ -77,32 +77,25 @@ def make_turn(vehicle: Vehicle) -> Turn:
     return Turn(dive, climb, 0.0, 0.0, 0.0)
 
 
+_LEVEL = Angles(0.0, 0.0, 0.0)
+
+
 class AttitudeState(NamedTuple):
     """The last sample, and how it moves."""
 
-    sample: Angles
-    rates: Angles
-    balance: Angles  #: that the moving mass makes, the heading of no account
-    balance_then: Angles  #: that it made at the sample
     turn: Turn
-    age_s: float
-    seen: bool
-    dense: bool  #: it came soon after the one before
+    sample: Angles = _LEVEL
+    rates: Angles = _LEVEL
+    balance: Angles = _LEVEL  #: that the moving mass makes, the heading of no account
+    balance_then: Angles = _LEVEL  #: that it made at the sample
+    age_s: float = 0.0
+    seen: bool = False
+    dense: bool = False  #: it came soon after the one before
 
 
 def initial_attitude(vehicle: Vehicle) -> AttitudeState:
     """Nothing is measured yet."""
-    level = Angles(0.0, 0.0, 0.0)
-    return AttitudeState(
-        sample=level,
-        rates=level,
-        balance=level,
-        balance_then=level,
-        turn=make_turn(vehicle),
-        age_s=0.0,
-        seen=False,
-        dense=False,
-    )
+    return AttitudeState(make_turn(vehicle))
 
 
 class Attitude(NamedTuple):

@@ -57,37 +57,28 @@ class Uncertainty(NamedTuple):
     bb: float
 
 
+_STILL = Vector(0.0, 0.0)
+
+
 class CurrentBelief(NamedTuple):
     """What is believed of the current."""
 
-    mean: Vector  #: (m/s)
-    cos: Vector
-    sin: Vector
     p: Uncertainty
-    q: float  #: growth of the variance of the mean (m^2/s^3)
-    weight: float  #: ways that q was learnt from
-    glide: Vector  #: mean velocity through the water in the last way that was taken in (m/s)
-    way_s: float  #: its time; 0.0: none yet
-    carried: Vector  #: change of the current since then, by the drift at the surface (m/s)
-    gap_s: float  #: time since then for which nothing tells how the current has changed
+    mean: Vector = _STILL  #: (m/s)
+    cos: Vector = _STILL
+    sin: Vector = _STILL
+    q: float = FIRST_Q  #: growth of the variance of the mean (m^2/s^3)
+    weight: float = FIRST_WEIGHT  #: ways that q was learnt from
+    glide: Vector = _STILL  #: mean velocity through the water in the last way taken in (m/s)
+    way_s: float = 0.0  #: its time; 0.0: none yet
+    carried: Vector = _STILL  #: change of the current since, by the drift at the surface (m/s)
+    gap_s: float = 0.0  #: time since then for which nothing tells how the current has changed
 
 
 def initial_belief(tide: bool, mean_std: float = MEAN_STD) -> CurrentBelief:
     """Nothing is known yet, but how far the mean may be off (m/s)."""
-    still, tide2 = Vector(0.0, 0.0), TIDE_STD * TIDE_STD if tide else 0.0
-    p = Uncertainty(mm=mean_std * mean_std, ma=0.0, mb=0.0, aa=tide2, ab=0.0, bb=tide2)
-    return CurrentBelief(
-        mean=still,
-        cos=still,
-        sin=still,
-        p=p,
-        q=FIRST_Q,
-        weight=FIRST_WEIGHT,
-        glide=still,
-        way_s=0.0,
-        carried=still,
-        gap_s=0.0,
-    )
+    tide2 = TIDE_STD * TIDE_STD if tide else 0.0
+    return CurrentBelief(Uncertainty(mean_std * mean_std, 0.0, 0.0, tide2, 0.0, tide2))
 
 
 @kernel

@@ -43,28 +43,18 @@ class IntakeParams(NamedTuple):
 class IntakeState(NamedTuple):
     """The last that was believed, and the time since (s)."""
 
-    odometry: GateState
-    joints: Joints
-    imu: Imu
-    imu_s: float
-    depth: float
-    depth_s: float
-    seen: bool  #: there has been an attitude
-    sounded: bool  #: there has been a depth
-    refused_s: float  #: since something was refused
+    odometry: GateState = INITIAL_GATE
+    joints: Joints = Joints(0.0, 0.0, 0.0, 0.0)
+    imu: Imu = Imu(1.0, *(6 * (0.0,)), False)
+    imu_s: float = 0.0
+    depth: float = 0.0
+    depth_s: float = 0.0
+    seen: bool = False  #: there has been an attitude
+    sounded: bool = False  #: there has been a depth
+    refused_s: float = REFUSAL_TOLD_S  #: since something was refused
 
 
-INITIAL_INTAKE = IntakeState(
-    odometry=INITIAL_GATE,
-    joints=Joints(0.0, 0.0, 0.0, 0.0),
-    imu=Imu(q_w=1.0, q_x=0.0, q_y=0.0, q_z=0.0, p=0.0, q=0.0, r=0.0, has_rates=False),
-    imu_s=0.0,
-    depth=0.0,
-    depth_s=0.0,
-    seen=False,
-    sounded=False,
-    refused_s=REFUSAL_TOLD_S,
-)
+INITIAL_INTAKE = IntakeState()
 
 
 @kernel

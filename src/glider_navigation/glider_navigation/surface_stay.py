@@ -34,6 +34,10 @@ FARTHEST_STD, FARTHEST_M = 6.0, 100.0
 CONFIRMED_S, CONFIRMED_M, CONFIRMED_MPS = 10.0, 100.0, 1.5
 
 
+#: There is no fix that was set aside.
+NO_FIX_ASIDE = -1.0
+
+
 class Known(NamedTuple):
     """Covariance of where it came up (c), place now (p) and drift (v) (m^2, m^2/s, m^2/s^2)."""
 
@@ -65,11 +69,13 @@ class Stay(NamedTuple):
     fixes: int
     fixed_s: float  #: time of the last fix that counted
     aside: Vector  #: a fix that was set aside (m)
-    aside_s: float  #: when that was; `NO_FIX_ASIDE`: there is none
+    aside_s: float = NO_FIX_ASIDE  #: when that was; `NO_FIX_ASIDE`: there is none
 
 
-#: There is no fix that was set aside.
-NO_FIX_ASIDE = -1.0
+_STILL = Vector(0.0, 0.0)
+_NOWHERE = Stay(
+    0.0, _STILL, _STILL, _STILL, Known(*(6 * (0.0,))), Early(_STILL, 0.0, 0.0), 0, 0.0, _STILL
+)
 
 
 @kernel
@@ -77,18 +83,13 @@ def begin(place, variance, drift):
     """Come up at a place (m) that is known with a variance (m^2)."""
     vv = DRIFT_STD * DRIFT_STD
     known = Known(cc=variance, cp=variance, cv=0.0, pp=variance, pv=0.0, vv=vv)
-    early = Early(drift, vv, 0.0)
-    return Stay(
-        t_s=0.0,
+    return replace(
+        _NOWHERE,
         came_up=place,
         place=place,
         drift=drift,
         known=known,
-        early=early,
-        fixes=0,
-        fixed_s=0.0,
-        aside=Vector(0.0, 0.0),
-        aside_s=NO_FIX_ASIDE,
+        early=Early(drift, vv, 0.0),
     )
 
 
@@ -135,8 +136,8 @@ def take_fix(stay, fix):
     vv, early = k.vv - k_v * k.pv, stay.early
     if stay.t_s <= EARLY_S or stay.fixes == 0:
         early = Early(drift, vv, stay.t_s)
-    return Stay(
-        t_s=stay.t_s,
+    return replace(
+        stay,
         came_up=Vector(stay.came_up.n + k_c * off_n, stay.came_up.e + k_c * off_e),
         place=Vector(stay.place.n + k_p * off_n, stay.place.e + k_p * off_e),
         drift=drift,
@@ -151,7 +152,6 @@ def take_fix(stay, fix):
         early=early,
         fixes=stay.fixes + 1,
         fixed_s=stay.t_s,
-        aside=stay.aside,
         aside_s=NO_FIX_ASIDE,
     )
 
@@ -174,16 +174,14 @@ def _begin_at(stay, fix):
     t, drift, vv = stay.t_s, stay.drift, LOST_DRIFT_STD * LOST_DRIFT_STD
     variance = max(LEAST_VARIANCE, fix.variance)
     back = variance + t * t * (vv + DRIFT_WANDERS * t / 3.0)
-    return Stay(
-        t_s=t,
+    return replace(
+        stay,
         came_up=Vector(fix.p_n - t * drift.n, fix.p_e - t * drift.e),
         place=Vector(fix.p_n, fix.p_e),
-        drift=drift,
         known=Known(cc=back, cp=variance, cv=-t * vv, pp=variance, pv=0.0, vv=vv),
         early=Early(drift, vv, t),
         fixes=stay.fixes + 1,
         fixed_s=t,
-        aside=stay.aside,
         aside_s=NO_FIX_ASIDE,
     )
 

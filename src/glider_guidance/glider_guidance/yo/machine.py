@@ -151,28 +151,22 @@ def surfacing_every_dive(params):
 class ProfileState(NamedTuple):
     """Stage of the yo."""
 
-    stage: int
-    ticks: int  #: ticks in this stage
-    near_ticks: int  #: for which the bottom has been heard too near for this dive
-    dives: int  #: dives completed
-    aborted: bool
-    lead_up_s: float  #: lead of the turn at depth, as learnt from the last one; 0: none yet (s)
-    lead_down_s: float  #: lead of the upper turn
-    turn_depth: float  #: planned lower turn of this dive, or of the next; 0: none is to come (m)
-    depth: float  #: of a dive, when that was planned (m)
+    stage: int = SURFACE_PREPARATION
+    ticks: int = 0  #: ticks in this stage
+    near_ticks: int = 0  #: for which the bottom has been heard too near for this dive
+    dives: int = 0  #: dives completed
+    aborted: bool = False
+    lead_up_s: float = (
+        0.0  #: lead of the turn at depth, as learnt from the last one; 0: none yet (s)
+    )
+    lead_down_s: float = 0.0  #: lead of the upper turn
+    turn_depth: float = (
+        math.inf
+    )  #: planned lower turn of this dive, or of the next; 0: none is to come (m)
+    depth: float = math.inf  #: of a dive, when that was planned (m)
 
 
-INITIAL_PROFILE = ProfileState(
-    stage=SURFACE_PREPARATION,
-    ticks=0,
-    near_ticks=0,
-    dives=0,
-    aborted=False,
-    lead_up_s=0.0,
-    lead_down_s=0.0,
-    turn_depth=math.inf,
-    depth=math.inf,
-)
+INITIAL_PROFILE = ProfileState()
 #: Of a mission that does not end with its path.
 NO_END = WayLeft(math.inf, 0.0)
 

@@ -31,38 +31,27 @@ REMEMBERED = 0b111111
 MOST_M, MOST_MPS, MOST_M2 = 1e8, 10.0, 1e16
 
 
+_STILL, _NONE = Vector(0.0, 0.0), Covariance(0.0, 0.0, 0.0)
+
+
 class FixWatch(NamedTuple):
     """What is watched, between two ticks."""
 
-    is_under: bool
-    under_s: float  #: time under water since the last fix
-    is_fixed: bool  #: there was a fix in this stay at the surface
-    place: Vector  #: that was believed a tick before (m)
-    known: Covariance  #: of it (m^2)
-    jump: Vector  #: at the fix of this stay, over the time under water (m/s)
-    off: float  #: the same as a distance, squared, over its variance
-    drift: Vector  #: at the surface, last heard of (m/s)
-    drift_1: Vector  #: as the last dive but none began
-    drift_2: Vector  #: and the one before it
-    judged: int  #: surfacings
-    against: int  #: those of the last six that contradict, as bits
+    is_under: bool = False
+    under_s: float = 0.0  #: time under water since the last fix
+    is_fixed: bool = False  #: there was a fix in this stay at the surface
+    place: Vector = _STILL  #: that was believed a tick before (m)
+    known: Covariance = _NONE  #: of it (m^2)
+    jump: Vector = _STILL  #: at the fix of this stay, over the time under water (m/s)
+    off: float = 0.0  #: the same as a distance, squared, over its variance
+    drift: Vector = _STILL  #: at the surface, last heard of (m/s)
+    drift_1: Vector = _STILL  #: as the last dive but none began
+    drift_2: Vector = _STILL  #: and the one before it
+    judged: int = 0  #: surfacings
+    against: int = 0  #: those of the last six that contradict, as bits
 
 
-_STILL, _NONE = Vector(0.0, 0.0), Covariance(0.0, 0.0, 0.0)
-INITIAL_FIX_WATCH = FixWatch(
-    is_under=False,
-    under_s=0.0,
-    is_fixed=False,
-    place=_STILL,
-    known=_NONE,
-    jump=_STILL,
-    off=0.0,
-    drift=_STILL,
-    drift_1=_STILL,
-    drift_2=_STILL,
-    judged=0,
-    against=0,
-)
+INITIAL_FIX_WATCH = FixWatch()
 
 
 @kernel
@@ -124,15 +113,13 @@ def _dive(watch):
         is_against = judged > 0 and fast and watch.off > FAR
         against = ((against << 1) | (1 if is_against else 0)) & REMEMBERED
         under_s, judged = 0.0, judged + 1
-    return FixWatch(
+    return replace(
+        watch,
         is_under=True,
         under_s=under_s,
         is_fixed=False,
-        place=watch.place,
-        known=watch.known,
         jump=_STILL,
         off=0.0,
-        drift=watch.drift,
         drift_1=watch.drift,
         drift_2=watch.drift_1,
         judged=judged,

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 from pydantic import Field
 
 from glider_base.frames import OriginSettings, quaternion_from_euler, rotate_to_body
-from glider_base.kernel import kernel
+from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings, number
 from glider_base.signals import TICK_S, Joints, Odometry, Vector, Water, not_finite
 from glider_base.slot import default, slot
@@ -17,7 +17,7 @@ from glider_model.ocean.bottom import NO_BOTTOM, BathymetrySettings, aground, bo
 from glider_model.ocean.water import WaterSettings, with_wind
 from glider_model.plant.energy import FULL, Ledger, battery_of, spend
 from glider_model.plant.faults.body import acting, blown, felt, moved
-from glider_model.plant.faults.kinds import FaultParams, begun, summed
+from glider_model.plant.faults.kinds import FaultParams, NoFaultState, begun, summed
 from glider_model.plant.faults.sensing import remembered, told
 from glider_model.plant.faults.settings import FAULTS, Fault, fault_params, fault_state
 from glider_model.plant.health import health_of
@@ -65,25 +65,27 @@ class Surfacing(NamedTuple):
     silent_ticks: int  #: ticks since it was last out of the water, or since the start
 
 
+LAUNCHED = Surfacing(0, False, 0, 0)
+
+
 class PlantState(NamedTuple):
     """State of the plant at a tick."""
 
     motion: Motion
     joints: Joints
-    water: Water  #: water velocity during the tick that led here, with the drift of wind
-    tick: int
-    deep: bool  #: has been below where a dive counts since it was last above
-    dives: int  #: completed dives
-    surface_ticks: int  #: ticks at the surface without a break
-    afloat_ticks: int  #: those in which the pump was not filled; -1: has not dived yet
-    sample: Sample  #: what the sensors showed at the tick before
-    surfacing: Surfacing
-    faults: NamedTuple  #: NoFaultState, or FaultState
-    is_dropped: bool  #: the drop weight is gone
-    ledger: Ledger  #: energy taken out of the battery
-
-
-LAUNCHED = Surfacing(0, False, 0, 0)
+    water: Water = Water(
+        0.0, 0.0, 0.0
+    )  #: water velocity during the tick that led here, with the drift of wind
+    tick: int = 0
+    deep: bool = False  #: has been below where a dive counts since it was last above
+    dives: int = 0  #: completed dives
+    surface_ticks: int = 0  #: ticks at the surface without a break
+    afloat_ticks: int = -1  #: those in which the pump was not filled; -1: has not dived yet
+    sample: Sample = NO_SAMPLE  #: what the sensors showed at the tick before
+    surfacing: Surfacing = LAUNCHED
+    faults: NamedTuple = NoFaultState()  #: NoFaultState, or FaultState
+    is_dropped: bool = False  #: the drop weight is gone
+    ledger: Ledger = FULL  #: energy taken out of the battery
 
 
 class PlantParams(NamedTuple):
@@ -211,21 +213,7 @@ class PlantSettings(Settings):
             start.north_m, start.east_m, start.depth_m, *q, start.speed_mps, *(5 * (0.0,))
         )
         m_b = min(limit, max(-limit, start.net_heaviness_kg))
-        return PlantState(
-            motion=motion,
-            joints=Joints(m_b, 0.0, 0.0, 0.0),
-            water=Water(0.0, 0.0, 0.0),
-            tick=0,
-            deep=False,
-            dives=0,
-            surface_ticks=0,
-            afloat_ticks=-1,
-            sample=NO_SAMPLE,
-            surfacing=LAUNCHED,
-            faults=fault_state(self.faults),
-            is_dropped=False,
-            ledger=FULL,
-        )
+        return PlantState(motion, Joints(m_b, 0.0, 0.0, 0.0), faults=fault_state(self.faults))
 
 
 @kernel
@@ -233,21 +221,7 @@ def plant_odometry(state):
     """Where the vehicle is and how it moves: what it would measure without error."""
     x, water = state.motion, state.water
     u, v, w = rotate_to_body(x.q_w, x.q_x, x.q_y, x.q_z, water.v_n, water.v_e, water.v_d)
-    return Odometry(
-        p_n=x.p_n,
-        p_e=x.p_e,
-        p_d=x.p_d,
-        q_w=x.q_w,
-        q_x=x.q_x,
-        q_y=x.q_y,
-        q_z=x.q_z,
-        u=x.u + u,
-        v=x.v + v,
-        w=x.w + w,
-        p=x.p,
-        q=x.q,
-        r=x.r,
-    )
+    return Odometry(*replace(x, u=x.u + u, v=x.v + v, w=x.w + w))
 
 
 @kernel

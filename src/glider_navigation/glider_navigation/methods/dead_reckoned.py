@@ -105,38 +105,15 @@ class DeadReckonedSettings(NavigationMethodSettings):
 
     def initial_state(self, start: Start) -> 'DeadReckonedState':
         """At the surface, where the vehicle was put into the water."""
-        place, still = Vector(start.p_n, start.p_e), Vector(0.0, 0.0)
-        drift = Drift(still, math.inf)
-        way = Way(
-            begun=place,
-            variance=self.start_std_m**2,
-            drift=drift,
-            through=still,
-            believed=still,
-            forecast=still,
-            t_s=0.0,
-            cos_s=0.0,
-            sin_s=0.0,
-        )
+        place = Vector(start.p_n, start.p_e)
+        way = Way(place, self.start_std_m**2, Drift(_STILL, math.inf))
         stay = launched(place, self.start_std_m**2)
         current, trust = initial_belief(start.current == 'tidal'), Trust(1.0, 0.0)
         if start.current == 'forecast':
             current = initial_belief(False, start.forecast.error_std_mps)
             trust = Trust(1.0, start.forecast.share_std**2)
-        return DeadReckonedState(
-            tick=0,
-            attitude=initial_attitude(start.vehicle),
-            flight=INITIAL_FLIGHT,
-            under=False,
-            place=place,
-            way=way,
-            stay=stay,
-            current=current,
-            trust=trust,
-            column=still,
-            depth=0.0,
-            zero=INITIAL_ZERO,
-        )
+        attitude = initial_attitude(start.vehicle)
+        return DeadReckonedState(attitude, place, way, stay, current, trust)
 
 
 class DeadReckonedParams(NamedTuple):
@@ -158,35 +135,41 @@ class Drift(NamedTuple):
     variance: float  #: (m^2/s^2)
 
 
+_STILL = Vector(0.0, 0.0)
+
+
 class Way(NamedTuple):
     """The way under water since the last fix."""
 
     begun: Vector  #: where that was (m)
     variance: float  #: (m^2)
     drift: Drift  #: there
-    through: Vector  #: way through the water, and by drift where nothing fixed it (m)
-    believed: Vector  #: way by the current that was believed (m)
-    forecast: Vector  #: way by the current that was forecast (m)
-    t_s: float  #: time under water
-    cos_s: float  #: integrals of cos(w t) and sin(w t) over it (s)
-    sin_s: float
+    through: Vector = _STILL  #: way through the water, and by drift where nothing fixed it (m)
+    believed: Vector = _STILL  #: way by the current that was believed (m)
+    forecast: Vector = _STILL  #: way by the current that was forecast (m)
+    t_s: float = 0.0  #: time under water
+    cos_s: float = 0.0  #: integrals of cos(w t) and sin(w t) over it (s)
+    sin_s: float = 0.0
+
+
+_NO_WAY = Way(_STILL, 0.0, Drift(_STILL, 0.0))
 
 
 class DeadReckonedState(NamedTuple):
     """Dead reckoning between two ticks."""
 
-    tick: int
     attitude: AttitudeState
-    flight: Flight
-    under: bool  #: it is under water
     place: Vector  #: where the vehicle believes it is (m)
     way: Way
     stay: Stay
     current: CurrentBelief  #: beside what is believed of the forecast
     trust: Trust
-    column: Vector  #: mean of the forecast over the last way that told something (m/s)
-    depth: float  #: that was shown last (m)
-    zero: Zero  #: what is shown at the surface
+    tick: int = 0
+    flight: Flight = INITIAL_FLIGHT
+    under: bool = False  #: it is under water
+    column: Vector = _STILL  #: mean of the forecast over the last way that told something (m/s)
+    depth: float = 0.0  #: that was shown last (m)
+    zero: Zero = INITIAL_ZERO  #: what is shown at the surface
 
 
 @kernel
@@ -257,19 +240,8 @@ def _learn(current, trust, column, way, stay, params):
 def _dive(way, stay):
     """The way that begins with a dive: a new one, if the stay had a fix."""
     if stay.fixes > 0:
-        still = Vector(0.0, 0.0)
         drift = Drift(stay.drift, stay.known.vv)
-        return Way(
-            begun=stay.place,
-            variance=stay.known.pp,
-            drift=drift,
-            through=still,
-            believed=still,
-            forecast=still,
-            t_s=0.0,
-            cos_s=0.0,
-            sin_s=0.0,
-        )
+        return replace(_NO_WAY, begun=stay.place, variance=stay.known.pp, drift=drift)
     drifted = Vector(
         way.through.n + stay.place.n - stay.came_up.n,
         way.through.e + stay.place.e - stay.came_up.e,
