@@ -13,7 +13,7 @@ import numpy as np
 
 from glider_base.kernel import kernel
 from glider_base.signals import SEA_WATER_DENSITY
-from glider_model.ocean.columns import MAX_ROWS, check_depths, read_columns
+from glider_model.ocean.columns import MAX_ROWS, check_rows, read_columns
 from glider_model.ocean.density import SPECIFIC_WEIGHT, displacing, immersed
 
 #: Columns of a file: density, or what it follows from by TEOS-10.
@@ -90,23 +90,16 @@ def check_cast(rows: list[list[float]], names, source: str) -> None:
     ValueError
         Naming the source, the row and the column at fault.
     """
-    if not rows:
-        raise ValueError(f'{source}: no rows (allowed: at least 1)')
     names, columns = list(names), ('depth_m', 'density_kgpm3', 'temperature_degC')
-    limits = (None, DENSITY_RANGE, TEMPERATURE_RANGE)
+    check_rows(rows, names, source, columns, alike=True)
     for name, row in zip(names, rows, strict=True):
-        if len(row) not in (2, 3) or len(row) != len(rows[0]):
-            raise ValueError(
-                f'{source}: row {name}: {len(row)} columns (allowed: {", ".join(columns[:2])}, '
-                f'and optionally {columns[2]}; in all rows the same)'
-            )
-        for column, number, limit in zip(columns, row, limits, strict=False):
-            if limit and not limit[0] <= number <= limit[1]:
+        limits = zip(columns[1:], row[1:], (DENSITY_RANGE, TEMPERATURE_RANGE), strict=False)
+        for column, number, (least, most) in limits:
+            if not least <= number <= most:
                 raise ValueError(
                     f'{source}: row {name}, column {column} = {number!r} '
-                    f'(allowed: >= {limit[0]} and <= {limit[1]})'
+                    f'(allowed: >= {least} and <= {most})'
                 )
-    check_depths([row[0] for row in rows], names, source)
 
 
 def read_cast(path: Path) -> list[list[float]]:

@@ -68,23 +68,46 @@ def read_columns(
     return rows
 
 
-def check_depths(depths: list[float], names, source: str) -> None:
-    """Refuse depths (m) that do not increase; ``names`` are the numbers of their rows.
+def check_rows(
+    rows: list[list[float]], names, source: str, columns: tuple[str, ...], alike: bool = False
+) -> None:
+    """Refuse rows that cannot be interpolated.
+
+    Parameters
+    ----------
+    rows : list of list of float
+        Of numbers by the columns, of which the first is the depth (m) and the last may be missing.
+    names : sequence of int
+        Numbers of the rows.
+    source : str
+    columns : tuple of str
+    alike : bool
+        The last one is missing in all rows or in none.
 
     Raises
     ------
     ValueError
-        Naming the source, the row and the column.
+        Naming the source, the row and the column at fault.
     """
-    for i, depth in enumerate(depths):
-        where = f'{source}: row {names[i]}, column depth_m = {depth!r}'
-        if not 0.0 <= depth <= MAX_DEPTH_M:
+    if not rows:
+        raise ValueError(f'{source}: no rows (allowed: at least 1)')
+    allowed = f'{", ".join(columns[:-1])}, and optionally {columns[-1]}'
+    allowed += '; in all rows the same' if alike else ''
+    above, before = None, -math.inf
+    for name, row in zip(names, rows, strict=True):
+        where = f'{source}: row {name}'
+        if not len(columns) - 1 <= len(row) <= len(columns) or (
+            alike and len(row) != len(rows[0])
+        ):
+            raise ValueError(f'{where}: {len(row)} columns (allowed: {allowed})')
+        where += f', column depth_m = {row[0]!r}'
+        if not 0.0 <= row[0] <= MAX_DEPTH_M:
             raise ValueError(f'{where} (allowed: >= 0.0 and <= {MAX_DEPTH_M})')
-        if i > 0 and depth <= depths[i - 1]:
+        if row[0] <= before:
             raise ValueError(
-                f'{where}: depths must increase '
-                f'(allowed: > {depths[i - 1]!r}, the depth of row {names[i - 1]})'
+                f'{where}: depths must increase (allowed: > {before!r}, the depth of row {above})'
             )
+        above, before = name, row[0]
 
 
 def _number(text: str, where: str) -> float:

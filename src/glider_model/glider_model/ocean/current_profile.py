@@ -5,7 +5,7 @@
 import math
 from pathlib import Path
 
-from glider_model.ocean.columns import check_depths, read_columns
+from glider_model.ocean.columns import check_rows, read_columns
 
 #: No component may be faster than this (m/s); the swiftest ocean currents reach about 2.5 m/s.
 MAX_SPEED_MPS = 3.0
@@ -29,18 +29,10 @@ def check_profile(rows: list[list[float]], names, source: str) -> None:
     ValueError
         Naming the source, the row and the column at fault.
     """
-    if not rows:
-        raise ValueError(f'{source}: no rows (allowed: at least 1)')
     names = list(names)
-    for i, row in enumerate(rows):
-        where = f'{source}: row {names[i]}'
-        if len(row) not in (3, 4):
-            raise ValueError(
-                f'{where}: {len(row)} columns (allowed: {", ".join(_COLUMNS[:3])}, '
-                f'and optionally {_COLUMNS[3]})'
-            )
-        check_depths([one[0] for one in rows[: i + 1]][-2:], names[max(0, i - 1) : i + 1], source)
-        check_speed(math.hypot(*row[1:]), where)
+    check_rows(rows, names, source, _COLUMNS)
+    for name, row in zip(names, rows, strict=True):
+        check_speed(math.hypot(*row[1:]), f'{source}: row {name}')
 
 
 def read_profile(path: Path) -> list[list[float]]:

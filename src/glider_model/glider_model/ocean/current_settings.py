@@ -56,7 +56,18 @@ class _Packed(NamedTuple):
     seed_offset: int = 0
 
 
-class _Flow(Settings):
+class _Component(Settings):
+    """Part of a current."""
+
+    def resolved(self, course_rad: float):
+        """Copy that needs no path; itself, of one that has no direction.
+
+        ``course_rad`` is the course of its first leg (rad, clockwise from north).
+        """
+        return self
+
+
+class _Flow(_Component):
     """A horizontal velocity, as a speed and the direction the water flows towards."""
 
     speed_kn: float | None = number(
@@ -93,44 +104,27 @@ class _Flow(Settings):
                 )
 
     def resolved(self, course_rad: float):
-        """Copy with the speed in m/s and the direction clockwise from north.
-
-        Parameters
-        ----------
-        course_rad : float
-            Course of the first leg of the path (rad, clockwise from north).
-        """
+        """Copy with the speed in m/s and the direction clockwise from north."""
         if not self._has_flow():
             return self
-        speed, direction = self.speed_mps, self.direction_deg
-        if speed is None:
-            speed = self.speed_kn * KNOT_MPS
+        direction = self.direction_deg
         if direction is None:
             direction = (math.degrees(course_rad) + self.angle_deg) % 360.0
-        return self.model_copy(
-            update={
-                'speed_kn': None,
-                'speed_mps': speed,
-                'angle_deg': None,
-                'direction_deg': direction,
-            }
-        )
+        absolute = {'speed_mps': self._speed_mps, 'direction_deg': direction}
+        return self.model_copy(update={'speed_kn': None, 'angle_deg': None, **absolute})
+
+    @property
+    def _speed_mps(self) -> float:
+        return self.speed_kn * KNOT_MPS if self.speed_mps is None else self.speed_mps
 
     def _north_east(self) -> tuple[float, float]:
-        """Velocity as its north and east parts (m/s).
-
-        Raises
-        ------
-        ValueError
-            If the direction is relative to a path that is not known here.
-        """
+        """Velocity as its north and east parts (m/s)."""
         if self.direction_deg is None:
             raise ValueError(
                 f'angle_deg = {self.angle_deg!r} is relative to the path: '
                 'call resolved(course_rad) first, or give direction_deg'
             )
-        speed = self.speed_mps if self.speed_mps is not None else self.speed_kn * KNOT_MPS
-        direction = math.radians(self.direction_deg)
+        speed, direction = self._speed_mps, math.radians(self.direction_deg)
         return speed * math.cos(direction), speed * math.sin(direction)
 
 
@@ -177,7 +171,7 @@ class ShearCurrent(_FlowComponent):
         return _Packed(EXPONENTIAL_SHEAR, (north, east, self.depth_m))
 
 
-class TableCurrent(Settings):
+class TableCurrent(_Component):
     """A measured profile: velocity by depth, linear between rows and held beyond the ends.
 
     A file is read when the settings are validated and lives on as ``rows``, so that validated
@@ -217,10 +211,6 @@ class TableCurrent(Settings):
         check_profile(self.rows, range(1, len(self.rows) + 1), 'rows')
         return self
 
-    def resolved(self, course_rad: float):
-        """Return itself: the table is in north and east."""
-        return self
-
     def _pack(self) -> _Packed:
         return _Packed(TABLE, rows=tuple((*row, 0.0)[:4] for row in self.rows))
 
@@ -244,7 +234,7 @@ class TidalCurrent(_FlowComponent):
         return _Packed(TIDAL, (north, east, *minor, rate, math.radians(self.phase_deg)))
 
 
-class GaussMarkovCurrent(Settings):
+class GaussMarkovCurrent(_Component):
     """Random velocity of zero mean and exponential autocorrelation, north and east independent."""
 
     kind: Literal['gauss_markov']
@@ -257,10 +247,6 @@ class GaussMarkovCurrent(Settings):
     seed_offset: int = number(
         0, (0, 2**31 - 1), 'Chooses another random history under the same seed (1).'
     )
-
-    def resolved(self, course_rad: float):
-        """Return itself: it has no direction."""
-        return self
 
     def _pack(self) -> _Packed:
         numbers = (self.std_mps, self.time_constant_s)
@@ -306,7 +292,7 @@ class CurrentStep(_Flow):
         return (self.at_s, *self._north_east(), 0.0)
 
 
-class StepsCurrent(Settings):
+class StepsCurrent(_Component):
     """A scripted current: constant from step to step, still water before the first."""
 
     kind: Literal['steps']
@@ -383,17 +369,7 @@ class SumOfCurrents(_Flow):
     def resolved(self, course_rad: float, mission: Mission | None = None) -> 'SumOfCurrents':
         """Copy that needs no path: every angle absolute, every speed in m/s.
 
-        Parameters
-        ----------
-        course_rad : float
-            Course of the first leg of the path (rad, clockwise from north).
-        mission : Mission, optional
-            Where and when it is flown, which a field by place may have to know.
-
-        Returns
-        -------
-        SumOfCurrents
-            With ``direction_deg`` and ``speed_mps`` in place of ``angle_deg`` and ``speed_kn``.
+        ``mission`` is where and when it is flown, which a field by place may have to know.
         """
         components = [component.resolved(course_rad) for component in self.components]
         field = self.field.resolved(mission) if self.field and mission else self.field
