@@ -22,7 +22,7 @@ from glider_base.settings import ConfigurationError
 from glider_bringup.scoring.card import finite, fly_scored, scorecard
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.scenario import Scenario, load_scenario
-from glider_model.ocean.current_profile import MAX_SPEED_MPS
+from glider_model.ocean.current_settings import MAX_SPEED_MPS
 from glider_model.vehicle.file import load_vehicle, vehicle_names
 from glider_studies.random_faults import sample_faults
 

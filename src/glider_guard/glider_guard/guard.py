@@ -24,10 +24,11 @@ from glider_guard.depth import (
     sinking_rate,
     sound,
 )
-from glider_guard.fixes import fix_rows
 from glider_guard.health import INITIAL_HEALTH, HealthLimits, HealthState, check_health
 from glider_guard.rows import (
+    ASTRAY,
     BLIND,
+    CONTRADICTED,
     DROPS,
     HOLDS,
     LATCHED,
@@ -63,7 +64,7 @@ from glider_guard.witness import (
     is_out,
     watch,
 )
-from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH, FixWatch, watch_fixes
+from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH, FixWatch, contradictions, watch_fixes
 from glider_model.onboard.gate import (
     INITIAL_GATE,
     GateParams,
@@ -72,6 +73,9 @@ from glider_model.onboard.gate import (
     gate_step,
     is_lost,
 )
+
+#: So many of the last six surfacings end the mission, whose fixes contradict navigation.
+TOO_MANY = 2
 
 
 class GuardParams(NamedTuple):
@@ -178,6 +182,15 @@ def _intake_rows(taken, params):
     lost = is_lost(taken.gate, params.gate) or taken.joints_s > hold_s or taken.target_s > hold_s
     told = row(ORDERED, taken.target <= SURFACE_TARGET) | row(LOST, lost)
     return told | row(NO_DEMAND, taken.demand_s > hold_s)
+
+
+@kernel
+def fix_rows(watch):
+    """Rows that hold by a `FixWatch`."""
+    count = contradictions(watch)
+    if count >= TOO_MANY:
+        return CONTRADICTED | ASTRAY
+    return CONTRADICTED if count > 0 else 0
 
 
 @kernel

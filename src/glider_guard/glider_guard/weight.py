@@ -133,12 +133,8 @@ def sinks_on_m(rate, weight, m_b, is_pumped, limits):
 def led_rate(state, theta, m_b, limits):
     """Vertical rate (m/s, + down) of the steady glide that pitch (rad) and pump (kg) make.
 
-    Returns
-    -------
-    float
-        Down for a vehicle that is heavy, up for one that is light, wherever its nose points.
-    bool
-        Whether it points there: a glide.
+    Down for a vehicle that is heavy, up for one that is light, wherever its nose points; and
+    whether it points there: a glide.
     """
     weight = m_b + limits.ballast + state.off
     rate = abs(glide_vertical_rate(theta, weight, limits.polar))

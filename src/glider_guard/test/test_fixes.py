@@ -8,7 +8,7 @@ import pytest
 
 from glider_base.signals import Covariance, Odometry
 from glider_guard import rows
-from glider_guard.fixes import fix_rows
+from glider_guard.guard import fix_rows
 from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH, watch_fixes
 
 WAY_S, STAY_S, STD_M = 5000, 600, 100.0

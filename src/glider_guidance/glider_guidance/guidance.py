@@ -383,14 +383,9 @@ def observe(state, place, leg, params, dt):
 
 @kernel
 def refer(state, place, doing, asked, aborted, params, dt):
-    """What control is asked for, and the virtual target a tick later.
+    """What control is asked for, and the path parameter (m) of the virtual target a tick later.
 
-    Returns
-    -------
-    Commanded
-    s : float
-        Path parameter of the virtual target (m).
-    Reference
+    `Commanded`, the parameter and `Reference`.
     """
     pitch_target, rate_target = doing.pitch, doing.rate
     if place.follows_path and not aborted:

@@ -98,13 +98,8 @@ def check_orders(
 ) -> None:
     """Refuse orders of a mission that make no sense one after the other.
 
-    Parameters
-    ----------
-    settings : GuidanceSettings
-        Before the first of them.
-    orders : iterable of Order
-    name : str
-        What an order is called, by its number.
+    ``settings`` are those before the first of them, ``name`` is what one is called by its
+    number.
 
     Raises
     ------

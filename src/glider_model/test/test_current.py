@@ -12,8 +12,12 @@ from hypothesis import strategies as st
 
 from glider_base.kernel import kernel
 from glider_model.ocean.current import current_initial, current_step
-from glider_model.ocean.current_profile import MAX_SPEED_MPS
-from glider_model.ocean.current_settings import KNOT_MPS, M2_PERIOD_S, CurrentSettings
+from glider_model.ocean.current_settings import (
+    KNOT_MPS,
+    M2_PERIOD_S,
+    MAX_SPEED_MPS,
+    CurrentSettings,
+)
 
 DT = 0.1
 quick = settings(max_examples=50)

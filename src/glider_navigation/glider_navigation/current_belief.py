@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from glider_base.kernel import kernel, replace
 from glider_base.signals import Vector
-from glider_model.ocean.current_profile import MAX_SPEED_MPS
+from glider_model.ocean.current_settings import MAX_SPEED_MPS
 
 #: Principal lunar tide M2 (rad/s).
 TIDE = 2.0 * math.pi / (12.4206012 * 3600.0)
@@ -144,24 +144,12 @@ def _bounded(current):
 
 @kernel
 def take_in(belief, off, h, way_s, glide, variance, bias):
-    """What is believed after a way.
+    """What is believed after a way of ``way_s`` s under water; ``belief`` is that before it.
 
-    Parameters
-    ----------
-    belief : CurrentBelief
-        Before the way.
-    off : Vector
-        Mean current over the way less what was believed (m/s).
-    h : Regressors
-    way_s : float
-        Time under water (s).
-    glide : Vector
-        Mean velocity through the water (m/s).
-    variance : float
-        Of the measured mean, by that of the fixes (m^2/s^2).
-    bias : float
-        Variance of what speed and compass errors seem to be of current, and was not in the way
-        before (m^2/s^2).
+    ``off`` is the mean current over the way less what was believed (m/s), ``h`` its
+    `Regressors`, ``glide`` the mean velocity through the water (m/s). ``variance`` (m^2/s^2)
+    is that of the measured mean, by that of the fixes; ``bias`` that of what speed and
+    compass errors seem to be of current, and was not in the way before.
     """
     wander = wandered(belief, way_s)
     p = belief.p

@@ -37,14 +37,14 @@ class PathParams(NamedTuple):
     knots: np.ndarray  #: float64[n + 1], s at the ends of the pieces (m), from 0
     #: float64[n, 3, 4], NED (m) by powers 0..3 of s - knots[i]; cubic only
     coefficients: np.ndarray
-    centre_n: float  #: axis of the helix (m)
-    centre_e: float  #: (m)
-    start_d: float  #: depth where the helix starts (m)
-    radius: float  #: of the helix (m)
-    bearing: float  #: from the axis to the start of the helix (rad, clockwise from north)
-    turn: float  #: sense of the helix, seen from above: +1 clockwise, -1 counterclockwise
-    slope: float  #: descent angle of the helix (rad, + down)
     ways: np.ndarray  #: float64[n + 1], horizontal way along the path at the knots (m), from 0
+    centre_n: float = 0.0  #: axis of the helix (m)
+    centre_e: float = 0.0  #: (m)
+    start_d: float = 0.0  #: depth where the helix starts (m)
+    radius: float = 0.0  #: of the helix (m)
+    bearing: float = 0.0  #: from the axis to the start of the helix (rad, clockwise from north)
+    turn: float = 0.0  #: sense of the helix, seen from above: +1 clockwise, -1 counterclockwise
+    slope: float = 0.0  #: descent angle of the helix (rad, + down)
 
 
 @kernel

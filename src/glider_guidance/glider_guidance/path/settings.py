@@ -33,13 +33,6 @@ def _cubic_params(knots: np.ndarray, coefficients: np.ndarray) -> PathParams:
         knots=knots,
         coefficients=np.ascontiguousarray(coefficients, dtype=float),
         ways=_horizontal_ways(knots, coefficients),
-        centre_n=0.0,
-        centre_e=0.0,
-        start_d=0.0,
-        radius=0.0,
-        bearing=0.0,
-        turn=0.0,
-        slope=0.0,
     )
 
 
@@ -106,17 +99,9 @@ class _PathSettings(Settings):
         return math.atan2(de, dn)
 
     def points(self, n: int) -> np.ndarray:
-        """Sample the path for display, every waypoint included.
+        """Sample the path for display, every waypoint included: float64[n or more, 3] (m, NED).
 
-        Parameters
-        ----------
-        n : int
-            Number of points; a path with more waypoints than this gives its waypoints.
-
-        Returns
-        -------
-        float64[max(n, number of waypoints), 3]
-            (m, NED)
+        A path with more waypoints than ``n`` gives its waypoints.
         """
         params, corners = self.params(), self._corners()
         lengths = np.diff(corners)

@@ -29,25 +29,12 @@ class WayLeft(NamedTuple):
 
 @kernel
 def way_left(s, e1, speed, current_n, current_e, enough_s, path):
-    """Way left from a position to the end of a path.
+    """Way left from a position to the end of a path: `WayLeft`.
 
-    Parameters
-    ----------
-    s : float
-        Parameter of the virtual target (m).
-    e1 : float
-        By how much the vehicle is ahead of it (m).
-    speed : float
-        Horizontal speed through the water in a glide (m/s).
-    current_n, current_e : float
-        Current (m/s).
-    enough_s : float
-        More than this (s) is told as infinite: legs that are far away are not looked at.
-    path : PathParams
-
-    Returns
-    -------
-    WayLeft
+    ``s`` (m) is the parameter of the virtual target, ``e1`` (m) by how much the vehicle is
+    ahead of it, ``speed`` (m/s) the horizontal one through the water in a glide; the current
+    is in m/s. More than ``enough_s`` (s) is told as infinite: legs that are far away are not
+    looked at.
     """
     first, _ = path_piece(s, path)
     begin, before, glide_s, drift = s, e1, 0.0, 0.0
@@ -76,25 +63,11 @@ def shallowest_dive(params):
 
 @kernel
 def next_dive(left, depth, surfaced, lead_s, dives, params):
-    """Depth of the lower turn of the dive to come, so that the last one ends with the path.
+    """Depth (m) of the lower turn of the dive to come, so that the last one ends with the path.
 
-    Parameters
-    ----------
-    left : WayLeft
-    depth : float
-        Where the vehicle is: rising to the upper turn, or at the surface (m).
-    surfaced : bool
-        The dive begins at the surface.
-    lead_s : float
-        Lead of a turn (s).
-    dives : int
-        Dives begun so far.
-    params : ProfileParams
-
-    Returns
-    -------
-    float
-        (m); 0.0 if no dive is to come.
+    0.0 if no dive is to come. ``depth`` (m) is where the vehicle is: rising to the upper
+    turn, or at the surface, if the dive begins there (``surfaced``). ``lead_s`` (s) is the
+    lead of a turn, ``dives`` were begun so far.
     """
     if math.isinf(left.glide_s):
         return params.depth

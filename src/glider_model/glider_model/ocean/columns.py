@@ -21,11 +21,7 @@ def read_columns(
 ) -> list[tuple[int, dict[str, float]]]:
     """Rows of a CSV file with a header: line of the file, and numbers by column.
 
-    Parameters
-    ----------
-    path : Path
-    known, needed : tuple of str
-        Columns that there may be, and those of them that there must be.
+    There may be the columns that are known, and must be those that are needed.
 
     Raises
     ------

@@ -18,7 +18,7 @@ from glider_base import plugins
 from glider_base.noise import random_stream
 from glider_base.settings import Settings, number
 from glider_model.ocean import fields
-from glider_model.ocean.columns import MAX_DEPTH_M, MAX_ROWS
+from glider_model.ocean.columns import MAX_DEPTH_M, MAX_ROWS, check_rows, read_columns
 from glider_model.ocean.current import (
     CONSTANT,
     EXPONENTIAL_SHEAR,
@@ -31,20 +31,54 @@ from glider_model.ocean.current import (
     CurrentState,
     current_initial,
 )
-from glider_model.ocean.current_profile import (
-    MAX_SPEED_MPS,
-    check_profile,
-    check_speed,
-    read_profile,
-)
 from glider_model.ocean.field import FieldSettings, Mission, NoField
 
+#: No component may be faster than this (m/s); the swiftest ocean currents reach about 2.5 m/s.
+MAX_SPEED_MPS = 3.0
+
+_COLUMNS = ('depth_m', 'north_mps', 'east_mps', 'down_mps')
 #: One international knot (m/s).
 KNOT_MPS = 1852.0 / 3600.0
 #: Components of a current: each is looked at in every tick.
 MAX_COMPONENTS = 100
 #: Period of the principal lunar semidiurnal tide M2, 12.4206 h (s).
 M2_PERIOD_S = 12.4206 * 3600.0
+
+
+def check_speed(speed_mps: float, where: str) -> None:
+    """Refuse, by a ValueError that names the place ``where``, a speed that no water has."""
+    if speed_mps > MAX_SPEED_MPS:
+        raise ValueError(
+            f'{where}: the speed is {speed_mps:.3f} m/s (allowed: <= {MAX_SPEED_MPS} m/s)'
+        )
+
+
+def check_profile(rows: list[list[float]], names, source: str) -> None:
+    """Refuse a profile that cannot be interpolated; ``names`` are the numbers of its rows.
+
+    Raises
+    ------
+    ValueError
+        Naming the source, the row and the column at fault.
+    """
+    names = list(names)
+    check_rows(rows, names, source, _COLUMNS)
+    for name, row in zip(names, rows, strict=True):
+        check_speed(math.hypot(*row[1:]), f'{source}: row {name}')
+
+
+def read_profile(path: Path) -> list[list[float]]:
+    """Read and check a current profile.
+
+    Raises
+    ------
+    ValueError
+        Naming the file, and the column and row (line of the file) at fault.
+    """
+    found = read_columns(path, _COLUMNS, _COLUMNS[:3])
+    rows = [list(row.values()) for _, row in found]
+    check_profile(rows, [number for number, _ in found], f'file {path}')
+    return rows
 
 
 class _Packed(NamedTuple):

@@ -86,24 +86,13 @@ def immersed(depth, m_b, vehicle, params):
 
 @kernel
 def displacing(m_b, volume, compressibility, warmer, ratio, depth, vehicle):
-    """What a vehicle of a volume weighs: Merckelbach et al. (2019).
+    """What a vehicle of a volume weighs, `Immersed`: Merckelbach et al. (2019).
 
     m_net = m - rho (V (1 - eps P + a_T (T - T_0)) + V_b),  V_b = -m_b / rho_0,  P over the surface
 
-    Parameters
-    ----------
-    m_b, depth, vehicle
-        As of `immersed`.
-    volume, compressibility : float
-        V (m^3) at the surface and at T_0, eps (1/Pa).
-    warmer : float
-        T - T_0 (K).
-    ratio : float
-        rho / rho_0 (-), rho_0 = `SEA_WATER_DENSITY`.
-
-    Returns
-    -------
-    Immersed
+    The volume V (m^3) is that at the surface and at T_0, the compressibility eps in 1/Pa,
+    ``warmer`` T - T_0 (K), the ratio rho / rho_0 with rho_0 = `SEA_WATER_DENSITY`; the rest
+    is as of `immersed`.
     """
     pressure = SPECIFIC_WEIGHT * max(depth, 0.0)
     stretch = 1.0 - compressibility * pressure + vehicle.thermal_expansion * warmer

@@ -222,22 +222,12 @@ def _normalised(x):
 
 @kernel
 def integrate(motion, start, end, current, water_rate, params, dt, steps):
-    """Integrate a motion over ``dt`` s while the actuators go evenly from start to end.
+    """Integrate a motion over ``dt`` s, in steps of equal length.
 
-    Exponential RK4 for p, q and r with the poles of their damping at the start; the classical RK4
-    for all else.
-
-    Parameters
-    ----------
-    steps : int
-        Steps of equal length.
-
-    Returns
-    -------
-    Motion
-    float
-        Error of the worst step (J): the energy of what the four stages disagree about,
-        h / 6 (k_1 - k_2 - k_3 + k_4), which shrinks with the third power of the step.
+    The actuators go evenly from start to end. Exponential RK4 for p, q and r with the poles
+    of their damping at the start; the classical RK4 for all else. Comes with the error of the
+    worst step (J): the energy of what the four stages disagree about, h / 6 (k_1 - k_2 - k_3
+    + k_4), which shrinks with the third power of the step.
     """
     vehicle, density = params.vehicle, params.density
     h = dt / steps

@@ -20,9 +20,8 @@ from glider_model.plant.faults.body import acting, blown, felt, moved
 from glider_model.plant.faults.kinds import FaultParams, NoFaultState, begun, summed
 from glider_model.plant.faults.sensing import remembered, told
 from glider_model.plant.faults.settings import FAULTS, Fault, fault_params, fault_state
-from glider_model.plant.health import health_of
 from glider_model.plant.motion import Motion, integrate
-from glider_model.plant.readings import Readings, make_readings, read
+from glider_model.plant.readings import Readings, health_of, make_readings, read
 from glider_model.plant.sensors import (
     ANTENNA_M,
     NO_SAMPLE,

@@ -1,6 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where actuators say that they are: their positions with noise, a function of (seed, tick)."""
+"""What the vehicle says of itself: where its actuators are, and how it is.
+
+Positions have noise, a function of (seed, tick). The hull has no model of its own: without faults
+it is as it was at the start.
+"""
 
 from typing import NamedTuple
 
@@ -8,10 +12,13 @@ import numpy as np
 
 from glider_base.kernel import kernel
 from glider_base.noise import normal_pair, random_stream
-from glider_base.signals import Joints
+from glider_base.signals import TICK_S, Health, Joints
 
 #: Sets this stream apart from those of the sensors and of the current.
 _STREAM_OFFSET, _STREAM = 2**32, 3
+#: Pressure in a closed hull below that of the air (Pa): 7 inches of mercury, in the middle of what
+#: a Slocum accepts (4 to 12).
+VACUUM_PA = 23700.0
 
 
 class Readings(NamedTuple):
@@ -45,3 +52,9 @@ def read(joints, tick, params):
         return joints
     n = noise_of_readings(tick, params)
     return Joints(joints.m_b + n.m_b, joints.x_p + n.x_p, joints.mu + n.mu, joints.delta + n.delta)
+
+
+@kernel
+def health_of(state):
+    """What the health sensors of a vehicle say at a tick (`Health`), all well but for contact."""
+    return Health(0.0, VACUUM_PA, state.surfacing.silent_ticks * TICK_S)

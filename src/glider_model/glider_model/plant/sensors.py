@@ -40,9 +40,8 @@ from glider_base.kernel import kernel, replace
 from glider_base.noise import normal_pair, random_stream, uniform
 from glider_base.settings import Settings, derived, number
 from glider_base.signals import TICK_S, Imu, Odometry
-from glider_base.wiring import NO_ECHO, SENSORS
+from glider_base.wiring import ALTIMETER_REACH_M, NO_ECHO, SENSORS
 from glider_model.ocean.density import pressure_at
-from glider_model.plant.altimeter import AltimeterParams, echo
 
 #: Sets the streams of the sensors apart from those of the current, whose offsets are smaller.
 _STREAM_OFFSET = 2**32
@@ -182,6 +181,15 @@ class GpsParams(NamedTuple):
     missed_bits: int  #: pattern of surfacings without a fix, and its length
     missed_count: int
     origin: Origin
+
+
+class AltimeterParams(NamedTuple):
+    """The altimeter as the kernels see it."""
+
+    is_fitted: bool
+    std: float  #: (m)
+    period_ticks: int  #: from one echo to the next
+    stream: np.uint64  #: start of the random stream
 
 
 class SensorParams(NamedTuple):
@@ -335,6 +343,17 @@ def _is_sampled(tick, params):
 
 
 @kernel
+def echo(height, tick, params):
+    """Measured height over the bottom, of a true one (m), as a float32; `NO_ECHO` out of reach."""
+    if params.std > 0.0:
+        noise, _ = normal_pair(params.stream, np.uint64(tick))
+        height += params.std * noise
+    if height < ALTIMETER_REACH_M[0] or height > ALTIMETER_REACH_M[1]:
+        return NO_ECHO
+    return float(np.float32(height))
+
+
+@kernel
 def take_sample(
     measured: Odometry, height: float, sample: Sample, tick: int, params: SensorParams
 ) -> Sample:
@@ -379,26 +398,11 @@ def _take_fix(odometry, out_ticks, surfacings, tick, params):
 def sense(odometry, height, joints, sample, out_ticks, surfacings, tick, params):
     """What the vehicle measures at a tick, for the topics of the plant.
 
-    Parameters
-    ----------
-    odometry : Odometry
-        Where the vehicle is.
-    height : float
-        Over the bottom (m).
-    joints : Joints
-        Where the actuators are.
-    sample : Sample
-        That of the tick before.
-    out_ticks, surfacings : int
-        Ticks with the antenna out of the water without a break; surfacings so far.
-    tick : int
-    params : SensorParams
-
-    Returns
-    -------
-    tuple of tuple of float
-        Numbers on the wire, in the order of the plant's outputs in `glider_base.wiring`, but
-        for health and battery; zeros for what is not fitted.
+    Numbers on the wire, in the order of the plant's outputs in `glider_base.wiring`, but for
+    health and battery; zeros for what is not fitted. The odometry is the true one, as is the
+    height over the bottom (m); ``joints`` is where the actuators say they are, ``sample``
+    (`Sample`) that of the tick before. The antenna has been out of the water for
+    ``out_ticks`` without a break.
     """
     truth = odometry_to_wire(odometry)
     measured = add_noise(odometry, tick, params)

@@ -389,17 +389,11 @@ def vehicle_names() -> list[str]:
 
 
 def changed_vehicle(name: str, changes: dict[str, Any]) -> str:
-    """Name of a vehicle of which some fields differ from its file.
+    """Name of a vehicle, by name or path, of which some fields differ from its file.
 
-    `load_vehicle` takes it like any other, in every process that is handed it. No person can type
-    it, and no path looks like it: a NUL stands in it.
-
-    Parameters
-    ----------
-    name : str
-        Vehicle by name or path.
-    changes : dict
-        Values by dotted name of the field; that of a quantity is its number, in its unit.
+    Values are by dotted name of the field; that of a quantity is its number, in its unit.
+    `load_vehicle` takes it like any other, in every process that is handed it. No person can
+    type it, and no path looks like it: a NUL stands in it.
     """
     return f'{name}\0{json.dumps(changes)}' if changes else name
 

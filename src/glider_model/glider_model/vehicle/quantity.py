@@ -40,15 +40,9 @@ HINTS = {
 
 @cache
 def quantity(unit: str, also: Other | None = None, **limits: float) -> type[Settings]:
-    """Model of one number with its unit and source.
+    """Model of one number with its unit and source, within limits as of pydantic's Field.
 
-    Parameters
-    ----------
-    unit : str
-    also : Other, optional
-        Another unit in which the number may be given; it is kept in ``unit``.
-    limits : float
-        Those of pydantic's Field.
+    It may be given in a unit ``also``, and is kept in ``unit``.
     """
 
     def convert(values):

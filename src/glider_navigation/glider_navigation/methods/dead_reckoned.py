@@ -34,8 +34,11 @@ from glider_navigation.current_belief import (
 )
 from glider_navigation.flight_model import (
     INITIAL_FLIGHT,
+    INITIAL_ZERO,
     Flight,
+    Zero,
     at_the_surface,
+    find_zero,
     follow_depth,
     reckon_speed,
     set_anew,
@@ -56,7 +59,6 @@ from glider_navigation.method import (
     method_step,
 )
 from glider_navigation.phase import AT_SURFACE, DIVES_M, FIXED, SURFACES_M, UNDER_WATER
-from glider_navigation.surface_depth import INITIAL_ZERO, Zero, find_zero
 from glider_navigation.surface_stay import (
     Stay,
     begin,
