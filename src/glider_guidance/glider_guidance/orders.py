@@ -51,20 +51,10 @@ def due(orders: Iterable[Order], tick: int, stage: int) -> list[Order]:
 
 
 def first_ticks(orders: Iterable[Order], tick: int, stages: np.ndarray) -> list[tuple[int, Order]]:
-    """Those that hold from one of some ticks on, in order, and from which; none after an abort.
+    """Those that hold from one of some ticks on, with their row, in order; none after an abort.
 
-    Parameters
-    ----------
-    orders : iterable of Order
-    tick : int
-        The first of the ticks.
-    stages : int64[n]
-        Stage of guidance a tick before each.
-
-    Returns
-    -------
-    list of (int, Order)
-        Row of the tick, from 0 on.
+    ``tick`` is the first of the ticks, ``stages``, int64[n], those of guidance a tick before each.
+    Rows are counted from 0 on.
     """
     ticks, up = np.arange(len(stages)) + tick, is_surfaced(stages)
     found = []

@@ -158,16 +158,10 @@ def _is_steep(angles):
 
 
 @kernel
-def attitude_step(state, imu, joints, mass, dt):
-    """One tick of ``dt`` s with the actuators at ``joints``.
-
-    Returns
-    -------
-    AttitudeState
-    Attitude
-    bool
-        Whether there is a new sample.
-    """
+def attitude_step(
+    state: AttitudeState, imu, joints, mass, dt: float
+) -> tuple[AttitudeState, Attitude, bool]:
+    """One tick of ``dt`` s with the actuators at ``joints``; and whether a sample is new."""
     balance, tilts = _follow_mass(state.balance, joints, mass, dt)
     phi, theta, psi = euler_from_quaternion(imu.q_w, imu.q_x, imu.q_y, imu.q_z)
     sample, before = Angles(phi, theta, psi), state.sample

@@ -11,16 +11,19 @@ vehicle up. Whether a fix lies where the vehicle can be is for the method to say
 import math
 from typing import NamedTuple
 
-from glider_base.kernel import kernel, replace
+from glider_base.kernel import kernel
 from glider_base.signals import Imu, Joints
 from glider_model.onboard.gate import (
     INITIAL_GATE,
     NORM_REFUSED,
-    NORM_SCALED,
     GateParams,
     GateState,
     are_believed,
     gate_step,
+    has_turned,
+    is_slow,
+    norm2,
+    scaled,
 )
 from glider_navigation.method import Fix, Heard
 
@@ -58,39 +61,9 @@ INITIAL_INTAKE = IntakeState()
 
 
 @kernel
-def _norm2(imu):
-    return imu.q_w * imu.q_w + imu.q_x * imu.q_x + imu.q_y * imu.q_y + imu.q_z * imu.q_z
-
-
-@kernel
 def _is_plausible(imu, params):
     """Whether a sample is an attitude, with rates that a glider can have; false for NaN."""
-    if not abs(_norm2(imu) - 1.0) < NORM_REFUSED:
-        return False
-    most = params.rate_max
-    return not imu.has_rates or (abs(imu.p) <= most and abs(imu.q) <= most and abs(imu.r) <= most)
-
-
-@kernel
-def _has_turned(imu, last, params):
-    """Whether a sample is farther from the last good one than a glider turns."""
-    turn = imu.q_w * last.q_w + imu.q_x * last.q_x + imu.q_y * last.q_y + imu.q_z * last.q_z
-    return (
-        abs(turn) < params.attitude_cosine
-        or abs(imu.p - last.p) > params.rate_jump
-        or abs(imu.q - last.q) > params.rate_jump
-        or abs(imu.r - last.r) > params.rate_jump
-    )
-
-
-@kernel
-def _scaled(imu):
-    """The same sample with a unit quaternion; the very same if it has one."""
-    norm2 = _norm2(imu)
-    if abs(norm2 - 1.0) <= NORM_SCALED:
-        return imu
-    s = 1.0 / math.sqrt(norm2)
-    return replace(imu, q_w=s * imu.q_w, q_x=s * imu.q_x, q_y=s * imu.q_y, q_z=s * imu.q_z)
+    return abs(norm2(imu) - 1.0) < NORM_REFUSED and (not imu.has_rates or is_slow(imu, params))
 
 
 @kernel
@@ -115,9 +88,9 @@ def take_in(
     imu, imu_s, seen = heard.imu, state.imu_s + dt, state.seen
     good = _is_plausible(imu, params.gate)
     if good and seen and imu_s <= params.hold_s:
-        good = not _has_turned(imu, state.imu, params.gate)
+        good = not has_turned(imu, state.imu, params.gate)
     if good:
-        imu, imu_s, seen = _scaled(imu), 0.0, True
+        imu, imu_s, seen = scaled(imu), 0.0, True
     else:
         imu, refused = state.imu, refused or params.reads_attitude
     depth, depth_s, sounded = heard.depth, state.depth_s + dt, state.sounded

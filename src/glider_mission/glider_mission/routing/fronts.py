@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_base.kernel import kernel
-from glider_model.ocean.fields.grid import bracket
+from glider_model.ocean.field import bracket
 
 #: A line of the lattice reaches so many points far.
 REACH = 5

@@ -18,13 +18,8 @@ from glider_base.frames import (
 )
 from glider_base.kernel import kernel, replace
 from glider_base.slot import slot
-from glider_model.ocean.field import Mission
-from glider_model.ocean.fields.grid import (
-    GridFileSettings,
-    bracket,
-    mission_window,
-    widened,
-)
+from glider_model.ocean.field import Mission, bracket
+from glider_model.ocean.fields.grid import GridFileSettings, mission_window, widened
 from glider_model.ocean.grid_file import LoadedBottom, load_bottom
 
 #: Chart around the path that is read too, as far as the file has it (m).

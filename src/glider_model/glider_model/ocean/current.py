@@ -14,7 +14,7 @@ import numpy as np
 from glider_base.kernel import kernel
 from glider_base.noise import normal_pair
 from glider_base.signals import Water
-from glider_model.ocean.field import field_velocity
+from glider_model.ocean.field import bracket, field_velocity
 
 #: Kinds of components.
 CONSTANT, POWER_SHEAR, EXPONENTIAL_SHEAR, TABLE, TIDAL, GAUSS_MARKOV, STEPS = range(7)
@@ -61,22 +61,12 @@ def current_initial(params: CurrentParams) -> CurrentState:
 @kernel
 def _profile(depth, table, first, last):
     """Velocity at ``depth`` by linear interpolation in rows [first, last), held at both ends."""
-    if depth <= table[first, 0]:
-        return table[first, 1], table[first, 2], table[first, 3]
-    if depth >= table[last - 1, 0]:
-        return table[last - 1, 1], table[last - 1, 2], table[last - 1, 3]
-    low, high = first, last - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if table[middle, 0] <= depth:
-            low = middle
-        else:
-            high = middle
-    part = (depth - table[low, 0]) / (table[high, 0] - table[low, 0])
+    low, high, part = bracket(depth, table[first:last, 0])
+    one, other = table[first + low], table[first + high]
     return (
-        table[low, 1] + part * (table[high, 1] - table[low, 1]),
-        table[low, 2] + part * (table[high, 2] - table[low, 2]),
-        table[low, 3] + part * (table[high, 3] - table[low, 3]),
+        one[1] + part * (other[1] - one[1]),
+        one[2] + part * (other[2] - one[2]),
+        one[3] + part * (other[3] - one[3]),
     )
 
 

@@ -80,3 +80,20 @@ def field_velocity(position, t_s, params):
 def still(position, t_s, params):
     """No velocity."""
     return 0.0, 0.0, 0.0
+
+
+@kernel
+def bracket(x, axis):
+    """Points of an increasing axis on both sides of ``x``, and its share from one to the other."""
+    low, high = 0, len(axis) - 1
+    if not x > axis[0]:
+        return 0, 0, 0.0
+    if x >= axis[high]:
+        return high, high, 0.0
+    while high - low > 1:
+        middle = (low + high) // 2
+        if axis[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low, high, (x - axis[low]) / (axis[high] - axis[low])

@@ -16,6 +16,7 @@ from typing import NamedTuple
 from glider_base.frames import rotate_to_ned
 from glider_base.kernel import kernel, replace
 from glider_base.signals import Covariance, Odometry, Vector
+from glider_model.onboard.gate import norm2
 
 #: A vehicle that has been below the first depth dives, above the second it has come up (m).
 DIVES_M, SURFACES_M = 3.0, 1.5
@@ -95,7 +96,7 @@ def _is_plausible(x, known):
         and abs(x.u) < MOST_MPS
         and abs(x.v) < MOST_MPS
         and abs(x.w) < MOST_MPS
-        and abs(x.q_w * x.q_w + x.q_x * x.q_x + x.q_y * x.q_y + x.q_z * x.q_z - 1.0) < 0.1
+        and abs(norm2(x) - 1.0) < 0.1
         and 0.0 <= known.nn < MOST_M2
         and 0.0 <= known.ee < MOST_M2
         and abs(known.ne) < MOST_M2

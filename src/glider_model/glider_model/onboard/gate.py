@@ -78,20 +78,30 @@ INITIAL_GATE = GateState(Odometry(*(3 * (0.0,)), 1.0, *(9 * (0.0,))), False, 0.0
 
 
 @kernel
+def norm2(x):
+    """Squared norm of the quaternion of a sample."""
+    return x.q_w * x.q_w + x.q_x * x.q_x + x.q_y * x.q_y + x.q_z * x.q_z
+
+
+@kernel
+def is_slow(x, params):
+    """Whether the angular rates of a sample are those of a glider; false for NaN."""
+    most = params.rate_max
+    return abs(x.p) <= most and abs(x.q) <= most and abs(x.r) <= most
+
+
+@kernel
 def is_plausible(odometry, params):
     """Whether a sample is good in itself: finite, an attitude, no faster than any glider."""
     x = odometry
-    norm2 = x.q_w * x.q_w + x.q_x * x.q_x + x.q_y * x.q_y + x.q_z * x.q_z
     # a comparison with NaN is false: each is put such that NaN is refused
     return (
         math.isfinite(x.p_n)
         and math.isfinite(x.p_e)
         and math.isfinite(x.p_d)
-        and abs(norm2 - 1.0) < NORM_REFUSED
+        and abs(norm2(x) - 1.0) < NORM_REFUSED
         and x.u * x.u + x.v * x.v + x.w * x.w <= params.speed_max2
-        and abs(x.p) <= params.rate_max
-        and abs(x.q) <= params.rate_max
-        and abs(x.r) <= params.rate_max
+        and is_slow(x, params)
     )
 
 
@@ -107,6 +117,18 @@ def are_believed(joints, ranges):
 
 
 @kernel
+def has_turned(x, y, params):
+    """Whether a sample is farther from another one than a glider turns."""
+    turn = x.q_w * y.q_w + x.q_x * y.q_x + x.q_y * y.q_y + x.q_z * y.q_z
+    return (
+        abs(turn) < params.attitude_cosine
+        or abs(x.p - y.p) > params.rate_jump
+        or abs(x.q - y.q) > params.rate_jump
+        or abs(x.r - y.r) > params.rate_jump
+    )
+
+
+@kernel
 def has_jumped(odometry, last, velocity, age_s, params):
     """Whether a sample lies farther from the last good one than a glider comes in ``age_s``.
 
@@ -117,26 +139,20 @@ def has_jumped(odometry, last, velocity, age_s, params):
     d_e = x.p_e - y.p_e - velocity[1] * age_s
     d_d = x.p_d - y.p_d - velocity[2] * age_s
     d_u, d_v, d_w = x.u - y.u, x.v - y.v, x.w - y.w
-    turn = x.q_w * y.q_w + x.q_x * y.q_x + x.q_y * y.q_y + x.q_z * y.q_z
     return (
         d_n * d_n + d_e * d_e > params.position_jump2
         or abs(d_d) > params.depth_jump
         or d_u * d_u + d_v * d_v + d_w * d_w > params.speed_jump2
-        or abs(turn) < params.attitude_cosine
-        or abs(x.p - y.p) > params.rate_jump
-        or abs(x.q - y.q) > params.rate_jump
-        or abs(x.r - y.r) > params.rate_jump
+        or has_turned(x, y, params)
     )
 
 
 @kernel
-def _scaled(odometry):
+def scaled(x):
     """The same sample with a unit quaternion; the very same if it has one."""
-    x = odometry
-    norm2 = x.q_w * x.q_w + x.q_x * x.q_x + x.q_y * x.q_y + x.q_z * x.q_z
-    if abs(norm2 - 1.0) <= NORM_SCALED:
-        return odometry
-    s = 1.0 / math.sqrt(norm2)
+    if abs(norm2(x) - 1.0) <= NORM_SCALED:
+        return x
+    s = 1.0 / math.sqrt(norm2(x))
     return replace(x, q_w=s * x.q_w, q_x=s * x.q_x, q_y=s * x.q_y, q_z=s * x.q_z)
 
 
@@ -153,7 +169,7 @@ def gate_step(state: GateState, odometry: Odometry, params: GateParams, dt: floa
         velocity = rotate_to_ned(last.q_w, last.q_x, last.q_y, last.q_z, last.u, last.v, last.w)
         good = not has_jumped(odometry, last, velocity, age_s, params)
     if good:
-        return GateState(_scaled(odometry), True, 0.0, state.refused)
+        return GateState(scaled(odometry), True, 0.0, state.refused)
     return GateState(state.odometry, state.seen, age_s, state.refused + 1)
 
 

@@ -19,7 +19,7 @@ from pydantic import Field
 from glider_base.frames import Origin, OriginSettings, on_chart
 from glider_base.kernel import kernel
 from glider_base.settings import Settings, beside
-from glider_model.ocean.field import FieldSettings, Mission, field_velocity
+from glider_model.ocean.field import FieldSettings, Mission, bracket, field_velocity
 from glider_model.ocean.grid_file import (
     Loaded,
     Window,
@@ -170,23 +170,6 @@ class GridParams(NamedTuple):
 
 
 @kernel
-def bracket(x, axis):
-    """Points of an increasing axis on both sides of ``x``, and its share from one to the other."""
-    low, high = 0, len(axis) - 1
-    if not x > axis[0]:
-        return 0, 0, 0.0
-    if x >= axis[high]:
-        return high, high, 0.0
-    while high - low > 1:
-        middle = (low + high) // 2
-        if axis[middle] <= x:
-            low = middle
-        else:
-            high = middle
-    return low, high, (x - axis[low]) / (axis[high] - axis[low])
-
-
-@kernel
 def interpolate(t_s, depth, latitude, longitude, params):
     """Velocity of a grid to the north and to the east (m/s), linear between its points."""
     t, t_next, f_t = bracket(t_s, params.times)
@@ -196,23 +179,10 @@ def interpolate(t_s, depth, latitude, longitude, params):
     water = params.water
     north, east = 0.0, 0.0
     for i in range(8):
-        at_t, at_z, at_y = t, z, y
-        weight = 1.0
-        if i & 1:
-            at_t = t_next
-            weight *= f_t
-        else:
-            weight *= 1.0 - f_t
-        if i & 2:
-            at_z = z_next
-            weight *= f_z
-        else:
-            weight *= 1.0 - f_z
-        if i & 4:
-            at_y = y_next
-            weight *= f_y
-        else:
-            weight *= 1.0 - f_y
+        at_t, w_t = (t_next, f_t) if i & 1 else (t, 1.0 - f_t)
+        at_z, w_z = (z_next, f_z) if i & 2 else (z, 1.0 - f_z)
+        at_y, w_y = (y_next, f_y) if i & 4 else (y, 1.0 - f_y)
+        weight = w_t * w_z * w_y
         if weight > 0.0:
             here, there = water[at_t, at_z, at_y, x], water[at_t, at_z, at_y, x_next]
             north += weight * ((1.0 - f_x) * here[0] + f_x * there[0])
