@@ -9,7 +9,7 @@ from pydantic import Field
 
 from glider_base import plugins
 from glider_base.frames import Origin, OriginSettings
-from glider_base.settings import Settings, number
+from glider_base.settings import Settings, derived, number
 from glider_base.signals import Joints
 from glider_base.wiring import SENSORS
 from glider_model.onboard.gate import GateSettings
@@ -113,16 +113,9 @@ class NavigationSettings(NavigationLawSettings):
 
     @property
     def _start(self) -> Start:
-        return Start(
-            vehicle=load_vehicle(self.vehicle),
-            origin=self.origin.params(),
-            p_n=self.north_m,
-            p_e=self.east_m,
-            imu_period_s=self.imu_period_s,
-            gyro=self.gyro,
-            current=self.current,
-            forecast=self.forecast,
-        )
+        vehicle, origin = load_vehicle(self.vehicle), self.origin.params()
+        place = {'p_n': self.north_m, 'p_e': self.east_m}
+        return derived(Start, self, vehicle=vehicle, origin=origin, **place)
 
     def params(self) -> 'NavigationParams':
         """Kernel parameters."""
