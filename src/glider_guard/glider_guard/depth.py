@@ -5,19 +5,8 @@
 from typing import NamedTuple
 
 from glider_base.kernel import kernel, replace
-from glider_guard.rows import (
-    CRUSHING,
-    DISAGREES,
-    FROZEN,
-    NEAR_BOTTOM,
-    NOT_CLIMBING,
-    NOT_RISING,
-    OVERDEPTH,
-    STALLED,
-    TOO_DEEP,
-    UNDER_LONG,
-    row,
-)
+from glider_guard import rows
+from glider_guard.rows import row
 from glider_guard.witness import SURFACE_M
 
 #: Longer than this (s) a vehicle may not be too deep.
@@ -252,13 +241,14 @@ def _weight_goes(state, sees, floods, limits):
 @kernel
 def depth_rows(state, surfaces, sees, floods, limits):
     """Rows that hold for a vehicle that is to surface for good, sees its depth, floods, or not."""
-    told = row(TOO_DEEP, state.deep_s > TOO_DEEP_S) | row(CRUSHING, state.crush_s > TOO_DEEP_S)
-    told |= row(OVERDEPTH, state.over_s > limits.overdepth_s)
-    told |= row(NEAR_BOTTOM, state.bottom_s > limits.altitude_s)
-    told |= row(NOT_CLIMBING, state.climbs_s > limits.no_climb_s)
-    told |= row(NOT_RISING, surfaces and _weight_goes(state, sees, floods, limits))
-    told |= row(STALLED, state.stalled_s > limits.stalled_s)
-    told |= row(UNDER_LONG, state.under_s > limits.under_water_s)
-    told |= row(FROZEN, state.lag_s > LAG_S or state.still_s > limits.still_s)
-    told |= row(FROZEN, not surfaces and abs(state.led_m) > limits.led_m)
-    return told | row(DISAGREES, state.apart_s > limits.disagree_s)
+    told = row(rows.TOO_DEEP, state.deep_s > TOO_DEEP_S)
+    told |= row(rows.CRUSHING, state.crush_s > TOO_DEEP_S)
+    told |= row(rows.OVERDEPTH, state.over_s > limits.overdepth_s)
+    told |= row(rows.NEAR_BOTTOM, state.bottom_s > limits.altitude_s)
+    told |= row(rows.NOT_CLIMBING, state.climbs_s > limits.no_climb_s)
+    told |= row(rows.NOT_RISING, surfaces and _weight_goes(state, sees, floods, limits))
+    told |= row(rows.STALLED, state.stalled_s > limits.stalled_s)
+    told |= row(rows.UNDER_LONG, state.under_s > limits.under_water_s)
+    told |= row(rows.FROZEN, state.lag_s > LAG_S or state.still_s > limits.still_s)
+    told |= row(rows.FROZEN, not surfaces and abs(state.led_m) > limits.led_m)
+    return told | row(rows.DISAGREES, state.apart_s > limits.disagree_s)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from glider_base.frames import euler_from_quaternion, rotate_to_ned
 from glider_base.kernel import kernel
 from glider_base.signals import SURFACE_TARGET, Battery, Covariance, Health, Joints, Odometry
+from glider_guard import rows
 from glider_guard.actuators import INITIAL_FOLLOWERS, ActuatorLimits, Followers, follow
 from glider_guard.ascent import INITIAL_ASCENT, Ascent, AscentLimits, Rise, come_up
 from glider_guard.depth import (
@@ -25,23 +26,7 @@ from glider_guard.depth import (
     sound,
 )
 from glider_guard.health import INITIAL_HEALTH, HealthLimits, HealthState, check_health
-from glider_guard.rows import (
-    ASTRAY,
-    BLIND,
-    CONTRADICTED,
-    DROPS,
-    HOLDS,
-    LATCHED,
-    LEAK,
-    LOST,
-    NO_DEMAND,
-    ORDERED,
-    STUCK_BUOYANCY,
-    STUCK_PITCH,
-    SURFACES,
-    TOO_HEAVY,
-    row,
-)
+from glider_guard.rows import row
 from glider_guard.weight import (
     INITIAL_WEIGHT,
     Glide,
@@ -180,8 +165,8 @@ def _intake_rows(taken, params):
     """Rows of what is asked for, and of what is not heard any more."""
     hold_s = params.gate.hold_s
     lost = is_lost(taken.gate, params.gate) or taken.joints_s > hold_s or taken.target_s > hold_s
-    told = row(ORDERED, taken.target <= SURFACE_TARGET) | row(LOST, lost)
-    return told | row(NO_DEMAND, taken.demand_s > hold_s)
+    told = row(rows.ORDERED, taken.target <= SURFACE_TARGET) | row(rows.LOST, lost)
+    return told | row(rows.NO_DEMAND, taken.demand_s > hold_s)
 
 
 @kernel
@@ -189,14 +174,14 @@ def fix_rows(watch):
     """Rows that hold by a `FixWatch`."""
     count = contradictions(watch)
     if count >= TOO_MANY:
-        return CONTRADICTED | ASTRAY
-    return CONTRADICTED if count > 0 else 0
+        return rows.CONTRADICTED | rows.ASTRAY
+    return rows.CONTRADICTED if count > 0 else 0
 
 
 @kernel
 def _sent(last, demand, told):
     """Where actuators are sent: held level, whether they follow is seen by what is demanded."""
-    if told & HOLDS and not told & (SURFACES | DROPS):
+    if told & rows.HOLDS and not told & (rows.SURFACES | rows.DROPS):
         return Joints(last.m_b, last.x_p, demand.mu, demand.delta)
     return last
 
@@ -205,12 +190,12 @@ def _sent(last, demand, told):
 def _react(state, taken, told, glide, is_same, witness, params, dt):
     """Ascent a tick later, and the command of this one: what is demanded, held level, or up."""
     demand = taken.demand
-    if told & (SURFACES | DROPS):
-        seen, x_p = not state.told & BLIND, taken.joints.x_p
-        is_stuck = ((told | state.told) & STUCK_PITCH) != 0
+    if told & (rows.SURFACES | rows.DROPS):
+        seen, x_p = not state.told & rows.BLIND, taken.joints.x_p
+        is_stuck = ((told | state.told) & rows.STUCK_PITCH) != 0
         rise = Rise(
             rate=glide.sinking if seen else (witness.raw - state.witness.raw) / dt,
-            sees=not told & BLIND,
+            sees=not told & rows.BLIND,
             moves=witness.same_s < params.witness.same_s,
             under=glide.under,
             theta=glide.theta,
@@ -220,7 +205,7 @@ def _react(state, taken, told, glide, is_same, witness, params, dt):
             is_there=is_stuck or abs(x_p - state.command.x_p) <= params.ascent.there,
         )
         return come_up(state.ascent, rise, params.ascent, dt)
-    if told & HOLDS:
+    if told & rows.HOLDS:
         return INITIAL_ASCENT, Joints(demand.m_b, demand.x_p, 0.0, 0.0)
     return INITIAL_ASCENT, demand
 
@@ -236,7 +221,7 @@ def _sounding(state, taken, before, heard, shown, witness, last, told, params):
     north, east, down = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
     sinks = sinking_weight(state.weight, m_b, params.weight)
     neutral = -params.weight.ballast - state.weight.off
-    is_stuck = ((told | state.told) & STUCK_BUOYANCY) != 0
+    is_stuck = ((told | state.told) & rows.STUCK_BUOYANCY) != 0
     is_pumped = is_stuck or m_b <= params.ascent.pumped
     led = shown.led if shown.is_glide else 0.0
     # in a slow dive of a light vehicle the pump is on its light side
@@ -245,7 +230,7 @@ def _sounding(state, taken, before, heard, shown, witness, last, told, params):
     ascends = ascends or (is_asked_up and last.m_b < min(0.0, neutral))
     is_afloat = witness.depth <= SURFACE_M
     if heard.health.contact_age_s >= 0.0:
-        is_afloat = is_out(witness) or (witness.depth <= AFLOAT_M and not state.told & BLIND)
+        is_afloat = is_out(witness) or (witness.depth <= AFLOAT_M and not state.told & rows.BLIND)
     return Sounding(
         odom=x.p_d,
         before=before.p_d,
@@ -262,7 +247,7 @@ def _sounding(state, taken, before, heard, shown, witness, last, told, params):
         altitude=heard.altitude,
         is_sent_up=last.m_b < max(0.0, neutral),
         ascends=ascends,
-        surfaces=(state.told & (SURFACES | DROPS)) != 0,
+        surfaces=(state.told & (rows.SURFACES | rows.DROPS)) != 0,
         is_pumped=is_pumped,
         is_out=is_out(witness),
         is_afloat=is_afloat,
@@ -283,7 +268,7 @@ def guard_step(
     x, m_b = taken.gate.odometry, taken.joints.m_b
     _, theta, _ = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
     _, _, rate = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
-    sees = not state.told & BLIND
+    sees = not state.told & rows.BLIND
     led, is_glide = led_rate(state.weight, theta, m_b, params.weight)
     shown = Shown(
         raw=heard.depth if params.has_pressure else heard.odometry.p_d,
@@ -302,7 +287,7 @@ def guard_step(
     at = _sounding(state, taken, before, heard, shown, witness, last, told, params)
     depths = sound(depths, at, params.depth, dt)
     # without a depth, a leak alone is certain
-    floods = (state.told & (LEAK | TOO_HEAVY if sees else LEAK)) != 0
+    floods = (state.told & (rows.LEAK | rows.TOO_HEAVY if sees else rows.LEAK)) != 0
     told |= wrong | depth_rows(depths, at.surfaces, sees, floods, params.depth)
     health, unwell = check_health(state.health, heard.health, heard.battery, params.health, dt)
     sinking = sinking_rate(depths) if sees else rate
@@ -319,10 +304,11 @@ def guard_step(
     )
     weight, heavy = weigh(state.weight, glide, params.weight, dt)
     fixes = watch_fixes(state.fixes, heard.odometry, heard.known, dt)
-    told |= fix_rows(fixes) | unwell | heavy | _intake_rows(taken, params) | (state.told & LATCHED)
+    told |= unwell | heavy | fix_rows(fixes) | _intake_rows(taken, params)
+    told |= state.told & rows.LATCHED
     ascent, command = _react(state, taken, told, glide, shown.is_same, witness, params, dt)
     tick = state.tick + 1 if taken.gate.seen else 0
-    output = GuardOutput(command, (told & DROPS) != 0, told)
+    output = GuardOutput(command, (told & rows.DROPS) != 0, told)
     state = GuardState(
         tick=tick,
         taken=taken,

@@ -17,20 +17,9 @@ from pydantic import Field
 from glider_base import plugins
 from glider_base.noise import random_stream
 from glider_base.settings import Settings, number
-from glider_model.ocean import fields
+from glider_model.ocean import current, fields
 from glider_model.ocean.columns import MAX_DEPTH_M, MAX_ROWS, check_rows, read_columns
-from glider_model.ocean.current import (
-    CONSTANT,
-    EXPONENTIAL_SHEAR,
-    GAUSS_MARKOV,
-    POWER_SHEAR,
-    STEPS,
-    TABLE,
-    TIDAL,
-    CurrentParams,
-    CurrentState,
-    current_initial,
-)
+from glider_model.ocean.current import CurrentParams, CurrentState, current_initial
 from glider_model.ocean.field import FieldSettings, Mission, NoField
 
 #: No component may be faster than this (m/s); the swiftest ocean currents reach about 2.5 m/s.
@@ -177,7 +166,7 @@ class ConstantCurrent(_FlowComponent):
     kind: Literal['constant']
 
     def _pack(self) -> _Packed:
-        return _Packed(CONSTANT, self._north_east())
+        return _Packed(current.CONSTANT, self._north_east())
 
 
 class ShearCurrent(_FlowComponent):
@@ -201,8 +190,8 @@ class ShearCurrent(_FlowComponent):
     def _pack(self) -> _Packed:
         north, east = self._north_east()
         if self.law == 'power':
-            return _Packed(POWER_SHEAR, (north, east, self.depth_m, self.exponent))
-        return _Packed(EXPONENTIAL_SHEAR, (north, east, self.depth_m))
+            return _Packed(current.POWER_SHEAR, (north, east, self.depth_m, self.exponent))
+        return _Packed(current.EXPONENTIAL_SHEAR, (north, east, self.depth_m))
 
 
 class TableCurrent(_Component):
@@ -246,7 +235,7 @@ class TableCurrent(_Component):
         return self
 
     def _pack(self) -> _Packed:
-        return _Packed(TABLE, rows=tuple((*row, 0.0)[:4] for row in self.rows))
+        return _Packed(current.TABLE, rows=tuple((*row, 0.0)[:4] for row in self.rows))
 
 
 class TidalCurrent(_FlowComponent):
@@ -265,7 +254,7 @@ class TidalCurrent(_FlowComponent):
         north, east = self._north_east()
         minor = (-self.ellipticity * east, self.ellipticity * north)
         rate = 2.0 * math.pi / self.period_s
-        return _Packed(TIDAL, (north, east, *minor, rate, math.radians(self.phase_deg)))
+        return _Packed(current.TIDAL, (north, east, *minor, rate, math.radians(self.phase_deg)))
 
 
 class GaussMarkovCurrent(_Component):
@@ -284,7 +273,7 @@ class GaussMarkovCurrent(_Component):
 
     def _pack(self) -> _Packed:
         numbers = (self.std_mps, self.time_constant_s)
-        return _Packed(GAUSS_MARKOV, numbers, seed_offset=self.seed_offset)
+        return _Packed(current.GAUSS_MARKOV, numbers, seed_offset=self.seed_offset)
 
 
 class CurrentStep(_Flow):
@@ -350,7 +339,7 @@ class StepsCurrent(_Component):
         return self.model_copy(update={'steps': steps})
 
     def _pack(self) -> _Packed:
-        return _Packed(STEPS, rows=tuple(step._row() for step in self.steps))
+        return _Packed(current.STEPS, rows=tuple(step._row() for step in self.steps))
 
 
 CurrentComponent = Annotated[
@@ -423,7 +412,7 @@ class SumOfCurrents(_Flow):
         ValueError
             If an angle is still relative to the path.
         """
-        packed = [_Packed(CONSTANT, self._north_east())] if self._has_flow() else []
+        packed = [_Packed(current.CONSTANT, self._north_east())] if self._has_flow() else []
         packed += [component._pack() for component in self.components]
         count = len(packed)
         kind, first, last = (np.zeros(count, dtype=np.int64) for _ in range(3))
@@ -434,7 +423,7 @@ class SumOfCurrents(_Flow):
         for i, part in enumerate(packed):
             kind[i] = part.kind
             numbers[i, : len(part.numbers)] = part.numbers
-            if part.kind == GAUSS_MARKOV:
+            if part.kind == current.GAUSS_MARKOV:
                 first[i] = 2 * random
                 stream[i] = random_stream(seed, part.seed_offset, random)
                 random += 1
