@@ -19,31 +19,11 @@ from glider_base.settings import number
 from glider_base.signals import Covariance, Odometry, Vector
 from glider_model.onboard.glide_polar import Polar, make_polar
 from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
+from glider_navigation import current_belief as belief
+from glider_navigation import flight_model, surface_stay
 from glider_navigation.attitude import AttitudeState, attitude_step, initial_attitude
-from glider_navigation.current_belief import (
-    TIDE,
-    CurrentBelief,
-    Regressors,
-    carry,
-    current_at,
-    initial_belief,
-    last_mean,
-    mean_variance,
-    take_in,
-    wandered,
-)
-from glider_navigation.flight_model import (
-    INITIAL_FLIGHT,
-    INITIAL_ZERO,
-    Flight,
-    Zero,
-    at_the_surface,
-    find_zero,
-    follow_depth,
-    reckon_speed,
-    set_anew,
-    weigh_speed,
-)
+from glider_navigation.current_belief import TIDE, CurrentBelief, Regressors
+from glider_navigation.flight_model import INITIAL_FLIGHT, INITIAL_ZERO, Flight, Zero
 from glider_navigation.forecast import (
     Forecast,
     Trust,
@@ -59,15 +39,7 @@ from glider_navigation.method import (
     method_step,
 )
 from glider_navigation.phase import AT_SURFACE, DIVES_M, FIXED, SURFACES_M, UNDER_WATER
-from glider_navigation.surface_stay import (
-    Stay,
-    begin,
-    counts,
-    drifted_variance,
-    hear_fix,
-    launched,
-    wait,
-)
+from glider_navigation.surface_stay import Stay
 
 #: Shorter than this (s) a way under water tells no current.
 SHORTEST_WAY_S = 120.0
@@ -109,10 +81,10 @@ class DeadReckonedSettings(NavigationMethodSettings):
         """At the surface, where the vehicle was put into the water."""
         place = Vector(start.p_n, start.p_e)
         way = Way(place, self.start_std_m**2, Drift(_STILL, math.inf))
-        stay = launched(place, self.start_std_m**2)
-        current, trust = initial_belief(start.current == 'tidal'), Trust(1.0, 0.0)
+        stay = surface_stay.launched(place, self.start_std_m**2)
+        current, trust = belief.initial_belief(start.current == 'tidal'), Trust(1.0, 0.0)
         if start.current == 'forecast':
-            current = initial_belief(False, start.forecast.error_std_mps)
+            current = belief.initial_belief(False, start.forecast.error_std_mps)
             trust = Trust(1.0, start.forecast.share_std**2)
         attitude = initial_attitude(start.vehicle)
         return DeadReckonedState(attitude, place, way, stay, current, trust)
@@ -200,7 +172,7 @@ def place_covariance(way, current, trust, column, params):
     """Covariance of the place after a way (m^2)."""
     t = way.t_s
     known = way.variance + t * t * (
-        mean_variance(current, _regressors(way)) + wandered(current, t)
+        belief.mean_variance(current, _regressors(way)) + belief.wandered(current, t)
     )
     unlike = _unlike(way, current)
     n, e = t * unlike.n, t * unlike.e
@@ -228,14 +200,14 @@ def _learn(current, trust, column, way, stay, params):
     bias *= squared(_unlike(way, current))
     if trust.variance > 0.0 and current.way_s > 0.0:
         change = _change_of_forecast(way, column)
-        noise = mean_variance(current, h) + wandered(current, t) + bias + variance
+        noise = belief.mean_variance(current, h) + belief.wandered(current, t) + bias + variance
         weighed = weigh(trust, off, change, noise)
         more = weighed.share - trust.share
         off = Vector(off.n - more * change.n, off.e - more * change.e)
         mean = Vector(current.mean.n - more * column.n, current.mean.e - more * column.e)
         current, trust = replace(current, mean=mean), weighed
     through = Vector(way.through.n / t, way.through.e / t)
-    return take_in(current, off, h, t, through, variance, bias), trust
+    return belief.take_in(current, off, h, t, through, variance, bias), trust
 
 
 @kernel
@@ -248,7 +220,7 @@ def _dive(way, stay):
         way.through.n + stay.place.n - stay.came_up.n,
         way.through.e + stay.place.e - stay.came_up.e,
     )
-    more = drifted_variance(stay)
+    more = surface_stay.drifted_variance(stay)
     return replace(way, variance=way.variance + more, through=drifted)
 
 
@@ -276,7 +248,7 @@ def _water(learnt, told, trust):
 def _at_the_top(place, t_s, current, trust, params):
     """Current (m/s) that is believed for a place at the surface (m) and a time (s)."""
     told = forecast_at(params.forecast, place, 0.0, t_s)
-    return _water(current_at(current, t_s), told, trust)
+    return _water(belief.current_at(current, t_s), told, trust)
 
 
 @kernel
@@ -302,7 +274,7 @@ def _carry(current, trust, way, stay, t_s, params):
         first = _unforeseen(drift, way.begun, begun_s, current, trust, params)
         then = Vector(0.5 * (then.n + first.n), 0.5 * (then.e + first.e))
     change = Vector(now.n - then.n, now.e - then.e)
-    return carry(current, change, stay.t_s, stay.known.vv + early.variance)
+    return belief.carry(current, change, stay.t_s, stay.known.vv + early.variance)
 
 
 @kernel
@@ -338,7 +310,7 @@ def _change_over(state, under, t_s, params):
         drift = stay.drift
         if stay.fixes <= 1:
             drift = _at_the_top(state.place, t_s, current, trust, params)
-        stay = begin(state.place, 0.5 * (covariance.nn + covariance.ee), drift)
+        stay = surface_stay.begin(state.place, 0.5 * (covariance.nn + covariance.ee), drift)
     return way, stay, current, trust, column
 
 
@@ -376,37 +348,39 @@ def dead_reckoned_step(state, heard, params, dt):
         state.attitude, heard.imu, heard.joints, params.mass, dt
     )
     is_new = sampled or heard.depth != state.depth
-    zero = find_zero(state.zero, heard.depth, is_new, heard.fix.is_fix, dt)
-    flight = set_anew(state.flight, state.zero.offset - zero.offset)
-    flight = follow_depth(flight, heard.depth - zero.offset, is_new, dt)
-    flight = at_the_surface(flight, heard.fix.is_fix)
+    zero = flight_model.find_zero(state.zero, heard.depth, is_new, heard.fix.is_fix, dt)
+    flight = flight_model.set_anew(state.flight, state.zero.offset - zero.offset)
+    flight = flight_model.follow_depth(flight, heard.depth - zero.offset, is_new, dt)
+    flight = flight_model.at_the_surface(flight, heard.fix.is_fix)
     if params.is_weighed:
-        flight = weigh_speed(flight, attitude.angles.theta, heard.joints.m_b, params.polar, dt)
+        flight = flight_model.weigh_speed(
+            flight, attitude.angles.theta, heard.joints.m_b, params.polar, dt
+        )
     else:
-        flight = reckon_speed(flight, attitude.angles.theta, params.polar, dt)
+        flight = flight_model.reckon_speed(flight, attitude.angles.theta, params.polar, dt)
     under = flight.depth > (SURFACES_M if state.under else DIVES_M)
     way, stay, current, trust, column = _change_over(state, under, t_s, params)
     if under:
         psi = attitude.angles.psi
         through = Vector(flight.speed * math.cos(psi), flight.speed * math.sin(psi))
         told = forecast_at(params.forecast, state.place, flight.depth, t_s)
-        water = _water(current_at(current, t_s), told, trust)
+        water = _water(belief.current_at(current, t_s), told, trust)
         way = _go_on(way, through, water, told, t_s, dt)
         place, velocity = _end_of(way), Vector(through.n + water.n, through.e + water.e)
         covariance = place_covariance(way, current, trust, column, params)
         phase = UNDER_WATER
     else:
-        stay = wait(stay, dt)
-        if counts(stay, heard.fix):
-            stay = hear_fix(stay, heard.fix)
+        stay = surface_stay.wait(stay, dt)
+        if surface_stay.counts(stay, heard.fix):
+            stay = surface_stay.hear_fix(stay, heard.fix)
         place, velocity, variance = stay.place, stay.drift, stay.known.pp
         covariance = Covariance(variance, 0.0, variance)
         phase = FIXED if stay.fixes > 0 else AT_SURFACE
-    wandering = current.p.mm + wandered(current, current.way_s)
+    wandering = current.p.mm + belief.wandered(current, current.way_s)
     believed = Believed(
         odom=_odometry(place, attitude, flight, velocity),
         place=covariance,
-        current=_water(last_mean(current, t_s), column, trust),
+        current=_water(belief.last_mean(current, t_s), column, trust),
         current_covariance=Covariance(wandering, 0.0, wandering),
         surface=stay.drift,
         surface_covariance=Covariance(stay.known.vv, 0.0, stay.known.vv),
