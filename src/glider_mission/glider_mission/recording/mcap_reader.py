@@ -27,7 +27,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from glider_base.settings import ConfigurationError
 from glider_mission.recording.bag_files import bag_files
 from glider_mission.recording.mcap_records import (
-    CHUNK_TIMES,
     DEFINITIONS,
     HEAD,
     MAGIC,
@@ -121,25 +120,30 @@ class _File:
             checksum = zlib.crc32(data, zlib.crc32(HEAD.pack(opcode, len(data)), checksum))
             end = at + HEAD.size + len(data)
         stream.seek(end)
-        rest = stream.read(HEAD.size + CHUNK_TIMES.size)
-        ends = rest.startswith(_DATA_END) and len(rest) >= len(_DATA_END) + 4
-        told = int.from_bytes(rest[len(_DATA_END) :][:4], 'little') if ends else 0
+        rest = stream.read(len(_DATA_END) + 4)
+        ends = rest.startswith(_DATA_END) and len(rest) == len(_DATA_END) + 4
+        told = int.from_bytes(rest[len(_DATA_END) :], 'little') if ends else 0
         if told and told != checksum:
-            self._refuse('the checksum (CRC) of its data is wrong', summary)
-        if summary and not ends:
-            self._refuse(f'no record begins at byte {end:,}', summary)
-        if not told and summary is None:
-            self.cut = f'{self.path} ends early, after {end:,} bytes: {self._goes_to(rest)}'
-        if not told and unsound:
-            raise self._harmed(unsound)
-        if not summary or not summary.channels:  # topics may be defined in chunks only
+            unsound = 'the checksum (CRC) of its data is wrong'
+        elif told:
+            unsound = ''
+        elif summary and not ends:
+            unsound = f'no record begins at byte {end:,}'
+        elif summary is None:
+            times = (part.end_ns / 1e9 for part in self.parts)
+            goes = f'it goes to t = {max(times):.1f} s' if self.parts else 'no message is whole'
+            self.cut = f'{self.path} ends early, after {end:,} bytes: {goes}'
+        is_enough = bool(summary and summary.channels)  # else they may be in chunks only
+        if unsound or not is_enough:
             for part in self.parts:
                 self.read(part)
-            return
-        if not told:
+        if summary and (unsound or not told):
             self._compare(summary)
-        self.schemas = summary.schemas | self.schemas
-        self.channels |= {i: one for i, one in summary.channels.items() if i not in self.channels}
+        if unsound:
+            raise self._harmed(unsound)
+        if is_enough:
+            self.schemas = summary.schemas | self.schemas
+            self.channels = summary.channels | self.channels
 
     def _take(self, opcode: int, at: int, data: bytes) -> None:
         """Note a record that is in no chunk."""
@@ -150,7 +154,14 @@ class _File:
                 place = len(self._chunks), at + HEAD.size, len(data)
                 self.parts.append(_Part(self._number, *place, start_ns, end_ns))
         elif opcode == Opcode.MESSAGE:
-            self._take_loose(at, data)
+            (log_ns,) = struct.unpack_from('<Q', data, _LOG_TIME_AT)
+            part = _Part(self._number, 0, at, HEAD.size + len(data), log_ns, log_ns)
+            last = self.parts[-1] if self.parts else part
+            if not last.number and last.start + last.length == at:
+                times = min(last.start_ns, log_ns), max(last.end_ns, log_ns)
+                self.parts[-1] = _Part(*last[:3], last.length + part.length, *times)
+            else:
+                self.parts.append(part)
         elif opcode in DEFINITIONS:
             self._define(parse(DEFINITIONS[opcode], data))
         elif opcode == Opcode.ATTACHMENT:
@@ -167,36 +178,6 @@ class _File:
         else:
             self.schemas[record.id] = record
 
-    def _take_loose(self, at: int, data: bytes) -> None:
-        """Note a message that is in no chunk, together with those before it."""
-        (log_ns,) = struct.unpack_from('<Q', data, _LOG_TIME_AT)
-        part = _Part(self._number, 0, at, HEAD.size + len(data), log_ns, log_ns)
-        last = self.parts[-1] if self.parts else None
-        if last and not last.number and last.start + last.length == at:
-            self.parts.pop()
-            part = last._replace(
-                length=last.length + part.length,
-                start_ns=min(last.start_ns, log_ns),
-                end_ns=max(last.end_ns, log_ns),
-            )
-        self.parts.append(part)
-
-    def _goes_to(self, rest: bytes) -> str:
-        """What is the last that is whole, and what only begins."""
-        ends_ns = [part.end_ns for part in self.parts]
-        goes = f'it goes to t = {max(ends_ns) / 1e9:.1f} s' if ends_ns else 'no message is whole'
-        if rest[:1] == bytes([Opcode.CHUNK]) and len(rest) == HEAD.size + CHUNK_TIMES.size:
-            _, end_ns = CHUNK_TIMES.unpack_from(rest, HEAD.size)
-            goes += f', and of the chunk up to t = {end_ns / 1e9:.1f} s only a part is there'
-        return goes
-
-    def _refuse(self, what: str, summary: Summary | None) -> None:
-        """Raise an error about a chunk, or what else can be found; else about the file."""
-        for part in self.parts:
-            self.read(part)
-        self._compare(summary or Summary())
-        raise self._harmed(what)
-
     def _compare(self, summary: Summary) -> None:
         """Raise an error that names what lacks, if a summary tells of more or of others."""
         indexes = sorted(summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
@@ -210,10 +191,8 @@ class _File:
         said = summary.statistics.chunk_count if summary.statistics else here
         if said != here:
             raise self._harmed(f'{here} chunks, {said} by its summary')
-        for mine, theirs in (
-            (self.schemas, summary.schemas),
-            (self.channels, summary.channels),
-        ):
+        pairs = (self.schemas, summary.schemas), (self.channels, summary.channels)
+        for mine, theirs in pairs:
             if theirs and any(theirs.get(number) != one for number, one in mine.items()):
                 raise self._harmed('a topic or type is not that of its summary')
 

@@ -8,7 +8,6 @@ from collections.abc import Callable, Container, Iterator
 from io import BytesIO
 from typing import IO, NamedTuple
 
-import lz4.frame
 import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -16,6 +15,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, Schema
+from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 
 from glider_base.kernel import kernel
@@ -89,25 +89,16 @@ def unpack(data: bytes) -> bytes:
     """
     try:
         chunk = parse(Chunk, data)
-        size, packed = chunk.uncompressed_size, chunk.data
-        if chunk.compression == 'zstd':
-            told = zstandard.frame_content_size(packed)
-            if told not in (size, _NOT_TOLD):
-                raise ValueError(f'{told:,} bytes in place of {size:,}')
-            content = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
-        elif chunk.compression == 'lz4':
-            content = lz4.frame.decompress(packed)
-        elif not chunk.compression:
-            content = packed
-        else:
-            raise ValueError(f'unknown compression {chunk.compression!r}')
+        size = chunk.uncompressed_size
+        told = zstandard.frame_content_size(chunk.data) if chunk.compression == 'zstd' else size
+        if told not in (size, _NOT_TOLD):
+            raise ValueError(f'{told:,} bytes in place of {size:,}')
+        stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     except (*UNREADABLE, zstandard.ZstdError, RuntimeError, MemoryError) as error:
         raise ValueError(f'it does not decompress ({error})') from None
-    if len(content) != size:
-        raise ValueError(f'{len(content):,} bytes in place of {size:,}')
-    if chunk.uncompressed_crc and zlib.crc32(content) != chunk.uncompressed_crc:
-        raise ValueError('its checksum (CRC) is wrong')
-    return content
+    if length != size:
+        raise ValueError(f'{length:,} bytes in place of {size:,}')
+    return stream.read(length)
 
 
 @kernel

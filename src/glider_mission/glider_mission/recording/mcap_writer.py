@@ -17,23 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import zstandard
+from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
 from mcap.summary import Summary
 
 from glider_mission.disk import not_written, refuse_vanished
@@ -61,7 +47,7 @@ class McapWriter:
         self.channels = self._summary.channels  #: that are defined, by their ids
         self._counts: Counter[int] = Counter()  #: of messages in chunks that are finished
         self._chunk = bytearray()
-        self._put(Header(profile, _LIBRARY))
+        self._put(records.Header(profile, _LIBRARY))
 
     def _put(self, record) -> tuple[int, int]:
         """Write a record; return its place and length in the file."""
@@ -85,25 +71,25 @@ class McapWriter:
         except OSError as error:
             raise not_written(self._path, error) from None
 
-    def define(self, record: Schema | Channel) -> None:
+    def define(self, record: records.Schema | records.Channel) -> None:
         """Define a message type or a topic; one that comes again is not needed."""
-        known = self.channels if isinstance(record, Channel) else self._summary.schemas
+        known = self.channels if isinstance(record, records.Channel) else self._summary.schemas
         if record.id not in known:
             known[record.id] = record
             self._put(record)
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
         """Store a file beside the messages."""
-        offset, length = self._put(Attachment(0, 0, name, media_type, data))
+        offset, length = self._put(records.Attachment(0, 0, name, media_type, data))
         self._summary.attachment_indexes.append(
-            AttachmentIndex(offset, length, 0, 0, len(data), name, media_type)
+            records.AttachmentIndex(offset, length, 0, 0, len(data), name, media_type)
         )
 
     def add_metadata(self, name: str, data: dict[str, str]) -> None:
         """Store named texts."""
         self.flush()
-        place = self._put(Metadata(name=name, metadata=data))
-        self._summary.metadata_indexes.append(MetadataIndex(*place, name))
+        place = self._put(records.Metadata(name=name, metadata=data))
+        self._summary.metadata_indexes.append(records.MetadataIndex(*place, name))
 
     # ------------------------------------------------------------------ messages
 
@@ -176,7 +162,7 @@ class McapWriter:
         found = find(bytes(content))
         start_ns, end_ns = int(found.log_ns.min()), int(found.log_ns.max())
         data = self._compressor.compress(content)
-        chunk = Chunk(
+        chunk = records.Chunk(
             compression='zstd',
             data=data,
             message_start_time=start_ns,
@@ -195,7 +181,7 @@ class McapWriter:
             size = entries.nbytes
             self._pending += struct.pack('<BQHI', Opcode.MESSAGE_INDEX, 6 + size, number, size)
             self._pending += entries.tobytes()
-        index = ChunkIndex(
+        index = records.ChunkIndex(
             message_start_time=start_ns,
             message_end_time=end_ns,
             chunk_start_offset=offset,
@@ -213,11 +199,11 @@ class McapWriter:
     def close(self, sync: bool = False) -> None:
         """Write the summary, sync the file if so wanted, and close it."""
         self.flush()
-        self._put(DataEnd(self._checksum))
+        self._put(records.DataEnd(self._checksum))
         summary_start = self._tell()
         data, offsets = bytearray(), []
         summary = self.summary()
-        for records in (
+        for group in (
             [*summary.schemas.values()],
             [*summary.channels.values()],
             [summary.statistics],
@@ -225,15 +211,15 @@ class McapWriter:
             summary.attachment_indexes,
             summary.metadata_indexes,
         ):
-            start, encoded = summary_start + len(data), b''.join(map(_encoded, records))
-            if records:
-                offsets.append(SummaryOffset(encoded[0], start, len(encoded)))
+            start, encoded = summary_start + len(data), b''.join(map(_encoded, group))
+            if group:
+                offsets.append(records.SummaryOffset(encoded[0], start, len(encoded)))
             data += encoded
         offsets_start = summary_start + len(data)
         data += b''.join(map(_encoded, offsets))
         head = struct.pack('<BQQQ', Opcode.FOOTER, 20, summary_start, offsets_start)
         self._pending += data
-        self._put(Footer(summary_start, offsets_start, zlib.crc32(head, zlib.crc32(data))))
+        self._put(records.Footer(summary_start, offsets_start, zlib.crc32(head, zlib.crc32(data))))
         self._pending += MAGIC
         self._hand_over()
         if sync:
@@ -247,7 +233,7 @@ class McapWriter:
         counts = self._counts + Counter(waiting)
         starts_ns = [index.message_start_time for index in summary.chunk_indexes]
         ends_ns = [index.message_end_time for index in summary.chunk_indexes]
-        summary.statistics = Statistics(
+        summary.statistics = records.Statistics(
             attachment_count=len(summary.attachment_indexes),
             channel_count=len(summary.channels),
             channel_message_counts=dict(sorted(counts.items())),

@@ -70,14 +70,12 @@ def recover(path: Path, progress: Progress = lambda done, total: None) -> Recove
         room for the new file. All files are as they were, then.
     """
     files, is_listed = _files(path)
-    rebuilt, dropped_bytes, dropped, summaries = [], 0, [], {}
+    rebuilt, dropped, summaries = [], [], {}
     for file in files:
         summary = _summary(file)
         if summary is None:
-            size, words = _rebuild(file, progress)
+            dropped += _rebuild(file, progress)
             rebuilt.append(file.name)
-            dropped_bytes += size
-            dropped += words
             summary = _summary(file)
         summaries[file.name] = summary
     if path.is_dir() and (rebuilt or not is_listed):
@@ -86,8 +84,8 @@ def recover(path: Path, progress: Progress = lambda done, total: None) -> Recove
     bag = Bag(path)  # which tests all checksums
     return Recovered(
         rebuilt=tuple(rebuilt),
-        dropped_bytes=dropped_bytes,
-        dropped=tuple(dropped),
+        dropped_bytes=sum(size for size, _ in dropped),
+        dropped=tuple(what for _, what in dropped),
         counts=dict(topic_counts(summaries.values())),
         start_ns=bag.start_ns,
         end_ns=bag.end_ns,
@@ -117,102 +115,81 @@ def _summary(file: Path) -> Summary | None:
     return summary if summary and summary.statistics else None
 
 
-def _rebuild(file: Path, progress: Progress) -> tuple[int, list[str]]:
-    """Give a file its index; the bytes of it that were dropped, and what they were, in words."""
-    draft = file.with_name(f'.part-{file.stem}')
+def _rebuild(file: Path, progress: Progress) -> list[tuple[int, str]]:
+    """Give a file its index; sizes of what was dropped of it, and what it was, in words."""
+    draft, writer, end = file.with_name(f'.part-{file.stem}'), None, len(MAGIC)
+    dropped = []
     try:
         with file.open('rb') as stream:
             if stream.read(len(MAGIC)) != MAGIC:
                 raise ConfigurationError(f'{file}: not an MCAP file, or nothing is left of it')
-            rebuilt = _Rebuilt(file, draft)
             for opcode, at, data in whole_records(stream):
-                rebuilt.take(opcode, at, data)
+                if opcode == Opcode.HEADER:
+                    writer = McapWriter(draft, parse(Header, data).profile)
+                elif writer is None:
+                    raise ValueError('no header')
+                elif lost := _take(writer, opcode, data):
+                    dropped.append((len(data), f'the chunk {lost[0]} at byte {at:,}: {lost[1]}'))
+                end = at + HEAD.size + len(data)
                 progress(stream.tell(), stream.seek(0, 2))
-            dropped = rebuilt.close(stream)
+            if writer is None:
+                raise ValueError('nothing is left of it')
+            dropped += _rest(stream, end)
+        text = metadata_text({file.name: writer.summary()})
+        writer.add_metadata(ROSBAG2, {'serialized_metadata': text})
+        writer.close(sync=True)
         os.replace(draft, file)
+    except ConfigurationError:
+        raise
+    except (ValueError, *UNREADABLE) as error:
+        raise ConfigurationError(f'{file}: cannot be recovered: {error} (byte {end:,})') from None
     except OSError as error:
         raise not_written(file, error) from None
     finally:
         draft.unlink(missing_ok=True)
-    return sum(size for size, _ in dropped), [f'{file.name}: {what}' for _, what in dropped]
+    return [(size, f'{file.name}: {what}') for size, what in dropped]
 
 
-class _Rebuilt:
-    """The new file that what is left of an old one goes into."""
-
-    def __init__(self, file: Path, draft: Path) -> None:
-        self._file, self._draft = file, draft
-        self._writer: McapWriter | None = None
-        self._end = len(MAGIC)  #: of what was taken, in the old file
-        self._dropped: list[tuple[int, str]] = []  #: size, and what it is
-
-    def take(self, opcode: int, at: int, data: bytes) -> None:
-        """Take a record."""
-        if self._writer is None and opcode != Opcode.HEADER:
-            raise self._damaged(at, 'no header')
+def _take(writer: McapWriter, opcode: int, data: bytes) -> tuple[str, str] | None:
+    """Write a record into the new file; times of a chunk that is harmed, and what harms it."""
+    if opcode in DEFINITIONS:
+        writer.define(parse(DEFINITIONS[opcode], data))
+    elif opcode == Opcode.ATTACHMENT:
+        one = parse(Attachment, data)
+        writer.add_attachment(one.name, one.media_type, one.data)
+    elif opcode == Opcode.METADATA:
+        one = parse(Metadata, data)
+        if one.name != ROSBAG2:
+            writer.add_metadata(one.name, one.metadata)
+    elif opcode == Opcode.MESSAGE:
+        _write(writer, HEAD.pack(opcode, len(data)) + data)
+        if writer.waiting > _LOOSE_BYTES:
+            writer.flush()
+    elif opcode == Opcode.CHUNK:
+        writer.flush()
         try:
-            self._take(opcode, at, data)
-        except ConfigurationError:
-            raise
-        except (ValueError, *UNREADABLE) as error:
-            raise self._damaged(at, str(error)) from None
-        self._end = at + HEAD.size + len(data)
+            _write(writer, unpack(data))
+        except ValueError as error:
+            return f'({span(*CHUNK_TIMES.unpack_from(data))})', str(error)
+        writer.flush()
+    return None
 
-    def _take(self, opcode: int, at: int, data: bytes) -> None:
-        if opcode == Opcode.HEADER:
-            self._writer = McapWriter(self._draft, parse(Header, data).profile)
-        elif opcode in DEFINITIONS:
-            self._writer.define(parse(DEFINITIONS[opcode], data))
-        elif opcode == Opcode.ATTACHMENT:
-            one = parse(Attachment, data)
-            self._writer.add_attachment(one.name, one.media_type, one.data)
-        elif opcode == Opcode.METADATA:
-            one = parse(Metadata, data)
-            if one.name != ROSBAG2:
-                self._writer.add_metadata(one.name, one.metadata)
-        elif opcode == Opcode.MESSAGE:
-            self._write(HEAD.pack(opcode, len(data)) + data)
-            if self._writer.waiting > _LOOSE_BYTES:
-                self._writer.flush()
-        elif opcode == Opcode.CHUNK:
-            self._writer.flush()
-            try:
-                self._write(unpack(data))
-            except ValueError as error:
-                times = span(*CHUNK_TIMES.unpack_from(data))
-                what = f'the chunk ({times}) at byte {at:,}: {error}'
-                self._dropped.append((len(data), what))
-            self._writer.flush()
 
-    def _write(self, content: bytes) -> None:
-        """Write the records of a chunk; raise ValueError if they are none."""
-        found = find_defined(content, self._writer.define, self._writer.channels)
-        if len(found.channel):
-            self._writer.add(content)
+def _write(writer: McapWriter, content: bytes) -> None:
+    """Write the records of a chunk; raise ValueError if they are none."""
+    found = find_defined(content, writer.define, writer.channels)
+    if len(found.channel):
+        writer.add(content)
 
-    def close(self, stream: IO[bytes]) -> list[tuple[int, str]]:
-        """Complete the new file, on disk; sizes of what was dropped, and what it is."""
-        if self._writer is None:
-            raise self._damaged(len(MAGIC), 'nothing is left of it')
-        self._drop_rest(stream)
-        text = metadata_text({self._file.name: self._writer.summary()})
-        self._writer.add_metadata(ROSBAG2, {'serialized_metadata': text})
-        self._writer.close(sync=True)
-        return self._dropped
 
-    def _drop_rest(self, stream: IO[bytes]) -> None:
-        """Note what is behind the last whole record, if it is more than an index."""
-        size = stream.seek(0, 2)
-        stream.seek(self._end)
-        rest = stream.read(HEAD.size + CHUNK_TIMES.size)
-        if not rest or rest[0] in (Opcode.DATA_END, Opcode.FOOTER):
-            return
-        what = 'what begins'
-        if rest[0] == Opcode.CHUNK and len(rest) == HEAD.size + CHUNK_TIMES.size:
-            what = f'the chunk ({span(*CHUNK_TIMES.unpack_from(rest, HEAD.size))})'
-        self._dropped.append(
-            (size - self._end, f'{what} at byte {self._end:,}: its end is missing')
-        )
-
-    def _damaged(self, at: int, what: str) -> ConfigurationError:
-        return ConfigurationError(f'{self._file}: cannot be recovered: {what} (byte {at:,})')
+def _rest(stream: IO[bytes], end: int) -> list[tuple[int, str]]:
+    """What is behind the last whole record, if it is more than an index: its size, and words."""
+    size = stream.seek(0, 2)
+    stream.seek(end)
+    rest = stream.read(HEAD.size + CHUNK_TIMES.size)
+    if not rest or rest[0] in (Opcode.DATA_END, Opcode.FOOTER):
+        return []
+    what = 'what begins'
+    if rest[0] == Opcode.CHUNK and len(rest) == HEAD.size + CHUNK_TIMES.size:
+        what = f'the chunk ({span(*CHUNK_TIMES.unpack_from(rest, HEAD.size))})'
+    return [(size - end, f'{what} at byte {end:,}: its end is missing')]
