@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from rclpy.serialization import deserialize_message
 
-_SECOND_NS = 1_000_000_000
+_SECOND_NS, _STAMP = 1_000_000_000, struct.Struct('<iI')
 _CDR_HEADER = b'\x00\x01\x00\x00'  #: of little-endian bytes, which are aligned from behind it on
 #: Fields that name frames.
 _FRAMES = ('header.frame_id', 'child_frame_id')
@@ -136,57 +136,44 @@ class Codec:
         raw = to_cdr(template)
         raw += bytes(-len(raw) % 4)  # the middleware sends whole words
         places = {place.path: place for place in cdr_places(template)}
-        self._stamp_at = places[f'{stamp}.sec'].start
         split = [_split(template, path) for path in self.fields]
-        found = [places[name if i is None else f'{name}[{i}]'] for name, i in split]
-        self._codes = [place.code for place in found]
-        self._lay_out(raw, [place.start for place in found])
+        names = [name if i is None else f'{name}[{i}]' for name, i in split]
+        self._lay_out(raw, [places[one] for one in (f'{stamp}.sec', f'{stamp}.nanosec', *names)])
 
-    def _lay_out(self, raw: bytes, offsets: list[int]) -> None:
-        """Group the numbers into runs of neighbours and keep the constant rest."""
-        order = sorted(range(len(offsets)), key=offsets.__getitem__)
-        runs: list[tuple[str, int, list[int]]] = []
-        for index in order:
-            at, code = offsets[index], self._codes[index]
-            if runs and (code, at) == (runs[-1][0], runs[-1][1] + _size(code, len(runs[-1][2]))):
-                runs[-1][2].append(index)
-            else:
-                runs.append((code, at, [index]))
-        holes = [(at, _size(code, len(picked))) for code, at, picked in runs]
-        holes = sorted([(self._stamp_at, 8), *holes])
-        template = bytearray(raw)
-        for at, size in holes:
-            template[at : at + size] = bytes(size)
-        self._template = bytes(template)
-        self.size = len(template)
-        start = 0
-        self._constants = []
-        for at, size in [*holes, (self.size, 0)]:
-            if at > start:
-                self._constants.append((start, at, self._template[start:at]))
-            start = at + size
-        self._stamp_format = struct.Struct('<iI')
-        self._runs = [
-            (struct.Struct(f'<{len(picked)}{code}'), at, tuple(picked), code)
-            for code, at, picked in runs
-        ]
+    def _lay_out(self, raw: bytes, places: list[Place]) -> None:
+        """Note where stamp and numbers lie, and keep the constant rest, which is 0 there."""
+        self.size, self._stamp_at = len(raw), places[0].start
+        order = sorted(range(len(places)), key=lambda index: places[index].start)
+        template, mask, text, end = bytearray(raw), bytearray(self.size * b'\xff'), '<', 0
+        for place in (places[index] for index in order):
+            text += f'{place.start - end}x{place.code}'
+            end = place.end
+            template[place.start : end] = mask[place.start : end] = bytes(end - place.start)
+        self._struct = struct.Struct(f'{text}{self.size - end}x')
+        self._template, self._mask = (np.frombuffer(one, np.uint8) for one in (template, mask))
+        self._constant, self._kept = (int.from_bytes(one, 'little') for one in (template, mask))
+        self._in_memory = operator.itemgetter(*order)
+        self._in_order = operator.itemgetter(*map(order.index, range(len(order))))
+        self._codes = [place.code for place in places[2:]]
         self._has_integers = any(code != 'd' for code in self._codes)
-        in_memory_order = order == list(range(len(order)))
-        inverse = [order.index(index) for index in range(len(order))]
-        self._reorder = None if in_memory_order else operator.itemgetter(*inverse)
+        self._columns = [str(index) for index in range(len(places))]
+        self._rows = np.dtype(
+            {
+                'names': self._columns,
+                'formats': [f'<{place.code}' for place in places],
+                'offsets': [place.start for place in places],
+                'itemsize': self.size,
+            }
+        )
 
     def encode(self, stamp_ns: int, values) -> bytes:
         """Bytes of the message with this stamp (ns) and these numbers, ready to publish."""
-        buffer = bytearray(self._template)
-        self._stamp_format.pack_into(
-            buffer, self._stamp_at, stamp_ns // _SECOND_NS, stamp_ns % _SECOND_NS
-        )
         if self._has_integers:
-            kinds = zip(self._codes, values, strict=True)
+            kinds = zip(self._codes, values, strict=False)
             values = [value if code in 'df' else int(value) for code, value in kinds]
-        for run, at, picked, _ in self._runs:
-            run.pack_into(buffer, at, *[values[index] for index in picked])
-        return bytes(buffer)
+        numbers = (*divmod(stamp_ns, _SECOND_NS), *values)
+        packed = int.from_bytes(self._struct.pack(*self._in_memory(numbers)), 'little')
+        return (packed | self._constant).to_bytes(self.size, 'little')
 
     def encode_many(self, stamps_ns, values) -> np.ndarray:
         """Bytes uint8[n, size] of n messages at once.
@@ -194,15 +181,11 @@ class Codec:
         Of stamps int64[n] (ns), and of rows float64[n, m] that begin with the ``fields``.
         """
         stamps_ns = np.asarray(stamps_ns, np.int64)
-        values = np.asarray(values, np.float64)
-        out = np.empty((len(stamps_ns), self.size), np.uint8)
-        out[:] = np.frombuffer(self._template, np.uint8)
-        stamps = np.stack((stamps_ns // _SECOND_NS, stamps_ns % _SECOND_NS), axis=1)
-        at = self._stamp_at
-        out[:, at : at + 8] = stamps.astype('<u4').view(np.uint8).reshape(-1, 8)
-        for run, at, picked, code in self._runs:
-            block = np.ascontiguousarray(values[:, list(picked)].astype(f'<{code}'))
-            out[:, at : at + run.size] = block.view(np.uint8).reshape(len(out), -1)
+        out = np.tile(self._template, (len(stamps_ns), 1))
+        rows = out.view(self._rows)[:, 0]
+        columns = (*np.divmod(stamps_ns, _SECOND_NS), *np.asarray(values, np.float64).T)
+        for name, column in zip(self._columns, columns, strict=False):
+            rows[name] = column
         return out
 
     def decode(self, raw: bytes, check_frames: bool = False) -> tuple[int, tuple[float, ...]]:
@@ -216,20 +199,11 @@ class Codec:
         NotFiniteFieldError
             If a number is NaN or infinite.
         """
-        if len(raw) != self.size:
+        if len(raw) != self.size or int.from_bytes(raw, 'little') & self._kept != self._constant:
             return self._decode_foreign(raw, check_frames)
-        for start, end, constant in self._constants:
-            if raw[start:end] != constant:
-                return self._decode_foreign(raw, check_frames)
-        values: tuple[float, ...] = ()
-        for run, at, _, _ in self._runs:
-            values += run.unpack_from(raw, at)
-        if self._has_integers:
-            values = tuple(map(float, values))
-        if self._reorder is not None:
-            values = self._reorder(values)
+        sec, nanosec, *numbers = self._in_order(self._struct.unpack(raw))
+        values = tuple(map(float, numbers) if self._has_integers else numbers)
         self._refuse_non_finite(values)
-        sec, nanosec = self._stamp_format.unpack_from(raw, self._stamp_at)
         return sec * _SECOND_NS + nanosec, values + self._absent
 
     def decode_many(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -245,23 +219,18 @@ class Codec:
             Whether all other bytes are those that `encode_many` writes: then, and only then,
             stamp and numbers are the whole message. Else they may be anything.
         """
-        own = np.ones(len(rows), bool)
-        for start, end, constant in self._constants:
-            own &= np.all(rows[:, start:end] == np.frombuffer(constant, np.uint8), axis=1)
-        at = self._stamp_at
-        stamps = np.ascontiguousarray(rows[:, at : at + 8]).view('<u4').astype(np.int64)
-        own &= stamps[:, 1] < _SECOND_NS
-        seconds = stamps[:, 0].astype(np.int32).astype(np.int64)
+        own = np.all(rows & self._mask == self._template, axis=1)
+        table = np.ascontiguousarray(rows).view(self._rows)[:, 0]
+        sec, nanosec = (table[name].astype(np.int64) for name in self._columns[:2])
         values = np.zeros((len(rows), self.width))
-        for run, at, picked, code in self._runs:
-            block = np.ascontiguousarray(rows[:, at : at + run.size])
-            values[:, list(picked)] = block.view(f'<{code}')
-        return seconds * _SECOND_NS + stamps[:, 1], values, own
+        for i, name in enumerate(self._columns[2:]):
+            values[:, i] = table[name]
+        return sec * _SECOND_NS + nanosec, values, own & (nanosec < _SECOND_NS)
 
     def decode_stamp(self, raw: bytes) -> int:
         """Stamp (ns) of a serialized message; its numbers are not looked at."""
         if len(raw) == self.size:
-            sec, nanosec = self._stamp_format.unpack_from(raw, self._stamp_at)
+            sec, nanosec = _STAMP.unpack_from(raw, self._stamp_at)
             return sec * _SECOND_NS + nanosec
         return self._stamp_of(self.message(raw))
 
@@ -298,11 +267,6 @@ class Codec:
         for path, value in zip(self.fields, values, strict=True):
             if not math.isfinite(value):
                 raise NotFiniteFieldError(f'{path} is {value}')
-
-
-def _size(code: str, count: int) -> int:
-    """Bytes of so many numbers."""
-    return count * struct.calcsize(f'<{code}')
 
 
 def _value_at(message, path: str) -> str:
