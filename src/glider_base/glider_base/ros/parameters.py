@@ -22,11 +22,6 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.exceptions import (
-    InvalidParameterTypeException,
-    InvalidParameterValueException,
-    ParameterUninitializedException,
-)
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -36,12 +31,7 @@ from glider_base.settings import ConfigurationError, Settings, mistakes, validat
 
 SettingsT = TypeVar('SettingsT', bound=Settings)
 
-_TYPES = {
-    bool: Parameter.Type.BOOL,
-    int: Parameter.Type.INTEGER,
-    float: Parameter.Type.DOUBLE,
-    str: Parameter.Type.STRING,
-}
+_PLAIN = (bool, int, float, str)
 _MISSING = object()
 _LARGEST = {float: sys.float_info.max, int: 2**63 - 1}
 _RANGES = {
@@ -62,7 +52,7 @@ class _Leaf(NamedTuple):
         """Python type of a plain parameter; None for one that holds JSON or YAML text."""
         if self.choices:
             return str
-        return self.field.annotation if self.field.annotation in _TYPES else None
+        return self.field.annotation if self.field.annotation in _PLAIN else None
 
     @property
     def choices(self) -> tuple[str, ...]:
@@ -119,34 +109,28 @@ def _descriptor(leaf: _Leaf) -> ParameterDescriptor:
     return descriptor
 
 
-def _refuse(node: Node, leaf: _Leaf, value, reason: str) -> ConfigurationError:
-    """Error that says which parameter cannot be used, its value, and what is allowed."""
-    limits = leaf.limits
-    allowed = f' (allowed: {limits[0]} to {limits[1]})' if limits else ''
-    return ConfigurationError(
-        f'{node.get_name()}: parameter {leaf.name} = {shown(value)}: {reason}{allowed}'
-    )
-
-
 def _declare(node: Node, leaf: _Leaf) -> None:
-    default = leaf.default if leaf.kind else _text(leaf.field, leaf.default)
-    if leaf.field.is_required() and leaf.default is None:
-        default = _TYPES.get(leaf.kind, Parameter.Type.STRING)
-    try:
-        node.declare_parameter(leaf.name, default, _descriptor(leaf))
-        node.get_parameter(leaf.name)
-    except ParameterUninitializedException:
-        raise _refuse(node, leaf, None, 'this parameter has to be given') from None
-    except (InvalidParameterTypeException, InvalidParameterValueException) as error:
-        given = node.declare_parameter(
-            leaf.name, default, ParameterDescriptor(dynamic_typing=True)
-        ).value
+    """Declare a parameter; one that was given of another type, or out of its range, is refused."""
+    limits, reason = leaf.limits, ''
+    # rclpy has no public name for what the command line and parameter files give to a node
+    given = node._parameter_overrides.get(leaf.name)
+    value = leaf.default if leaf.kind else _text(leaf.field, leaf.default)
+    if given is not None:
+        value = given.value
+    elif leaf.field.is_required() and leaf.default is None:
+        value, reason = None, 'this parameter has to be given'
+    if leaf.kind and type(value) is not leaf.kind:
+        is_whole = leaf.kind is float and type(value) is int
+        hint = f', write {float(value)}' if is_whole else ''
+        reason = reason or f'expected a {leaf.kind.__name__}{hint}'
+    elif limits and not limits[0] <= value <= limits[1]:
         reason = 'out of range'
-        if isinstance(error, InvalidParameterTypeException):
-            reason = f'expected a {leaf.kind.__name__}'
-            if leaf.kind is float and type(given) is int:
-                reason = f'expected a float, write {float(given)}'
-        raise _refuse(node, leaf, given, reason) from None
+    if reason:
+        allowed = f' (allowed: {limits[0]} to {limits[1]})' if limits else ''
+        raise ConfigurationError(
+            f'{node.get_name()}: parameter {leaf.name} = {shown(value)}: {reason}{allowed}'
+        )
+    node.declare_parameter(leaf.name, value, _descriptor(leaf))
 
 
 def _parse(leaf: _Leaf, value, source: str):
