@@ -31,11 +31,7 @@ from glider_bringup.showing.report import report_page
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recover import recover
 from glider_mission.recording.ros.recorded_run import Recording
-from glider_mission.recording.ros.republish import (
-    check_not_empty,
-    plan_replay,
-    recorded_messages,
-)
+from glider_mission.recording.ros.republish import plan_replay, recorded_messages
 from glider_mission.recording.ros.told import read_told
 from glider_mission.recording.ros.verify.every_block import report, verify
 from glider_mission.run_folder import make_run_folder
@@ -165,7 +161,6 @@ def _verify(folder: Path) -> Answer:
 def _replay(folder: Path) -> Answer:
     bag = Bag(folder)
     plan = plan_replay(bag, [], 0.0, None, None)
-    check_not_empty(plan)
     return list(recorded_messages(plan)), bool(bag.cut)
 
 

@@ -61,12 +61,11 @@ def replay(
     names = [name for text in topics or () for name in text.split(',') if name]
     bag = Bag(run)
     plan = work.plan_replay(bag, names, start, duration, namespace)
-    work.check_not_empty(plan)
     if bag.cut:
         tell(bag.cut)
     span_s = (plan.end_ns - plan.start_ns) / 1e9
     bar = progress_bar('replaying', max(span_s, 1e-9), STATE, REMAINING)
-    with interrupted_told(), work.Replay(plan, factor) as player, bar as show:
+    with interrupted_told(), work.replay(plan, factor) as player, bar as show:
 
         def update(passed_s: float) -> None:
             show(completed=passed_s, state=f'{passed_s:,.1f} of {span_s:,.1f} s')

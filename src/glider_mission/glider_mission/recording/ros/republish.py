@@ -5,6 +5,7 @@
 import math
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -90,11 +91,16 @@ def plan_replay(
     Raises
     ------
     ConfigurationError
-        Naming the option, and what is recorded.
+        Naming the option, and what is recorded; also if nothing is to be published.
     """
-    recorded = _recorded_namespace(bag, namespace)
+    try:
+        recorded = choose_namespace(bag, None)
+    except ConfigurationError as error:
+        if namespace is not None:
+            raise ConfigurationError(f'--namespace {namespace}: {error}') from None
+        recorded = '/'  # a bag of others needs none to be replayed as it is
     names = [topic.name for topic in bag.topics]
-    asked = [_find_topic(bag, name, recorded) for name in topics] or names
+    asked = [_find_topic(names, name, recorded) for name in topics] or names
     wanted = {*asked, '/clock'}.intersection(names)
     length_s = (bag.end_ns - bag.start_ns) / 1e9
     if start_s > length_s:
@@ -113,8 +119,9 @@ def plan_replay(
         raise ConfigurationError(
             f'--namespace {namespace}: not usable (allowed: {NAMESPACE_ALLOWED})'
         )
-    renamed = {name: _rename(name, recorded, published) for name in wanted}
-    return Plan(
+    ours = {one.full_name(recorded): one.full_name(published) for one in TOPICS.values()}
+    renamed = {name: ours.get(name, name) for name in wanted}
+    plan = Plan(
         bag=bag,
         names={index: renamed[name] for index, name in enumerate(names) if name in wanted},
         namespace=published,
@@ -122,38 +129,23 @@ def plan_replay(
         end_ns=end_ns,
         asked=frozenset(renamed[name] for name in asked),
     )
+    if not any(plan.has(batch).any() for batch in bag.batches()):
+        begin_s, end_s = ((at - bag.start_ns) / 1e9 for at in (start_ns, end_ns))
+        raise ConfigurationError(
+            f'nothing to replay: no message on {", ".join(plan.names.values()) or "any topic"} '
+            f'from {begin_s:.1f} s to {end_s:.1f} s of the recording'
+        )
+    return plan
 
 
-def _recorded_namespace(bag: Bag, namespace: str | None) -> str:
-    """Namespace of the nodes in a bag; a bag of others needs none to be replayed as it is."""
-    try:
-        return choose_namespace(bag, None)
-    except ConfigurationError as error:
-        if namespace is not None:
-            raise ConfigurationError(f'--namespace {namespace}: {error}') from None
-        return '/'
-
-
-def _find_topic(bag: Bag, name: str, namespace: str) -> str:
-    names = [topic.name for topic in bag.topics]
-    for candidate in (name, _join(namespace, name)):
+def _find_topic(names: list[str], name: str, namespace: str) -> str:
+    """Recorded name of a topic that is given by it, or as in the namespace of the nodes."""
+    for candidate in (name, f'{namespace.rstrip("/")}/{name}'):
         if candidate in names:
             return candidate
     raise ConfigurationError(
         f'--topics {name}: not recorded (recorded: {", ".join(sorted(names)) or "nothing"})'
     )
-
-
-def _join(namespace: str, name: str) -> str:
-    return f'{namespace.rstrip("/")}/{name}'
-
-
-def _rename(name: str, recorded: str, published: str) -> str:
-    prefix = recorded.rstrip('/') + '/'
-    ours = [topic.name for topic in TOPICS.values() if not topic.name.startswith('/')]
-    if name.startswith(prefix) and name.removeprefix(prefix) in ours:
-        return _join(published, name.removeprefix(prefix))
-    return name
 
 
 def qos_of(topic: BagTopic) -> QoSProfile:
@@ -168,40 +160,29 @@ def qos_of(topic: BagTopic) -> QoSProfile:
         raise ConfigurationError(
             f'{topic.name}: quality of service not readable: {error!r}'
         ) from None
+    depths, reliabilities, durabilities = zip(*found, strict=True)
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=max(depth for depth, _, _ in found),
-        reliability=min(reliability for _, reliability, _ in found),
-        durability=min(durability for _, _, durability in found),
+        depth=max(depths),
+        reliability=min(reliabilities),
+        durability=min(durabilities),
     )
 
 
 def _profile(profile: dict) -> tuple[int, ReliabilityPolicy, DurabilityPolicy]:
-    keeps_all = _policy(profile, 'history', HistoryPolicy.KEEP_LAST) is HistoryPolicy.KEEP_ALL
+    def policy(name: str, unknown):
+        """What is told, of the kind of that which is taken where nothing known is."""
+        kind, told = type(unknown), profile.get(name, 0)
+        if isinstance(told, int):
+            return kind(told) if told in (1, 2) else unknown
+        return kind.__members__.get(told.upper(), unknown)
+
+    keeps_all = policy('history', HistoryPolicy.KEEP_LAST) is HistoryPolicy.KEEP_ALL
     return (
         _DEPTH if keeps_all else int(profile.get('depth') or _DEPTH),
-        _policy(profile, 'reliability', ReliabilityPolicy.RELIABLE),
-        _policy(profile, 'durability', DurabilityPolicy.VOLATILE),
+        policy('reliability', ReliabilityPolicy.RELIABLE),
+        policy('durability', DurabilityPolicy.VOLATILE),
     )
-
-
-def _policy(profile: dict, name: str, unknown):
-    """Policy of a profile, of the kind of that which is taken where none is known."""
-    kind, told = type(unknown), profile.get(name, 0)
-    if isinstance(told, int):
-        return kind(told) if told in (1, 2) else unknown
-    return kind.__members__.get(told.upper(), unknown)
-
-
-def _message_class(topic: BagTopic) -> type:
-    """Message type of a recorded topic; a `ConfigurationError` if it is not installed."""
-    try:
-        return message_class(topic.type_name)
-    except (ImportError, AttributeError, ValueError):
-        raise ConfigurationError(
-            f'{topic.name}: its type {topic.type_name!r} is not installed here; choose others '
-            f'with --topics'
-        ) from None
 
 
 # ---------------------------------------------------------------------- replaying
@@ -212,7 +193,14 @@ class _Output:
 
     def __init__(self, node: Node, name: str, topic: BagTopic) -> None:
         self.name, self.qos = name, qos_of(topic)
-        self.publisher = node.create_publisher(_message_class(topic), name, self.qos)
+        try:
+            kind = message_class(topic.type_name)
+        except (ImportError, AttributeError, ValueError):
+            raise ConfigurationError(
+                f'{topic.name}: its type {topic.type_name!r} is not installed here; choose others '
+                f'with --topics'
+            ) from None
+        self.publisher = node.create_publisher(kind, name, self.qos)
         self.count = 0
         self._on_the_way = 0
 
@@ -282,25 +270,21 @@ class _Brake:
 class _Count:
     """Tells a recorder in lockstep how many events there were, as the nodes do by themselves."""
 
-    def __init__(self, node: Node, plan: Plan) -> None:
-        topic, self._name = TOPICS['told'], _join(plan.namespace, topics.REPLAY)
+    def __init__(self, node: Node, namespace: str) -> None:
+        topic = TOPICS['told']
         self.publisher = node.create_publisher(
-            topic.message_type, topic.full_name(plan.namespace), topic.qos
+            topic.message_type, topic.full_name(namespace), topic.qos
         )
+        self._name = node.get_fully_qualified_name()
         self._events, self._newest_ns, self._told_ns = 0, -TICK_NS, -TICK_NS
 
-    def add(self, name: str) -> None:
-        """Count a message of a topic."""
-        self._events += name == '/diagnostics'
-
-    def tell_before(self, log_ns: int) -> None:
-        """Tell now and then, when a tick is over."""
-        if (
-            log_ns != self._newest_ns
-            and abs(self._newest_ns - self._told_ns) >= COUNT_TICKS * TICK_NS
-        ):
+    def add(self, log_ns: int, name: str) -> None:
+        """Count a message of a topic; what there was is told now and then, when a tick is over."""
+        since_ns = abs(self._newest_ns - self._told_ns)
+        if log_ns != self._newest_ns and since_ns >= COUNT_TICKS * TICK_NS:
             self.tell()
         self._newest_ns = log_ns
+        self._events += name == '/diagnostics'
 
     def tell(self) -> None:
         """Say how many events there were up to what was published last."""
@@ -309,59 +293,51 @@ class _Count:
         self.publisher.publish(to_cdr(health.told_array(told)))
 
 
+@contextmanager
+def replay(plan: Plan, rate: float) -> Iterator['Replay']:
+    """Node that replays a plan; it is gone when the context ends."""
+    given_domain()
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = Node(
+            topics.REPLAY,
+            namespace=plan.namespace,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        try:
+            yield Replay(node, plan, rate)
+        finally:
+            node.destroy_node()
+    finally:
+        rclpy.shutdown()
+
+
 class Replay:
-    """Publishers for what is to be replayed. Use it as a context.
+    """Publishers for what is to be replayed.
 
     The rate is times real time; infinite: as fast as subscribers take it.
     """
 
-    def __init__(self, plan: Plan, rate: float) -> None:
+    def __init__(self, node: Node, plan: Plan, rate: float) -> None:
         self._plan, self._rate = plan, rate
-        given_domain()
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        try:
-            self._node = Node(
-                topics.REPLAY,
-                namespace=plan.namespace,
-                enable_rosout=False,
-                start_parameter_services=False,
-            )
-            self._outputs = {
-                index: _Output(self._node, name, plan.bag.topics[index])
-                for index, name in plan.names.items()
-            }
-            self._own_clock = None
-            if '/clock' not in plan.names.values():
-                clock = TOPICS['/clock']
-                self._own_clock = self._node.create_publisher(
-                    clock.message_type, clock.name, clock.qos
-                )
-            self._count = _Count(self._node, plan)
-            self._brake = _Brake(self._node, plan)
-        except BaseException:
-            rclpy.shutdown()
-            raise
-
-    def __enter__(self) -> 'Replay':
-        return self
-
-    def __exit__(self, *_) -> None:
-        self._node.destroy_node()
-        rclpy.shutdown()
-
-    def missing_subscribers(self, count: int) -> list[str]:
-        """Topics asked for that fewer than ``count`` subscribers are connected to."""
-        return [
-            output.name
-            for output in self._outputs.values()
-            if output.name in self._plan.asked
-            and output.publisher.get_subscription_count() < count
-        ]
+        self._outputs = {
+            index: _Output(node, name, plan.bag.topics[index])
+            for index, name in plan.names.items()
+        }
+        clock, has_clock = TOPICS['/clock'], '/clock' in plan.names.values()
+        self._own_clock = (
+            None if has_clock else node.create_publisher(clock.message_type, clock.name, clock.qos)
+        )
+        self._count = _Count(node, plan.namespace)
+        self._brake = _Brake(node, plan)
 
     def wait_for(self, count: int, say: Callable[[str], None]) -> None:
         """Wait until every topic that was asked for has that many subscribers."""
-        said = None
-        while missing := self.missing_subscribers(count):
+        asked, said = [one for one in self._outputs.values() if one.name in self._plan.asked], []
+        while missing := [
+            one.name for one in asked if one.publisher.get_subscription_count() < count
+        ]:
             if missing != said:
                 said = missing
                 say(f'waiting for {count} subscribers of {", ".join(missing)}')
@@ -378,10 +354,9 @@ class Replay:
             if math.isfinite(self._rate):
                 self._sleep_until(began_s + passed_s / self._rate, passed_s, progress)
             self._brake.wait(log_ns)
-            self._count.tell_before(log_ns)
+            self._count.add(log_ns, self._plan.names[index])
             self._tell_time(log_ns)
             self._outputs[index].publish(raw)
-            self._count.add(self._plan.names[index])
             now_s = time.monotonic()
             if now_s - shown_s > _PATIENCE_S:
                 shown_s = now_s
@@ -431,14 +406,3 @@ def recorded_messages(plan: Plan) -> Iterator[tuple[int, int, bytes]]:
                 yield from ((plan.start_ns, index, raw) for raw in kept)
             held = {}
             yield int(batch.log_ns[i]), int(batch.topic[i]), batch.payload(i)
-
-
-def check_not_empty(plan: Plan) -> None:
-    """Refuse a plan by which nothing is published, by a `ConfigurationError`."""
-    if any(plan.has(batch).any() for batch in plan.bag.batches()):
-        return
-    start_s, end_s = ((at - plan.bag.start_ns) / 1e9 for at in (plan.start_ns, plan.end_ns))
-    raise ConfigurationError(
-        f'nothing to replay: no message on {", ".join(plan.names.values()) or "any topic"} '
-        f'from {start_s:.1f} s to {end_s:.1f} s of the recording'
-    )
