@@ -19,6 +19,7 @@ from glider_base.frames import OriginSettings, to_geodetic
 from glider_base.settings import (
     ConfigurationError,
     Settings,
+    SettingsT,
     beside,
     file_names,
     find_file,
@@ -220,20 +221,14 @@ class Scenario(Settings):
 
     def plant_settings(self) -> PlantSettings:
         """What the plant node is told."""
-        return PlantSettings(
-            vehicle=self.vehicle,
-            water=self.water,
+        return _told(
+            PlantSettings,
+            self,
             bathymetry=self._bathymetry(),
-            initial=self.initial,
-            duration_s=self.duration_s,
             dives=0 if self._holds else self.dives,
             dive_depth_m=self.shallowest_m,
             afloat_s=self._afloat_s(),
-            seed=self.seed,
-            sensors=self.sensors,
             fitted=[name for name in SENSORS if name in self.topics],
-            origin=self.origin,
-            perturb=self.perturb,
             faults=self.vehicle_faults,
         )
 
@@ -301,58 +296,33 @@ class Scenario(Settings):
 
     def navigation_settings(self) -> NavigationSettings:
         """What the navigation node is told."""
+        sources = self.navigation, self.initial, self.sensors, self
         forecast = self.resolved_current(self.navigation.forecast)
-        return NavigationSettings(
-            vehicle=self.vehicle,
-            origin=self.origin,
-            north_m=self.initial.north_m,
-            east_m=self.initial.east_m,
-            imu_period_s=self.sensors.imu_period_s,
-            gyro=self.sensors.gyro,
-            also_fitted=self.sensors.also_fitted,
-            **{**dict(self.navigation), 'forecast': forecast},
-        )
+        return _told(NavigationSettings, *sources, forecast=forecast)
 
     def guidance_settings(self) -> GuidanceSettings:
         """What the guidance node is told."""
-        return GuidanceSettings(
-            vehicle=self.vehicle,
-            path=self.path,
-            profile=self.profile,
-            dives=self.dives,
-            duration_s=self.duration_s,
-            orders=self.orders,
-            altitude='altitude' in self.topics,
-            **self._believing(self.guidance),
-        )
+        altitude, gate = 'altitude' in self.topics, self._gate(self.guidance)
+        return _told(GuidanceSettings, self.guidance, self, altitude=altitude, gate=gate)
 
-    def _believing(
-        self, law: GuidanceLawSettings | ControlLawSettings | GuardLimitSettings
-    ) -> dict[str, Any]:
-        """Fields of a law that is told where the vehicle believes it is.
+    def _gate(self, law: GuidanceLawSettings | ControlLawSettings | GuardLimitSettings):
+        """Gate of a law that is told where the vehicle believes it is.
 
         A belief may jump at a fix as far as it was off: that is no fault, unless somebody said so.
         """
-        fields = dict(law)
         if not self.navigation.jumps or law.gate.position_jump_m != GateSettings().position_jump_m:
-            return fields
-        return {**fields, 'gate': law.gate.model_copy(update={'position_jump_m': JUMP_M})}
+            return law.gate
+        return law.gate.model_copy(update={'position_jump_m': JUMP_M})
 
     def control_settings(self) -> ControlSettings:
         """What the control node is told."""
-        return self.control_kind(vehicle=self.vehicle, **self._believing(self.control))
+        return _told(self.control_kind, self.control, self, gate=self._gate(self.control))
 
     def guard_settings(self) -> GuardSettings:
         """What the guard node is told."""
-        return GuardSettings(
-            vehicle=self.vehicle,
-            pressure='pressure' in self.topics,
-            altitude='altitude' in self.topics,
-            imu_period_s=self.sensors.imu_period_s,
-            imu_missed_share=self.sensors.imu_missed_share,
-            depth_resolution_m=self.sensors.depth_resolution_m,
-            **self._believing(self.guard),
-        )
+        has = {name: name in self.topics for name in ('pressure', 'altitude')}
+        gate = self._gate(self.guard)
+        return _told(GuardSettings, self.guard, self.sensors, self, gate=gate, **has)
 
     def block_settings(self) -> tuple[Settings, ...]:
         """What the node of each block is told, in the order of `glider_mission.blocks`."""
@@ -415,6 +385,14 @@ class Scenario(Settings):
         }
         values = self.model_dump(mode='json', exclude_none=True, exclude=left_out)
         return yaml_text({**values, 'vehicle': vehicle or self.vehicle})
+
+
+def _told(kind: type[SettingsT], *sources: Settings, **told: Any) -> SettingsT:
+    """Settings of a kind: what is told, else what the first of the sources has by that name."""
+    for source in sources:
+        names = type(source).model_fields.keys() & kind.model_fields.keys() - told.keys()
+        told |= {name: getattr(source, name) for name in names}
+    return kind(**told)
 
 
 #: Kinds of scenario that know one law more, which this program brought, by its name.
