@@ -32,9 +32,8 @@ from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive, left_over, mapped
 from glider_bringup.engines.processes import MODULES
 from glider_mission.recording.mcap_reader import Bag
-from glider_mission.recording.read_back import read_back
 from glider_mission.recording.recover import recover
-from glider_mission.recording.ros.recorded_log import RecordedLog
+from glider_mission.recording.ros.recorded_log import RecordedLog, read_back
 from glider_mission.scenario import load_scenario
 
 SCENARIO = 'current_8deg'

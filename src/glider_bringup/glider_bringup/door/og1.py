@@ -25,7 +25,7 @@ from glider_mission.blocks import COLUMNS
 from glider_mission.disk import whole_file
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
-from glider_mission.recording.read_back import read_back
+from glider_mission.recording.ros.recorded_log import read_back
 from glider_mission.run_folder import scenario_of
 from glider_mission.scenario import Scenario
 from glider_model.ocean.density import depth_at

@@ -299,7 +299,7 @@ def open_run(path: str | Path) -> Run:
 
 def _rows_of(path: Path, vehicle: str) -> np.ndarray:
     """Rows of the bag of a run, float64[ticks, ROW]."""
-    from glider_mission.recording.read_back import read_back
+    from glider_mission.recording.ros.recorded_log import read_back
 
     rows = Rows()
     read_back(Bag(path), vehicle, [rows])

@@ -22,8 +22,8 @@ from glider_bringup.engines.processes import Layout, node_commands, run_nodes
 from glider_mission.disk import DiskError, vanished
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
-from glider_mission.recording.read_back import Reader, read_back
 from glider_mission.recording.ros.log_writer import LogWriter
+from glider_mission.recording.ros.recorded_log import Reader, read_back
 from glider_mission.recording.ros.rosbag2 import BagWriter, Sync
 from glider_mission.run_folder import (
     LOG_FILE,

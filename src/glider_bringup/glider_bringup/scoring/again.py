@@ -13,8 +13,7 @@ from glider_bringup.scoring.score import make_scorer, scores_of
 from glider_mission.planned import planned_ticks
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
-from glider_mission.recording.read_back import Reader, read_back
-from glider_mission.recording.ros.recorded_log import RecordedLog
+from glider_mission.recording.ros.recorded_log import Reader, RecordedLog, read_back
 from glider_mission.run_folder import PARAMETERS_FILE, scenario_of
 from glider_mission.scenario import Scenario
 

@@ -54,7 +54,7 @@ def _ticks(run: Path) -> dict[str, Any]:
     from glider_bringup.scoring.card import read_score
     from glider_mission.planned import planned_ticks
     from glider_mission.recording.mcap_reader import Bag
-    from glider_mission.recording.read_back import read_back
+    from glider_mission.recording.ros.recorded_log import read_back
     from glider_mission.recording.ros.rosbag2 import CHUNK_TICKS
     from glider_mission.run_folder import scenario_of
 

@@ -3,8 +3,8 @@
 """Bags to log rows: what lets one function score and draw every kind of run."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -18,6 +18,7 @@ from glider_base.wiring import BELIEFS, SENSORS, WHEN_SILENT
 from glider_guidance.yo.stage import STAGE_NAMES
 from glider_mission.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_mission.recording.mcap_reader import Bag, Batch
+from glider_model.vehicle.file import load_vehicle
 
 _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 
@@ -243,3 +244,32 @@ class RecordedLog:
             left_out |= {'ground_truth/odom'}
         names = (topic.name for topic in _PER_TICK if topic.name not in left_out)
         return {name: self.counts[name] for name in names}
+
+
+class Reader(Protocol):
+    """A taker that also says what it needs, so that no more is read from a bag."""
+
+    topics: tuple[str, ...]  #: that it needs, beside those of the score
+
+    def add(self, log: np.ndarray) -> None:
+        """Take in the next rows, float64[n, ROW]; they are valid until the next are read."""
+
+
+def read_back(
+    bag: Bag,
+    vehicle: str,
+    takers: Iterable[Reader],
+    progress: Callable[[int], None] = lambda ticks: None,
+) -> RecordedLog:
+    """Give the rows of a bag of a vehicle to takers; ``progress`` gets the ticks read.
+
+    A `ConfigurationError` says where the bag is damaged.
+    """
+    takers = tuple(takers)
+    also = {topic for taker in takers for topic in taker.topics}
+    log = RecordedLog(bag, also, load_vehicle(vehicle).steers_by)
+    for rows in log.blocks():
+        for taker in takers:
+            taker.add(rows)
+        progress(log.ticks)
+    return log
