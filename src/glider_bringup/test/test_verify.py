@@ -26,7 +26,7 @@ from glider_bringup.engines.recorded import fly_recorded
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.recorded_run import Recording
 from glider_mission.recording.ros.told import read_told
-from glider_mission.recording.ros.verify.differences import IDENTICAL
+from glider_mission.recording.ros.verify.check import IDENTICAL
 from glider_mission.recording.ros.verify.every_block import report, verify
 from glider_mission.recording.ros.verify.lockstep import place_ticks
 from glider_mission.run_folder import make_run_folder

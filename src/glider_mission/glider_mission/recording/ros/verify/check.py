@@ -1,33 +1,27 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""One block at work on recorded inputs, and what has been found so far."""
+"""One block at work on recorded inputs: where it differs from what is recorded, byte by byte."""
 
+import struct
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
 
 from glider_base import wiring
 from glider_base.block import Telling
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.health import ABORT, CLEAR, PARAMETERS_SET, SURFACE
 from glider_base.ros.parameters import with_parameters
-from glider_base.ros.wire.codec import to_cdr
+from glider_base.ros.wire.codec import Codec, cdr_places, to_cdr
 from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_NS
 from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording, Series
-from glider_mission.recording.ros.verify.differences import (
-    DIFFERENT,
-    IDENTICAL,
-    NOT_RECORDED,
-    WHOLE,
-    Difference,
-    Verdict,
-    field_difference,
-    message_difference,
-)
 from glider_model.plant.block import PLANT
 
 #: Orders that change what a block does.
@@ -36,6 +30,39 @@ ORDERS = (ABORT, CLEAR, PARAMETERS_SET, SURFACE)
 _BYTES_ALIKE = 16
 #: Ticks at the end that may lack in a topic: whoever recorded it left in the middle of one.
 TICKS_OF_THE_END = 10
+
+IDENTICAL, DIFFERENT, SKIPPED = 'identical', 'different', 'skipped'
+
+#: What stands where there is no field, and no message.
+WHOLE, MISSING = '(message)', 'not recorded'
+
+
+class Difference(NamedTuple):
+    """Where a recording and today's code differ."""
+
+    stamp_ns: int
+    topic: str
+    field: str
+    computed: str
+    recorded: str
+
+    @property
+    def tick(self) -> int:
+        """Number of the tick; of a vehicle's own clock, that many tenths of a second."""
+        return self.stamp_ns // TICK_NS
+
+
+class Verdict(NamedTuple):
+    """What came out for one block."""
+
+    block: str
+    result: str  #: IDENTICAL, DIFFERENT or SKIPPED
+    reason: str = ''  #: why it was skipped
+    ticks: int = 0  #: that were computed
+    compared: Mapping[str, int] = {}  #: messages by topic
+    differing: Mapping[str, int] = {}  #: those of them that differ, by topic
+    first: Difference | None = None
+    notes: Sequence[str] = ()
 
 
 class Track:
@@ -78,6 +105,10 @@ class Check:
         self.differing[difference.topic] += 1
         self.found.append(difference)
 
+    def add_whole(self, at_ns: int, topic: str, computed: str, recorded: str = MISSING) -> None:
+        """Keep that a message is recorded or computed that is not the other."""
+        self.add(Difference(int(at_ns), topic, WHOLE, computed, recorded))
+
     def tracks(self, place: Place, why: str) -> dict[str, Track]:
         """Tracks of the outputs that are recorded; ``why`` tells of what has no place."""
         tracks = {}
@@ -89,8 +120,7 @@ class Check:
             tracks[name], left = place(series)
             for i in left:
                 text = f'message {i} of the topic, {why}'
-                stamp_ns = int(series.stamps_ns[i])
-                self.add(Difference(stamp_ns, name, WHOLE, text, 'not computed'))
+                self.add_whole(series.stamps_ns[i], name, text, 'not computed')
         return tracks
 
     # .................................................................. steps
@@ -152,8 +182,7 @@ class Check:
             )
         for row in np.flatnonzero(index < 0):
             if start + row < track.end or track.end + TICKS_OF_THE_END < len(track.index):
-                stamp_ns = int(self.stamps_ns[start + row])
-                self.add(Difference(stamp_ns, name, WHOLE, 'a message', NOT_RECORDED))
+                self.add_whole(self.stamps_ns[start + row], name, 'a message')
 
     # .................................................................. events, path, verdict
 
@@ -171,7 +200,7 @@ class Check:
                 self.add(Difference(stamp_ns, 'path', *field_difference(paths[0], recorded)))
         for raw in expected:
             if raw not in self.recording.paths:
-                self.add(Difference(stamp_ns, 'path', WHOLE, 'a message', NOT_RECORDED))
+                self.add_whole(stamp_ns, 'path', 'a message')
 
     def compare_events(self, expected: list[DiagnosticArray], is_ours) -> None:
         """Compare the events that the block tells with those on record."""
@@ -179,33 +208,43 @@ class Check:
             self.notes.append('/diagnostics is not recorded')
             return
         end_ns = int(self.stamps_ns[self.ticks - 1])
-        left = Counter(event.raw for event in self.recording.events)
-        missing = []
-        for array in expected:
-            raw = to_cdr(array)
-            if left[raw]:
-                left[raw] -= 1
-                self.compared['/diagnostics'] += 1
-            else:
-                missing.append((array, raw))
-        rest = []
-        for event in self.recording.events:
-            if left[event.raw]:
-                left[event.raw] -= 1
-                rest.append(event)
+        told = [(array, to_cdr(array)) for array in expected]
+        recorded = [(event, event.raw) for event in self.recording.events]
+        missing = _unmatched(told, recorded)
+        self.compared['/diagnostics'] += len(told) - len(missing)
+        rest = [event for event, _ in _unmatched(recorded, told)]
         for array, raw in missing:
-            alike = [e for e in rest if len(e.raw) == len(raw) and _alike(e.raw, raw)]
-            if alike:
-                rest.remove(alike[0])
-                found = field_difference(array, alike[0].raw)
+            at_ns = health.stamp_of(array)
+            alike = (e for e in rest if len(e.raw) == len(raw) and _alike(e.raw, raw))
+            if event := next(alike, None):
+                rest.remove(event)
+                found = field_difference(array, event.raw)
+                self.add(Difference(at_ns, '/diagnostics', *found))
                 self.compared['/diagnostics'] += 1
             else:
-                found = (WHOLE, repr(array.status[0].message), NOT_RECORDED)
-            self.add(Difference(health.stamp_of(array), '/diagnostics', *found))
+                self.add_whole(at_ns, '/diagnostics', repr(array.status[0].message))
         for event in rest:
             if is_ours(event) and event.stamp_ns <= end_ns:
-                found = WHOLE, repr(event.message), 'not computed'
-                self.add(Difference(event.stamp_ns, '/diagnostics', *found))
+                said = repr(event.message)
+                self.add_whole(event.stamp_ns, '/diagnostics', said, 'not computed')
+
+    def finish_events(self) -> None:
+        """Compare what the block tells on /diagnostics, and the path."""
+        stamps_ns, flags = self.stamps_ns[: self.ticks], self.flags[: self.ticks]
+        block = self.block.block
+        node = self.recording.node(block.wired.node)
+        if block.wired == wiring.GUIDANCE:
+            self.compare_paths()
+        if block.say:
+            told = Telling(block, int(stamps_ns[0])).among(flags, stamps_ns)
+            said = ((int(stamps_ns[i]), block.say(*flags[i].tolist())) for i in told)
+            arrays = [health.said_array(stamp_ns, node, one) for stamp_ns, one in said]
+            self.compare_events(arrays, lambda e: e.node == node and block.flags[0] in e.values)
+        elif block is PLANT:
+            ends = map(int, stamps_ns[flags[:, 0] > 0])
+            reports = (health.Report(node, health.FINISHED, health.COMPLETE, at) for at in ends)
+            arrays = [health.report_array(one) for one in reports]
+            self.compare_events(arrays, lambda e: e.node == node and e.message == health.COMPLETE)
 
     def verdict(self) -> Verdict:
         """What came out."""
@@ -221,27 +260,66 @@ class Check:
         )
 
 
+def _unmatched(pairs: list[tuple], others: list[tuple]) -> list[tuple]:
+    """Those of some things with their bytes that none of the others has, one for one."""
+    left, unmatched = Counter(raw for _, raw in others), []
+    for thing, raw in pairs:
+        if not left[raw]:
+            unmatched.append((thing, raw))
+        left[raw] -= bool(left[raw])
+    return unmatched
+
+
 def _alike(one: bytes, other: bytes) -> bool:
     return sum(a != b for a, b in zip(one, other, strict=True)) <= _BYTES_ALIKE
 
 
-def finish_events(check: Check) -> None:
-    """Compare what the block tells on /diagnostics, and the path."""
-    stamps_ns, flags = check.stamps_ns[: check.ticks], check.flags[: check.ticks]
-    block = check.block.block
-    node = check.recording.node(block.wired.node)
-    if block.wired == wiring.GUIDANCE:
-        check.compare_paths()
-    if block.say:
-        told = Telling(block, int(stamps_ns[0])).among(flags, stamps_ns)
-        arrays = [
-            health.said_array(int(stamps_ns[i]), node, block.say(*flags[i].tolist())) for i in told
-        ]
-        check.compare_events(arrays, lambda e: e.node == node and block.flags[0] in e.values)
-    elif block is PLANT:
-        ends = [int(stamp_ns) for stamp_ns in stamps_ns[flags[:, 0] > 0]]
-        arrays = [
-            health.report_array(health.Report(node, health.FINISHED, health.COMPLETE, stamp_ns))
-            for stamp_ns in ends
-        ]
-        check.compare_events(arrays, lambda e: e.node == node and e.message == health.COMPLETE)
+def field_difference(expected, recorded: bytes) -> tuple[str, str, str]:
+    """First field in which any bytes differ from a message, and what is computed and recorded.
+
+    With the bits where two numbers print alike.
+    """
+    raw = to_cdr(expected)
+    shared = min(len(raw), len(recorded))
+    at = next((i for i in range(shared) if raw[i] != recorded[i]), shared)
+    if at < 4:
+        return 'CDR header', raw[:4].hex(), recorded[:4].hex()
+    if at >= len(raw):
+        return WHOLE, f'{len(raw)} bytes', f'{len(recorded)} bytes'
+    before = 'CDR header'
+    for place in cdr_places(expected):
+        if at < place.start:
+            break
+        before = place.path
+        if at < place.end:
+            return place.path, *_values(place, raw, recorded)
+    return f'padding after {before}', f'byte {raw[at]:#04x}', f'byte {recorded[at]:#04x}'
+
+
+def _values(place, raw: bytes, recorded: bytes) -> tuple[str, str]:
+    texts = [_value(place, data) for data in (raw, recorded)]
+    if texts[0] == texts[1]:
+        bits = [data[place.start : place.end][::-1].hex() for data in (raw, recorded)]
+        texts = [f'{text} (0x{bit})' for text, bit in zip(texts, bits, strict=True)]
+    return texts[0], texts[1]
+
+
+def _value(place, data: bytes) -> str:
+    """Value of a field in bytes that may end before it."""
+    if len(data) < place.start + (4 if place.code == 's' else place.end - place.start):
+        return 'cut off'
+    if place.code != 's':
+        return str(struct.unpack_from('<' + place.code, data, place.start)[0])
+    (length,) = struct.unpack_from('<I', data, place.start)
+    text = data[place.start + 4 : place.start + 4 + length]
+    if len(text) < length:
+        return f'a string of {length} bytes'
+    return repr(text[:-1].decode(errors='backslashreplace') if text[-1:] == b'\0' else text)
+
+
+def message_difference(
+    topic: str, codec: Codec, stamp_ns: int, values, recorded: bytes
+) -> Difference:
+    """Where a recorded message differs from the numbers that are computed."""
+    expected = deserialize_message(codec.encode(stamp_ns, values), codec.message_type)
+    return Difference(stamp_ns, topic, *field_difference(expected, recorded))

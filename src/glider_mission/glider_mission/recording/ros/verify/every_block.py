@@ -20,11 +20,7 @@ from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording
 from glider_mission.recording.ros.told import Told
-from glider_mission.recording.ros.verify.differences import (
-    IDENTICAL,
-    SKIPPED,
-    Verdict,
-)
+from glider_mission.recording.ros.verify.check import IDENTICAL, SKIPPED, Verdict
 from glider_mission.recording.ros.verify.free_running import free_running
 from glider_mission.recording.ros.verify.lockstep import in_lockstep
 

@@ -8,14 +8,7 @@ import numpy as np
 
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording, Series
-from glider_mission.recording.ros.verify.check import Check, Track, finish_events
-from glider_mission.recording.ros.verify.differences import (
-    NOT_RECORDED,
-    SKIPPED,
-    WHOLE,
-    Difference,
-    Verdict,
-)
+from glider_mission.recording.ros.verify.check import Check, Track, Verdict
 
 #: A step has the newest message of an input, or one that is so many older.
 _OLDER = range(4)
@@ -46,9 +39,7 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
     ours = wired.inputs + wired.outputs
     series = {name: one for name, one in recording.series.items() if name in ours}
     # what is published first is published while an input is stale, too
-    marker = next((name for name in reversed(wired.outputs) if name in series), None)
-    if marker is None:
-        return Verdict(wired.name, SKIPPED, f'none of {", ".join(wired.outputs)} is recorded')
+    marker = next(name for name in reversed(wired.outputs) if name in series)
     stamps_ns = series[marker].stamps_ns
     check = Check(block, recording, stamps_ns)
     outputs = check.tracks(
@@ -79,7 +70,7 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
     if check.found:
         check.notes.append('free-running: compared up to the first difference')
     elif check.ticks:
-        finish_events(check)
+        check.finish_events()
     return check.verdict()
 
 
@@ -155,5 +146,4 @@ def _keep_difference(check: Check, step: int, options, outputs) -> None:
         return
     topic = next(iter(outputs))
     wanted = f'{" and ".join(check.block.inputs)} of this step'
-    stamp_ns = int(check.stamps_ns[step])
-    check.add(Difference(stamp_ns, topic, WHOLE, wanted, NOT_RECORDED))
+    check.add_whole(check.stamps_ns[step], topic, wanted)

@@ -11,16 +11,11 @@ from glider_base.signals import TICK_NS
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording, Series
 from glider_mission.recording.ros.verify.check import (
+    MISSING,
+    SKIPPED,
     TICKS_OF_THE_END,
     Check,
     Track,
-    finish_events,
-)
-from glider_mission.recording.ros.verify.differences import (
-    NOT_RECORDED,
-    SKIPPED,
-    WHOLE,
-    Difference,
     Verdict,
 )
 from glider_model.plant.block import PLANT
@@ -86,12 +81,12 @@ def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict
         progress(end / count)
     for name, track in inputs.items():
         if track.gap < max(track.end, ticks - TICKS_OF_THE_END):
-            reason = track.series.unusable.get(int(track.index[track.gap]), NOT_RECORDED)
+            reason = track.series.unusable.get(int(track.index[track.gap]), MISSING)
             wanted = f'an input of {wired.name}, which cannot be computed any further'
-            check.add(Difference(int(check.stamps_ns[track.gap]), name, WHOLE, wanted, reason))
+            check.add_whole(check.stamps_ns[track.gap], name, wanted, reason)
     behind = ticks - check.ticks
     if behind and not check.found:
         check.notes.append(f'the inputs of the last {behind} ticks are not complete')
     if check.ticks:
-        finish_events(check)
+        check.finish_events()
     return check.verdict()
