@@ -25,22 +25,10 @@ from mcap.summary import Summary
 from numpy.lib.stride_tricks import sliding_window_view
 
 from glider_base.settings import ConfigurationError
+from glider_mission.recording import mcap_records as records
 from glider_mission.recording.bag_files import bag_files
-from glider_mission.recording.mcap_records import (
-    DEFINITIONS,
-    HEAD,
-    MAGIC,
-    UNREADABLE,
-    Places,
-    find_defined,
-    parse,
-    read_summary,
-    span,
-    unpack,
-    whole_records,
-)
 
-_DATA_END = HEAD.pack(Opcode.DATA_END, 4)
+_DATA_END = records.HEAD.pack(Opcode.DATA_END, 4)
 _LOG_TIME_AT = 6  # in a message record: channel (2), sequence (4), log time (8), publish time (8)
 
 
@@ -104,21 +92,21 @@ class _File:
     def _open(self, stream: IO[bytes]) -> None:
         """Note the chunks, topics and attachments, and test the checksums."""
         try:
-            summary, unsound = read_summary(stream), ''
+            summary, unsound = records.read_summary(stream), ''
         except ValueError as error:
             summary, unsound = Summary(), str(error)
         stream.seek(0)
-        magic = stream.read(len(MAGIC))
-        if not MAGIC.startswith(magic):
+        magic = stream.read(len(records.MAGIC))
+        if not records.MAGIC.startswith(magic):
             raise ConfigurationError(f'{self.path}: not an MCAP file')
         end, checksum = len(magic), zlib.crc32(magic)
-        for opcode, at, data in whole_records(stream):
+        for opcode, at, data in records.whole_records(stream):
             try:
                 self._take(opcode, at, data)
-            except UNREADABLE:
+            except records.UNREADABLE:
                 raise self._harmed(f'the record at byte {at:,} cannot be read') from None
-            checksum = zlib.crc32(data, zlib.crc32(HEAD.pack(opcode, len(data)), checksum))
-            end = at + HEAD.size + len(data)
+            checksum = zlib.crc32(data, zlib.crc32(records.HEAD.pack(opcode, len(data)), checksum))
+            end = at + records.HEAD.size + len(data)
         stream.seek(end)
         rest = stream.read(len(_DATA_END) + 4)
         ends = rest.startswith(_DATA_END) and len(rest) == len(_DATA_END) + 4
@@ -151,21 +139,21 @@ class _File:
             start_ns, end_ns, unpacked = struct.unpack_from('<QQQ', data)
             self._chunks[at] = start_ns, end_ns
             if unpacked:
-                place = len(self._chunks), at + HEAD.size, len(data)
+                place = len(self._chunks), at + records.HEAD.size, len(data)
                 self.parts.append(_Part(self._number, *place, start_ns, end_ns))
         elif opcode == Opcode.MESSAGE:
             (log_ns,) = struct.unpack_from('<Q', data, _LOG_TIME_AT)
-            part = _Part(self._number, 0, at, HEAD.size + len(data), log_ns, log_ns)
+            part = _Part(self._number, 0, at, records.HEAD.size + len(data), log_ns, log_ns)
             last = self.parts[-1] if self.parts else part
             if not last.number and last.start + last.length == at:
                 times = min(last.start_ns, log_ns), max(last.end_ns, log_ns)
                 self.parts[-1] = _Part(*last[:3], last.length + part.length, *times)
             else:
                 self.parts.append(part)
-        elif opcode in DEFINITIONS:
-            self._define(parse(DEFINITIONS[opcode], data))
+        elif opcode in records.DEFINITIONS:
+            self._define(records.parse(records.DEFINITIONS[opcode], data))
         elif opcode == Opcode.ATTACHMENT:
-            one, told = parse(Attachment, data), int.from_bytes(data[-4:], 'little')
+            one, told = records.parse(Attachment, data), int.from_bytes(data[-4:], 'little')
             if told and zlib.crc32(memoryview(data)[:-4]) != told:
                 raise self._harmed(f'the checksum (CRC) of the attachment {one.name!r} is wrong')
             self.attachments.setdefault(one.name, one.data)
@@ -184,7 +172,8 @@ class _File:
         for order, index in enumerate(indexes, 1):
             times = index.message_start_time, index.message_end_time
             if self._chunks.get(index.chunk_start_offset) != times:
-                raise self._harmed(f'chunk {order} ({span(*times)}) is not where it should be')
+                told = f'chunk {order} ({records.span(*times)})'
+                raise self._harmed(f'{told} is not where it should be')
         if {index.offset for index in summary.attachment_indexes} - self._attached:
             raise self._harmed('an attachment is not where it should be')
         here = len(self._chunks)
@@ -196,21 +185,21 @@ class _File:
             if theirs and any(theirs.get(number) != one for number, one in mine.items()):
                 raise self._harmed('a topic or type is not that of its summary')
 
-    def read(self, part: _Part) -> tuple[np.ndarray, Places]:
+    def read(self, part: _Part) -> tuple[np.ndarray, records.Places]:
         """Content of a part, and its messages in the order of the file."""
         with self.path.open('rb') as stream:
             stream.seek(part.start)
             content = stream.read(part.length)
         try:
-            content = unpack(content) if part.number else content
-            found = find_defined(content, self._define, self.channels)
+            content = records.unpack(content) if part.number else content
+            found = records.find_defined(content, self._define, self.channels)
             if len(found.channel):
                 times = int(found.log_ns.min()), int(found.log_ns.max())
                 if times != (part.start_ns, part.end_ns):
-                    raise ValueError(f'its messages are of {span(*times)}')
-        except (ValueError, *UNREADABLE) as error:
-            place = f'bytes {part.start - HEAD.size:,} to {part.start + part.length:,}'
-            what = f'{error} ({place}, {span(part.start_ns, part.end_ns)})'
+                    raise ValueError(f'its messages are of {records.span(*times)}')
+        except (ValueError, *records.UNREADABLE) as error:
+            place = f'bytes {part.start - records.HEAD.size:,} to {part.start + part.length:,}'
+            what = f'{error} ({place}, {records.span(part.start_ns, part.end_ns)})'
             raise self._harmed(what, f'chunk {part.number} is ') from None
         return np.frombuffer(content, np.uint8), found
 

@@ -18,6 +18,7 @@ from mcap.summary import Summary
 
 from glider_base.settings import ConfigurationError
 from glider_mission.disk import not_written
+from glider_mission.recording import mcap_records as records
 from glider_mission.recording.bag_files import (
     METADATA_FILE,
     ROSBAG2,
@@ -27,19 +28,6 @@ from glider_mission.recording.bag_files import (
     write_metadata,
 )
 from glider_mission.recording.mcap_reader import Bag
-from glider_mission.recording.mcap_records import (
-    CHUNK_TIMES,
-    DEFINITIONS,
-    HEAD,
-    MAGIC,
-    UNREADABLE,
-    find_defined,
-    parse,
-    read_summary,
-    span,
-    unpack,
-    whole_records,
-)
 from glider_mission.recording.mcap_writer import McapWriter
 
 #: Messages that are in no chunk are put into chunks of about this size (B).
@@ -107,7 +95,7 @@ def _summary(file: Path) -> Summary | None:
     """What the end of a file says is in it; None if it does not count its messages."""
     try:
         with file.open('rb') as stream:
-            summary = read_summary(stream, is_checked=False)  # the bag is, in the end
+            summary = records.read_summary(stream, is_checked=False)  # the bag is, in the end
     except OSError as error:
         raise ConfigurationError(f'{file}: {error.strerror or error}') from None
     except ValueError as error:
@@ -117,20 +105,20 @@ def _summary(file: Path) -> Summary | None:
 
 def _rebuild(file: Path, progress: Progress) -> list[tuple[int, str]]:
     """Give a file its index; sizes of what was dropped of it, and what it was, in words."""
-    draft, writer, end = file.with_name(f'.part-{file.stem}'), None, len(MAGIC)
+    draft, writer, end = file.with_name(f'.part-{file.stem}'), None, len(records.MAGIC)
     dropped = []
     try:
         with file.open('rb') as stream:
-            if stream.read(len(MAGIC)) != MAGIC:
+            if stream.read(len(records.MAGIC)) != records.MAGIC:
                 raise ConfigurationError(f'{file}: not an MCAP file, or nothing is left of it')
-            for opcode, at, data in whole_records(stream):
+            for opcode, at, data in records.whole_records(stream):
                 if opcode == Opcode.HEADER:
-                    writer = McapWriter(draft, parse(Header, data).profile)
+                    writer = McapWriter(draft, records.parse(Header, data).profile)
                 elif writer is None:
                     raise ValueError('no header')
                 elif lost := _take(writer, opcode, data):
                     dropped.append((len(data), f'the chunk {lost[0]} at byte {at:,}: {lost[1]}'))
-                end = at + HEAD.size + len(data)
+                end = at + records.HEAD.size + len(data)
                 progress(stream.tell(), stream.seek(0, 2))
             if writer is None:
                 raise ValueError('nothing is left of it')
@@ -141,7 +129,7 @@ def _rebuild(file: Path, progress: Progress) -> list[tuple[int, str]]:
         os.replace(draft, file)
     except ConfigurationError:
         raise
-    except (ValueError, *UNREADABLE) as error:
+    except (ValueError, *records.UNREADABLE) as error:
         raise ConfigurationError(f'{file}: cannot be recovered: {error} (byte {end:,})') from None
     except OSError as error:
         raise not_written(file, error) from None
@@ -152,32 +140,32 @@ def _rebuild(file: Path, progress: Progress) -> list[tuple[int, str]]:
 
 def _take(writer: McapWriter, opcode: int, data: bytes) -> tuple[str, str] | None:
     """Write a record into the new file; times of a chunk that is harmed, and what harms it."""
-    if opcode in DEFINITIONS:
-        writer.define(parse(DEFINITIONS[opcode], data))
+    if opcode in records.DEFINITIONS:
+        writer.define(records.parse(records.DEFINITIONS[opcode], data))
     elif opcode == Opcode.ATTACHMENT:
-        one = parse(Attachment, data)
+        one = records.parse(Attachment, data)
         writer.add_attachment(one.name, one.media_type, one.data)
     elif opcode == Opcode.METADATA:
-        one = parse(Metadata, data)
+        one = records.parse(Metadata, data)
         if one.name != ROSBAG2:
             writer.add_metadata(one.name, one.metadata)
     elif opcode == Opcode.MESSAGE:
-        _write(writer, HEAD.pack(opcode, len(data)) + data)
+        _write(writer, records.HEAD.pack(opcode, len(data)) + data)
         if writer.waiting > _LOOSE_BYTES:
             writer.flush()
     elif opcode == Opcode.CHUNK:
         writer.flush()
         try:
-            _write(writer, unpack(data))
+            _write(writer, records.unpack(data))
         except ValueError as error:
-            return f'({span(*CHUNK_TIMES.unpack_from(data))})', str(error)
+            return f'({records.span(*records.CHUNK_TIMES.unpack_from(data))})', str(error)
         writer.flush()
     return None
 
 
 def _write(writer: McapWriter, content: bytes) -> None:
     """Write the records of a chunk; raise ValueError if they are none."""
-    found = find_defined(content, writer.define, writer.channels)
+    found = records.find_defined(content, writer.define, writer.channels)
     if len(found.channel):
         writer.add(content)
 
@@ -186,10 +174,10 @@ def _rest(stream: IO[bytes], end: int) -> list[tuple[int, str]]:
     """What is behind the last whole record, if it is more than an index: its size, and words."""
     size = stream.seek(0, 2)
     stream.seek(end)
-    rest = stream.read(HEAD.size + CHUNK_TIMES.size)
+    rest, what = stream.read(records.HEAD.size + records.CHUNK_TIMES.size), 'what begins'
     if not rest or rest[0] in (Opcode.DATA_END, Opcode.FOOTER):
         return []
-    what = 'what begins'
-    if rest[0] == Opcode.CHUNK and len(rest) == HEAD.size + CHUNK_TIMES.size:
-        what = f'the chunk ({span(*CHUNK_TIMES.unpack_from(rest, HEAD.size))})'
+    times = rest[records.HEAD.size :]
+    if rest[0] == Opcode.CHUNK and len(times) == records.CHUNK_TIMES.size:
+        what = f'the chunk ({records.span(*records.CHUNK_TIMES.unpack(times))})'
     return [(size - end, f'{what} at byte {end:,}: its end is missing')]

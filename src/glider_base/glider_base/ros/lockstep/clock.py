@@ -58,24 +58,6 @@ class _Lead:
         return self.said_ns < (tick - MAX_TICKS_AHEAD[self.name]) * TICK_NS
 
 
-class _Pace:
-    """Wall time at which each tick is due, without drift."""
-
-    def __init__(self, speed: float) -> None:
-        self._tick_s = TICK_S / speed if speed > 0.0 else 0.0
-        self._start_s = 0.0
-
-    def restart(self, tick: int) -> None:
-        """Let ``tick`` be due now."""
-        self._start_s = time.monotonic() - tick * self._tick_s
-
-    def wait_s(self, tick: int) -> float:
-        """Wall time (s) until ``tick`` is due; not positive if it is."""
-        if not self._tick_s:
-            return 0.0
-        return self._start_s + tick * self._tick_s - time.monotonic()
-
-
 class ClockNode(TickNode):
     """Starts, paces and ends the run.
 
@@ -90,7 +72,8 @@ class ClockNode(TickNode):
         self.tick = 0
         self._published = -1
         self._paused = False
-        self._pace = _Pace(self.ticks.speed)
+        self._tick_s = TICK_S / self.ticks.speed if self.ticks.speed else 0.0  #: of wall time
+        self._start_s = 0.0  #: wall time at which tick 0 was due, so that nothing drifts
         self._pace_timer = self.wall_timer(1.0, self._on_pace)
         self._pace_timer.cancel()
         self._clock_started_s = self._flies_since_s = time.monotonic()
@@ -164,7 +147,7 @@ class ClockNode(TickNode):
         """Start time."""
         self._flies_since_s = time.monotonic()
         self._due_ns = 0
-        self._pace.restart(0)
+        self._start_s = time.monotonic()
         if self.ticks.lockstep:
             self._release()
         else:
@@ -203,8 +186,8 @@ class ClockNode(TickNode):
             if self._held_by is not None:
                 self.gate.awaited.add(self._held_by.subscription)
                 return
-            wait_s = self._pace.wait_s(self.tick)
-            if wait_s > 0.0:
+            wait_s = self._start_s + self.tick * self._tick_s - time.monotonic()
+            if self._tick_s and wait_s > 0.0:
                 self._pace_timer.timer_period_ns = max(1, int(wait_s * 1e9))
                 self._pace_timer.reset()
                 return
@@ -246,7 +229,7 @@ class ClockNode(TickNode):
     def _on_pause(self, request, response):
         self._paused = request.data
         if not self._paused:
-            self._pace.restart(self.tick)
+            self._start_s = time.monotonic() - self.tick * self._tick_s
             if self.running:
                 self._release()
         response.success = True

@@ -31,7 +31,7 @@ CHUNK_TICKS = 128
 Sync = Literal['never', 'end', 'chunk']
 
 _DELIMITER = 80 * '=' + '\n'
-_INFINITE_NS = 2**63 - 1
+_INFINITE = '\n    sec: 9223372036\n    nsec: 854775807\n'  #: time, which ours all have
 
 
 def _interface_file(type_name: str, suffix: str) -> Path:
@@ -69,22 +69,16 @@ def type_hash(type_name: str) -> str:
 
 def qos_yaml(qos: QoSProfile) -> str:
     """Offered quality of service, as a YAML list with one profile (version 9 of rosbag2)."""
-
-    def duration(name: str, value) -> str:
-        nanoseconds = value.nanoseconds or _INFINITE_NS
-        seconds, rest = divmod(nanoseconds, 1_000_000_000)
-        return f'  {name}:\n    sec: {seconds}\n    nsec: {rest}\n'
-
     return (
         f'- history: {qos.history.name.lower()}\n'
         f'  depth: {qos.depth}\n'
         f'  reliability: {qos.reliability.name.lower()}\n'
         f'  durability: {qos.durability.name.lower()}\n'
-        + duration('deadline', qos.deadline)
-        + duration('lifespan', qos.lifespan)
-        + '  liveliness: automatic\n'
-        + duration('liveliness_lease_duration', qos.liveliness_lease_duration)
-        + '  avoid_ros_namespace_conventions: false'
+        f'  deadline:{_INFINITE}'
+        f'  lifespan:{_INFINITE}'
+        '  liveliness: automatic\n'
+        f'  liveliness_lease_duration:{_INFINITE}'
+        '  avoid_ros_namespace_conventions: false'
     )
 
 
