@@ -1,17 +1,43 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""NetCDF files of flights, of version 3 or 4."""
+"""NetCDF files of flights, of version 3 or 4; `variables.yaml` says what is read of them."""
 
+import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from glider_base.errors import ConfigurationError
+from glider_base.files import read_yaml
 from glider_flights.folders import installed
 
 SUFFIXES = ('.nc', '.ncdf', '.nc4')
+#: Our unit in those of `variables.yaml`.
+_UNITS = {
+    **{'': 1.0, 'rad': 1.0, 'deg': math.radians(1.0), 'cc': 1e-6, 'g': 1e-3},
+    **{'cm': 1e-2, 'cm aft': -1e-2, 'inch': 0.0254, 'cm/s up': -1e-2},
+}
+#: What is text, or may be.
+_TEXTS = ('model', 'vehicle', 'fix_quality')
+#: By our name, what each name in a file is multiplied by, best name first.
+Names = dict[str, dict[str, float]]
+
+
+@cache
+def names_of(kind: str) -> Names:
+    """What is read of a kind of files, by `variables.yaml`."""
+    table = read_yaml(Path(__file__).with_name('variables.yaml'))
+    found: Names = {}
+    for key, of in table.items():
+        pairs = (
+            one if isinstance(one, dict) else {one: of.get('unit', '')} for one in of.get(kind, ())
+        )
+        names = {name: _UNITS[unit] for pair in pairs for name, unit in pair.items()}
+        found |= {key: names} if names else {}
+    return found
 
 
 def datasets(path: Path) -> list:
@@ -29,25 +55,22 @@ def datasets(path: Path) -> list:
     return list(xarray.open_groups(path, engine='h5netcdf', decode_times=False).values())
 
 
-def variables(
-    path: Path, wanted: dict[str, Sequence[str]], spelt: Callable[[str], str] = str
-) -> Iterator[tuple[str, str, np.ndarray, str]]:
-    """Variables of a file as flat arrays, each with our name, its own and its unit.
+def read(
+    path: Path,
+    wanted: Names,
+    spelt: Callable[[str], str] = str,
+    scales: dict[str, float] | None = None,
+) -> dict[str, np.ndarray]:
+    """Variables of a file as flat arrays in our units, by our names.
 
-    Parameters
-    ----------
-    path : Path
-    wanted : dict
-        Names that a variable may have in the file, by our own; times, in s since 1970, are those
-        of which ours ends with ``time``.
-    spelt : callable, optional
-        What makes such a name of one in the file.
+    Times, in s since 1970, are those of which ours ends with ``time``. ``spelt`` makes a wanted
+    name of one in the file, ``scales`` says what values in some units are multiplied by instead.
 
     Raises
     ------
     ConfigurationError
     """
-    found = set()
+    found: dict[str, np.ndarray] = {}
     try:
         for dataset in datasets(path):
             with dataset:
@@ -56,21 +79,21 @@ def variables(
                     name = next((name for name in names if name in by_name), None)
                     if name is None or key in found:
                         continue
-                    found.add(key)
                     variable = dataset[by_name[name]]
-                    units = str(variable.attrs.get('units', ''))
+                    unit = str(variable.attrs.get('units', ''))
                     values = np.atleast_1d(variable.values).ravel()
-                    if values.dtype.kind not in 'SUO' or key.endswith('time'):
-                        values = values.astype(float)
                     if key.endswith('time'):
-                        values = _seconds(values, units)
-                    yield key, name, values, units
+                        values = _seconds(values.astype(float), unit)
+                    elif key not in _TEXTS:
+                        values = values.astype(float) * (scales or {}).get(unit, names[name])
+                    found[key] = values
     except (OSError, ValueError, TypeError, KeyError, RuntimeError) as error:
         raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
+    return found
 
 
-def refuse_missing(path: Path, found: dict, needed: dict[str, Sequence[str]], why: str) -> None:
-    """Refuse a file that lacks variables: by our names, the names that each may have.
+def refuse_missing(path: Path, found: dict, needed: Names, why: str) -> None:
+    """Refuse a file that lacks something that is needed.
 
     Raises
     ------
@@ -80,6 +103,18 @@ def refuse_missing(path: Path, found: dict, needed: dict[str, Sequence[str]], wh
     if missing:
         names = ', '.join(' or '.join(names) for names in missing)
         raise ConfigurationError(f'{path}: no variable {names} (needed {why})')
+
+
+def fixes_of(found: dict[str, np.ndarray]) -> np.ndarray:
+    """Usable fixes, each once, in the order of time: time, latitude, longitude, float[n, 3]."""
+    none = np.empty(0)
+    latitude, longitude = (found.get(f'fix_{name}', none) for name in ('latitude', 'longitude'))
+    times = found.get('fix_time', found.get('time', none))
+    if not len(latitude) == len(longitude) == len(times):
+        return np.empty((0, 3))
+    table = np.stack([times, latitude, longitude], axis=-1)
+    good = np.isfinite(table).all(axis=-1) & (np.abs(table[:, 1:]) <= (90.0, 180.0)).all(axis=-1)
+    return table[good][np.unique(table[good, 0], return_index=True)[1]]
 
 
 def _seconds(values: np.ndarray, units: str) -> np.ndarray:

@@ -24,10 +24,9 @@ from glider_flights.folders import (
     of_one_flight,
     read_each,
 )
-from glider_flights.netcdf import SUFFIXES, datasets, refuse_missing, variables
+from glider_flights.netcdf import SUFFIXES, datasets, fixes_of, names_of, read, refuse_missing
 from glider_flights.reckoning import DENSITY
 from glider_flights.record import (
-    NOT_KNOWN,
     Flight,
     OnBoard,
     Polar,
@@ -43,34 +42,8 @@ from glider_flights.slocum import POLAR
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import Vehicle
 
-#: Names of variables in capitals, by ours, and what their values are multiplied by.
-NAMES = {
-    'time': (('TIME',), 1.0),
-    'latitude': (('LATITUDE', 'LAT'), 1.0),
-    'longitude': (('LONGITUDE', 'LON'), 1.0),
-    'fix_time': (('TIME_GPS',), 1.0),
-    'fix_latitude': (('LATITUDE_GPS',), 1.0),
-    'fix_longitude': (('LONGITUDE_GPS',), 1.0),
-    'pressure': (('PRES', 'PRESSURE'), 1.0),
-    'depth_m': (('DEPTH', 'GLIDER_DEPTH'), 1.0),
-    'pitch_rad': (('PITCH', 'GLIDER_PITCH'), math.radians(1.0)),
-    'roll_rad': (('ROLL', 'GLIDER_ROLL'), math.radians(1.0)),
-    'heading_rad': (('HEADING', 'HDG', 'GLIDER_HEADING'), math.radians(1.0)),
-    'declination_rad': (('MAGNETIC_VARIATION',), math.radians(1.0)),
-    'pumped_m3': (('VBD_CC', 'BALLAST_PUMPED', 'OIL_VOLUME'), 1e-6),
-    'mass_x_m': (('PITCH_CTL',), -1e-2),  # of a Seaglider: cm, + aft
-    'mass_roll_rad': (('ROLL_CTL',), math.radians(1.0)),
-    'surface_rad': (('FIN', 'RUDDER'), math.radians(1.0)),
-    'temperature_degc': (('TEMP', 'TEMPERATURE'), 1.0),
-    'salinity': (('PSAL', 'SALINITY'), 1.0),
-    'own_rate_mps': (('GLIDER_VERT_VELO_MODEL',), -1e-2),
-    'buoyancy_kg': (('BUOYANCY',), 1e-3),
-    'dac_north': (('DAVG_CURR_NORTH', 'WCUR_Y', 'WATERCURRENTS_V'), 1.0),
-    'dac_east': (('DAVG_CURR_EAST', 'WCUR_X', 'WATERCURRENTS_U'), 1.0),
-}
-#: Units of which the values are multiplied by something else.
+#: Units of which the values are multiplied by something else than `variables.yaml` says.
 SCALES = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0, 'cm/s': 1e-2, 'cm s-1': 1e-2}
-TEXTS = {'model': ('PLATFORM_MODEL', 'PLATFORM_TYPE'), 'vehicle': ('PLATFORM_SERIAL_NUMBER',)}
 
 
 def og1_files(place: Path) -> list[Path]:
@@ -113,27 +86,26 @@ def _on_board(known: dict[str, np.ndarray], samples: Samples) -> OnBoard:
     """What a file says of the current of a segment with such samples."""
     time_s = known['time']
     inside = (time_s >= samples.time_s[0]) & (time_s <= samples.time_s[-1])
-    told = [known.get(name, ()) for name in ('dac_north', 'dac_east')]
-    if any(len(values) != len(time_s) for values in told):
-        return OnBoard(NOT_KNOWN, NOT_KNOWN, NOT_KNOWN)
-    return OnBoard(np.array([usual(values[inside]) for values in told]), NOT_KNOWN, NOT_KNOWN)
+    told = [known.get(name) for name in ('dac_north', 'dac_east')]
+    if any(values is None for values in told):
+        return OnBoard()
+    return OnBoard(np.array([usual(values[inside]) for values in told]))
 
 
 def _read(path: Path) -> LogFile:
-    known, texts = {}, {}
-    wanted = {key: names for key, (names, _) in NAMES.items()} | TEXTS
-    for key, _, values, units in variables(path, wanted, str.upper):
-        if key in TEXTS:
-            texts[key] = str(values[0]) if len(values) else ''
-        else:
-            known[key] = SCALES.get(units, NAMES[key][1]) * values.astype(float)
+    wanted = names_of('og1')
+    known = read(path, wanted, str.upper, SCALES)
+    model, vehicle = (
+        str(values[0]) if len(values) else ''
+        for values in (known.pop(name, ()) for name in ('model', 'vehicle'))
+    )
     count = len(known.get('time', ()))
     known = {
         key: values
         for key, values in known.items()
         if len(values) == count or key == 'declination_rad' or key.startswith('fix_')
     }
-    fixes, notes = _fixes(known), []
+    fixes, notes = fixes_of(known), []
     if 'pressure' in known:
         latitude = fixes[0, 1] if len(fixes) else _middle(known)[0]
         known['depth_m'] = -gsw().z_from_p(known['pressure'], latitude)
@@ -144,7 +116,7 @@ def _read(path: Path) -> LogFile:
         known['heading_rad'] = known['heading_rad'] + declination
         notes += [f'{path.name}: {note}'] if note else []
     else:
-        notes.append(f'{path.name}: no variable {" or ".join(NAMES["heading_rad"][0])}')
+        notes.append(f'{path.name}: no variable {" or ".join(wanted["heading_rad"])}')
     if not len(fixes):
         notes.append(f'{path.name}: no fix in LATITUDE_GPS, LONGITUDE_GPS')
     nothing = np.full(count, math.nan)
@@ -157,17 +129,15 @@ def _read(path: Path) -> LogFile:
         known.get('buoyancy_kg', nothing),
     )
     own_polar = _own_polar(path)
-    of_base = own_polar is None and 'seaglider' in texts.get('model', '').lower()
+    of_base = own_polar is None and 'seaglider' in model.lower()
     return LogFile(
         name=path.name,
-        vehicle=texts.get('vehicle', ''),
-        dive=0,
+        vehicle=vehicle,
         begin_s=np.min(own_s, where=np.isfinite(own_s), initial=math.inf),
         fixes=fixes,
         about_deg=_middle(known),
         samples=samples,
         instruments=instruments(own_s, **known),
-        body={},
         polar=own_polar or (polar_of({}) if of_base else POLAR),
         on_board=partial(_on_board, known),
         of_base_station=of_base,
@@ -191,19 +161,6 @@ def _own_polar(path: Path) -> Polar | None:
         area_m2=1.0,
         shallowest_rad=own.shallowest,
     )
-
-
-def _fixes(known: dict[str, np.ndarray]) -> np.ndarray:
-    """Fixes, each once, in the order of time."""
-    latitude = known.get('fix_latitude', np.empty(0))
-    longitude = known.get('fix_longitude', np.empty(0))
-    times = known.get('fix_time', known.get('time', np.empty(0)))
-    if not len(latitude) == len(longitude) == len(times):
-        return np.empty((0, 3))
-    table = np.stack([times, latitude, longitude], axis=-1)
-    good = np.isfinite(table).all(axis=-1)
-    good &= (np.abs(table[:, 1:]) <= (90.0, 180.0)).all(axis=-1)
-    return table[good][np.unique(table[good, 0], return_index=True)[1]]
 
 
 def _declination(known: dict[str, np.ndarray], fixes: np.ndarray) -> tuple[float, str]:

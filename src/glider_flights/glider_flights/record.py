@@ -34,16 +34,19 @@ class Samples(NamedTuple):
     buoyancy_kg: np.ndarray  #: buoyancy (kg, + rises), NaN where it is not known
 
 
+NOT_KNOWN = np.full(2, math.nan)
+
+
 class OnBoard(NamedTuple):
     """What the vehicle, or its base station, made of the same segment; NaN if it did not.
 
     Each of shape (2,): north, east.
     """
 
-    dac_mps: np.ndarray  #: depth-averaged current (m/s)
-    way_m: np.ndarray  #: way through the water (m)
+    dac_mps: np.ndarray = NOT_KNOWN  #: depth-averaged current (m/s)
+    way_m: np.ndarray = NOT_KNOWN  #: way through the water (m)
     #: Where it believed to be when it came up (m of the flight's first fix).
-    surfaced_m: np.ndarray
+    surfaced_m: np.ndarray = NOT_KNOWN
 
 
 class Polar(NamedTuple):
@@ -111,7 +114,6 @@ class Flight(NamedTuple):
 
 
 SamplesOrInstruments = TypeVar('SamplesOrInstruments', Samples, Instruments)
-NOT_KNOWN = np.full(2, math.nan)
 
 
 def instruments(time_s: np.ndarray, **known: np.ndarray) -> Instruments:

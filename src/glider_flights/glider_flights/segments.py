@@ -51,19 +51,19 @@ class LogFile(NamedTuple):
 
     name: str
     vehicle: str  #: '' if it does not say
-    dive: int  #: number of the one dive that it holds; 0 if it does not say
     begin_s: float  #: when it begins (s since 1970)
     fixes: np.ndarray  #: shape (n, 3): time (s since 1970), latitude, longitude (degrees)
     about_deg: np.ndarray  #: latitude and longitude (degrees) for want of a fix, shape (2,)
     samples: Samples
     instruments: Instruments
-    #: Constants of the body that it names, see `glider_flights.record.Flight`.
-    body: dict[str, float]
     polar: Polar
     #: What was made on board, or by a base station, of a segment with such samples.
     on_board: Callable[[Samples], OnBoard]
     of_base_station: bool  #: whether that is of one: its current is a mean between fixes
     notes: list[str]
+    dive: int = 0  #: number of the one dive that it holds; 0 if it does not say
+    #: Constants of the body that it names, see `glider_flights.record.Flight`.
+    body: dict[str, float] = {}
 
     @property
     def time_s(self) -> np.ndarray:

@@ -10,24 +10,12 @@ import numpy as np
 from glider_base.errors import ConfigurationError
 from glider_flights.energy.uses import PUMP, Uses
 from glider_flights.folders import Progress, read_each, said
-from glider_flights.netcdf import refuse_missing
-from glider_flights.seaglider import read_variables, seaglider_files
+from glider_flights.netcdf import names_of, read, refuse_missing
+from glider_flights.seaglider import seaglider_files
 
 #: Less than this is no pumping of a Seaglider: oil let in, or the valve (cc, A).
 PUMPED_CC, PUMPING_A = 2.0, 0.05
 _METRES_PER_CM = 0.01
-#: Variables of a Seaglider, by which they are called here: its table of actuator moves.
-MOVES = {
-    'depth': ('gc_depth',),
-    'cc_per_count': ('log_VBD_CNV',),
-    'before_1': ('gc_vbd_pot1_ad_start', 'gc_vbd_ad_start'),
-    'before_2': ('gc_vbd_pot2_ad_start', 'gc_vbd_ad_start'),
-    'after_1': ('gc_vbd_pot1_ad', 'gc_vbd_ad'),
-    'after_2': ('gc_vbd_pot2_ad', 'gc_vbd_ad'),
-    'amps': ('gc_vbd_i',),
-    'volts': ('gc_vbd_volts',),
-    'seconds': ('gc_vbd_secs',),
-}
 #: Its moving masses: field of the vehicle file.
 MASSES = {'pitch': 'pitch_mass', 'roll': 'roll_mass'}
 
@@ -62,12 +50,13 @@ class _Dive(NamedTuple):
 
 def _pumpings(path: Path) -> _Dive:
     """Read a dive."""
-    of_masses = {one: (one,) for name in MASSES for one in _variables_of(name)}
-    found = read_variables(path, MOVES | of_masses)
-    refuse_missing(path, found, MOVES, 'for the energy of a Seaglider')
-    rows = {key: len(found[key]) for key in MOVES if key != 'cc_per_count'}
+    moves = names_of('moves')
+    of_masses = {one: {one: 1.0} for name in MASSES for one in _variables_of(name)}
+    found = read(path, moves | of_masses)
+    refuse_missing(path, found, moves, 'for the energy of a Seaglider')
+    rows = {key: len(found[key]) for key in moves if key != 'cc_per_count'}
     if len(set(rows.values())) > 1:
-        told = ', '.join(f'{MOVES[key][0]} {count}' for key, count in rows.items())
+        told = ', '.join(f'{next(iter(moves[key]))} {count}' for key, count in rows.items())
         raise ConfigurationError(f'{path}: {told} values (allowed: as many of each)')
     counts = found['after_1'] + found['after_2'] - found['before_1'] - found['before_2']
     pumped = 0.5 * counts * found['cc_per_count'][0]
