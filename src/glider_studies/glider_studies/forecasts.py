@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from glider_bringup.scoring.card import fly_scored
+from glider_mission.choices import combination_of
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.eddying_sea import EddyingSea, write_sea
-from glider_studies.paper.experiments import Experiment, told
+from glider_studies.paper.experiments import Experiment, Study, make_study
 from glider_studies.paper.judges import Check
-from glider_studies.workers import Pool, Progress
 
 NAME = 'forecasts'
 #: rms of each part of the current at the top (m/s) in each of the seas, and the first of them.
@@ -24,13 +24,10 @@ PERSISTENCE = 'persistence'
 #: What is believed of a forecast: all of it, or the share that there is in the sea.
 WAYS = {'whole forecast': 0.0, 'its share': 0.5}
 CASES = [(PERSISTENCE, 0.0), *((way, error) for error in ERRORS for way in WAYS)]
-#: Flights that it takes.
-TASKS = len(SIZES) * len(CASES)
 #: The first surfacings are not judged: all that is believed at first is the forecast.
 _SETTLED = 3
 #: By its share a vehicle is off at most so many times as far as by the better of the others.
 LIMIT = 1.1
-_TITLE = 'eddies_10d for five days, by a forecast that is off by 0, 0.05 and 0.15 m/s'
 
 
 def scenario_in(sea: Path, forecast: Path, way: str) -> Scenario:
@@ -68,16 +65,21 @@ def judge(rows: list[dict[str, Any]]) -> list[Check]:
     return checks
 
 
-def fly(seed: int, pool: Pool, progress: Progress) -> dict[str, Any]:
-    """Fly the seas of a seed in all ways; returns an entry of ``experiments.json``."""
+def experiment(seed: int) -> Experiment:
+    """The seas of a seed, reckoned through in all ways."""
+
+    def rows(found: dict[tuple, list[float]]) -> tuple[list[dict], dict]:
+        told = []
+        for way, error in CASES:
+            off = np.concatenate(
+                [misses for key, misses in found.items() if key[1:] == (way, error)]
+            )
+            p50, p90 = np.quantile(off, (0.5, 0.9)).tolist()
+            figures = {'surfacings': len(off), 'p50_m': p50, 'p90_m': p90}
+            told.append({'way': way, 'error_mps': error, **figures})
+        return told, {}
+
     seas = enumerate(SIZES, FIRST + len(SIZES) * seed)
     tasks = {(sea, *case): (sea, rms, *case) for sea, rms in seas for case in CASES}
-    found = pool.results(fly_one, tasks, progress)
-    rows = []
-    for way, error in CASES:
-        off = np.concatenate([misses for key, misses in found.items() if key[1:] == (way, error)])
-        p50, p90 = np.quantile(off, (0.5, 0.9)).tolist()
-        rows.append(
-            {'way': way, 'error_mps': error, 'surfacings': len(off), 'p50_m': p50, 'p90_m': p90}
-        )
-    return told(Experiment(NAME, NAME, '', f'{_TITLE}, seed {seed}', '-', [], judge), rows)
+    loops = {combination_of(load_scenario('eddies_10d', {'orders': []}))}
+    return make_study(NAME, seed, judge, Study(fly_one, tasks, loops, rows))

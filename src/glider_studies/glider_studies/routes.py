@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from glider_bringup.scoring.card import fly_scored
-from glider_mission.choices import Combination, combination_of
+from glider_mission.choices import combination_of
 from glider_mission.routing.plan import plan
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.eddying_sea import EddyingSea, write_sea
-from glider_studies.paper.experiments import Experiment, told
+from glider_studies.paper.experiments import Experiment, Study, make_study
 from glider_studies.paper.judges import Check
-from glider_studies.workers import Pool, Progress
 
 NAME = 'routes'
 #: rms of each part of the current at the top (m/s), and seas of each.
@@ -33,12 +32,9 @@ WAYS: dict[str, dict[str, Any]] = {
     'planned': _PLANNED,
     'erring': {**_PLANNED, 'forecast.error_mps': 0.15},
 }
-#: Flights that it takes, and plans.
-TASKS = len(SIZES) * SEAS * len(WAYS)
 #: A planned route takes at most this share of the time of straight legs, and by a forecast that
 #: errs never more than this share.
 GAIN, LOSS = 0.9, 1.1
-_TITLE = 'planned routes and straight legs, 192 km through eddies'
 
 
 def scenario_in(sea: Path, way: str) -> Scenario:
@@ -70,11 +66,6 @@ def _hours(time_s: float) -> float | None:
     return time_s / 3600.0 if math.isfinite(time_s) else None
 
 
-def combinations() -> set[Combination]:
-    """What loops flights of the mission need, whatever it believes of a forecast."""
-    return {combination_of(load_scenario('eddies_10d', {'orders': []}))}
-
-
 def judge(rows: list[dict[str, Any]]) -> list[Check]:
     """What is asked of planned routes, over all seas."""
     missed = sum(row['reachable'] and row['planned_h'] is None for row in rows)
@@ -93,19 +84,21 @@ def judge(rows: list[dict[str, Any]]) -> list[Check]:
     ]
 
 
-def cross(seed: int, pool: Pool, progress: Progress) -> dict[str, Any]:
-    """Cross the seas of a seed in all ways; returns an entry of ``experiments.json``."""
+def experiment(seed: int) -> Experiment:
+    """The seas of a seed, crossed in all ways."""
     seas = {
         FIRST + len(SIZES) * SEAS * seed + SEAS * k + number: rms_mps
         for k, rms_mps in enumerate(SIZES)
         for number in range(SEAS)
     }
+
+    def rows(found: dict[tuple[int, str], dict]) -> tuple[list[dict], dict]:
+        return [
+            {'sea': sea, 'rms_mps': rms_mps}
+            | {name: figure for way in WAYS for name, figure in found[sea, way].items()}
+            for sea, rms_mps in seas.items()
+        ], {}
+
     tasks = {(sea, way): (sea, rms_mps, way) for sea, rms_mps in seas.items() for way in WAYS}
-    found = pool.results(cross_one, tasks, progress)
-    rows = [
-        {'sea': sea, 'rms_mps': rms_mps}
-        | {name: figure for way in WAYS for name, figure in found[sea, way].items()}
-        for sea, rms_mps in seas.items()
-    ]
-    title = f'{_TITLE}, seed {seed}'
-    return told(Experiment(NAME, NAME, '', title, '-', [], judge), rows)
+    loops = {combination_of(load_scenario('eddies_10d', {'orders': []}))}
+    return make_study(NAME, seed, judge, Study(cross_one, tasks, loops, rows))

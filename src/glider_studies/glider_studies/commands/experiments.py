@@ -3,7 +3,6 @@
 """``./glider experiments``: the paper's figures, and what goes beyond them."""
 
 import json
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -72,31 +71,21 @@ def experiments(
 
     groups = picked(only, Group)
     planned = paper.make_experiments(groups)
-    flown = paper.count_flights(planned)
-    others = []  # flights, loops that they need, and what flies and judges them
     if search.NAME in groups:
-        hunt = partial(search.search, seed, flights)
-        others.append((flights, search.combinations(seed, flights), hunt))
-    if routes.NAME in groups:
-        crossing = partial(routes.cross, seed)
-        others.append((routes.TASKS, routes.combinations(), crossing))
-    if forecasts.NAME in groups:
-        reckoning = partial(forecasts.fly, seed)
-        others.append((forecasts.TASKS, routes.combinations(), reckoning))
-    total = flown + sum(count for count, _, _ in others)
+        planned.append(search.experiment(seed, flights))
+    planned += [one.experiment(seed) for one in (routes, forecasts) if one.NAME in groups]
+    total = paper.count_flights(planned)
     if out:
         make_result_folder(out, paper.RESULT_FILE)
     what = 'flights and plans' if routes.NAME in groups else 'flights'
-    messages.print(f'{len(planned) + len(others)} experiments, {total} {what}')
-    loops = paper.combinations(planned).union(*(needed for _, needed, _ in others))
-    with workers_at_work(workers, scheduler, loops, total) as (pool, update):
+    messages.print(f'{len(planned)} experiments, {total} {what}')
+    with workers_at_work(workers, scheduler, paper.combinations(planned), total) as (pool, update):
         rows, records = paper.fly(planned, pool, update)
-        result = paper.report(planned, rows)
-        for count, _, fly in others:
-            found = fly(pool, lambda done, before=flown: update(before + done))
-            flown += count
-            result['experiments'].append(found)
-            result |= found.get('counts', {})
+    result = paper.report(planned, rows)
+    for entry, counts in zip(result['experiments'], records, strict=True):
+        if isinstance(counts, dict) and counts:
+            entry['counts'] = counts
+            result |= counts
     if out:
         with messages.status('drawing'):
             drawn = paper_figures.draw(planned, rows, records, out)

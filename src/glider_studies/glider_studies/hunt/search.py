@@ -12,16 +12,14 @@ from glider_mission.choices import Combination, combination_of
 from glider_mission.scenario import Scenario, run_command
 from glider_studies.hunt.missions import Mission, draw_mission
 from glider_studies.hunt.oracle import Truth, Verdict, judge, unfounded
-from glider_studies.paper.experiments import Experiment, told
+from glider_studies.paper.experiments import Experiment, Study, make_study
 from glider_studies.paper.judges import Check
-from glider_studies.workers import Pool, Progress
 
 NAME = 'random_faults'
 #: What may go wrong with a flight with faults.
 KINDS = ('lost', 'untold', 'late', 'not_finite')
 #: What may with one without.
 FALSE = 'false_reaction'
-_TITLE = 'two or three random faults in random missions, and the same missions without'
 
 
 class Flown(NamedTuple):
@@ -84,28 +82,37 @@ def command(mission: Mission, faults: list[dict[str, Any]]) -> str:
     return run_command(mission.scenario, fields, '--duration full')
 
 
-def search(seed: int, flights: int, pool: Pool, progress: Progress) -> dict[str, Any]:
-    """Fly missions 0 to ``flights`` of a seed.
+def judge_search(rows: list[dict[str, Any]]) -> list[Check]:
+    """Nothing may go wrong, with faults or without."""
+    wrong = _wrong(rows)
+    return [Check(kind, count, 0, count == 0) for kind, count in wrong.items()]
 
-    Returns an entry of ``experiments.json``, and in it ``counts``: flights, lost, untold, late,
-    not_finite, false_reactions, hours.
-    """
-    places = {number: (seed, number) for number in range(flights)}
-    flown = pool.results(_fly_mission, places, progress)
-    rows = []
-    for number, one in flown.items():
-        mission = draw_mission(seed, number)
-        harms = [(one.verdict, one.faults)] if one.verdict.kind else []
-        harms += [(Verdict(FALSE, one.latched), [])] if one.latched else []
-        rows += [
-            {'flight': number, **said._asdict(), 'command': command(mission, faults)}
-            for said, faults in harms
-        ]
+
+def _wrong(rows: list[dict[str, Any]]) -> dict[str, int]:
     found = Counter(row['kind'] for row in rows)
-    wrong = {kind: found[kind] for kind in KINDS} | {'false_reactions': found[FALSE]}
-    hours = round(sum(one.hours for one in flown.values()), 1)
-    checks = [Check(kind, count, 0, count == 0) for kind, count in wrong.items()]
-    title = f'{_TITLE}, seed {seed}'
-    return told(Experiment(NAME, NAME, '', title, '-', [], lambda rows: checks), rows) | {
-        'counts': {'flights': flights, **wrong, 'hours': hours}
-    }
+    return {kind: found[kind] for kind in KINDS} | {'false_reactions': found[FALSE]}
+
+
+def experiment(seed: int, flights: int) -> Experiment:
+    """Missions 0 to ``flights`` of a seed.
+
+    Beside its rows it tells the counts of flights, lost, untold, late, not_finite,
+    false_reactions, hours.
+    """
+
+    def rows(flown: dict[int, Flown]) -> tuple[list[dict], dict[str, Any]]:
+        told = []
+        for number, one in flown.items():
+            mission = draw_mission(seed, number)
+            harms = [(one.verdict, one.faults)] if one.verdict.kind else []
+            harms += [(Verdict(FALSE, one.latched), [])] if one.latched else []
+            told += [
+                {'flight': number, **said._asdict(), 'command': command(mission, faults)}
+                for said, faults in harms
+            ]
+        hours = round(sum(one.hours for one in flown.values()), 1)
+        return told, {'flights': flights, **_wrong(told), 'hours': hours}
+
+    places = {number: (seed, number) for number in range(flights)}
+    study = Study(_fly_mission, places, combinations(seed, flights), rows)
+    return make_study(NAME, seed, judge_search, study)

@@ -9,7 +9,7 @@ anything worse turns a verdict to ``failed``.
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -88,6 +88,16 @@ class Case(NamedTuple):
         return json.dumps([*self[1:5], self.measures, self.told])
 
 
+class Study(NamedTuple):
+    """Flights that are no cases of the file."""
+
+    fly: Callable[[Any], Any]  #: what a worker does with a task
+    tasks: dict[Hashable, Any]
+    loops: set[Combination]  #: what they need
+    #: Rows, and what else is told of all flights, of what came of each task.
+    rows: Callable[[dict[Hashable, Any]], tuple[list[dict], dict[str, Any]]]
+
+
 class Experiment(NamedTuple):
     """Flights, and what is asked of them."""
 
@@ -98,20 +108,32 @@ class Experiment(NamedTuple):
     paper: str  #: the paper's figure
     cases: list[Case]
     judge: Callable[[list[dict]], list[Check]]
+    study: Study | None = None
 
 
 # ---------------------------------------------------------------------------------- the file
 
 
 @cache
+def _file() -> dict[str, Any]:
+    return read_yaml(Path(__file__).with_name('experiments.yaml'))
+
+
 def catalogue() -> dict[str, dict[str, dict[str, Any]]]:
     """Experiments by group and name, as the file has them."""
-    return read_yaml(Path(__file__).with_name('experiments.yaml'))['experiments']
+    return _file()['experiments']
 
 
 def described(name: str) -> dict[str, Any]:
     """What the file says of an experiment."""
-    return next((group[name] for group in catalogue().values() if name in group), {})
+    groups = (*catalogue().values(), _file()['studies'])
+    return next((group[name] for group in groups if name in group), {})
+
+
+def make_study(name: str, seed: int, judge: Callable, study: Study) -> Experiment:
+    """Experiment of a study that the file describes."""
+    title = f'{described(name)["title"]}, seed {seed}'
+    return Experiment(name, name, '', title, '-', [], judge, study)
 
 
 def make_experiments(groups: list[str]) -> list[Experiment]:
@@ -125,7 +147,9 @@ def make_experiments(groups: list[str]) -> list[Experiment]:
 
 
 def _experiment(group: str, name: str, one: dict[str, Any]) -> Experiment:
-    limits = judge_limits(_merged(one.get('limits', {})), one.get('limited', 'adaptive'))
+    limits = judge_limits(
+        _merged(one.get('limits', {})), one.get('limited', 'adaptive'), one.get('limits_of')
+    )
     title, cases = one['title'], _cases(name, one)
     if name == 'robustness':
         cases = [case._replace(facts=_changed(case)) for case in cases]
@@ -263,43 +287,64 @@ def _row(scores: dict[str, Any], failed: bool = False) -> dict[str, Any]:
     return {'finite': whole, **clean, **({'status': 'failed'} if failed else {})}
 
 
-def fly(
-    experiments: list[Experiment], pool: Pool, progress: Progress
-) -> tuple[list[list[dict]], list[list[Record | None]]]:
-    """Fly every case, in worker processes; what two experiments share is flown once.
+def _work(task: tuple[Callable, Any]) -> Any:
+    function, argument = task
+    return function(argument)
 
-    Returns rows, and records (None for what is not drawn), by experiment and case.
-    """
+
+def _tasks(experiments: list[Experiment]) -> dict[Hashable, tuple[Callable, Any]]:
+    """What is to be done; what two experiments share once, with its record if one is drawn."""
     cases: dict[str, Case] = {}
     for case in (case for one in experiments for case in one.cases):
         if case.drawn or case.key() not in cases:
             cases[case.key()] = case
-    flown = pool.results(_fly_case, cases, progress)
-    rows = [
-        [
+    return {key: (_fly_case, case) for key, case in cases.items()} | {
+        (one.name, key): (one.study.fly, task)
+        for one in experiments
+        if one.study
+        for key, task in one.study.tasks.items()
+    }
+
+
+def fly(
+    experiments: list[Experiment], pool: Pool, progress: Progress
+) -> tuple[list[list[dict]], list[list[Record | None] | dict[str, Any]]]:
+    """Fly all experiments, in worker processes.
+
+    Returns rows by experiment and case; and the record of each case (None for what is not drawn),
+    or what else is told of a study.
+    """
+    flown = pool.results(_work, _tasks(experiments), progress)
+    found = []
+    for one in experiments:
+        if one.study:
+            found.append(one.study.rows({key: flown[one.name, key] for key in one.study.tasks}))
+            continue
+        results = [flown[case.key()] for case in one.cases]
+        rows = [
             {
                 'case': case.case,
                 'controller': case.controller,
                 'guidance': case.guidance,
                 **case.facts,
-                **flown[case.key()][0],
+                **row,
                 'command': case.command(),
             }
-            for case in one.cases
+            for case, (row, _) in zip(one.cases, results, strict=True)
         ]
-        for one in experiments
-    ]
-    return rows, [[flown[case.key()][1] for case in one.cases] for one in experiments]
+        found.append((rows, [record for _, record in results]))
+    return [rows for rows, _ in found], [others for _, others in found]
 
 
 def combinations(experiments: list[Experiment]) -> set[Combination]:
     """What `fly` needs loops for."""
-    return {combination_of(case.load()) for one in experiments for case in one.cases}
+    loops = {combination_of(case.load()) for one in experiments for case in one.cases}
+    return loops.union(*(one.study.loops for one in experiments if one.study))
 
 
 def count_flights(experiments: list[Experiment]) -> int:
     """Number of flights that `fly` makes."""
-    return len({case.key() for one in experiments for case in one.cases})
+    return len(_tasks(experiments))
 
 
 # ---------------------------------------------------------------------------------- verdicts

@@ -11,15 +11,6 @@ from glider_model.vehicle.file import load_vehicle
 from glider_studies.montecarlo import pooled
 
 WAYPOINT_LIMIT_M = 10.0
-#: From the fourth surfacing on, where a vehicle came up and how it went under water (m), with
-#: errors of the sensors and without.
-RECKONED_LIMITS = {
-    'reckoned': {
-        'navigation.from_fourth.surfacing_cross_track_m': 50.0,
-        'navigation.from_fourth.under_water_rms_m': 30.0,
-    },
-    'reckoned, no errors': {'navigation.from_fourth.surfacing_cross_track_m': 20.0},
-}
 #: In a leg, after its corner: spread of the heading, and how far it may be from the course (deg).
 HEADING_SPREAD_LIMIT_DEG, OFF_COURSE_LIMIT_DEG = 45.0, 90.0
 #: Mean distance of the heading from the best crab where no course can be held (deg).
@@ -75,24 +66,21 @@ def _flown(rows: list[dict], controller: str = 'adaptive') -> list[dict]:
 
 
 def judge_limits(
-    limits: dict[str, float], controller: str = 'adaptive'
+    limits: dict[str, float],
+    controller: str = 'adaptive',
+    limits_of: dict[str, dict[str, float]] | None = None,
 ) -> Callable[[list[dict]], list[Check]]:
-    """Judgement that holds every flight of a controller to the same limits."""
+    """Judgement that holds flights of a controller to the same limits, or to those by case."""
 
     def judge(rows: list[dict]) -> list[Check]:
-        return [check for row in _flown(rows, controller) for check in within(row, limits)]
+        return [
+            check
+            for row in _flown(rows, controller)
+            if limits_of is None or row['case'] in limits_of
+            for check in within(row, limits if limits_of is None else limits_of[row['case']])
+        ]
 
     return judge
-
-
-def judge_reckoned(rows: list[dict]) -> list[Check]:
-    """The default way to reckon keeps near its path once the current has been met."""
-    return [
-        check
-        for row in _flown(rows)
-        if row['case'] in RECKONED_LIMITS
-        for check in within(row, RECKONED_LIMITS[row['case']])
-    ]
 
 
 def judge_survey(rows: list[dict]) -> list[Check]:
@@ -226,7 +214,6 @@ def judge_ablation(rows: list[dict]) -> list[Check]:
 
 #: Judgements of experiments, where they are not by limits alone.
 JUDGES = {
-    'reckoned_12deg': judge_reckoned,
     'survey': judge_survey,
     'ablation': judge_ablation,
     'envelope': judge_envelope,

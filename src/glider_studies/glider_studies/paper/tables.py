@@ -45,48 +45,53 @@ def _table(names: list[str], figures: list[str]) -> Table:
     return table
 
 
-def _by_flight(figures: dict[str, str]) -> Callable[[list[dict]], Table]:
-    """Tables with one line for each flight and these figures, by dotted name."""
+def _by_flight(rows: list[dict], said: dict[str, Any]) -> Table:
+    """One line for each flight, or row of a study, and figures by dotted name."""
+    figures = said.get('figures') or compared(rows)
+    texts = said.get('texts')
+    if texts is None:
+        shown = {
+            'case': any(row['case'] for row in rows),
+            'flown by': True,
+            'LOS': len({row['guidance'] for row in rows}) > 1,
+            'status': any(row['status'] != 'completed' for row in rows),
+        }
+        fields = dict(zip(('case', 'controller', 'guidance', 'status'), shown, strict=True))
+        texts = {field: name for field, name in fields.items() if shown[name]}
+    table = _table(list(texts.values()), list(figures.values()))
+    adaptive = by_case(rows, 'adaptive')
+    for row in rows:
+        rival = adaptive.get((row.get('case'), row.get('guidance')))
+        named = (LAW_NAMES.get(row[field], str(row[field])) for field in texts)
+        table.add_row(*named, *(_marked(row, rival, name, said) for name in figures))
+    return table
 
-    def make(rows: list[dict]) -> Table:
-        cases = any(row['case'] for row in rows)
-        flagged = any(row['status'] != 'completed' for row in rows)
-        ways = len({row['guidance'] for row in rows}) > 1
-        names = ['case'] * cases + ['flown by'] + ['LOS'] * ways + ['status'] * flagged
-        table = _table(names, list(figures.values()))
-        adaptive = by_case(rows, 'adaptive')
-        for row in rows:
-            rival = adaptive.get((row['case'], row['guidance']))
-            texts = [row['case']] * cases + [LAW_NAMES[row['controller']]]
-            texts += [row['guidance']] * ways + [row['status']] * flagged
-            table.add_row(*texts, *(_marked(row, rival, name) for name in figures))
-        return table
 
-    return make
-
-
-def _marked(row: dict | None, rival: dict | None, name: str) -> str:
+def _marked(row: dict | None, rival: dict | None, name: str, said: dict[str, Any]) -> str:
     """Figure of a row, marked if it is of another law and better than that of its rival."""
     if row is None:
         return '-'
     value = figure_of(row, name)
     marked = (
-        row['controller'] != 'adaptive'
-        and rival is not None
+        rival is not None
+        and row['controller'] != 'adaptive'
         and name in compared([row])
         and is_better(value, figure_of(rival, name))
     )
-    return _number(value) + (BETTER if marked else '')
+    return _number(value, said.get('digits', 2)) + (BETTER if marked else '')
 
 
-def _side_by_side(rows: list[dict]) -> Table:
+def _side_by_side(rows: list[dict], said: dict[str, Any]) -> Table:
     """One line for each case; in every column adaptive | tuned PID."""
     figures = dict(list(compared(rows).items())[:5])
     table = _table(['adaptive | tuned PID'], list(figures.values()))
     ours, theirs = (by_case(rows, law) for law in ('adaptive', 'pid'))
     for case in dict.fromkeys((row['case'], row['guidance']) for row in rows):
         one, other = ours.get(case), theirs.get(case)
-        cells = (f'{_marked(one, None, name)} | {_marked(other, one, name)}' for name in figures)
+        cells = (
+            f'{_marked(one, None, name, said)} | {_marked(other, one, name, said)}'
+            for name in figures
+        )
         table.add_row(case[0], *cells)
     return table
 
@@ -101,7 +106,7 @@ def _steering(rows: list[dict]) -> list[str]:
     ]
 
 
-def _survey(rows: list[dict]) -> Table:
+def _survey(rows: list[dict], said: dict[str, Any]) -> Table:
     """Closest pass of each waypoint, and the heading in each leg."""
     legs = rows[0]['legs']
     table = _table(['', *(LAW_NAMES[row['controller']] for row in rows)], [])
@@ -114,7 +119,7 @@ def _survey(rows: list[dict]) -> Table:
     return table
 
 
-def _envelope(rows: list[dict]) -> Table:
+def _envelope(rows: list[dict], said: dict[str, Any]) -> Table:
     """Largest error by speed and angle of the current; beyond the limit what was flagged."""
     speeds = sorted({row['speed_kn'] for row in rows})
     table = _table(['angle'], [f'{speed:g} kn' for speed in speeds])
@@ -128,7 +133,7 @@ def _envelope(rows: list[dict]) -> Table:
     return table
 
 
-def _ablation(rows: list[dict]) -> Table:
+def _ablation(rows: list[dict], said: dict[str, Any]) -> Table:
     """What each piece was built for, with it and without; and where it is missed most, steady."""
     table = _table(['off', 'built for'], ['whole', 'without', 'missed most', 'whole', 'without'])
     by_name = {row['case']: row for row in rows}
@@ -150,7 +155,7 @@ def _ablation(rows: list[dict]) -> Table:
     return table
 
 
-_TABLES: dict[str, Callable[[list[dict]], Table]] = {
+_TABLES: dict[str, Callable[[list[dict], dict[str, Any]], Table]] = {
     'side_by_side': _side_by_side,
     'survey': _survey,
     'ablation': _ablation,
@@ -161,18 +166,15 @@ _TABLES: dict[str, Callable[[list[dict]], Table]] = {
 def show(result: dict[str, Any], output: Console) -> None:
     """Print experiment by experiment: the paper's figure, ours, verdict."""
     for one in result['experiments']:
-        head = f'{one["section"]}: {one["title"]}' if one['section'] else one['title']
-        if one['name'] in _OTHERS:
-            output.print(f'\n{head}', soft_wrap=True)
-            _OTHERS[one['name']](one, output)
-            _show_verdict(one, output)
-            continue
         said = described(one['name'])
-        figures = said.get('figures') or compared(one['rows'])
-        make = _TABLES.get(said.get('table')) or _by_flight(figures)
-        output.print(f'\n{head}\npaper: {one["paper"]}', soft_wrap=True)
-        output.print(make(one['rows']))
-        if one['pid_better'] and make is not _survey:
+        head = f'{one["section"]}: {one["title"]}' if one['section'] else one['title']
+        head += '' if one['paper'] == '-' else f'\npaper: {one["paper"]}'
+        output.print(f'\n{head}', soft_wrap=True)
+        if 'counts' in one:
+            _show_search(one, output)
+        else:
+            output.print(_TABLES.get(said.get('table'), _by_flight)(one['rows'], said))
+        if one['pid_better'] and said.get('table') != 'survey':
             output.print(f'{BETTER} the tuned PID is better than the adaptive law')
         for line in _steering(one['rows']):
             output.print(line)
@@ -193,46 +195,6 @@ def _show_search(one: dict[str, Any], output: Console) -> None:
         output.print(f'  {row["command"]}', soft_wrap=True)
     if len(one['rows']) > LISTED:
         output.print(f'and {len(one["rows"]) - LISTED} more')
-
-
-def _show_routes(one: dict[str, Any], output: Console) -> None:
-    """Print a line for each sea: what was planned, and when it was crossed in which way."""
-    ways = {
-        name: name.removesuffix('_h').replace('_', '\n')
-        for name in one['rows'][0]
-        if name.endswith('_h')
-    }
-    table = _table(['sea'], ['rms (m/s)', *(f'{way}\n(h)' for way in ways.values())])
-    for row in one['rows']:
-        hours = (_number(row[name], 1) for name in ways)
-        table.add_row(str(row['sea']), _number(row['rms_mps']), *hours)
-    output.print(table)
-    output.print(
-        'Plan: with the true sea for a forecast, and of straight legs in it. Others are flown, '
-        'planned and erring along routes by a forecast that is 12 h late; that of the last errs '
-        'by 0.15 m/s as well. A dash: not in 288 h.'
-    )
-
-
-def _show_forecasts(one: dict[str, Any], output: Console) -> None:
-    """Print how far off a vehicle came up, by what it believed of which forecast."""
-    table = _table(['reckoned by'], ['forecast off\nby (m/s)', 'surfacings', 'p50 (m)', 'p90 (m)'])
-    for row in one['rows']:
-        figures = (_number(row[name], 0) for name in ('surfacings', 'p50_m', 'p90_m'))
-        table.add_row(row['way'], _number(row['error_mps']), *figures)
-    output.print(table)
-    output.print(
-        'Persistence: the mean of the way before, and no forecast. How far off the estimated '
-        'position is at surfacings, from the fourth on.'
-    )
-
-
-#: What is no experiment of the catalogue.
-_OTHERS = {
-    'random_faults': _show_search,
-    'routes': _show_routes,
-    'forecasts': _show_forecasts,
-}
 
 
 def _show_verdict(one: dict[str, Any], output: Console) -> None:
