@@ -6,9 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from glider_base.errors import ConfigurationError
-from glider_flights.energy.seaglider import seaglider_uses
-from glider_flights.energy.slocum import slocum_uses
-from glider_flights.energy.uses import Uses
+from glider_flights.energy import Uses, seaglider_uses, slocum_uses
 from glider_flights.folders import Progress, said
 from glider_flights.og1 import og1_files, read_og1
 from glider_flights.record import Flight

@@ -23,6 +23,7 @@ from glider_flights.folders import (
     installed,
     of_one_flight,
 )
+from glider_flights.netcdf import names_of
 from glider_flights.record import (
     NOT_KNOWN,
     Fixes,
@@ -65,18 +66,14 @@ WANTED = (
     *('m_gps_mag_var', 'm_speed', 'm_lat', 'm_lon', 'm_dr_time'),
     *('m_final_water_vx', 'm_final_water_vy', 'm_water_vx', 'm_water_vy'),
 )
-#: What more there is for a flight model: of the flight computer, and of that of science.
-ENGINEERING = (
-    *('m_roll', 'm_fin', 'm_battpos', 'm_battroll', 'm_ballast_pumped', 'm_de_oil_vol'),
-    'm_pressure',
-)
+#: What the science computer says of the water.
 WATER = ('sci_water_pressure', 'sci_water_cond', 'sci_water_temp')
 #: When the CTD measured, of which the times of the file are up to a second off.
 CTD_TIMES = ('sci_ctd41cp_timestamp', 'sci_rbrctd_timestamp')
 #: No further off than this, or they are of something else (s).
 CTD_LATE_S = 10.0
-#: Unit of ``m_battpos`` (m), of pressures (dbar) and of conductivity (mS/cm) there.
-INCH, BAR, SIEMENS_PER_METRE = 0.0254, 10.0, 10.0
+#: Unit of pressures (dbar) and of conductivity (mS/cm) there.
+BAR, SIEMENS_PER_METRE = 10.0, 10.0
 #: Merckelbach, Smeed and Griffiths (2010), doi:10.1175/2009JTECHO710.1: lift slopes 3.8 of the
 #: hull and 3.73 of the wings, drag 0.15 + 10.5 alpha^2, area 0.1 m^2.
 POLAR = Polar(
@@ -120,7 +117,10 @@ def read_slocum(
     ConfigurationError
     """
     files = slocum_files(place)
-    listed = NEEDED + WANTED + (ENGINEERING if whole else ())
+    listed = NEEDED + WANTED
+    if whole:
+        names = (name for of in names_of('slocum').values() for name in of)
+        listed += ('m_pressure', *(name for name in names if name not in (*NEEDED, *WATER)))
     sensors, files, names, notes = read_sensors(files, cache, progress, listed, NEEDED[:3])
     missing = [name for name in NEEDED if not len(sensors[name][0])]
     if missing:
@@ -202,32 +202,16 @@ def _instruments(sensors: Sensors, declined: float, origin: np.ndarray) -> Instr
     if not len(time_s):
         time_s, depth_m = sensors['m_depth']
 
-    def measured(name: str, unit: float = 1.0) -> np.ndarray:
-        own_s, values = sensors[name]
-        return unit * at_times(time_s, own_s, values)
-
-    # One of the two is of another engine, which is not fitted.
-    engines = [measured(name, 1e-6) for name in ('m_ballast_pumped', 'm_de_oil_vol')]
-    pumped = max(engines, key=lambda values: int(np.isfinite(values).sum()))
-    temperature = measured('sci_water_temp')
-    heading = angles_at_times(time_s, *sensors['m_heading']) - declined
-    return instruments(
-        time_s,
-        depth_m=depth_m,
-        pitch_rad=measured('m_pitch'),
-        roll_rad=measured('m_roll'),
-        heading_rad=heading,
-        pumped_m3=pumped,
-        mass_x_m=measured('m_battpos', INCH),
-        mass_roll_rad=measured('m_battroll'),
-        surface_rad=measured('m_fin'),
-        temperature_degc=temperature,
-        salinity=gsw().SP_from_C(
-            measured('sci_water_cond', SIEMENS_PER_METRE),
-            temperature,
-            gsw().p_from_z(-depth_m, origin[0]),
-        ),
+    measured = {'heading_rad': angles_at_times(time_s, *sensors['m_heading']) - declined}
+    for key, names in names_of('slocum').items():
+        told = [scale * at_times(time_s, *sensors[name]) for name, scale in names.items()]
+        measured[key] = max(told, key=lambda values: int(np.isfinite(values).sum()))
+    measured['salinity'] = gsw().SP_from_C(
+        SIEMENS_PER_METRE * at_times(time_s, *sensors['sci_water_cond']),
+        measured['temperature_degc'],
+        gsw().p_from_z(-depth_m, origin[0]),
     )
+    return instruments(time_s, depth_m=depth_m, **measured)
 
 
 class DbdFile(NamedTuple):

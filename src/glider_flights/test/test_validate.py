@@ -15,9 +15,8 @@ from glider_base.errors import ConfigurationError
 from glider_bringup.cli import app
 from glider_flights.reading import read_whole
 from glider_flights.record import Instruments
-from glider_flights.validation.flying import Simulated
+from glider_flights.validation.flying import Simulated, Track
 from glider_flights.validation.score import turn_rates
-from glider_flights.validation.track import Track
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle
 

@@ -32,7 +32,7 @@ def energy(
 
     Of a Seaglider the energy of its pump, of a Slocum all that its counter of charge counted.
     """
-    from glider_flights.energy.uses import UNITS, predict
+    from glider_flights.energy import UNITS, predict
     from glider_flights.reading import read_uses
 
     fitted = None

@@ -86,10 +86,9 @@ def validate(
     Beside it the model of others: gliderflight, or what the base station of a Seaglider wrote.
     """
     from glider_flights.reading import read_whole
-    from glider_flights.showing.validation import draw_validation
-    from glider_flights.validation.result import Half, find_adcp
+    from glider_flights.validation.figure import draw_validation
+    from glider_flights.validation.result import Half, find_adcp, validate_all
     from glider_flights.validation.result import validate as validated
-    from glider_flights.validation.table import validate_all
 
     if every is not None:
         if flight is not None or fit_on is not None or adcp is not None or out is not None:

@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_base.errors import ConfigurationError
-from glider_flights.validation.flying import Imposed, Model, fly
+from glider_flights.validation.flying import Imposed, Model, Track, fly
 from glider_flights.validation.score import Adcp, speed_off
-from glider_flights.validation.track import Track
 
 #: One of least squares: of the vertical rate (m/s), of pitch (rad), of speed by an ADCP (m/s).
 UNIT_MPS, UNIT_RAD, UNIT_ADCP_MPS = 0.01, math.radians(2.0), 0.03

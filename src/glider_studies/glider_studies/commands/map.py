@@ -36,12 +36,11 @@ def draw(
     more dimension, such as stability_map, or reckoned_map by surfacing.
     """
     from glider_studies.showing import stability_map as study
-    from glider_studies.showing.map_figure import draw_map
 
     stability = study.load_map(file, by)
     image = out or file.with_suffix('.png')
     with messages.status('drawing'):
-        draw_map(stability, image)
+        study.draw_map(stability, image)
     rows = study.shares(stability)
     if as_json:
         found = {'image': str(image), 'horizontal_kn': stability.horizontal_kn, 'panels': rows}
