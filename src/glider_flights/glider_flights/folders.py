@@ -51,9 +51,7 @@ def files_in(place: Path, wanted: Callable[[Path], bool]) -> list[Path]:
 def installed(library: str) -> Iterator[None]:
     """Say of a library that is imported here, and is not there, how to get it.
 
-    Raises
-    ------
-    ConfigurationError
+    Raises ConfigurationError.
     """
     try:
         yield
@@ -76,9 +74,7 @@ def read_each(
 ) -> tuple[list[File], dict[str, str]]:
     """What can be read of files, and why others cannot be, by name; of one alone, it is raised.
 
-    Raises
-    ------
-    ConfigurationError
+    Raises ConfigurationError.
     """
     found, left_out = [], {}
     for number, path in enumerate(files):

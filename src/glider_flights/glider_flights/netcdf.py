@@ -65,10 +65,7 @@ def read(
 
     Times, in s since 1970, are those of which ours ends with ``time``. ``spelt`` makes a wanted
     name of one in the file, ``scales`` says what values in some units are multiplied by instead.
-
-    Raises
-    ------
-    ConfigurationError
+    Raises ConfigurationError.
     """
     found: dict[str, np.ndarray] = {}
     try:
@@ -93,12 +90,7 @@ def read(
 
 
 def refuse_missing(path: Path, found: dict, needed: Names, why: str) -> None:
-    """Refuse a file that lacks something that is needed.
-
-    Raises
-    ------
-    ConfigurationError
-    """
+    """Refuse a file that lacks something that is needed; raises ConfigurationError."""
     missing = [names for key, names in needed.items() if not len(found.get(key, ()))]
     if missing:
         names = ', '.join(' or '.join(names) for names in missing)

@@ -66,12 +66,7 @@ def _is_one(path: Path) -> bool:
 
 
 def read_og1(place: Path, progress: Progress) -> Flight:
-    """Read a flight.
-
-    Raises
-    ------
-    ConfigurationError
-    """
+    """Read a flight; raises ConfigurationError."""
     files, left_out = read_each(og1_files(place), progress, _read)
     files.sort(key=lambda file: file.name)
     return put_together('og1', *of_one_flight(place, files, left_out))

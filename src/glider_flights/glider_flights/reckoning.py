@@ -74,12 +74,7 @@ class Reckoned(NamedTuple):
 
 
 def check(method: str) -> None:
-    """Refuse a method that recorded flights cannot feed.
-
-    Raises
-    ------
-    ConfigurationError
-    """
+    """Refuse a method that recorded flights cannot feed; raises ConfigurationError."""
     if method not in METHODS:
         raise ConfigurationError(f'--method {method} (allowed: {", ".join(METHODS)})')
     lacking = [name for name in METHODS[method]().reads if name not in RECORDED]

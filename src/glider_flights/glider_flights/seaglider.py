@@ -55,12 +55,7 @@ def seaglider_files(place: Path) -> list[Path]:
 
 
 def read_seaglider(place: Path, progress: Progress) -> Flight:
-    """Read a flight.
-
-    Raises
-    ------
-    ConfigurationError
-    """
+    """Read a flight; raises ConfigurationError."""
     dives, left_out = read_each(seaglider_files(place), progress, _read_dive)
     dives.sort(key=lambda dive: (dive.dive, dive.name))
     return put_together('seaglider', *of_one_flight(place, dives, left_out))

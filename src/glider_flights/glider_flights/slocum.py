@@ -111,10 +111,7 @@ def read_slocum(
     """Read a flight; without a folder of caches they are looked for.
 
     With ``whole`` its instruments too, those of the science computer from the files beside.
-
-    Raises
-    ------
-    ConfigurationError
+    Raises ConfigurationError.
     """
     files = slocum_files(place)
     listed = NEEDED + WANTED

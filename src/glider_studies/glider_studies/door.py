@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sweeps from Python."""
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -11,27 +11,24 @@ from typing import Any
 import numpy as np
 import xarray
 
-from glider_base.files import yaml_text
 from glider_base.settings import ConfigurationError
 from glider_bringup.console import compiling, counter
 from glider_bringup.door.netcdf import read_dataset
 from glider_mission.scenario import DEFAULT_SCENARIO, scenario_names, scenario_path
 from glider_studies.sweep import fly as study
-from glider_studies.sweep.plan import load_sweep
+from glider_studies.sweep.plan import Plan, load_sweep
 from glider_studies.workers import worker_pool
 
 
-@contextmanager
-def _sweep_file(name: str | Path | Mapping, scenario: str | Path) -> Iterator[str]:
-    """Name or file of a sweep; of a mapping a file is made."""
+def _plan(name: str | Path | Mapping, scenario: str | Path, changes: dict[str, Any]) -> Plan:
+    """Plan of a sweep by name or file, or of a mapping."""
     if not isinstance(name, Mapping):
         if scenario != DEFAULT_SCENARIO:
             raise ConfigurationError(
                 f'scenario {scenario}: the sweep {name} has one of its own (allowed: with a '
                 'mapping of fields)'
             )
-        yield str(name)
-        return
+        return load_sweep(str(name), changes)
     if not name:
         raise ConfigurationError('sweep: no field to go through (allowed: one or more)')
     dimensions = {
@@ -45,10 +42,7 @@ def _sweep_file(name: str | Path | Mapping, scenario: str | Path) -> Iterator[st
     over = str(scenario)
     if over not in scenario_names():
         over = str(scenario_path(over).resolve())
-    with TemporaryDirectory() as place:
-        file = Path(place) / 'sweep.yaml'
-        file.write_text(yaml_text({'scenario': over, 'dimensions': dimensions}), encoding='utf-8')
-        yield str(file)
+    return Plan(Path('sweep.yaml'), changes, {'scenario': over, 'dimensions': dimensions})
 
 
 def sweep(
@@ -99,8 +93,7 @@ def sweep(
     ConfigurationError
         Naming file, field, value and allowed range.
     """
-    with _sweep_file(name, scenario) as file:
-        plan = load_sweep(file, dict(set or {}))
+    plan = _plan(name, scenario, dict(set or {}))
     bar = counter('flying', plan.cells) if progress else nullcontext(lambda done: None)
     with nullcontext(out) if out is not None else TemporaryDirectory() as place:
         folder = Path(place)

@@ -83,7 +83,7 @@ def _segments_table(flight, rows) -> Table:
             f'{np.hypot(*row.reckoned.way_m):.0f}',
             _current(own),
             _current(other),
-            _number(100.0 * float(np.hypot(*(own - other))), 1),
+            _number(float(np.hypot(*(own - other))), 1, 100.0),
             _number(row.missed_m['persistence'], 0),
             _number(row.missed_m['ours'], 0),
         )
@@ -99,9 +99,9 @@ def _current(mps: np.ndarray) -> str:
     return '-' if np.isnan(mps).any() else f'{100.0 * mps[0]:.1f}, {100.0 * mps[1]:.1f}'
 
 
-def _number(value: float | None, digits: int) -> str:
+def _number(value: float | None, digits: int, scale: float = 1.0) -> str:
     known = value is not None and math.isfinite(value)
-    return f'{value:,.{digits}f}' if known else '-'
+    return f'{scale * value:,.{digits}f}' if known else '-'
 
 
 def _print_figures(report: dict) -> None:
@@ -115,11 +115,12 @@ def _print_figures(report: dict) -> None:
     ]
     for name, spread in report['prediction_m'].items():
         lines.append((f'surfaced off (m): {MEANING[name]}', spread, 1.0, 0))
-    rows = []
-    for text, spread, scale, digits in lines:
-        numbers = [
-            _number(None if spread[key] is None else scale * spread[key], digits)
-            for key in ('median', 'p90')
+    rows = [
+        [
+            text,
+            *(_number(spread[key], digits, scale) for key in ('median', 'p90')),
+            str(spread['segments']),
         ]
-        rows.append([text, *numbers, str(spread['segments'])])
+        for text, spread, scale, digits in lines
+    ]
     print_table(title, ('', 'median', '9 of 10', 'dives'), rows, numbers_from=1)

@@ -82,12 +82,7 @@ BY_ADCP = ('pitch_scale',)
 
 
 def chosen(text: str | None, kind: str, impose: Imposed, has_adcp: bool) -> tuple[str, ...]:
-    """Names of constants of an option ``--fit``; ``none`` is none.
-
-    Raises
-    ------
-    ConfigurationError
-    """
+    """Names of constants of an option ``--fit``; ``none`` is none; raises ConfigurationError."""
     if text is None:
         names = FITTED[kind] + (BY_ADCP if has_adcp else ())
         return names + (OF_ACTUATORS if impose == 'actuators' else ())

@@ -184,12 +184,7 @@ def model_of(name: str, flight: Flight) -> Model:
 
 
 def check(found: list[Track], impose: Imposed) -> None:
-    """Refuse a flight that lacks what is to be imposed.
-
-    Raises
-    ------
-    ConfigurationError
-    """
+    """Refuse a flight that lacks what is to be imposed; raises ConfigurationError."""
     for name in NEEDED[impose]:
         if all(np.isnan(getattr(track.instruments, name)).all() for track in found):
             raise ConfigurationError(

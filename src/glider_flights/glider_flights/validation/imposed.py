@@ -111,13 +111,14 @@ def _turned(n, x, y, z):
 
 
 @kernel
-def _held(u, v, w, turn, forcing, phi_dot, theta_dot, vehicle):
-    """Acceleration u', v', w' and psi'' of a plant whose roll and pitch are imposed.
+def _held(x, forcing, phi_dot, theta_dot, vehicle):
+    """Rate of u, v, w and psi' of a plant whose roll and pitch are imposed.
 
     What holds them is a moment about horizontal axes, as gravity makes it on masses that are
     moved: about the vertical the plant turns as it will. With ω' = k psi'' + e, k the vertical in
     body axes and T the moment: M nu' = tau + [0; T], T . k = 0.
     """
+    u, v, w, turn = x
     s_f, c_f = math.sin(forcing.phi), math.cos(forcing.phi)
     s_t, c_t = math.sin(forcing.theta), math.cos(forcing.theta)
     p = phi_dot - turn * s_t
@@ -138,6 +139,22 @@ def _held(u, v, w, turn, forcing, phi_dot, theta_dot, vehicle):
     m_x, m_y, m_z = turn_dot * d_x - f_x, turn_dot * d_y - f_y, turn_dot * d_z - f_z
     b = solve_mass(0.0, 0.0, 0.0, m_x, m_y, m_z, inertia, vehicle)
     return a[0] + b[0], a[1] + b[1], a[2] + b[2], turn_dot
+
+
+@kernel
+def _after(x, rate, h):
+    return x[0] + h * rate[0], x[1] + h * rate[1], x[2] + h * rate[2], x[3] + h * rate[3]
+
+
+@kernel
+def _held_after(x, start, middle, end, phi_dot, theta_dot, vehicle, h):
+    """u, v, w and psi' after a step of Runge and Kutta; see `_held`."""
+    a = _held(x, start, phi_dot, theta_dot, vehicle)
+    b = _held(_after(x, a, 0.5 * h), middle, phi_dot, theta_dot, vehicle)
+    c = _held(_after(x, b, 0.5 * h), middle, phi_dot, theta_dot, vehicle)
+    d = _held(_after(x, c, h), end, phi_dot, theta_dot, vehicle)
+    e = _after(_after(a, b, 2.0), c, 2.0)
+    return _after(x, _after(e, d, 1.0), h / 6.0)
 
 
 @kernel
@@ -164,12 +181,12 @@ def fly_held(table, vehicle, step, flown):
         and to starboard of it (m), how far it has turned since (rad), speed through the water
         (m/s), roll and pitch (rad).
     """
-    u, v, w, turn = START_MPS, 0.0, 0.0, 0.0
+    x = START_MPS, 0.0, 0.0, 0.0
     down, ahead, abeam, heading = 0.0, 0.0, 0.0, 0.0
     for k in range(len(table)):
         here = table[k]
         phi, theta = here[2], here[3]
-        speed = math.sqrt(u * u + v * v + w * w)
+        speed = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
         flown[k, 0], flown[k, 1], flown[k, 2], flown[k, 3] = down, ahead, abeam, heading
         flown[k, 4], flown[k, 5], flown[k, 6] = speed, phi, theta
         if k == len(table) - 1:
@@ -179,7 +196,7 @@ def fly_held(table, vehicle, step, flown):
         phi_dot, theta_dot = (after[2] - phi) / span, (after[3] - theta) / span
         done = 0.0
         while done < span:
-            speed2 = u * u + v * v + w * w
+            speed2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
             longest = step * min(1.0, STEP_MPS * STEP_MPS / max(speed2, 1e-9))
             longest = max(longest, SHORTEST_S)
             h = (span - done) / math.ceil((span - done) / longest)
@@ -187,31 +204,13 @@ def fly_held(table, vehicle, step, flown):
             middle = _between(here, after, (done + 0.5 * h) / span)
             end = _between(here, after, (done + h) / span)
             done = done + h if h < span - done else span
-            before = _rate(u, v, w, start.phi, start.theta)
-            a = _held(u, v, w, turn, start, phi_dot, theta_dot, vehicle)
-            g = 0.5 * h
-            b = _held(
-                u + g * a[0], v + g * a[1], w + g * a[2], turn + g * a[3],
-                middle, phi_dot, theta_dot, vehicle,
-            )  # fmt: skip
-            c = _held(
-                u + g * b[0], v + g * b[1], w + g * b[2], turn + g * b[3],
-                middle, phi_dot, theta_dot, vehicle,
-            )  # fmt: skip
-            d = _held(
-                u + h * c[0], v + h * c[1], w + h * c[2], turn + h * c[3],
-                end, phi_dot, theta_dot, vehicle,
-            )  # fmt: skip
-            old = turn
-            u += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0])
-            v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1])
-            w += h / 6.0 * (a[2] + 2.0 * b[2] + 2.0 * c[2] + d[2])
-            turn += h / 6.0 * (a[3] + 2.0 * b[3] + 2.0 * c[3] + d[3])
-            now = _rate(u, v, w, end.phi, end.theta)
-            down += g * (before[0] + now[0])
-            ahead += g * (before[1] + now[1])
-            abeam += g * (before[2] + now[2])
-            heading += g * (old + turn)
+            before, old = _rate(x[0], x[1], x[2], start.phi, start.theta), x[3]
+            x = _held_after(x, start, middle, end, phi_dot, theta_dot, vehicle, h)
+            now = _rate(x[0], x[1], x[2], end.phi, end.theta)
+            down += 0.5 * h * (before[0] + now[0])
+            ahead += 0.5 * h * (before[1] + now[1])
+            abeam += 0.5 * h * (before[2] + now[2])
+            heading += 0.5 * h * (old + x[3])
 
 
 @kernel

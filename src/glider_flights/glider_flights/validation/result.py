@@ -58,11 +58,7 @@ def validate(
     """Fly a vehicle along a recorded flight, with constants that ``fit`` names fitted first.
 
     They are fitted to the whole flight, or out of sample: to one half of it, and tried on the
-    other, or to another flight. With ``none`` nothing is fitted.
-
-    Raises
-    ------
-    ConfigurationError
+    other, or to another flight. With ``none`` nothing is fitted. Raises ConfigurationError.
     """
     names = chosen('none' if fit_on == 'none' else fit, flight.kind, impose, adcp is not None)
     found = tracks(flight)
@@ -158,9 +154,7 @@ def _crosswise(
 def find_adcp(place: Path, file: Path | None) -> Adcp | None:
     """Speeds of an ADCP from a file, or from one beside a flight; None if there is none.
 
-    Raises
-    ------
-    ConfigurationError
+    Raises ConfigurationError.
     """
     if file is None:
         folder = place if place.is_dir() else place.parent

@@ -21,7 +21,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_base.files import is_file, read_text, read_yaml, yaml_line
+from glider_base.files import is_file, read_text, read_yaml, yaml_line, yaml_text
 from glider_base.kernel import source_digest
 from glider_base.settings import (
     ConfigurationError,
@@ -218,16 +218,19 @@ class Axis(NamedTuple):
 
 
 class Plan:
-    """The cells of a sweep, by its file.
+    """The cells of a sweep, by its file, or by the values that would stand there.
 
     ``changes`` are scenario fields of every cell by dotted name, before those that the file sets.
     Raises ConfigurationError, naming file, field, value and what is allowed, for every value of
     every dimension.
     """
 
-    def __init__(self, path: Path, changes: dict[str, Any] | None = None) -> None:
+    def __init__(
+        self, path: Path, changes: dict[str, Any] | None = None, values: dict | None = None
+    ) -> None:
         self.path = path
-        self.sweep = _validate(path)
+        self.text = read_text(path) if values is None else yaml_text(values)
+        self.sweep = _validate(path, values)
         self.given = dict(changes or {})
         #: scenario fields of every cell
         self.common = {
@@ -235,7 +238,6 @@ class Plan:
             for field, value in self.sweep.set.items()
             if not any(overlap(field, other) for other in self.given)
         } | self.given
-        self.text = read_text(path)
         self.axes = [_axis(name, one) for name, one in self.sweep.dimensions.items()]
         self.shape = tuple(len(axis.values) for axis in self.axes)
         self.cells = math.prod(self.shape)
@@ -373,10 +375,10 @@ def sweep_names() -> list[str]:
     return file_names(SWEEP_FOLDER)
 
 
-def _validate(path: Path) -> Sweep:
-    values = read_yaml(path)
-    values.setdefault('name', path.stem)
-    return validate(Sweep, values, str(path), line_of=partial(yaml_line, path))
+def _validate(path: Path, values: dict[str, Any] | None = None) -> Sweep:
+    told = {'name': path.stem} | (read_yaml(path) if values is None else values)
+    lines = {'line_of': partial(yaml_line, path)} if values is None else {}
+    return validate(Sweep, told, str(path), **lines)
 
 
 def read_sweep(name: str) -> Sweep:
