@@ -9,7 +9,7 @@ setup(
     name=package_name,
     version='1.0.0',
     packages=find_packages(exclude=['test']),
-    package_data={package_name: ['paper/*.yaml', 'sweep/sweeps/*']},
+    package_data={package_name: ['*.yaml', 'paper/*.yaml', 'sweep/sweeps/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
