@@ -10,8 +10,7 @@ import numpy as np
 
 from glider_flights.folders import Progress
 from glider_flights.reckoning import FIX_STD_M, Reckoned, check, reckon
-from glider_flights.record import Flight, Segment
-from glider_flights.segments import runs
+from glider_flights.record import Flight, Segment, runs
 
 #: Method of navigation, if nothing else is said.
 METHOD = 'dead_reckoned'

@@ -28,16 +28,17 @@ from glider_flights.netcdf import SUFFIXES, datasets, fixes_of, names_of, read, 
 from glider_flights.reckoning import DENSITY
 from glider_flights.record import (
     Flight,
+    LogFile,
     OnBoard,
     Polar,
     Samples,
     angles_at_times,
     at_times,
     instruments,
+    put_together,
     usual,
 )
 from glider_flights.seaglider import DIVE_FILE, polar_of
-from glider_flights.segments import LogFile, put_together
 from glider_flights.slocum import POLAR
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import Vehicle

@@ -18,15 +18,16 @@ from glider_flights.netcdf import SUFFIXES, fixes_of, names_of, read, refuse_mis
 from glider_flights.record import (
     Flight,
     Instruments,
+    LogFile,
     OnBoard,
     Polar,
     Samples,
     angles_at_times,
     at_times,
     instruments,
+    put_together,
     usual,
 )
-from glider_flights.segments import LogFile, put_together
 
 #: Files of dives: the number of the vehicle, three digits, and of the dive, four.
 DIVE_FILE = re.compile(r'p(\d{3})(\d{4}).*\.nc.*', re.IGNORECASE)

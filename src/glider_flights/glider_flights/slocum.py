@@ -25,7 +25,9 @@ from glider_flights.folders import (
 )
 from glider_flights.netcdf import names_of
 from glider_flights.record import (
+    DIVE_DEPTH_M,
     NOT_KNOWN,
+    Cut,
     Fixes,
     Flight,
     Instruments,
@@ -35,11 +37,11 @@ from glider_flights.record import (
     Segment,
     angles_at_times,
     at_times,
+    cut,
     instruments,
     local_metres,
     usual,
 )
-from glider_flights.segments import DIVE_DEPTH_M, Cut, cut
 
 #: Kinds of files of the flight computer, fullest first: all that is measured, then what is sent.
 KINDS = (('.dbd', '.dcd'), ('.mbd', '.mcd'), ('.sbd', '.scd'))
