@@ -191,6 +191,8 @@ PAPER_KN = 1.0
 PAPER_POINTS = ((8.0, STABLE, 'o'), (10.0, CRITICAL, '^'), (12.0, LOST, 'X'))
 #: A speed and an angle that stand alone are drawn so far to either side (kn, deg).
 ALONE_KN, ALONE_DEG = 0.1, 5.0
+#: Between circles (kn): the first that gives two of them.
+_CIRCLES_KN = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 #: No less of the circle is in view (deg).
 LEAST_DEG = 60.0
 #: Points of an arc, and size of a panel (inch).
@@ -244,7 +246,7 @@ def draw_map(stability: StabilityMap, file: Path) -> None:
     figure.suptitle(
         f'{stability.title}\n'
         f'Each cell: a flight of {stability.vehicle}, at the tip of the arrow of its current:\n'
-        'its speed (kn), and its angle off the path, which points up'
+        'its speed, and its angle off the path, which points up'
     )
     figure.legend(
         handles=_legend(stability), loc='outside lower center', ncols=2 if columns > 1 else 1
@@ -298,6 +300,9 @@ def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray) -> None:
     last = min(max(first + LEAST_DEG, angle[-1]), first + 360.0)
     axis.set(thetamin=first, thetamax=last, rmin=0.0, rmax=rim)
     axis.grid(color='black', linewidth=0.4, alpha=0.4)
+    step = next((step for step in _CIRCLES_KN if rim >= 2.0 * step), rim)
+    axis.set_rticks(np.arange(step, rim, step))
+    axis.yaxis.set_major_formatter(' {x:g} kn')
 
 
 def _legend(stability: StabilityMap) -> list:
