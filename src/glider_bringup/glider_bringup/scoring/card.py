@@ -8,14 +8,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    ValidationError,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from glider_base.files import is_file, read_json
 from glider_base.settings import ConfigurationError
@@ -93,6 +86,99 @@ def write_score(folder: Path, card: dict) -> None:
     write_whole(folder / SCORE_FILE, json.dumps(card, indent=2, allow_nan=False) + '\n')
 
 
+#: A number of a scorecard that is not known is None; north and east; in three dimensions.
+_Figure = float | None
+_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+_Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
+_Count = Annotated[int, Field(ge=0)]
+
+
+class _Part(BaseModel):
+    """Part of a score file, which may hold anything."""
+
+    model_config = ConfigDict(strict=True)
+
+
+class _Figures(_Part):
+    """A part that holds figures only."""
+
+    model_config = ConfigDict(extra='allow')
+    __pydantic_extra__: dict[str, _Figure]
+
+
+def _part(names: str = '', **kinds: Any) -> Any:
+    """Kind of a part with at least figures of these names, and others, each with its kind."""
+    fields = {name: (_Figure, ...) for name in names.split()}
+    for name, kind in kinds.items():
+        fields[name] = kind if isinstance(kind, tuple) else (kind, ...)
+    return create_model('Part', __base__=_Part if kinds else _Figures, **fields)
+
+
+_Event = _part(t_s=float, message=str)
+_Fault = _part('t_s end_s', kind=str, message=str, when=str)
+#: What was taken out of the battery (Wh), and how long it lasts.
+_Energy = _part('wh wh_per_dive endurance_days range_km', by=_part('pump hotel masses calls'))
+_Arrival = _part(
+    't_s missed_m left_m eta_s overrun_s', arrived=bool, place_latlon_deg=_Pair | None
+)
+_Bottom = _part('t_s least_height_m', touched=bool)
+_Surfacing = _part(
+    t_s=float,
+    dive_t_s=float,
+    true_ned_m=_Pair,
+    believed_ned_m=_Pair,
+    covariance_m2=_Triple,
+    fix_ned_m=_Pair | None,
+    cross_track_m=float,
+    believed_cross_track_m=float,
+    error_m=float,
+    inside_95=bool | None,
+    dac_true_mps=_Pair | None,
+    dac_believed_mps=_Pair | None,
+)
+_Navigation = _part(
+    'ellipse_95_share',
+    method=str,
+    surfacings=int,
+    fixed=int,
+    error_m=_part('p50 p95 worst'),
+    dac_error_mps=_part('rms worst'),
+    believed_cross_track_m=_part('rms_steady max_steady'),
+    surfacing_cross_track_m=list[float],
+    reports=(list[_Surfacing], []),
+)
+_State = _part(position_ned_m=_Triple, attitude_rpy_rad=_Triple, velocity_mps=_Triple)
+#: A scorecard: what it has to have, and what is shown of it. Older runs lack what has a default.
+_Card = _part(
+    'sim_time_s wall_time_s real_time_factor distance_along_path_m',
+    scenario=str,
+    changed=(dict[str, str], {}),
+    vehicle=str,
+    controller=str,
+    guidance=str,
+    engine=str | None,
+    seed=_Count,
+    status=Literal[STATUSES],
+    reason=str,
+    ticks=_Count,
+    messages_recorded=_Count,
+    messages_lost=_Count,
+    dives=_Count,
+    cross_track_m=_part('rms_steady max_steady max_all'),
+    pitch_error_deg=_part('rms_steady max_steady'),
+    heading_fluctuation_deg=_part('rms_steady max_steady'),
+    depth_m=_part('max overshoot'),
+    actuator_travel=_part('buoyancy_engine_kg pitch_mass_m roll_mass_deg'),
+    final_state=_State | None,
+    guard=(_part(events=(list[_Event], [])), {}),
+    faults=(list[_Fault], []),
+    navigation=(_Navigation | None, None),
+    energy=(_Energy | None, None),
+    arrival=(_Arrival | None, None),
+    bottom=(_Bottom | None, None),
+)
+
+
 def read_score(run: Path) -> dict:
     """Contents of a run's score file; empty if it has none, but a bag."""
     path = run / SCORE_FILE
@@ -105,150 +191,10 @@ def read_score(run: Path) -> dict:
             )
         return {}
     card = read_json(path)
-    try:
-        _Card.model_validate(card)
+    try:  # only a run without a tick has no final state
+        is_card = _Card.model_validate(card).final_state or not card['ticks']
     except ValidationError:
-        raise ConfigurationError(f'{path}: not a scorecard of this program') from None
+        is_card = False
+    if not is_card:
+        raise ConfigurationError(f'{path}: not a scorecard of this program')
     return card
-
-
-#: A number of a scorecard that is not known is None; north and east; in three dimensions.
-_Figure = float | None
-_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
-_Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
-_Count = Annotated[int, Field(ge=0)]
-
-
-def _group(names: str) -> Any:
-    """Kind of a group of figures that has at least those of these names."""
-
-    def complete(told: dict) -> dict:
-        if not told.keys() >= set(names.split()):
-            raise ValueError(f'without one of {names}')
-        return told
-
-    return Annotated[dict[str, _Figure], AfterValidator(complete)]
-
-
-class _Checked(BaseModel):
-    """Part of a score file, which may hold anything; older runs lack what has a default."""
-
-    model_config = ConfigDict(strict=True)
-
-
-class _Event(_Checked):
-    t_s: float
-    message: str
-
-
-class _Guard(_Checked):
-    events: list[_Event] = []
-
-
-class _Fault(_Checked):
-    t_s: _Figure
-    end_s: _Figure
-    kind: str
-    message: str
-    when: str
-
-
-class _Energy(_Checked):
-    """What was taken out of the battery (Wh), and how long it lasts."""
-
-    wh: _Figure
-    wh_per_dive: _Figure
-    by: _group('pump hotel masses calls')
-    endurance_days: _Figure
-    range_km: _Figure
-
-
-class _Arrival(_Checked):
-    arrived: bool
-    t_s: _Figure
-    missed_m: _Figure
-    left_m: _Figure
-    eta_s: _Figure
-    overrun_s: _Figure
-    place_latlon_deg: _Pair | None
-
-
-class _Bottom(_Checked):
-    touched: bool
-    t_s: _Figure
-    least_height_m: _Figure
-
-
-class _Report(_Checked):
-    """One surfacing."""
-
-    t_s: float
-    dive_t_s: float
-    true_ned_m: _Pair
-    believed_ned_m: _Pair
-    covariance_m2: _Triple
-    fix_ned_m: _Pair | None
-    cross_track_m: float
-    believed_cross_track_m: float
-    error_m: float
-    inside_95: bool | None
-    dac_true_mps: _Pair | None
-    dac_believed_mps: _Pair | None
-
-
-class _Navigation(_Checked):
-    method: str
-    surfacings: int
-    fixed: int
-    error_m: _group('p50 p95 worst')
-    dac_error_mps: _group('rms worst')
-    believed_cross_track_m: _group('rms_steady max_steady')
-    surfacing_cross_track_m: list[float]
-    ellipse_95_share: _Figure
-    reports: list[_Report] = []
-
-
-class _State(_Checked):
-    position_ned_m: _Triple
-    attitude_rpy_rad: _Triple
-    velocity_mps: _Triple
-
-
-class _Card(_Checked):
-    """A scorecard: what it has to have, and what is shown of it."""
-
-    scenario: str
-    changed: dict[str, str] = {}
-    vehicle: str
-    controller: str
-    guidance: str
-    engine: str | None
-    seed: _Count
-    status: Literal[STATUSES]
-    reason: str
-    ticks: _Count
-    sim_time_s: _Figure
-    wall_time_s: _Figure
-    real_time_factor: _Figure
-    messages_recorded: _Count
-    messages_lost: _Count
-    dives: _Count
-    distance_along_path_m: _Figure
-    cross_track_m: _group('rms_steady max_steady max_all')
-    pitch_error_deg: _group('rms_steady max_steady')
-    heading_fluctuation_deg: _group('rms_steady max_steady')
-    depth_m: _group('max overshoot')
-    actuator_travel: _group('buoyancy_engine_kg pitch_mass_m roll_mass_deg')
-    final_state: _State | None
-    guard: _Guard = _Guard()
-    faults: list[_Fault] = []
-    navigation: _Navigation | None = None
-    energy: _Energy | None = None
-    arrival: _Arrival | None = None
-    bottom: _Bottom | None = None
-
-    @model_validator(mode='after')
-    def _flown_or_never_flown(self) -> '_Card':
-        if self.ticks and self.final_state is None:
-            raise ValueError('only a run without a tick has no final state')
-        return self
