@@ -7,6 +7,7 @@ Where the vehicle was and where it believed to be, its waypoints, and where it c
 
 import json
 from datetime import datetime, timedelta, timezone
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -15,6 +16,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_base.frames import OriginSettings, to_geodetic
+from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.web_page import FlownRun
 from glider_mission.disk import write_whole
 from glider_mission.goto_list import goto_list
@@ -50,6 +52,11 @@ class Chart(NamedTuple):
     route: list[tuple[float, float]]  #: waypoints: latitude, longitude (deg)
     lines: list[Line]
     surfacings: list[Point]
+
+    @property
+    def as_line(self) -> Line:
+        """The route as a line over the chart."""
+        return Line('route', self.route, [0.0] * len(self.route), [])
 
 
 def start_of(scenario: Scenario, start: str | None) -> float | None:
@@ -92,32 +99,23 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
 
     traces = flown.traces.thinned(MOST_POINTS)
     samples, lines = traces.samples, []
-    times = [when(t) for t in 2.0 * traces.spacing_s * np.arange(len(samples['track_north_m']))]
     for name, of in (('track', 'track'), ('believed track', 'believed')):
-        table = np.array(
-            [samples[f'{of}_north_m'], samples[f'{of}_east_m'], samples['track_depth_m']]
-        )
-        known = np.flatnonzero(np.isfinite(table).all(axis=0))
-        north, east, depth = table[:, known]
-        told = [times[at] for at in known] if began_s is not None else []
-        lines.append(Line(name, places(north, east), [round(float(d), 2) for d in depth], told))
-    reports = (flown.card.get('navigation') or {}).get('reports') or []
+        columns = samples[f'{of}_north_m'], samples[f'{of}_east_m'], samples['track_depth_m']
+        known = np.flatnonzero(np.isfinite(columns).all(axis=0))
+        north, east, depth = (column[known] for column in columns)
+        times = [when(2.0 * traces.spacing_s * at) for at in known] if began_s is not None else []
+        lines.append(Line(name, places(north, east), [round(float(d), 2) for d in depth], times))
     surfacings = [
         Point(
             f'surfacing {number}',
-            places(*([value] for value in report['true_ned_m'][:2]))[0],
+            to_geodetic(*map(float, report['true_ned_m'][:2]), origin),
             when(report['t_s']),
-            {
-                't_s': report['t_s'],
-                'error_m': report['error_m'],
-                'dac_believed_mps': report['dac_believed_mps'],
-            },
+            {name: report[name] for name in ('t_s', 'error_m', 'dac_believed_mps')},
         )
-        for number, report in enumerate(reports, 1)
+        for number, report in enumerate((reckoned(flown.card) or {}).get('reports', []), 1)
     ]
     waypoints = None if flown.is_rerouted else getattr(scenario.path, 'waypoints', None)
-    route = waypoints or flown.path_points()
-    norths, easts = np.array([point[:2] for point in route]).T
+    norths, easts = np.array([point[:2] for point in waypoints or flown.path_points()]).T
     return Chart(
         scenario.name, places(norths, easts), [line for line in lines if line.places], surfacings
     )
@@ -148,64 +146,56 @@ def geojson(chart: Chart) -> bytes:
 
 def kml(chart: Chart) -> bytes:
     """A document with a placemark for each line and surfacing."""
-    root = ElementTree.Element('kml', xmlns=KML)
-    document = _child(root, 'Document')
-    _child(document, 'name', chart.name)
 
-    def placemark(name: str, time: str, kind: str, places, depths_m) -> None:
-        mark = _child(document, 'Placemark')
-        _child(mark, 'name', name)
-        if time:
-            _child(_child(mark, 'TimeStamp'), 'when', time)
-        shape = _child(mark, kind)
-        _child(shape, 'altitudeMode', 'absolute' if any(depths_m) else 'clampToGround')
+    def placemark(name: str, time: str, kind: str, places, depths_m) -> ElementTree.Element:
         pairs = zip(places, depths_m, strict=True)
         told = (f'{place[1]:.7f},{place[0]:.7f},{-depth:.2f}' for place, depth in pairs)
-        _child(shape, 'coordinates', ' '.join(told))
+        mode = 'absolute' if any(depths_m) else 'clampToGround'
+        shape = _element(
+            kind, _element('altitudeMode', mode), _element('coordinates', ' '.join(told))
+        )
+        stamp = [_element('TimeStamp', _element('when', time))] if time else []
+        return _element('Placemark', _element('name', name), *stamp, shape)
 
-    if chart.route:
-        placemark('route', '', 'LineString', chart.route, [0.0] * len(chart.route))
-    for line in chart.lines:
+    marks = [
         placemark(line.name, '', 'LineString', line.places, line.depths_m)
-    for point in chart.surfacings:
-        placemark(point.name, point.time, 'Point', [point.place], [0.0])
-    return _text(root)
+        for line in [chart.as_line, *chart.lines]
+        if line.places
+    ]
+    marks += [
+        placemark(one.name, one.time, 'Point', [one.place], [0.0]) for one in chart.surfacings
+    ]
+    document = _element('Document', _element('name', chart.name), *marks)
+    return _text(_element('kml', document, xmlns=KML))
 
 
 def gpx(chart: Chart) -> bytes:
     """Surfacings as waypoints, the waypoints as a route, the tracks as tracks."""
-    root = ElementTree.Element('gpx', version='1.1', creator='glider stack', xmlns=GPX)
 
-    def at(parent, tag: str, place, time: str = '', name: str = '', depth: float | None = None):
-        point = _child(parent, tag)
-        point.set('lat', f'{place[0]:.7f}')
-        point.set('lon', f'{place[1]:.7f}')
+    def at(tag: str, place, time: str = '', name: str = '', depth: float | None = None):
         told = {'ele': '' if depth is None else f'{-depth:.2f}', 'time': time, 'name': name}
-        for key, text in told.items():
-            if text:
-                _child(point, key, text)
+        inside = [_element(key, text) for key, text in told.items() if text]
+        return _element(tag, *inside, lat=f'{place[0]:.7f}', lon=f'{place[1]:.7f}')
 
-    for one in chart.surfacings:
-        at(root, 'wpt', one.place, one.time, one.name)
+    inside = [at('wpt', one.place, one.time, one.name) for one in chart.surfacings]
     if chart.route:
-        route = _child(root, 'rte')
-        _child(route, 'name', chart.name)
-        for place in chart.route:
-            at(route, 'rtept', place)
+        route = (at('rtept', place) for place in chart.route)
+        inside.append(_element('rte', _element('name', chart.name), *route))
     for line in chart.lines:
-        track = _child(root, 'trk')
-        _child(track, 'name', line.name)
-        segment = _child(track, 'trkseg')
-        times = line.times or [''] * len(line.places)
-        for place, depth, time in zip(line.places, line.depths_m, times, strict=True):
-            at(segment, 'trkpt', place, time, depth=depth)
-    return _text(root)
+        rows = zip_longest(line.places, line.times, line.depths_m, fillvalue='')
+        points = (at('trkpt', place, time, depth=depth) for place, time, depth in rows)
+        inside.append(_element('trk', _element('name', line.name), _element('trkseg', *points)))
+    return _text(_element('gpx', *inside, version='1.1', creator='glider stack', xmlns=GPX))
 
 
-def _child(parent: ElementTree.Element, tag: str, text: str = '') -> ElementTree.Element:
-    child = ElementTree.SubElement(parent, tag)
-    child.text = text or None
-    return child
+def _element(tag: str, *inside: ElementTree.Element | str, **about: str) -> ElementTree.Element:
+    made = ElementTree.Element(tag, about)
+    for one in inside:
+        if isinstance(one, str):
+            made.text = one
+        else:
+            made.append(one)
+    return made
 
 
 def _text(root: ElementTree.Element) -> bytes:
