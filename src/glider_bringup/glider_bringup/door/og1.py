@@ -41,6 +41,7 @@ DIMENSION = 'N_MEASUREMENTS'
 _SECONDS = {'units': 'seconds since 1970-01-01T00:00:00Z', 'calendar': 'gregorian'}
 _NORTH = {'units': 'degrees_north', 'standard_name': 'latitude'}
 _EAST = {'units': 'degrees_east', 'standard_name': 'longitude'}
+_DOWN = {'units': 'm', 'positive': 'down', 'axis': 'Z'}
 _WAY = {'coordinates': 'TIME LATITUDE LONGITUDE DEPTH'}
 _CURRENT = 'depth-averaged current of the dive, as the vehicle believed it'
 
@@ -61,14 +62,7 @@ VARIABLES = {
     'TIME': _of('TIME', 'time of measurement', standard_name='time', axis='T', **_SECONDS),
     'LATITUDE': _of('LAT', 'latitude that the vehicle believed to be at', **_NORTH),
     'LONGITUDE': _of('LON', 'longitude that the vehicle believed to be at', **_EAST),
-    'DEPTH': _of(
-        'DEPTH',
-        'depth by the pressure sensor',
-        standard_name='depth',
-        units='m',
-        positive='down',
-        axis='Z',
-    ),
+    'DEPTH': _of('DEPTH', 'depth by the pressure sensor', standard_name='depth', **_DOWN),
     'TIME_GPS': _of('TIME', 'time of each GPS location', **_SECONDS),
     'LATITUDE_GPS': _of('LAT_GPS', 'latitude of each GPS location', **_NORTH),
     'LONGITUDE_GPS': _of('LON_GPS', 'longitude of each GPS location', **_EAST),
@@ -154,29 +148,18 @@ def flight_dataset(
     )
     vehicle = load_vehicle(scenario.vehicle)
     serial, day = f'simulated_{vehicle.name}', _compact(began_s)
-    about = {
-        'TRAJECTORY': (f'{serial}_{day}', {'cf_role': 'trajectory_id', 'long_name': 'trajectory'}),
-        'WMO_IDENTIFIER': ('0000000', {'long_name': 'wmo id'}),
-        'PLATFORM_MODEL': (vehicle.name, {'long_name': 'model of the glider'}),
-        'PLATFORM_SERIAL_NUMBER': (serial, {'long_name': 'glider serial number'}),
-        'DEPLOYMENT_TIME': (
-            began_s,
-            {'long_name': 'date of deployment', 'standard_name': 'time', **_SECONDS},
-        ),
-        'DEPLOYMENT_LATITUDE': (
-            values['LATITUDE'][0],
-            {'long_name': 'latitude of deployment', **_NORTH},
-        ),
-        'DEPLOYMENT_LONGITUDE': (
-            values['LONGITUDE'][0],
-            {'long_name': 'longitude of deployment', **_EAST},
-        ),
-        'MAGNETIC_VARIATION': (
-            0.0,
-            {'long_name': 'true less magnetic heading, + east', 'units': 'degree'},
-        ),
+    deployed = {
+        'TRAJECTORY': (f'{serial}_{day}', 'trajectory', {'cf_role': 'trajectory_id'}),
+        'WMO_IDENTIFIER': ('0000000', 'wmo id', {}),
+        'PLATFORM_MODEL': (vehicle.name, 'model of the glider', {}),
+        'PLATFORM_SERIAL_NUMBER': (serial, 'glider serial number', {}),
+        'DEPLOYMENT_TIME': (began_s, 'date of deployment', {'standard_name': 'time', **_SECONDS}),
+        'DEPLOYMENT_LATITUDE': (values['LATITUDE'][0], 'latitude of deployment', _NORTH),
+        'DEPLOYMENT_LONGITUDE': (values['LONGITUDE'][0], 'longitude of deployment', _EAST),
+        'MAGNETIC_VARIATION': (0.0, 'true less magnetic heading, + east', {'units': 'degree'}),
     }
-    dataset = dataset.assign({name: ((), *pair) for name, pair in about.items()})
+    for name, (value, text, more) in deployed.items():
+        dataset[name] = ((), value, {'long_name': text, **more})
     return dataset.assign_attrs(_about(dataset, scenario, card, serial, day))
 
 
@@ -192,8 +175,14 @@ def _measured(
         wire[:, 3:] = rows[:, COLUMNS['imu']][:, :4]
         attitude = poses_from_wire(wire)[:, 3:]
         depth = depth_at(rows[:, COLUMNS['pressure'].start])
-    latitude, longitude = _degrees(place[:, 0], place[:, 1], scenario)
-    fix = _fixes(time_s, rows, scenario, latitude, longitude, depth)
+    latitude, longitude = on_chart(place[:, 0], place[:, 1], scenario.origin.params())
+    longitude = (longitude + 180.0) % 360.0 - 180.0
+    fix, fixed = (latitude, longitude), (depth < FIX_DEPTH_M) & (time_s % FIX_EVERY_S == 0.0)
+    if 'fix' in scenario.topics:
+        status, *fixes = rows[:, COLUMNS['fix']].T[:3]
+        fix = np.where(time_s == 0.0, fix, fixes)  # it is known where it was put into the water
+        fixed = (time_s == 0.0) | (status >= 0.0)
+    fix = np.where(fixed, fix, np.nan)
     roll, pitch, heading = np.degrees(attitude).T
     stage = np.nan_to_num(rows[:, COLUMNS['stage']], nan=-1.0).astype(int)
     values = {
@@ -217,29 +206,6 @@ def _measured(
         if report['dac_believed_mps']:
             values['WCUR_Y'][dive], values['WCUR_X'][dive] = report['dac_believed_mps']
     return values
-
-
-def _degrees(north: np.ndarray, east: np.ndarray, scenario: Scenario) -> tuple[np.ndarray, ...]:
-    """Latitude and longitude (deg) of places north and east of the origin (m)."""
-    latitude, longitude = on_chart(north, east, scenario.origin.params())
-    return latitude, (longitude + 180.0) % 360.0 - 180.0
-
-
-def _fixes(
-    time_s: np.ndarray,
-    rows: np.ndarray,
-    scenario: Scenario,
-    latitude: np.ndarray,
-    longitude: np.ndarray,
-    depth: np.ndarray,
-) -> np.ndarray:
-    """Latitude and longitude (deg) of fixes, shape (2, n); NaN where there is none."""
-    if 'fix' in scenario.topics:
-        status, *fix = rows[:, COLUMNS['fix']].T[:3]
-        # It is known where the vehicle was put into the water.
-        return np.where(time_s == 0.0, (latitude, longitude), np.where(status >= 0.0, fix, np.nan))
-    told = (depth < FIX_DEPTH_M) & (time_s % FIX_EVERY_S == 0.0)
-    return np.where(told, (latitude, longitude), np.nan)
 
 
 def _compact(time_s: float) -> str:
