@@ -18,7 +18,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import pydantic
 
@@ -101,6 +101,22 @@ def classes(
         except (Exception, SystemExit) as error:  # it is not our code
             _tell(point, f'{type(error).__name__}: {error}'.partition('\n')[0])
     return found
+
+
+def choice(found: dict[str, ClassT], default: str, group: str) -> tuple:
+    """Field, as of `pydantic.create_model`, for the name of one of them."""
+    extra = {'others': others(group)}
+    field = pydantic.Field(default, description=listed(found), json_schema_extra=extra)
+    return Literal[tuple(found)], field
+
+
+def sections(found: dict[str, ClassT]) -> dict[str, tuple]:
+    """Fields for the settings of each that has some, by its name."""
+    return {
+        name: (one, pydantic.Field(one(), description=summary(one)))
+        for name, one in found.items()
+        if one.model_fields
+    }
 
 
 def offered(group: str) -> dict[str, EntryPoint]:

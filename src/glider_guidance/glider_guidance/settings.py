@@ -36,25 +36,11 @@ OLD_NAMES = {'observer': 'los_current', 'paper': 'los_zhang2021'}
 _MethodChoice = pydantic.create_model(
     '_MethodChoice',
     __base__=Settings,
-    method=(
-        Literal[tuple(METHODS)],
-        Field(
-            'los_current',
-            description=plugins.listed(METHODS),
-            json_schema_extra={'others': plugins.others(plugins.GUIDANCE_METHODS)},
-        ),
-    ),
+    method=plugins.choice(METHODS, 'los_current', plugins.GUIDANCE_METHODS),
 )
-
 #: Gains of the methods that have some of their own, by the names of the methods.
 _MethodGains = pydantic.create_model(
-    '_MethodGains',
-    __base__=Settings,
-    **{
-        name: (settings, Field(settings(), description=plugins.summary(settings)))
-        for name, settings in METHODS.items()
-        if settings.model_fields
-    },
+    '_MethodGains', __base__=Settings, **plugins.sections(METHODS)
 )
 
 

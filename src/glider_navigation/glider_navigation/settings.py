@@ -28,19 +28,8 @@ METHODS = plugins.classes(plugins.NAVIGATION_METHODS, NavigationMethodSettings, 
 _MethodChoice = pydantic.create_model(
     '_MethodChoice',
     __base__=Settings,
-    method=(
-        Literal[tuple(METHODS)],
-        Field(
-            'known',
-            description=plugins.listed(METHODS),
-            json_schema_extra={'others': plugins.others(plugins.NAVIGATION_METHODS)},
-        ),
-    ),
-    **{
-        name: (settings, Field(settings(), description=plugins.summary(settings)))
-        for name, settings in METHODS.items()
-        if settings.model_fields
-    },
+    method=plugins.choice(METHODS, 'known', plugins.NAVIGATION_METHODS),
+    **plugins.sections(METHODS),
 )
 
 
