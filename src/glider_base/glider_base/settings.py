@@ -51,21 +51,11 @@ _UNITS = (
 
 
 def derived(params: type[ParamsT], settings: Settings, **computed: Any) -> ParamsT:
-    """Kernel parameters of settings.
+    """Kernel parameters of settings, of the type of a NamedTuple.
 
-    Parameters
-    ----------
-    params : type of NamedTuple
-        Its fields are those of the settings of the same name, or of that name and a unit; numbers
-        in degrees become radians.
-    settings : Settings
-    computed
-        The fields that are not, by name.
-
-    Raises
-    ------
-    TypeError
-        If a field is missing, or there is none of a name that is given.
+    Each of its fields is that of the settings of the same name, or of that name and a unit;
+    numbers in degrees become radians. What is computed is given by name. A TypeError if a
+    field is missing, or there is none of a name that is given.
     """
     fields = type(settings).model_fields
     for name in params._fields:

@@ -50,17 +50,17 @@ class Ascent(NamedTuple):
 
 
 class Rise(NamedTuple):
-    """What a tick shows of it."""
+    """What a tick shows of it; by default nothing is seen."""
 
-    rate: float  #: measured vertical rate (m/s, + down)
-    sees: bool  #: whether that is to be believed
-    moves: bool  #: whether it is shown at all: what is not believed tells of a stall still
-    under: bool  #: under water
-    theta: float  #: pitch (rad)
-    is_new: bool  #: whether that is measured anew
     m_b: float  #: where the pump is (kg)
     x_p: float  #: where the mass is (m)
-    is_there: bool  #: where it was sent, or it goes no farther
+    rate: float = 0.0  #: measured vertical rate (m/s, + down)
+    sees: bool = False  #: whether that is to be believed
+    moves: bool = False  #: whether it is shown at all: what is not believed tells of a stall still
+    under: bool = True  #: under water
+    theta: float = 0.0  #: pitch (rad)
+    is_new: bool = False  #: whether that is measured anew
+    is_there: bool = False  #: where it was sent, or it goes no farther
 
 
 INITIAL_ASCENT = Ascent(0.0, 0.0, False, 0.0, 0.0)

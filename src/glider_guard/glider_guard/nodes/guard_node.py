@@ -56,17 +56,7 @@ class GuardNode(BlockNode):
     def _come_up(self, cycles: int = 1) -> Joints:
         """Command of a cycle, or of some at once, in which nothing is seen."""
         joints = self.state.taken.joints
-        unseen = Rise(
-            rate=0.0,
-            sees=False,
-            moves=False,
-            under=True,
-            theta=0.0,
-            is_new=False,
-            m_b=joints.m_b,
-            x_p=joints.x_p,
-            is_there=False,
-        )
+        unseen = Rise(joints.m_b, joints.x_p)
         for _ in range(cycles):
             self.ascent, command = come_up(self.ascent, unseen, self.params.ascent, TICK_S)
         return command

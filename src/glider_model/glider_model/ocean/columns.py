@@ -21,12 +21,8 @@ def read_columns(
 ) -> list[tuple[int, dict[str, float]]]:
     """Rows of a CSV file with a header: line of the file, and numbers by column.
 
-    There may be the columns that are known, and must be those that are needed.
-
-    Raises
-    ------
-    ValueError
-        Naming the file, and the column and row (line of the file) at fault.
+    There may be the columns that are known, and must be those that are needed. A ValueError
+    names the file, and the column and row (line of the file) at fault.
     """
     source = f'file {path}'
     try:
@@ -67,23 +63,11 @@ def read_columns(
 def check_rows(
     rows: list[list[float]], names, source: str, columns: tuple[str, ...], alike: bool = False
 ) -> None:
-    """Refuse rows that cannot be interpolated.
+    """Refuse rows that cannot be interpolated; ``names`` are their numbers.
 
-    Parameters
-    ----------
-    rows : list of list of float
-        Of numbers by the columns, of which the first is the depth (m) and the last may be missing.
-    names : sequence of int
-        Numbers of the rows.
-    source : str
-    columns : tuple of str
-    alike : bool
-        The last one is missing in all rows or in none.
-
-    Raises
-    ------
-    ValueError
-        Naming the source, the row and the column at fault.
+    They are of numbers by the columns, of which the first is the depth (m) and the last may be
+    missing; in all rows or in none, if they are ``alike``. A ValueError names the source, the
+    row and the column at fault.
     """
     if not rows:
         raise ValueError(f'{source}: no rows (allowed: at least 1)')

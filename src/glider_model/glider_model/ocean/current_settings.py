@@ -45,10 +45,7 @@ def check_speed(speed_mps: float, where: str) -> None:
 def check_profile(rows: list[list[float]], names, source: str) -> None:
     """Refuse a profile that cannot be interpolated; ``names`` are the numbers of its rows.
 
-    Raises
-    ------
-    ValueError
-        Naming the source, the row and the column at fault.
+    A ValueError names the source, the row and the column at fault.
     """
     names = list(names)
     check_rows(rows, names, source, _COLUMNS)
@@ -59,10 +56,7 @@ def check_profile(rows: list[list[float]], names, source: str) -> None:
 def read_profile(path: Path) -> list[list[float]]:
     """Read and check a current profile.
 
-    Raises
-    ------
-    ValueError
-        Naming the file, and the column and row (line of the file) at fault.
+    A ValueError names the file, and the column and row (line of the file) at fault.
     """
     found = read_columns(path, _COLUMNS, _COLUMNS[:3])
     rows = [list(row.values()) for _, row in found]
@@ -400,17 +394,9 @@ class SumOfCurrents(_Flow):
         return super().resolved(course_rad).model_copy(update=changed)
 
     def params(self, seed: int = 0) -> CurrentParams:
-        """Arrays that `current_step` reads.
+        """Arrays that `current_step` reads; ``seed`` is that of the random components.
 
-        Parameters
-        ----------
-        seed : int, optional
-            Seed of the random components.
-
-        Raises
-        ------
-        ValueError
-            If an angle is still relative to the path.
+        A ValueError if an angle is still relative to the path.
         """
         packed = [_Packed(current.CONSTANT, self._north_east())] if self._has_flow() else []
         packed += [component._pack() for component in self.components]

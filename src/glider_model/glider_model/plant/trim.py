@@ -65,13 +65,9 @@ def solve_trim(
 ) -> Trim:
     """Solve M nu' = 0 for a steady rotation about the vertical.
 
-    Give either the pitch (the pitch-mass position is solved for) or the pitch-mass position from
-    neutral (the pitch is solved for).
-
-    Raises
-    ------
-    ConfigurationError
-        If both or neither are given, or an input is outside the actuator's range.
+    Give either the pitch (the pitch-mass position is solved for) or the pitch-mass position
+    from neutral (the pitch is solved for). A ConfigurationError if both or neither are given,
+    or an input is outside the actuator's range.
     """
     if (pitch_deg is None) == (pitch_mass_m is None):
         raise ConfigurationError('give either pitch_deg or pitch_mass_m')

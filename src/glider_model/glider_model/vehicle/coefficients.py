@@ -73,10 +73,7 @@ SETS = {'merckelbach': MerckelbachSettings, 'eriksen': EriksenSettings}
 def with_coefficients(values):
     """Fields of a hydrodynamics section, with those that follow from a set of another's.
 
-    Raises
-    ------
-    ValueError
-        If there are two sets, or a coefficient beside the set that it follows from.
+    A ValueError if there are two sets, or a coefficient beside the set that it follows from.
     """
     given = [name for name in SETS if isinstance(values, dict) and values.get(name) is not None]
     if not given:

@@ -405,24 +405,12 @@ def _parts(name: str) -> tuple[str, dict[str, Any]]:
 
 
 def vehicle_path(name: str) -> Path:
-    """File of a vehicle given by name, or by path.
-
-    Raises
-    ------
-    ConfigurationError
-        If there is neither a vehicle of that name nor such a file.
-    """
+    """File of a vehicle given by name, or by path; a ConfigurationError if there is none."""
     return find_file('vehicle', _parts(name)[0], VEHICLE_FOLDER)
 
 
 def vehicle_file(name: str) -> bytes:
-    """Content of a file that loads to a vehicle: its own or, if fields are changed, a new one.
-
-    Raises
-    ------
-    ConfigurationError
-        If there is no such vehicle.
-    """
+    """Content of a file that loads to a vehicle: its own or, if fields are changed, a new one."""
     path, (_, changes) = vehicle_path(name), _parts(name)
     if not changes:
         return read_bytes(path)
@@ -432,10 +420,7 @@ def vehicle_file(name: str) -> bytes:
 def load_vehicle(name: str) -> Vehicle:
     """Load and validate a vehicle by name or path.
 
-    Raises
-    ------
-    ConfigurationError
-        Naming file, field, value and allowed range.
+    A ConfigurationError names file, field, value and allowed range.
     """
     path = vehicle_path(name)
     status = path.stat()

@@ -54,10 +54,7 @@ class PerturbSettings(_Factors):
 def perturbed(vehicle: VehicleParams, settings: PerturbSettings) -> VehicleParams:
     """Vehicle that differs from ``vehicle`` as the settings say.
 
-    Raises
-    ------
-    ConfigurationError
-        If its mass matrix is not positive definite.
+    A ConfigurationError if its mass matrix is not positive definite.
     """
     scaled = {name: getattr(vehicle, name) * getattr(settings, name) for name in _SCALED}
     # at rest the first moment of the whole vehicle points down: tan(roll) = s_y / s_z

@@ -166,17 +166,9 @@ def coriolis(u, v, w, p, q, r, inertia, vehicle):
 def mass_matrix(x_p: float, mu: float, vehicle) -> np.ndarray:
     """M = M_RB + M_A, float64[6, 6], for positions of the pitch (m) and roll mass (rad)."""
     s_x, s_y, s_z, i_xx, i_yy, i_zz, i_xy, i_xz, i_yz = rigid_body(x_p, mu, vehicle)
-    m = vehicle.m
-    matrix = np.diag(
-        [
-            m + vehicle.a_11,
-            m + vehicle.a_22,
-            m + vehicle.a_33,
-            i_xx + vehicle.a_44,
-            i_yy + vehicle.a_55,
-            i_zz + vehicle.a_66,
-        ]
-    )
+    m, v = vehicle.m, vehicle
+    added = [v.a_11, v.a_22, v.a_33, v.a_44, v.a_55, v.a_66]
+    matrix = np.diag(np.add([m, m, m, i_xx, i_yy, i_zz], added))
     coupling = np.array(
         [
             [0.0, s_z, -s_y],

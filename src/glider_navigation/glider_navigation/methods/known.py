@@ -10,21 +10,12 @@ the samples; see `glider_navigation.attitude`.
 
 from typing import ClassVar, NamedTuple
 
-from glider_base.frames import (
-    odometry_to_wire,
-    quaternion_from_euler,
-)
+from glider_base.frames import odometry_to_wire, quaternion_from_euler
 from glider_base.kernel import kernel, replace
 from glider_base.signals import TICK_S, Imu, Vector
 from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
 from glider_navigation.attitude import AttitudeState, attitude_step, initial_attitude
-from glider_navigation.method import (
-    NONE,
-    Believed,
-    NavigationMethodSettings,
-    Start,
-    method_step,
-)
+from glider_navigation.method import NONE, Believed, NavigationMethodSettings, Start, method_step
 from glider_navigation.phase import KNOWN
 
 
@@ -57,6 +48,10 @@ class KnownState(NamedTuple):
     attitude: AttitudeState
 
 
+_STILL = Vector(0.0, 0.0)
+_BELIEVED = Believed(13 * (0.0,), NONE, _STILL, NONE, _STILL, NONE, KNOWN)
+
+
 @method_step.body(KnownParams)
 @kernel
 def known_step(state, heard, params, dt):
@@ -72,13 +67,4 @@ def known_step(state, heard, params, dt):
         odom = odometry_to_wire(
             replace(x, q_w=q[0], q_x=q[1], q_y=q[2], q_z=q[3], p=now.p, q=now.q, r=now.r)
         )
-    nothing = Vector(0.0, 0.0)
-    return KnownState(attitude), Believed(
-        odom=odom,
-        place=NONE,
-        current=nothing,
-        current_covariance=NONE,
-        surface=nothing,
-        surface_covariance=NONE,
-        phase=KNOWN,
-    )
+    return KnownState(attitude), replace(_BELIEVED, odom=odom)
