@@ -53,16 +53,10 @@ def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdic
         for name in block.inputs:
             behind = int(np.searchsorted(series[name].stamps_ns, stamps_ns[start], 'right'))
             choices[name] = _places(behind - 1, last and last[name])
-        options = _options(choices)
         check.follow_orders(start)
         end = min([start + 1024, len(stamps_ns), *(cut for cut in cuts if cut > start)])
-        for begin in options:
-            rows = _consecutive(check, start, end, begin)
-            good = _identical(check, start, rows, outputs)
-            if good:
-                break
-        else:
-            _keep_difference(check, start, options, outputs)
+        rows, good = _closest(check, start, end, _options(choices), outputs)
+        if not good:
             break
         start += good
         last = {name: int(index[good - 1]) for name, index in rows.items()}
@@ -111,39 +105,34 @@ def _consecutive(check: Check, start: int, end: int, begin: dict[str, int]):
     return {name: index[:count] for name, index in rows.items()}
 
 
-def _identical(check: Check, start: int, rows, outputs) -> int:
-    """Steps from ``start`` on that are identical; the block is left after the last of them."""
-    count = min(len(index) for index in rows.values())
-    if not count:
-        return 0
-    before = check.block.state
-    computed = check.run(start, start + count, rows)
-    wrong = [np.flatnonzero(check.differs(outputs[n], start, computed[n])) for n in outputs]
-    good = min((int(steps[0]) for steps in wrong if len(steps)), default=count)
+def _closest(check: Check, start: int, end: int, options, outputs):
+    """Compare by that of the options for the inputs of a step that gives most of its outputs.
+
+    Returns the messages of the inputs, and how many steps from ``start`` on are identical. The
+    block is left after them; if there are none, what differs is kept.
+    """
+    before, least = check.block.state, np.inf
+    rows, computed, good, count = {}, {}, 0, 0
+    for begin in options:
+        tried = _consecutive(check, start, end, begin)
+        if not (steps := min(map(len, tried.values()))):
+            continue
+        check.block.state = before
+        found = check.run(start, start + steps, tried)
+        wrong = np.array([check.differs(outputs[name], start, found[name]) for name in outputs])
+        if np.sum(wrong[:, 0]) < least:
+            least, rows, computed, count = np.sum(wrong[:, 0]), tried, found, steps
+            good = int(np.argmax(np.append(np.any(wrong, axis=0), True)))
+        if good:
+            break
+    if not rows:
+        wanted = f'{" and ".join(check.block.inputs)} of this step'
+        check.add_whole(check.stamps_ns[start], next(iter(outputs)), wanted)
+        return rows, 0
+    steps = max(1, good)
     if good < count:
         check.block.state = before
-        if good:
-            check.run(start, start + good, {name: index[:good] for name, index in rows.items()})
+        check.run(start, start + steps, {name: index[:steps] for name, index in rows.items()})
     for name, track in outputs.items():
-        check.compare(name, track, start, computed[name][:good])
-    return good
-
-
-def _keep_difference(check: Check, step: int, options, outputs) -> None:
-    """Put on record that no choice of inputs gives the outputs of a step, by the closest one."""
-    before, tried = check.block.state, []
-    for begin in options:
-        rows = _consecutive(check, step, step + 1, begin)
-        if min(len(index) for index in rows.values()):
-            check.block.state = before
-            computed = check.run(step, step + 1, rows)
-            wrong = sum(int(check.differs(outputs[n], step, computed[n])[0]) for n in outputs)
-            tried.append((wrong, len(tried), computed))
-    if tried:
-        _, _, computed = min(tried)
-        for name, track in outputs.items():
-            check.compare(name, track, step, computed[name])
-        return
-    topic = next(iter(outputs))
-    wanted = f'{" and ".join(check.block.inputs)} of this step'
-    check.add_whole(check.stamps_ns[step], topic, wanted)
+        check.compare(name, track, start, computed[name][:steps])
+    return rows, good
