@@ -118,8 +118,6 @@ class RecordedLog:
         self._unusable: dict[tuple[str, int], str] = {}
         self._lacks = ''
         self._log = np.full((2 * BLOCK_TICKS, ROW), np.nan)
-        #: Which of `SCORED` a tick has, bit by bit.
-        self._has = np.zeros(2 * BLOCK_TICKS, np.int64)
         self._start, self._over = 0, False
 
     def blocks(self) -> Iterator[np.ndarray]:
@@ -174,8 +172,6 @@ class RecordedLog:
                     usable[row] = False
                 now = usable & (ticks < len(self._log))
                 self._log[ticks[now], COLUMNS[name]] = values[now]
-                if name in SCORED:
-                    self._has[ticks[now]] |= 1 << SCORED.index(name)
                 if len(rest := np.flatnonzero(usable & ~now)):
                     later[name] = Decoded(stamps_ns[rest], values[rest], own[rest], {})
             found = later
@@ -184,8 +180,8 @@ class RecordedLog:
 
     def _shift(self) -> np.ndarray:
         """The first block up to a tick that lacks something; then the second takes its place."""
-        whole = sum(1 << SCORED.index(name) for name in self._needed)
-        missing = np.flatnonzero(self._has[:BLOCK_TICKS] != whole)
+        numbers = self._log[:BLOCK_TICKS, [COLUMNS[name].start for name in self._needed]]
+        missing = np.flatnonzero(np.any(np.isnan(numbers), axis=1))
         rows = int(missing[0]) if len(missing) else BLOCK_TICKS
         block = self._log[:rows].copy()
         block[:, [COLUMNS['infeasible'], COLUMNS['saturation'], COLUMNS['guard']]] = 0.0
@@ -194,16 +190,14 @@ class RecordedLog:
         if len(missing):
             self._over, self._lacks = True, self._what_lacks(rows)
         self._log[:BLOCK_TICKS], self._log[BLOCK_TICKS:] = self._log[BLOCK_TICKS:], np.nan
-        self._has[:BLOCK_TICKS], self._has[BLOCK_TICKS:] = self._has[BLOCK_TICKS:], 0
         self._start += BLOCK_TICKS
         self.ticks += rows
         return block
 
     def _what_lacks(self, row: int) -> str:
         """Why a tick is not whole, in words."""
-        tick = self._start + row
-        has = self._has[row]
-        names = [name for name in self._needed if not has >> SCORED.index(name) & 1]
+        tick, has = self._start + row, ~np.isnan(self._log[row])
+        names = [name for name in self._needed if not has[COLUMNS[name].start]]
         why = self._unusable.get((names[0], tick), 'not recorded')
         return f'tick {tick:,} (t = {tick * TICK_NS / 1e9:.1f} s) lacks {names[0]}: {why}'
 
@@ -227,9 +221,8 @@ class RecordedLog:
         which is not a loss: a node that ended within a tick may have let the others begin the
         next one.
         """
-        counts = self.recorded()
-        expected = max(counts.values()) - (0 if complete else 2)
-        return sum(max(0, expected - count) for count in counts.values())
+        unsure = 0 if complete else 2
+        return sum(max(0, less - unsure) for less in self.lacking().values())
 
     def lacking(self) -> dict[str, int]:
         """Messages that per-tick topics have less than the one that has most, by topic."""
