@@ -5,7 +5,8 @@
 import json
 import math
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -493,11 +494,9 @@ def make_scenario(
     scenario = validate(_kind(values), values, str(path), path.parent, line_of, changed)
     scenario = _find_vehicle(scenario, path.parent, in_vehicle, f'{path}{changed}')
     if not recorded:
-        try:
+        with told_of(f'{path}{changed}: '):
             _check_glide(scenario)
             return _with_known_fields(scenario)
-        except ConfigurationError as error:
-            raise ConfigurationError(f'{path}{changed}: {error}') from None
     return scenario
 
 
@@ -529,19 +528,15 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
     for name, current in told.items():
         if current.field is None:
             continue
-        try:
+        with told_of(f'{name}.field.', ValueError):
             field = current.field.known()
             scenario.resolved_current(current).field.params()
-        except ValueError as error:
-            raise ConfigurationError(f'{name}.field.{error}') from None
         told[name] = current.model_copy(update={'field': field})
     bathymetry = scenario.bathymetry
     if bathymetry.file:
-        try:
+        with told_of('bathymetry.', ValueError):
             bathymetry = bathymetry.known()
             scenario.bottom()
-        except ValueError as error:
-            raise ConfigurationError(f'bathymetry.{error}') from None
     forecast = {'forecast': told['navigation.forecast']}
     navigation = scenario.navigation.model_copy(update=forecast)
     changed = {'current': told['current'], 'navigation': navigation, 'bathymetry': bathymetry}
@@ -555,6 +550,15 @@ def load_scenario(
     return make_scenario(read_scenario(name), changes, recorded)
 
 
+@contextmanager
+def told_of(what: str, kind: type[ValueError] = ConfigurationError) -> Iterator[None]:
+    """Begin the errors of a kind that the block raises with what they are of."""
+    try:
+        yield
+    except kind as error:
+        raise ConfigurationError(f'{what}{error}') from None
+
+
 def _find_vehicle(
     scenario: Scenario, folder: Path, changes: dict[str, Any], source: str
 ) -> Scenario:
@@ -563,18 +567,14 @@ def _find_vehicle(
     name = scenario.vehicle
     if name not in vehicle_names() and beside.suffix and is_file(beside):
         name = str(beside.resolve())
-    try:
+    with told_of(f'{source}: '):
         path = vehicle_path(name)
-    except ConfigurationError as error:
-        raise ConfigurationError(f'{source}: {error}') from None
     name = changed_vehicle(name if name in vehicle_names() else str(path.resolve()), changes)
     vehicle = load_vehicle(name)
-    try:
+    with told_of(f'{source}: '):
         perturbed(vehicle.params(), scenario.perturb)
         scenario.control.steering(vehicle.steers_by)
         check_actuators(scenario.faults, vehicle.steers_by)
-    except ConfigurationError as error:
-        raise ConfigurationError(f'{source}: {error}') from None
     return scenario.model_copy(update={'vehicle': name})
 
 

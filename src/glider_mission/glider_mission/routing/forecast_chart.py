@@ -9,10 +9,9 @@ import numpy as np
 from glider_base.frames import from_geodetic
 from glider_base.kernel import kernel
 from glider_base.noise import random_stream
-from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_mission.routing.fronts import Chart, current_on
-from glider_mission.scenario import Scenario
+from glider_mission.scenario import Scenario, told_of
 from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
 from glider_model.ocean.current_settings import CurrentSettings
 from glider_model.ocean.fields.grid import GridSettings
@@ -71,10 +70,8 @@ def forecast_of(scenario: Scenario) -> tuple[Chart, np.ndarray]:
         current = CurrentSettings(field=GridSettings(file=told.file))
     steady = [one for one in current.components if one.kind != 'gauss_markov']
     settings = scenario.resolved_current(current.model_copy(update={'components': steady}))
-    try:
+    with told_of('forecast: ', ValueError):
         params = settings.params(0)
-    except ValueError as error:
-        raise ConfigurationError(f'forecast: {error}') from None
     norths, easts = _lattice(scenario, params)
     times = np.arange(0.0, scenario.duration_s + STEP_S, STEP_S)
     depths = (np.arange(_LEVELS) + 0.5) * scenario.profile.depth_m / _LEVELS
