@@ -22,24 +22,15 @@ GID = 'publisher_gid'
 _GID_BYTES, _PARTICIPANT_BYTES = 16, 12
 #: Nothing is there to be taken (RCL_RET_SUBSCRIPTION_TAKE_FAILED).
 _NOTHING = 401
-_FIRST_BYTES = 4096
-
-
-class _Gid(ctypes.Structure):
-    """The struct rmw_gid_t of C."""
-
-    _fields_ = [('implementation', c_char_p), ('data', c_uint8 * _GID_BYTES)]
 
 
 class _Info(ctypes.Structure):
-    """The struct rmw_message_info_t of C."""
+    """The struct rmw_message_info_t of C, with the rmw_gid_t in it."""
 
     _fields_ = [
-        ('source_timestamp', c_int64),
-        ('received_timestamp', c_int64),
-        ('publication_sequence_number', ctypes.c_uint64),
-        ('reception_sequence_number', ctypes.c_uint64),
-        ('publisher_gid', _Gid),
+        ('times_and_numbers', c_int64 * 4),
+        ('implementation', c_char_p),
+        ('gid', c_uint8 * _GID_BYTES),
         ('from_intra_process', c_bool),
     ]
 
@@ -67,15 +58,8 @@ class _Taker:
     def __init__(self) -> None:
         rcl, rcutils = ctypes.CDLL('librcl.so'), ctypes.CDLL('librcutils.so')
         rcutils.rcutils_get_default_allocator.restype = _Allocator
-        rcutils.rcutils_uint8_array_init.argtypes = [
-            POINTER(_Bytes),
-            c_size_t,
-            POINTER(_Allocator),
-        ]
-        allocator = rcutils.rcutils_get_default_allocator()
-        self._bytes, self._info = _Bytes(), _Info()
-        if rcutils.rcutils_uint8_array_init(byref(self._bytes), _FIRST_BYTES, byref(allocator)):
-            raise MemoryError
+        self._bytes = _Bytes(allocator=rcutils.rcutils_get_default_allocator())
+        self._info = _Info()
         self._take = rcl.rcl_take_serialized_message
         self._take.argtypes = [c_void_p, POINTER(_Bytes), POINTER(_Info), c_void_p]
         self._take.restype = c_int
@@ -91,7 +75,7 @@ class _Taker:
                 raise RuntimeError(f'rcl_take_serialized_message: error {code}')
             return None
         raw = ctypes.string_at(self._bytes.buffer, self._bytes.length)
-        return raw, {GID: bytes(self._info.publisher_gid.data)}
+        return raw, {GID: bytes(self._info.gid)}
 
 
 @cache

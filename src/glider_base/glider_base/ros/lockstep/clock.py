@@ -46,18 +46,6 @@ class ClockSettings(TickSettings):
     )
 
 
-class _Lead:
-    """How far the plant is ahead of what the recorder says on a topic."""
-
-    def __init__(self, name: str) -> None:
-        self.name, self.said_ns = name, -TICK_NS
-        self.subscription: Subscription | None = None
-
-    def is_too_long(self, tick: int) -> bool:
-        """Whether a tick has to wait for the recorder."""
-        return self.said_ns < (tick - MAX_TICKS_AHEAD[self.name]) * TICK_NS
-
-
 class ClockNode(TickNode):
     """Starts, paces and ends the run.
 
@@ -77,13 +65,13 @@ class ClockNode(TickNode):
         self._pace_timer = self.wall_timer(1.0, self._on_pace)
         self._pace_timer.cancel()
         self._clock_started_s = self._flies_since_s = time.monotonic()
-        self._leads: list[_Lead] = []
-        self._held_by: _Lead | None = None
+        #: what the recorder says on each topic, and up to when it has (ns)
+        self._leads: dict[str, Subscription] = {}
+        self._said_ns = dict.fromkeys(MAX_TICKS_AHEAD, -TICK_NS)
+        self._held_by = ''  #: topic on which it has not said enough for the tick that is due
         for name in MAX_TICKS_AHEAD if self.ticks.record else ():
-            lead = _Lead(name)
-            hear = partial(self._on_recorder, lead)
-            lead.subscription = self._subscription(TOPICS[name], hear, raw=False)
-            self._leads.append(lead)
+            hear = partial(self._on_recorder, name)
+            self._leads[name] = self._subscription(TOPICS[name], hear, raw=False)
         self.create_service(SetBool, 'pause', self._on_pause)
 
     # ------------------------------------------------------------------ for subclasses
@@ -182,9 +170,9 @@ class ClockNode(TickNode):
         if self._paused or self._published == self.tick:
             return
         if self.ticks.lockstep:
-            self._held_by = next((lead for lead in self._leads if self._is_ahead(lead)), None)
-            if self._held_by is not None:
-                self.gate.awaited.add(self._held_by.subscription)
+            self._held_by = next(filter(self._is_ahead, self._leads), '')
+            if self._held_by:
+                self.gate.awaited.add(self._leads[self._held_by])
                 return
             wait_s = self._start_s + self.tick * self._tick_s - time.monotonic()
             if self._tick_s and wait_s > 0.0:
@@ -210,20 +198,22 @@ class ClockNode(TickNode):
             f'{seconds(self._due_ns)} is due: it follows another plant, or is wrong; {peers.ALONE}'
         )
 
-    def _is_ahead(self, lead: _Lead) -> bool:
-        while lead.is_too_long(self.tick) and (message := take(lead.subscription)) is not None:
-            self._keep_said(lead, message)
-        return lead.is_too_long(self.tick)
+    def _is_ahead(self, name: str) -> bool:
+        """Whether a tick has to wait for what the recorder says on a topic."""
+        least_ns = (self.tick - MAX_TICKS_AHEAD[name]) * TICK_NS
+        while self._said_ns[name] < least_ns and (message := take(self._leads[name])) is not None:
+            self._keep_said(name, message)
+        return self._said_ns[name] < least_ns
 
-    def _keep_said(self, lead: _Lead, message: Header) -> None:
+    def _keep_said(self, name: str, message: Header) -> None:
         recorder = self.reports.get(topics.RECORDER)
         if recorder is not None and message.frame_id == recorder.process:  # no second glider's
-            lead.said_ns = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
+            self._said_ns[name] = message.stamp.sec * 1_000_000_000 + message.stamp.nanosec
 
-    def _on_recorder(self, lead: _Lead, message: Header) -> None:
-        self._keep_said(lead, message)
-        self.gate.awaited.discard(lead.subscription)
-        self._held_by = None
+    def _on_recorder(self, name: str, message: Header) -> None:
+        self._keep_said(name, message)
+        self.gate.awaited.discard(self._leads[name])
+        self._held_by = ''
         self._release()
 
     def _on_pause(self, request, response):
@@ -250,7 +240,7 @@ class ClockNode(TickNode):
 
     def watch_tick(self) -> None:
         """End the run, and name the culprit, if a tick takes too long."""
-        waits_for_time = self._published != self.tick and self._held_by is None
+        waits_for_time = self._published != self.tick and not self._held_by
         if self._paused or waits_for_time:
             self._seen_ns = None  # it counts from the next look on
         elif self.stuck_s() > self.ticks.tick_timeout_s:
@@ -258,11 +248,12 @@ class ClockNode(TickNode):
 
     def _blame(self) -> str:
         """Find the node at which the tick hangs, by following who waits for whom."""
-        if self._held_by is not None:
+        if self._held_by:
             what = {'recorded': 'has nothing on disk', 'heard': 'has not heard everything'}
             return (
-                f'{topics.RECORDER} {what[self._held_by.name]} after '
-                f'{seconds(self._held_by.said_ns)}; the run waits at {seconds(self._due_ns)}'
+                f'{topics.RECORDER} {what[self._held_by]} after '
+                f'{seconds(self._said_ns[self._held_by])}; the run waits at '
+                f'{seconds(self._due_ns)}'
             )
         missing = [item for item in self.inputs if not self._has(item)]
         if not missing:

@@ -112,15 +112,13 @@ def stamp_of(array: DiagnosticArray) -> int:
 
 def reports_in(array: DiagnosticArray) -> list[Report]:
     """Reports that a message carries."""
-    stamp_ns = stamp_of(array)
-    return [_report(status, stamp_ns) for status in array.status]
-
-
-def _report(status: DiagnosticStatus, stamp_ns: int) -> Report:
-    values = {pair.key: pair.value for pair in status.values}
-    phase, peer, topic = (values.get(key, '') for key in ('phase', 'peer', 'topic'))
-    said = (status.name, phase, status.message, stamp_ns, peer, topic, status.level)
-    return Report(*said, status.hardware_id)
+    stamp_ns, found = stamp_of(array), []
+    for status in array.status:
+        said = {pair.key: pair.value for pair in status.values}
+        phase, peer, topic = (said.get(key, '') for key in ('phase', 'peer', 'topic'))
+        about = (phase, status.message, stamp_ns, peer, topic, status.level)
+        found.append(Report(status.name, *about, status.hardware_id))
+    return found
 
 
 def end_of_run(array: DiagnosticArray) -> Report | None:

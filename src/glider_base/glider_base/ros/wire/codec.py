@@ -3,11 +3,11 @@
 """Messages as flat tuples of floats, without building message objects.
 
 A per-tick message differs from tick to tick in its stamp and in some numbers; everything else in
-its CDR bytes never changes. A `Codec` knows where those numbers lie in the bytes of a template.
-From then on encoding is writing numbers into a copy of
-the template, and decoding is reading them, once the rest has been compared with the template. A
-message that is laid out otherwise (another publisher, other frame names, joints in another order,
-covariances filled) is deserialized and its fields are read by name: slower, same numbers.
+its CDR bytes never changes. A `Codec` knows where those numbers lie. From then on encoding is
+packing them, with zeros between, over bytes that are zero where they lie; decoding is unpacking
+them, once the rest has been compared. A message that is laid out otherwise (another publisher,
+other frame names, joints in another order, covariances filled) is deserialized and its fields are
+read by name: slower, same numbers.
 """
 
 import math
@@ -201,10 +201,10 @@ class Codec:
         """
         if len(raw) != self.size or int.from_bytes(raw, 'little') & self._kept != self._constant:
             return self._decode_foreign(raw, check_frames)
-        sec, nanosec, *numbers = self._in_order(self._struct.unpack(raw))
-        values = tuple(map(float, numbers) if self._has_integers else numbers)
+        numbers = self._in_order(self._struct.unpack(raw))
+        values = tuple(map(float, numbers[2:])) if self._has_integers else numbers[2:]
         self._refuse_non_finite(values)
-        return sec * _SECOND_NS + nanosec, values + self._absent
+        return numbers[0] * _SECOND_NS + numbers[1], values + self._absent
 
     def decode_many(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Stamps and numbers of n serialized messages uint8[n, size] at once.
