@@ -24,8 +24,8 @@ from glider_flights.folders import (
     of_one_flight,
     read_each,
 )
+from glider_flights.navigation import DENSITY
 from glider_flights.netcdf import SUFFIXES, datasets, fixes_of, names_of, read, refuse_missing
-from glider_flights.reckoning import DENSITY
 from glider_flights.record import (
     Flight,
     LogFile,

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from glider_base.errors import ConfigurationError
 from glider_bringup.cli import app
-from glider_flights.comparison import navigate, summary
+from glider_flights.navigation import navigate, summary
 from glider_flights.reading import read_flight, read_whole
 from glider_flights.slocum import slocum_files
 

@@ -41,8 +41,8 @@ def navigate(
     The kernel of navigation_node makes of the recorded samples the depth-averaged current, the way
     through the water, and where it would surface next.
     """
-    from glider_flights.comparison import navigate as navigated
-    from glider_flights.comparison import summary
+    from glider_flights.navigation import navigate as navigated
+    from glider_flights.navigation import summary
     from glider_flights.reading import read_flight
 
     with counter('reading', None) as update:
