@@ -23,7 +23,10 @@ from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS, TICK_S
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.traces import load_traces
-from glider_bringup.showing.flown_run import draw, read_run, write_report
+from glider_bringup.showing.figure import draw_run
+from glider_bringup.showing.flown_run import read_run
+from glider_bringup.showing.report import report_page
+from glider_mission.disk import write_whole
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.recorded_run import Recording
 from glider_mission.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
@@ -118,7 +121,7 @@ def test_bit_in_a_chunk_is_told_with_time_and_ticks(run, share):
     for use in (
         score_again,
         read_run,
-        lambda run: draw(run, run / 'x.png'),
+        lambda run: draw_run(read_run(run), run / 'x.png'),
     ):
         with pytest.raises(ConfigurationError, match=words):
             use(run)
@@ -269,7 +272,7 @@ def test_score_file_that_is_damaged_is_named_or_can_be_shown(run):
     for _ in range(60):
         file.write_bytes(flip(data, draw.randrange(8 * len(data))))
         try:
-            write_report(read_run(run), run / 'report.html')
+            write_whole(run / 'report.html', report_page(read_run(run)))
         except ConfigurationError as error:
             assert str(error).startswith(str(run))
 

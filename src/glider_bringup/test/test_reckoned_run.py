@@ -14,10 +14,13 @@ import glider_bringup as glider
 from glider_bringup import cli, console
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.traces import load_traces
+from glider_bringup.showing.figure import draw_run
 from glider_bringup.showing.findings import navigation_notes, verdict
-from glider_bringup.showing.flown_run import draw, read_run, write_report
+from glider_bringup.showing.flown_run import read_run
+from glider_bringup.showing.report import report_page
 from glider_bringup.showing.scorecard import card_rows
 from glider_bringup.showing.words import small
+from glider_mission.disk import write_whole
 from glider_model.ocean.current_settings import KNOT_MPS
 
 RECKONED = {
@@ -217,11 +220,11 @@ def test_report_from_the_bag_is_that_of_the_flight(flown, tmp_path):
     folder = tmp_path / flown.folder.name
     shutil.copytree(flown.folder, folder)
     files = [tmp_path / name for name in ('kept.html', 'bag.html')]
-    write_report(read_run(folder), files[0])
+    write_whole(files[0], report_page(read_run(folder)))
     (folder / 'traces.npz').unlink()
-    write_report(read_run(folder), files[1])
+    write_whole(files[1], report_page(read_run(folder)))
     assert files[0].read_bytes() == files[1].read_bytes()
-    draw(folder, tmp_path / 'run.png')
+    draw_run(read_run(folder), tmp_path / 'run.png')
     assert (tmp_path / 'run.png').stat().st_size > 10_000
 
 

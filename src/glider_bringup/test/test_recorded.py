@@ -18,7 +18,8 @@ from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import make_scorer, scores_of
-from glider_bringup.showing.flown_run import draw, read_run
+from glider_bringup.showing.figure import draw_run
+from glider_bringup.showing.flown_run import read_run
 from glider_mission.recording.ros.rosbag2 import BagWriter
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
@@ -92,7 +93,7 @@ def test_launched_run_has_parameters_and_no_score_file(run, tmp_path):
 
 
 def test_drawn_from_the_bag_alone(bag_only):
-    draw(bag_only, bag_only / 'run.png')
+    draw_run(read_run(bag_only), bag_only / 'run.png')
     assert (bag_only / 'run.png').read_bytes().startswith(b'\x89PNG')
 
 

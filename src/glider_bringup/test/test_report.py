@@ -27,9 +27,11 @@ from glider_bringup.scoring.one_hertz import Rows
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import make_tracer
 from glider_bringup.showing.findings import LOST_M, findings, lost_since_s, verdict
-from glider_bringup.showing.flown_run import keep_traces, read_run, write_report
+from glider_bringup.showing.flown_run import keep_traces, read_run
+from glider_bringup.showing.report import report_page
 from glider_bringup.showing.words import span
 from glider_mission.blocks import COLUMNS
+from glider_mission.disk import write_whole
 from glider_mission.rules import Rules
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario, scenario_names
@@ -94,7 +96,7 @@ def fly(tmp_path, change=None, stop=False, name='flight', of='current_8deg', **f
 
 def report_of(folder):
     file = folder / 'report.html'
-    write_report(read_run(folder), file)
+    write_whole(file, report_page(read_run(folder)))
     return read_page(file)
 
 

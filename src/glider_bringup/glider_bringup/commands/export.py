@@ -9,6 +9,7 @@ import typer
 
 from glider_base.errors import ConfigurationError
 from glider_bringup.console import Json, Run, beside, counter, messages, print_written
+from glider_mission.disk import write_whole
 
 app = typer.Typer()
 #: Kinds of files, and how they end.
@@ -68,11 +69,12 @@ def export(
 
         write_goto_list(read_run(run, traced=False), file)
     elif to in ('geojson', 'kml', 'gpx'):
-        from glider_bringup.door.tracks import write_chart
+        from glider_bringup.door.tracks import CHARTS, chart_of, start_of
         from glider_bringup.showing.flown_run import read_run
 
         with counter('reading', None) as update:
-            write_chart(to, read_run(run, update), start, file)
+            flown = read_run(run, update)
+        write_whole(file, CHARTS[to](chart_of(flown, start_of(flown.scenario, start))))
     else:
         _write_all(run, to, file, start)
     print_written('written', run, file, as_json)

@@ -22,9 +22,10 @@ def figure(
     as_json: Json = False,
 ) -> None:
     """Draw a run: track, depth, errors, attitude, current and actuators."""
-    from glider_bringup.showing.flown_run import draw
+    from glider_bringup.showing.figure import draw_run
+    from glider_bringup.showing.flown_run import read_run
 
     file = out or beside(run, 'run.png')
     with counter('reading the bag', None) as update:
-        draw(run, file, update)
+        draw_run(read_run(run, update), file)
     print_written('drawn', run, file, as_json)

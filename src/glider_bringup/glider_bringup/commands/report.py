@@ -24,14 +24,16 @@ def report(
     as_json: Json = False,
 ) -> None:
     """Write the report of a run again: one HTML file that needs no network."""
-    from glider_bringup.showing.flown_run import read_run, write_report
+    from glider_bringup.showing.flown_run import read_run
+    from glider_bringup.showing.report import report_page
+    from glider_mission.disk import write_whole
     from glider_mission.run_folder import REPORT_FILE
 
     file = out or beside(run, REPORT_FILE)
     with counter('reading the bag', None) as update:
         flown = read_run(run, update)
     with messages.status('writing the report'):
-        write_report(flown, file)
+        write_whole(file, report_page(flown))
     print_status(flown.card)
     print_written('report', run, file, as_json)
     if show and not webbrowser.open(file.resolve().as_uri()):

@@ -30,7 +30,7 @@ from glider_bringup.scoring.card import STOPPED
 from glider_bringup.showing.scorecard import STYLES, print_card, print_places
 from glider_guidance.settings import METHODS, OLD_NAMES
 from glider_mission.choices import ENGINES, chosen_fields, combination_of
-from glider_mission.disk import DiskError
+from glider_mission.disk import DiskError, write_whole
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
 
 app = typer.Typer()
@@ -255,14 +255,14 @@ def _write_report(scenario: Scenario, folder: Path, card: dict, tracer) -> bool:
 
     Returns whether the disk had room for it.
     """
-    from glider_bringup.showing.flown_run import keep_traces, write_report
+    from glider_bringup.showing.flown_run import keep_traces
+    from glider_bringup.showing.report import report_page
     from glider_mission.run_folder import REPORT_FILE
 
     file = folder / REPORT_FILE
     try:
         with messages.status('writing the report'):
-            run = keep_traces(scenario, folder, card, tracer)
-            write_report(run, file)
+            write_whole(file, report_page(keep_traces(scenario, folder, card, tracer)))
     except (Exception, KeyboardInterrupt) as error:
         cause = str(error) or type(error).__name__
         messages.print(f'no report: {cause}', style='red', soft_wrap=True)

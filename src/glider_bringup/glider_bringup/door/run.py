@@ -27,6 +27,7 @@ from glider_bringup.scoring.traces import make_tracer
 from glider_control.law import LawSettings
 from glider_control.own_law import own_law
 from glider_mission.choices import ENGINES, chosen_fields, combination_of
+from glider_mission.disk import write_whole
 from glider_mission.planned import planned_ticks
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
@@ -112,7 +113,8 @@ class Run:
         ConfigurationError
             If it cannot be written, or there is nothing that could be drawn.
         """
-        from glider_bringup.showing.flown_run import flown_run, read_run, write_report
+        from glider_bringup.showing.flown_run import flown_run, read_run
+        from glider_bringup.showing.report import report_page
 
         folder = self.folder if self.folder and self.folder.is_dir() else None
         file = Path(path) if path is not None else (folder or Path()) / REPORT_FILE
@@ -124,7 +126,7 @@ class Run:
             text = self.scenario.to_yaml()
             name = Path(self.scenario.name)
             flown = flown_run(name, self.scenario, text, self.score, tracer.result())
-        write_report(flown, file)
+        write_whole(file, report_page(flown))
         return file
 
 

@@ -206,17 +206,6 @@ def _text(root: ElementTree.Element) -> bytes:
 CHARTS = {'geojson': geojson, 'kml': kml, 'gpx': gpx}
 
 
-def write_chart(to: str, flown: FlownRun, start: str | None, file: Path) -> None:
-    """Write what of a run is on a chart.
-
-    Raises
-    ------
-    ConfigurationError
-        If the file cannot be written, or ``start`` cannot be used.
-    """
-    write_whole(file, CHARTS[to](chart_of(flown, start_of(flown.scenario, start))))
-
-
 def write_goto_list(flown: FlownRun, file: Path) -> None:
     """Write the waypoints of a run as a list of a Slocum's mission.
 

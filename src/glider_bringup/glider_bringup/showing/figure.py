@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from glider_bringup.scoring.traces import Traces
+from glider_bringup.showing.web_page import FlownRun
 from glider_mission.disk import save_figure
 
 #: A picture shows at most this many values of each curve.
@@ -85,13 +85,13 @@ def draw_curves(axis, x, title: str, labels: tuple[str, str], curves, width: flo
     dress(axis, title, *labels, legend='upper right' if len(curves) > 1 else '')
 
 
-def draw_run(traces: Traces, title: str, file: Path) -> None:
+def draw_run(run: FlownRun, file: Path) -> None:
     """Draw a run into an image file; the suffix of ``file`` says which kind (png, svg, pdf)."""
     figure = new_figure(12.0, 12.0)
     axes = figure.subplot_mosaic(
         [['track', 'depth'], ['track', 'cross'], ['heading', 'pitch'], ['current', 'joints']]
     )
-    traces = traces.thinned(POINTS)
+    traces = run.traces.thinned(POINTS)
     hours, reckons = traces.time_s() / 3600.0, traces.has('place_error_m')
     _draw_track(axes['track'], traces.samples)
     for place, (name, label, curves) in _PANELS.items():
@@ -107,7 +107,7 @@ def draw_run(traces: Traces, title: str, file: Path) -> None:
     if len(hours):
         axes['cross'].plot([], [], color=GREY, linestyle=':', label='inflection')
     axes['cross'].legend(loc='upper right', fontsize='small')
-    figure.suptitle(title)
+    figure.suptitle(f'{run.scenario.name}: {run.scenario.described}')
     save_figure(figure, file, dpi=100)
 
 

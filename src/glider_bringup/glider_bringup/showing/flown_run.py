@@ -9,11 +9,8 @@ from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_bringup.scoring.card import read_score
 from glider_bringup.scoring.traces import Tracer, Traces, load_traces, make_tracer
-from glider_bringup.showing.figure import draw_run
-from glider_bringup.showing.report import report_page
 from glider_bringup.showing.web_page import FlownRun
 from glider_guidance.settings import OLD_NAMES
-from glider_mission.disk import write_whole
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.run_folder import (
@@ -107,27 +104,3 @@ def keep_traces(scenario: Scenario, folder: Path, card: dict, tracer: Tracer) ->
     traces.save(folder / TRACES_FILE)
     as_flown = (folder / SCENARIO_FILE).read_text(encoding='utf-8')
     return flown_run(folder, scenario, as_flown, card, traces)
-
-
-def write_report(run: FlownRun, file: Path) -> None:
-    """Write the report of a run.
-
-    Raises
-    ------
-    ConfigurationError
-        If the file cannot be written.
-    """
-    write_whole(file, report_page(run))
-
-
-def draw(run: Path, file: Path, progress: 'Reading' = lambda ticks, total: None) -> None:
-    """Draw a run into an image file.
-
-    Raises
-    ------
-    ConfigurationError
-        If it holds no run, or the image cannot be written.
-    """
-    flown = read_run(run, progress)
-    title = f'{flown.scenario.name}: {flown.scenario.described}'
-    draw_run(flown.traces, title, file)
