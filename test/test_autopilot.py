@@ -22,7 +22,7 @@ from glider_bringup.engines.processes import (
     node_environment,
 )
 from glider_bringup.engines.recorded import fly_nodes, fly_recorded
-from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.score import Scorer, scores_of
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
 
@@ -48,7 +48,7 @@ def flights(tmp_path_factory) -> dict:
         ('alone', {'layout': 'processes'}),
         ('direct', None),
     ):
-        folder, scorer = make_run_folder(scenario, parent / name), make_scorer(scenario)
+        folder, scorer = make_run_folder(scenario, parent / name), Scorer(scenario)
         if options is None:
             flight = fly_recorded(scenario, folder, [scorer])
         else:

@@ -24,7 +24,7 @@ from glider_base.settings import ConfigurationError
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
-from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.score import Scorer, scores_of
 from glider_bringup.scoring.traces import make_tracer
 from glider_bringup.showing.flown_run import keep_traces, read_run
 from glider_bringup.showing.report import report_page
@@ -106,7 +106,7 @@ def fly_whole(scenario: Scenario, folder: Path) -> Path:
     """Fly into a folder with all that a run has."""
     run = make_run_folder(scenario, folder)
     tracer = make_tracer(scenario)
-    scorer = make_scorer(scenario)
+    scorer = Scorer(scenario)
     flight = fly_recorded(scenario, run, [scorer, tracer])
     card = scorecard(scenario, 'direct', flight, scores_of(scenario, scorer))
     write_score(run, card)

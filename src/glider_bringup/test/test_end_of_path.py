@@ -12,7 +12,7 @@ from glider_bringup.engines.flight import fly as fly_flight
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
-from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.score import Scorer, scores_of
 from glider_bringup.showing.scorecard import card_rows
 from glider_mission.planned import planned_ticks
 from glider_mission.run_folder import make_run_folder
@@ -22,7 +22,7 @@ from glider_mission.scenario import load_scenario, scenario_names
 def fly(folder, name, with_bag=False, **changes):
     """Scorecard of a direct run into a folder."""
     scenario = load_scenario(name, {key.replace('__', '.'): v for key, v in changes.items()})
-    scorer = make_scorer(scenario)
+    scorer = Scorer(scenario)
     if with_bag:
         make_run_folder(scenario, folder)
         flight = fly_recorded(scenario, folder, [scorer])

@@ -19,7 +19,7 @@ from glider_base.signals import TICK_NS
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
-from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.score import Scorer, scores_of
 from glider_mission.disk import DiskError, whole_file, write_whole
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.rosbag2 import CHUNK_TICKS, BagWriter
@@ -81,7 +81,7 @@ def test_file_behind_a_link_is_written_and_the_link_stays(tmp_path):
 def test_device_that_is_full_is_named_and_stays_a_device(tmp_path, name):
     scenario = load_scenario('current_8deg', {'dives': 0, 'duration_s': 10.0})
     folder = make_run_folder(scenario, tmp_path / 'flight')
-    scorer = make_scorer(scenario)
+    scorer = Scorer(scenario)
     flight = fly_recorded(scenario, folder, [scorer])
     write_score(folder, scorecard(scenario, 'direct', flight, scores_of(scenario, scorer)))
     done = glider(name, folder, '--out', '/dev/full')

@@ -17,7 +17,7 @@ from glider_base.signals import TICK_NS
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
-from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.score import Scorer, scores_of
 from glider_bringup.showing.figure import draw_run
 from glider_bringup.showing.flown_run import read_run
 from glider_mission.recording.ros.rosbag2 import BagWriter
@@ -36,7 +36,7 @@ def run(tmp_path_factory) -> Path:
     """Run folder with bag and score file."""
     scenario = load_scenario('noisy_sensors', {'dives': 0, 'duration_s': 300.0, 'settle_s': 0.0})
     folder = make_run_folder(scenario, tmp_path_factory.mktemp('run') / 'flight')
-    scorer = make_scorer(scenario)
+    scorer = Scorer(scenario)
     flight = fly_recorded(scenario, folder, [scorer])
     write_score(folder, scorecard(scenario, 'direct', flight, scores_of(scenario, scorer)))
     return folder

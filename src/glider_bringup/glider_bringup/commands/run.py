@@ -5,6 +5,7 @@
 import json
 from collections.abc import Callable
 from contextlib import contextmanager, nullcontext
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -20,7 +21,6 @@ from glider_bringup.console import (
     Law,
     Named,
     changed_fields,
-    compiling,
     messages,
     number,
     progress,
@@ -29,7 +29,7 @@ from glider_bringup.console import (
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.showing.scorecard import STYLES, print_card, print_places
 from glider_guidance.settings import METHODS, OLD_NAMES
-from glider_mission.choices import ENGINES, chosen_fields, combination_of
+from glider_mission.choices import ENGINES, chosen_fields
 from glider_mission.disk import DiskError, write_whole
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
 
@@ -129,8 +129,8 @@ def run(
     fields = chosen_fields(changed_fields(changes), controller, guidance, seed, duration)
     rate, place = _checked(engine, speed, namespace, view, processes)
     flown = load_scenario(scenario, fields)
-    nodes = {'speed': rate, 'namespace': place}
-    nodes['layout'] = 'processes' if processes else 'together'
+    layout = 'processes' if processes else 'together'
+    nodes = {'speed': rate, 'namespace': place, 'layout': layout, 'on_log': tell}
     with _view(view_port, place) if view else nullcontext() as begin_view:
         card, folder, has_room = _fly(flown, engine, out, bag, sync, report, begin_view, nodes)
     page = folder / REPORT_FILE
@@ -204,38 +204,22 @@ def _fly(
 
     Returns the scorecard, the run folder, and whether the disk had room for score and report.
     """
-    from glider_bringup.engines.compiling import told
-    from glider_bringup.engines.flight import fly
-    from glider_bringup.scoring.card import scorecard, write_score
-    from glider_bringup.scoring.score import make_scorer, scores_of
+    from glider_bringup.door.run import fly_by
+    from glider_bringup.scoring.card import write_score
     from glider_bringup.scoring.traces import make_tracer
     from glider_mission.planned import planned_ticks
-    from glider_mission.run_folder import make_run_folder, write_scenario
+    from glider_mission.run_folder import make_run_folder
 
-    if bag or engine == 'nodes':  # else nothing of ROS is needed
-        from glider_bringup.engines.recorded import fly_nodes, fly_recorded
-
+    if bag or engine == 'nodes':  # else nothing of ROS is needed; with it, it is there
+        import_module('glider_bringup.engines.recorded')
     folder = make_run_folder(scenario, out)
     messages.print(f'{scenario.name}: {scenario.described}')
-    scorer, tracer = make_scorer(scenario), make_tracer(scenario) if report else None
-    takers = [scorer, tracer] if tracer else [scorer]
-    with (
-        progress(planned_ticks(scenario)) as (flying, reading),
-        told(combination_of(scenario), compiling) if engine == 'direct' else nullcontext(),
-    ):
-        if engine == 'nodes':
-            if begin_view:
-                flying = _after_first(begin_view, flying)
-            nodes |= {'on_log': tell, 'on_read': reading, 'sync': sync}
-            flight = fly_nodes(scenario, folder, takers, flying, **nodes)
-        elif bag:
-            flight = fly_recorded(scenario, folder, takers, flying, sync)
-        else:
-            flight = fly(scenario, takers, flying)
-    if flight.orders:
-        scenario = scenario.with_orders(flight.orders)
-        write_scenario(scenario, folder)
-    card = scorecard(scenario, engine, flight, scores_of(scenario, scorer))
+    tracer = make_tracer(scenario) if report else None
+    with progress(planned_ticks(scenario)) as (flying, reading):
+        if begin_view:
+            flying = _after_first(begin_view, flying)
+        shown, takers = (flying, reading), [tracer] if tracer else []
+        scenario, card = fly_by(engine, scenario, folder, takers, shown, bag, sync, **nodes)
     has_room = True
     try:
         write_score(folder, card)

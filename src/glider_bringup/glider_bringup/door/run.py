@@ -3,7 +3,7 @@
 """Flights from Python, and runs that were flown."""
 
 import weakref
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
@@ -18,11 +18,11 @@ from glider_base.ros.places import given_domain
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_bringup.engines.compiling import told
-from glider_bringup.engines.flight import Outcome
+from glider_bringup.engines.flight import Progress, Taker
 from glider_bringup.engines.flight import fly as fly_direct
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.one_hertz import Rows
-from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.score import Scorer, scores_of
 from glider_bringup.scoring.traces import make_tracer
 from glider_control.law import LawSettings
 from glider_control.own_law import own_law
@@ -36,6 +36,7 @@ from glider_mission.run_folder import (
     TRACES_FILE,
     make_run_folder,
     scenario_of,
+    write_scenario,
 )
 from glider_mission.scenario import (
     DEFAULT_SCENARIO,
@@ -210,7 +211,6 @@ def fly(
     ConfigurationError
         Naming field, value and allowed range.
     """
-    from glider_bringup.console import compiling
     from glider_bringup.console import progress as bar
 
     if engine not in ENGINES:
@@ -225,16 +225,14 @@ def fly(
         given_domain()
     flown = chosen_scenario(scenario, set or {}, controller, law, guidance, seed, duration)
     kept = out is not None
-    scorer, rows, tracer = make_scorer(flown), Rows(), make_tracer(flown)
+    rows, tracer = Rows(), make_tracer(flown)
     in_bag = kept and (bag or engine == 'nodes')
-    takers = [scorer, *([] if in_bag else [rows]), *([tracer] if kept else [])]
+    takers = [*([] if in_bag else [rows]), *([tracer] if kept else [])]
     with (
         _run_folder(flown, out, engine) as folder,
         bar(planned_ticks(flown)) if progress else nullcontext((None, None)) as shown,
-        told(combination_of(flown), compiling) if engine == 'direct' else nullcontext(),
     ):
-        flight = _fly(flown, takers, engine, folder, bag, *shown)
-        card = scorecard(flown, engine, flight, scores_of(flown, scorer))
+        flown, card = fly_by(engine, flown, folder, takers, shown, bag)
         if kept:
             write_score(folder, card)
             tracer.result().save(folder / TRACES_FILE)
@@ -254,23 +252,42 @@ def _run_folder(scenario: Scenario, out: str | Path | None, engine: str) -> Iter
         yield None
 
 
-def _fly(
-    scenario: Scenario,
-    takers: list,
+def fly_by(
     engine: str,
+    scenario: Scenario,
     folder: Path | None,
+    takers: Iterable[Taker],
+    shown: tuple[Progress | None, Callable[[int], None] | None],
     bag: bool,
-    flying: Callable[[int, float], None] | None,
-    reading: Callable[[int], None] | None,
-) -> Outcome:
-    """Fly with the engine of this name, into the folder if there is a bag."""
-    if engine == 'direct' and not bag:
-        return fly_direct(scenario, takers, flying)
-    from glider_bringup.engines.recorded import fly_nodes, fly_recorded
+    sync: str = 'end',
+    **nodes: Any,
+) -> tuple[Scenario, dict[str, Any]]:
+    """Fly with the engine of this name, into a folder if there is a bag; give the scorecard too.
 
-    if engine == 'direct':
-        return fly_recorded(scenario, folder, takers, flying)
-    return fly_nodes(scenario, folder, takers, flying, on_read=reading or (lambda ticks: None))
+    ``shown`` is called in flight, and while a bag is read back; `fly_nodes` takes the ``nodes``.
+    The scenario that comes back, and stands in the folder, has the orders that were given in
+    flight.
+    """
+    from glider_bringup.console import compiling
+
+    scorer, (flying, reading) = Scorer(scenario), shown
+    takers = [scorer, *takers]
+    with told(combination_of(scenario), compiling) if engine == 'direct' else nullcontext():
+        if engine == 'direct' and not bag:  # nothing of ROS is needed
+            flight = fly_direct(scenario, takers, flying)
+        else:
+            from glider_bringup.engines.recorded import fly_nodes, fly_recorded
+
+            if engine == 'direct':
+                flight = fly_recorded(scenario, folder, takers, flying, sync)
+            else:
+                nodes |= {'sync': sync, 'on_read': reading or (lambda ticks: None)}
+                flight = fly_nodes(scenario, folder, takers, flying, **nodes)
+    if flight.orders:
+        scenario = scenario.with_orders(flight.orders)
+        if folder:
+            write_scenario(scenario, folder)
+    return scenario, scorecard(scenario, engine, flight, scores_of(scenario, scorer))
 
 
 def open_run(path: str | Path) -> Run:

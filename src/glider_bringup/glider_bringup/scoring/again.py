@@ -9,7 +9,7 @@ from glider_base.ros.lockstep.health import FINISHED
 from glider_base.settings import ConfigurationError
 from glider_bringup.engines.flight import Outcome, ended
 from glider_bringup.scoring.card import STOPPED, read_score, scorecard
-from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.score import Scorer, scores_of
 from glider_mission.planned import planned_ticks
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
@@ -51,7 +51,7 @@ def score_bag(
     takers: Iterable[Reader] = (),
 ) -> dict:
     """Scorecard of a bag, whose rows takers are given too; ``old`` is the one it has, or empty."""
-    scorer = make_scorer(scenario)
+    scorer = Scorer(scenario)
     total = old.get('ticks') or planned_ticks(scenario)
     log = read_back(
         bag, scenario.vehicle, [scorer, *takers], lambda ticks: progress(ticks, max(ticks, total))

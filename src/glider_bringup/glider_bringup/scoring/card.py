@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from glider_base.files import is_file, read_json
 from glider_base.settings import ConfigurationError
 from glider_bringup.engines.flight import Outcome, Taker, fly
-from glider_bringup.scoring.score import make_scorer, scores_of
+from glider_bringup.scoring.score import Scorer, scores_of
 from glider_mission.disk import write_whole
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.run_folder import SCORE_FILE
@@ -27,7 +27,7 @@ STOPPED = ('aborted', 'failed')
 
 def fly_scored(scenario: Scenario, takers: Iterable[Taker] = ()) -> tuple[Outcome, dict]:
     """Fly with the direct engine, as `fly` does, and give the scores too."""
-    scorer = make_scorer(scenario)
+    scorer = Scorer(scenario)
     flight = fly(scenario, [scorer, *takers])
     return flight, scores_of(scenario, scorer)
 

@@ -13,13 +13,10 @@ What is scored is the true motion, whatever the vehicle believes.
 """
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from glider_base.frames import (
-    Origin,
     OriginSettings,
     euler_from_quaternion,
     odometry_from_wire,
@@ -48,9 +45,8 @@ from glider_mission.blocks import COLUMNS
 from glider_mission.rules import Rules
 from glider_mission.scenario import Scenario
 from glider_model.ocean.bottom import NO_BOTTOM
-from glider_model.plant.faults.settings import FaultSettings
 from glider_model.plant.plant import dive_depths
-from glider_model.plant.readings import Readings, make_readings, noise_of_readings
+from glider_model.plant.readings import make_readings, noise_of_readings
 from glider_model.vehicle.file import Vehicle, load_vehicle
 
 #: Heading fluctuation is about the mean over this time (s).
@@ -103,42 +99,37 @@ class Scorer:
 
     Parameters
     ----------
-    origin : Origin, optional
-        To which fixes are relative.
-    topics : tuple of str
-        What there is of navigation in the run; empty of a vehicle that knows its place.
+    scenario : Scenario, optional
+        What is flown; without one there are no faults, no bottom, no noise of where actuators
+        say that they are, and the vehicle knows its place.
     vehicle : Vehicle, optional
-        Its steering surface, battery, crush depth and drop weight; without it there are none.
-    readings : Readings, optional
-        Noise of where the actuators say that they are: no way that they go.
-    course_rad : float
-        Of the path at its start, for a vehicle whose target never moved along it.
-    bottom : NamedTuple
-        Of the sea, as the plant has it.
+        Its steering surface, battery, crush depth and drop weight, if there is no scenario;
+        without it there are none.
     """
 
     def __init__(
-        self,
-        origin: Origin | None = None,
-        topics: tuple[str, ...] = (),
-        faults: Sequence[FaultSettings] = (),
-        vehicle: Vehicle | None = None,
-        readings: Readings | None = None,
-        course_rad: float = 0.0,
-        bottom: NamedTuple = NO_BOTTOM,
+        self, scenario: Scenario | None = None, *, vehicle: Vehicle | None = None
     ) -> None:
-        self.topics = topics  #: that it needs, beside those that are always read
+        faults, bottom, origin = (), NO_BOTTOM, OriginSettings()
+        self.topics = ()  #: that it needs, beside those that are always read
+        self._course_rad = 0.0  #: of the path at its start, if the target never moves along it
+        self._readings = None
+        if scenario:
+            vehicle, faults = load_vehicle(scenario.vehicle), scenario.faults
+            bottom, origin = scenario.bottom(), scenario.origin
+            self._course_rad = scenario.path.course_rad()
+            readings = make_readings(vehicle.params(), scenario.seed)
+            self._readings = readings if readings.is_noisy else None
+            if scenario.navigation.jumps:
+                self.topics = ('fix', 'believed_current', 'current_velocity')
         self._steers_by = vehicle.steers_by if vehicle else ''
         self._crush_depth_m = vehicle.crush_depth_m if vehicle else math.inf
         self._has_weight = bool(vehicle and vehicle.drop_weight)
-        self._course_rad = course_rad
         self._bottom = None if bottom is NO_BOTTOM else BottomWatch(bottom)
         self._truth = TrueMotion()
-        origin = origin or OriginSettings().params()
-        self._navigation = NavigationScorer(origin, reckons=bool(topics))
+        self._navigation = NavigationScorer(origin.params(), reckons=bool(self.topics))
         self._faults = FaultTimes(faults)
         self._energy = EnergyScorer(vehicle.energy if vehicle else None)
-        self._readings = readings if readings and readings.is_noisy else None
         self._blocks: list[np.ndarray] = []
         self._first: np.ndarray | None = None
         self._last: np.ndarray | None = None
@@ -280,24 +271,6 @@ class Scorer:
 
 def _odometry_of(row: np.ndarray) -> Odometry:
     return odometry_from_wire(tuple(row[_ODOM].tolist()))
-
-
-def make_scorer(scenario: Scenario) -> Scorer:
-    """Scorer of a run of a scenario."""
-    topics = ()
-    if scenario.navigation.jumps:
-        topics = ('fix', 'believed_current', 'current_velocity')
-    vehicle, course_rad = load_vehicle(scenario.vehicle), scenario.path.course_rad()
-    readings = make_readings(vehicle.params(), scenario.seed)
-    return Scorer(
-        origin=scenario.origin.params(),
-        topics=topics,
-        faults=scenario.faults,
-        vehicle=vehicle,
-        readings=readings,
-        course_rad=course_rad,
-        bottom=scenario.bottom(),
-    )
 
 
 def scores_of(scenario: Scenario, scorer: Scorer) -> dict:
