@@ -13,9 +13,8 @@ from collections.abc import Callable
 from functools import partial
 from tempfile import TemporaryDirectory
 
+import floor
 import numpy as np
-from floor import Floor, compare, compiler, compiler_version
-from plant_step import SCENARIO, SEA, SHALLOW, cost_s, flight_of, plant_steps
 
 from glider_bringup.door.flight import Flight
 from glider_bringup.engines.direct import fly_blocks
@@ -66,7 +65,7 @@ def measure(progress: Callable[[str], None]) -> dict:
     mission_s, score_s = map(min, zip(*missions, strict=True))
     return {
         **compilation,
-        'c_compiler': compiler_version(),
+        'c_compiler': floor.compiler_version(),
         'mission_30h_s': mission_s,
         'plant_step_ns': 1e9 * plant_s,
         'plant_step_floor_ns': plant_floor_s and 1e9 * plant_floor_s,
@@ -82,7 +81,7 @@ def measure(progress: Callable[[str], None]) -> dict:
 
 def load_mission(**changes) -> Scenario:
     """The mission that is measured, with changes to its fields."""
-    return load_scenario(SCENARIO, {'dives': 0, 'duration_s': DURATION_S, **changes})
+    return load_scenario(floor.SCENARIO, {'dives': 0, 'duration_s': DURATION_S, **changes})
 
 
 def _mission_s() -> tuple[float, float]:
@@ -94,11 +93,11 @@ def _mission_s() -> tuple[float, float]:
 
     def fly() -> None:
         for log in fly_blocks(state, params):
-            scoring_s.append(cost_s(scorer.add, log))
+            scoring_s.append(floor.cost_s(scorer.add, log))
 
-    whole_s = cost_s(fly)
+    whole_s = floor.cost_s(fly)
     flying_s = whole_s - sum(scoring_s)
-    scoring_s.append(cost_s(scorer.result, scenario.score_rules(DURATION_S)))
+    scoring_s.append(floor.cost_s(scorer.result, scenario.score_rules(DURATION_S)))
     return flying_s, sum(scoring_s)
 
 
@@ -115,25 +114,32 @@ def _step_s() -> float:
 
 def _plant_s() -> tuple[float, float | None, int | None]:
     """Processor time (s) of a tick of the plant, and of one in C; ticks with the same bits."""
-    flight = flight_of(load_mission(**SHALLOW))
+    flight = floor.flight_of(load_mission(**floor.SHALLOW))
     motions = np.empty((2, len(flight[2]), len(flight[0].motion)))
-    ways = [plant_steps, *([Floor(*flight[:2]).plant_steps] if compiler() else [])]
+    ways = [
+        floor.plant_steps,
+        *([floor.Floor(*flight[:2]).plant_steps] if floor.compiler() else []),
+    ]
     calls = (partial(way, *flight, rows) for way, rows in zip(ways, motions, strict=False))
     plant_s, *floor_s = (time_s / len(flight[2]) for time_s in _least_s(*calls))
-    return (plant_s, *floor_s, compare(*motions)) if floor_s else (plant_s, None, None)
+    return (plant_s, *floor_s, floor.compare(*motions)) if floor_s else (plant_s, None, None)
 
 
 def _sea_s() -> tuple[float, float]:
     """Processor time (s) of a tick of the plant with a fin in measured water, and without."""
-    flights = [flight_of(load_mission(**SHALLOW, **changes)) for changes in (SEA, {})]
+    flights = [
+        floor.flight_of(load_mission(**floor.SHALLOW, **changes)) for changes in (floor.SEA, {})
+    ]
     motions = np.empty((len(flights[0][2]), len(flights[0][0].motion)))
-    sea_s, plain_s = _least_s(*(partial(plant_steps, *flight, motions) for flight in flights))
+    sea_s, plain_s = _least_s(
+        *(partial(floor.plant_steps, *flight, motions) for flight in flights)
+    )
     return sea_s / len(motions), plain_s / len(motions)
 
 
 def _least_s(*calls: Callable[[], None]) -> list[float]:
     """Least processor times (s) of some calls, by turns; in the first turn they may compile."""
-    turns = [[cost_s(call) for call in calls] for _ in range(2 * REPEATS)]
+    turns = [[floor.cost_s(call) for call in calls] for _ in range(2 * REPEATS)]
     return [min(times) for times in zip(*turns, strict=True)]
 
 

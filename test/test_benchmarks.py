@@ -16,35 +16,34 @@ FOLDER = Path(__file__).resolve().parents[1] / 'benchmarks'
 
 
 @pytest.fixture(scope='module')
-def modules():
-    """Modules of the floor and of the plant's flight."""
+def floor():
+    """Module of the floor and of the plant's flight."""
     sys.path.insert(0, str(FOLDER))
     try:
         import floor
-        import plant_step
 
         if not floor.compiler():
             pytest.skip('no C compiler')
-        yield floor, plant_step
+        yield floor
     finally:
         sys.path.remove(str(FOLDER))
 
 
-def motions(modules, way, flight):
+def motions(way, flight):
     """Where one of the two plants goes."""
     rows = np.full((len(flight[2]), 13), np.nan)
     way(*flight, rows)
     return rows
 
 
-def flight_of(modules, **changes):
+def flight_of(floor, **changes):
     fields = {field.replace('__', '.'): value for field, value in changes.items()}
-    return modules[1].flight_of(load_scenario('current_8deg', {'dives': 0, **fields}))
+    return floor.flight_of(load_scenario('current_8deg', {'dives': 0, **fields}))
 
 
 @pytest.fixture(scope='module')
-def library(modules):
-    return modules[0].Floor(*flight_of(modules, duration_s=0.1)[:2])
+def library(floor):
+    return floor.Floor(*flight_of(floor, duration_s=0.1)[:2])
 
 
 @pytest.mark.parametrize(
@@ -62,20 +61,18 @@ def library(modules):
         {'duration_s': 3000.0, 'profile__depth_m': 60.0, 'perturb__D_p': 0.0},
     ],
 )
-def test_floor_computes_the_bits_of_the_plant(modules, library, changes):
-    floor, plant_step = modules
-    flight = flight_of(modules, **changes)
-    ways = plant_step.plant_steps, library.plant_steps
-    assert floor.compare(*(motions(modules, way, flight) for way in ways)) > 10000
+def test_floor_computes_the_bits_of_the_plant(floor, library, changes):
+    flight = flight_of(floor, **changes)
+    ways = floor.plant_steps, library.plant_steps
+    assert floor.compare(*(motions(way, flight) for way in ways)) > 10000
 
 
-def test_a_floor_with_other_arithmetic_is_refused(modules, library):
-    floor, plant_step = modules
-    state, params, *given = flight_of(modules, duration_s=300.0)
+def test_a_floor_with_other_arithmetic_is_refused(floor, library):
+    state, params, *given = flight_of(floor, duration_s=300.0)
     vehicle = params.vehicle
     other = params._replace(vehicle=vehicle._replace(K_D=np.nextafter(vehicle.K_D, 0.0)))
-    engine = motions(modules, plant_step.plant_steps, (state, params, *given))
-    in_c = motions(modules, library.plant_steps, (state, other, *given))
+    engine = motions(floor.plant_steps, (state, params, *given))
+    in_c = motions(library.plant_steps, (state, other, *given))
     with pytest.raises(RuntimeError, match='not the arithmetic of the plant, at tick'):
         floor.compare(engine, in_c)
 

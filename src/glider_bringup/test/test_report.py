@@ -22,10 +22,9 @@ from glider_bringup import cli, console
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import Outcome, mission_of
 from glider_bringup.scoring.card import scorecard, write_score
-from glider_bringup.scoring.dives import dives_of
 from glider_bringup.scoring.one_hertz import Rows
 from glider_bringup.scoring.score import Scorer
-from glider_bringup.scoring.traces import make_tracer
+from glider_bringup.scoring.traces import dives_of, make_tracer
 from glider_bringup.showing.findings import LOST_M, findings, lost_since_s, verdict
 from glider_bringup.showing.flown_run import keep_traces, read_run
 from glider_bringup.showing.report import report_page

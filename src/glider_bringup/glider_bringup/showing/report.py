@@ -9,8 +9,8 @@ from typing import Any
 from glider_base.files import yaml_text
 from glider_base.frames import to_geodetic
 from glider_base.signals import TICK_S
-from glider_bringup.scoring.dives import Dive, dives_of
 from glider_bringup.scoring.scores import reckoned
+from glider_bringup.scoring.traces import Dive, dives_of
 from glider_bringup.showing.findings import findings, verdict
 from glider_bringup.showing.panels import report_panels
 from glider_bringup.showing.scorecard import card_rows
