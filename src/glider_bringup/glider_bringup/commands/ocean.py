@@ -4,13 +4,13 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from glider_base.settings import ConfigurationError
 from glider_bringup.console import Json, messages, output, print_table
-from glider_bringup.showing.ocean import Sea, draw_sea, in_words, look, mission_in
+from glider_bringup.showing.ocean import draw_sea, in_words, look, mission_in
 from glider_model.ocean.eddying_sea import EddyingSea, write_sea
 
 app = typer.Typer()
@@ -52,9 +52,18 @@ def ocean(
     Exit code 2: it is no grid of currents, or does not cover the mission.
     """
     if make is not None:
-        _make(file, EddyingSea(seed=make, rms_mps=rms, error_mps=error))
+        if file.exists():
+            raise ConfigurationError(f'{file}: is there already (allowed: a new file)')
+        write_sea(EddyingSea(seed=make, rms_mps=rms, error_mps=error), file)
     with messages.status('reading'):
-        told, sea, refused = _told(file, mission)
+        told, sea = look(file)
+        refused = ''
+        if mission is not None:
+            try:
+                sea = mission_in(file, mission)
+            except ConfigurationError as error:
+                sea, refused = None, str(error)
+            told['mission'] = {'scenario': mission, 'covered': not refused, 'reason': refused}
         if out and sea:
             draw_sea(sea, out)
             told['drawn'] = str(out)
@@ -66,24 +75,3 @@ def ocean(
         raise ConfigurationError(refused)
     if out and not as_json:
         output.print(f'drawn: {out}', soft_wrap=True)
-
-
-def _make(file: Path, sea: EddyingSea) -> None:
-    """Make a sea full of eddies, in the layout of CMEMS."""
-    if file.exists():
-        raise ConfigurationError(f'{file}: is there already (allowed: a new file)')
-    write_sea(sea, file)
-
-
-def _told(file: Path, mission: str | None) -> tuple[dict[str, Any], Sea | None, str]:
-    """What is in a file, its water, and why it does not cover a mission; empty: it does."""
-    told, sea = look(file)
-    if mission is None:
-        return told, sea, ''
-    try:
-        sea = mission_in(file, mission)
-    except ConfigurationError as error:
-        told['mission'] = {'scenario': mission, 'covered': False, 'reason': str(error)}
-        return told, None, str(error)
-    told['mission'] = {'scenario': mission, 'covered': True, 'reason': ''}
-    return told, sea, ''

@@ -4,7 +4,7 @@
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 
@@ -32,16 +32,3 @@ def interrupts_noted() -> Iterator[list[bool]]:
         yield noted
     finally:
         signal.signal(signal.SIGINT, handler)
-
-
-@contextmanager
-def interrupts_at(progress: Callable[..., None]) -> Iterator[Callable[..., None]]:
-    """Yields ``progress``, whose calls are where Ctrl-C is raised, and nowhere else."""
-    with interrupts_noted() as noted:
-
-        def call(*arguments) -> None:
-            progress(*arguments)
-            if noted:
-                raise KeyboardInterrupt
-
-        yield call

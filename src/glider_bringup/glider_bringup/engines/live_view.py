@@ -64,7 +64,11 @@ def live_view(port: int, namespace: str | None = None) -> Iterator[tuple[str, Ca
                 raise ConfigurationError(f'--view: {lines[-1].removeprefix(FATAL)}')
             yield address.removeprefix(_READY).strip(), lambda: _begin(process)
         finally:
-            _end(process)
+            try:
+                process.communicate(timeout=_LEAVE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.communicate()
 
 
 def _begin(process: subprocess.Popen) -> None:
@@ -72,14 +76,6 @@ def _begin(process: subprocess.Popen) -> None:
     with suppress(OSError):
         process.stdin.write('look\n')
         process.stdin.flush()
-
-
-def _end(process: subprocess.Popen) -> None:
-    try:
-        process.communicate(timeout=_LEAVE_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.communicate()
 
 
 @contextmanager

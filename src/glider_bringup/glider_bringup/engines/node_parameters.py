@@ -3,6 +3,7 @@
 """From a scenario to the one parameter file that is handed to all nodes."""
 
 import json
+from collections import defaultdict
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -43,8 +44,12 @@ def node_parameters(
         for block, settings in zip(BLOCKS, scenario.block_settings(), strict=True)
     }
     nodes[topics.PLANT]['speed'] = speed
-    for name, faults in _message_faults(scenario).items():
-        nodes[name] |= {'message_faults': json.dumps(faults), 'message_seed': scenario.seed}
+    faults = defaultdict(list)
+    for one in scenario.message_faults:
+        told = one.model_dump(include=set(MessageFault.model_fields))
+        faults[publisher(one.topic).node].append(told)
+    for name, told in faults.items():
+        nodes[name] |= {'message_faults': json.dumps(told), 'message_seed': scenario.seed}
     if record_to is not None:
         nodes[topics.RECORDER] = {
             'folder': str(record_to.resolve()),
@@ -55,16 +60,6 @@ def node_parameters(
             'sync': sync,
         }
     return {name: {**parameters, **common} for name, parameters in nodes.items()}
-
-
-def _message_faults(scenario: Scenario) -> dict[str, list[dict]]:
-    """What goes wrong with messages, as in a scenario, by the node that publishes them."""
-    found = {}
-    for fault in scenario.message_faults:
-        found.setdefault(publisher(fault.topic).node, []).append(
-            fault.model_dump(include=set(MessageFault.model_fields))
-        )
-    return found
 
 
 def write_parameters(nodes: dict[str, dict], file: Path, namespace: str = '/glider') -> None:

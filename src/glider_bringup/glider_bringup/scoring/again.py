@@ -13,7 +13,7 @@ from glider_bringup.scoring.score import Scorer, scores_of
 from glider_mission.planned import planned_ticks
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
-from glider_mission.recording.ros.recorded_log import Reader, RecordedLog, read_back
+from glider_mission.recording.ros.recorded_log import Reader, read_back
 from glider_mission.run_folder import PARAMETERS_FILE, scenario_of
 from glider_mission.scenario import Scenario
 
@@ -61,7 +61,9 @@ def score_bag(
         complete = old['status'] not in STOPPED
         reason = '' if complete else old['reason']
     else:
-        complete, reason = _end_of_run(log)
+        complete = bool(log.end) and log.end.phase == FINISHED
+        cut = 'the recording was stopped before the run was complete'
+        reason = '' if complete else log.end.message if log.end else cut
     lost = log.lost(complete)
     if not log.ticks and (lost or missing):
         why = bag.cut or (
@@ -76,11 +78,3 @@ def score_bag(
     flight = Outcome(status, reason, old.get('wall_time_s'), recorded, lost)
     engine = old.get('engine') or ('nodes' if (run / PARAMETERS_FILE).exists() else None)
     return scorecard(scenario, engine, flight, scores_of(scenario, scorer))
-
-
-def _end_of_run(log: RecordedLog) -> tuple[bool, str]:
-    """Whether the plant said in a bag that the run is complete; if not, what it said instead."""
-    if log.end is None:
-        return False, 'the recording was stopped before the run was complete'
-    complete = log.end.phase == FINISHED
-    return complete, '' if complete else log.end.message

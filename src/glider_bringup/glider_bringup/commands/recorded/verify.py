@@ -49,7 +49,7 @@ def verify(
     Exit code 1, and the first tick, topic and field that differ, unless all of them are identical.
     """
     from glider_base.kernel import compiling_told
-    from glider_bringup.engines.interrupts import interrupts_at
+    from glider_bringup.engines.interrupts import interrupts_noted
     from glider_mission.recording.mcap_reader import Bag
     from glider_mission.recording.ros.recorded_run import Recording
     from glider_mission.recording.ros.told import read_told
@@ -66,8 +66,14 @@ def verify(
         recording = Recording(
             bag, namespace, lambda share: update('reading', share), told.steers_by
         )
-        with interrupts_at(update) as update, compiling_told(told_compiling):
-            verdicts = list(verify_blocks(recording, told, wanted, update))
+        with interrupts_noted() as noted, compiling_told(told_compiling):
+
+            def go_on(*done) -> None:
+                update(*done)
+                if noted:
+                    raise KeyboardInterrupt
+
+            verdicts = list(verify_blocks(recording, told, wanted, go_on))
     report = report_of(bag, recording, told, verdicts)
     if as_json:
         print(json.dumps({'run': str(run), **report}))
