@@ -6,6 +6,7 @@ import errno
 import gc
 import os
 import pkgutil
+import re
 import signal
 import sys
 from functools import partial
@@ -47,9 +48,8 @@ _USAGE = {
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP, errno.EINVAL),
 }
 
-#: What ends the name of a module of ROS 2, if it does not begin as these do.
-_ROS_ENDS = '_msgs', '_srvs', '_interfaces'
-_ROS_BEGINS = 'rcl', 'rosidl', 'rpyutils', 'ament_'
+#: Names of modules that come with ROS 2.
+_OF_ROS = re.compile(r'(rcl|rosidl|rpyutils|ament_)|\w+(_msgs|_srvs|_interfaces)(\.|$)')
 
 #: Commands in the order in which --help lists them; those that are not named here follow.
 ORDER = (
@@ -169,7 +169,7 @@ def main() -> int:
         _tell(str(error))
         code = EXIT_FAILED if isinstance(error, DiskError) else EXIT_USAGE
     except ModuleNotFoundError as error:
-        if not _of_ros(error.name or ''):
+        if not _OF_ROS.match(error.name or ''):
             raise
         _tell(
             f'ROS 2 Jazzy is not there (no module {error.name}), which nodes and bags need; '
@@ -191,12 +191,6 @@ def _run() -> int:
     except SystemExit as end:
         return end.code
     return 0
-
-
-def _of_ros(module: str) -> bool:
-    """Whether a module comes with ROS 2."""
-    top = module.partition('.')[0]
-    return top.startswith(_ROS_BEGINS) or top.endswith(_ROS_ENDS)
 
 
 def _tell(text: str) -> None:

@@ -131,16 +131,6 @@ class Run:
         return file
 
 
-def _scenario(scenario: str | Path | Scenario, fields: dict[str, Any]) -> Scenario:
-    """The scenario with some fields changed; one that was made already is validated again."""
-    if not isinstance(scenario, Scenario):
-        return load_scenario(str(scenario), fields)
-    if not fields:
-        return scenario
-    values = parse_yaml(scenario.to_yaml(), scenario.name)
-    return make_scenario(ScenarioSource(Path(scenario.name), values), fields)
-
-
 def chosen_scenario(
     scenario: str | Path | Scenario,
     fields: Mapping[str, Any],
@@ -159,7 +149,13 @@ def chosen_scenario(
         raise ConfigurationError(f'--controller {controller}: not with a law of your own')
     if law is not None:
         controller = know_law(own_law(law))
-    return _scenario(scenario, chosen_fields(fields, controller, guidance, seed, duration))
+    fields = chosen_fields(fields, controller, guidance, seed, duration)
+    if not isinstance(scenario, Scenario):
+        return load_scenario(str(scenario), fields)
+    if not fields:
+        return scenario
+    values = parse_yaml(scenario.to_yaml(), scenario.name)  # all of it is validated again
+    return make_scenario(ScenarioSource(Path(scenario.name), values), fields)
 
 
 # long: most of it says what its parameters are.

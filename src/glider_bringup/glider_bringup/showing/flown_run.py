@@ -44,7 +44,9 @@ def read_run(
         scenario = found.scenario
         _refuse_another(card, scenario, found.source)
         is_kept = card and (not traced or kept.is_file())
-        if is_kept and (bag is None or _covers(bag, card)):
+        if is_kept and bag is not None:  # which goes as far as the scorecard
+            is_kept = not bag.cut and bag.end_ns >= (card['ticks'] - 1) * TICK_NS
+        if is_kept:
             traces = load_traces(kept) if traced else None
         elif bag is None:
             raise ConfigurationError(
@@ -76,11 +78,6 @@ def _refuse_another(card: dict, scenario: Scenario, source: str) -> None:
                 f'{source}: {name} = {value!r}: not what was flown (allowed: {card[name]!r}, by '
                 f'{SCORE_FILE})'
             )
-
-
-def _covers(bag: Bag, card: dict) -> bool:
-    """Whether a bag goes as far as the scorecard of its run."""
-    return not bag.cut and bag.end_ns >= (card['ticks'] - 1) * TICK_NS
 
 
 def flown_run(

@@ -337,11 +337,6 @@ def _learnt_panels(run: FlownRun) -> list[Panel]:
     return panels
 
 
-def _is_there(curve: Curve, run: FlownRun) -> bool:
-    """Whether there is anything to draw of a curve."""
-    return run.traces.has(curve.name) and not (curve.flag and not run.traces.flagged[curve.flag])
-
-
 def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
     """Panels of a report by heading; without those, and their curves, that have no data."""
     if not run.traces.ticks:
@@ -356,13 +351,10 @@ def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
         'The current': _current_panels(run),
         'What control learnt': _learnt_panels(run),
     }
-    found = {}
+    has, flagged, found = run.traces.has, {'': True, **run.traces.flagged}, {}
     for heading, panels in groups.items():
-        drawn = [
-            panel._replace(curves=tuple(curve for curve in panel.curves if _is_there(curve, run)))
-            for panel in panels
-        ]
-        found[heading] = [
-            panel for panel in drawn if panel.curves or panel.steps or panel.kind != 'time'
-        ]
-    return {heading: panels for heading, panels in found.items() if panels}
+        for panel in panels:
+            curves = tuple(one for one in panel.curves if has(one.name) and flagged[one.flag])
+            if curves or panel.steps or panel.kind != 'time':
+                found.setdefault(heading, []).append(panel._replace(curves=curves))
+    return found

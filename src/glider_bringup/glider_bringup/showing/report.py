@@ -13,11 +13,10 @@ from glider_bringup.scoring.scores import reckoned
 from glider_bringup.scoring.traces import Dive, dives_of
 from glider_bringup.showing.findings import findings, verdict
 from glider_bringup.showing.panels import report_panels
-from glider_bringup.showing.scorecard import card_rows
+from glider_bringup.showing.scorecard import card_rows, title_of
 from glider_bringup.showing.web_page import FlownRun, make_page
 from glider_bringup.showing.words import count, span, way
 from glider_mission.chart import place_told
-from glider_mission.scenario import told_fields
 from glider_model.ocean.current_settings import KNOT_MPS
 
 _BADGES = {
@@ -28,12 +27,6 @@ _BADGES = {
     'aborted': '✕ Aborted',
     'failed': '✕ Failed',
 }
-
-
-def _title(run: FlownRun) -> str:
-    """Name of what was flown, and what was changed in it."""
-    changed = told_fields(run.scenario.changed)
-    return f'{run.scenario.name} with {changed}' if changed else run.scenario.name
 
 
 def _number(value: float | None, digits: int, unit: str) -> str:
@@ -146,7 +139,7 @@ def report_page(run: FlownRun) -> str:
         'report.html',
         [run],
         report_panels(run),
-        title=f'{_title(run)}: {card["status"]}',
+        title=f'{title_of(run.scenario.name, run.scenario.changed)}: {card["status"]}',
         scenario=run.scenario,
         status=card['status'],
         badge=_BADGES[card['status']],

@@ -197,10 +197,14 @@ def guard_texts(card: dict) -> list[str]:
     ]
 
 
+def title_of(scenario: str, changed: dict[str, str]) -> str:
+    """Name of what was flown, and what was changed in it."""
+    return f'{scenario} with {told_fields(changed)}' if changed else scenario
+
+
 def print_card(card: dict, folder: Path, report: Path | None = None) -> None:
     """Print the scorecard for a person, and where the run and its report are."""
-    changed = told_fields(card.get('changed', {}))
-    title = f'{card["scenario"]} with {changed}' if changed else card['scenario']
+    title = title_of(card['scenario'], card.get('changed', {}))
     table = Table(title=title, show_header=False, title_justify='left')
     for name, text in card_rows(card):
         table.add_row(name, text, style=STYLES[card['status']] if name == 'status' else None)
