@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -339,12 +339,10 @@ class _Run:
                 return first
             self.pump(0.05)
 
-    def _wait_for(self, processes, timeout_s: float) -> bool:
-        processes = list(processes)
+    def _wait_for(self, processes: Collection[_Process], timeout_s: float) -> None:
         deadline = time.monotonic() + timeout_s
         while any(p.code is None for p in processes) and time.monotonic() < deadline:
             self.pump(0.05)
-        return all(p.code is not None for p in processes)
 
     # ------------------------------------------------------------------ the end
 
