@@ -8,11 +8,12 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+import glider_bringup as glider
 from glider_base.settings import ConfigurationError
 from glider_bringup.commands.plan import plan
 from glider_bringup.engines.flight import fly
 from glider_bringup.engines.recorded import fly_recorded
-from glider_mission.run_folder import make_run_folder, write_scenario
+from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
 
 #: Two dives on a route that is planned anew between them.
@@ -51,9 +52,9 @@ def test_a_planned_flight_has_its_route_as_orders_and_flies_so_to_the_same_bits(
     assert flight.orders[0].at_s == 0.0
     assert len(flight.orders) > 1
     assert all(order.path.at_end == 'stop' for order in flight.orders)
-    folder = make_run_folder(scenario, tmp_path / 'run')
-    write_scenario(scenario.with_orders(flight.orders), folder)
-    kept = load_scenario(str(folder / 'scenario.yaml'))
+    run = glider.fly(scenario, out=tmp_path / 'run')
+    assert tuple(run.scenario.orders) == flight.orders
+    kept = load_scenario(str(run.folder / 'scenario.yaml'))
     assert kept.guidance.route == 'straight'
     assert not fly(kept, [again]).orders
     one, other = (np.concatenate(rows.blocks) for rows in (first, again))
