@@ -57,7 +57,7 @@ def rights(node: str) -> dict[str, set[str]]:
         publish |= {*block.outputs}
         subscribe |= {*block.inputs}
     if node == GUIDANCE:
-        publish.add('path')
+        publish |= {'path', 'mission/status'}
     if node == PLANT:
         subscribe |= {'recorded', 'heard'}
     if node == RECORDER:

@@ -25,25 +25,33 @@ def guidance_tick(state, t_s, inputs, params, dt):
     state, out = guidance_step(state, odometry, inputs[1][0], params, dt)
     error = (out.error.e1, out.error.e2, out.error.e3)
     outputs = (reference_to_wire(out.reference), error, water_to_wire(out.current))
-    return state, outputs, (out.stage, int(out.infeasible))
+    return state, outputs, (out.stage, int(out.infeasible), out.no_progress)
 
 
-def say(stage: int, infeasible: int) -> Said:
-    """Which stage began, or whether the course can be held."""
+def say_no_progress(waypoint: int) -> str:
+    """That there is no progress."""
+    return f'waypoint {waypoint} comes no nearer'
+
+
+def say(stage: int, infeasible: int, no_progress: int = 0) -> Said:
+    """Which stage began, whether the course can be held, and what comes no nearer."""
     name = STAGE_NAMES[stage]
     values = {'stage': name, 'infeasible': str(bool(infeasible)).lower()}
+    message = name
     if infeasible:
-        message = f'{name}; the course cannot be held against this current'
-        return Said('warn', message, values)
-    return Said('ok', name, values)
+        message += '; the course cannot be held against this current'
+    if no_progress:
+        message += f'; {say_no_progress(no_progress)}'
+        values['no_progress'] = str(no_progress)
+    return Said('ok' if message == name else 'warn', message, values)
 
 
 GUIDANCE = Block(
     WIRED,
     GuidanceSettings,
     guidance_tick,
-    flags=('stage', 'infeasible'),
-    quiet=(-1, -1),
+    flags=('stage', 'infeasible', 'no_progress'),
+    quiet=(-1, -1, 0),
     say=say,
     surface=guidance_abort,
 )

@@ -37,6 +37,12 @@ from glider_guidance.yo.machine import (
     profile_targets,
     surfacing_every_dive,
 )
+from glider_guidance.yo.progress import (
+    Progress,
+    on_another_path,
+    watch_progress,
+    waypoint_not_neared,
+)
 from glider_guidance.yo.stage import (
     AT_END_OF_PATH,
     GLIDING_DOWN,
@@ -84,6 +90,7 @@ class GuidanceParams(NamedTuple):
     method: NamedTuple  #: of the method that was chosen
     end_s: float  #: when the mission ends (s)
     ends_with_path: bool  #: comes up at the end of the path, and stays there
+    no_progress_surfacings: int  #: so many without progress are told; 0: none are
     target_gain: float  #: delta1 (1/s)
     observer: ObserverParams
     heading_filter: FilterParams
@@ -127,6 +134,7 @@ class GuidanceState(NamedTuple):
     water: WaterState = WaterState(ObserverState(0.0, 0.0, 0.0, 0.0), 0.0)
     commanded: Commanded = Commanded(Filtered(0.0, 0.0), Filtered(0.0, 0.0), 0.0)
     infeasible_ticks: int = 0
+    progress: Progress = Progress()
     fixes: FixWatch = INITIAL_FIX_WATCH
 
 
@@ -138,6 +146,7 @@ class GuidanceOutput(NamedTuple):
     current: Water
     stage: int
     infeasible: bool
+    no_progress: int  #: number of the waypoint that it comes no nearer to, from 1 on; 0: none
 
 
 class Place(NamedTuple):
@@ -205,6 +214,7 @@ def _start(state, odometry, params):
         water=WaterState(state.water.observer, params.profile_speed),
         commanded=Commanded(Filtered(psi, 0.0), Filtered(theta, 0.0), psi),
         infeasible_ticks=0,
+        progress=Progress(s, 0, 0),
     )
 
 
@@ -218,7 +228,8 @@ def _change_path(state, odometry, params):
         profile = replace(profile, stage=SURFACE_PREPARATION, ticks=0)
     if is_descending(profile.stage):
         profile = replace(profile, turn_depth=params.profile.depth)
-    return replace(state, profile=profile, s=s, path_id=params.path_id)
+    progress = on_another_path(state.progress, state.tick, s, params.no_progress_surfacings)
+    return replace(state, profile=profile, s=s, path_id=params.path_id, progress=progress)
 
 
 def path_time_s(params: GuidanceParams, current_n: float, current_e: float) -> float:
@@ -449,6 +460,7 @@ def guidance_step(
         state = _change_path(state, odometry, params)
     place = locate(state.s, odometry, params)
     profile, doing = advance(state, place, altitude, params, dt)
+    progress = watch_progress(state.progress, state.tick, state.s, state.profile.stage, profile)
     followed = follow(state, odometry, params, dt)
     water = observe(state.water, place, doing.leg, params, dt)
     current = Water(water.observer.current_n, water.observer.current_e, 0.0)
@@ -471,7 +483,10 @@ def guidance_step(
 
     infeasible_ticks = 0 if asked.feasible else state.infeasible_ticks + 1
     is_infeasible = infeasible_ticks * dt > INFEASIBLE_S
-    output = GuidanceOutput(reference, place.error, current, doing.leg.stage, is_infeasible)
+    stays_at = waypoint_not_neared(progress, state.s, params.no_progress_surfacings, params.path)
+    output = GuidanceOutput(
+        reference, place.error, current, doing.leg.stage, is_infeasible, stays_at
+    )
     return GuidanceState(
         tick=state.tick + 1 if gate.seen else 0,
         gate=gate,
@@ -483,5 +498,6 @@ def guidance_step(
         method=method if gate.seen else state.method,
         commanded=commanded,
         infeasible_ticks=infeasible_ticks,
+        progress=progress,
         fixes=state.fixes,
     ), output

@@ -7,12 +7,15 @@ node sets its parameters there, which is on record.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+import pydantic
 
 from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_S
 from glider_guidance.order import Order
+from glider_guidance.path.settings import WaypointPath
 from glider_guidance.settings import GuidanceSettings
 from glider_guidance.yo.stage import AT_END_OF_PATH, SURFACE_PREPARATION, WAITING_ON_SURFACE
 
@@ -64,6 +67,42 @@ def first_ticks(orders: Iterable[Order], tick: int, stages: np.ndarray) -> list[
     found.sort(key=lambda one: (one[0], one[1].tick))
     last = next((i for i, (_, order) in enumerate(found) if order.abort), len(found))
     return found[: last + 1]
+
+
+def reaction(
+    settings: GuidanceSettings, no_progress: int, odom: Sequence[float], tick: int
+) -> Order | None:
+    """What guidance orders itself as it begins to tell of no progress, if anything.
+
+    Parameters
+    ----------
+    settings : GuidanceSettings
+    no_progress : int
+        Number of the waypoint that comes no nearer.
+    odom : sequence of float
+        Numbers of the topic.
+    tick : int
+        From which the order holds.
+    """
+    at_s = round(tick * TICK_S, 1)
+    if settings.no_progress == 'hold' and not settings.hold:
+        return Order(at_s=at_s, hold=True)
+    if settings.no_progress != 'skip' or settings.path.kind != 'waypoints':
+        return None
+    rest = settings.path.waypoints[no_progress + 1 :]
+    if not rest:
+        return None
+    waypoints = [(float(odom[1]), float(odom[0]), rest[0][2]), *rest]
+    try:
+        path = WaypointPath(kind='waypoints', waypoints=waypoints, at_end=settings.path.at_end)
+    except pydantic.ValidationError:  # it is there
+        return None
+    return Order(at_s=at_s, path=path)
+
+
+def begins(no_progress: np.ndarray, before: float) -> np.ndarray:
+    """Rows in which guidance begins to tell of no progress, int[n]; ``before``: a row earlier."""
+    return np.flatnonzero((no_progress > 0) & (np.concatenate([[before], no_progress[:-1]]) == 0))
 
 
 def ticks_alone(orders: Iterable[Order], tick: int) -> float:

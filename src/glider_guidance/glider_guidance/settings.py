@@ -102,6 +102,22 @@ class GuidanceLawSettings(_MethodGains):
         'never',
         description='a planned route is planned anew at surfacings, with what was observed',
     )
+    no_progress: Literal['tell', 'skip', 'hold'] = Field(
+        'tell',
+        description='what follows where the way along the path gets no shorter: a report alone; '
+        'the next waypoint is headed for; or the vehicle waits at the surface for orders',
+    )
+    no_progress_surfacings: int = Field(
+        3, ge=0, le=1000, description='so many surfacings in a row are no progress; 0: none are'
+    )
+
+    @pydantic.model_validator(mode='after')
+    def _leave_it_to_the_pilot(self):
+        if self.route == 'planned' and self.no_progress != 'tell':
+            raise ValueError(
+                f"no_progress = '{self.no_progress}': not with a planned route (allowed: tell)"
+            )
+        return self
 
     @pydantic.model_validator(mode='before')
     @classmethod
@@ -231,6 +247,7 @@ class GuidanceSettings(GuidanceLawSettings):
             method=self.chosen.params(self.los, vehicle),
             end_s=self.duration_s if self.duration_s > 0.0 else math.inf,
             ends_with_path=self.path.at_end == 'stop',
+            no_progress_surfacings=self.no_progress_surfacings,
             target_gain=self.los.delta1_per_s,
             observer=ObserverParams(self.observer.k3_per_s, self.observer.k4_per_s2),
             heading_filter=FilterParams(

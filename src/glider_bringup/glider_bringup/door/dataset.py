@@ -310,6 +310,7 @@ def _flags(log: np.ndarray) -> dict[str, tuple]:
         'flag_meanings': ' '.join(names),
     }
     course = {'long_name': '1 where the course cannot be held in this current'}
+    stays = {'long_name': 'number of the waypoint that comes no nearer, 0 for none'}
     bits = {
         SATURATED_BUOYANCY: 'buoyancy_engine_at_limit',
         SATURATED_PITCH: 'pitch_mass_at_limit',
@@ -321,6 +322,7 @@ def _flags(log: np.ndarray) -> dict[str, tuple]:
     return {
         'stage': ('time', stage, told | stages),
         'infeasible': ('time', log[:, COLUMNS['infeasible']].astype(np.int8), told | course),
+        'no_progress': ('time', log[:, COLUMNS['no_progress']].astype(np.int32), told | stays),
         'saturation': _bits('saturation', log, 'what control notices', bits),
         'guard': _bits('guard', log, 'what the guard tells', {row.bit: row.name for row in ROWS}),
     }

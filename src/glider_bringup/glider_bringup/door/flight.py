@@ -23,6 +23,7 @@ from glider_bringup.engines.flight import Held, Kept, refuse_message_faults, ref
 from glider_control.law import LawSettings
 from glider_guard.rows import LATCHED
 from glider_guidance.order import Order
+from glider_guidance.status import Status
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.chart import in_metres
@@ -161,6 +162,11 @@ class Flight:
         from glider_bringup.door.dataset import numbers_of
 
         return {} if self._past.row is None else numbers_of(self._past.row, self.scenario)
+
+    @property
+    def status(self) -> Status:
+        """How the mission goes, as ``mission/status`` tells it over nodes."""
+        return self._held.status
 
     def step(self, n: int = 1) -> Event:
         """Fly ``n`` ticks of 0.1 s, or until the mission ends; raises as `until`."""

@@ -26,20 +26,23 @@ from glider_bringup.engines.interrupts import interrupts_noted
 from glider_guidance.guidance import guidance_abort
 from glider_guidance.order import Order
 from glider_guidance.orders import (
+    begins,
     changed,
     check_orders,
     due,
     is_surfaced,
+    reaction,
     ticks_alone,
     wait_for_surface,
 )
 from glider_guidance.settings import GuidanceSettings
+from glider_guidance.status import Status, status_of
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.disk import VANISHED, DiskError
 from glider_mission.routing.pilot import LOOK_TICKS, Pilot
 from glider_mission.scenario import Scenario
 
-_STAGE = COLUMNS['stage']
+_STAGE, _NO_PROGRESS, _ODOM = (COLUMNS[name] for name in ('stage', 'no_progress', 'odom'))
 
 #: Called now and then with the ticks flown and the depth (m).
 Progress = Callable[[int, float], None]
@@ -76,6 +79,8 @@ class Kept(NamedTuple):
     mission: MissionState
     tick: int  #: ticks flown
     stage: int  #: of guidance, at the last one; -1: there was none
+    no_progress: int  #: what guidance told of that then
+    own: tuple[Order, ...]  #: what it orders itself by that, to come
     settings: GuidanceSettings  #: by the orders that hold
     followed: tuple[Order, ...]  #: those that were given in flight, and held until now
     waiting: tuple[Order, ...]  #: those to come
@@ -95,8 +100,9 @@ class Held:
     ) -> None:
         state, self._params = mission or mission_of(scenario)
         self._held = hold(state, self._params)
-        self.tick, self._stage = 0, -1
+        self.tick, self._stage, self._no_progress = 0, -1, 0
         self._scenario, self._settings = scenario, scenario.guidance_settings()
+        self._own: tuple[Order, ...] = ()
         self._followed: tuple[Order, ...] = ()
         self._waiting = tuple(scenario.orders)
         fly_held(self._held, np.empty((0, ROW)), TICK_S)
@@ -107,15 +113,23 @@ class Held:
             mission=held_state(self._held),
             tick=self.tick,
             stage=self._stage,
+            no_progress=self._no_progress,
+            own=self._own,
             settings=self._settings,
             followed=self._followed,
             waiting=self._waiting,
         )
 
+    @property
+    def status(self) -> Status:
+        """How the mission goes, by guidance."""
+        return status_of(held_state(self._held).guidance, self._settings.params())
+
     def restore(self, kept: Kept) -> None:
         """Go on from there."""
         set_held(self._held, kept.mission)
         self.tick, self._stage, self._waiting = kept.tick, kept.stage, kept.waiting
+        self._no_progress, self._own = kept.no_progress, kept.own
         self._tell(kept.settings, kept.followed)
 
     def order(self, order: Order) -> None:
@@ -136,25 +150,37 @@ class Held:
         """Fill a log, float64[n, ROW]; rows filled, and whether the mission has ended."""
         filled, is_over = 0, False
         while filled < len(log) and not is_over:
-            for order in due(self._waiting, self.tick, self._stage):
+            for order in due((*self._waiting, *self._own), self.tick, self._stage):
                 self._follow(order)
+            self._own = ()
             ticks = int(min(len(log) - filled, ticks_alone(self._waiting, self.tick)))
-            flown, is_over = self._until_surface(log[filled : filled + ticks])
+            flown, is_over = self._until_told(log[filled : filled + ticks])
             filled += flown
             self.tick += flown
-            self._stage = int(log[filled - 1, _STAGE])
+            self._look(log[filled - 1])
         return filled, is_over
 
-    def _until_surface(self, log: np.ndarray) -> tuple[int, bool]:
-        """Fill a log, but not beyond where an order waits for the surface."""
+    def _until_told(self, log: np.ndarray) -> tuple[int, bool]:
+        """Fill a log, but not beyond where an order waits for the surface, or is a reaction."""
         waits = wait_for_surface(self._waiting, self.tick)
-        before = held_state(self._held) if waits else None
+        reacts = self._settings.no_progress != 'tell'
+        before = held_state(self._held) if waits or reacts else None
         rows, is_over = fly_held(self._held, log, TICK_S)
         up = np.flatnonzero(is_surfaced(log[:rows, _STAGE])) if waits else ()
-        if len(up) and up[0] + 1 < rows:  # again, and no further
+        stays = begins(log[:rows, _NO_PROGRESS], self._no_progress) if reacts else ()
+        last = min((int(found[0]) + 1 for found in (up, stays) if len(found)), default=rows)
+        if last < rows:  # again, and no further
             set_held(self._held, before)
-            rows, is_over = fly_held(self._held, log[: up[0] + 1], TICK_S)
+            rows, is_over = fly_held(self._held, log[:last], TICK_S)
         return rows, is_over
+
+    def _look(self, row: np.ndarray) -> None:
+        """Note what guidance told at the last tick, and what it orders itself by that."""
+        before, self._no_progress = self._no_progress, int(row[_NO_PROGRESS])
+        self._stage = int(row[_STAGE])
+        if self._no_progress and not before:
+            order = reaction(self._settings, self._no_progress, row[_ODOM], self.tick)
+            self._own = (order,) if order else ()
 
     def _follow(self, order: Order) -> None:
         """Do what an order says."""
@@ -164,7 +190,13 @@ class Held:
             state = held_state(self._held)
             set_held(self._held, state._replace(guidance=guidance_abort(state.guidance)))
             return
-        self._tell(changed(self._settings, order), (*self._followed, order))
+        try:
+            settings = changed(self._settings, order)
+        except ConfigurationError:  # it made sense before guidance ordered itself something
+            return
+        # who ends the run knows what was ordered from outside, as over nodes
+        given = () if any(one is order for one in self._own) else (order,)
+        self._tell(settings, (*self._followed, *given))
 
     def _tell(self, settings: GuidanceSettings, followed: tuple[Order, ...]) -> None:
         """Fly on with other settings of guidance, by orders that were followed."""
@@ -252,7 +284,8 @@ def fly(
         pilot = Pilot(scenario) if scenario.guidance.route == 'planned' else None
         start = time.perf_counter()
         try:
-            held = Held(scenario, (state, params)) if scenario.orders or pilot else None
+            is_held = scenario.orders or pilot or scenario.guidance.no_progress != 'tell'
+            held = Held(scenario, (state, params)) if is_held else None
             advance = _piloted(held, pilot) if held and pilot else held and held.fly
             for log in blocks_of(advance) if advance else fly_blocks(state, params):
                 for taker in takers:

@@ -171,6 +171,7 @@ _Card = _part(
     actuator_travel=_part('buoyancy_engine_kg pitch_mass_m roll_mass_deg'),
     final_state=_State | None,
     guard=(_part(events=(list[_Event], [])), {}),
+    no_progress=(_part(events=(list[_Event], [])), {}),
     faults=(list[_Fault], []),
     navigation=(_Navigation | None, None),
     energy=(_Energy | None, None),

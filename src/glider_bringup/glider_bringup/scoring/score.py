@@ -13,6 +13,7 @@ What is scored is the true motion, whatever the vehicle believes.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +41,8 @@ from glider_bringup.scoring.scores import Flown, measured, seconds
 from glider_bringup.scoring.true_motion import TrueMotion
 from glider_control.intake import REFUSED
 from glider_guard.rows import ALL, DROP, LATCHED, NOTE, REACTIONS, ROWS, SURFACE, reaction_of
+from glider_guidance.block import say_no_progress
+from glider_guidance.orders import begins
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS
 from glider_mission.rules import Rules
@@ -56,7 +59,7 @@ INFEASIBLE_SHARE = 0.5
 
 #: The course of the path is told by so much of it (m).
 COURSE_M = 1.0
-#: So many events of the guard are kept.
+#: So many events of the guard, or of guidance, are kept.
 EVENTS_KEPT = 100
 #: What the event of a refused measurement says.
 REFUSED_SAYS = 'a measurement was refused, the last good one serves'
@@ -134,6 +137,7 @@ class Scorer:
         self._first: np.ndarray | None = None
         self._last: np.ndarray | None = None
         self._end: tuple[int, np.ndarray] | None = None
+        self._stays: list[dict[str, Any]] = []
 
     def add(self, log: np.ndarray) -> None:
         """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
@@ -150,7 +154,11 @@ class Scorer:
         if self._bottom:
             self._bottom.add(*np.ascontiguousarray(poses_from_wire(log[:, _ODOM])[:, :3].T))
         if self._first is None:
-            self._first = log[0].copy()
+            self._first = self._last = log[0].copy()
+        no_progress = log[:, COLUMNS['no_progress']]
+        for row in begins(no_progress, self._last[COLUMNS['no_progress']]).tolist():
+            said = say_no_progress(int(no_progress[row]))
+            self._stays += [{'t_s': seconds(self.ticks - len(log) + row), 'message': said}]
         self._last = log[-1].copy()
         at_end = np.flatnonzero(log[:, COLUMNS['stage']] == AT_END_OF_PATH)
         if self._end is None and len(at_end):
@@ -173,9 +181,9 @@ class Scorer:
         -------
         dict
             The run's part of ``score.json``: ticks, settle_s, dives, distance_along_path_m,
-            end_of_path_m, arrival, bottom, what is `measured`, actuator_travel, energy, guard,
-            faults, navigation, final_state, and ``status`` and ``reason`` of a run that was flown
-            to its end. A figure without data is None.
+            end_of_path_m, arrival, no_progress, bottom, what is `measured`, actuator_travel,
+            energy, guard, faults, navigation, final_state, and ``status`` and ``reason`` of a run
+            that was flown to its end. A figure without data is None.
         """
         series, ticks = self._series, self.ticks
         depth, told = series('depth'), as_told(series('guard').astype(np.int64) & ALL)
@@ -207,6 +215,7 @@ class Scorer:
             'dives': dives,
             'distance_along_path_m': way_m,
             **self._arrival(rules),
+            'no_progress': {'events': self._stays[:EVENTS_KEPT]},
             'bottom': self._bottom.result() if self._bottom else None,
             **measured(flown),
             'actuator_travel': self._actuator_travel(),

@@ -12,7 +12,7 @@ from glider_base.settings import ConfigurationError
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.scoring.scores import SCORES, Score, reckoned
 from glider_bringup.showing.panels import ACTUATORS, FLOWN, SPACE, SURFACE, flown_panel
-from glider_bringup.showing.scorecard import engine_text, flown_text, guard_texts, show
+from glider_bringup.showing.scorecard import engine_text, event_texts, flown_text, show
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page
 from glider_bringup.showing.words import small, span
 from glider_mission.scenario import told_fields
@@ -168,8 +168,8 @@ def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
         rows.append(
             told('navigation', lambda card: (reckoned(card) or {'method': 'known'})['method'])
         )
-    if any(guard_texts(card) for card in cards):
-        rows.append(told('guard', lambda card: '; '.join(guard_texts(card)) or 'nothing'))
+    if any(event_texts(card, 'guard') for card in cards):
+        rows.append(told('guard', lambda card: '; '.join(event_texts(card, 'guard')) or 'nothing'))
     return rows + [
         (score.label, _cells(score, cards))
         for score in SCORES

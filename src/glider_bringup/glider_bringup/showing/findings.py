@@ -12,7 +12,7 @@ from glider_bringup.scoring.card import STOPPED
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.scoring.traces import Traces
 from glider_bringup.showing.panels import actuators_of
-from glider_bringup.showing.scorecard import arrival_text, fault_texts, guard_texts
+from glider_bringup.showing.scorecard import arrival_text, event_texts, fault_texts
 from glider_bringup.showing.web_page import FlownRun
 from glider_bringup.showing.words import count, small, span, way
 from glider_mission.rules import STEADY_DEPTH_M
@@ -176,7 +176,8 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
     if told:
         notes += navigation_notes(told, run.scenario.navigation.current != 'none')
     notes += [f'Broken on purpose: {text}.' for text in fault_texts(card)]
-    problems += [f'The guard, {text}.' for text in guard_texts(card)]
+    problems += [f'The guard, {text}.' for text in event_texts(card, 'guard')]
+    problems += [f'Guidance, {text}.' for text in event_texts(card, 'no_progress')]
     if (card.get('bottom') or {}).get('touched'):
         problems.append(f'It touched the bottom at {at(card["bottom"]["t_s"])}.')
     if card['messages_lost']:

@@ -104,7 +104,8 @@ def engine_text(card: dict) -> str:
 def _end_rows(card: dict) -> list[tuple[str, str]]:
     """Lines of what broke, what the guard told, and where it came up if it flew to its end."""
     rows = [('fault', text) for text in fault_texts(card)]
-    rows += [('guard', text) for text in guard_texts(card)]
+    rows += [('guard', text) for text in event_texts(card, 'guard')]
+    rows += [('guidance', text) for text in event_texts(card, 'no_progress')]
     texts = {'arrival': arrival_text(card), 'bottom': bottom_text(card)}
     return [*rows, *((name, text) for name, text in texts.items() if text)]
 
@@ -182,10 +183,10 @@ def fault_texts(card: dict) -> list[str]:
     ]
 
 
-def guard_texts(card: dict) -> list[str]:
-    """What the guard told, in words: each kind once, with its first time and how often."""
+def event_texts(card: dict, told: str) -> list[str]:
+    """What the guard told, or guidance of no progress: each once, its first time, how often."""
     first, count = {}, Counter()
-    for event in card.get('guard', {}).get('events', []):
+    for event in card.get(told, {}).get('events', []):
         reaction, text = event.get('reaction'), event['message']
         if reaction not in (None, 'none', 'note'):
             text = f'{reaction}: {text}'

@@ -18,10 +18,12 @@ from glider_base.signals import TICK_NS, Water
 from glider_base.wiring import MAP
 from glider_guidance.block import GUIDANCE
 from glider_guidance.order import Order
-from glider_guidance.orders import changed, due
+from glider_guidance.orders import changed, due, reaction
+from glider_guidance.status import status_of
 
 #: Number of points of the published path.
 PATH_POINTS = 500
+SECOND_NS = 10**9
 
 
 class GuidanceNode(BlockNode):
@@ -35,6 +37,8 @@ class GuidanceNode(BlockNode):
         self.create_service(Trigger, 'abort', self.on_abort)
         self.waiting, self.first_ns = list(self.settings.orders), None
         self.publish_path = self.add_output('path')
+        self.publish_status, self.second = self.add_output('mission/status'), -1
+        self.answer = ''  #: to the last order
         self.tell_path(0)
         self.start_up()
 
@@ -52,12 +56,39 @@ class GuidanceNode(BlockNode):
             self.follow(stamp_ns, order)
         if self.settings.path != self.told_path:
             self.tell_path(stamp_ns)
+        before = self.flags[2] if self.flags else 0
         super().step(stamp_ns, *inputs)
+        no_progress = self.flags[2]
+        if no_progress and not before:
+            order = reaction(self.settings, no_progress, inputs[0], tick + 1)
+            self.waiting += [order] if order else []
+        if stamp_ns // SECOND_NS != self.second:
+            self.second = stamp_ns // SECOND_NS
+            self.tell_status(stamp_ns)
+
+    def tell_status(self, stamp_ns: int) -> None:
+        """Publish how the mission goes, once a second."""
+        told = {
+            name: value if isinstance(value, str | int) else round(value, 3)
+            for name, value in status_of(self.state, self.params)._asdict().items()
+        }
+        said, name = self.block.say(*self.flags), self.get_fully_qualified_name()
+        values = {**told, 'order': self.answer}
+        level = health.LEVELS[said.level]
+        self.publish_status(health.status_array(stamp_ns, name, level, said.message, values))
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]):
+        """Set parameters at run time, and answer an order on `mission/status`."""
+        said = super().set_parameters_atomically(parameter_list)
+        names = ', '.join(parameter.name for parameter in parameter_list)
+        self.answer = f'taken: {names}' if said.successful else refused(said.reason)
+        return said
 
     def follow(self, stamp_ns: int, order: Order) -> None:
         """Do what an order says."""
         if order.abort:
             self.waiting.clear()
+            self.answer = 'taken: abort'
             self.surface(health.ABORT)
             return
         values = {
@@ -72,14 +103,21 @@ class GuidanceNode(BlockNode):
         except ConfigurationError as error:
             reason = str(error)
         if reason:
-            self.event(stamp_ns, health.WARN, f'order refused: {reason}')
+            self.answer = refused(reason)
+            self.event(stamp_ns, health.WARN, self.answer)
 
     def on_abort(self, request, response):
         """Serve ``abort``."""
+        self.answer = 'taken: abort'
         self.surface(health.ABORT)
         response.success = True
         response.message = 'surfacing'
         return response
+
+
+def refused(why: object) -> str:
+    """What the event of an order says that makes no sense."""
+    return f'order refused: {why}'
 
 
 def path_message(points, stamp_ns: int = 0) -> Path:

@@ -102,6 +102,7 @@ TOPICS = {
     for topic in (
         *(_per_tick(name) for wired in WIRING for name in wired.outputs),
         Topic('path', Path, GUIDANCE, qos=qos.LATCHED),
+        Topic('mission/status', DiagnosticArray, GUIDANCE, qos=qos.LATCHED, recorded=False),
         Topic('/diagnostics', DiagnosticArray, 'all', qos=qos.EVENTS),
         Topic('lockstep', DiagnosticArray, 'all', qos=qos.EVENTS, recorded=False),
         Topic('told', DiagnosticArray, 'all', qos=qos.EVENTS, recorded=False),

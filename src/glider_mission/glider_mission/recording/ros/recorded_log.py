@@ -47,6 +47,7 @@ def _mask(text: str) -> float:
 #: Columns of a row that events on /diagnostics tell, by their keys, and how they are read.
 _FLAGS = {
     'infeasible': lambda text: float(text == 'true'),
+    'no_progress': _mask,
     'stage': _stage_number,
     'saturation': _mask,
     'guard': _mask,
@@ -153,12 +154,16 @@ class RecordedLog:
             except Exception:  # the middleware has no class for bytes that are no message
                 continue
             self.end = self.end or health.end_of_run(array)
-            self._flags += [
-                (health.stamp_of(array) // TICK_NS, pair.key, _FLAGS[pair.key](pair.value))
-                for status in array.status
-                for pair in status.values
-                if pair.key in _FLAGS
-            ]
+            tick = health.stamp_of(array) // TICK_NS
+            for status in array.status:
+                values = {pair.key: pair.value for pair in status.values}
+                if 'stage' in values:  # and nothing else that has to be said each time
+                    values.setdefault('no_progress', '0')
+                self._flags += [
+                    (tick, key, _FLAGS[key](value))
+                    for key, value in values.items()
+                    if key in _FLAGS
+                ]
 
     def _put(self, found: dict[str, Decoded]) -> Iterator[np.ndarray]:
         """Put messages into their rows; gives the rows that are far behind."""
@@ -184,7 +189,7 @@ class RecordedLog:
         missing = np.flatnonzero(np.any(np.isnan(numbers), axis=1))
         rows = int(missing[0]) if len(missing) else BLOCK_TICKS
         block = self._log[:rows].copy()
-        block[:, [COLUMNS['infeasible'], COLUMNS['saturation'], COLUMNS['guard']]] = 0.0
+        block[:, [COLUMNS[name] for name in _FLAGS if name != 'stage']] = 0.0
         for tick, column, value in self._flags:
             block[max(0, tick - self._start) :, COLUMNS[column]] = value
         if len(missing):

@@ -1,0 +1,107 @@
+# Copyright 2026 The glider stack authors
+# SPDX-License-Identifier: Apache-2.0
+"""How a mission goes, as a pilot is told: what is foretold comes true, and orders are answered."""
+
+import signal
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+
+import glider_bringup as glider
+from glider_base.ros.places import domain_id
+from glider_base.ros.wire import qos
+from glider_base.wiring import at_rest
+from glider_guidance.nodes.guidance_node import GuidanceNode
+
+DIVES = {'profile.depth_m': 100.0, 'profile.surface_every_dives': 2, 'profile.wait_s': 60.0}
+STILL = {'current.speed_mps': 0.0, 'dives': 0}
+LEGS = {'kind': 'waypoints', 'waypoints': [[0, 0], [700, 0], [700, 500]], 'at_end': 'stop'}
+
+
+def surfaced(flight) -> float:
+    """Time of the next surfacing (s)."""
+    flight.until('surfacing')
+    return flight.t_s
+
+
+def test_next_surfacing_and_arrival_come_when_they_are_foretold():
+    flight = glider.Flight('current_8deg', {**DIVES, **STILL, 'path': LEGS})
+    assert flight.status.next_surfacing_s == 0.0 and flight.status.legs == 2
+    flight.until(t_s=300.0)
+    told = flight.status
+    assert (told.leg, told.dives, told.stage) == (1, 0, 'gliding down')
+    assert 900.0 < told.to_go_m < 1200.0
+    up_s = surfaced(flight)
+    assert told.t_s + told.next_surfacing_s == pytest.approx(up_s, rel=0.1)
+    assert flight.until('arrival').name == 'arrival'
+    assert told.t_s + told.eta_s == pytest.approx(flight.t_s, rel=0.2)
+    assert flight.status.leg == 2 and abs(flight.status.to_go_m) < 30.0
+
+
+def test_to_go_grows_for_who_is_carried_back():
+    flight = glider.Flight(
+        'current_8deg', {**DIVES, 'current.speed_mps': 0.6, 'current.direction_deg': 180.0}
+    )
+    flight.until(t_s=2000.0)
+    assert flight.status.to_go_m > 25000.0
+    assert flight.status.eta_s == float('inf')
+
+
+def test_who_holds_is_told_when_it_is_up():
+    flight = glider.Flight('current_8deg', DIVES)
+    flight.until(t_s=900.0)
+    flight.order(hold=True)
+    flight.step(10)
+    told = flight.status
+    assert told.t_s + told.next_surfacing_s == pytest.approx(surfaced(flight), abs=120.0)
+
+
+@pytest.fixture
+def context(monkeypatch):
+    """ROS context in a domain of its own, and the signals of this process as they were."""
+    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    context = Context()
+    with domain_id() as domain:
+        rclpy.init(context=context, domain_id=domain)
+        yield context
+        rclpy.try_shutdown(context=context)
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def test_a_node_tells_it_once_a_second_and_answers_orders(context):
+    node = GuidanceNode(context=context, parameter_overrides=[])
+    listener = rclpy.create_node('listener', context=context)
+    heard, executor = [], SingleThreadedExecutor(context=context)
+    listener.create_subscription(DiagnosticArray, 'mission/status', heard.append, qos.LATCHED)
+    executor.add_node(listener)
+    inputs = at_rest('odom'), at_rest('altitude')
+
+    def told(tick: int) -> dict[str, str]:
+        node.step(tick * 10**8, *inputs[: len(node.inputs)])
+        before = len(heard)
+        while len(heard) == before:
+            executor.spin_once(timeout_sec=30.0)
+        (status,) = heard[-1].status
+        return {pair.key: pair.value for pair in status.values}
+
+    try:
+        first = told(0)
+        assert first['stage'] == 'surface preparation' and first['order'] == ''
+        assert float(first['to_go_m']) == pytest.approx(25000.0)
+        node.set_parameters_atomically([Parameter('profile.depth_m', value=200.0)])
+        node.step(5 * 10**8, *inputs[: len(node.inputs)])
+        assert told(10)['order'] == 'taken: profile.depth_m'
+        assert len(heard) == 2
+        node.set_parameters_atomically([Parameter('profile.depth_m', value=9000.0)])
+        assert told(20)['order'].startswith('order refused: ')
+    finally:
+        node.close()
+        node.destroy_node()
+        listener.destroy_node()
