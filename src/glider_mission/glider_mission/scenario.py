@@ -225,6 +225,7 @@ class Scenario(Settings):
         return _told(
             PlantSettings,
             self,
+            water=self.resolved_water(),
             bathymetry=self._bathymetry(),
             dives=0 if self._holds else self.dives,
             dive_depth_m=self.shallowest_m,
@@ -266,6 +267,13 @@ class Scenario(Settings):
     def resolved_current(self, current: SumOfCurrents) -> SumOfCurrents:
         """A current with what it has to know of the mission."""
         return current.resolved(self.path.course_rad(), self._mission() if current.field else None)
+
+    def resolved_water(self) -> WaterSettings:
+        """Its water, which knows where and when the mission is."""
+        grid = self.water.grid
+        if not grid.file:
+            return self.water
+        return self.water.model_copy(update={'grid': grid.resolved(self._mission())})
 
     def _bathymetry(self) -> BathymetrySettings:
         """Chart of the bottom, which knows where the mission is, if there is one."""
@@ -537,9 +545,15 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
         with told_of('bathymetry.', ValueError):
             bathymetry = bathymetry.known()
             scenario.bottom()
+    water = scenario.water
+    if water.grid.file:
+        with told_of('water.grid.', ValueError):
+            water = water.model_copy(update={'grid': water.grid.known()})
+            scenario.resolved_water().params()
     forecast = {'forecast': told['navigation.forecast']}
     navigation = scenario.navigation.model_copy(update=forecast)
-    changed = {'current': told['current'], 'navigation': navigation, 'bathymetry': bathymetry}
+    changed = {'current': told['current'], 'navigation': navigation}
+    changed |= {'bathymetry': bathymetry, 'water': water}
     return scenario.model_copy(update=changed)
 
 

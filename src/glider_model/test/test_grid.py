@@ -7,12 +7,17 @@ import pytest
 import xarray
 
 from glider_base.frames import OriginSettings, from_geodetic
+from glider_base.settings import ConfigurationError, validate
+from glider_base.signals import SEA_WATER_DENSITY
 from glider_model.ocean.bottom import BathymetrySettings, bottom_depth
 from glider_model.ocean.current import current_initial, current_step
 from glider_model.ocean.current_settings import CurrentSettings
+from glider_model.ocean.density import immersed
 from glider_model.ocean.field import Mission, field_velocity
 from glider_model.ocean.fields.grid import GridSettings, interpolate
 from glider_model.ocean.grid_file import contents, load
+from glider_model.ocean.water import ModelWaterSettings, WaterSettings, around, water_there
+from glider_model.plant.plant import PlantSettings
 
 DEPTHS = np.array([0.494, 2.6, 9.6, 25.2, 65.8, 130.7, 266.0, 541.1, 1062.4])
 TIMES = np.datetime64('2026-03-01T12:00') + np.arange(4) * np.timedelta64(24, 'h')
@@ -323,3 +328,129 @@ def test_a_path_over_land_is_refused(tmp_path):
     settings = BathymetrySettings(file=str(tmp_path / 'chart.nc')).resolved(mission((36.0, 122.0)))
     with pytest.raises(ValueError, match=r'36.0000, 122.0000 on the path is land'):
         settings.params()
+
+
+#: Names of CMEMS and HYCOM, and what CF calls their temperature.
+HYDROGRAPHY = {
+    'cmems': ('thetao', 'so', 'sea_water_potential_temperature'),
+    'hycom': ('water_temp', 'salinity', 'sea_water_temperature'),
+}
+PLACES = (35.0, 121.0), (37.0, 123.0)
+
+
+@pytest.fixture
+def gsw():
+    """The library by which density follows from temperature and salinity."""
+    return pytest.importorskip('gsw')
+
+
+def hydrography(layout='cmems', **units):
+    """A warm and fresh front to the north, that warms by the day."""
+    latitudes, longitudes = np.arange(34.0, 38.01, 0.25), np.arange(120.0, 124.01, 0.25)
+    t, z, y, x = np.meshgrid(np.arange(4.0), DEPTHS, latitudes, longitudes, indexing='ij')
+    warm = 4.0 + 14.0 * np.exp(-z / 150.0) + (y - 36.0) + 0.2 * t + 0.1 * x - 12.0
+    salt = 34.5 + 0.4 * (1.0 - np.exp(-z / 200.0)) - 0.2 * (y - 36.0)
+    temperature, salinity, standard = HYDROGRAPHY[layout]
+    dims = ('time', 'depth', 'latitude', 'longitude')
+    told = {'temperature': 'degrees_C', 'salinity': '1e-3', **units}
+    variables = {
+        temperature: (dims, warm, {'standard_name': standard, 'units': told['temperature']}),
+        salinity: (
+            *(dims, salt),
+            {'standard_name': 'sea_water_salinity', 'units': told['salinity']},
+        ),
+    }
+    coords = {
+        'time': ('time', TIMES, {'standard_name': 'time'}),
+        'depth': ('depth', DEPTHS, {'units': 'm', 'positive': 'down'}),
+        'latitude': ('latitude', latitudes, {'units': 'degrees_north'}),
+        'longitude': ('longitude', longitudes, {'units': 'degrees_east'}),
+    }
+    return xarray.Dataset(variables, coords)
+
+
+def params_of(path, *places):
+    """Kernel parameters of a mission's water."""
+    return ModelWaterSettings(file=str(path)).resolved(mission(*places)).params(0.0)
+
+
+@pytest.mark.parametrize('layout', HYDROGRAPHY)
+def test_density_is_that_of_gsw_at_the_points_of_the_grid(layout, gsw, tmp_path):
+    """1e-3 kg/m^3, and 1e-5 degC in place: potential temperature is not that of the place."""
+    data = hydrography(layout)
+    params = params_of(written(data, tmp_path / 'sea.nc'), *PLACES)
+    temperature, salinity, standard = HYDROGRAPHY[layout]
+    for t, z, latitude, longitude in (
+        (0, 0, 35.0, 121.0),
+        (2, 6, 36.5, 122.25),
+        (3, 8, 37.0, 123.0),
+    ):
+        at = data.isel(time=t, depth=z).sel(latitude=latitude, longitude=longitude)
+        pressure = gsw.p_from_z(-DEPTHS[z], 45.0)
+        absolute = gsw.SR_from_SP(at[salinity].item())
+        make = gsw.CT_from_pt if 'potential' in standard else gsw.CT_from_t
+        more = () if 'potential' in standard else (pressure,)
+        conservative = make(absolute, at[temperature].item(), *more)
+        n, e = from_geodetic(latitude, longitude, params.origin)
+        rise, warm = water_there(DEPTHS[z], params._replace(n=n, e=e, t_s=t * 86400.0))
+        density = SEA_WATER_DENSITY * (1.0 + rise)
+        assert density == pytest.approx(gsw.rho(absolute, conservative, pressure), abs=1e-3)
+        assert warm == pytest.approx(gsw.t_from_CT(absolute, conservative, pressure), abs=1e-5)
+
+
+def test_between_the_points_it_is_linear_and_held_at_the_ends(gsw, tmp_path):
+    params = params_of(written(hydrography(), tmp_path / 'sea.nc'), *PLACES)
+    last = water_there(DEPTHS[-1], params)
+    assert water_there(2000.0, params) == last and water_there(0.0, params) == water_there(
+        0.4, params
+    )
+    between = water_there(0.5 * (DEPTHS[6] + DEPTHS[7]), params)
+    ends = [water_there(DEPTHS[i], params) for i in (6, 7)]
+    assert between == pytest.approx(np.mean(ends, axis=0), abs=1e-12)
+
+
+def test_a_vehicle_is_neutral_where_it_was_ballasted_and_lighter_in_denser_water(gsw, tmp_path):
+    """In the fresh and warm north it is heavier by as much as its volume of water is lighter."""
+    told = WaterSettings(grid={'file': str(written(hydrography(), tmp_path / 'sea.nc'))})
+    water = told.model_copy(update={'grid': told.grid.resolved(mission(*PLACES))})
+    plant = PlantSettings(water=water).params()
+    there = around(plant, *from_geodetic(*PLACES[1], plant.density.origin), 0.0, plant.density)
+    here = around(plant, *from_geodetic(*PLACES[0], plant.density.origin), 0.0, plant.density)
+    net = [immersed(0.0, 0.0, one.vehicle, one.density).net for one in (here, there)]
+    assert net[0] == pytest.approx(0.0, abs=1e-9)
+    rises = [water_there(0.0, one.density)[0] for one in (here, there)]
+    volume = plant.vehicle.m / (SEA_WATER_DENSITY * (1.0 + rises[0]))
+    assert net[1] == pytest.approx(volume * SEA_WATER_DENSITY * (rises[0] - rises[1]), rel=1e-9)
+    assert net[1] > 0.05
+
+
+@pytest.mark.parametrize(
+    ('change', 'says'),
+    [
+        (
+            lambda data: data.drop_vars('so'),
+            r'no salinity \(allowed: .* called so or salinity; it',
+        ),
+        (lambda data: hydrography(temperature='K'), r"thetao: units = 'K' \(allowed: degrees_C"),
+        (lambda data: data.isel(time=slice(0, 2)), r'the mission goes from .* the times of the'),
+        (lambda data: data.where(data.latitude > 35.2), r'35.0000, 121.0000 on the path is land'),
+        (lambda data: data.rename(latitude='node'), r'dimension node is no axis; a mesh'),
+    ],
+)
+def test_what_has_no_such_water_is_refused_by_name(change, says, tmp_path):
+    path = written(change(hydrography()), tmp_path / 'sea.nc')
+    with pytest.raises(ValueError, match=says) as error:
+        params_of(path, *PLACES)
+    assert str(path) in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ('also', 'says'),
+    [
+        ({'pycnocline_rise': 0.002}, r'pycnocline_rise = 0.002: the grid says the density'),
+        ({'profile': [[0.0, 1025.0]]}, r'profile: the grid says the density'),
+    ],
+)
+def test_the_grid_alone_says_the_density(also, says):
+    with pytest.raises(ConfigurationError, match=says):
+        validate(WaterSettings, {'grid': {'file': 'sea.nc'}, **also}, 'water')

@@ -107,7 +107,7 @@ def _levels(depth: float) -> np.ndarray:
 
 def _rise(scenario: Scenario, params: GuidanceParams) -> tuple[float, float]:
     """Time (s) and way through the water (m) of a climb with all the pump has."""
-    body, water = load_vehicle(scenario.vehicle).params(), scenario.water.params()
+    body, water = load_vehicle(scenario.vehicle).params(), scenario.resolved_water().params()
     profile, (time_s, way_m) = params.profile, (0.0, 0.0)
     step = profile.depth / _LEVELS
     for depth in _levels(profile.depth):
@@ -125,7 +125,11 @@ def _cycle_wh(
     vehicle, profile = load_vehicle(scenario.vehicle), params.profile
     if vehicle.energy is None:
         return None
-    told, water, body = vehicle.energy.params(), scenario.water.params(), vehicle.params()
+    told, water, body = (
+        vehicle.energy.params(),
+        scenario.resolved_water().params(),
+        vehicle.params(),
+    )
 
     def heaviness(depth: float, net: float) -> float:
         """What the pump makes of it (kg) for a net weight (kg) in the water of a depth (m)."""

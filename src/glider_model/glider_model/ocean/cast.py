@@ -126,15 +126,28 @@ def read_cast(path: Path) -> list[list[float]]:
     names = [name for name, _ in found]
     table = {name: np.array([row[name] for _, row in found]) for name in columns}
     if 'density_kgpm3' not in table:
-        table['density_kgpm3'] = _density(table, source)
+        told = (table[name] for name in ('depth_m', 'temperature_degC', 'salinity_psu'))
+        table['density_kgpm3'], _ = density_of(source, *told)
     order = [name for name in ('depth_m', *COLUMNS[1:3]) if name in table]
     rows = [[float(number) for number in row] for row in zip(*map(table.get, order), strict=True)]
     check_cast(rows, names, source)
     return rows
 
 
-def _density(table: dict[str, np.ndarray], source: str) -> np.ndarray:
-    """Density (kg/m^3) in place, by TEOS-10 with the salinity of reference sea water."""
+def density_of(
+    source: str,
+    depth_m: np.ndarray,
+    temperature_degC: np.ndarray,  # noqa: N803, as the column is called
+    salinity_psu: np.ndarray,
+    is_potential: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Density (kg/m^3) and temperature (degC) in place, by TEOS-10 with reference salinity.
+
+    Raises
+    ------
+    ValueError
+        Naming the source, if there is no library for it.
+    """
     try:
         import gsw
     except ImportError:
@@ -142,10 +155,14 @@ def _density(table: dict[str, np.ndarray], source: str) -> np.ndarray:
             f'{source}: density from temperature and salinity takes the library gsw; install it '
             'with: ./glider python -m pip install --no-deps -r requirements-flights.txt'
         ) from None
-    pressure = gsw.p_from_z(-table['depth_m'], _LATITUDE)
-    salinity = gsw.SR_from_SP(table['salinity_psu'])
-    temperature = gsw.CT_from_t(salinity, table['temperature_degC'], pressure)
-    return gsw.rho(salinity, temperature, pressure)
+    pressure = gsw.p_from_z(-depth_m, _LATITUDE)
+    salinity = gsw.SR_from_SP(salinity_psu)
+    if is_potential:
+        conservative = gsw.CT_from_pt(salinity, temperature_degC)
+        temperature_degC = gsw.t_from_CT(salinity, conservative, pressure)  # noqa: N806
+    else:
+        conservative = gsw.CT_from_t(salinity, temperature_degC, pressure)
+    return gsw.rho(salinity, conservative, pressure), temperature_degC
 
 
 def _read_netcdf(path: Path, source: str) -> list[tuple[int, dict[str, float]]]:

@@ -1,11 +1,11 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Currents of ocean models from NetCDF files: what is in a file, and a window of it.
+"""Water of ocean models from NetCDF files: what is in a file, and a window of it.
 
 Variables and axes are found by what the CF conventions call them, in whatever order: velocities to
-the east and to the north on axes of time, depth, latitude and longitude, as CMEMS and HYCOM write
-them. Of a file only the window that is asked for is read, step by step. What is no such grid is
-refused by name.
+the east and to the north, or temperature and salinity, on axes of time, depth, latitude and
+longitude, as CMEMS and HYCOM write them. Of a file only the window that is asked for is read, step
+by step. What is no such grid is refused by name.
 """
 
 import hashlib
@@ -23,21 +23,39 @@ from glider_base.files import is_file
 if TYPE_CHECKING:
     import xarray
 
-#: Velocities by what they are called in CF, else by name.
-_VELOCITIES = {
-    'east': ('eastward_sea_water_velocity', ('uo', 'water_u')),
-    'north': ('northward_sea_water_velocity', ('vo', 'water_v')),
-}
 #: m/s in units that files have.
 _SPEEDS = {
     **dict.fromkeys(('m s-1', 'm/s', 'm s^-1', 'm.s-1', 'meter/s', 'meter second-1'), 1.0),
     **dict.fromkeys(('cm s-1', 'cm/s', 'centimeter/s'), 0.01),
 }
+_CELSIUS = dict.fromkeys(('degrees_C', 'degree_C', 'degC', 'Celsius', 'celsius', 'deg_C'), 1.0)
+_PSU = dict.fromkeys(('1e-3', '0.001', 'psu', 'PSU', '1'), 1.0)
 _LENGTHS = {
     **dict.fromkeys(('m', 'meter', 'meters', 'metre', 'metres'), 1.0),
     **dict.fromkeys(('cm', 'centimeter', 'centimeters'), 0.01),
 }
 _AXES = ('time', 'depth', 'latitude', 'longitude')
+
+
+class Wanted(NamedTuple):
+    """A quantity of the water, and how a file tells it."""
+
+    what: str
+    names: dict[str, str]  #: what CF calls a variable of a name that says nothing of that
+    units: dict[str, float]  #: what makes m/s, degC or psu of them
+
+
+_EAST, _NORTH = 'eastward_sea_water_velocity', 'northward_sea_water_velocity'
+POTENTIAL = 'sea_water_potential_temperature'
+#: What is read of a file, in this order.
+VELOCITIES = (
+    Wanted('velocity to the north', {'vo': _NORTH, 'water_v': _NORTH}, _SPEEDS),
+    Wanted('velocity to the east', {'uo': _EAST, 'water_u': _EAST}, _SPEEDS),
+)
+TEMPERATURE_AND_SALINITY = (
+    Wanted('temperature', {'thetao': POTENTIAL, 'water_temp': 'sea_water_temperature'}, _CELSIUS),
+    Wanted('salinity', dict.fromkeys(('so', 'salinity'), 'sea_water_salinity'), _PSU),
+)
 #: What of a grid no regular axes have, by names of dimensions or coordinates: what it is called.
 _OTHER_GRIDS = {
     's_rho': 'levels that follow the bottom, as ROMS and CROCO have',
@@ -78,16 +96,18 @@ class Loaded(NamedTuple):
     """A window of a grid."""
 
     axes: Axes
-    water: np.ndarray  #: float32[time, depth, latitude, longitude, 2], to the north, east (m/s)
+    water: np.ndarray  #: float32[time, depth, latitude, longitude, 2], what was wanted
+    standards: tuple[str, ...]  #: what CF calls the two of them
     land: np.ndarray  #: bool[latitude, longitude], of the uppermost level
 
 
 class _Layout(NamedTuple):
-    """Where in a dataset the velocities and their axes are."""
+    """Where in a dataset what is wanted and its axes are."""
 
     dataset: 'xarray.Dataset'
-    variables: dict[str, str]  #: of east and north
-    scales: dict[str, float]  #: that makes m/s of them
+    variables: list[str]
+    standards: tuple[str, ...]  #: what CF calls them
+    scales: list[float]  #: that make m/s, degC or psu of them
     axes: dict[str, str]  #: dimension by axis; depth may be missing
     values: dict[str, np.ndarray]  #: of each axis, as in the file
 
@@ -145,22 +165,22 @@ def fingerprint(path: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-def _velocity(dataset: 'xarray.Dataset', side: str) -> str:
-    """Name of a velocity."""
-    standard, names = _VELOCITIES[side]
-    found = [
-        n for n, one in dataset.data_vars.items() if one.attrs.get('standard_name') == standard
-    ]
-    found = found or [name for name in names if name in dataset.data_vars]
+def _variable(dataset: 'xarray.Dataset', wanted: Wanted) -> tuple[str, str]:
+    """Name of a variable, and what CF calls it."""
+    named = {str(name): one.attrs.get('standard_name') for name, one in dataset.data_vars.items()}
+    known = wanted.names
+    found = {name: told for name, told in named.items() if told in known.values()}
+    found = found or {name: known[name] for name in known if name in named}
     if not found:
-        listed = ', '.join(map(str, list(dataset.data_vars)[:12])) or 'none'
+        listed = ', '.join(list(named)[:12]) or 'none'
         raise ValueError(
-            f'no velocity to the {side} (allowed: a variable of standard_name {standard}, or '
-            f'called {" or ".join(names)}; it has {listed})'
+            f'no {wanted.what} (allowed: a variable of standard_name '
+            f'{" or ".join(dict.fromkeys(known.values()))}, or called {" or ".join(known)}; it '
+            f'has {listed})'
         )
     if len(found) > 1:
-        raise ValueError(f'several velocities to the {side}: {", ".join(found)} (allowed: one)')
-    return found[0]
+        raise ValueError(f'several of {wanted.what}: {", ".join(found)} (allowed: one)')
+    return next(iter(found.items()))
 
 
 def _axis_of(name: str, variable: 'xarray.Variable') -> str:
@@ -236,26 +256,27 @@ def _bare(variable: 'xarray.Variable') -> tuple[np.ndarray, dict]:
     return variable.values, {k: v for k, v in variable.attrs.items() if k != 'bounds'}
 
 
-def _layout(dataset: 'xarray.Dataset') -> _Layout:
-    """Where the velocities of a dataset and their axes are.
+def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
+    """Where what is wanted of a dataset and its axes are.
 
     Raises
     ------
     ValueError
         Naming what is missing, or is no regular grid.
     """
-    names = {side: _velocity(dataset, side) for side in _VELOCITIES}
-    axes = _find_axes(dataset, names['east'])
-    if _find_axes(dataset, names['north']) != axes:
-        both = ' and '.join(str(dataset[name].dims) for name in names.values())
-        raise ValueError(f'{" and ".join(names.values())}: on different axes, {both}, as a '
+    found = [_variable(dataset, one) for one in reversed(wanted)][::-1]
+    names = [name for name, _ in found]
+    axes = _find_axes(dataset, names[-1])
+    if _find_axes(dataset, names[0]) != axes:
+        both = ' and '.join(str(dataset[name].dims) for name in names)
+        raise ValueError(f'{" and ".join(names)}: on different axes, {both}, as a '
                          'staggered grid has them (allowed: both at the same places)')  # fmt: skip
-    scales, values = {}, {}
-    for side, name in names.items():
+    scales, values = [], {}
+    for one, name in zip(wanted, names, strict=True):
         units = str(dataset[name].attrs.get('units', '')).strip()
-        if units not in _SPEEDS:
-            raise ValueError(f'{name}: units = {units!r} (allowed: {", ".join(_SPEEDS)})')
-        scales[side] = _SPEEDS[units]
+        if units not in one.units:
+            raise ValueError(f'{name}: units = {units!r} (allowed: {", ".join(one.units)})')
+        scales.append(one.units[units])
     for axis, dimension in axes.items():
         one = dataset.variables[dimension]
         values[axis] = _times(one) if axis == 'time' else np.asarray(one.values, dtype=float)
@@ -270,7 +291,8 @@ def _layout(dataset: 'xarray.Dataset') -> _Layout:
         is_axis = np.isfinite(values[axis]).all() and (np.all(steps > 0) or np.all(steps < 0))
         if not len(values[axis]) or not is_axis:
             raise ValueError(f'{dimension}: neither increases nor decreases all along')
-    return _Layout(dataset, names, scales, axes, values)
+    standards = tuple(standard for _, standard in found)
+    return _Layout(dataset, names, standards, scales, axes, values)
 
 
 def _chosen(values: np.ndarray, low: float, high: float) -> np.ndarray:
@@ -296,7 +318,12 @@ def _runs(indices: np.ndarray) -> list[slice]:
     return found
 
 
-def load(path: Path, window: Window | None = None, needed: Window | None = None) -> Loaded:
+def load(
+    path: Path,
+    window: Window | None = None,
+    needed: Window | None = None,
+    wanted: tuple[Wanted, ...] = VELOCITIES,
+) -> Loaded:
     """Read a window of a file; all of it without one.
 
     Parameters
@@ -306,6 +333,7 @@ def load(path: Path, window: Window | None = None, needed: Window | None = None)
         That is read, as far as the file has it.
     needed : Window, optional
         That the file has to cover.
+    wanted : tuple of Wanted
 
     Raises
     ------
@@ -313,7 +341,7 @@ def load(path: Path, window: Window | None = None, needed: Window | None = None)
         Naming the file, and what is missing in it or what of the window it does not cover.
     """
     with _opened(path) as dataset:
-        layout = _layout(dataset)
+        layout = _layout(dataset, wanted)
         chosen, axes, whole = _select(layout, window)
         if needed is not None:
             _refuse_uncovered(whole, needed)
@@ -391,14 +419,14 @@ def _read(layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes) -> Loaded:
     present = [axis for axis in _AXES[1:] if axis in layout.axes]
     land = np.zeros(shape[2:], dtype=bool)
     for step, index in enumerate(chosen['time']):
-        for side, component in (('north', 0), ('east', 1)):
-            part = layout.dataset[layout.variables[side]].isel({layout.axes['time']: int(index)})
+        for component, name in enumerate(layout.variables):
+            part = layout.dataset[name].isel({layout.axes['time']: int(index)})
             read = _cut(part, {axis: layout.axes[axis] for axis in present}, chosen)
-            read = layout.scales[side] * read.reshape(shape[1:])
+            read = layout.scales[component] * read.reshape(shape[1:])
             if step == 0:
                 land |= ~np.isfinite(read[0])
             water[step, ..., component] = _fill_land(read)
-    return Loaded(axes, water, land)
+    return Loaded(axes, water, layout.standards, land)
 
 
 def _cut(part: 'xarray.DataArray', axes: dict[str, str], chosen: dict[str, np.ndarray]):
@@ -520,10 +548,9 @@ class Contents(NamedTuple):
 def contents(path: Path) -> Contents:
     """What is in a file, of which no velocity is read; raises as `load`."""
     with _opened(path) as dataset:
-        layout = _layout(dataset)
+        layout = _layout(dataset, VELOCITIES)
         source = dataset.attrs.get('source') or dataset.attrs.get('title') or ''
-        names = [layout.variables[side] for side in _VELOCITIES]
-        return Contents(names, _select(layout, None)[1], str(source))
+        return Contents(layout.variables[::-1], _select(layout, None)[1], str(source))
 
 
 def told_time(seconds: float) -> str:

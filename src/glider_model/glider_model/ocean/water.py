@@ -2,31 +2,144 @@
 # SPDX-License-Identifier: Apache-2.0
 """The water of a mission beside its current: density, bottom, and what the wind does to a vehicle.
 
+The density is told by some numbers, by a cast, or by temperature and salinity of an ocean model,
+in a file as CMEMS or HYCOM write it. Of these become density, by TEOS-10, and temperature in
+place. Between the points of the grid both are linear in place, depth and time; beyond its levels
+they are those of the first or the last.
+
 At the surface wind and waves carry a vehicle along by a share of the wind, some hundredths: leeway
 and Stokes drift together. It is as if the water there went faster by that much.
 """
 
+import functools
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 import pydantic
 from pydantic import Field
 
 from glider_base.errors import ConfigurationError
-from glider_base.kernel import kernel
+from glider_base.frames import Origin, from_geodetic, on_chart
+from glider_base.kernel import kernel, replace
 from glider_base.settings import number
-from glider_base.signals import Vector, Water
+from glider_base.signals import SEA_WATER_DENSITY, Vector, Water
+from glider_base.slot import default, slot
 from glider_model.ocean.bottom import NO_BOTTOM, FlatBottom
-from glider_model.ocean.cast import CastParams, cast_params, check_cast, read_cast
+from glider_model.ocean.cast import CastParams, cast_params, check_cast, density_of, read_cast
 from glider_model.ocean.columns import MAX_ROWS
-from glider_model.ocean.density import DensityParams, DensitySettings
+from glider_model.ocean.density import (
+    SPECIFIC_WEIGHT,
+    DensityParams,
+    DensitySettings,
+    displacing,
+    immersed,
+)
+from glider_model.ocean.field import Mission
+from glider_model.ocean.fields.grid import GridFileSettings, interpolate, loaded_window
+from glider_model.ocean.grid_file import POTENTIAL, TEMPERATURE_AND_SALINITY, Axes
 
 #: The drift of wind is whole above the first depth, and there is none below the second (m).
 WIND_WHOLE_M, WIND_NONE_M = 0.5, 1.5
 #: Density of a cast falls with depth by no more than this (kg/m^3): the density inversion test of
 #: the Argo quality control manual (test 14, doi 10.13155/33951).
 INVERSION_KGPM3 = 0.03
+
+
+class ModelWaterParams(NamedTuple):
+    """Water of a model as the kernels see it, at a place and time; its axes increase."""
+
+    times: np.ndarray  #: float64[t] (s since the start)
+    depths: np.ndarray  #: float64[z] (m)
+    latitudes: np.ndarray  #: float64[y] (deg)
+    longitudes: np.ndarray  #: float64[x] (deg), around the origin
+    #: float32[t, z, y, x, 2]: rho / rho_0 - 1, of `SEA_WATER_DENSITY`, and temperature (degC)
+    water: np.ndarray
+    origin: Origin
+    surface: float  #: the first at the surface where and when the mission begins
+    hull_compression: float  #: of a vehicle whose file has no volume (1/Pa)
+    n: float  #: where the vehicle is (m)
+    e: float
+    t_s: float
+
+
+class ModelWaterSettings(GridFileSettings):
+    """Temperature and salinity of an ocean model, from a file."""
+
+    def params(self, hull_compression_per_m: float) -> ModelWaterParams:
+        """Kernel parameters.
+
+        Raises
+        ------
+        ValueError
+            Naming the file, and what of it or of the mission is at fault.
+        """
+        axes, begin, water = _loaded(self.file, self.mission)
+        origin = self.mission.origin.params()
+        n, e = (
+            from_geodetic(*self.mission.places[0], origin) if self.mission.places else (0.0, 0.0)
+        )
+        made = ModelWaterParams(
+            times=axes.times - begin,
+            depths=axes.depths,
+            latitudes=axes.latitudes,
+            longitudes=axes.longitudes,
+            water=water,
+            origin=origin,
+            surface=0.0,
+            hull_compression=hull_compression_per_m / SPECIFIC_WEIGHT,
+            n=n,
+            e=e,
+            t_s=0.0,
+        )
+        return made._replace(surface=water_there(0.0, made)[0])
+
+
+@functools.lru_cache(maxsize=4)
+def _loaded(file: str, mission: Mission) -> tuple[Axes, float, np.ndarray]:
+    """What a mission needs of a file, its start (s since 1970), and the water of the params."""
+    loaded, begin = loaded_window(Path(file), mission, TEMPERATURE_AND_SALINITY)
+    temperature, salinity = (loaded.water[..., i].astype(float) for i in range(2))
+    depths = loaded.axes.depths[:, None, None]
+    density, temperature = density_of(
+        f'file {file}', depths, temperature, salinity, loaded.standards[0] == POTENTIAL
+    )
+    water = np.stack((density / SEA_WATER_DENSITY - 1.0, temperature), axis=-1)
+    return loaded.axes, begin, water.astype(np.float32)
+
+
+@kernel
+def water_there(depth, params):
+    """Density over `SEA_WATER_DENSITY`, less 1, and temperature (degC) at a depth (m)."""
+    latitude, longitude = on_chart(params.n, params.e, params.origin)
+    return interpolate(params.t_s, depth, latitude, longitude, params)
+
+
+@immersed.body(ModelWaterParams)
+@kernel
+def _in_model_water(depth, m_b, vehicle, params):
+    """Of a vehicle without a volume neutral at the surface where and when the mission begins."""
+    rise, temperature = water_there(max(depth, 0.0), params)
+    volume, compressibility = vehicle.volume, vehicle.compressibility
+    if volume == 0.0:
+        volume = vehicle.m / (SEA_WATER_DENSITY * (1.0 + params.surface))
+        compressibility = params.hull_compression
+    warmer = temperature - vehicle.reference_temperature
+    return displacing(m_b, volume, compressibility, warmer, 1.0 + rise, depth, vehicle)
+
+
+@slot
+@default
+def around(whole, n, e, t_s, params):
+    """Something with ``density``, the params of the water, at a place (m) and time (s)."""
+    return whole
+
+
+@around.body(ModelWaterParams)
+@kernel
+def _around(whole, n, e, t_s, params):
+    return replace(whole, density=replace(params, n=n, e=e, t_s=t_s))
 
 
 class WaterSettings(DensitySettings):
@@ -46,6 +159,10 @@ class WaterSettings(DensitySettings):
         'NetCDF cast (.nc); or rows of [depth (m), density (kg/m^3)] and optionally temperature '
         '(degC), by increasing depth',
     )
+    grid: ModelWaterSettings = Field(
+        ModelWaterSettings(),
+        description='temperature and salinity of an ocean model instead of the pycnocline',
+    )
     bottom_m: float = number(0.0, (0.0, 12000.0), 'depth of a flat bottom (m); 0: none')
     wind_mps: float = number(0.0, (0.0, 40.0), 'speed of the wind (m/s)')
     wind_from_deg: float = number(
@@ -64,14 +181,18 @@ class WaterSettings(DensitySettings):
 
     @pydantic.model_validator(mode='after')
     def _check_rows(self):
-        if self.profile is None:
+        if self.profile is None and not self.grid.file:
             return self
-        check_cast(self.profile, range(1, len(self.profile) + 1), 'profile')
+        told = 'grid' if self.grid.file else 'profile'
+        if self.profile is not None:
+            check_cast(self.profile, range(1, len(self.profile) + 1), 'profile')
+            if self.grid.file:
+                raise ValueError('profile: the grid says the density (allowed: one of them)')
         for name in ('pycnocline_rise', 'compression_per_m'):
             if getattr(self, name):
                 raise ValueError(
-                    f'{name} = {getattr(self, name)!r}: the profile says the density '
-                    '(allowed: 0.0 beside a profile)'
+                    f'{name} = {getattr(self, name)!r}: the {told} says the density '
+                    f'(allowed: 0.0 beside a {told})'
                 )
         return self
 
@@ -92,8 +213,10 @@ class WaterSettings(DensitySettings):
                 )
             heaviest = max(heaviest, (depth, density), key=lambda row: row[1])
 
-    def params(self) -> DensityParams | CastParams:
+    def params(self) -> DensityParams | CastParams | ModelWaterParams:
         """Kernel parameters of the density; their type says how it is told."""
+        if self.grid.file:
+            return self.grid.params(self.hull_compression_per_m)
         if self.profile is None:
             return super().params()
         return cast_params(self.profile, self.hull_compression_per_m)

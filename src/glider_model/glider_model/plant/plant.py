@@ -14,7 +14,7 @@ from glider_base.signals import TICK_S, Joints, Odometry, Vector, Water, not_fin
 from glider_base.slot import default, slot
 from glider_base.wiring import SENSORS
 from glider_model.ocean.bottom import NO_BOTTOM, BathymetrySettings, aground, bottom_depth
-from glider_model.ocean.water import WaterSettings, with_wind
+from glider_model.ocean.water import WaterSettings, around, with_wind
 from glider_model.plant.energy import FULL, Ledger, battery_of, spend
 from glider_model.plant.faults.body import acting, blown, felt, moved
 from glider_model.plant.faults.kinds import FaultParams, NoFaultState, begun, summed
@@ -91,7 +91,7 @@ class PlantParams(NamedTuple):
     """Vehicle, water, where the run ends, and the noise of what is measured."""
 
     vehicle: VehicleParams
-    density: NamedTuple  #: DensityParams, or CastParams
+    density: NamedTuple  #: DensityParams, CastParams or ModelWaterParams
     wind_drift: Vector  #: at the surface (m/s)
     max_ticks: int
     stop_after_dives: int  #: 0: only max_ticks ends the run
@@ -282,7 +282,8 @@ def plant_step(
     joints = moved(state.joints, command, depth, v, dt, total, params.faults)
     start = acting(state.joints, params.vehicle, total, params.faults)
     end = acting(joints, params.vehicle, total, params.faults)
-    body = felt(params, total, params.faults)
+    x, t_s = state.motion, state.tick * dt
+    body = felt(around(params, x.p_n, x.p_e, t_s, params.density), total, params.faults)
     water_rate = Water(0.0, 0.0, 0.0)
     if state.tick > 0:
         water_rate = Water(

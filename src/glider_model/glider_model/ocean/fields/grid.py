@@ -21,7 +21,9 @@ from glider_base.kernel import kernel
 from glider_base.settings import Settings, beside
 from glider_model.ocean.field import FieldSettings, Mission, bracket, field_velocity
 from glider_model.ocean.grid_file import (
+    VELOCITIES,
     Loaded,
+    Wanted,
     Window,
     fingerprint,
     load,
@@ -105,8 +107,15 @@ class GridSettings(GridFileSettings, FieldSettings):
 @functools.lru_cache(maxsize=4)
 def _loaded(file: str, mission: Mission) -> tuple[Loaded, float]:
     """What a mission needs of a file, and its start (s since 1970)."""
-    path, needed = Path(file), mission_window(mission)
-    loaded = load(path, widened(needed, MARGIN_M), needed)
+    return loaded_window(Path(file), mission, VELOCITIES)
+
+
+def loaded_window(
+    path: Path, mission: Mission, wanted: tuple[Wanted, ...]
+) -> tuple[Loaded, float]:
+    """What a mission needs of a file, and its start (s since 1970); errors as `load`."""
+    needed = mission_window(mission)
+    loaded = load(path, widened(needed, MARGIN_M), needed, wanted)
     for place in mission.places:
         row, column = (
             int(np.argmin(np.abs(values - one)))
