@@ -130,12 +130,12 @@ class Codec:
         self.fields = tuple(fields)
         self.width = max(width, len(self.fields))
         self._absent = (self.width - len(self.fields)) * (0.0,)
-        frames = {path: _value_at(template, path) for path in _FRAMES}
-        self._frames = {path: name for path, name in frames.items() if name}
         self._stamp_path = stamp
         raw = to_cdr(template)
         raw += bytes(-len(raw) % 4)  # the middleware sends whole words
         places = {place.path: place for place in cdr_places(template)}
+        frames = {one: operator.attrgetter(one)(template) for one in _FRAMES if one in places}
+        self._frames = {path: name for path, name in frames.items() if name}
         split = [_split(template, path) for path in self.fields]
         names = [name if i is None else f'{name}[{i}]' for name, i in split]
         self._lay_out(raw, [places[one] for one in (f'{stamp}.sec', f'{stamp}.nanosec', *names)])
@@ -242,17 +242,12 @@ class Codec:
             name = self.message_type.__name__
             raise MessageError(f'{len(raw)} bytes that are no {name}') from None
 
-    def _check_frames(self, message) -> None:
-        """Refuse other frames; a prefix, such as that of a vehicle, is none of our business."""
-        for path, name in self._frames.items():
-            frame = _value_at(message, path)
-            if frame.rpartition('/')[2] != name:
-                raise MessageError(f'{path} is {frame[:80]!r} (allowed: {name!r})')
-
     def _decode_foreign(self, raw: bytes, check_frames: bool) -> tuple[int, tuple[float, ...]]:
         message = self.message(raw)
-        if check_frames:
-            self._check_frames(message)
+        for path, name in self._frames.items() if check_frames else ():
+            frame = operator.attrgetter(path)(message)
+            if frame.rpartition('/')[2] != name:  # a prefix, as of a vehicle, is not our business
+                raise MessageError(f'{path} is {frame[:80]!r} (allowed: {name!r})')
         values = tuple(float(_get(message, path)) for path in self.fields)
         self._refuse_non_finite(values)
         return self._stamp_of(message), values + self._absent
@@ -267,13 +262,6 @@ class Codec:
         for path, value in zip(self.fields, values, strict=True):
             if not math.isfinite(value):
                 raise NotFiniteFieldError(f'{path} is {value}')
-
-
-def _value_at(message, path: str) -> str:
-    """Value at a dotted path; empty where there is none."""
-    for name in path.split('.'):
-        message = getattr(message, name, '')
-    return message
 
 
 def _split(message, path: str) -> tuple[str, int | None]:

@@ -26,7 +26,7 @@ _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 SCORED = ('ground_truth/odom', 'odom', 'joint_states', 'reference', 'tracking_error')
 
 
-def _known_name(topic: str) -> str:
+def known_name(topic: str) -> str:
     """Our name of a recorded topic, whatever its namespace; its own if it is none of ours."""
     for name in TOPICS:
         if topic == name or topic.endswith('/' + name.lstrip('/')):
@@ -111,7 +111,7 @@ class RecordedLog:
         self.ticks = 0
         self.counts: Counter[str] = Counter()
         self.end: health.Report | None = None
-        self._recorded = {_known_name(topic.name) for topic in bag.topics}
+        self._recorded = {known_name(topic.name) for topic in bag.topics}
         self._names = (*SCORED, *also)
         self._codecs = {name: topic_of(name, steers_by).codec for name in self._names}
         #: Tick, column and new value, in the order in which they were told.
@@ -127,7 +127,7 @@ class RecordedLog:
         They are float64[n, ROW], valid until the next are asked for. A `ConfigurationError` says
         where the bag is damaged.
         """
-        names = {i: _known_name(topic.name) for i, topic in enumerate(self._bag.topics)}
+        names = {i: known_name(topic.name) for i, topic in enumerate(self._bag.topics)}
         for batch in self._bag.batches():
             found = {}
             for index in np.unique(batch.topic):

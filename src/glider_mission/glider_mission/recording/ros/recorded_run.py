@@ -14,7 +14,7 @@ from glider_base.ros.wire.codec import Codec
 from glider_base.ros.wire.topics import TOPICS, topic_of
 from glider_base.settings import ConfigurationError
 from glider_mission.recording.mcap_reader import Bag
-from glider_mission.recording.ros.recorded_log import decode
+from glider_mission.recording.ros.recorded_log import decode, known_name
 
 #: Messages of foreign layout whose bytes are kept, for each topic.
 _KEPT = 1000
@@ -118,7 +118,7 @@ class Recording:
                 self.series[topic.name] = Series(topic_of(topic.name, steers_by).codec)
                 takers[index] = self.series[topic.name].add
             elif topic.name == 'path':
-                takers[index] = self._add_paths
+                takers[index] = lambda batch, chosen: self.paths.extend(map(batch.payload, chosen))
             elif topic.name == '/diagnostics':
                 takers[index] = self._add_events
         for batch in bag.batches():
@@ -134,9 +134,6 @@ class Recording:
     def node(self, name: str) -> str:
         """Full name of a node, as it stands on /diagnostics, or of a topic."""
         return f'{self.namespace.rstrip("/")}/{name}'
-
-    def _add_paths(self, batch, chosen) -> None:
-        self.paths += [batch.payload(index) for index in chosen]
 
     def _add_events(self, batch, chosen) -> None:
         for index in chosen:
@@ -156,12 +153,10 @@ def choose_namespace(bag: Bag, given: str | None) -> str:
     """Namespace of the nodes in a bag, ``'/'`` for the root."""
     found = set()
     for recorded in bag.topics:
-        for topic in TOPICS.values():
-            if topic.name.startswith('/') or recorded.type_name != topic.type_name:
-                continue
-            if recorded.name.endswith('/' + topic.name):
-                found.add(recorded.name.removesuffix(topic.name).rstrip('/') or '/')
-                break
+        topic = TOPICS.get(known_name(recorded.name))
+        is_ours = topic is not None and recorded.type_name == topic.type_name
+        if is_ours and not topic.name.startswith('/'):
+            found.add(recorded.name.removesuffix(topic.name).rstrip('/') or '/')
     named = ', '.join(sorted(found))
     if given is not None:
         wanted = '/' + given.strip('/')
