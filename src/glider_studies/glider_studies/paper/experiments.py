@@ -9,7 +9,7 @@ anything worse turns a verdict to ``failed``.
 
 import json
 import math
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -336,10 +336,11 @@ def fly(
     return [rows for rows, _ in found], [others for _, others in found]
 
 
-def combinations(experiments: list[Experiment]) -> set[Combination]:
+def combinations(experiments: list[Experiment]) -> Iterator[Combination]:
     """What `fly` needs loops for."""
-    loops = {combination_of(case.load()) for one in experiments for case in one.cases}
-    return loops.union(*(one.study.loops for one in experiments if one.study))
+    for one in experiments:
+        yield from (combination_of(case.load()) for case in one.cases)
+        yield from one.study.loops if one.study else ()
 
 
 def count_flights(experiments: list[Experiment]) -> int:
