@@ -102,7 +102,7 @@ def test_complete_run(fly):
     assert result.reason == result.culprit == ''
     assert seen[0]['tick'] == 7
     assert result.progress['complete'] is True
-    assert result.startup_s > 0.0 < result.flight_s
+    assert result.flight_s > 0.0
     assert any(line.startswith('[guidance_node] up') for line in lines)
 
 

@@ -64,7 +64,6 @@ class RunnerResult(NamedTuple):
     reason: str = ''  #: one or more sentences for the person
     culprit: str = ''  #: node that failed
     exit_code: int = 0  #: of the culprit; negative: the signal that killed it
-    startup_s: float = 0.0  #: wall time from the start of the processes to the first tick
     flight_s: float = 0.0  #: wall time from the first tick to the end
     progress: Mapping[str, Any] = {}  #: last word of the recorder
 
@@ -226,7 +225,6 @@ class _Run:
         self._selector = selectors.DefaultSelector()
         self._partial: dict[int, bytes] = {}
         self.signal: int | None = None
-        self.started_s = time.monotonic()
         self.first_tick_s: float | None = None
         self.progress: dict[str, Any] = {}
         self.processes: dict[str, _Process] = {}
@@ -432,7 +430,6 @@ def run_nodes(
 
 def _result(run: _Run, status: str, culprit: _Process | None) -> RunnerResult:
     now = time.monotonic()
-    first = run.first_tick_s or now
     reason, name, code = '', '', 0
     if status == 'aborted':
         reason = f'stopped by {signal.Signals(run.signal).name}'
@@ -446,8 +443,7 @@ def _result(run: _Run, status: str, culprit: _Process | None) -> RunnerResult:
         reason=reason,
         culprit=name,
         exit_code=code,
-        startup_s=first - run.started_s,
-        flight_s=now - first,
+        flight_s=now - (run.first_tick_s or now),
         progress=run.progress,
     )
 

@@ -190,14 +190,15 @@ class Scorer:
         flies = ~ends_mission(told) & ~(np.maximum.accumulate(depth) > self._crush_depth_m)
         steady, scored = windows(depth, series('rate_ref') > 0.0, rules, TICK_S)
         steady &= flies
+        heading, has_whole_mean = _heading_fluctuation_deg(series('heading'))
         flown = Flown(
             depth=depth,
             e2=series('e2'),
             pitch_error=np.degrees(series('pitch') - series('pitch_ref')),
-            heading=_heading_fluctuation_deg(series('heading')),
+            heading=heading,
             steady=steady,
             scored=scored,
-            whole=steady & _has_whole_mean(ticks),
+            whole=steady & has_whole_mean,
             turn_m=rules.depth_m,
         )
         believed = flown._replace(e2=series('told_e2'))
@@ -335,25 +336,14 @@ def windows(
     return steady, scored
 
 
-def _heading_fluctuation_deg(heading: np.ndarray) -> np.ndarray:
-    """Heading less its running mean over HEADING_MEAN_S, in deg."""
-    if not len(heading):
-        return heading
-    unwrapped = np.unwrap(heading)
-    half = round(0.5 * HEADING_MEAN_S / TICK_S)
-    total = np.concatenate(([0.0], np.cumsum(unwrapped - unwrapped[0])))
-    index = np.arange(len(heading))
-    first = np.maximum(index - half, 0)
-    last = np.minimum(index + half + 1, len(heading))
+def _heading_fluctuation_deg(heading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Heading less its running mean over HEADING_MEAN_S (deg), and where that mean is whole."""
+    unwrapped = np.unwrap(heading) - (heading[0] if len(heading) else 0.0)
+    half, index = round(0.5 * HEADING_MEAN_S / TICK_S), np.arange(len(heading))
+    total = np.concatenate(([0.0], np.cumsum(unwrapped)))
+    first, last = np.maximum(index - half, 0), np.minimum(index + half + 1, len(heading))
     mean = (total[last] - total[first]) / (last - first)
-    return np.degrees(unwrapped - unwrapped[0] - mean)
-
-
-def _has_whole_mean(ticks: int) -> np.ndarray:
-    """Mask of the ticks around which the log holds the whole time of the heading's mean."""
-    half = round(0.5 * HEADING_MEAN_S / TICK_S)
-    index = np.arange(ticks)
-    return (index >= half) & (index < ticks - half)
+    return np.degrees(unwrapped - mean), last - first == 2 * half + 1
 
 
 def _count_dives(depth: np.ndarray, below_m: float, above_m: float) -> int:
