@@ -99,14 +99,10 @@ def fly_nodes(
     place = namespace or NAMESPACE
     write_parameters(parameters, folder / PARAMETERS_FILE, place)
 
-    def tell(said: dict) -> None:
-        if progress:
-            progress(said['tick'], said['depth_m'])
-
     result = run_nodes(
         node_commands(folder / PARAMETERS_FILE, place, namespace is not None, layout),
         folder / LOG_FILE,
-        on_progress=tell,
+        on_progress=progress and (lambda said: progress(said['tick'], said['depth_m'])),
         on_log=on_log,
     )
     if result.exit_code == EXIT_USAGE:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run as pages and figures show it: read from where it was kept, or from its bag."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
@@ -22,12 +22,11 @@ from glider_mission.run_folder import (
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import load_vehicle
 
-if TYPE_CHECKING:
-    from glider_bringup.scoring.again import Reading
-
 
 def read_run(
-    run: Path, progress: 'Reading' = lambda ticks, total: None, traced: bool = True
+    run: Path,
+    progress: Callable[[int, int], None] = lambda ticks, total: None,
+    traced: bool = True,
 ) -> FlownRun:
     """A run folder or MCAP file as pages show it: as it was kept in flight, else from its bag.
 

@@ -6,7 +6,7 @@ import base64
 import zlib
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from glider_guidance.path.curve import path_length, path_point, path_tangent
 from glider_mission.rules import Rules
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import Vehicle
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 #: Templates, style and scripts of the pages.
 _WEB = Path(__file__).parent / 'web'
@@ -179,7 +176,7 @@ def page_data(runs: list[FlownRun], panels: list[Panel]) -> dict[str, Any]:
 
 
 @cache
-def _templates() -> 'Environment':
+def _templates() -> Any:
     """Templates of the pages: what is put in is text, and an unknown name an error."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
