@@ -84,8 +84,8 @@ def _case(victim: str, tick: int, folder: Path, domain: int) -> tuple[str, str]:
         if not ended:
             left = [name for name, pid in flight.pids.items() if is_alive(pid)]
             return 'hangs', f'{", ".join(left) or PARENT} still there after {HANG_S:g} s'
-        if not _wait(lambda: not left_over(segments), HANG_S):
-            return 'wrong', f'shared memory is left: {", ".join(sorted(left_over(segments)))}'
+        if not _wait(lambda: not left_over() & segments, HANG_S):
+            return 'wrong', f'shared memory is left: {", ".join(sorted(left_over() & segments))}'
         return _judge(flight, victim, heard.take())
 
 

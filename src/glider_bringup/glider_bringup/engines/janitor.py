@@ -67,10 +67,11 @@ def is_locked(name: str) -> bool:
     return False
 
 
-def left_over(names: set[str]) -> set[str]:
-    """Those of the segments that are there, and that nobody has."""
+def left_over() -> set[str]:
+    """Segments that are there, and that nobody has."""
     pids = [int(name) for name in os.listdir('/proc') if name.isdecimal()]
-    there = names.intersection(os.listdir(SHARED_MEMORY)).difference(*map(mapped, pids))
+    segments = filter(_NAME.fullmatch, os.listdir(SHARED_MEMORY))
+    there = set(segments).difference(*map(mapped, pids))
     return {name for name in there if not is_locked(name)}
 
 
@@ -111,8 +112,7 @@ def main() -> None:
     deadline_s = time.monotonic() + _PATIENCE_S
     while any(map(is_alive, pids)) and time.monotonic() < deadline_s:
         time.sleep(0.1)
-    remove(lasting(lambda: left_over(set(filter(_NAME.fullmatch, os.listdir(SHARED_MEMORY))))))
-    remove(lasting(_in_the_making))
+    remove(lasting(lambda: left_over() | _in_the_making()))
 
 
 if __name__ == '__main__':
