@@ -24,7 +24,7 @@ setup(
     entry_points={
         'glider.commands': [
             f'{name} = glider_studies.commands.{name}:app'
-            for name in ('experiments', 'list', 'map', 'montecarlo', 'sweep')
+            for name in ('bounds', 'experiments', 'list', 'map', 'montecarlo', 'sweep')
         ],
         'glider.python': ['sweep = glider_studies.door:sweep'],
     },
