@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from glider_guidance.los import (
     approach_angles,
+    approach_heading,
     crab_heading,
     desired_direction,
     target_rate,
@@ -128,6 +129,24 @@ def test_course_is_infeasible_exactly_when_no_heading_holds_it(
     assume(abs(room) > 1e-9 and abs(held) > 1e-9)
     _, _, feasible = crab_heading(course, speed, current_n, current_e)
     assert feasible == (room > 0.0 and held > 0.0)
+
+
+@pytest.mark.parametrize('share', [-0.5, 0.6, 1.1])
+def test_error_of_the_current_ends_where_it_is_balanced(share):
+    """At Delta1 |w| / sqrt(P^2 - w^2), whatever its sign; an error above P carries it off."""
+    course, speed, lookahead, e2 = 0.4, 0.4, 60.0, 0.0
+    estimate = -0.1 * math.sin(course), 0.1 * math.cos(course)  # 0.1 m/s to starboard
+    _, progress, _ = crab_heading(course, speed, *estimate)
+    error = share * progress
+    for _ in range(12000):
+        gamma_r, _ = approach_angles(e2, 0.0, lookahead, 1.0)
+        heading = approach_heading(course, gamma_r, progress, speed, *estimate)
+        e2 += 1.0 * (0.1 + error + speed * math.sin(heading - course))
+    if abs(error) < progress:
+        balanced = lookahead * error / math.sqrt(progress**2 - error**2)
+        assert e2 == pytest.approx(balanced, rel=1e-6)
+    else:
+        assert abs(e2) > 50.0
 
 
 @quick

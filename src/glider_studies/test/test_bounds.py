@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bounds of the steering loop: certificates that can fail, and flights that stay within them."""
 
+import itertools
 import math
 
 import numpy as np
@@ -10,11 +11,12 @@ import pytest
 from glider_base.signals import TICK_S
 from glider_model.onboard.command_filter import FilterParams
 from glider_studies.bounds import lmi
-from glider_studies.bounds.certificate import dissipates, gain, gain_verified, region
+from glider_studies.bounds.certificate import dissipates, gain, gain_verified, reached, region
 from glider_studies.bounds.flights import fly_jumps, fly_starts
 from glider_studies.bounds.glide import glides, slope, steering_loop
 from glider_studies.bounds.steering_loop import (
     INPUTS,
+    Gains,
     SteeringLoop,
     box,
     limits,
@@ -29,13 +31,14 @@ B, K = 0.0276, -0.303
 def made(b=B, k=K, faster=1.0, believed_b=B):
     """A loop by hand, with a law that believes b and knows k: bandwidth .035, lookahead 150 s."""
     turn = faster * 0.035 / believed_b
+    ahead = (1.1 - turn * k) / believed_b  # of the turn itself, and of the roll that it takes
     return SteeringLoop(
         speed=0.435,
         b=b,
         k=k,
         line_of_sight=faster / (150.0 * 0.435),
         heading_filter=FilterParams(0.07, 0.012),
-        law=(turn, 1.1 / believed_b, -turn, -0.1 / believed_b, turn * K, 0.1 * K / believed_b),
+        law=(turn, ahead, -turn, -0.1 / believed_b, turn * k, 0.1 * k / believed_b),
         limit=math.radians(30.0),
         roll_filter=FilterParams(0.5, 0.08),
         leg_s=3700.0,
@@ -56,6 +59,18 @@ def loop():
 @pytest.fixture(scope='module')
 def current(loop):
     return gain(loop, 1)
+
+
+@pytest.fixture(scope='module')
+def strong():
+    """A vehicle that turns well for its kick, as zhang2021 does in a climb."""
+    return made(b=-0.0367, k=0.295, believed_b=-0.0367)
+
+
+@pytest.fixture(scope='module')
+def home(strong):
+    """Its region."""
+    return region(strong, less_by_reach, ((1.5, 0.6),))
 
 
 def test_lmi_finds_the_smallest_trace_above_a_matrix():
@@ -98,11 +113,13 @@ def test_gain_holds_for_errors_and_gains_of_any_course(loop, current):
     assert 0.3 * current.gain < largest <= current.gain
 
 
-def test_gain_is_not_less_than_that_of_a_constant_error(loop, current):
+def test_gain_is_not_less_than_what_an_input_reaches(loop, current):
+    """A constant error of the current does no more than the worst course of it."""
     constant = max(
         abs(np.linalg.solve(one.f, one.g[:, 1])[0]) for one in (tick(loop, at) for at in box(loop))
     )
-    assert constant <= current.gain < 1.5 * constant
+    least = reached(loop)[1]
+    assert constant * (1.0 - 1e-3) <= least <= current.gain < 1.5 * least
 
 
 def test_nothing_saturates_up_to_what_the_gain_is_told_for(loop, current):
@@ -118,8 +135,47 @@ def test_no_certificate_with_the_wrong_sign_of_b(column):
     assert gain(made(b=-B), column) is None
 
 
+def test_v_falls_in_the_region_though_signals_saturate(strong, home):
+    """From its edge, at corners of the box, with the gains that what saturates has just now."""
+    inverse, at_limit = np.linalg.inv(home.p), 0
+    corners = itertools.product((0.7, 1.3), (0.7, 1.3), limits(strong))
+    for b, k, name in corners:
+        row = tick(strong, Gains(b=b, k=k)).signals[name]
+        x = inverse @ row / math.sqrt(row @ inverse @ row)  # where this signal is largest
+        v = 1.0
+        for _ in range(40):
+            now = Gains(b=b, k=k, line_of_sight=less_by_reach(abs(x[0]) + 1e-9))
+            for _ in range(2):  # one signal's gain changes the other signals
+                signals = tick(strong, now).signals
+                now = now._replace(
+                    **{
+                        name: min(1.0, limit / max(1e-12, abs(signals[name] @ x)))
+                        for name, limit in limits(strong).items()
+                    }
+                )
+            at_limit += min(now.u, now.heading_rate, now.roll_rate) < 1.0
+            x = x + TICK_S * tick(strong, now).f @ x
+            after = x @ home.p @ x
+            assert after <= v + 1e-12
+            v = after
+    assert at_limit > 10
+
+
+def test_no_roll_changes_the_weighted_mean():
+    """The integral of exp(-z t) e is (e + U psi* / z) / z, whatever is done with the roll."""
+    b, k, speed, h = 0.02, -0.3, 0.4, 0.01
+    z = -b / k
+    t = np.arange(0.0, 400.0, h)
+    for roll in (0.0 * t, 0.3 * np.sin(0.02 * t), 0.5 * np.sign(np.sin(0.013 * t**1.2))):
+        u = roll - roll[0]
+        left = 0.05 + np.cumsum(b * u) * h
+        e = 3.0 + np.cumsum(speed * (left + k * u)) * h
+        mean = float(np.sum(np.exp(-z * t) * e) * h)
+        assert mean == pytest.approx((3.0 + speed * 0.05 / z) / z, rel=2e-3)
+
+
 def test_no_region_with_the_wrong_sign_of_b():
-    assert region(made(b=-B), less_by_reach) is None
+    assert region(made(b=-B), less_by_reach, ((1.0, 0.3),)) is None
 
 
 def test_no_certificate_with_gains_five_times_too_large():
@@ -156,8 +212,8 @@ def test_starts_in_the_region_come_home_within_their_bound(vehicle, phase):
     """Few here: ./glider bounds flies 200 of each phase of each vehicle."""
     glide = glides(vehicle)[phase]
     of_glide = steering_loop(glide)
-    home = region(of_glide, lambda reach: slope(glide, reach))
-    flown = fly_starts(glide, home, 3, 7, lambda: None)
+    inside = region(of_glide, lambda reach: slope(glide, reach), ((1.0, 0.3),))
+    flown = fly_starts(glide, inside, 3, 7, lambda: None)
     assert flown.home == flown.starts
     assert 0.05 < flown.of_bound <= 1.0
     jumps = fly_jumps(glide, gain(of_glide, 1), 1, 7, lambda: None)

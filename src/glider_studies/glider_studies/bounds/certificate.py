@@ -23,6 +23,8 @@ from scipy.linalg import solve_continuous_lyapunov
 from glider_base.signals import TICK_S
 from glider_studies.bounds import lmi
 from glider_studies.bounds.steering_loop import (
+    BOX,
+    INPUTS,
     SteeringLoop,
     Tick,
     box,
@@ -33,7 +35,7 @@ from glider_studies.bounds.steering_loop import (
 
 #: Times its limit that a signal that saturates may come to, and reach beside the path over the
 #: lookahead distance: the region is the best that some of these give.
-_TRIED = ((1.0, 0.3), (1.0, 0.6), (1.5, 0.6), (2.0, 0.6))
+TRIED = ((1.0, 0.3), (1.0, 0.6), (1.5, 0.6), (2.0, 0.6))
 #: Condition of P, in states over their sizes, at which the search for a region begins.
 _WORST_CONDITION = 1e6
 #: Largest heading error of a region (rad): sin(psi) / psi.
@@ -140,9 +142,9 @@ def _bordered(rows: np.ndarray, size: float):
 # ------------------------------------------------------------------------------------- gains
 
 
-def gain(loop: SteeringLoop, column: int, ratios=None) -> Gain | None:
+def gain(loop: SteeringLoop, column: int, ratios=BOX) -> Gain | None:
     """Smallest gain that is found from an input to the cross-track error; None: there is none."""
-    vertices = box(loop, **({'ratios': ratios} if ratios else {}))
+    vertices = box(loop, ratios=ratios)
     scale = _scales(loop)
     ticks = [tick(loop, one) for one in vertices]
     size = _input_size(loop, column)
@@ -171,6 +173,24 @@ def gain(loop: SteeringLoop, column: int, ratios=None) -> Gain | None:
 def gain_verified(p: np.ndarray, ticks: list[Tick], column: int, rate: float) -> bool:
     """Whether P is a certificate at every vertex, by eigenvalues."""
     return is_positive(p) and all(is_positive(dissipates(p, one, column, rate)) for one in ticks)
+
+
+def reached(loop: SteeringLoop, ratios=BOX) -> np.ndarray:
+    """Metres per unit (3,) that the worst course of each input does at a vertex that stays.
+
+    The sum of the absolute impulse response, over twelve times the slowest time: no true gain of
+    the box is less.
+    """
+    most = np.zeros(len(INPUTS))
+    for one in (tick(loop, at) for at in box(loop, ratios=ratios)):
+        slowest = -1.0 / np.linalg.eigvals(one.f).real.max()
+        step = np.eye(len(one.f)) + TICK_S * one.f
+        x, total = TICK_S * one.g, np.zeros(len(INPUTS))
+        for _ in range(round(12.0 * slowest / TICK_S)):
+            total += np.abs(x[0])
+            x = step @ x
+        most = np.maximum(most, total)
+    return most
 
 
 def _input_size(loop: SteeringLoop, column: int) -> float:
@@ -230,7 +250,7 @@ def _propose_gain(loop, ticks, column, rate) -> np.ndarray | None:
 # ------------------------------------------------------------------------------------ region
 
 
-def region(loop: SteeringLoop, slope, ratios=None) -> Region | None:
+def region(loop: SteeringLoop, slope, tried=TRIED, ratios=BOX) -> Region | None:
     """Largest region that is found; None: there is none.
 
     Parameters
@@ -238,9 +258,13 @@ def region(loop: SteeringLoop, slope, ratios=None) -> Region | None:
     loop : SteeringLoop
     slope : callable
         Least gain of the line of sight, of its slope on the path, up to a reach (m).
+    tried : tuple of (float, float)
+        As `TRIED`.
+    ratios : (float, float)
+        Least and largest b / b_hat, and k / k_hat.
     """
     best = None
-    for times, part in _TRIED:
+    for times, part in tried:
         reach = part / loop.line_of_sight
         found = _region(loop, reach, slope(reach), times, ratios)
         if found and (best is None or found.aside_m * found.turned > best.aside_m * best.turned):
@@ -289,7 +313,7 @@ def _largest(y: np.ndarray, basis: np.ndarray, rows: np.ndarray) -> float:
 
 
 def _region(loop, reach, slope, times, ratios) -> Region | None:
-    vertices = box(loop, _least(loop, slope, times), **({'ratios': ratios} if ratios else {}))
+    vertices = box(loop, _least(loop, slope, times), ratios)
     ticks = [tick(loop, one) for one in vertices]
     scale, rows = _scales(loop), _bounds(loop, ticks, reach, times)
     scaled = [_scaled(one, scale) for one in ticks]

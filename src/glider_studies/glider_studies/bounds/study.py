@@ -10,7 +10,7 @@ import numpy as np
 
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle
-from glider_studies.bounds.certificate import Gain, Region, gain, region
+from glider_studies.bounds.certificate import Gain, Region, gain, reached, region
 from glider_studies.bounds.flights import JUMPS_SHARE, fly_jumps, fly_starts
 from glider_studies.bounds.glide import Glide, glides, slope, steering_loop
 from glider_studies.bounds.steering_loop import BOX, INPUTS, SteeringLoop, box, sensitivity, tick
@@ -67,9 +67,12 @@ def _phase(glide: Glide, starts: int, seed: int, done: Callable[[], None]) -> di
     loop = steering_loop(glide)
     found = region(loop, lambda reach: slope(glide, reach))
     gains = {name: gain(loop, i) for i, name in enumerate(INPUTS)}
+    least = dict(zip(INPUTS, reached(loop).tolist(), strict=True))
     told = {
         'loop': _of_loop(glide, loop),
-        'gains': {name: one and _of_gain(one, INPUTS[name]) for name, one in gains.items()},
+        'gains': {
+            name: one and _of_gain(one, least[name], INPUTS[name]) for name, one in gains.items()
+        },
         'region': found and _of_region(found),
         'starts': None,
         'jumps': None,
@@ -148,8 +151,8 @@ def _turn(glide: Glide, loop: SteeringLoop) -> tuple[float | None, float | None]
     return less * (glide.speed / slow) ** exponent, exponent
 
 
-def _of_gain(one: Gain, unit: str) -> dict[str, float | str]:
-    return {'m_per_unit': one.gain, 'unit': unit, 'holds_to': one.holds_to}
+def _of_gain(one: Gain, least: float, unit: str) -> dict[str, float | str]:
+    return {'m_per_unit': one.gain, 'unit': unit, 'at_least': least, 'holds_to': one.holds_to}
 
 
 def _of_region(one: Region) -> dict[str, float]:
