@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_model.onboard.command_filter import FilterParams
 from glider_studies.bounds import lmi
@@ -205,6 +206,11 @@ def test_a_certificate_is_refuted_where_it_does_not_hold(loop, current):
 
 def test_sensitivity_grows_with_the_gains(loop):
     assert 1.0 <= sensitivity(loop) < sensitivity(made(faster=5.0))
+
+
+def test_a_vehicle_that_is_none_is_told_in_a_line():
+    with pytest.raises(ConfigurationError, match="^vehicle = 'nosuch': no such vehicle"):
+        glides('nosuch')
 
 
 @pytest.mark.parametrize(('vehicle', 'phase'), [('zhang2021', 'dive'), ('slocum_g2', 'climb')])

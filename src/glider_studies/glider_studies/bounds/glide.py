@@ -165,7 +165,13 @@ def _seen(state: MissionState, params: MissionParams) -> Seen:
 
 
 def steering_loop(glide: Glide) -> SteeringLoop:
-    """The loop of a glide, with the gains that law and method have in it."""
+    """The loop of a glide, with the gains that law and method have in it.
+
+    Raises
+    ------
+    ConfigurationError
+        If the law does not steer there.
+    """
     state, params = glide.state, glide.params
     law, seen = params.control.law, _seen(state, params)
     fin = params.control.steering
@@ -180,7 +186,7 @@ def steering_loop(glide: Glide) -> SteeringLoop:
         phase = steering.dive if glide.descends else steering.climb
         b, k = phase.b * getattr(steering, 'ratio', speed_ratio(glide.speed)), phase.k
     speed = state.guidance.water.speed
-    return SteeringLoop(
+    loop = SteeringLoop(
         speed=speed,
         b=b,
         k=k,
@@ -191,6 +197,12 @@ def steering_loop(glide: Glide) -> SteeringLoop:
         roll_filter=roll_filter,
         leg_s=glide.leg_s,
     )
+    if not loop.bandwidth > 0.0:
+        raise ConfigurationError(
+            f'{glide.scenario.vehicle}: the law does not steer it in a glide of '
+            f'{glide.speed:.2f} m/s'
+        )
+    return loop
 
 
 def slope(glide: Glide, reach: float) -> float:
