@@ -31,7 +31,7 @@ NO_RATES = -1.0
 
 @kernel
 def wrap_angle(angle):
-    """Angle (rad) brought into [-pi, pi)."""
+    """Angle (rad) brought into [-pi, pi), but for the rounding of its last digit."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
