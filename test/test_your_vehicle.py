@@ -218,7 +218,7 @@ def fly(navigates: bool, autopilot: bool, folder: Path) -> Flown:
             stand_in += options(navigates=str(navigates).lower())
             processes.append(subprocess.Popen(stand_in, env=environment))
             watch.until_s(CHANGE_S)
-            gain = Parameter('adaptive.heading_kp_per_s', value=0.03)
+            gain = Parameter('adaptive.roll.kp', value=5.0)
             request = SetParameters.Request(parameters=[gain.to_parameter_msg()])
             answer = watch.call(SetParameters, 'control_node/set_parameters', request)
             assert [result.successful for result in answer.results] == [True]

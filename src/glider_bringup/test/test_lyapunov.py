@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The Lyapunov function of the adaptive law along flights of vehicles that it does not know.
+"""The Lyapunov function of the paper's law along flights of vehicles that it does not know.
 
 docs/theory.md, section 3: W = V1 + K2bar^T M K2bar / 2, which is the topic's ``lyapunov_2``, obeys
 
@@ -36,7 +36,12 @@ from glider_model.onboard.glide_polar import glide_speed
 from glider_model.vehicle.rigid_body import GRAVITY
 
 #: Dives of 100 m, so that the flight has several inflections.
-FLIGHT = {'dives': 0, 'duration_s': 3200.0, 'profile.depth_m': 100.0}
+FLIGHT = {
+    'dives': 0,
+    'duration_s': 3200.0,
+    'profile.depth_m': 100.0,
+    'control.law': 'backstepping',
+}
 UNKNOWN = {
     'trim and roll bias': {'perturb.pitch_trim_m': 0.01, 'perturb.roll_bias_deg': 10.0},
     'damping and moments': {
@@ -182,8 +187,8 @@ def test_w_falls_outside_its_ultimate_set(flight, capsys):
 def test_what_is_learnt_makes_the_set_smaller(name):
     """With adaptation switched off, W is several times as large in the same glides."""
     still = {
-        'control.adaptive.roll.gamma': 0.0,
-        'control.adaptive.pitch.gamma': 0.0,
+        'control.backstepping.roll.gamma': 0.0,
+        'control.backstepping.pitch.gamma': 0.0,
     }
     _, learning = fly_unknown(UNKNOWN[name])
     _, knowing_nothing = fly_unknown({**UNKNOWN[name], **still})

@@ -299,7 +299,7 @@ def test_bit_that_rots_in_a_chunk_is_named_with_file_and_chunk(
 # ---------------------------------------------------------------------- other code
 
 CHANGES = {
-    'gain': ('control', {'control.adaptive.pitch.b1': 6.000001}),
+    'gain': ('control', {'control.adaptive.pitch.kp': 8.100001}),
     'law': ('control', {'control.law': 'pid'}),
     'filter': ('guidance', {'guidance.filters.pitch_frequency_radps': 0.120001}),
     'current': ('current', {'current.speed_kn': 0.71, 'current.angle_deg': 60.0}),

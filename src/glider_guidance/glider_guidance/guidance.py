@@ -65,7 +65,7 @@ from glider_model.onboard.glide_polar import (
     glide_vertical_rate,
     steepen,
 )
-from glider_model.onboard.learnt_steering import Steering, SteeringParams, learn
+from glider_model.onboard.learnt_steering import Steering, SteeringParams, learn, lookaheads
 
 #: An infeasible course is reported once it has lasted this long (s).
 INFEASIBLE_S = 60.0
@@ -464,6 +464,7 @@ def guidance_step(
     followed = follow(state, odometry, params, dt)
     water = observe(state.water, place, doing.leg, params, dt)
     current = Water(water.observer.current_n, water.observer.current_e, 0.0)
+    dive_s, climb_s = lookaheads(followed.steering, params.steering)
     seen = Situation(
         course=place.course,
         elevation=place.elevation,
@@ -475,6 +476,8 @@ def guidance_step(
         glide_speed=params.profile_speed,
         current=current,
         steering=followed.steering,
+        dive_s=dive_s,
+        climb_s=climb_s,
         leg=doing.leg,
         heading=state.commanded.heading_command,
     )

@@ -28,13 +28,6 @@ class LosGains(Settings):
         description='least lookahead of los_current (m)',
         json_schema_extra=TUNABLE,
     )
-    lookahead_s: float = Field(
-        150.0,
-        ge=0.0,
-        le=3600.0,
-        description='lookahead of los_current in time at the speed over ground (s)',
-        json_schema_extra=TUNABLE,
-    )
     lead_turns: bool = Field(
         True, description='share the drift of a turn between before and after (los_current)'
     )
@@ -107,6 +100,8 @@ class Situation(NamedTuple):
     glide_speed: float  #: that of the steady glide to come, by the flight model (m/s)
     current: Water  #: estimated (m/s)
     steering: Steering  #: what is known of how the vehicle turns
+    dive_s: float  #: how far ahead it can follow in a dive (s)
+    climb_s: float  #: and in a climb
     leg: Leg
     heading: float  #: that was asked for last
 

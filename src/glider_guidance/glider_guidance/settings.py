@@ -254,7 +254,9 @@ class GuidanceSettings(GuidanceLawSettings):
                 filters.heading_frequency_radps, filters.heading_rate_radps
             ),
             pitch_filter=FilterParams(filters.pitch_frequency_radps, filters.pitch_rate_radps),
-            steering=self.steering.params(not vehicle.steers_by, kernel_vehicle.slowest_glide),
+            steering=self.steering.params(
+                not vehicle.steers_by, kernel_vehicle.slowest_glide, kernel_vehicle
+            ),
             gate=self.gate.params(),
         )
 

@@ -34,6 +34,8 @@ def step(state, e2, course=0.0, is_gliding=True, heading=0.0):
         glide_speed=0.4,
         current=Water(0.0, 0.0, 0.0),
         steering=SteeringLearningSettings().initial_state(),
+        dive_s=100.0,
+        climb_s=100.0,
         leg=Leg(
             stage=2,
             descends=True,

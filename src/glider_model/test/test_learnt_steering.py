@@ -6,19 +6,25 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import solve_continuous_are
 
 from glider_base.kernel import kernel
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.learnt_steering import (
     AT_LIMIT,
+    BANDWIDTH_MAX,
     KEPT_S,
     STRONG_STEERING,
     SteeringLearningSettings,
     choose_steering,
-    followed_frequency,
+    choose_way,
+    heading_gains,
     is_to_be_kicked,
     learn,
     learn_steering,
+    lookaheads,
+    slope_at,
+    steer_to,
 )
 
 DT = 0.1
@@ -194,21 +200,136 @@ def test_kick_is_given_up_where_the_vehicle_turns_out_to_turn_well(b, sign, k, s
     assert choose_steering(state._replace(kept_s=KEPT_S - 1.0), sine, LIMIT).is_kicked
 
 
-@given(effectiveness, some_kicks)
-def test_vehicle_follows_up_to_where_its_turn_outruns_its_kick(b, k):
-    """Where the kick goes against the turn; elsewhere it follows at least as fast."""
-    frequency = followed_frequency(known(b, 0.0, k, 0.0))
-    if b * k < 0.0:
-        assert frequency == pytest.approx(abs(b / k))
+# -------------------------------------------------------------------------------- steering
+
+
+adverse = st.tuples(st.floats(0.003, 0.05), st.floats(0.02, 0.5))
+
+
+def riccati(b, k):
+    """Gains of e and psi* that minimise the integral of `heading_gains`, by scipy."""
+    rho, tau = PARAMS.rho, PARAMS.tau
+    a, g = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[k], [b]])
+    q, r = np.diag([1.0, tau**2]), np.array([[1.0 / rho**2 + tau**2 * k**2]])
+    cross = np.array([[0.0], [tau**2 * k]])
+    p = solve_continuous_are(a, g, q, r, s=cross)
+    return (np.linalg.solve(r, g.T @ p + cross.T))[0]
+
+
+@settings(max_examples=100)
+@given(st.floats(0.003, 0.05), kicks.filter(lambda k: abs(k) > 1e-3))
+def test_closed_form_is_the_solution_of_the_riccati_equation(b, k):
+    """beta e + (alpha - beta k / b) psi*, before it is put into a, T and w."""
+    more = 1.0 + (PARAMS.rho * k * PARAMS.tau) ** 2
+    beta = PARAMS.rho * b / np.sqrt(more)
+    alpha = np.sqrt(2.0 * beta + PARAMS.rho**2 * (k**2 + (b * PARAMS.tau) ** 2) / more)
+    assert riccati(b, k) * b == pytest.approx([beta, alpha - beta * k / b], rel=1e-6)
+
+
+@settings(max_examples=100)
+@given(adverse, st.sampled_from([1.0, -1.0]))
+def test_what_is_fed_forward_changes_nothing_of_the_best_loop(steering, side):
+    """With psi_s = -e / T, b u = w psi_s' + a (psi_s - psi*) is the best u."""
+    b, k = steering[0] * side, -steering[1] * side
+    a, lookahead_s, fed = heading_gains(b, k, PARAMS)
+    assert 0.0 <= fed <= 1.0
+    if a < BANDWIDTH_MAX:
+        # u of e = 1 and of psi* = 1, with psi_s' = -(psi* + k u) / T
+        share = b + fed * k / lookahead_s
+        of_e, of_psi = a / lookahead_s / share, (fed / lookahead_s + a) / share
+        assert [of_e, of_psi] == pytest.approx(riccati(b, k), rel=1e-6)
+
+
+@settings(max_examples=100)
+@given(adverse, st.floats(0.67, 1.33), st.floats(0.67, 1.33))
+def test_loop_stays_stable_where_b_and_k_are_a_third_wrong(steering, of_b, of_k):
+    """The linear loop of position and heading, with what is fed forward."""
+    b, k = steering[0], -steering[1]
+    a, lookahead_s, fed = heading_gains(b, k, PARAMS)
+    real_b, real_k = of_b * b, of_k * k
+    share = b + fed * real_k / lookahead_s - a * (k - real_k)
+    u = -np.array([a / lookahead_s, fed / lookahead_s + a]) / share
+    loop = np.array([[0.0, 1.0], [0.0, 0.0]]) + np.outer([real_k, real_b], u)
+    assert np.max(np.linalg.eigvals(loop).real) < 0.0
+
+
+@given(st.floats(3e-4, 0.005), st.floats(0.1, 0.5))
+def test_a_weaker_vehicle_is_looked_further_ahead_for(b, k):
+    assert heading_gains(0.3 * b, -k, PARAMS)[1] >= heading_gains(b, -k, PARAMS)[1]
+
+
+def test_lookaheads_are_those_of_the_phases():
+    steering = SETTINGS.initial_state()._replace(climb=known(-1e-3, 0.0, 0.3))
+    dive_s, climb_s = lookaheads(steering, PARAMS)
+    assert climb_s > 2.0 * dive_s
+
+
+@settings(max_examples=200)
+@given(effectiveness, bends, offsets, st.floats(-0.02, 0.02), st.floats(0.3, 2.0))
+def test_the_roll_turns_as_asked_or_as_much_as_it_can(b, c, d, turn, ratio):
+    """With the share that is fed, for a heading that is right already."""
+    state = known(b, c, 0.0)._replace(d=d)
+    way = choose_way(state, turn, ratio, LIMIT, PARAMS)
+    fed = heading_gains(slope_at(state, 0.0) * ratio, 0.0, PARAMS)[2]
+    made = (b * way.trim + c * way.trim**3) * ratio + d
+    assert abs(way.trim) <= way.most <= LIMIT
+    if abs(way.trim) < way.most:
+        assert made == pytest.approx(fed * turn, rel=0.02, abs=1e-8)
     else:
-        assert frequency >= abs(b / k) * (1.0 - 1e-9)
+        assert (made - d) * (fed * turn - d) > 0.0
 
 
-@given(weak, some_kicks, st.floats(0.0, 0.02), st.floats(0.0, 0.02))
-def test_unknown_vehicle_is_not_expected_to_follow_less(b, k, one_std, other_std):
-    """Asked too slowly it would never show what it can do."""
-    less, more = sorted((one_std, other_std))
-    assert followed_frequency(known(b, 0.0, k, less)) <= followed_frequency(known(b, 0.0, k, more))
+@given(st.floats(0.001, 0.01), st.floats(0.005, 0.02), st.sampled_from([1.0, -1.0]))
+def test_no_vehicle_is_rolled_past_the_peak_of_its_turn_rate(b, c, side):
+    """Where steering fades with roll, more roll turns less: most of the peak, with less roll."""
+    way = choose_way(known(b, -c, -0.3), 0.0, 1.0, 0.99, PARAMS)
+    sine = steer_to(way, side * 3.0, 0.0, -0.3)
+    rolls = np.linspace(0.0, 0.99, 1000)
+    rates = b * rolls - c * rolls**3
+    assert 0.0 < side * sine <= rolls[np.argmax(rates)] + 1e-3
+    assert b * side * sine - c * (side * sine) ** 3 >= 0.85 * np.max(rates)
+
+
+@given(effectiveness, st.floats(0.0, 0.1), st.floats(0.001, 0.5))
+def test_doubt_never_turns_the_roll_off(b, std, error):
+    """A vehicle that is not rolled shows nothing; it goes to the side that is thought right."""
+    sure, unsure = (
+        steer_to(choose_way(known(b, 0.0, 0.0, one), 0.0, 1.0, LIMIT, PARAMS), error, 0.0, 0.0)
+        for one in (1e-6, std)
+    )
+    assert 0.0 < abs(unsure) <= LIMIT and 0.0 < abs(sure) <= LIMIT
+    assert unsure * b > 0.0
+
+
+@given(some_kicks, st.floats(0.0, 0.5), st.floats(-1.0, 1.0))
+def test_vehicle_that_hardly_turns_is_kicked_for_the_whole_error(k, kick_std, error):
+    """Whichever way it turns; of a kick in doubt a part is used."""
+    state = known(1e-4, 0.0, k, is_kicked=True)
+    state = state._replace(p=(*state.p[:7], kick_std**2 + 1e-9, *state.p[8:]))
+    way = choose_way(state, 0.0, 1.0, LIMIT, PARAMS)
+    assert 0.0 <= way.gain * k * error * error <= error * error * (1.0 + 1e-9)
+    if kick_std < 0.01 * abs(k):
+        assert way.gain * k == pytest.approx(1.0, rel=1e-3)
+
+
+@settings(max_examples=50)
+@given(st.floats(2e-4, 2e-3), st.floats(8.0, 26.0), st.floats(0.2, 0.45), st.floats(-3.0, 3.0))
+def test_kicked_vehicle_holds_its_heading_at_the_bank_at_which_it_does_not_turn(
+    b, null_deg, k, error_deg
+):
+    """Turn and kick go to different sides; the roll grows until the vehicle turns no more.
+
+    psi_left' = b s + c s^3 with b + c s^2 = 0 at the bank ``null_deg``, psi = psi_left - k phi.
+    """
+    c = -b / np.sin(np.radians(null_deg)) ** 2
+    way = choose_way(known(b, c, -k, is_kicked=True), 0.0, 1.0, LIMIT, PARAMS)
+    left, dt = np.radians(error_deg), 4.0
+    for _ in range(20000):
+        sine = min(LIMIT, max(-LIMIT, -way.gain * left))
+        left += dt * (b * sine + c * sine**3)
+        assert abs(left - k * sine) < np.radians(0.2)
+    if abs(error_deg) > 0.1:
+        assert abs(np.degrees(np.arcsin(sine))) == pytest.approx(null_deg, rel=0.01)
 
 
 def test_only_the_phase_that_is_flown_learns_and_only_in_a_glide():

@@ -9,8 +9,8 @@ from glider_base.signals import TICK_S
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.card import fly_scored
-from glider_guidance.methods.los_current import lookahead_stretch
 from glider_mission.blocks import ROW
+from glider_model.onboard.learnt_steering import lookaheads
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.perturb import PerturbSettings, perturbed
 from glider_studies.montecarlo import airframe, judge, make_scenarios, sample_plant
@@ -62,7 +62,6 @@ def test_guidance_looks_further_ahead_for_the_weak_only(seed, is_weak):
     log, is_over = np.empty((50000, ROW)), False
     while not is_over:
         state, _, is_over = fly(state, params, log, TICK_S)
-    steering = state.guidance.followed.steering
-    assert lookahead_stretch(steering.climb, 150.0) == 1.0
-    dive = lookahead_stretch(steering.dive, 150.0)
-    assert (1.2 < dive < 4.0) if is_weak else dive == 1.0
+    dive_s, climb_s = lookaheads(state.guidance.followed.steering, params.guidance.steering)
+    assert climb_s < 150.0
+    assert (200.0 < dive_s < 600.0) if is_weak else dive_s < 150.0

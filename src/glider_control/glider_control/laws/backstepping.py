@@ -13,8 +13,8 @@ K1bar = K1 - xi and K2bar = K2 - zeta are the errors less what the command filte
 are to blame for (Farrell et al. 2009), so that neither is learnt as a disturbance. Regressors are
 scaled such that every parameter is a moment in N m. Unknown to the law: damping, static moments
 and trim. The paper has no law for the heading of a vehicle that banks to turn: here that is the
-PID's, by the steering of the vehicle file. The adaptive law has these moments too, and learns how
-the vehicle steers.
+PID's, by the steering of the vehicle file. The adaptive law is this one with a single regressor
+for each phase, and learns how the vehicle steers.
 """
 
 import math

@@ -1,177 +1,154 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""How the vehicle steers, learnt in flight: yaw rate = (b s + c s^3) V / V_0 + k phi' + d.
+"""How the vehicle steers, learnt in flight, and how fast it can therefore be asked to.
 
-s is sin(phi). Both the effectiveness b and its sign belong to vehicle and phase (Seaglider: -0.040
-in the dive, +0.018 in the climb), so a Kalman filter estimates (b, c, k, d) for each phase from
-the measured yaw rate. It starts knowing nothing: the first turn that the path asks for tells the
-sign.
+psi' = (b u + c u^3) (V / V_0)^n + k u' + d, with u the sine of the roll.
 
-The bend c: steering fades, or grows, with roll. A vehicle that steers weakly turns fastest at some
-20 deg of roll and beyond 35 deg the other way.
+b is the effectiveness, its sign that of vehicle and phase. The bend c: steering fades, or grows,
+with roll. The adverse or proverse yaw k: while the vehicle rolls, the roll mass makes more moment
+than gravity takes back, and the excess turns the nose. d turns the vehicle by itself. n goes by
+the vehicle file. A Kalman filter for each phase learns (b, c, k, d) from the measured yaw rate.
 
-The kick k: while the vehicle rolls, the roll mass makes more moment than gravity takes back, and
-on a pitched vehicle the excess turns the nose, by about (damping in roll / damping in yaw)
-tan(pitch) of the roll angle, often to the wrong side. psi - k phi is the heading that is left when
-the roll is gone.
-
-Control steers by these estimates; guidance needs them to know how slowly it has to ask. Each
-learns by itself from the odometry, and so each works with any other (docs/theory.md, section 3).
+Control steers by these estimates, and guidance looks ahead by them; each learns by itself from the
+odometry, and so each works with any other (docs/theory.md, section 3).
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from pydantic import Field
 
 from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings
-from glider_model.vehicle.file import SLOWEST_GLIDE_MPS
+from glider_model.vehicle.file import SLOWEST_GLIDE_MPS, VehicleParams
+from glider_model.vehicle.steering import steering_exponents
 
-#: Speed through the water at which steering effectiveness is given (m/s).
-STEERING_SPEED = 0.5
+#: Speed through the water at which b is given, and below which nothing is learnt (m/s).
+STEERING_SPEED, LEARN_SPEED = 0.5, 0.15
 #: A vehicle that does not bank to turn begins to learn after this time (s).
 NEVER_S = 1e12
-#: Nothing is learnt below this speed (m/s).
-LEARN_SPEED = 0.15
-#: A vehicle that turns faster than this times sin(roll) is steered by its turn (rad/s).
+#: What the model does not explain, as a gust, counts as so many standard deviations at most.
+MOST_DEVIATIONS = 3.0
+#: Largest bandwidth (rad/s), longest lookahead (s), and smallest k that is of importance (-).
+BANDWIDTH_MAX, LOOKAHEAD_MAX_S, SMALLEST_KICK = 0.12, 1500.0, 1e-3
+#: A weak vehicle is fed less of psi_s': this, times by how much alpha outdoes beta / z (-).
+FED = 0.5
+#: The vehicle rolls to this share of the roll at which it turns fastest.
+SHARE_OF_PEAK = 0.7
+#: Sine of the roll at which a vehicle has to turn, or else is steered by its adverse yaw, and the
+#: share of it that is at the limit.
+BANK, AT_LIMIT = 0.5, 0.98
+#: Turn rate over u (rad/s) of a vehicle that is steered by its turn in any case.
 STRONG_STEERING = 6e-3
 #: An estimate with a smaller standard deviation is believed, this share of which is no difference.
 WELL_KNOWN, NO_DIFFERENCE = 3e-4, 0.4
-#: The way of steering is kept at least this long (s).
+#: A way of steering is kept at least this long (s).
 KEPT_S = 300.0
-#: Roll is at its limit from this share of its sine on.
-AT_LIMIT = 0.98
-#: Smallest kick that is of importance (-).
-SMALLEST_KICK = 1e-3
-#: A vehicle that is steered by its kick too follows as one whose turn outruns it here (rad/s).
-KICKED_FREQUENCY = 0.015
+#: Lookahead of a vehicle that is steered by its adverse yaw (s).
+KICKED_LOOKAHEAD_S = 150.0
+
+
+def _number(value: float, what: str, **limits: float) -> Any:
+    return Field(value, description=what, **limits)
 
 
 class SteeringLearningSettings(Settings):
-    """Estimator of steering effectiveness and turn-rate disturbance."""
+    """Estimator of (b, c, k, d), and the two weights of steering by them."""
 
-    prior_radps: float = Field(
-        0.02, gt=0.0, le=1.0, description='b before anything is known, - in the climb (rad/s)'
+    prior_radps: float = _number(
+        0.02, 'b before the first turn, - in the climb (rad/s)', gt=0.0, le=1.0
     )
-    prior_std_radps: float = Field(
-        0.02, gt=0.0, le=1.0, description='its standard deviation (rad/s)'
+    prior_std_radps: float = _number(0.02, 'its standard deviation (rad/s)', gt=0.0, le=1.0)
+    drift_radps: float = _number(0.0002, 'change of b in 1000 s (rad/s)', ge=0.0, le=0.1)
+    bend_std_radps: float = _number(0.01, 'standard deviation of c (rad/s)', gt=0.0, le=1.0)
+    bend_drift_radps: float = _number(0.0003, 'change of c in 1000 s (rad/s)', ge=0.0, le=0.1)
+    kick_std: float = _number(0.3, 'standard deviation of k (-)', ge=0.0, le=5.0)
+    kick_drift: float = _number(0.05, 'change of k in 1000 s (-)', ge=0.0, le=5.0)
+    disturbance_std_radps: float = _number(
+        0.0001, 'standard deviation of d (rad/s)', gt=0.0, le=0.1
     )
-    drift_radps: float = Field(
-        0.0002, ge=0.0, le=0.1, description='change of b to be expected in 1000 s (rad/s)'
+    disturbance_drift_radps: float = _number(
+        0.00005, 'change of d in 1000 s (rad/s)', ge=0.0, le=0.1
     )
-    bend_std_radps: float = Field(
-        0.01, gt=0.0, le=1.0, description='standard deviation of c before it is known (rad/s)'
+    noise_radps: float = _number(0.0002, 'yaw rate that is not explained (rad/s)', gt=0.0, le=0.1)
+    correlation_s: float = _number(
+        60.0, 'for how long that is one and the same (s)', gt=0.0, le=600.0
     )
-    bend_drift_radps: float = Field(
-        0.0003, ge=0.0, le=0.1, description='change of c to be expected in 1000 s (rad/s)'
+    smoothing_s: float = _number(20.0, 'low pass on u and yaw rate (s)', gt=0.0, le=200.0)
+    after_s: float = _number(
+        30.0, 'learning begins so long after a turn-over (s)', ge=0.0, le=600.0
     )
-    kick_std: float = Field(
-        0.3, ge=0.0, le=5.0, description='standard deviation of k before it is known (-)'
+    roll_per_s: float = _number(
+        0.032, 'rho: u for each second of way beside the path', gt=0.0, le=1.0
     )
-    kick_drift: float = Field(
-        0.05, ge=0.0, le=5.0, description='change of k to be expected in 1000 s (-)'
-    )
-    disturbance_std_radps: float = Field(
-        0.0001, gt=0.0, le=0.1, description='standard deviation of d before it is known (rad/s)'
-    )
-    disturbance_drift_radps: float = Field(
-        0.00005, ge=0.0, le=0.1, description='change of d to be expected in 1000 s (rad/s)'
-    )
-    noise_radps: float = Field(
-        0.0002, gt=0.0, le=0.1, description='yaw rate that the model does not explain (rad/s)'
-    )
-    correlation_s: float = Field(
-        60.0, gt=0.0, le=600.0, description='time over which that is one and the same error (s)'
-    )
-    smoothing_s: float = Field(
-        20.0,
-        gt=0.0,
-        le=200.0,
-        description='low pass on roll and yaw rate, slower than the turn takes to build up (s)',
-    )
-    after_s: float = Field(
-        30.0, ge=0.0, le=600.0, description='learning begins this long after an inflection (s)'
-    )
-    bank_deg: float = Field(
-        30.0,
-        gt=0.0,
-        le=80.0,
-        description='roll at which a vehicle has to turn, or else is steered by its kick (deg)',
+    approach_s: float = _number(
+        60.0, 'tau: the way beside is closed no faster (s)', ge=0.0, le=3600.0
     )
 
     def params(
-        self, banks: bool = True, slowest_glide: float = SLOWEST_GLIDE_MPS
+        self,
+        banks: bool = True,
+        slowest_glide: float = SLOWEST_GLIDE_MPS,
+        vehicle: VehicleParams | None = None,
     ) -> 'SteeringParams':
-        """Kernel parameters for a vehicle, of its file's slowest glide (m/s).
-
-        One that does not bank to turn learns nothing.
-        """
+        """Kernel parameters for a vehicle; one that does not bank to turn learns nothing."""
+        power = steering_exponents(vehicle) if vehicle is not None else (2.0, 2.0)
         return SteeringParams(
-            drift=self.drift_radps**2 / 1000.0,
-            bend_drift=self.bend_drift_radps**2 / 1000.0,
-            kick_drift=self.kick_drift**2 / 1000.0,
-            disturbance_drift=self.disturbance_drift_radps**2 / 1000.0,
-            noise=self.noise_radps**2 * self.correlation_s,
-            after_s=self.after_s if banks else NEVER_S,
-            smoothing_s=self.smoothing_s,
-            bank=math.sin(math.radians(self.bank_deg)),
-            slowest_glide=slowest_glide,
+            self.drift_radps**2 / 1000.0,
+            self.bend_drift_radps**2 / 1000.0,
+            self.kick_drift**2 / 1000.0,
+            self.disturbance_drift_radps**2 / 1000.0,
+            self.noise_radps**2,
+            self.correlation_s,
+            self.after_s if banks else NEVER_S,
+            self.smoothing_s,
+            slowest_glide,
+            *map(float, power),
+            self.roll_per_s,
+            self.approach_s,
+            BANK,
         )
 
     def initial_state(self) -> 'Steering':
         """Estimates before the first turn."""
-        return Steering(
-            dive=self._phase(1.0),
-            climb=self._phase(-1.0),
-            bank=0.0,
-            bend=0.0,
-            roll_rate=0.0,
-            yaw_rate=0.0,
-            steady_s=0.0,
-        )
+        return Steering(self.phase(1.0), self.phase(-1.0), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
-    def _phase(self, sign: float) -> 'SteeringState':
-        return SteeringState(
-            b=sign * self.prior_radps,
-            c=0.0,
-            k=0.0,
-            d=0.0,
-            p=(
-                *(self.prior_std_radps**2, 0.0, 0.0, 0.0),
-                *(self.bend_std_radps**2, 0.0, 0.0),
-                *(self.kick_std**2, 0.0),
-                self.disturbance_std_radps**2,
-            ),
-            is_kicked=False,
-            kept_s=0.0,
-        )
+    def phase(self, sign: float) -> 'SteeringState':
+        """Estimate of one phase that knows nothing."""
+        b, c, k = self.prior_std_radps**2, self.bend_std_radps**2, self.kick_std**2
+        p = (b, 0.0, 0.0, 0.0, c, 0.0, 0.0, k, 0.0, self.disturbance_std_radps**2)
+        return SteeringState(sign * self.prior_radps, 0.0, 0.0, 0.0, p, False, 0.0)
 
 
 class SteeringParams(NamedTuple):
-    """Estimator as the kernels see it."""
+    """Estimator and weights as the kernels see them."""
 
-    drift: float  #: variance growth of b (rad^2/s^3)
-    bend_drift: float  #: variance growth of c (rad^2/s^3)
-    kick_drift: float  #: variance growth of k (1/s)
-    disturbance_drift: float  #: variance growth of d (rad^2/s^3)
-    noise: float  #: spectral density of the yaw-rate noise (rad^2/s)
-    after_s: float  #: time after a turn-over in which nothing is learnt (s)
+    drift: float  #: variance growth of b, c (rad^2/s^3), k (1/s) and d (rad^2/s^3)
+    bend_drift: float
+    kick_drift: float
+    disturbance_drift: float
+    noise: float  #: variance of the yaw rate that is not explained (rad^2/s^2)
+    correlation_s: float
+    after_s: float
     smoothing_s: float
-    bank: float  #: sine of the roll at which a vehicle has to turn (-)
     slowest_glide: float  #: vertical rate below which it turns over (m/s)
+    power_dive: float  #: n
+    power_climb: float
+    rho: float  #: (1/s)
+    tau: float  #: (s)
+    bank: float  #: sine of the roll at which a vehicle has to turn (-)
 
 
 class SteeringState(NamedTuple):
     """Estimate and covariance for one phase."""
 
-    b: float  #: effectiveness (rad/s)
-    c: float  #: how it bends with the cube of sin(roll) (rad/s)
-    k: float  #: heading per roll angle while the vehicle rolls (-)
+    b: float  #: effectiveness at the reference speed (rad/s)
+    c: float  #: how it bends with the cube of u (rad/s)
+    k: float  #: adverse (b k < 0) or proverse yaw (-)
     d: float  #: turn-rate disturbance (rad/s)
     p: tuple[float, float, float, float, float, float, float, float, float, float]
-    #: upper triangle of the covariance of (b, c, k, d), row by row
-    is_kicked: bool  #: steered by its kick, not by its turn
+    #: bb, bc, bk, bd, cc, ck, cd, kk, kd, dd
+    is_kicked: bool  #: steered by its adverse yaw alone
     kept_s: float  #: for how long it is steered this way (s)
 
 
@@ -180,11 +157,21 @@ class Steering(NamedTuple):
 
     dive: SteeringState
     climb: SteeringState
-    bank: float  #: sin(phi) V / V_0 (-)
-    bend: float  #: sin(phi)^3 V / V_0 (-)
-    roll_rate: float  #: (rad/s)
+    sine: float  #: u (V / V_0)^n (-)
+    cube: float  #: u^3 (V / V_0)^n (-)
+    sine_rate: float  #: u' (1/s)
     yaw_rate: float  #: (rad/s)
     steady_s: float  #: time since the last turn-over (s)
+    ratio: float  #: (V / V_0)^n of now (-)
+
+
+class Way(NamedTuple):
+    """How to steer about a trim: u = trim + gain (e + k (u - trim))."""
+
+    trim: float  #: u that turns as is wanted (-)
+    most: float  #: largest u that is of use (-)
+    gain: float  #: u for an error of the heading (1/rad)
+    lookahead_s: float
 
 
 @kernel
@@ -194,33 +181,28 @@ def speed_ratio(speed):
 
 
 @kernel
-def learn_steering(state, bank, bend, roll_rate, yaw_rate, params, dt):
-    """One Kalman step of ``dt`` s on yaw_rate = b bank + c bend + k roll_rate + d.
-
-    Parameters
-    ----------
-    bank, bend : float
-        sin(phi) V / V_0 and sin(phi)^3 V / V_0, smoothed as the rates are (-).
-    roll_rate, yaw_rate : float
-        Measured and smoothed (rad/s).
-    """
+def learn_steering(state, sine, cube, sine_rate, yaw_rate, params, dt):
+    """One Kalman step of ``dt`` s on yaw_rate = b sine + c cube + k sine_rate + d."""
     bb, bc, bk, bd, cc, ck, cd, kk, kd, dd = state.p
     bb += params.drift * dt
     cc += params.bend_drift * dt
     kk += params.kick_drift * dt
     dd += params.disturbance_drift * dt
-    g_b = bb * bank + bc * bend + bk * roll_rate + bd
-    g_c = bc * bank + cc * bend + ck * roll_rate + cd
-    g_k = bk * bank + ck * bend + kk * roll_rate + kd
-    g_d = bd * bank + cd * bend + kd * roll_rate + dd
-    spread = g_b * bank + g_c * bend + g_k * roll_rate + g_d + params.noise / dt
-    gain = (yaw_rate - state.b * bank - state.c * bend - state.k * roll_rate - state.d) / spread
+    g_b = bb * sine + bc * cube + bk * sine_rate + bd
+    g_c = bc * sine + cc * cube + ck * sine_rate + cd
+    g_k = bk * sine + ck * cube + kk * sine_rate + kd
+    g_d = bd * sine + cd * cube + kd * sine_rate + dd
+    explained = g_b * sine + g_c * cube + g_k * sine_rate + g_d
+    most = MOST_DEVIATIONS * math.sqrt(explained + params.noise)
+    error = yaw_rate - state.b * sine - state.c * cube - state.k * sine_rate - state.d
+    spread = explained + params.noise * params.correlation_s / dt
+    gain = min(most, max(-most, error)) / spread
     return SteeringState(
-        b=state.b + g_b * gain,
-        c=state.c + g_c * gain,
-        k=state.k + g_k * gain,
-        d=state.d + g_d * gain,
-        p=(
+        state.b + g_b * gain,
+        state.c + g_c * gain,
+        state.k + g_k * gain,
+        state.d + g_d * gain,
+        (
             bb - g_b * g_b / spread,
             bc - g_b * g_c / spread,
             bk - g_b * g_k / spread,
@@ -232,54 +214,45 @@ def learn_steering(state, bank, bend, roll_rate, yaw_rate, params, dt):
             kd - g_k * g_d / spread,
             dd - g_d * g_d / spread,
         ),
-        is_kicked=state.is_kicked,
-        kept_s=state.kept_s + dt,
+        state.is_kicked,
+        state.kept_s + dt,
     )
 
 
 @kernel
-def is_to_be_kicked(state, bank):
-    """Whether the vehicle is to be steered by its kick: it hardly turns, however far it rolls.
-
-    Turned by the kick alone, the roll that is needed grows until the vehicle turns no more: it
-    ends up at the bank at which b + c s^2 vanishes. That is a place to fly at if there is such a
-    bank within the limit ``bank`` (sine): if at the limit the vehicle turns to the side to which
-    the kick goes. If it turns against the kick even there, it can be steered by turning, and so it
-    can if turn and kick go to the same side at any roll. Where nothing is known, the vehicle is
-    kicked, and so rolled, until it is.
-    """
+def _at_limit(state, bank):
+    """Turn rate over u at a limit ``bank`` of u, and its standard deviation (rad/s)."""
     square = bank * bank
-    against = state.b + square * state.c
-    variance = state.p[0] + 2.0 * square * state.p[1] + square * square * state.p[4]
-    if against * against + variance > STRONG_STEERING * STRONG_STEERING:
-        return False
-    if state.k > 0.0:
-        against = -against
-    if state.b * state.k > 0.0 and state.p[0] < state.b * state.b:
-        return False
-    std = math.sqrt(max(0.0, variance))
-    doubt = NO_DIFFERENCE * std if std < WELL_KNOWN else std
-    if abs(against) > doubt:
-        return against < 0.0
-    return state.is_kicked or state.p[0] > state.b * state.b
+    variance = state.p[0] + square * (2.0 * state.p[1] + square * state.p[4])
+    return state.b + square * state.c, math.sqrt(max(0.0, variance))
 
 
 @kernel
-def turns_well(state, bank):
-    """Whether it is known that the vehicle turns fast at the limit ``bank`` (sine)."""
-    square = bank * bank
-    turn = state.b + square * state.c
-    variance = state.p[0] + 2.0 * square * state.p[1] + square * square * state.p[4]
-    return abs(turn) > STRONG_STEERING + 3.0 * math.sqrt(max(0.0, variance))
+def is_to_be_kicked(state, bank):
+    """Whether the vehicle is to be steered by its adverse yaw alone.
+
+    So turned it drifts to the roll at which it turns no more, and stays there with its heading
+    held, if there is one within the limit ``bank`` (sine): if at the limit it does not turn
+    against k. Where nothing is known it is kicked, and so rolled, until it is.
+    """
+    turn, std = _at_limit(state, bank)
+    is_unknown = state.p[0] > state.b * state.b
+    if turn * turn + std * std > STRONG_STEERING * STRONG_STEERING:
+        return False
+    if state.b * state.k > 0.0 and not is_unknown:
+        return False
+    against = -turn if state.k > 0.0 else turn
+    if abs(against) > (NO_DIFFERENCE * std if std < WELL_KNOWN else std):
+        return against < 0.0
+    return state.is_kicked or is_unknown
 
 
 @kernel
 def choose_steering(state, sine, bank):
     """Change the way of steering, if that is called for.
 
-    A vehicle that holds its heading by its kick is left alone: given up at a large roll, the kick
-    leaves a large heading error. The kick is given up where it is not enough, at the limit, and
-    where the vehicle turns out to turn well: what made it look weak, as a gust does, is over.
+    Given up at a large roll, the kick leaves a large heading error; so it is kept while it is
+    enough, or until the vehicle turns out to turn well.
 
     Parameters
     ----------
@@ -287,64 +260,116 @@ def choose_steering(state, sine, bank):
     sine, bank : float
         Sine of the roll, smoothed, and of its limit.
     """
+    turn, std = _at_limit(state, bank)
+    turns_well = abs(turn) > STRONG_STEERING + MOST_DEVIATIONS * std
     is_kicked = is_to_be_kicked(state, bank)
-    is_enough = state.is_kicked and abs(sine) < AT_LIMIT * bank and not turns_well(state, bank)
+    is_enough = state.is_kicked and abs(sine) < AT_LIMIT * bank and not turns_well
     if is_kicked == state.is_kicked or is_enough or state.kept_s < KEPT_S:
         return state
     return replace(state, is_kicked=is_kicked, kept_s=0.0)
 
 
 @kernel
-def followed_frequency(state):
-    """Frequency z = |b / k| (rad/s) up to which the vehicle can be steered by its turn.
-
-    While it rolls its kick goes the wrong way: y'' = U (b phi + k phi') has a zero there. A
-    vehicle that is kicked, or whose kick goes with its turn, follows faster. Of one that is not
-    known yet no less is expected than it may turn out to have.
-    """
-    frequency = math.sqrt(state.b * state.b + state.p[0]) / max(abs(state.k), SMALLEST_KICK)
-    if state.is_kicked or state.b * state.k > 0.0:
-        return max(KICKED_FREQUENCY, frequency)
-    return frequency
-
-
-@kernel
 def learn(steering, measured, speed, params, dt):
-    """One tick of learning; only the phase that is flown learns, and only in a glide.
-
-    Parameters
-    ----------
-    steering : Steering
-    measured : Measured
-    speed : float
-        Speed through the water, by the flight model (m/s).
-    params : SteeringParams
-    dt : float
-        Length of the tick (s).
-    """
-    ratio = speed_ratio(speed)
+    """One tick of learning; only the phase that is flown learns, and only in a glide."""
+    power = params.power_dive if measured.vertical_rate > 0.0 else params.power_climb
+    ratio = speed_ratio(speed) ** power
     is_gliding = abs(measured.vertical_rate) > params.slowest_glide and speed > LEARN_SPEED
     steady_s = steering.steady_s + dt if is_gliding else 0.0
     share = dt / (params.smoothing_s + dt) if steady_s > dt else 1.0
-    sine = math.sin(measured.phi)
-    bank = steering.bank + share * (sine * ratio - steering.bank)
-    bend = steering.bend + share * (sine * sine * sine * ratio - steering.bend)
-    roll_rate = steering.roll_rate + share * (measured.phi_dot - steering.roll_rate)
+    u = math.sin(measured.phi)
+    sine = steering.sine + share * (u * ratio - steering.sine)
+    cube = steering.cube + share * (u * u * u * ratio - steering.cube)
+    sine_rate = steering.sine_rate + share * (measured.phi_dot - steering.sine_rate)
     yaw_rate = steering.yaw_rate + share * (measured.psi_dot - steering.yaw_rate)
     dive, climb = steering.dive, steering.climb
     if steady_s > params.after_s:
         if measured.vertical_rate > 0.0:
-            dive = learn_steering(dive, bank, bend, roll_rate, yaw_rate, params, dt)
-            dive = choose_steering(dive, bank / ratio, params.bank)
+            dive = learn_steering(dive, sine, cube, sine_rate, yaw_rate, params, dt)
+            dive = choose_steering(dive, sine / ratio, params.bank)
         else:
-            climb = learn_steering(climb, bank, bend, roll_rate, yaw_rate, params, dt)
-            climb = choose_steering(climb, bank / ratio, params.bank)
-    return Steering(
-        dive=dive,
-        climb=climb,
-        bank=bank,
-        bend=bend,
-        roll_rate=roll_rate,
-        yaw_rate=yaw_rate,
-        steady_s=steady_s,
-    )
+            climb = learn_steering(climb, sine, cube, sine_rate, yaw_rate, params, dt)
+            climb = choose_steering(climb, sine / ratio, params.bank)
+    return Steering(dive, climb, sine, cube, sine_rate, yaw_rate, steady_s, ratio)
+
+
+@kernel
+def heading_gains(slope, k, params):
+    """Bandwidth a (1/s) of the heading, lookahead T (s), and the share w of psi_s' to be fed.
+
+    For e = e2 / U, e' = psi* + k u, psi*' = b u with b the ``slope``, the u that minimises the
+    integral of e^2 + tau^2 e'^2 + (u / rho)^2 is b u = -beta e - (alpha - beta k / b) psi*. With
+    psi_s = -e / T, b u = w psi_s' + a (psi_s - psi*) is that u exactly.
+    """
+    b, kick = abs(slope), max(abs(k), SMALLEST_KICK)
+    r2, t2 = params.rho * params.rho, params.tau * params.tau
+    more = 1.0 + r2 * kick * kick * t2
+    beta = params.rho * b / math.sqrt(more)
+    alpha = math.sqrt(2.0 * beta + r2 * (kick * kick + b * b * t2) / more)
+    q = math.copysign(kick, slope * k) / b
+    a = alpha - beta * q
+    fed = min(alpha * alpha / (4.0 * beta), FED * (alpha / abs(beta * q) - 1.0))
+    fed = min(1.0, max(0.0, fed))
+    rest = max(0.0, (a + fed * beta * q) ** 2 - 4.0 * fed * beta)
+    x = 2.0 * beta / (a - fed * beta * q + math.sqrt(rest))
+    a = beta * (1.0 + fed * q * x) / x
+    return min(BANDWIDTH_MAX, a), min(LOOKAHEAD_MAX_S, 1.0 / x), fed
+
+
+@kernel
+def slope_at(state, square):
+    """Slope b + 3 c u^2 where u^2 is so much, with its deviation: never zero (rad/s)."""
+    three = 3.0 * square
+    slope = state.b + three * state.c
+    variance = state.p[0] + three * (2.0 * state.p[1] + three * state.p[4])
+    return math.copysign(math.sqrt(slope * slope + max(0.0, variance)), slope)
+
+
+@kernel
+def choose_way(state, turn, ratio, limit, params):
+    """How to steer where ``turn`` (rad/s) is asked for: a `Way`.
+
+    About the roll that turns so; where steering fades with roll it stays below the peak of
+    b u + c u^3. Or by the adverse yaw alone, with as much of it as is known.
+
+    Parameters
+    ----------
+    state : SteeringState
+    turn : float
+        psi_s', that of the heading asked for (rad/s).
+    ratio : float
+        (V / V_0)^n (-).
+    limit : float
+        Largest u (-).
+    params : SteeringParams
+    """
+    if state.is_kicked:
+        gain = state.k / (state.k * state.k + state.p[7])
+        return Way(0.0, limit, gain, KICKED_LOOKAHEAD_S)
+    b, c, most = state.b, state.c, limit
+    if b * c < 0.0:
+        most = min(limit, SHARE_OF_PEAK * math.sqrt(-b / (3.0 * c)))
+    _, _, fed = heading_gains(slope_at(state, 0.0) * ratio, state.k, params)
+    wanted = (fed * turn - state.d) / ratio
+    trim = 0.0
+    for _ in range(4):
+        trim += (wanted - (b + c * trim * trim) * trim) / slope_at(state, trim * trim)
+        trim = min(most, max(-most, trim))
+    slope = slope_at(state, trim * trim) * ratio
+    a, lookahead_s, _ = heading_gains(slope, state.k, params)
+    return Way(trim, most, a / slope, lookahead_s)
+
+
+@kernel
+def steer_to(way, error, u, k):
+    """Return the u that steers to a heading ``error`` away (rad), from the u of now."""
+    sine = way.trim + way.gain * (error + k * (u - way.trim))
+    return min(way.most, max(-way.most, sine))
+
+
+@kernel
+def lookaheads(steering, params):
+    """How far ahead the vehicle can follow, in dive and climb (s)."""
+    dive = choose_way(steering.dive, 0.0, steering.ratio, params.bank, params)
+    climb = choose_way(steering.climb, 0.0, steering.ratio, params.bank, params)
+    return dive.lookahead_s, climb.lookahead_s
