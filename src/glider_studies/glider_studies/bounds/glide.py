@@ -32,7 +32,7 @@ from glider_guidance.yo.stage import GLIDING_DOWN, GLIDING_UP
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.onboard.command_filter import Filtered
-from glider_model.onboard.learnt_steering import speed_ratio
+from glider_model.onboard.learnt_steering import lookaheads
 from glider_model.vehicle.file import load_vehicle
 from glider_studies.bounds.steering_loop import SteeringLoop
 
@@ -184,7 +184,7 @@ def steering_loop(glide: Glide) -> SteeringLoop:
         limit = _largest(ask, seen)
         steering = state.control.law.steering
         phase = steering.dive if glide.descends else steering.climb
-        b, k = phase.b * getattr(steering, 'ratio', speed_ratio(glide.speed)), phase.k
+        b, k = phase.b * steering.ratio, phase.k
     speed = state.guidance.water.speed
     loop = SteeringLoop(
         speed=speed,
@@ -228,6 +228,7 @@ def _heading(glide: Glide, beside: float) -> float:
         lead_before_s=0.0,
         to_turn_s=math.inf,
     )
+    dive_s, climb_s = lookaheads(guidance.followed.steering, params.guidance.steering)
     seen = Situation(
         course=psi,
         elevation=0.0,
@@ -239,10 +240,15 @@ def _heading(glide: Glide, beside: float) -> float:
         glide_speed=params.guidance.profile_speed,
         current=Water(0.0, 0.0, 0.0),
         steering=guidance.followed.steering,
+        dive_s=dive_s,
+        climb_s=climb_s,
         leg=leg,
         heading=psi,
     )
-    _, asked = method_step(guidance.method, seen, params.guidance.method, TICK_S)
+    method = guidance.method
+    if hasattr(method, 'beside'):  # as long as it has been there, so long it is known
+        method = method._replace(beside=beside)
+    _, asked = method_step(method, seen, params.guidance.method, TICK_S)
     return math.remainder(asked.heading - psi, 2.0 * math.pi)
 
 
