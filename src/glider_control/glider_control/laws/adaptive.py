@@ -38,7 +38,7 @@ class RollSettings(Settings):
     """PI-D of roll."""
 
     kp: float = Field(
-        6.0, gt=0.0, le=500.0, description='angle (N m/rad)', json_schema_extra=TUNABLE
+        6.5, gt=0.0, le=500.0, description='angle (N m/rad)', json_schema_extra=TUNABLE
     )
     ki: float = Field(
         0.1, ge=0.0, le=50.0, description='integral (N m/(rad s))', json_schema_extra=TUNABLE
