@@ -59,7 +59,7 @@ def numeric_fields(model: type[pydantic.BaseModel], before: str) -> Iterator[tup
         for kind in kinds:
             if isinstance(kind, type) and issubclass(kind, pydantic.BaseModel):
                 yield from numeric_fields(kind, f'{before}{name}.')
-        if kinds[0] in (int, float):
+        if kinds[0] in (int, float) and field.metadata:  # else it is not a person's to set
             yield f'{before}{name}', field
 
 

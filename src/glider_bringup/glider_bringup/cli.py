@@ -55,7 +55,7 @@ _OF_ROS = re.compile(r'(rcl|rosidl|rpyutils|ament_)|\w+(_msgs|_srvs|_interfaces)
 ORDER = (
     *('run', 'montecarlo', 'experiments', 'sweep', 'map', 'score', 'figure', 'report', 'compare'),
     *('export', 'replay', 'verify', 'recover', 'navigate', 'validate', 'energy'),
-    *('plan', 'ocean', 'autopilot', 'trim', 'list'),
+    *('plan', 'ocean', 'autopilot', 'trim', 'bounds', 'list'),
 )
 #: What the ./glider script does by itself, and --help has to tell of: text and example.
 OF_THE_SCRIPT = {

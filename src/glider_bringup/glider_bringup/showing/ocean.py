@@ -122,7 +122,7 @@ def mission_in(file: Path, name: str) -> Sea:
     params = scenario.current_settings().field.params()
     axes = Axes(params.times, params.depths, params.latitudes, params.longitudes)
     none = np.zeros((len(axes.latitudes), len(axes.longitudes)), dtype=bool)
-    loaded = Loaded(axes, params.water, none)
+    loaded = Loaded(axes, params.water, (), none)
     return Sea(f'{file.name} at the start of {scenario.name}', loaded, scenario)
 
 
