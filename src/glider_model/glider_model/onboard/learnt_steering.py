@@ -76,13 +76,13 @@ class SteeringLearningSettings(Settings):
     )
     smoothing_s: float = _number(20.0, 'low pass on u and yaw rate (s)', gt=0.0, le=200.0)
     after_s: float = _number(
-        30.0, 'learning begins so long after a turn-over (s)', ge=0.0, le=600.0
+        30.0, 'learning begins so long after an inflection (s)', ge=0.0, le=600.0
     )
     roll_per_s: float = _number(
-        0.032, 'rho: u for each second of way beside the path', gt=0.0, le=1.0
+        0.032, 'rho: u for each second of cross-track (1/s)', gt=0.0, le=1.0
     )
     approach_s: float = _number(
-        60.0, 'tau: the way beside is closed no faster (s)', ge=0.0, le=3600.0
+        60.0, 'tau: cross-track is closed no faster (s)', ge=0.0, le=3600.0
     )
 
     def params(
