@@ -77,7 +77,7 @@ def test_a_floor_with_other_arithmetic_is_refused(floor, library):
         floor.compare(engine, in_c)
 
 
-def test_bench_prints_one_object_of_figures(modules, monkeypatch):
+def test_bench_prints_one_object_of_figures(floor, monkeypatch):
     """Of shorter flights than the figures are of, which are named after 30 h."""
     import bench
     import memory

@@ -125,7 +125,7 @@ def test_orders_in_flight_are_on_record_and_verified(glider, bystander, tmp_path
 
     try:
         wait_for(lambda: 'gliding down' in stages, 'the dive')
-        set_to('control_node', 'adaptive.pitch.b1', 7.25)
+        set_to('control_node', 'adaptive.pitch.kp', 7.25)
         set_to('guidance_node', 'observer.k3_per_s', 0.03)
         assert call(pause, SetBool.Request(data=True)).success
         assert call(pause, SetBool.Request(data=False)).success
@@ -139,7 +139,7 @@ def test_orders_in_flight_are_on_record_and_verified(glider, bystander, tmp_path
     with file.open('rb') as stream:
         events = [m.data for _, _, m in make_reader(stream).iter_messages(['/diagnostics'])]
     text = b'|'.join(events)
-    for word in (ABORT, PARAMETERS_SET, 'adaptive.pitch.b1', '7.25', 'observer.k3_per_s', '0.03'):
+    for word in (ABORT, PARAMETERS_SET, 'adaptive.pitch.kp', '7.25', 'observer.k3_per_s', '0.03'):
         assert word.encode() in text
     code, blocks = verified(glider, out)
     assert code == 0, blocks

@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from glider_base.kernel import kernel
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number
 from glider_base.signals import Covariance, Imu, Odometry, Reference, Water, Wrench
 
 _HALF_SQRT2 = math.sqrt(0.5)
@@ -244,10 +244,8 @@ class OriginSettings(Settings):
     at 36 degrees 0.1 % for 9 km, 1 % for 88 km.
     """
 
-    latitude_deg: float = Field(36.0, ge=-85.0, le=85.0, description='Latitude (deg, + north).')
-    longitude_deg: float = Field(
-        122.0, ge=-180.0, le=180.0, description='Longitude (deg, + east).'
-    )
+    latitude_deg: float = number(36.0, (-85.0, 85.0), 'Latitude (deg, + north).')
+    longitude_deg: float = number(122.0, (-180.0, 180.0), 'Longitude (deg, + east).')
     time: str = Field(
         '', description='Time of the start (UTC, as 2026-03-01T06:00), if anything asks for it.'
     )

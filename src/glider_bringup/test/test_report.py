@@ -278,10 +278,10 @@ def test_not_a_number_in_the_data_is_a_gap_that_is_told(tmp_path):
 
     text, data = report_of(fly(tmp_path, spoil))
     assert 'cross_track_m (500)' in text.text
-    assert 'lyapunov_1 (1)' in text.text
+    assert 'steering_dive_radps (1)' in text.text
     curve = data['runs'][0]['arrays']['cross_track_m']
     assert np.count_nonzero(np.isnan(curve)) == 500
-    assert not np.any(np.isinf(data['runs'][0]['arrays']['lyapunov_1']))
+    assert not np.any(np.isinf(data['runs'][0]['arrays']['steering_dive_radps']))
 
 
 def test_topic_that_is_not_in_the_bag_has_no_panel(tmp_path):

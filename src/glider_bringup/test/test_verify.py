@@ -341,9 +341,9 @@ def test_edited_scenario_is_refused_in_the_folder_and_tried_as_settings(
 ):
     folder = altered(beginning)
     text = (folder / 'scenario.yaml').read_text()
-    assert 'b1: 6.0' in text
+    assert 'kp: 8.1' in text
     edited = folder / 'scenario.yaml'
-    edited.write_text(text.replace('b1: 6.0', 'b1: 6.1'))
+    edited.write_text(text.replace('kp: 8.1', 'kp: 8.2'))
     with pytest.raises(ConfigurationError, match='not the one that was flown'):
         verified(folder, tmp_path)
     assert different(results(folder, tmp_path, settings=edited)) == {'control'}

@@ -5,11 +5,9 @@
 import math
 from typing import NamedTuple
 
-from pydantic import Field
-
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
-from glider_base.settings import TUNABLE
+from glider_base.settings import number
 from glider_control.law import LawSettings
 from glider_model.onboard.learnt_steering import speed_ratio
 from glider_model.vehicle.file import Vehicle
@@ -21,15 +19,9 @@ HEADING_INTEGRAL_MAX = 0.005
 class HeadingLawSettings(LawSettings):
     """Gains of a law whose heading goes by the steering of the vehicle file."""
 
-    heading_kp_per_s: float = Field(
-        0.035, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=TUNABLE
-    )
-    heading_ki_per_s2: float = Field(
-        2e-4, ge=0.0, le=0.1, description='heading integral (1/s^2)', json_schema_extra=TUNABLE
-    )
-    heading_kd: float = Field(
-        0.3, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=TUNABLE
-    )
+    heading_kp_per_s: float = number(0.035, (0.0, 1.0), 'k_psi, heading (1/s)', tunable=True)
+    heading_ki_per_s2: float = number(2e-4, (0.0, 0.1), 'heading integral (1/s^2)', tunable=True)
+    heading_kd: float = number(0.3, (0.0, 5.0), 'yaw-rate damping (-)', tunable=True)
 
     def heading_params(self, vehicle: Vehicle) -> 'HeadingParams':
         """Kernel parameters for a vehicle whose steering is known."""

@@ -10,10 +10,8 @@ one from nothing.
 import math
 from typing import NamedTuple
 
-from pydantic import Field
-
 from glider_base.kernel import kernel, replace
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number, positive
 from glider_base.signals import Adaptation, Reference
 from glider_base.slot import default, slot
 from glider_model.onboard.attitude_filter import Measured
@@ -30,15 +28,11 @@ CAREFUL_SHARE = 1.0 / 3.0
 class HeadingSettings(Settings):
     """Bank to turn."""
 
-    roll_limit_deg: float = Field(
-        30.0, ge=1.0, le=60.0, description='largest commanded roll (deg)'
+    roll_limit_deg: float = number(30.0, (1.0, 60.0), 'largest commanded roll (deg)')
+    roll_frequency_radps: float = positive(
+        0.5, 5.0, 'natural frequency of the roll filter (rad/s)'
     )
-    roll_frequency_radps: float = Field(
-        0.5, gt=0.0, le=5.0, description='natural frequency of the roll filter (rad/s)'
-    )
-    roll_rate_radps: float = Field(
-        0.08, gt=0.0, le=1.0, description='largest rate of the desired roll (rad/s)'
-    )
+    roll_rate_radps: float = positive(0.08, 1.0, 'largest rate of the desired roll (rad/s)')
 
     def params(self) -> 'Bank':
         """Kernel parameters."""

@@ -9,7 +9,7 @@ import pydantic
 from pydantic import Field
 
 from glider_base import plugins
-from glider_base.settings import TUNABLE, ConfigurationError, Settings
+from glider_base.settings import ConfigurationError, Settings, number, positive
 from glider_base.signals import Joints
 from glider_control import laws, surfaces
 from glider_control.allocation import make_allocation
@@ -27,39 +27,27 @@ from glider_model.vehicle.file import load_vehicle
 class BuoyancySettings(Settings):
     """Vertical rate on the buoyancy engine."""
 
-    ki_kg_per_m: float = Field(
-        0.004,
-        ge=0.0,
-        le=10.0,
-        description='integral of the vertical-rate error (kg/m)',
-        json_schema_extra=TUNABLE,
+    ki_kg_per_m: float = number(
+        0.004, (0.0, 10.0), 'integral of the vertical-rate error (kg/m)', tunable=True
     )
-    drag_ki_kg_per_m: float = Field(
-        0.002,
-        ge=0.0,
-        le=10.0,
-        description='integral that changes sides with dive and climb (kg/m)',
-        json_schema_extra=TUNABLE,
+    drag_ki_kg_per_m: float = number(
+        0.002, (0.0, 10.0), 'integral that changes sides with dive and climb (kg/m)', tunable=True
     )
-    trim_limit_kg: float = Field(
-        0.3, ge=0.0, le=20.0, description='largest correction by each integral (kg)'
-    )
+    trim_limit_kg: float = number(0.3, (0.0, 20.0), 'largest correction by each integral (kg)')
 
 
 class FilterSettings(Settings):
     """What keeps noise from moving the motors."""
 
-    attitude_s: float = Field(
-        3.0, gt=0.0, le=60.0, description='time constant of the attitude filter (s)'
+    attitude_s: float = positive(3.0, 60.0, 'time constant of the attitude filter (s)')
+    buoyancy_dead_band_kg: float = number(
+        0.005, (0.0, 1.0), 'change of command that the pump ignores (kg)'
     )
-    buoyancy_dead_band_kg: float = Field(
-        0.005, ge=0.0, le=1.0, description='change of command that the pump ignores (kg)'
+    pitch_dead_band_m: float = number(
+        1e-4, (0.0, 0.1), 'change of command that the pitch mass ignores (m)'
     )
-    pitch_dead_band_m: float = Field(
-        1e-4, ge=0.0, le=0.1, description='change of command that the pitch mass ignores (m)'
-    )
-    roll_dead_band_deg: float = Field(
-        0.2, ge=0.0, le=10.0, description='change of command that the roll mass ignores (deg)'
+    roll_dead_band_deg: float = number(
+        0.2, (0.0, 10.0), 'change of command that the roll mass ignores (deg)'
     )
 
 

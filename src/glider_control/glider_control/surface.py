@@ -9,10 +9,8 @@ not bank to turn: the control law holds it level, and `steer` has the heading.
 
 from typing import NamedTuple
 
-from pydantic import Field
-
 from glider_base.kernel import kernel
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number
 from glider_base.slot import default, slot
 from glider_model.vehicle.file import Vehicle
 
@@ -23,8 +21,8 @@ class SurfaceLawSettings(Settings):
     Its fields are those of ``control.NAME``.
     """
 
-    dead_band_deg: float = Field(
-        0.2, ge=0.0, le=10.0, description='change of command that the surface ignores (deg)'
+    dead_band_deg: float = number(
+        0.2, (0.0, 10.0), 'change of command that the surface ignores (deg)'
     )
 
     def params(self, vehicle: Vehicle) -> NamedTuple:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from glider_base.settings import TUNABLE, Settings
+from glider_base.settings import Settings, number, positive
 from glider_base.signals import TrackingError, Water
 from glider_base.slot import slot
 from glider_model.onboard.learnt_steering import Steering
@@ -21,36 +21,23 @@ from glider_model.vehicle.file import Vehicle
 class LosGains(Settings):
     """Line of sight, as far as methods share it."""
 
-    lookahead_m: float = Field(
-        40.0,
-        ge=1.0,
-        le=10000.0,
-        description='least lookahead of los_current (m)',
-        json_schema_extra=TUNABLE,
+    lookahead_m: float = number(
+        40.0, (1.0, 10000.0), 'least lookahead of los_current (m)', tunable=True
     )
     lead_turns: bool = Field(
         True, description='share the drift of a turn between before and after (los_current)'
     )
-    delta1_m: float = Field(
-        3.2,
-        ge=0.1,
-        le=10000.0,
-        description='Delta1, lookahead of los_zhang2021 (m)',
-        json_schema_extra=TUNABLE,
+    delta1_m: float = number(
+        3.2, (0.1, 10000.0), 'Delta1, lookahead of los_zhang2021 (m)', tunable=True
     )
-    delta1_per_s: float = Field(
-        0.1,
-        gt=0.0,
-        le=5.0,
-        description='delta1, pull of the virtual target toward the vehicle (1/s)',
-        json_schema_extra=TUNABLE,
+    delta1_per_s: float = positive(
+        0.1, 5.0, 'delta1, pull of the virtual target toward the vehicle (1/s)', tunable=True
     )
-    delta2: float = Field(
+    delta2: float = number(
         1.0,
-        ge=0.05,
-        le=20.0,
-        description='delta2, ratio of the vertical lookahead to the distance (-)',
-        json_schema_extra=TUNABLE,
+        (0.05, 20.0),
+        'delta2, ratio of the vertical lookahead to the distance (-)',
+        tunable=True,
     )
 
 

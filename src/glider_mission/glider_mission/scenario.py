@@ -25,6 +25,7 @@ from glider_base.settings import (
     file_names,
     find_file,
     holder_of,
+    number,
     validate,
 )
 from glider_base.wiring import SENSORS
@@ -87,18 +88,11 @@ class RouteForecast(Settings):
         max_length=4000,
         description='NetCDF file, relative to this one; without: the current of the scenario',
     )
-    error_mps: float = Field(
-        0.0,
-        ge=0.0,
-        le=1.0,
-        description='rms of a random error of each part of the depth-averaged current (m/s)',
+    error_mps: float = number(
+        0.0, (0.0, 1.0), 'rms of a random error of each part of the depth-averaged current (m/s)'
     )
-    error_km: float = Field(
-        40.0, ge=5.0, le=1000.0, description='correlation length of the error (km)'
-    )
-    late_h: float = Field(
-        0.0, ge=0.0, le=240.0, description='by what its water comes too late: its age (h)'
-    )
+    error_km: float = number(40.0, (5.0, 1000.0), 'correlation length of the error (km)')
+    late_h: float = number(0.0, (0.0, 240.0), 'by what its water comes too late: its age (h)')
 
     _found = pydantic.field_validator('file')(beside)
 
@@ -121,19 +115,14 @@ class Scenario(Settings):
     vehicle: str = Field(
         'zhang2021', description='vehicle by name, or path of a file relative to this one'
     )
-    seed: int = Field(0, ge=0, le=2**63 - 1, description='seed of everything random')
-    dives: int = Field(
-        1, ge=0, le=100000, description='dives of a run without --duration; 0: until duration_s'
-    )
-    duration_s: float = Field(
-        108000.0, ge=0.1, le=1e8, description='simulated time of --duration full (s)'
-    )
-    settle_s: float | None = Field(
+    seed: int = number(0, (0, 2**63 - 1), 'seed of everything random')
+    dives: int = number(1, (0, 100000), 'dives of a run without --duration; 0: until duration_s')
+    duration_s: float = number(108000.0, (0.1, 1e8), 'simulated time of --duration full (s)')
+    settle_s: float | None = number(
         None,
-        ge=0.0,
-        le=1e8,
-        description='time left out of the score (s); by default 7200 in long runs, else 1800, a '
-        'dive to depth_m or half of the run, whichever is shortest',
+        (0.0, 1e8),
+        'time left out of the score (s); by default 7200 in long runs, else 1800, a dive to '
+        'depth_m or half of the run, whichever is shortest',
     )
     initial: InitialSettings = Field(
         InitialSettings(depth_m=0.1), description='state at the start'

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number, positive
 from glider_base.wiring import PORTS
 
 #: Topics that are published in every tick, but that of time.
@@ -22,12 +22,10 @@ class MessageFault(Settings):
         description='it is lost, comes twice, comes late, comes after the next one, or is cut in '
         'two'
     )
-    share: float = Field(gt=0.0, le=1.0, description='of so many of the messages (-)')
-    delay_s: float = Field(
-        0.02, ge=0.0, le=10.0, description='by which one comes late (s of wall time)'
-    )
-    at_s: float = Field(0.0, ge=0.0, le=1e8, description='not before this time (s)')
-    for_s: float = Field(0.0, ge=0.0, le=1e8, description='how long it lasts (s); 0: to the end')
+    share: float = positive(..., 1.0, 'of so many of the messages (-)')
+    delay_s: float = number(0.02, (0.0, 10.0), 'by which one comes late (s of wall time)')
+    at_s: float = number(0.0, (0.0, 1e8), 'not before this time (s)')
+    for_s: float = number(0.0, (0.0, 1e8), 'how long it lasts (s); 0: to the end')
 
     def strikes_at(self, t_s: float) -> bool:
         """Whether it is the time of the fault."""

@@ -20,6 +20,7 @@ from glider_bringup.engines.direct import (
     finite_rows,
 )
 from glider_bringup.engines.flight import Held, Kept, refuse_message_faults, refuse_planned_route
+from glider_bringup.scoring.scores import seconds
 from glider_control.law import LawSettings
 from glider_guard.rows import LATCHED
 from glider_guidance.order import Order
@@ -134,7 +135,7 @@ class Flight:
     @property
     def t_s(self) -> float:
         """Time flown (s)."""
-        return self.tick * TICK_S
+        return seconds(self.tick)
 
     @property
     def is_over(self) -> bool:

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
-from glider_base.settings import TUNABLE, Settings
+from glider_base.settings import Settings, number, positive
 from glider_base.signals import Adaptation
 from glider_control.law import Bank, LawSettings, bank_carefully, law_learnt, law_step
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
@@ -37,29 +37,17 @@ LEARN_AFTER_S, INTEGRAL_MAX = 20.0, 3.0
 class RollSettings(Settings):
     """PI-D of roll."""
 
-    kp: float = Field(
-        6.5, gt=0.0, le=500.0, description='angle (N m/rad)', json_schema_extra=TUNABLE
-    )
-    ki: float = Field(
-        0.1, ge=0.0, le=50.0, description='integral (N m/(rad s))', json_schema_extra=TUNABLE
-    )
-    kd: float = Field(
-        6.0, ge=0.0, le=500.0, description='rate (N m s/rad)', json_schema_extra=TUNABLE
-    )
+    kp: float = positive(6.5, 500.0, 'angle (N m/rad)', tunable=True)
+    ki: float = number(0.1, (0.0, 50.0), 'integral (N m/(rad s))', tunable=True)
+    kd: float = number(6.0, (0.0, 500.0), 'rate (N m s/rad)', tunable=True)
 
 
 class PitchSettings(Settings):
     """PI-D of pitch."""
 
-    kp: float = Field(
-        8.1, gt=0.0, le=500.0, description='angle (N m/rad)', json_schema_extra=TUNABLE
-    )
-    ki: float = Field(
-        0.16, ge=0.0, le=50.0, description='integral (N m/(rad s))', json_schema_extra=TUNABLE
-    )
-    kd: float = Field(
-        14.0, ge=0.0, le=500.0, description='rate (N m s/rad)', json_schema_extra=TUNABLE
-    )
+    kp: float = positive(8.1, 500.0, 'angle (N m/rad)', tunable=True)
+    ki: float = number(0.16, (0.0, 50.0), 'integral (N m/(rad s))', tunable=True)
+    kd: float = number(14.0, (0.0, 500.0), 'rate (N m s/rad)', tunable=True)
 
 
 class AdaptiveSettings(LawSettings):

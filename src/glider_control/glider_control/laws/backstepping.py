@@ -24,7 +24,7 @@ from pydantic import Field
 
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
-from glider_base.settings import TUNABLE, Settings
+from glider_base.settings import Settings, number, positive
 from glider_base.signals import Adaptation
 from glider_control.heading import HeadingLawSettings, HeadingParams, heading_to_roll
 from glider_control.law import Bank, bank_carefully, law_learnt, law_step
@@ -44,33 +44,15 @@ RATE_FILTER = FilterParams(2.0, 10.0)
 class ChannelSettings(Settings):
     """Gains of one channel, roll or pitch."""
 
-    l1_per_s: float = Field(
-        0.15, gt=0.0, le=5.0, description='L1, angle error (1/s)', json_schema_extra=TUNABLE
+    l1_per_s: float = positive(0.15, 5.0, 'L1, angle error (1/s)', tunable=True)
+    b1: float = positive(6.0, 500.0, 'B1, angle (N m/rad)', tunable=True)
+    b2: float = positive(14.0, 500.0, 'B2, rate (N m s/rad)', tunable=True)
+    gamma: float = number(0.3, (0.0, 50.0), 'Gamma, adaptation (N m/rad)', tunable=True)
+    sigma_per_s: float = number(1e-5, (0.0, 1.0), 'sigma, leakage (rad/(N m s))', tunable=True)
+    dead_zone_radps: float = number(
+        5e-5, (0.0, 0.1), 'rate error below which nothing is learnt (rad/s)', tunable=True
     )
-    b1: float = Field(
-        6.0, gt=0.0, le=500.0, description='B1, angle (N m/rad)', json_schema_extra=TUNABLE
-    )
-    b2: float = Field(
-        14.0, gt=0.0, le=500.0, description='B2, rate (N m s/rad)', json_schema_extra=TUNABLE
-    )
-    gamma: float = Field(
-        0.3, ge=0.0, le=50.0, description='Gamma, adaptation (N m/rad)', json_schema_extra=TUNABLE
-    )
-    sigma_per_s: float = Field(
-        1e-5,
-        ge=0.0,
-        le=1.0,
-        description='sigma, leakage (rad/(N m s))',
-        json_schema_extra=TUNABLE,
-    )
-    dead_zone_radps: float = Field(
-        5e-5,
-        ge=0.0,
-        le=0.1,
-        description='rate error below which nothing is learnt (rad/s)',
-        json_schema_extra=TUNABLE,
-    )
-    bound: float = Field(3.0, gt=0.0, le=100.0, description='projection: largest parameter (N m)')
+    bound: float = positive(3.0, 100.0, 'projection: largest parameter (N m)')
 
     def params(self, inertia: float) -> 'ChannelParams':
         """Kernel parameters of a channel that turns an inertia (kg m^2)."""
@@ -89,21 +71,11 @@ class ChannelSettings(Settings):
 class RollChannelSettings(ChannelSettings):
     """Gains of the roll channel."""
 
-    l1_per_s: float = Field(
-        0.3, gt=0.0, le=5.0, description='L1, angle error (1/s)', json_schema_extra=TUNABLE
-    )
-    b1: float = Field(
-        8.0, gt=0.0, le=500.0, description='B1, angle (N m/rad)', json_schema_extra=TUNABLE
-    )
-    b2: float = Field(
-        12.0, gt=0.0, le=500.0, description='B2, rate (N m s/rad)', json_schema_extra=TUNABLE
-    )
-    dead_zone_radps: float = Field(
-        5e-4,
-        ge=0.0,
-        le=0.1,
-        description='rate error below which nothing is learnt (rad/s)',
-        json_schema_extra=TUNABLE,
+    l1_per_s: float = positive(0.3, 5.0, 'L1, angle error (1/s)', tunable=True)
+    b1: float = positive(8.0, 500.0, 'B1, angle (N m/rad)', tunable=True)
+    b2: float = positive(12.0, 500.0, 'B2, rate (N m s/rad)', tunable=True)
+    dead_zone_radps: float = number(
+        5e-4, (0.0, 0.1), 'rate error below which nothing is learnt (rad/s)', tunable=True
     )
 
 

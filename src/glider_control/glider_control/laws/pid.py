@@ -8,11 +8,9 @@ knows the vehicle: steering effectiveness and its sign in both phases, and the m
 
 from typing import NamedTuple
 
-from pydantic import Field
-
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
-from glider_base.settings import TUNABLE
+from glider_base.settings import number
 from glider_control.heading import HeadingLawSettings, HeadingParams, heading_to_roll
 from glider_control.law import Bank, bank_carefully, law_step
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
@@ -26,24 +24,12 @@ class PidSettings(HeadingLawSettings):
     Moments in N m, angles in rad.
     """
 
-    pitch_kp: float = Field(
-        8.0, ge=0.0, le=1000.0, description='pitch (N m/rad)', json_schema_extra=TUNABLE
-    )
-    pitch_ki: float = Field(
-        0.08, ge=0.0, le=100.0, description='pitch (N m/(rad s))', json_schema_extra=TUNABLE
-    )
-    pitch_kd: float = Field(
-        10.0, ge=0.0, le=1000.0, description='pitch rate (N m s/rad)', json_schema_extra=TUNABLE
-    )
-    roll_kp: float = Field(
-        8.0, ge=0.0, le=1000.0, description='roll (N m/rad)', json_schema_extra=TUNABLE
-    )
-    roll_ki: float = Field(
-        0.4, ge=0.0, le=100.0, description='roll (N m/(rad s))', json_schema_extra=TUNABLE
-    )
-    roll_kd: float = Field(
-        2.0, ge=0.0, le=1000.0, description='roll rate (N m s/rad)', json_schema_extra=TUNABLE
-    )
+    pitch_kp: float = number(8.0, (0.0, 1000.0), 'pitch (N m/rad)', tunable=True)
+    pitch_ki: float = number(0.08, (0.0, 100.0), 'pitch (N m/(rad s))', tunable=True)
+    pitch_kd: float = number(10.0, (0.0, 1000.0), 'pitch rate (N m s/rad)', tunable=True)
+    roll_kp: float = number(8.0, (0.0, 1000.0), 'roll (N m/rad)', tunable=True)
+    roll_ki: float = number(0.4, (0.0, 100.0), 'roll (N m/(rad s))', tunable=True)
+    roll_kd: float = number(2.0, (0.0, 1000.0), 'roll rate (N m s/rad)', tunable=True)
 
     def params(self, vehicle: Vehicle, bank: Bank) -> 'PidParams':
         """Kernel parameters for a vehicle whose steering is known."""

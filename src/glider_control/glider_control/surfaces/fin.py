@@ -19,11 +19,9 @@ not explain, as a gust, counts as a few standard deviations at most, and s never
 import math
 from typing import NamedTuple
 
-from pydantic import Field
-
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel, replace
-from glider_base.settings import TUNABLE
+from glider_base.settings import number, positive
 from glider_base.signals import Adaptation
 from glider_control.surface import SurfaceLawSettings, steer, surface_learnt
 from glider_model.onboard.learnt_steering import LEARN_SPEED, STEERING_SPEED
@@ -42,41 +40,26 @@ MOST_DEVIATIONS = 2.0
 class FinLawSettings(SurfaceLawSettings):
     """Gains of steering by a tail fin."""
 
-    heading_kp_per_s: float = Field(
-        0.05, ge=0.0, le=1.0, description='k_psi, heading (1/s)', json_schema_extra=TUNABLE
-    )
-    heading_ki_per_s2: float = Field(
-        2e-4, ge=0.0, le=0.1, description='heading integral (1/s^2)', json_schema_extra=TUNABLE
-    )
-    heading_kd: float = Field(
-        0.5, ge=0.0, le=5.0, description='yaw-rate damping (-)', json_schema_extra=TUNABLE
-    )
-    share_std: float = Field(
+    heading_kp_per_s: float = number(0.05, (0.0, 1.0), 'k_psi, heading (1/s)', tunable=True)
+    heading_ki_per_s2: float = number(2e-4, (0.0, 0.1), 'heading integral (1/s^2)', tunable=True)
+    heading_kd: float = number(0.5, (0.0, 5.0), 'yaw-rate damping (-)', tunable=True)
+    share_std: float = number(
         0.7,
-        ge=0.0,
-        le=5.0,
-        description='standard deviation of s before anything is known; 0: it is not learnt (-)',
+        (0.0, 5.0),
+        'standard deviation of s before anything is known; 0: it is not learnt (-)',
     )
-    share_drift: float = Field(
-        0.05, ge=0.0, le=5.0, description='change of s to be expected in 1000 s (-)'
+    share_drift: float = number(0.05, (0.0, 5.0), 'change of s to be expected in 1000 s (-)')
+    noise_radps: float = positive(0.0003, 0.1, 'yaw rate that the model does not explain (rad/s)')
+    correlation_s: float = positive(
+        60.0, 600.0, 'time over which that is one and the same error (s)'
     )
-    noise_radps: float = Field(
-        0.0003, gt=0.0, le=0.1, description='yaw rate that the model does not explain (rad/s)'
+    build_up_s: float = positive(4.0, 200.0, 'time in which a turn builds up (s)')
+    smoothing_s: float = positive(10.0, 200.0, 'low pass on angle and yaw rate (s)')
+    lasting_s: float = positive(
+        300.0, 2000.0, 'what lasts longer than this tells nothing of s (s)'
     )
-    correlation_s: float = Field(
-        60.0, gt=0.0, le=600.0, description='time over which that is one and the same error (s)'
-    )
-    build_up_s: float = Field(
-        4.0, gt=0.0, le=200.0, description='time in which a turn builds up (s)'
-    )
-    smoothing_s: float = Field(
-        10.0, gt=0.0, le=200.0, description='low pass on angle and yaw rate (s)'
-    )
-    lasting_s: float = Field(
-        300.0, gt=0.0, le=2000.0, description='what lasts longer than this tells nothing of s (s)'
-    )
-    after_s: float = Field(
-        90.0, ge=0.0, le=600.0, description='learning begins this long after an inflection (s)'
+    after_s: float = number(
+        90.0, (0.0, 600.0), 'learning begins this long after an inflection (s)'
     )
 
     def params(self, vehicle: Vehicle) -> 'FinLawParams':

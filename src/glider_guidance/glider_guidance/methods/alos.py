@@ -16,11 +16,9 @@ climb or in a turn-over, is learnt anew.
 import math
 from typing import NamedTuple
 
-from pydantic import Field
-
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
-from glider_base.settings import TUNABLE
+from glider_base.settings import number
 from glider_guidance.los import approach_angles, crab_heading, desired_direction
 from glider_guidance.method import Asked, LosGains, MethodSettings, method_step
 from glider_model.vehicle.file import Vehicle
@@ -32,15 +30,9 @@ CRAB_MAX = math.radians(80.0)
 class AlosSettings(MethodSettings):
     """Adaptive line of sight."""
 
-    lookahead_m: float = Field(
-        65.0, ge=1.0, le=10000.0, description='Delta, lookahead (m)', json_schema_extra=TUNABLE
-    )
-    gamma_radpms: float = Field(
-        2e-5,
-        ge=0.0,
-        le=0.01,
-        description='gamma, adaptation of the crab angle (rad/(m s))',
-        json_schema_extra=TUNABLE,
+    lookahead_m: float = number(65.0, (1.0, 10000.0), 'Delta, lookahead (m)', tunable=True)
+    gamma_radpms: float = number(
+        2e-5, (0.0, 0.01), 'gamma, adaptation of the crab angle (rad/(m s))', tunable=True
     )
 
     def params(self, los: LosGains, vehicle: Vehicle) -> 'AlosParams':

@@ -14,12 +14,10 @@ odometry, and so each works with any other (docs/theory.md, section 3).
 """
 
 import math
-from typing import Any, NamedTuple
-
-from pydantic import Field
+from typing import NamedTuple
 
 from glider_base.kernel import kernel, replace
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number, positive
 from glider_model.vehicle.file import SLOWEST_GLIDE_MPS, VehicleParams
 from glider_model.vehicle.steering import steering_exponents
 
@@ -48,42 +46,24 @@ KEPT_S = 300.0
 KICKED_LOOKAHEAD_S = 150.0
 
 
-def _number(value: float, what: str, **limits: float) -> Any:
-    return Field(value, description=what, **limits)
-
-
 class SteeringLearningSettings(Settings):
     """Estimator of (b, c, k, d), and the two weights of steering by them."""
 
-    prior_radps: float = _number(
-        0.02, 'b before the first turn, - in the climb (rad/s)', gt=0.0, le=1.0
-    )
-    prior_std_radps: float = _number(0.02, 'its standard deviation (rad/s)', gt=0.0, le=1.0)
-    drift_radps: float = _number(0.0002, 'change of b in 1000 s (rad/s)', ge=0.0, le=0.1)
-    bend_std_radps: float = _number(0.01, 'standard deviation of c (rad/s)', gt=0.0, le=1.0)
-    bend_drift_radps: float = _number(0.0003, 'change of c in 1000 s (rad/s)', ge=0.0, le=0.1)
-    kick_std: float = _number(0.3, 'standard deviation of k (-)', ge=0.0, le=5.0)
-    kick_drift: float = _number(0.05, 'change of k in 1000 s (-)', ge=0.0, le=5.0)
-    disturbance_std_radps: float = _number(
-        0.0001, 'standard deviation of d (rad/s)', gt=0.0, le=0.1
-    )
-    disturbance_drift_radps: float = _number(
-        0.00005, 'change of d in 1000 s (rad/s)', ge=0.0, le=0.1
-    )
-    noise_radps: float = _number(0.0002, 'yaw rate that is not explained (rad/s)', gt=0.0, le=0.1)
-    correlation_s: float = _number(
-        60.0, 'for how long that is one and the same (s)', gt=0.0, le=600.0
-    )
-    smoothing_s: float = _number(20.0, 'low pass on u and yaw rate (s)', gt=0.0, le=200.0)
-    after_s: float = _number(
-        30.0, 'learning begins so long after an inflection (s)', ge=0.0, le=600.0
-    )
-    roll_per_s: float = _number(
-        0.032, 'rho: u for each second of cross-track (1/s)', gt=0.0, le=1.0
-    )
-    approach_s: float = _number(
-        60.0, 'tau: cross-track is closed no faster (s)', ge=0.0, le=3600.0
-    )
+    prior_radps: float = positive(0.02, 1.0, 'b before the first turn, - in the climb (rad/s)')
+    prior_std_radps: float = positive(0.02, 1.0, 'its standard deviation (rad/s)')
+    drift_radps: float = number(0.0002, (0.0, 0.1), 'change of b in 1000 s (rad/s)')
+    bend_std_radps: float = positive(0.01, 1.0, 'standard deviation of c (rad/s)')
+    bend_drift_radps: float = number(0.0003, (0.0, 0.1), 'change of c in 1000 s (rad/s)')
+    kick_std: float = number(0.3, (0.0, 5.0), 'standard deviation of k (-)')
+    kick_drift: float = number(0.05, (0.0, 5.0), 'change of k in 1000 s (-)')
+    disturbance_std_radps: float = positive(0.0001, 0.1, 'standard deviation of d (rad/s)')
+    disturbance_drift_radps: float = number(0.00005, (0.0, 0.1), 'change of d in 1000 s (rad/s)')
+    noise_radps: float = positive(0.0002, 0.1, 'yaw rate that is not explained (rad/s)')
+    correlation_s: float = positive(60.0, 600.0, 'for how long that is one and the same (s)')
+    smoothing_s: float = positive(20.0, 200.0, 'low pass on u and yaw rate (s)')
+    after_s: float = number(30.0, (0.0, 600.0), 'learning begins so long after an inflection (s)')
+    roll_per_s: float = positive(0.032, 1.0, 'rho: u for each second of cross-track (1/s)')
+    approach_s: float = number(60.0, (0.0, 3600.0), 'tau: cross-track is closed no faster (s)')
 
     def params(
         self,

@@ -9,7 +9,6 @@ there. That is the plant; a replay could do the same.
 import time
 from functools import partial
 
-from pydantic import Field
 from rclpy.subscription import Subscription
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
@@ -23,6 +22,7 @@ from glider_base.ros.lockstep.node import TickNode, TickSettings
 from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.wire import topics
 from glider_base.ros.wire.topics import TOPICS
+from glider_base.settings import number
 from glider_base.signals import TICK_NS, TICK_S
 from glider_base.wiring import WIRING
 
@@ -41,9 +41,7 @@ _RIVALS_SHOW_S = 5.0
 class ClockSettings(TickSettings):
     """How the node that makes time keeps step."""
 
-    speed: float = Field(
-        0.0, ge=0.0, le=1e6, description='times real time; 0.0: as fast as possible'
-    )
+    speed: float = number(0.0, (0.0, 1e6), 'times real time; 0.0: as fast as possible')
 
 
 class ClockNode(TickNode):

@@ -34,7 +34,7 @@ from glider_base.ros.parameters import declare_settings, unknown_parameters
 from glider_base.ros.wire import qos, topics
 from glider_base.ros.wire.codec import MessageError, NotFiniteFieldError, to_cdr
 from glider_base.ros.wire.topics import TOPICS, Topic, topic_of
-from glider_base.settings import Settings
+from glider_base.settings import Settings, number
 from glider_base.signals import TICK_NS, not_finite
 from glider_base.wiring import WHEN_SILENT
 
@@ -54,19 +54,19 @@ class TickSettings(Settings):
         True, description='act on ticks in step with the peers; else on the newest input at 10 Hz'
     )
     record: bool = Field(False, description='a recorder takes part: wait for it, never outrun it')
-    startup_timeout_s: float = Field(
-        60.0, ge=0.1, le=3600.0, description='wall time that peers have to get ready (s)'
+    startup_timeout_s: float = number(
+        60.0, (0.1, 3600.0), 'wall time that peers have to get ready (s)'
     )
-    tick_timeout_s: float = Field(
-        5.0, ge=0.1, le=3600.0, description='wall time in which a tick has to be complete (s)'
+    tick_timeout_s: float = number(
+        5.0, (0.1, 3600.0), 'wall time in which a tick has to be complete (s)'
     )
-    input_max_age_s: float = Field(
-        1.0, ge=0.05, le=3600.0, description='free-running: older input counts as stale (s)'
+    input_max_age_s: float = number(
+        1.0, (0.05, 3600.0), 'free-running: older input counts as stale (s)'
     )
     message_faults: list[MessageFault] = Field(
         [], description='what goes wrong with messages of this node'
     )
-    message_seed: int = Field(0, ge=0, le=2**63 - 1, description='seed of which are struck')
+    message_seed: int = number(0, (0, 2**63 - 1), 'seed of which are struck')
 
 
 class TickNode(Node):
