@@ -46,7 +46,7 @@ from glider_studies.workers import WorkError, worker_pool
 DEADLINE_S = 300.0
 #: What a scorecard has that is not a result of the flight.
 NOT_COMPARED = {'wall_time_s', 'real_time_factor', 'messages_recorded', 'messages_lost', 'seed'}
-NOT_COMPARED |= {'guard', 'faults'}  # what happened, in words
+NOT_COMPARED |= {'guard', 'no_progress', 'faults'}  # what happened, in words
 NOT_COMPARED |= {'wh_per_dive', 'by', 'endurance_days', 'range_km'}  # follow from what is kept
 #: Variants, a vector field, text in another alphabet, and one cell in which nothing can be flown.
 MINE = {

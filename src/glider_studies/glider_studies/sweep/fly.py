@@ -52,7 +52,7 @@ NOT_RESULTS = {
     'messages_recorded',
     'messages_lost',
     'seed',
-    'guard',  # what happened, in words
+    *('guard', 'no_progress'),  # what happened, in words
     'faults',  # the same
     *('wh_per_dive', 'by', 'endurance_days', 'range_km'),  # of energy, wh is enough
 }
