@@ -277,7 +277,6 @@ def test_report_of_the_default_run(open_report, default_run):
         *('buoyancy_engine', 'pitch_mass', 'roll_mass', 'battery'),
         *('current_north', 'current_east'),
         *('learnt_pitch', 'learnt_roll', 'learnt_steering', 'learnt_disturbance'),
-        'learnt_lyapunov',
     }
 
     card = json.loads((default_run / 'score.json').read_text())
