@@ -2,17 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a mission goes, as a pilot is told: what is foretold comes true, and orders are answered."""
 
-import signal
-
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
 import glider_bringup as glider
-from glider_base.ros.places import domain_id
 from glider_base.ros.wire import qos
 from glider_base.wiring import at_rest
 from glider_guidance.nodes.guidance_node import GuidanceNode
@@ -58,21 +54,6 @@ def test_who_holds_is_told_when_it_is_up():
     flight.step(10)
     told = flight.status
     assert told.t_s + told.next_surfacing_s == pytest.approx(surfaced(flight), abs=120.0)
-
-
-@pytest.fixture
-def context(monkeypatch):
-    """ROS context in a domain of its own, and the signals of this process as they were."""
-    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    context = Context()
-    with domain_id() as domain:
-        rclpy.init(context=context, domain_id=domain)
-        yield context
-        rclpy.try_shutdown(context=context)
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 def test_a_node_tells_it_once_a_second_and_answers_orders(context):
