@@ -90,7 +90,7 @@ PYPI_NAMES = {'foxglove': 'foxglove-sdk'}
 
 #: Packages of ROS 2 Jazzy, of which rosdep takes the name as a key.
 JAZZY = {
-    *('ament_index_python', 'launch', 'launch_ros', 'rclpy', 'tf2_msgs'),
+    *('ament_index_python', 'launch', 'launch_ros', 'lifecycle_msgs', 'rclpy', 'tf2_msgs'),
     *('builtin_interfaces', 'rcl_interfaces', 'rosgraph_msgs', 'std_srvs'),
     *(f'{kind}_msgs' for kind in ('diagnostic', 'geometry', 'nav', 'sensor', 'std')),
 }
@@ -154,7 +154,9 @@ def violations(sources: Path) -> list[str]:
                     found.append(f'{name}: {package} must not import {module}')
                 if is_launch(module) and not (place[0] == 'launch' or is_test):
                     found.append(f'{name}: only launch files import {module}')
-                if is_ros(module) and not (ROS_FOLDERS & set(place[1:-1]) or is_test):
+                is_named = place[0] == 'launch' and module.endswith('_msgs')
+                speaks = ROS_FOLDERS & set(place[1:-1]) or is_named or is_test
+                if is_ros(module) and not speaks:
                     found.append(f'{name}: only nodes/ and ros/ import {module}')
     return found
 
@@ -403,6 +405,7 @@ def test_a_violation_is_found(tmp_path, path, source, sentence):
             'import glider_control, glider_guidance',
         ),
         ('glider_bringup/launch/glider.launch.py', 'import launch, launch_ros.actions'),
+        ('glider_bringup/launch/glider.launch.py', 'import lifecycle_msgs.msg'),
         ('glider_model/test/test_messages.py', 'from nav_msgs.msg import Odometry'),
     ],
 )

@@ -21,6 +21,7 @@ from glider_base import files
 from glider_base.errors import MAX_LINE, MAX_LINES, MAX_SHOWN
 from glider_base.plugins import registered
 from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.block_node import BlockSettings
 from glider_base.ros.lockstep.clock import ClockSettings
 from glider_base.ros.lockstep.node import TickSettings
 from glider_base.ros.places import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
@@ -65,6 +66,7 @@ NODES = {
     'recorder_node': (RecorderNode, RecorderSettings),
 }
 CLOCK_FIELDS = set(ClockSettings.model_fields) - set(TickSettings.model_fields)
+BLOCK_FIELDS = set(BlockSettings.model_fields) - set(TickSettings.model_fields)
 
 #: Fields that every fault has.
 COMMON = set(FaultSettings.model_fields)
@@ -254,6 +256,7 @@ def tables() -> dict[str, str]:
         'qos': table(('QoS', 'reliability', 'durability', 'history'), profile_rows()),
         'every node': table(parameters, parameter_rows(TickSettings)),
         'clock': table(parameters, parameter_rows(ClockSettings, CLOCK_FIELDS)),
+        'blocks': table(parameters, parameter_rows(BlockSettings, BLOCK_FIELDS)),
         'paths': table(fields, member_rows(PathSettings)),
         'currents': table(fields, member_rows(CurrentComponent)),
         'current fields': table(fields, member_rows(CurrentField)),
@@ -334,10 +337,9 @@ def test_parameters_of_the_document_are_those_of_the_node(context, keep_signals,
     overrides = [Parameter('folder', value=str(tmp_path))] if name == 'recorder_node' else []
     node = node_type(context=context, parameter_overrides=overrides)
     try:
-        tick = ClockSettings if name == 'plant_node' else TickSettings
         documented = {
             leaf: (field, value)
-            for model in (tick, settings)
+            for model in (node_type.tick_settings, settings)
             for leaf, field, value in leaves(model, model())
         }
         declared = set(node.list_parameters([], 0).names) - {'use_sim_time'}

@@ -12,7 +12,8 @@ from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, Shutdown
 from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
+from launch_ros.actions import LifecycleNode, LifecycleTransition, Node
+from lifecycle_msgs.msg import Transition
 
 from glider_bringup.engines.launch_plan import (
     ARGUMENTS,
@@ -49,12 +50,19 @@ def start(context: LaunchContext) -> list:
     }
     plan = plan_launch(values, Path(launch.logging.launch_config.log_dir))
     said = f'{plan.scenario.name}: {plan.scenario.description} ({plan.parameters_file})'
-    return [LogInfo(msg=said), *(node_action(node, plan) for node in plan.nodes)]
+    actions = [LogInfo(msg=said), *(node_action(node, plan) for node in plan.nodes)]
+    if plan.managed:
+        names = [f'{plan.namespace}/{name}' for name in plan.managed]
+        steps = [Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE]
+        actions.append(LifecycleTransition(lifecycle_node_names=names, transition_ids=steps))
+    return actions
 
 
 def node_action(node: LaunchedNode, plan: LaunchPlan) -> Node:
     """Process of a node."""
-    return Node(
+    name = {'name': node.executable} if node.executable in plan.managed else {}
+    return (LifecycleNode if name else Node)(
+        **name,
         package=node.package,
         executable=node.executable,
         arguments=node.words,

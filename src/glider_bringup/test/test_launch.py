@@ -86,6 +86,21 @@ def test_free_running(tmp_path):
     assert not any(entry['lockstep'] for entry in parameters(plan).values())
 
 
+@pytest.mark.parametrize(
+    ('arguments', 'names'),
+    [
+        ({'lockstep': 'false'}, {wired.node for wired in ON_BOARD}),
+        ({'lockstep': 'false', 'autopilot': 'true'}, set()),
+        ({}, set()),
+    ],
+)
+def test_nodes_on_board_that_run_freely_are_managed(tmp_path, arguments, names):
+    plan = plan_launch(arguments, tmp_path)
+    told = {name for name, entry in parameters(plan).items() if entry.get('managed')}
+    assert set(plan.managed) == names
+    assert told == {f'/glider/{name}' for name in names}
+
+
 def test_autopilot_takes_the_place_of_its_nodes(tmp_path):
     plan = plan_launch({'autopilot': 'true'}, tmp_path)
     assert plan.nodes == (

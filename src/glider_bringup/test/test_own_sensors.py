@@ -8,12 +8,14 @@ import time
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.srv import ChangeState, GetState
 from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure, Imu, JointState, NavSatFix
 
 from glider_base.frames import OriginSettings
+from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.lockstep.step_node import OLD_AFTER
 from glider_base.ros.wire import qos
 from glider_model.ocean.density import pressure_at
@@ -95,8 +97,8 @@ class Vehicle:
 class Flight:
     """Navigation, free-running, and a vehicle that has begun to talk to it."""
 
-    def __init__(self, context) -> None:
-        overrides = [Parameter(name, value=value) for name, value in PARAMETERS.items()]
+    def __init__(self, context, **more) -> None:
+        overrides = [Parameter(name, value=value) for name, value in (PARAMETERS | more).items()]
         self.vehicle = Vehicle(context)
         self.navigation = NavigationNode(
             context=context, namespace='/glider', parameter_overrides=overrides
@@ -115,6 +117,11 @@ class Flight:
         """Until so many more odom have come."""
         before = len(self.vehicle.odom)
         self.until(lambda: len(self.vehicle.odom) >= before + count)
+
+    def wait(self, wall_s: float) -> None:
+        """So much wall time."""
+        until_s = time.monotonic() + wall_s
+        self.until(lambda: time.monotonic() > until_s)
 
     def close(self) -> None:
         self.executor.shutdown()
@@ -165,8 +172,8 @@ def test_sensor_that_is_silent_for_long_makes_navigation_silent(flight, name):
     start_s = time.monotonic()
     flight.until(lambda: vehicle.said(f'missing or stale: {name}; silent until then'))
     assert time.monotonic() - start_s > OLD_AFTER * IMU_PERIOD_S - 2 * IMU_PERIOD_S
-    count, until_s = len(vehicle.odom), time.monotonic() + 1.0
-    flight.until(lambda: time.monotonic() > until_s)
+    count = len(vehicle.odom)
+    flight.wait(1.0)
     assert len(vehicle.odom) <= count + 1  # which was under way
     vehicle.silent = set()
     flight.until(lambda: vehicle.said('inputs are fresh again'))
@@ -207,3 +214,50 @@ def test_attitude_that_is_none_is_refused_and_named(flight):
     vehicle.quaternion = (0.0, 0.0, 0.0, 0.0)
     flight.until(lambda: vehicle.said('message refused: imu of plant_node: orientation is'))
     flight.until(lambda: vehicle.said('missing or stale: imu'))
+
+
+def test_managed_node_acts_while_it_is_active_and_forgets_when_it_is_configured(context):
+    flight = Flight(context, managed=True)
+    vehicle, services = flight.vehicle, '/glider/navigation_node'
+    change = vehicle.node.create_client(ChangeState, f'{services}/change_state')
+    tell = vehicle.node.create_client(GetState, f'{services}/get_state')
+
+    def state_after(label: str) -> str:
+        for client, request in (
+            (change, ChangeState.Request()),
+            (tell, GetState.Request()),
+        ):
+            if client is change:
+                request.transition.label = label
+            said = client.call_async(request)
+            flight.until(said.done)
+            assert client is tell or said.result().success
+        return said.result().current_state.label
+
+    try:
+        flight.until(change.service_is_ready)
+        assert state_after('configure') == 'inactive'
+        flight.wait(1.0)
+        assert not vehicle.odom
+        assert state_after('activate') == 'active'
+        vehicle.fix = a_fix(100.0)
+        flight.until(lambda: vehicle.odom and vehicle.north_m() > 50.0)
+        vehicle.fix = None
+        assert state_after('deactivate') == 'inactive'
+        flight.until(lambda: vehicle.said('deactivated: silent until it is activated'))
+        count = len(vehicle.odom)
+        flight.wait(1.0)
+        assert len(vehicle.odom) == count
+        assert state_after('activate') == 'active'
+        flight.go_on(5)
+        assert vehicle.north_m() > 50.0  # it goes on with what it knows
+        for label in ('deactivate', 'cleanup', 'configure', 'activate'):
+            state_after(label)
+        vehicle.odom.clear()
+        flight.until(lambda: len(vehicle.odom) > 5)
+        assert abs(vehicle.north_m()) < 20.0  # it knows nothing
+        with pytest.raises(Stop):
+            state_after('shutdown')
+            flight.wait(DEADLINE_S)
+    finally:
+        flight.close()

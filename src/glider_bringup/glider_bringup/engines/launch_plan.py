@@ -46,6 +46,8 @@ from glider_mission.scenario import (
 #: The node that `ros2 launch` starts and `./glider run`, which nobody can watch, does not.
 TF, TF_MODULE = 'tf_node', 'glider_model.nodes.tf_node'
 
+#: Nodes that are managed when they run freely, each in a process of its own.
+_ON_BOARD = tuple(wired.node for wired in ON_BOARD)
 _TRUTH = {'true': True, 'false': False}
 
 
@@ -140,6 +142,7 @@ class LaunchPlan(NamedTuple):
     remappings: tuple[tuple[str, str], ...]
     lockstep: bool
     nodes: tuple[LaunchedNode, ...]
+    managed: tuple[str, ...]  #: nodes that wait to be configured and activated
 
     @property
     def environment(self) -> dict[str, str]:
@@ -223,6 +226,11 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
         record_to is not None,
         with_tf,
     )
+    managed = ()
+    if not lockstep and not _TRUTH[text['autopilot']]:
+        managed = tuple(name for name in _ON_BOARD if name in {node.executable for node in nodes})
+    for name in managed:
+        parameters[name]['managed'] = True
     if with_tf:
         parameters[TF] = {'frame_prefix': text['frame_prefix']}
     write_parameters(parameters, folder / PARAMETERS_FILE, namespace)
@@ -234,6 +242,7 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
         remappings=remappings,
         lockstep=lockstep,
         nodes=nodes,
+        managed=managed,
     )
 
 

@@ -24,11 +24,14 @@ class GuardNode(BlockNode):
     when_stale = 'commanding the safe state until then'
 
     def __init__(self, **kwargs) -> None:
-        self.stale_ticks = 0
-        self.ascent = INITIAL_ASCENT
         super().__init__(GUARD, **kwargs)
         self.create_service(Trigger, 'clear_guard', self.on_clear)
         self.start_up()
+
+    def forget(self) -> None:
+        """Know nothing, as at the start."""
+        super().forget()
+        self.stale_ticks, self.ascent = 0, INITIAL_ASCENT
 
     def on_clear(self, request, response):
         """Serve ``clear_guard``."""

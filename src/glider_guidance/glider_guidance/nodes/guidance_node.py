@@ -35,12 +35,16 @@ class GuidanceNode(BlockNode):
     def __init__(self, **kwargs) -> None:
         super().__init__(GUIDANCE, **kwargs)
         self.create_service(Trigger, 'abort', self.on_abort)
-        self.waiting, self.first_ns = list(self.settings.orders), None
         self.publish_path = self.add_output('path')
         self.publish_status, self.second = self.add_output('mission/status'), -1
-        self.answer = ''  #: to the last order
         self.tell_path(0)
         self.start_up()
+
+    def forget(self) -> None:
+        """Know nothing, as at the start."""
+        super().forget()
+        self.waiting, self.first_ns = list(self.settings.orders), None
+        self.answer = ''  #: to the last order
 
     def tell_path(self, stamp_ns: int) -> None:
         """Publish the path that is followed from a tick on."""

@@ -2,9 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node of a block: everything that follows from what the block declares of itself."""
 
+import time
+
+from pydantic import Field
+from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
+
 from glider_base.block import Block, Telling, optional_topics
 from glider_base.kernel import compiling_told
 from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.node import TickSettings
+from glider_base.ros.lockstep.peers import FAREWELL_S
 from glider_base.ros.lockstep.step_node import StepNode
 from glider_base.ros.parameters import changed_parameters, declare_settings
 from glider_base.settings import Settings
@@ -12,8 +19,22 @@ from glider_base.signals import TICK_NS, TICK_S
 from glider_base.wiring import at_rest, present
 
 
-class BlockNode(StepNode):
-    """A block that answers ticks. Subclasses call `start_up` at the end of their constructor."""
+class BlockSettings(TickSettings):
+    """How the node of a block keeps step."""
+
+    managed: bool = Field(
+        False, description='free-running: a managed (lifecycle) node, silent until it is activated'
+    )
+
+
+class BlockNode(StepNode, LifecycleNodeMixin):
+    """A block that answers ticks. Subclasses call `start_up` at the end of their constructor.
+
+    A managed one acts while it is active: `configure` forgets all that was learnt, `activate` and
+    `deactivate` begin and end its cycles, `shutdown` ends it.
+    """
+
+    tick_settings = BlockSettings
 
     def __init__(self, block: Block, **kwargs) -> None:
         super().__init__(block.wired.node, **kwargs)
@@ -32,14 +53,47 @@ class BlockNode(StepNode):
             if topic not in present(block.wired.inputs, topics)
         ]
         self.params = self.settings.params()
-        self.state = self.settings.initial_state()
         self.orders: dict[str, dict[str, str]] = {}  #: that it has followed since the last tick
-        self.telling = Telling(block)
-        self.said = (0, ())  #: stamp and numbers of the last answer
-        self.flags: tuple[int, ...] | None = None  #: and its flags
+        self.forget()
         for topic in present(block.wired.inputs, topics):
             self.add_input(topic)
         self.compile_kernels()
+
+    def forget(self) -> None:
+        """Know nothing, as at the start."""
+        self.state = self.settings.initial_state()
+        self.telling = Telling(self.block)
+        self.said = (0, ())  #: stamp and numbers of the last answer
+        self.flags: tuple[int, ...] | None = None  #: and its flags
+
+    def on_ready(self) -> None:
+        """Begin, or offer the services of a managed node."""
+        if self.ticks.managed and not self.ticks.lockstep:
+            LifecycleNodeMixin.__init__(self, enable_communication_interface=True)
+        else:
+            super().on_ready()
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start from nothing."""
+        self.forget()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begin."""
+        self.begin()
+        self.event(self._newest_ns(), health.OK, 'activated')
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Pause."""
+        self.pause()
+        self.event(self._newest_ns(), health.WARN, 'deactivated: silent until it is activated')
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Leave when the watch looks next: what is raised here is not heard."""
+        self.over_since_s = time.monotonic() - FAREWELL_S
+        return TransitionCallbackReturn.SUCCESS
 
     def on_settings(self, settings: Settings) -> None:
         """Fly on with tunable parameters that were set at run time."""

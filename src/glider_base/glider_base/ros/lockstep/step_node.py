@@ -37,7 +37,16 @@ class StepNode(TickNode):
     def on_ready(self) -> None:
         """Start the timer of the free-running mode, on simulated time if that is used."""
         if not self.ticks.lockstep:
-            self.create_timer(TICK_S, self._on_cycle, clock=self.cycle_clock)
+            self.begin()
+
+    def begin(self) -> None:
+        """Act at 10 Hz from now on, in the free-running mode."""
+        self._cycle_s = None
+        self._timer = self.create_timer(TICK_S, self._on_cycle, clock=self.cycle_clock)
+
+    def pause(self) -> None:
+        """Act no more, until `begin`."""
+        self.destroy_timer(self._timer)
 
     @property
     def sample_period_s(self) -> float:
