@@ -78,15 +78,6 @@ def kernel(function: Callable) -> numba.core.dispatcher.Dispatcher:
     return compiled
 
 
-def loop(function: Callable) -> numba.core.dispatcher.Dispatcher:
-    """Compile a pure function that is so long that it is done once, and not inlined.
-
-    Kernels call it, and nobody else: it has nothing that unpacks the arguments of a call from
-    Python, which is long to compile.
-    """
-    return function if numba.config.DISABLE_JIT else _compiled(function, no_cpython_wrapper=True)
-
-
 def _compiled(function: Callable, ending: str = '', **options) -> numba.core.dispatcher.Dispatcher:
     """What compiles a function when it is called, and finds again what it compiled before."""
     compiled = numba.njit(**{**_OPTIONS, **options})(function)

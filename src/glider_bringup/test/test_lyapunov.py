@@ -20,7 +20,7 @@ import pytest
 
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Adaptation
-from glider_bringup.engines.direct import fly_ticks
+from glider_bringup.engines.direct import fly_held, hold
 from glider_bringup.engines.flight import mission_of
 from glider_control.allocation import moments
 from glider_control.laws.backstepping import (
@@ -57,14 +57,16 @@ APPLIED, MODEL, CROSS = [5, 11], [6, 12], 13
 
 
 @kernel
-def record(state, params, out):
+def record(held, out):
     """Fly tick by tick until the mission ends or ``out`` is full; ticks that were flown."""
-    log = np.empty((1, ROW))
+    log, params = np.empty((1, ROW)), held.params
     for tick in range(len(out)):
+        state = held.state
         joints = state.plant.joints
         channels = state.control.law.channels
         th_p, th_q = channels.roll_theta, channels.pitch_theta
-        state, _, finished = fly_ticks(state, params, log, TICK_S)
+        _, finished = fly_held(held, log, TICK_S)
+        state = held.state
         measured, channels = state.control.measured, state.control.law.channels
         roll, pitch, polar = channels.roll, channels.pitch, params.control.polar
         phi, theta = measured.phi, measured.theta
@@ -102,7 +104,7 @@ def fly_unknown(changes):
     scenario = load_scenario('current_8deg', {**FLIGHT, **changes})
     state, params = mission_of(scenario)
     out = np.empty((round(scenario.duration_s / TICK_S), CROSS + 1))
-    return params.control.law, out[: record(state, params, out)]
+    return params.control.law, out[: record(hold(state, params), out)]
 
 
 def gains(law):

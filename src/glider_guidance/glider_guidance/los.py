@@ -10,6 +10,10 @@ import math
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
 
+#: How fast the path is approached from afar at most, in a current from behind; and in any case.
+#: Times the speed through the water (-).
+FASTEST_APPROACH, SLOWEST_APPROACH = 0.9, 0.3
+
 
 @kernel
 def approach_angles(e2, e3, delta_1, delta_2):
@@ -106,7 +110,11 @@ def approach_heading(course, approach, progress, speed, current_n, current_e):
     to ask for far from it: where the current is faster than the vehicle, no heading makes good a
     course across it, and the best crab for one would let the vehicle drift away.
 
-        psi = gamma_d - asin(sat((n . v_c - P sin(approach)) / U_h))
+        psi = gamma_d - asin(sat((n . v_c - w) / U_h))
+
+    with w = P sin(approach), near the path. A following current may be faster than the vehicle,
+    which then comes to the path square to it and cannot turn in time. So w goes to V and no more,
+    V = 0.9 U_h, more or less the current across and 0.3 U_h at least: w = P s / sqrt(c^2 + (P s / V)^2).
 
     Parameters
     ----------
@@ -122,6 +130,11 @@ def approach_heading(course, approach, progress, speed, current_n, current_e):
         Water velocity (m/s).
     """
     across = -math.sin(course) * current_n + math.cos(course) * current_e
+    moves = max(speed, 1e-3)
     wanted = max(0.0, progress) * math.sin(approach)
-    ratio = (across - wanted) / max(speed, 1e-3)
+    most = FASTEST_APPROACH * moves + math.copysign(across, wanted * across)
+    most = max(SLOWEST_APPROACH * moves, most)
+    if progress > most:
+        wanted /= math.hypot(math.cos(approach), wanted / most)
+    ratio = (across - wanted) / moves
     return wrap_angle(course - math.asin(min(1.0, max(-1.0, ratio))))

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from glider_base.frames import wrap_angle
 from glider_guidance.los import (
     approach_angles,
     approach_heading,
@@ -131,9 +132,9 @@ def test_course_is_infeasible_exactly_when_no_heading_holds_it(
     assert feasible == (room > 0.0 and held > 0.0)
 
 
-@pytest.mark.parametrize('share', [-0.5, 0.6, 1.1])
+@pytest.mark.parametrize('share', [-0.5, 0.5, 1.1])
 def test_error_of_the_current_ends_where_it_is_balanced(share):
-    """At Delta1 |w| / sqrt(P^2 - w^2), whatever its sign; an error above P carries it off."""
+    """At Delta1 |w| / P / sqrt(1 - (w / V)^2); an error above V carries it off."""
     course, speed, lookahead, e2 = 0.4, 0.4, 60.0, 0.0
     estimate = -0.1 * math.sin(course), 0.1 * math.cos(course)  # 0.1 m/s to starboard
     _, progress, _ = crab_heading(course, speed, *estimate)
@@ -142,11 +143,39 @@ def test_error_of_the_current_ends_where_it_is_balanced(share):
         gamma_r, _ = approach_angles(e2, 0.0, lookahead, 1.0)
         heading = approach_heading(course, gamma_r, progress, speed, *estimate)
         e2 += 1.0 * (0.1 + error + speed * math.sin(heading - course))
-    if abs(error) < progress:
-        balanced = lookahead * error / math.sqrt(progress**2 - error**2)
+    most = min(progress, 0.9 * speed - 0.1 * math.copysign(1.0, error))
+    if abs(error) < most:
+        balanced = lookahead * error / progress / math.sqrt(1.0 - (error / most) ** 2)
         assert e2 == pytest.approx(balanced, rel=1e-6)
     else:
         assert abs(e2) > 50.0
+
+
+@quick
+@given(
+    courses,
+    st.floats(0.1, 0.5),
+    st.floats(0.0, 4.0),
+    st.floats(-0.3, 0.3),
+    st.floats(30.0, 200.0),
+    st.sampled_from([-500.0, 500.0]),
+)
+def test_the_turn_onto_the_path_is_one_that_a_glider_can_follow(
+    course, speed, following, crossing, lookahead_s, e2
+):
+    """From afar, with whatever current behind it, and on the path at the end."""
+    sine, cosine = math.sin(course), math.cos(course)
+    along, across = following * speed, crossing * speed
+    current = (along * cosine - across * sine, along * sine + across * cosine)
+    progress = speed * math.sqrt(1.0 - crossing**2) + along
+    turns, before = [], None
+    for _ in range(12000):
+        gamma_r, _ = approach_angles(e2, 0.0, lookahead_s * progress, 1.0)
+        heading = approach_heading(course, gamma_r, progress, speed, *current)
+        turns.append(0.0 if before is None else abs(wrap_angle(heading - before)))
+        before, e2 = heading, e2 + across + speed * math.sin(heading - course)
+    assert max(turns) < 0.9 / lookahead_s
+    assert abs(e2) < 1e-3
 
 
 @quick

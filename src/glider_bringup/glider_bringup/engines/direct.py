@@ -16,7 +16,7 @@ from numba.experimental import structref
 from numba.extending import overload
 
 from glider_base.frames import odometry_from_wire, water_to_wire
-from glider_base.kernel import INLINED, kernel, loop
+from glider_base.kernel import INLINED, kernel
 from glider_base.kernels.packing import packed, put, unpacked
 from glider_base.signals import TICK_S, Joints
 from glider_base.wiring import FIELDS, publisher
@@ -58,53 +58,6 @@ class MissionState(NamedTuple):
     guidance: GuidanceState
     control: ControlState
     guard: GuardState
-
-
-@loop
-def fly_ticks(state, params, log, dt):
-    """Fly until the log is full or the mission ends: what `fly` does, by kernels alone.
-
-    The values of the state's current are changed where they lie.
-    """
-    plant, current, navigation, guidance, control, guard = state
-    rows, finished = 0, False
-    for row in range(log.shape[0]):
-        t_s = plant.tick * dt
-        numbers, finished = plant_outputs(plant, params.plant)
-        measured = Measured(*numbers)
-        joints, pressure = measured.joint_states, measured.pressure
-        sensors = (measured.measured_odom, measured.imu, pressure, measured.fix, measured.altitude)
-        place = odometry_from_wire(measured.ground_truth_odom)
-        position = (place.p_n, place.p_e, place.p_d)
-        current, velocity = current_step_in_place(current, position, t_s, params.current, dt)
-        water = water_to_wire(velocity)
-        navigation, believed, phase = navigation_tick(
-            navigation, t_s, (joints, *sensors), params.navigation, dt
-        )
-        odom = believed[0]
-        guidance, guided, stage = guidance_tick(
-            guidance, t_s, (odom, measured.altitude), params.guidance, dt
-        )
-        seen = (guided[0], odom, joints)
-        control, controlled, limits = control_tick(control, t_s, seen, params.control, dt)
-        condition = (measured.health, measured.battery, pressure, measured.altitude)
-        heard = (controlled[0], guided[0], odom, joints, *condition)
-        guard, guarded, told = guard_tick(guard, t_s, heard, params.guard, dt)
-        plant = plant_move(plant, (guarded[0], water, guarded[1]), params.plant, dt)
-        said = (phase, stage, limits, told)
-        put(log, row, 0, (*numbers, water, *believed, *guided, *controlled, *guarded, *said))
-        rows = row + 1
-        if finished:
-            break
-    state = MissionState(
-        plant=plant,
-        current=current,
-        navigation=navigation,
-        guidance=guidance,
-        control=control,
-        guard=guard,
-    )
-    return state, rows, finished
 
 
 @structref.register
@@ -157,8 +110,49 @@ def apart(state: MissionState) -> MissionState:
 
 @kernel
 def fly_held(held, log, dt):
-    """Fly on what is held; rows filled, and whether the mission has ended."""
-    held.state, rows, finished = fly_ticks(held.state, held.params, log, dt)
+    """Fly until the log is full or the mission ends; rows filled, and whether it has ended.
+
+    The values of the state's current are changed where they lie.
+    """
+    params = held.params
+    plant, current, navigation, guidance, control, guard = held.state
+    rows, finished = 0, False
+    for row in range(log.shape[0]):
+        t_s = plant.tick * dt
+        numbers, finished = plant_outputs(plant, params.plant)
+        measured = Measured(*numbers)
+        joints, pressure = measured.joint_states, measured.pressure
+        sensors = (measured.measured_odom, measured.imu, pressure, measured.fix, measured.altitude)
+        place = odometry_from_wire(measured.ground_truth_odom)
+        position = (place.p_n, place.p_e, place.p_d)
+        current, velocity = current_step_in_place(current, position, t_s, params.current, dt)
+        water = water_to_wire(velocity)
+        navigation, believed, phase = navigation_tick(
+            navigation, t_s, (joints, *sensors), params.navigation, dt
+        )
+        odom = believed[0]
+        guidance, guided, stage = guidance_tick(
+            guidance, t_s, (odom, measured.altitude), params.guidance, dt
+        )
+        seen = (guided[0], odom, joints)
+        control, controlled, limits = control_tick(control, t_s, seen, params.control, dt)
+        condition = (measured.health, measured.battery, pressure, measured.altitude)
+        heard = (controlled[0], guided[0], odom, joints, *condition)
+        guard, guarded, told = guard_tick(guard, t_s, heard, params.guard, dt)
+        plant = plant_move(plant, (guarded[0], water, guarded[1]), params.plant, dt)
+        said = (phase, stage, limits, told)
+        put(log, row, 0, (*numbers, water, *believed, *guided, *controlled, *guarded, *said))
+        rows = row + 1
+        if finished:
+            break
+    held.state = MissionState(
+        plant=plant,
+        current=current,
+        navigation=navigation,
+        guidance=guidance,
+        control=control,
+        guard=guard,
+    )
     return rows, finished
 
 
