@@ -15,7 +15,6 @@ from glider_control.intake import REFUSED
 from glider_control.law import Seen
 from glider_control.settings import ControlSettings
 from glider_control.surfaces.fin import (
-    INTEGRAL_MAX,
     LEAST_SHARE,
     FinLawSettings,
     steer_by_fin,
@@ -30,11 +29,6 @@ LAWS = ('adaptive', 'pid')
 quick = settings(max_examples=60)
 LAW = ControlSettings(vehicle=VEHICLE).params().steering
 NOTHING_YET = FinLawSettings().initial_state()
-
-
-def integrated(integral):
-    """State that has been flying."""
-    return NOTHING_YET._replace(heading_integral=integral)
 
 
 def steer(psi=0.0, psi_dot=0.0, wanted=0.0, wanted_dot=0.0, w=0.25, speed=0.5, state=NOTHING_YET,
@@ -53,23 +47,21 @@ def test_it_turns_to_the_side_of_the_reference_in_dive_and_climb(w):
 
 
 def test_a_turn_that_is_asked_for_is_that_of_the_file():
-    """r = c sin(delta) V^2, with psi' already what is asked for."""
+    """r = c sin(delta) V^2, to a hundredth: the heading asked for is reached already."""
     for speed in (0.3, 0.5):
         _, delta = steer(psi_dot=0.01, wanted_dot=0.01, speed=speed)
-        assert 0.5 * math.sin(delta) * speed * speed == pytest.approx(0.01, rel=1e-12)
+        assert 0.5 * math.sin(delta) * speed * speed == pytest.approx(0.01, rel=1e-2)
 
 
 @quick
 @given(*4 * [st.floats(-3.0, 3.0)], st.floats(-0.5, 0.5), st.floats(0.0, 2.0))
-def test_angle_and_integral_keep_to_their_limits(psi, psi_dot, wanted, wanted_dot, w, speed):
-    state, delta = steer(psi, psi_dot, wanted, wanted_dot, w, speed, integrated(INTEGRAL_MAX))
+def test_the_angle_keeps_to_its_limit(psi, psi_dot, wanted, wanted_dot, w, speed):
+    _, delta = steer(psi, psi_dot, wanted, wanted_dot, w, speed)
     assert abs(delta) <= LIMIT * (1.0 + 1e-15)
-    assert abs(state.heading_integral) <= INTEGRAL_MAX
 
 
-def test_while_it_turns_over_the_fin_is_level_and_the_integral_waits():
-    state, delta = steer(wanted=1.0, w=0.01, state=integrated(0.001))
-    assert (state.heading_integral, delta) == (0.001, 0.0)
+def test_while_it_turns_over_the_fin_is_level():
+    assert steer(wanted=1.0, w=0.01)[1] == 0.0
 
 
 class Yaw:
@@ -99,7 +91,7 @@ class Yaw:
             turn = self.share * 0.5 * math.sin(self.delta) * speed * speed + d
             self.r += TICK_S / 4.0 * (turn - self.r)
             self.psi += TICK_S * self.r
-        return self.state.share
+        return self.state.known.b
 
 
 @pytest.mark.parametrize('share', [0.4, 1.0, 2.5])
@@ -117,7 +109,7 @@ def test_nothing_is_learnt_while_nothing_turns():
     """Straight on, as the current and a hull that turns by itself let it; and when floating."""
     yaw = Yaw(1.0)
     yaw.fly(1800.0)
-    known = yaw.state.share
+    known = yaw.state.known.b
     assert yaw.fly(600.0, w=0.01) == known
     yaw = Yaw(2.5)
     straight = yaw.fly(7200.0, wanted=lambda t: 0.0, d=0.0)
@@ -137,7 +129,7 @@ def test_gusts_and_a_fin_that_turns_it_the_wrong_way_do_not_change_the_sign():
     known = yaw.fly(1800.0)
     for d in (0.02, 0.0, -0.02, 0.0):
         yaw.fly(60.0, d=d)
-    assert yaw.state.share == pytest.approx(known, rel=0.4)
+    assert yaw.state.known.b == pytest.approx(known, rel=0.4)
     assert yaw.fly(1800.0) == pytest.approx(1.0, rel=0.15)
     assert Yaw(-1.0).fly(1200.0) == LEAST_SHARE
 
@@ -150,7 +142,7 @@ def test_it_can_be_told_not_to_learn():
     for tick in range(3000):
         now = seen._replace(delta=0.3 * math.sin(0.02 * tick))
         state, _ = steer_by_fin(state, now, params, TICK_S)
-    assert state.share == 1.0
+    assert state.known.b == 1.0
 
 
 def control(law='pid', joints=(0.4, 0.0, 0.0, 0.0), psi=0.0, ticks=1, vehicle=VEHICLE):
