@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""How a vehicle steers, learnt: the estimator, and the gains for it."""
+"""How a vehicle steers, learnt: the estimator, and which way of steering it is for."""
 
 import numpy as np
 import pytest
@@ -11,11 +11,18 @@ from scipy.linalg import solve_continuous_are
 from glider_base.kernel import kernel
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.learnt_steering import (
+    AT_LIMIT,
     BANDWIDTH_MAX,
+    BANK,
+    HARDLY,
     MOST_BANK,
+    KEPT_S,
+    STRONG_STEERING,
     SteeringLearningSettings,
+    choose_steering,
     choose_way,
     heading_gains,
+    is_to_be_kicked,
     learn,
     learn_steering,
     lookaheads,
@@ -120,13 +127,86 @@ def test_covariance_stays_positive_definite(seed, b):
 
 # ---------------------------------------------------------------------------- way of steering
 
-LIMIT = MOST_BANK
+LIMIT = BANK
 
 
 def known(b, c, k, std=1e-5, **changes):
     """State of an estimator that is as sure of b, c and k as ``std`` says."""
     p = (std**2, 0.0, 0.0, 0.0, std**2, 0.0, 0.0, std**2, 0.0, 1e-10)
     return prior(1.0)._replace(b=b, c=c, k=k, p=p, **changes)
+
+
+weak = st.floats(-0.004, 0.004)
+some_kicks = st.floats(0.05, 0.5).flatmap(lambda k: st.sampled_from([k, -k]))
+
+
+@given(weak, st.floats(-0.006, 0.006), some_kicks, st.booleans())
+def test_vehicle_whose_turn_changes_sides_within_the_limit_is_kicked(b, c, k, is_kicked):
+    """Against its kick at small rolls and with it at the limit; whatever was done before."""
+    at_limit = b + c * LIMIT * LIMIT
+    state = known(b, c, k, is_kicked=is_kicked)
+    if abs(at_limit) > 1e-4 and abs(b) > 1e-4:
+        assert is_to_be_kicked(state, LIMIT) == (at_limit * k > 0.0 > b * k)
+
+
+@given(weak, st.floats(-0.006, 0.006), some_kicks, st.floats(0.0, 0.003), st.booleans())
+def test_mirrored_vehicle_is_steered_the_same_way(b, c, k, std, is_kicked):
+    state = known(b, c, k, std, is_kicked=is_kicked)
+    mirrored = known(-b, -c, -k, std, is_kicked=is_kicked)
+    assert is_to_be_kicked(state, LIMIT) == is_to_be_kicked(mirrored, LIMIT)
+
+
+@given(st.floats(2.0 * STRONG_STEERING, 0.1), st.sampled_from([1.0, -1.0]), kicks)
+def test_vehicle_that_steers_well_is_never_kicked(b, sign, k):
+    assert not is_to_be_kicked(known(sign * b, 0.0, k), LIMIT)
+    assert not is_to_be_kicked(prior(sign)._replace(k=k), LIMIT)
+
+
+@pytest.mark.parametrize('is_kicked', [True, False])
+def test_doubt_about_the_limit_changes_nothing(is_kicked):
+    """b is known, what becomes of it at the limit is not: as before."""
+    state = known(1e-3, -7e-3, -0.3, is_kicked=is_kicked)
+    p = (1e-8, 0.0, 0.0, 0.0, 1.6e-5, *state.p[5:])
+    assert is_to_be_kicked(state._replace(p=p), LIMIT) == is_kicked
+
+
+def test_vehicle_of_which_nothing_is_known_but_that_it_hardly_turns_is_kicked():
+    """One that may turn as well is turned: at one roll, for long, nothing would be learnt of it."""
+    assert is_to_be_kicked(known(1e-5, 0.0, -0.3, 0.5 * HARDLY, is_kicked=False), LIMIT)
+    for is_kicked in (True, False):
+        assert not is_to_be_kicked(known(1e-5, 0.0, -0.3, 2e-3, is_kicked=is_kicked), LIMIT)
+
+
+@pytest.mark.parametrize('is_kicked', [True, False])
+def test_way_of_steering_is_kept_for_a_while(is_kicked):
+    """Five minutes at least, at the limit of roll too; then what is known counts."""
+    b, c = (2e-3, 0.0) if is_kicked else (1e-3, -1.2e-2)
+    state = known(b, c, -0.3, is_kicked=is_kicked)
+    early = choose_steering(state._replace(kept_s=KEPT_S - 1.0), LIMIT, LIMIT)
+    late = choose_steering(state._replace(kept_s=KEPT_S + 1.0), LIMIT, LIMIT)
+    assert early.is_kicked == is_kicked
+    assert late.is_kicked != is_kicked
+    assert late.kept_s == 0.0
+    assert late[:5] == state[:5]
+
+
+@given(st.floats(-1.0, 1.0))
+def test_kick_that_is_enough_is_not_given_up(sine):
+    """Only a vehicle that needs all its roll, and turns against it, is better turned."""
+    state = known(2e-3, 0.0, -0.3, is_kicked=True, kept_s=1e4)
+    kept = choose_steering(state, sine, LIMIT).is_kicked
+    assert kept == (abs(sine) < AT_LIMIT * LIMIT)
+
+
+@given(st.floats(0.012, 0.1), st.sampled_from([1.0, -1.0]), some_kicks, st.floats(-1.0, 1.0))
+def test_kick_is_given_up_where_the_vehicle_turns_out_to_turn_well(b, sign, k, sine):
+    """A gust made it look weak; held by its kick, it would fly the other way for good."""
+    state = known(sign * b, 0.0, k, 1e-3, is_kicked=True, kept_s=KEPT_S + 1.0)
+    assert not choose_steering(state, sine, LIMIT).is_kicked
+    assert choose_steering(state._replace(kept_s=KEPT_S - 1.0), sine, LIMIT).is_kicked
+
+
+# -------------------------------------------------------------------------------- steering
 
 
 adverse = st.tuples(st.floats(0.003, 0.05), st.floats(0.02, 0.5))
@@ -225,3 +305,46 @@ def test_doubt_never_turns_the_roll_off(b, std, error):
     )
     assert 0.0 < abs(unsure) <= LIMIT and 0.0 < abs(sure) <= LIMIT
     assert unsure * b > 0.0
+
+
+@given(some_kicks, st.floats(0.0, 0.5), st.floats(-1.0, 1.0))
+def test_vehicle_that_hardly_turns_is_kicked_for_the_whole_error(k, kick_std, error):
+    """Whichever way it turns; of a kick in doubt a part is used."""
+    state = known(1e-4, 0.0, k, is_kicked=True)
+    state = state._replace(p=(*state.p[:7], kick_std**2 + 1e-9, *state.p[8:]))
+    way = choose_way(state, 0.0, 1.0, LIMIT, PARAMS)
+    assert 0.0 <= way.gain * k * error * error <= error * error * (1.0 + 1e-9)
+    if kick_std < 0.01 * abs(k):
+        assert way.gain * k == pytest.approx(1.0, rel=1e-3)
+
+
+@settings(max_examples=50)
+@given(st.floats(2e-4, 2e-3), st.floats(8.0, 26.0), st.floats(0.2, 0.45), st.floats(-3.0, 3.0))
+def test_kicked_vehicle_holds_its_heading_at_the_bank_at_which_it_does_not_turn(
+    b, null_deg, k, error_deg
+):
+    """Turn and kick go to different sides; the roll grows until the vehicle turns no more.
+
+    psi_left' = b s + c s^3 with b + c s^2 = 0 at the bank ``null_deg``, psi = psi_left - k phi.
+    """
+    c = -b / np.sin(np.radians(null_deg)) ** 2
+    way = choose_way(known(b, c, -k, is_kicked=True), 0.0, 1.0, MOST_BANK, PARAMS)
+    left, dt = np.radians(error_deg), 4.0
+    for _ in range(20000):
+        sine = min(MOST_BANK, max(-MOST_BANK, -way.gain * left))
+        left += dt * (b * sine + c * sine**3)
+        assert abs(left - k * sine) < np.radians(0.2)
+    if abs(error_deg) > 0.1:
+        assert abs(np.degrees(np.arcsin(sine))) == pytest.approx(null_deg, rel=0.01)
+
+
+def test_only_the_phase_that_is_flown_learns_and_only_in_a_glide():
+    before = SETTINGS.initial_state()
+    for rate, changed in ((0.27, {'dive'}), (-0.27, {'climb'}), (0.05, set()), (-0.05, set())):
+        after = before
+        now = Measured(0.2, -0.5, 0.0, 0.0, 0.0, 0.004, rate)
+        for _ in range(600):
+            after = learn(after, now, 0.5, PARAMS, DT)
+        assert {
+            phase for phase in ('dive', 'climb') if getattr(after, phase) != getattr(before, phase)
+        } == changed

@@ -59,7 +59,7 @@ class FinLawSettings(SurfaceLawSettings):
     def initial_state(self) -> 'FinLawState':
         """A fin as in the file."""
         d = SteeringLearningSettings().phase(1.0).p[9]
-        known = SteeringState(1.0, 0.0, 0.0, 0.0, (self.share_std**2, *(0.0,) * 8, d))
+        known = SteeringState(1.0, 0.0, 0.0, 0.0, (self.share_std**2, *(0.0,) * 8, d), False, 0.0)
         return FinLawState(known, 0.0, 0.0, 0.0, 0.0)
 
 

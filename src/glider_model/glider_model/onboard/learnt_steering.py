@@ -16,7 +16,7 @@ odometry, and so each works with any other (docs/theory.md, section 3).
 import math
 from typing import NamedTuple
 
-from glider_base.kernel import kernel
+from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings, number, positive
 from glider_model.vehicle.file import SLOWEST_GLIDE_MPS, VehicleParams
 from glider_model.vehicle.steering import steering_exponents
@@ -33,8 +33,21 @@ BANDWIDTH_MAX, LOOKAHEAD_MAX_S, SMALLEST_KICK = 0.12, 1500.0, 1e-3
 FED = 0.5
 #: The vehicle rolls to this share of the roll at which it turns fastest.
 SHARE_OF_PEAK = 0.7
+#: Sine of the roll at which a vehicle has to turn, or else is steered by its adverse yaw; with
+#: little more it has to hold its heading. And the share of it that is at the limit.
+BANK, AT_LIMIT = 0.35, 0.98
 #: Sine of the roll that guidance takes the vehicle to be capable of.
 MOST_BANK = 0.5
+#: Turn rate over u (rad/s) of a vehicle that surely hardly turns there.
+HARDLY = 5e-4
+#: Turn rate over u (rad/s) of a vehicle that is steered by its turn in any case.
+STRONG_STEERING = 6e-3
+#: An estimate with a smaller standard deviation is believed, this share of which is no difference.
+WELL_KNOWN, NO_DIFFERENCE = 3e-4, 0.4
+#: A way of steering is kept at least this long (s).
+KEPT_S = 300.0
+#: Lookahead of a vehicle that is steered by its adverse yaw (s).
+KICKED_LOOKAHEAD_S = 150.0
 
 
 class SteeringLearningSettings(Settings):
@@ -87,7 +100,7 @@ class SteeringLearningSettings(Settings):
         """Estimate of one phase that knows nothing."""
         b, c, k = self.prior_std_radps**2, self.bend_std_radps**2, self.kick_std**2
         p = (b, 0.0, 0.0, 0.0, c, 0.0, 0.0, k, 0.0, self.disturbance_std_radps**2)
-        return SteeringState(sign * self.prior_radps, 0.0, 0.0, 0.0, p)
+        return SteeringState(sign * self.prior_radps, 0.0, 0.0, 0.0, p, False, 0.0)
 
 
 class SteeringParams(NamedTuple):
@@ -117,6 +130,8 @@ class SteeringState(NamedTuple):
     d: float  #: turn-rate disturbance (rad/s)
     p: tuple[float, float, float, float, float, float, float, float, float, float]
     #: bb, bc, bk, bd, cc, ck, cd, kk, kd, dd
+    is_kicked: bool  #: steered by its adverse yaw alone
+    kept_s: float  #: for how long it is steered this way (s)
 
 
 class Steering(NamedTuple):
@@ -181,7 +196,60 @@ def learn_steering(state, sine, cube, sine_rate, yaw_rate, params, dt):
             kd - g_k * g_d / spread,
             dd - g_d * g_d / spread,
         ),
+        state.is_kicked,
+        state.kept_s + dt,
     )
+
+
+@kernel
+def _at_limit(state, bank):
+    """Turn rate over u at a limit ``bank`` of u, and its standard deviation (rad/s)."""
+    square = bank * bank
+    variance = state.p[0] + square * (2.0 * state.p[1] + square * state.p[4])
+    return state.b + square * state.c, math.sqrt(max(0.0, variance))
+
+
+@kernel
+def is_to_be_kicked(state, bank):
+    """Whether the vehicle is to be steered by its adverse yaw alone.
+
+    So turned it drifts to the roll at which it turns no more, and stays there with its heading
+    held, if there is one within the limit ``bank`` (sine): if at the limit it does not turn
+    against k. Where it is not known whether it does, but that it hardly turns at all, it is
+    kicked, and so rolled, until it is.
+    """
+    turn, std = _at_limit(state, bank)
+    is_unknown = state.p[0] > state.b * state.b
+    if turn * turn + std * std > STRONG_STEERING * STRONG_STEERING:
+        return False
+    if state.b * state.k > 0.0 and not is_unknown:
+        return False
+    against = -turn if state.k > 0.0 else turn
+    if abs(against) > (NO_DIFFERENCE * std if std < WELL_KNOWN else std):
+        return against < 0.0
+    return (state.is_kicked and not is_unknown) or abs(turn) + std < HARDLY
+
+
+@kernel
+def choose_steering(state, sine, bank):
+    """Change the way of steering, if that is called for.
+
+    Given up at a large roll, the kick leaves a large heading error; so it is kept while it is
+    enough, or until the vehicle turns out to turn well.
+
+    Parameters
+    ----------
+    state : SteeringState
+    sine, bank : float
+        Sine of the roll, smoothed, and of its limit.
+    """
+    turn, std = _at_limit(state, bank)
+    turns_well = abs(turn) > STRONG_STEERING + MOST_DEVIATIONS * std
+    is_kicked = is_to_be_kicked(state, bank)
+    is_enough = state.is_kicked and abs(sine) < AT_LIMIT * bank and not turns_well
+    if is_kicked == state.is_kicked or is_enough or state.kept_s < KEPT_S:
+        return state
+    return replace(state, is_kicked=is_kicked, kept_s=0.0)
 
 
 @kernel
@@ -201,8 +269,10 @@ def learn(steering, measured, speed, params, dt):
     if steady_s > params.after_s:
         if measured.vertical_rate > 0.0:
             dive = learn_steering(dive, sine, cube, sine_rate, yaw_rate, params, dt)
+            dive = choose_steering(dive, sine / ratio, BANK)
         else:
             climb = learn_steering(climb, sine, cube, sine_rate, yaw_rate, params, dt)
+            climb = choose_steering(climb, sine / ratio, BANK)
     return Steering(dive, climb, sine, cube, sine_rate, yaw_rate, steady_s, ratio)
 
 
@@ -243,7 +313,7 @@ def choose_way(state, turn, ratio, limit, params):
     """How to steer where ``turn`` (rad/s) is asked for: a `Way`.
 
     About the roll that turns so; where steering fades with roll it stays below the peak of
-    b u + c u^3.
+    b u + c u^3. Or by the adverse yaw alone, with as much of it as is known.
 
     Parameters
     ----------
@@ -256,6 +326,9 @@ def choose_way(state, turn, ratio, limit, params):
         Largest u (-).
     params : SteeringParams
     """
+    if state.is_kicked:
+        gain = state.k / (state.k * state.k + state.p[7])
+        return Way(0.0, limit, gain, KICKED_LOOKAHEAD_S)
     b, c, most = state.b, state.c, limit
     if b * c < 0.0:
         most = min(limit, SHARE_OF_PEAK * math.sqrt(-b / (3.0 * c)))
