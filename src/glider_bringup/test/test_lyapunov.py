@@ -40,6 +40,7 @@ FLIGHT = {
     'dives': 0,
     'duration_s': 3200.0,
     'profile.depth_m': 100.0,
+    'path': {'kind': 'waypoints', 'waypoints': [[0, 0], [200, 0], [300, 200], [300, 2000]]},
     'control.law': 'backstepping',
 }
 UNKNOWN = {

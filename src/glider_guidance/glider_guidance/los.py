@@ -114,7 +114,8 @@ def approach_heading(course, approach, progress, speed, current_n, current_e):
 
     with w = P sin(approach), near the path. A following current may be faster than the vehicle,
     which then comes to the path square to it and cannot turn in time. So w goes to V and no more,
-    V = 0.9 U_h, more or less the current across and 0.3 U_h at least: w = P s / sqrt(c^2 + (P s / V)^2).
+    V = 0.9 U_h, more or less the current across and 0.3 U_h at least:
+    w = P s / sqrt(c^2 + (P s / V)^2).
 
     Parameters
     ----------

@@ -15,8 +15,8 @@ from glider_model.onboard.learnt_steering import (
     BANDWIDTH_MAX,
     BANK,
     HARDLY,
-    MOST_BANK,
     KEPT_S,
+    MOST_BANK,
     STRONG_STEERING,
     SteeringLearningSettings,
     choose_steering,
@@ -171,7 +171,7 @@ def test_doubt_about_the_limit_changes_nothing(is_kicked):
 
 
 def test_vehicle_of_which_nothing_is_known_but_that_it_hardly_turns_is_kicked():
-    """One that may turn as well is turned: at one roll, for long, nothing would be learnt of it."""
+    """One that may turn as well is turned: at one roll nothing would be learnt of it."""
     assert is_to_be_kicked(known(1e-5, 0.0, -0.3, 0.5 * HARDLY, is_kicked=False), LIMIT)
     for is_kicked in (True, False):
         assert not is_to_be_kicked(known(1e-5, 0.0, -0.3, 2e-3, is_kicked=is_kicked), LIMIT)

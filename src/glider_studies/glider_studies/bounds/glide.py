@@ -32,7 +32,7 @@ from glider_guidance.yo.stage import GLIDING_DOWN, GLIDING_UP
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.onboard.command_filter import Filtered
-from glider_model.onboard.learnt_steering import lookaheads
+from glider_model.onboard.learnt_steering import STEERING_SPEED, lookaheads
 from glider_model.vehicle.file import load_vehicle
 from glider_studies.bounds.steering_loop import SteeringLoop
 
@@ -177,7 +177,8 @@ def steering_loop(glide: Glide) -> SteeringLoop:
     fin = params.control.steering
     if hasattr(fin, 'turn_rate'):
         ask, limit, roll_filter = _ask_fin(state, fin), fin.limit, None
-        b, k = state.control.steering.share * fin.turn_rate * glide.speed**2, 0.0
+        speed_ratio = (glide.speed / STEERING_SPEED) ** 2
+        b, k = state.control.steering.known.b * fin.turn_rate * speed_ratio, 0.0
     else:
         careful = bank_carefully(seen.m_b, law)
         ask, roll_filter = _ask_law(state, law, careful.roll_filter), careful.roll_filter
