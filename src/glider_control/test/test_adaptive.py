@@ -101,6 +101,14 @@ def test_roll_goes_to_the_side_that_turns_the_right_way(rate, sign):
     assert np.sign(state.roll.value) == sign
 
 
+def test_vehicle_has_to_turn_at_the_roll_that_it_may_take():
+    """With a smaller limit of roll, the way of steering is decided at that."""
+    vehicle, roll_filter = load_vehicle('zhang2021'), FilterParams(0.5, 0.08)
+    for limit_deg, bank_deg in ((20.0, 20.0), (30.0, 30.0), (45.0, 30.0)):
+        params = SETTINGS.params(vehicle, Bank(math.radians(limit_deg), roll_filter))
+        assert params.steering.bank == pytest.approx(math.sin(math.radians(bank_deg)))
+
+
 def test_mirror_image_gives_mirror_image():
     """Port and starboard exchanged: roll moment, roll and disturbance change their sign only."""
     port, starboard = SETTINGS.initial_state(), SETTINGS.initial_state()

@@ -60,10 +60,11 @@ class AdaptiveSettings(LawSettings):
     def params(self, vehicle: Vehicle, bank: Bank) -> 'AdaptiveParams':
         """Kernel parameters."""
         x, roll, pitch = vehicle.params(), self.roll, self.pitch
+        steering = self.steering.params(bank.limit > 0.0, x.slowest_glide, x)
         return AdaptiveParams(
             Gains(roll.kp, roll.ki, roll.kd),
             Gains(pitch.kp, pitch.ki, pitch.kd),
-            self.steering.params(bank.limit > 0.0, x.slowest_glide, x),
+            steering._replace(bank=min(steering.bank, math.sin(bank.limit))),
             bank.limit,
             bank.filter,
             make_righting(x),

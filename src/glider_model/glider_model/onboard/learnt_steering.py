@@ -33,13 +33,9 @@ BANDWIDTH_MAX, LOOKAHEAD_MAX_S, SMALLEST_KICK = 0.12, 1500.0, 1e-3
 FED = 0.5
 #: The vehicle rolls to this share of the roll at which it turns fastest.
 SHARE_OF_PEAK = 0.7
-#: Sine of the roll at which a vehicle has to turn, or else is steered by its adverse yaw; with
-#: little more it has to hold its heading. And the share of it that is at the limit.
-BANK, AT_LIMIT = 0.35, 0.98
-#: Sine of the roll that guidance takes the vehicle to be capable of.
-MOST_BANK = 0.5
-#: Turn rate over u (rad/s) of a vehicle that surely hardly turns there.
-HARDLY = 5e-4
+#: Sine of the roll at which a vehicle has to turn, or else is steered by its adverse yaw, and the
+#: share of it from which on it counts as at its limit: no plant comes quite to that of its file.
+BANK, AT_LIMIT = 0.5, 0.9
 #: Turn rate over u (rad/s) of a vehicle that is steered by its turn in any case.
 STRONG_STEERING = 6e-3
 #: An estimate with a smaller standard deviation is believed, this share of which is no difference.
@@ -90,6 +86,7 @@ class SteeringLearningSettings(Settings):
             *map(float, power),
             self.roll_per_s,
             self.approach_s,
+            BANK,
         )
 
     def initial_state(self) -> 'Steering':
@@ -119,6 +116,7 @@ class SteeringParams(NamedTuple):
     power_climb: float
     rho: float  #: (1/s)
     tau: float  #: (s)
+    bank: float  #: sine of the roll at which a vehicle has to turn (-)
 
 
 class SteeringState(NamedTuple):
@@ -215,8 +213,7 @@ def is_to_be_kicked(state, bank):
 
     So turned it drifts to the roll at which it turns no more, and stays there with its heading
     held, if there is one within the limit ``bank`` (sine): if at the limit it does not turn
-    against k. Where it is not known whether it does, but that it hardly turns at all, it is
-    kicked, and so rolled, until it is.
+    against k. Where nothing is known it is kicked, and so rolled, until it is.
     """
     turn, std = _at_limit(state, bank)
     is_unknown = state.p[0] > state.b * state.b
@@ -227,7 +224,7 @@ def is_to_be_kicked(state, bank):
     against = -turn if state.k > 0.0 else turn
     if abs(against) > (NO_DIFFERENCE * std if std < WELL_KNOWN else std):
         return against < 0.0
-    return (state.is_kicked and not is_unknown) or abs(turn) + std < HARDLY
+    return state.is_kicked or is_unknown
 
 
 @kernel
@@ -269,10 +266,10 @@ def learn(steering, measured, speed, params, dt):
     if steady_s > params.after_s:
         if measured.vertical_rate > 0.0:
             dive = learn_steering(dive, sine, cube, sine_rate, yaw_rate, params, dt)
-            dive = choose_steering(dive, sine / ratio, BANK)
+            dive = choose_steering(dive, sine / ratio, params.bank)
         else:
             climb = learn_steering(climb, sine, cube, sine_rate, yaw_rate, params, dt)
-            climb = choose_steering(climb, sine / ratio, BANK)
+            climb = choose_steering(climb, sine / ratio, params.bank)
     return Steering(dive, climb, sine, cube, sine_rate, yaw_rate, steady_s, ratio)
 
 
@@ -353,6 +350,6 @@ def steer_to(way, error, u, k):
 @kernel
 def lookaheads(steering, params):
     """How far ahead the vehicle can follow, in dive and climb (s)."""
-    dive = choose_way(steering.dive, 0.0, steering.ratio, MOST_BANK, params)
-    climb = choose_way(steering.climb, 0.0, steering.ratio, MOST_BANK, params)
+    dive = choose_way(steering.dive, 0.0, steering.ratio, params.bank, params)
+    climb = choose_way(steering.climb, 0.0, steering.ratio, params.bank, params)
     return dive.lookahead_s, climb.lookahead_s
