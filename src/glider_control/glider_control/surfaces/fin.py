@@ -58,8 +58,8 @@ class FinLawSettings(SurfaceLawSettings):
 
     def initial_state(self) -> 'FinLawState':
         """A fin as in the file."""
-        d = SteeringLearningSettings().phase(1.0).p[9]
-        known = SteeringState(1.0, 0.0, 0.0, 0.0, (self.share_std**2, *(0.0,) * 8, d), False, 0.0)
+        known = SteeringLearningSettings().phase(1.0)
+        known = known._replace(b=1.0, p=(self.share_std**2, *(0.0,) * 8, known.p[9]))
         return FinLawState(known, 0.0, 0.0, 0.0, 0.0)
 
 
