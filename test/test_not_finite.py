@@ -138,10 +138,10 @@ def test_score_that_is_not_finite_is_a_failure():
 def test_extreme_flights_are_finite_or_refused():
     """A few of `./glider test --only fuzz --door flights`."""
     counter = Counter(lambda tried: None)
-    flights.fuzz(1, 6, counter)
+    flights.fuzz(1, 12, counter)
     counts = counter.result()
     assert counts.clean, counts.examples
-    assert counts.tried == 6
+    assert counts.tried == 12
 
 
 def test_fuzz_sees_a_flight_that_fails(driven, monkeypatch):
