@@ -222,17 +222,16 @@ def test_managed_node_acts_while_it_is_active_and_forgets_when_it_is_configured(
     change = vehicle.node.create_client(ChangeState, f'{services}/change_state')
     tell = vehicle.node.create_client(GetState, f'{services}/get_state')
 
+    def answer(client, request):
+        said = client.call_async(request)
+        flight.until(said.done)
+        return said.result()
+
     def state_after(label: str) -> str:
-        for client, request in (
-            (change, ChangeState.Request()),
-            (tell, GetState.Request()),
-        ):
-            if client is change:
-                request.transition.label = label
-            said = client.call_async(request)
-            flight.until(said.done)
-            assert client is tell or said.result().success
-        return said.result().current_state.label
+        request = ChangeState.Request()
+        request.transition.label = label
+        assert answer(change, request).success
+        return answer(tell, GetState.Request()).current_state.label
 
     try:
         flight.until(change.service_is_ready)

@@ -46,8 +46,6 @@ from glider_mission.scenario import (
 #: The node that `ros2 launch` starts and `./glider run`, which nobody can watch, does not.
 TF, TF_MODULE = 'tf_node', 'glider_model.nodes.tf_node'
 
-#: Nodes that are managed when they run freely, each in a process of its own.
-_ON_BOARD = tuple(wired.node for wired in ON_BOARD)
 _TRUTH = {'true': True, 'false': False}
 
 
@@ -226,9 +224,8 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
         record_to is not None,
         with_tf,
     )
-    managed = ()
-    if not lockstep and not _TRUTH[text['autopilot']]:
-        managed = tuple(name for name in _ON_BOARD if name in {node.executable for node in nodes})
+    started = [] if lockstep else [node.executable for node in nodes]
+    managed = tuple(wired.node for wired in ON_BOARD if wired.node in started)
     for name in managed:
         parameters[name]['managed'] = True
     if with_tf:
