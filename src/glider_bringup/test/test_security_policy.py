@@ -27,6 +27,8 @@ from glider_navigation.nodes.navigation_node import NavigationNode
 
 POLICY = Path(__file__).resolve().parents[1] / 'security' / 'policy.xml'
 NAMESPACE = '/glider'
+#: Where the nodes of the test are: those of other tests may be around for a while.
+APART = '/rights'
 #: What every node of rclpy says, and answers.
 SAYS = ('/parameter_events', '/rosout')
 PARAMETERS = tuple(
@@ -111,7 +113,7 @@ def graph(tmp_path_factory):
     with domain_id() as domain:
         rclpy.init(context=context, domain_id=domain)
         record = Parameter('record', value=True)
-        said = {'context': context, 'namespace': NAMESPACE}
+        said = {'context': context, 'namespace': APART}
         made = [node(parameter_overrides=[record], **said) for node in nodes]
         given = [record, Parameter('folder', value=str(folder))]
         made.append(RecorderNode(parameter_overrides=given, **said))
@@ -128,7 +130,10 @@ def _rights_of(node) -> dict[str, set[str]]:
         'subscribe': node.get_subscriber_names_and_types_by_node(name, place),
         'reply': node.get_service_names_and_types_by_node(name, place),
     }
-    return {right: {topic for topic, _ in several} for right, several in found.items()}
+    return {
+        right: {topic.replace(f'{APART}/', f'{NAMESPACE}/') for topic, _ in several}
+        for right, several in found.items()
+    }
 
 
 def _absolute(name: str, node: str) -> str:
