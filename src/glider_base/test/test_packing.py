@@ -2,15 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tuples of numbers that go to compiled code by arrays arrive as they were."""
 
+import sys
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba.core import types
+from numba.experimental import structref
+from numba.extending import overload
 
 from glider_base.kernel import kernel
-from glider_base.kernels.packing import packed, put, unpacked
+from glider_base.kernels.packing import packed, pour, put
 
 FLOATS = st.floats(allow_nan=False)
 INTEGERS = st.integers(-(2**63), 2**63 - 1)
@@ -30,9 +34,50 @@ class Outer(NamedTuple):
     values: np.ndarray
 
 
+@structref.register
+class BoxType(types.StructRef):
+    """Type of `Box` in compiled code."""
+
+
+class Box(structref.StructRefProxy):
+    """Holds a tuple, or another one in its place."""
+
+
+structref.define_boxing(BoxType, Box)
+
+
 @kernel
-def through(kind, numbers, others):
-    return unpacked(kind, numbers, others)
+def boxed(values):
+    return Box(values)
+
+
+@overload(Box)
+def _new_box(values):
+    kind = BoxType([('values', values)])
+
+    def new(values):
+        made = structref.new(kind)
+        made.values = values
+        return made
+
+    return new
+
+
+@kernel
+def poured(box, values):
+    pour(box, 'values', values)
+
+
+@kernel
+def opened(box):
+    return box.values
+
+
+def through(first, then):
+    """What is in a box that held something else of its kind before."""
+    box = boxed(first)
+    poured(box, packed(then))
+    return opened(box)
 
 
 @kernel
@@ -44,7 +89,8 @@ def write(table, row, start, tuples):
 def test_what_was_packed_is_what_arrives(x, is_on, count, y, stream):
     values = np.array([x, y])
     sent = Outer(Inner(x, is_on, count), (y, -0.0), (), np.uint64(stream), values)
-    got = through(*packed(sent))
+    before = Outer(Inner(1.0, True, 2), (3.0, 4.0), (), np.uint64(5), np.zeros(3))
+    got = through(before, sent)
     assert type(got) is Outer and type(got.inner) is Inner
     assert (got.inner, got.nothing, int(got.stream)) == (sent.inner, (), stream)
     assert [type(one) for one in got.inner] == [float, bool, int]
@@ -53,8 +99,10 @@ def test_what_was_packed_is_what_arrives(x, is_on, count, y, stream):
 
 
 def test_an_array_that_arrives_lives_on():
-    got = through(*packed((Inner(1.0, False, 2), np.arange(1000.0))))
+    before = np.zeros(7)
+    got = through((Inner(0.0, True, 1), before), (Inner(1.0, False, 2), np.arange(1000.0)))
     assert got[1].sum() == 499500.0
+    assert sys.getrefcount(before) == 2  # nobody else has it any more
 
 
 @pytest.mark.parametrize('row', [0, 2])

@@ -9,7 +9,7 @@ line of Python for each of its numbers. Here they go by a few arrays, and LLVM i
 import numba
 import numpy as np
 from numba.core import cgutils, types
-from numba.core.imputils import impl_ret_borrowed
+from numba.experimental import structref
 from numba.extending import intrinsic
 from numba.np import arrayobj
 
@@ -19,10 +19,12 @@ _NUMBERS = {
     **{types.int64: np.int64, types.uint64: np.uint64},
 }
 _ORDER = list(_NUMBERS)
+#: LLVM schedules every two of so many numbers that it moves: a block of all is long to compile.
+FENCED = 32
 
 
 def packed(values: tuple) -> tuple[types.Type, tuple[np.ndarray, ...], tuple]:
-    """What `unpacked` makes a tuple of again: its type, its numbers, and what is none.
+    """What `pour` makes a tuple of again: its type, its numbers, and what is none.
 
     Parameters
     ----------
@@ -48,32 +50,46 @@ def _sort(kind, value, numbers, others) -> None:
         others.append(value)
 
 
-def _unpacked(typing, kind, numbers, others):
-    """Load each number, and put the tuple together."""
-    made = kind.instance_type
+def _pour(typing, held, field, values):
+    """Load each number and store it, so that the tuple is never there as a whole."""
+    if not isinstance(field, types.StringLiteral):
+        return None
 
     def code(context, builder, signature, arguments):
-        parts = cgutils.unpack_tuple(builder, arguments[1], len(numbers.types))
+        kind, numbers, others = values.types
+        _, *parts = cgutils.unpack_tuple(builder, arguments[2], 3)
         arrays = [
             context.make_array(of)(context, builder, value=part)
-            for of, part in zip(numbers.types, parts, strict=True)
+            for of, part in zip(
+                numbers.types, cgutils.unpack_tuple(builder, parts[0]), strict=True
+            )
         ]
-        left = iter(cgutils.unpack_tuple(builder, arguments[2], len(others.types)))
+        left = iter(cgutils.unpack_tuple(builder, parts[1]))
         taken = [0] * len(_ORDER)
 
-        def make(of):
+        def store(of, place):
             if isinstance(of, types.BaseTuple):
-                return context.make_tuple(builder, of, [make(one) for one in of.types])
-            if of not in _NUMBERS:
-                return next(left)
-            which = _ORDER.index(of)
-            taken[which] += 1
-            place = cgutils.gep_inbounds(builder, arrays[which].data, taken[which] - 1)
-            return arrayobj.load_item(context, builder, numbers.types[which], place)
+                for k, one in enumerate(of.types):
+                    store(one, cgutils.gep_inbounds(builder, place, 0, k))
+            elif of in _NUMBERS:
+                which = _ORDER.index(of)
+                taken[which] += 1
+                source = cgutils.gep_inbounds(builder, arrays[which].data, taken[which] - 1)
+                item = arrayobj.load_item(context, builder, numbers.types[which], source)
+                builder.store(item, place)
+                if sum(taken) % FENCED == 0:
+                    builder.fence('acq_rel', 'singlethread')
+            else:
+                new, old = next(left), builder.load(place)
+                context.nrt.incref(builder, of, new)
+                builder.store(new, place)
+                context.nrt.decref(builder, of, old)
 
-        return impl_ret_borrowed(context, builder, made, make(made))
+        data = structref._Utils(context, builder, held).get_data_struct(arguments[0])
+        store(kind.instance_type, data._get_ptr_by_name(field.literal_value))
+        return context.get_dummy_value()
 
-    return made(kind, numbers, others), code
+    return types.none(held, field, values), code
 
 
 def _put(typing, table, row, start, tuples):
@@ -105,9 +121,9 @@ def _put(typing, table, row, start, tuples):
 
 if numba.config.DISABLE_JIT:
 
-    def unpacked(kind, numbers, others):
-        """The tuple that was `packed`."""
-        return kind
+    def pour(held, field, values):
+        """Make a field of a structure reference the tuple that was `packed`."""
+        setattr(held, field, values[0])
 
     def put(table, row, start, tuples):
         """Write tuples of numbers into a row of float64[n, m] from a column on."""
@@ -115,4 +131,4 @@ if numba.config.DISABLE_JIT:
         table[row, start : start + len(numbers)] = numbers
 
 else:
-    unpacked, put = intrinsic(_unpacked), intrinsic(_put)
+    pour, put = intrinsic(prefer_literal=True)(_pour), intrinsic(_put)

@@ -17,7 +17,7 @@ from numba.extending import overload
 
 from glider_base.frames import odometry_from_wire, water_to_wire
 from glider_base.kernel import INLINED, kernel
-from glider_base.kernels.packing import packed, put, unpacked
+from glider_base.kernels.packing import packed, pour, put
 from glider_base.signals import TICK_S, Joints
 from glider_base.wiring import FIELDS, publisher
 from glider_control.block import control_tick
@@ -75,31 +75,27 @@ class HeldMission(structref.StructRefProxy):
 structref.define_boxing(HeldType, HeldMission)
 
 
-def _held(state, params):
-    return SimpleNamespace(state=state, params=params)
+def _empty(state, params):
+    return SimpleNamespace()
 
 
-@overload(_held, jit_options=INLINED)
-def _new_held(state, params):
-    kind = HeldType([('state', state), ('params', params)])
-
-    def held(state, params):
-        made = structref.new(kind)
-        made.state, made.params = state, params
-        return made
-
-    return held
+@overload(_empty, jit_options=INLINED)
+def _new_empty(state, params):
+    kind = HeldType([('state', state.instance_type), ('params', params.instance_type)])
+    return lambda state, params: structref.new(kind)
 
 
 @kernel
-def _hold(kind, numbers, others):
-    state, params = unpacked(kind, numbers, others)
-    return _held(state, params)
+def _hold(state, params):
+    held = _empty(state[0], params[0])
+    pour(held, 'state', state)
+    pour(held, 'params', params)
+    return held
 
 
 def hold(state: MissionState, params: MissionParams) -> HeldMission:
     """Have a mission held. The state that was given does not change with it."""
-    return _hold(*packed((apart(state), params)))
+    return _hold(packed(apart(state)), packed(params))
 
 
 def apart(state: MissionState) -> MissionState:
@@ -167,23 +163,23 @@ def held_state(held: HeldMission) -> MissionState:
 
 
 @kernel
-def _set_state(held, kind, numbers, others):
-    held.state = unpacked(kind, numbers, others)
+def _set_state(held, state):
+    pour(held, 'state', state)
 
 
 def set_held(held: HeldMission, state: MissionState) -> None:
     """Hold another state."""
-    _set_state(held, *packed(apart(state)))
+    _set_state(held, packed(apart(state)))
 
 
 @kernel
-def _set_params(held, kind, numbers, others):
-    held.params = unpacked(kind, numbers, others)
+def _set_params(held, params):
+    pour(held, 'params', params)
 
 
 def set_held_params(held: HeldMission, params: MissionParams) -> None:
     """Fly on with other parameters."""
-    _set_params(held, *packed(params))
+    _set_params(held, packed(params))
 
 
 def fly(
