@@ -23,7 +23,7 @@ from glider_mission.run_folder import make_result_folder
 from glider_mission.scenario import load_scenario, parse_assignment
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle
-from glider_studies import forecasts, routes
+from glider_studies import bottoms, forecasts, routes
 from glider_studies.commands.experiments import Group
 from glider_studies.hunt import search
 from glider_studies.paper import experiments, measures
@@ -64,7 +64,10 @@ def planned():
 
 
 def test_command_line_knows_every_group():
-    assert get_args(Group) == (*catalogue(), search.NAME, routes.NAME, forecasts.NAME)
+    assert get_args(Group) == (
+        *(*catalogue(), search.NAME),
+        *(one.NAME for one in (routes, forecasts, bottoms)),
+    )
 
 
 def test_every_experiment_can_be_flown(planned):

@@ -279,7 +279,7 @@ def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
         scales.append(one.units[units])
     for axis, dimension in axes.items():
         one = dataset.variables[dimension]
-        values[axis] = _times(one) if axis == 'time' else np.asarray(one.values, dtype=float)
+        values[axis] = _times(one) if axis == 'time' else np.array(one.values, dtype=float)
         if axis == 'depth':
             units = str(one.attrs.get('units', 'm')).strip()
             if units not in _LENGTHS:
@@ -502,7 +502,7 @@ def load_bottom(path: Path, window: Window, needed: Window) -> LoadedBottom:
         name, scale = _bottom(dataset)
         axes = _find_axes(dataset, name, ('latitude', 'longitude'))
         values = {
-            axis: np.asarray(dataset.variables[one].values, float) for axis, one in axes.items()
+            axis: np.array(dataset.variables[one].values, float) for axis, one in axes.items()
         }
         values['longitude'] = _unwrapped(values['longitude'], 0.5 * (window.west + window.east))
         whole = Axes(np.zeros(1), np.zeros(1), *(np.sort(values[a]) for a in _AXES[2:]))

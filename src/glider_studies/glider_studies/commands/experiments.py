@@ -24,7 +24,7 @@ from glider_studies.at_work import workers_at_work
 app = typer.Typer()
 GROUPS = (
     *('current', 'yaw', 'profile', 'robustness', 'ablation', 'vehicles', 'paths', 'envelope'),
-    *('navigation', 'faults', 'random_faults', 'routes', 'forecasts'),
+    *('navigation', 'faults', 'random_faults', 'routes', 'forecasts', 'bottoms'),
 )
 Group = Literal[GROUPS]
 
@@ -43,7 +43,7 @@ def experiments(
         typer.Option(
             min=0,
             max=2**31 - 1,
-            help='Seed of the missions of random_faults, and of the seas of routes and forecasts.',
+            help='Seed of the missions, seas and bottoms that are drawn.',
         ),
     ] = 0,
     workers: Workers = None,
@@ -60,10 +60,10 @@ def experiments(
     another, and asks of each whether it earns its place. random_faults breaks random missions in
     two or three random ways, and judges them by their true motion alone. routes crosses twelve
     seas full of eddies by straight legs and along planned routes; forecasts reckons its way
-    through four by forecasts that err.
+    through four by forecasts that err; bottoms flies over 200 bottoms with hills.
     """
     from glider_mission.run_folder import make_result_folder
-    from glider_studies import forecasts, routes
+    from glider_studies import bottoms, forecasts, routes
     from glider_studies.hunt import search
     from glider_studies.paper import experiments as paper
     from glider_studies.paper import tables
@@ -73,7 +73,7 @@ def experiments(
     planned = paper.make_experiments(groups)
     if search.NAME in groups:
         planned.append(search.experiment(seed, flights))
-    planned += [one.experiment(seed) for one in (routes, forecasts) if one.NAME in groups]
+    planned += [one.experiment(seed) for one in (routes, forecasts, bottoms) if one.NAME in groups]
     total = paper.count_flights(planned)
     if out:
         make_result_folder(out, paper.RESULT_FILE)
