@@ -79,7 +79,7 @@ def main(arguments):
         rest[folder] += [f'--ignore={file}' for file in files]
         apart.append((folder, files))
     runs = [*rest.items()]
-    runs[2:2] = apart  # the longest first, so that nobody waits for one alone
+    runs[3:3] = apart  # the longest first, so that nobody waits for one alone
     codes = side_by_side([sys.executable, '-m', 'pytest'], runs)
     failed = dict.fromkeys(
         os.path.relpath(f'{folder}/test', ROOT)

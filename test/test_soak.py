@@ -13,11 +13,11 @@ from glider_bringup.engines.processes import process_modules
 
 def test_soak_counts_ticks_looks_at_memory_and_verifies(tmp_path):
     command = [sys.executable, Path(__file__).with_name('soak.py'), 'current_8deg', '--json']
-    command += ['--duration', '200', '--out', tmp_path / 'run']
+    command += ['--duration', '100', '--out', tmp_path / 'run']
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
-    assert (result['status'], result['ticks'], result['ticks_lost']) == ('completed', 2000, 0)
+    assert (result['status'], result['ticks'], result['ticks_lost']) == ('completed', 1000, 0)
     assert (result['messages_lost'], result['verify']) == (0, 'identical')
     processes = set(process_modules('together'))
     assert set(result['rss_mb']) == set(result['growth_mb_per_h']) == processes

@@ -85,7 +85,7 @@ def test_how_well_the_fin_turns_is_learnt_by_either_law(law):
     ids=['a gust', 'a fin stuck for a while'],
 )
 def test_what_breaks_teaches_no_nonsense(broken, rel):
-    scores, share = shelf('pid', 1.0, faults=[{**broken, 'at_s': 3000.0}])
+    scores, share = shelf('adaptive', 1.0, faults=[{**broken, 'at_s': 3000.0}])
     assert share[-1] == pytest.approx(1.0, rel=rel)
     assert 0.5 < share.min() < share.max() < 2.0
 

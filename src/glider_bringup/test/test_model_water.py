@@ -38,9 +38,8 @@ def sea(path, warmer_north=0.0):
 
 
 def fly(water, **fields):
-    """Two dives of a Slocum to 150 m."""
+    """Two dives to 150 m."""
     changes = {
-        'vehicle': 'slocum_g2',
         'water': water,
         'origin': {'latitude_deg': 36.0, 'longitude_deg': 122.0},
         'profile.depth_m': 150.0,
