@@ -27,7 +27,7 @@ LANES = {
     'soak': ('-m', 'soak'),
 }
 #: So many runs of tests go on at a time: two processors have something to do while a test waits.
-AT_ONCE = 4
+AT_ONCE = 3
 #: Files of tests that are runs of their own: they share no flight with the others of their folder.
 APART = (
     (ROOT, ('autopilot', 'benchmarks', 'driver_restart', 'faults', 'live_view')),
