@@ -239,8 +239,10 @@ def test_managed_node_acts_while_it_is_active_and_forgets_when_it_is_configured(
         flight.wait(1.0)
         assert not vehicle.odom
         assert state_after('activate') == 'active'
-        vehicle.fix = a_fix(100.0)
-        flight.until(lambda: vehicle.odom and vehicle.north_m() > 50.0)
+        vehicle.depth_m = 6.0
+        flight.until(lambda: vehicle.odom and vehicle.odom[-1].pose.pose.position.z < -4.0)
+        vehicle.depth_m, vehicle.fix = 0.0, a_fix(100.0)
+        flight.until(lambda: vehicle.north_m() > 50.0)
         vehicle.fix = None
         assert state_after('deactivate') == 'inactive'
         flight.until(lambda: vehicle.said('deactivated: silent until it is activated'))
