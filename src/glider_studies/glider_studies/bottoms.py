@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from glider_bringup.scoring.card import fly_scored
+from glider_guard.witness import AFLOAT_M
 from glider_mission.choices import combination_of
 from glider_mission.scenario import Scenario, load_scenario
 from glider_studies.paper.experiments import Experiment, Study, make_study
@@ -19,11 +20,11 @@ NAME = 'bottoms'
 COUNT, FIRST, HILLS = 200, 3000, 8
 CLEARANCE, WITHOUT = 'clearance of 10 m', 'without'
 WAYS: dict[str, dict[str, Any]] = {CLEARANCE: {'profile.clearance_m': 10.0}, WITHOUT: {}}
+#: Dives of a mission, which lead 3 to 10 km north; the hills stand there.
+DIVES = 8
 #: Corners of the chart (deg), as far apart as those of GEBCO; the mission goes north from 36, 122.
-_LATITUDES = np.arange(35.95, 36.35, 1.0 / 240.0)
+_LATITUDES = np.arange(35.95, 36.25, 1.0 / 240.0)
 _LONGITUDES = np.arange(121.9, 122.1, 1.0 / 240.0)
-#: A vehicle no deeper than this is at the surface (m).
-_UP_M = 2.0
 
 
 def write_bottom(seed: int, path: Path) -> None:
@@ -34,7 +35,7 @@ def write_bottom(seed: int, path: Path) -> None:
     plain = draw.uniform(120.0, 300.0)
     depth = np.full((len(_LATITUDES), len(_LONGITUDES)), plain)
     for _ in range(draw.integers(1, HILLS + 1)):
-        north, east = draw.uniform(36.0, 36.3), draw.uniform(121.97, 122.03)
+        north, east = draw.uniform(36.0, 36.08), draw.uniform(121.98, 122.02)
         away = np.hypot(_LATITUDES[:, None] - north, 0.8 * (_LONGITUDES - east))
         height, size = draw.uniform(20.0, plain - 50.0), draw.uniform(0.005, 0.03)
         depth -= height * np.exp(-((away / size) ** 2))
@@ -51,7 +52,8 @@ def write_bottom(seed: int, path: Path) -> None:
 
 def scenario_over(chart: Path, way: str) -> Scenario:
     """The mission over a chart, in one of `WAYS`."""
-    return load_scenario('slocum_shelf', {'bathymetry.file': str(chart), **WAYS[way]})
+    changes = {'dives': DIVES, 'bathymetry.file': str(chart), **WAYS[way]}
+    return load_scenario('slocum_shelf', changes)
 
 
 def fly_one(task: tuple[int, str]) -> dict[str, Any]:
@@ -66,7 +68,7 @@ def fly_one(task: tuple[int, str]) -> dict[str, Any]:
         'touched': bottom['touched'],
         'least_m': bottom['least_height_m'],
         'noticed': bool(scores['guard']['events']),
-        'came_up': place[2] < _UP_M,
+        'came_up': place[2] <= AFLOAT_M,
         'completed': scores['status'] == 'completed',
     }
 
