@@ -2,11 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiling: whoever waits for it is told."""
 
+import gc
 import os
 import subprocess
 import sys
 
 import numba
+import pytest
+from numba.core import event
 
 from glider_base.kernel import compiling_told
 
@@ -30,6 +33,43 @@ def test_compiling_is_told_before_it_begins_once_and_only_then():
     quarter(1j)
     assert seen == [1.0, 1.0, 2.0]
     assert told == [0]
+
+
+@pytest.mark.parametrize('is_on', [True, False])
+def test_no_garbage_is_looked_for_while_something_is_compiled(is_on):
+    """Not in what is compiled within it either; afterwards, or after a failure, as before."""
+
+    @numba.njit
+    def half(x):
+        return 0.5 * x
+
+    @numba.njit
+    def quarter(x):
+        return half(half(x))
+
+    @numba.njit
+    def wrong(x):
+        return half(x).no_such_thing
+
+    class Watch(event.Listener):
+        def on_start(self, event):
+            seen.append(gc.isenabled())
+
+        def on_end(self, event):
+            seen.append(gc.isenabled() if event.data['dispatcher'] is half else False)
+
+    seen, before = [], gc.isenabled()
+    (gc.enable if is_on else gc.disable)()
+    try:
+        with event.install_listener('numba:compile', Watch()):
+            quarter(4.0)
+            assert gc.isenabled() == is_on
+            with pytest.raises(numba.TypingError):
+                wrong(4.0)
+            assert gc.isenabled() == is_on
+    finally:
+        (gc.enable if before else gc.disable)()
+    assert len(seen) >= 6 and not any(seen)
 
 
 LAW = """

@@ -4,11 +4,11 @@
 
 A kernel that others call is inlined by them, so that no machine code of its own is ever run. numba
 makes it all the same. And for each tuple that is bound to a name numba takes apart all numbers in
-it, to count references, though there are none in most. Nor does Python look for garbage while
-something is compiled: nearly all that is made then is kept.
+it, to count references, though there are none in most.
 
-That stands on what is not public in numba. With any other numba than the one that it was
-written for, kernels are compiled as numba does it.
+Both stand on what is not public in numba. With any other numba than the one that they were
+written for, kernels are compiled as numba does it. With any of them, Python looks for no garbage
+while something is compiled.
 """
 
 import gc
