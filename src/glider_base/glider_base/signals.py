@@ -130,6 +130,10 @@ class Adaptation(NamedTuple):
     lyapunov_2: float
 
 
+#: Of a law that learns nothing.
+NOTHING_LEARNT = Adaptation(*(13 * (0.0,)))
+
+
 class Health(NamedTuple):
     """What the sensors of the vehicle's own health say."""
 

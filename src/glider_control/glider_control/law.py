@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings, number, positive
-from glider_base.signals import Adaptation, Reference
+from glider_base.signals import NOTHING_LEARNT, Reference
 from glider_base.slot import default, slot
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
@@ -130,18 +130,4 @@ def law_learnt(state, params):
     -------
     Adaptation
     """
-    return Adaptation(
-        roll_bias_nm=0.0,
-        roll_side_force_nm=0.0,
-        roll_damping_nm=0.0,
-        pitch_bias_nm=0.0,
-        pitch_alpha_nm=0.0,
-        pitch_speed_nm=0.0,
-        pitch_damping_nm=0.0,
-        steering_dive_radps=0.0,
-        disturbance_dive_radps=0.0,
-        steering_climb_radps=0.0,
-        disturbance_climb_radps=0.0,
-        lyapunov_1=0.0,
-        lyapunov_2=0.0,
-    )
+    return NOTHING_LEARNT

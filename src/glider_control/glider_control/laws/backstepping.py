@@ -23,9 +23,9 @@ from typing import NamedTuple
 from pydantic import Field
 
 from glider_base.frames import wrap_angle
-from glider_base.kernel import kernel
+from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings, number, positive
-from glider_base.signals import Adaptation
+from glider_base.signals import NOTHING_LEARNT
 from glider_control.heading import HeadingLawSettings, HeadingParams, heading_to_roll
 from glider_control.law import Bank, bank_carefully, law_learnt, law_step
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
@@ -351,7 +351,8 @@ def learnt_moments(channels, params):
         params.roll.inertia * roll.k2 * roll.k2 + params.pitch.inertia * pitch.k2 * pitch.k2
     )
     th_p, th_q = channels.roll_theta, channels.pitch_theta
-    return Adaptation(
+    return replace(
+        NOTHING_LEARNT,
         roll_bias_nm=th_p[0],
         roll_side_force_nm=th_p[1],
         roll_damping_nm=th_p[2],
@@ -359,10 +360,6 @@ def learnt_moments(channels, params):
         pitch_alpha_nm=th_q[1],
         pitch_speed_nm=th_q[2],
         pitch_damping_nm=th_q[3],
-        steering_dive_radps=0.0,
-        disturbance_dive_radps=0.0,
-        steering_climb_radps=0.0,
-        disturbance_climb_radps=0.0,
         lyapunov_1=v_1,
         lyapunov_2=v_2,
     )
