@@ -68,8 +68,6 @@ def alos_step(state, seen, params, dt):
         moved = crab + dt * params.gamma * params.lookahead * e2 / far
         crab = min(CRAB_MAX, max(-CRAB_MAX, moved))
     gamma_r, rho_r = approach_angles(e2, seen.error.e3, params.lookahead, params.vertical_ratio)
-    if not seen.follows_path:
-        rho_r = 0.0
     course, elevation = desired_direction(seen.course, seen.elevation, gamma_r, rho_r)
     _, _, feasible = crab_heading(seen.course, seen.speed, current.v_n, current.v_e)
     return AlosState(crab), Asked(

@@ -42,8 +42,6 @@ def los_zhang_step(state, seen, params, dt):
     gamma_r, rho_r = approach_angles(
         seen.error.e2, seen.error.e3, params.lookahead, params.vertical_ratio
     )
-    if not seen.follows_path:
-        rho_r = 0.0
     heading, elevation = desired_direction(seen.course, seen.elevation, gamma_r, rho_r)
     current = seen.current
     _, _, feasible = crab_heading(seen.course, seen.speed, current.v_n, current.v_e)
