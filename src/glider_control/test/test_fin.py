@@ -10,15 +10,12 @@ from hypothesis import strategies as st
 
 from glider_base.frames import quaternion_from_euler
 from glider_base.signals import TICK_S, Joints, Odometry, Reference
+from glider_control.allocation import limit_surface
 from glider_control.control import SATURATED_SURFACE, control_step
 from glider_control.intake import REFUSED
 from glider_control.law import Seen
 from glider_control.settings import ControlSettings
-from glider_control.surfaces.fin import (
-    LEAST_SHARE,
-    FinLawSettings,
-    steer_by_fin,
-)
+from glider_control.surfaces.fin import MOST_SHARE, FinLawSettings, steer_by_fin
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.vehicle.file import changed_vehicle
 
@@ -27,7 +24,7 @@ VEHICLE = changed_vehicle('zhang2021', {f'fin.{name}': value for name, value in 
 LIMIT = math.radians(26.0)
 LAWS = ('adaptive', 'pid')
 quick = settings(max_examples=60)
-LAW = ControlSettings(vehicle=VEHICLE).params().steering
+PARAMS = ControlSettings(vehicle=VEHICLE).params()
 NOTHING_YET = FinLawSettings().initial_state()
 
 
@@ -37,7 +34,7 @@ def steer(psi=0.0, psi_dot=0.0, wanted=0.0, wanted_dot=0.0, w=0.25, speed=0.5, s
     measured = Measured(0.0, -0.5, psi, 0.0, 0.0, psi_dot, w)
     reference = Reference(0.0, 0.0, 0.0, 0.0, -0.5, wanted, 0.0, 0.0, w, 0.0, 0.0, wanted_dot)
     seen = Seen(measured, reference, speed, 0.03, 0.4, 0.0, 0.0, False, False, delta)
-    return steer_by_fin(state, seen, LAW, TICK_S)
+    return steer_by_fin(state, seen, PARAMS.steering, TICK_S)
 
 
 @pytest.mark.parametrize('w', [0.25, -0.25], ids=['dive', 'climb'])
@@ -58,7 +55,8 @@ def test_a_turn_that_is_asked_for_is_that_of_the_file():
 @given(*4 * [st.floats(-3.0, 3.0)], st.floats(-0.5, 0.5), st.floats(0.0, 2.0))
 def test_the_angle_keeps_to_its_limit(psi, psi_dot, wanted, wanted_dot, w, speed):
     _, delta = steer(psi, psi_dot, wanted, wanted_dot, w, speed)
-    assert abs(delta) <= LIMIT * (1.0 + 1e-15)
+    held = limit_surface(delta, PARAMS.allocation)
+    assert held == pytest.approx(min(LIMIT, max(-LIMIT, delta)), rel=1e-15)
 
 
 def test_while_it_turns_over_the_fin_is_level():
@@ -88,6 +86,7 @@ class Yaw:
                 delta=self.delta,
             )
             reach = 0.0 if changes.get('is_stuck') else math.radians(1.2) * TICK_S
+            asked = min(LIMIT, max(-LIMIT, asked))
             self.delta += min(reach, max(-reach, asked - self.delta))
             turn = self.share * 0.5 * math.sin(self.delta) * speed * speed + d
             self.r += TICK_S / 4.0 * (turn - self.r)
@@ -132,7 +131,7 @@ def test_gusts_and_a_fin_that_turns_it_the_wrong_way_do_not_change_the_sign():
         yaw.fly(60.0, d=d)
     assert yaw.state.known.b == pytest.approx(known, rel=0.4)
     assert yaw.fly(1800.0) == pytest.approx(1.0, rel=0.15)
-    assert Yaw(-1.0).fly(1200.0) == LEAST_SHARE
+    assert Yaw(-1.0).fly(1200.0) == 1.0 / MOST_SHARE
 
 
 def test_it_can_be_told_not_to_learn():

@@ -58,6 +58,7 @@ from glider_model.onboard.command_filter import Filtered, FilterParams, filter_a
 from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH, FixWatch, contradictions, watch_fixes
 from glider_model.onboard.gate import INITIAL_GATE, GateParams, GateState, gate_step
 from glider_model.onboard.glide_polar import (
+    MODEL_VERTICAL_RATE,
     Polar,
     glide_alpha,
     glide_horizontal_speed,
@@ -69,8 +70,6 @@ from glider_model.onboard.learnt_steering import Steering, SteeringParams, learn
 
 #: An infeasible course is reported once it has lasted this long (s).
 INFEASIBLE_S = 60.0
-#: The flight model is believed above this vertical rate (m/s), and where the polar is used.
-MODEL_VERTICAL_RATE = 0.05
 #: Time constant of the estimated speed through the water (s).
 SPEED_FILTER_S = 30.0
 #: Time constant of the attitude from which steering is learnt (s).

@@ -254,9 +254,7 @@ class GuidanceSettings(GuidanceLawSettings):
                 filters.heading_frequency_radps, filters.heading_rate_radps
             ),
             pitch_filter=FilterParams(filters.pitch_frequency_radps, filters.pitch_rate_radps),
-            steering=self.steering.params(
-                not vehicle.steers_by, kernel_vehicle.slowest_glide, kernel_vehicle
-            ),
+            steering=self.steering.params(kernel_vehicle, 0.0 if vehicle.steers_by else 1.0),
             gate=self.gate.params(),
         )
 

@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The adaptive law: roll by what is learnt of the steering, and PI-D on roll and pitch.
 
-u = sat(u_0 + a / b (e + k (u - u_0))), with u_0 the roll that turns by psi_s' - d (`choose_way`).
+u = sat(u_0 + a / b (e + k (u - u_0))), with u_0 the roll that turns by psi_s' - d (`steer_to`).
 For each of roll and pitch tau = -kp e + kd (command' - rate) - I, I' = ki e, with an integral for
-each phase: the paper's backstepping with one regressor. Unknown to the law: damping, static
-moments, trim, steering effectiveness and its sign.
+each phase (docs/theory.md, 3). Of the vehicle's file it takes n and what rights it alone.
 """
 
 import math
@@ -14,16 +13,15 @@ from typing import NamedTuple
 from pydantic import Field
 
 from glider_base.frames import wrap_angle
-from glider_base.kernel import kernel
-from glider_base.settings import Settings, number, positive
-from glider_base.signals import Adaptation
+from glider_base.kernel import kernel, replace
+from glider_base.settings import Settings, derived, number, positive
+from glider_base.signals import NOTHING_LEARNT
 from glider_control.law import Bank, LawSettings, bank_carefully, law_learnt, law_step
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
 from glider_model.onboard.learnt_steering import (
     Steering,
     SteeringLearningSettings,
     SteeringParams,
-    choose_way,
     learn,
     steer_to,
 )
@@ -59,16 +57,10 @@ class AdaptiveSettings(LawSettings):
 
     def params(self, vehicle: Vehicle, bank: Bank) -> 'AdaptiveParams':
         """Kernel parameters."""
-        x, roll, pitch = vehicle.params(), self.roll, self.pitch
-        steering = self.steering.params(bank.limit > 0.0, x.slowest_glide, x)
-        return AdaptiveParams(
-            Gains(roll.kp, roll.ki, roll.kd),
-            Gains(pitch.kp, pitch.ki, pitch.kd),
-            steering._replace(bank=min(steering.bank, math.sin(bank.limit))),
-            bank.limit,
-            bank.filter,
-            make_righting(x),
-        )
+        of_file = vehicle.params()
+        gains = derived(Gains, self.roll), derived(Gains, self.pitch)
+        steering = self.steering.params(of_file, math.sin(bank.limit))
+        return AdaptiveParams(*gains, steering, *bank, make_righting(of_file))
 
     def initial_state(self) -> 'AdaptiveState':
         """State of a law that knows nothing yet."""
@@ -111,8 +103,7 @@ def hold(integrals, error, rate_error, down, learns, gains, dt):
     integral = integrals[0] if down else integrals[1]
     tau = -gains.kp * error - gains.kd * rate_error - integral
     if learns:
-        moved = integral + dt * gains.ki * error
-        integral = min(INTEGRAL_MAX, max(-INTEGRAL_MAX, moved))
+        integral = min(INTEGRAL_MAX, max(-INTEGRAL_MAX, integral + dt * gains.ki * error))
     return tau, (integral, integrals[1]) if down else (integrals[0], integral)
 
 
@@ -128,29 +119,16 @@ def adaptive_step(state, seen, params, dt):
     if steering.steady_s > 0.0:
         phase = steering.dive if down else steering.climb
         u, limit = math.sin(now.phi), math.sin(params.roll_limit)
-        way = choose_way(phase, wanted.psi_dot, steering.ratio, limit, params.steering)
         error = wrap_angle(wanted.psi - now.psi)
-        command = math.asin(steer_to(way, error, u, phase.k))
+        u, _ = steer_to(phase, error, wanted.psi_dot, u, steering.ratio, limit, params.steering)
+        command = math.asin(u)
     roll = filter_command(state.roll, command, params.roll_filter, dt)
     learns = steering.steady_s > LEARN_AFTER_S
-    tau_p, in_roll = hold(
-        state.roll_integral,
-        wrap_angle(now.phi - roll.value),
-        now.phi_dot - roll.rate,
-        down,
-        learns and not seen.roll_held,
-        params.roll,
-        dt,
-    )
-    tau_q, in_pitch = hold(
-        state.pitch_integral,
-        now.theta - wanted.theta,
-        now.theta_dot - wanted.theta_dot,
-        down,
-        learns and not seen.pitch_held,
-        params.pitch,
-        dt,
-    )
+    learns_p, learns_q = learns and not seen.roll_held, learns and not seen.pitch_held
+    e_p, e_q = wrap_angle(now.phi - roll.value), now.theta - wanted.theta
+    rate_p, rate_q = now.phi_dot - roll.rate, now.theta_dot - wanted.theta_dot
+    tau_p, in_roll = hold(state.roll_integral, e_p, rate_p, down, learns_p, params.roll, dt)
+    tau_q, in_pitch = hold(state.pitch_integral, e_q, rate_q, down, learns_q, params.pitch, dt)
     return AdaptiveState(roll, in_roll, in_pitch, steering, down), tau_p, tau_q
 
 
@@ -158,20 +136,13 @@ def adaptive_step(state, seen, params, dt):
 @kernel
 def adaptation(state, params):
     """What the law has learnt: the integrals of the phase that is flown, and the steering."""
-    dive, climb = state.steering.dive, state.steering.climb
-    phase = 0 if state.is_down else 1
-    return Adaptation(
+    steering, phase = state.steering, 0 if state.is_down else 1
+    return replace(
+        NOTHING_LEARNT,
         roll_bias_nm=state.roll_integral[phase],
-        roll_side_force_nm=0.0,
-        roll_damping_nm=0.0,
         pitch_bias_nm=state.pitch_integral[phase],
-        pitch_alpha_nm=0.0,
-        pitch_speed_nm=0.0,
-        pitch_damping_nm=0.0,
-        steering_dive_radps=dive.b,
-        disturbance_dive_radps=dive.d,
-        steering_climb_radps=climb.b,
-        disturbance_climb_radps=climb.d,
-        lyapunov_1=0.0,
-        lyapunov_2=0.0,
+        steering_dive_radps=steering.dive.b,
+        disturbance_dive_radps=steering.dive.d,
+        steering_climb_radps=steering.climb.b,
+        disturbance_climb_radps=steering.climb.d,
     )

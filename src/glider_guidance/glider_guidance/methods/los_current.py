@@ -11,24 +11,18 @@ from typing import NamedTuple
 
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
-from glider_guidance.los import (
-    approach_angles,
-    approach_heading,
-    crab_heading,
-    desired_direction,
-)
+from glider_guidance.los import approach_angles, approach_heading, crab_heading, desired_direction
 from glider_guidance.method import Asked, LosGains, MethodSettings, method_step
 from glider_guidance.yo.turns import turn_offset
+from glider_model.onboard.learnt_steering import WELL_S
 from glider_model.vehicle.file import Vehicle
 
-#: Of the drift of a turn, this part is made up for before it, and as much after it.
-TURN_SHARE = 0.46
-#: Of the lag behind a desired track that moves aside, this share is made up for beforehand.
-OFFSET_AHEAD = 0.5
+#: Of the drift of a turn this part is made up for before it, and as much after it; of the lag
+#: behind a desired track that moves aside this share is made up for beforehand.
+TURN_SHARE, OFFSET_AHEAD = 0.46, 0.5
 #: A phase that can hardly be steered is entered on its heading: the vehicle turns to it so long
-#: before the turn-over (s) for each time that the lookahead of one that steers well (s) goes into
-#: its own, and so long at most.
-READY_S, WELL_S, READY_S_MAX = 60.0, 150.0, 100.0
+#: before the turn-over (s) for each `WELL_S` of its lookahead but the first, and so long at most.
+READY_S, READY_S_MAX = 60.0, 100.0
 #: Position pulls the cross-track error that goes by the way over ground in this time (s), and lets
 #: it differ by so much at most (m).
 BESIDE_S, BESIDE_M = 60.0, 5.0
@@ -61,13 +55,6 @@ class LosCurrentState(NamedTuple):
     beside: float  #: cross-track error, by position and way over ground (m)
 
 
-class Aside(NamedTuple):
-    """Where the desired track lies beside the path, for the sake of a turn."""
-
-    offset: float  #: (m, + to starboard)
-    is_nearly_over: bool  #: the glide is: the vehicle turns to the heading of the next one
-
-
 @kernel
 def cross_track(before, seen, dt):
     """Cross-track error (m, + to starboard): the way over ground, pulled by the position."""
@@ -81,7 +68,8 @@ def cross_track(before, seen, dt):
 def lead_turns(drift, seen, lookahead_s, next_s):
     """Drift (m) of the last turn, and where the desired track lies for the sake of the turns.
 
-    ``lookahead_s`` and ``next_s`` are those of this phase and of the next one (s).
+    That is its offset (m, + to starboard), and whether the glide is nearly over: the vehicle turns
+    to the heading of the next one. The lookaheads (s) are those of this phase and of the next one.
     """
     leg, current = seen.leg, seen.current
     across = current.v_e * math.cos(seen.course) - current.v_n * math.sin(seen.course)
@@ -90,57 +78,40 @@ def lead_turns(drift, seen, lookahead_s, next_s):
     elif leg.begins_to_turn_over:
         drift = across * leg.lead_before_s
     if not leg.is_gliding:
-        return drift, Aside(0.0, False)
+        return drift, 0.0, False
     coming, past = TURN_SHARE * across * leg.lead_s, TURN_SHARE * drift
     offset = turn_offset(leg.to_turn_s, leg.glided_s, coming, past)
     moved = turn_offset(leg.to_turn_s - 1.0, leg.glided_s + 1.0, coming, past) - offset
     ready_s = min(READY_S_MAX, READY_S * (next_s / WELL_S - 1.0))
-    return drift, Aside(offset + OFFSET_AHEAD * lookahead_s * moved, leg.to_turn_s < ready_s)
+    return drift, offset + OFFSET_AHEAD * lookahead_s * moved, leg.to_turn_s < ready_s
 
 
 @method_step.body(LosCurrentParams)
 @kernel
 def los_current_step(state, seen, params, dt):
     """Direction to fly: see `method_step`."""
-    leg, current = seen.leg, seen.current
+    leg, current, course = seen.leg, seen.current, seen.course
     # a turn-over is flown on the heading of the glide to come, as it should be
     speed = seen.glide_speed if leg.begins_to_turn_over else seen.speed
     lookahead_s, next_s = seen.dive_s, seen.climb_s
     if not leg.descends:
         lookahead_s, next_s = next_s, lookahead_s
-    lookahead = max(
-        params.lookahead,
-        lookahead_s * math.sqrt(seen.ground_n * seen.ground_n + seen.ground_e * seen.ground_e),
-    )
-    drift, aside = state.drift, Aside(0.0, False)
-    beside = cross_track(state.beside, seen, dt)
+    over_ground = math.sqrt(seen.ground_n * seen.ground_n + seen.ground_e * seen.ground_e)
+    lookahead = max(params.lookahead, lookahead_s * over_ground)
+    drift, offset, is_nearly_over = state.drift, 0.0, False
     if params.leads and not seen.follows_path:
-        drift, aside = lead_turns(drift, seen, lookahead_s, next_s)
-
-    gamma_r, rho_r = approach_angles(
-        beside - aside.offset, seen.error.e3, lookahead, params.vertical_ratio
-    )
-    if not seen.follows_path:
-        rho_r = 0.0
-    course, elevation = desired_direction(seen.course, seen.elevation, gamma_r, rho_r)
-    _, progress, feasible = crab_heading(seen.course, speed, current.v_n, current.v_e)
-    heading = approach_heading(
-        seen.course,
-        wrap_angle(course - seen.course),
-        progress,
-        speed,
-        current.v_n,
-        current.v_e,
-    )
-    if aside.is_nearly_over or leg.begins_to_turn_over:
-        heading, _, _ = crab_heading(seen.course, seen.glide_speed, current.v_n, current.v_e)
+        drift, offset, is_nearly_over = lead_turns(drift, seen, lookahead_s, next_s)
+    beside = cross_track(state.beside, seen, dt)
+    e2, e3 = beside - offset, seen.error.e3
+    gamma_r, rho_r = approach_angles(e2, e3, lookahead, params.vertical_ratio)
+    desired, elevation = desired_direction(course, seen.elevation, gamma_r, rho_r)
+    _, progress, feasible = crab_heading(course, speed, current.v_n, current.v_e)
+    if is_nearly_over or leg.begins_to_turn_over:
+        heading, _, _ = crab_heading(course, seen.glide_speed, current.v_n, current.v_e)
     elif leg.turns_over:
         heading = seen.heading
-    return LosCurrentState(drift, beside), Asked(
-        heading=heading,
-        elevation=elevation,
-        speed=speed,
-        current_n=current.v_n,
-        current_e=current.v_e,
-        feasible=feasible,
-    )
+    else:
+        approach = wrap_angle(desired - course)
+        heading = approach_heading(course, approach, progress, speed, current.v_n, current.v_e)
+    asked = Asked(heading, elevation, speed, current.v_n, current.v_e, feasible)
+    return LosCurrentState(drift, beside), asked

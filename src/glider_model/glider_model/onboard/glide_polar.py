@@ -26,6 +26,8 @@ class Polar(NamedTuple):
     to_the_end: bool  #: whether the angle of attack of a shallow glide is sought to the end
 
 
+#: Below this vertical rate (m/s) a vehicle turns over, or floats: its speed is not known.
+MODEL_VERTICAL_RATE = 0.05
 #: Slower than this drag is taken as at this (m/s).
 _SLOWEST = 0.05
 #: Where the search for a speed begins (m/s), and how often it is bettered.

@@ -32,8 +32,9 @@ from glider_guidance.yo.stage import GLIDING_DOWN, GLIDING_UP
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.onboard.command_filter import Filtered
-from glider_model.onboard.learnt_steering import STEERING_SPEED, lookaheads
+from glider_model.onboard.learnt_steering import lookaheads
 from glider_model.vehicle.file import load_vehicle
+from glider_model.vehicle.steering import STEERING_SPEED
 from glider_studies.bounds.steering_loop import SteeringLoop
 
 #: Scenario in which a vehicle glides as it does nominally; any other vehicle as in the first.
@@ -176,7 +177,8 @@ def steering_loop(glide: Glide) -> SteeringLoop:
     law, seen = params.control.law, _seen(state, params)
     fin = params.control.steering
     if hasattr(fin, 'turn_rate'):
-        ask, limit, roll_filter = _ask_fin(state, fin), fin.limit, None
+        ask, roll_filter = _ask_fin(state, fin), None
+        limit = params.control.allocation.delta_max
         speed_ratio = (glide.speed / STEERING_SPEED) ** 2
         b, k = state.control.steering.known.b * fin.turn_rate * speed_ratio, 0.0
     else:
