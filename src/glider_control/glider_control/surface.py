@@ -57,7 +57,7 @@ def steer(state, seen, params, dt):
     -------
     state : NamedTuple
     delta : float
-        Angle of the surface (rad), + turns the nose to starboard.
+        Angle of the surface (rad), + turns the nose to starboard; control holds it in its range.
     """
 
 
