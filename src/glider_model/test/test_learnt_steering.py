@@ -308,6 +308,17 @@ def test_doubt_never_turns_the_roll_off(b, std, error):
     assert unsure * b > 0.0
 
 
+@given(effectiveness, kicks, offsets, st.booleans(), st.floats(-0.01, 0.01), st.floats(-0.5, 0.5))
+def test_what_counts_is_the_heading_that_is_left_when_the_roll_is_gone(
+    b, k, d, is_kicked, left, u
+):
+    """psi = psi* + k u: at the same psi*, whatever the roll of now, the same roll is asked for."""
+    state = known(b, 0.0, k, is_kicked=is_kicked)._replace(d=d)
+    level, _ = steer_to(state, -left, 0.0, 0.0, 1.0, LIMIT, PARAMS)
+    rolled, _ = steer_to(state, -left - k * u, 0.0, u, 1.0, LIMIT, PARAMS)
+    assert rolled == pytest.approx(level, abs=1e-6)
+
+
 @given(some_kicks, st.floats(0.0, 0.5), st.floats(-1.0, 1.0))
 def test_vehicle_that_hardly_turns_is_kicked_for_the_whole_error(k, kick_std, error):
     """Whichever way it turns; of a kick in doubt a part is used."""
