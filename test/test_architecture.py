@@ -41,7 +41,7 @@ MAY_IMPORT = {
 FLOORS = {
     'glider_model': (('vehicle', 'ocean'), ('onboard', 'plant'), ('nodes',)),
     'glider_mission': (
-        ('goto_list',),
+        ('mafiles',),
         ('blocks', 'chart', 'disk', 'rules'),
         ('scenario',),
         ('choices', 'planned', 'routing', 'run_folder'),

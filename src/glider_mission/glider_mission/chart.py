@@ -14,7 +14,7 @@ from typing import Any
 from glider_base.errors import shown
 from glider_base.frames import Origin, OriginSettings, from_geodetic
 from glider_guidance.path.settings import MAX_DISTANCE_M
-from glider_mission.goto_list import SUFFIX, read_goto_list
+from glider_mission.mafiles import SUFFIX, read_goto_list
 
 #: By this share the chart may stretch a length at a waypoint.
 MAX_STRETCH = 0.05

@@ -38,6 +38,8 @@ from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.chart import charted, in_metres
+from glider_mission.mafiles import FIELD as MAFILES
+from glider_mission.mafiles import read_profile, with_mafiles
 from glider_mission.rules import Rules
 from glider_model.ocean.bottom import BathymetrySettings
 from glider_model.ocean.current_settings import CurrentSettings, SumOfCurrents
@@ -151,7 +153,11 @@ class Scenario(Settings):
     path: PathSettings = Field(
         StraightPath(kind='straight', length_m=25000.0), description='path to follow'
     )
-    profile: ProfileSettings = Field(ProfileSettings(), description='sawtooth')
+    profile: ProfileSettings = Field(
+        ProfileSettings(),
+        description="sawtooth; mafiles in it names a Slocum's yo10.ma, surfac10.ma or both, in "
+        'place of fields, which a scenario makes of them',
+    )
     orders: list[Order] = Field([], description='orders to the vehicle in flight, and when')
     guidance: GuidanceLawSettings = Field(GuidanceLawSettings(), description='guidance')
     control: ControlLawSettings = Field(ControlLawSettings(), description='control')
@@ -168,6 +174,11 @@ class Scenario(Settings):
     @classmethod
     def _path_in_metres(cls, path: Any, info: pydantic.ValidationInfo) -> Any:
         return in_metres(path, info.data.get('origin', OriginSettings()))
+
+    @pydantic.field_validator('profile', mode='before')
+    @classmethod
+    def _profile_of_mafiles(cls, profile: Any) -> Any:
+        return with_mafiles(profile)
 
     @pydantic.field_validator('orders', mode='before')
     @classmethod
@@ -581,6 +592,16 @@ def _find_vehicle(
     return scenario.model_copy(update={'vehicle': name})
 
 
+def _replaced(name: str, value: Any) -> tuple[str, ...]:
+    """Names of the fields beside one that a value of it replaces."""
+    if name != MAFILES:
+        return _alternatives(name)
+    try:
+        return tuple(read_profile(value))
+    except ValueError:  # refused later
+        return ()
+
+
 def _alternatives(name: str) -> tuple[str, ...]:
     """Names of the fields of which only one can be given, this one among them."""
     return next((pair for pair in _ALTERNATIVES if name in pair), (name,))
@@ -603,7 +624,7 @@ def _set_field(values: dict, field: str, value) -> bool:
     holder, last = holder_of(values, field), field.rpartition('.')[2]
     is_plain = isinstance(value, str | int | float)  # of an array one cannot ask it
     is_new = not is_plain or last not in holder or holder[last] != value
-    for other in _alternatives(last):
+    for other in _replaced(last, value):
         holder.pop(other, None)
     holder[last] = deepcopy(value)  # which may be changed by a field inside it
     return is_new

@@ -12,7 +12,7 @@ from glider_bringup.console import Json, Run, beside, counter, messages, print_w
 from glider_mission.disk import write_whole
 
 app = typer.Typer()
-#: Kinds of files, and how they end.
+#: Kinds of files, and how they end; that of a Slocum is a folder.
 SUFFIXES = {
     'netcdf': '.nc',
     'csv': '.csv',
@@ -21,7 +21,7 @@ SUFFIXES = {
     'geojson': '.geojson',
     'kml': '.kml',
     'gpx': '.gpx',
-    'ma': '.ma',
+    'slocum': '_mafiles',
 }
 Kind = Literal[tuple(SUFFIXES)]
 
@@ -34,13 +34,16 @@ def export(
         typer.Option(
             help='netcdf: for xarray and other readers of NetCDF 3; csv: one row a tick; mat: '
             'structs for MATLAB and Octave; og1: what it measured, in the format of OceanGliders; '
-            'geojson, kml, gpx: tracks, waypoints and surfacings on a chart; ma: its waypoints, '
-            "as a Slocum's goto list."
+            'geojson, kml, gpx: tracks, waypoints and surfacings on a chart; slocum: a folder '
+            "with its mission, as a Slocum's goto_l10.ma, yo10.ma and surfac10.ma."
         ),
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar='FILE', help='Default: run.nc, run.csv, run.kml ... beside the bag.'),
+        typer.Option(
+            metavar='FILE',
+            help='Default: run.nc, run.csv, run_mafiles ... beside the bag.',
+        ),
     ] = None,
     start: Annotated[
         str | None,
@@ -63,11 +66,11 @@ def export(
 
         with counter('reading the bag', None) as update:
             write_og1(run, start, file, update)
-    elif to == 'ma':
-        from glider_bringup.door.tracks import write_goto_list
+    elif to == 'slocum':
+        from glider_bringup.door.tracks import write_mafiles
         from glider_bringup.showing.flown_run import read_run
 
-        write_goto_list(read_run(run, traced=False), file)
+        write_mafiles(read_run(run, traced=False), file)
     elif to in ('geojson', 'kml', 'gpx'):
         from glider_bringup.door.tracks import CHARTS, chart_of, start_of
         from glider_bringup.showing.flown_run import read_run

@@ -18,8 +18,8 @@ from glider_base.errors import ConfigurationError
 from glider_base.frames import OriginSettings, to_geodetic
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.web_page import FlownRun
-from glider_mission.disk import write_whole
-from glider_mission.goto_list import goto_list
+from glider_mission.disk import not_written, write_whole
+from glider_mission.mafiles import mafiles
 from glider_mission.scenario import Scenario
 
 #: A track has no more points than this: more are slow to draw in a browser.
@@ -206,18 +206,29 @@ def _text(root: ElementTree.Element) -> bytes:
 CHARTS = {'geojson': geojson, 'kml': kml, 'gpx': gpx}
 
 
-def write_goto_list(flown: FlownRun, file: Path) -> None:
-    """Write the waypoints of a run as a list of a Slocum's mission.
+def write_mafiles(flown: FlownRun, folder: Path) -> None:
+    """Write the mission of a run into a folder, as files of a Slocum's.
 
     Raises
     ------
     ConfigurationError
-        If its path has no waypoints, or the file cannot be written.
+        If its path has no waypoints or it follows a path in three dimensions, or the files cannot
+        be written.
     """
-    path, origin = flown.scenario.path, flown.scenario.origin.params()
+    scenario = flown.scenario
+    path, profile, origin = scenario.path, scenario.profile, scenario.origin.params()
     if path.kind != 'waypoints':
         raise ConfigurationError(
             f'{flown.label}: path.kind = {path.kind}: has no waypoints (allowed: waypoints)'
         )
+    if profile.mode != 'profile':
+        raise ConfigurationError(
+            f'{flown.label}: profile.mode = {profile.mode}: has no yo (allowed: profile)'
+        )
     places = [to_geodetic(*point[:2], origin) for point in path.waypoints]
-    write_whole(file, goto_list(flown.scenario.name, places))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise not_written(folder, error) from None
+    for name, text in mafiles(scenario.name, places, profile).items():
+        write_whole(folder / name, text)
