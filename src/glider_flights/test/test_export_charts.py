@@ -12,6 +12,9 @@ from typer.testing import CliRunner
 import glider_bringup as glider
 from glider_base.errors import ConfigurationError
 from glider_bringup.cli import app
+from glider_bringup.door.tracks import write_mafiles
+from glider_bringup.showing.flown_run import read_run
+from glider_mission.scenario import load_scenario
 
 WAYPOINTS = [(47.5, -52.5), (47.51, -52.49), (47.52, -52.5)]
 CHANGES = {
@@ -152,6 +155,17 @@ def test_a_mission_of_a_slocum_out_and_in_is_the_same_flight(export, flown):
     assert again.scenario.path == flown.scenario.path
     assert again.scenario.profile == flown.scenario.profile
     assert again.to_xarray().equals(flown.to_xarray())
+
+
+@pytest.mark.parametrize(
+    ('changes', 'named'),
+    [({}, 'path.kind = spline'), ({'path.kind': 'waypoints'}, 'profile.mode = path')],
+)
+def test_what_no_slocum_flies_is_not_written(flown, tmp_path, changes, named):
+    run = read_run(flown.folder, traced=False)._replace(scenario=load_scenario('spline', changes))
+    with pytest.raises(ConfigurationError, match=named):
+        write_mafiles(run, tmp_path / 'mafiles')
+    assert not (tmp_path / 'mafiles').exists()
 
 
 def test_a_run_of_no_date_is_refused_unless_it_is_told(tmp_path):

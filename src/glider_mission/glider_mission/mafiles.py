@@ -297,7 +297,7 @@ def _value(name: str, of: _Of, where: str, value: float) -> float:
     is_above, is_whole = bool(of.negative) or 'gt' in limits, field.annotation is int
     made = round(value * of.scale, _DECIMALS)
     if not low <= made <= high or (is_above and made == low) or (is_whole and made % 1.0):
-        ends = sorted((low / of.scale, high / of.scale))
+        ends = sorted((low / of.scale + 0.0, high / of.scale))  # no -0
         words = [
             f'{ends[0]:g} to {ends[1]:g}',
             *([f'not {low:g}'] if is_above else []),
@@ -384,7 +384,14 @@ def _written(one: _Of | _Only, profile: ProfileSettings) -> str:
     value = getattr(profile, one.field)
     if value is None:
         value = getattr(profile, _AS_IN_DIVE[one.field])
-    return f'-1 # {one.negative}' if one.negative and not value else f'{value / one.scale:.12g}'
+    return f'-1 # {one.negative}' if one.negative and not value else _digits(value, one.scale)
+
+
+def _digits(value: float, scale: float) -> str:
+    """The shortest number that makes a field of this value when it is read."""
+    texts = [f'{value / scale:.{decimals}f}' for decimals in range(16)]
+    kept = round(value, _DECIMALS)
+    return next((one for one in texts if round(float(one) * scale, _DECIMALS) == kept), texts[-1])
 
 
 def _minutes(degrees: float) -> str:

@@ -130,6 +130,13 @@ def test_round_numbers_come_back_to_the_last_bit(tmp_path_factory, tenths, grams
     assert ProfileSettings(**read_profile(str(folder / 'yo10.ma'))) == profile
 
 
+def test_what_was_read_is_written_as_it_was(write):
+    profile = ProfileSettings(**read_profile(write('yo10.ma', YO)))
+    written = mafiles('a mission', [], profile)['yo10.ma'].split('\n')
+    for line in ('d_target_depth(m) 180', 'd_pitch_value(X) -0.4538', 'c_pitch_value(X) 0.5236'):
+        assert f'b_arg: {line}' in written
+
+
 def test_a_list_by_hand_is_read_as_a_slocum_does(write):
     found = np.array(read_goto_list(write('goto_l10.ma', GOTO)))
     expected = [(39.0, -73.0 - 18.8 / 60.0), (-54.0 - 33.5 / 60.0, 7.0 + 13.0 / 60.0)]
@@ -243,7 +250,8 @@ def test_what_is_no_list_is_refused_by_line(write, old, new, told):
         ('(m)\t\t180', '(m) 5', r'line 9: d_target_depth = 5: .*allowed: 10 to 12000'),
         ('(m)  20#', '(m) 0 #', r'd_target_altitude = 0: .*allowed: 0 to 80, not 0, or -1 \(off'),
         ('-0.4538', '0.4538', r'd_pitch_value = 0.4538: .*allowed: -1.0472 to -0.139626'),
-        ('-200.0', '200', r'd_bpump_value = 200: .*allowed: -19512.2 to -?0, not 0'),
+        ('-200.0', '200', r'd_bpump_value = 200: .*allowed: -19512.2 to 0, not 0'),
+        ('0.5236', '0.1', r'c_pitch_value = 0.1: .*allowed: 0.139626 to 1.0472'),
         ('(X) -200.0', '(X)', "line 14: 'b_arg: d_bpump_value"),
         ('-200.0', 'inf', 'line 14: .*no argument'),
         ('d_speed_min', 'd_target_depth', 'line 17: d_target_depth: given twice'),
