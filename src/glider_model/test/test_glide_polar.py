@@ -135,6 +135,25 @@ def test_polar_of_a_vehicle_without_lift_is_usable():
 
 
 @quick
+@given(st.floats(math.radians(8.0), math.radians(60.0)), st.floats(0.06, 0.5), phases)
+def test_speed_and_angle_are_found_together_where_drag_changes_with_speed(pitch, rate, phase):
+    """Lift and drag at both balance a vertical weight, which makes that rate."""
+    polar, theta, rate = (
+        make_polar(load_vehicle('seaglider').params()),
+        -phase * pitch,
+        phase * rate,
+    )
+    speed, alpha = glide_speed(theta, rate, polar)
+    assert speed * math.sin(alpha - theta) == pytest.approx(rate, rel=1e-12)
+    drag = polar.K_D0 * speed**polar.n + polar.K_D * alpha**2
+    lift = polar.K_L0 + polar.K_L * alpha
+    across = drag * math.cos(theta - alpha) + lift * math.sin(theta - alpha)
+    assert abs(across) < 1e-3 * math.hypot(drag, lift)
+    weight = glide_net_heaviness(theta, rate, polar)
+    assert glide_vertical_rate(theta, weight, polar) == pytest.approx(rate, rel=3e-4)
+
+
+@quick
 @given(
     st.sampled_from(['seaglider', 'slocum_g2', 'zhang2021']),
     st.floats(math.radians(7.0), math.radians(60.0)),

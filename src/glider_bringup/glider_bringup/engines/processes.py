@@ -47,6 +47,8 @@ OWN_CLOCK = ('/clock', 'clock')
 _MAKES_TIME = (PLANT, STACK)
 #: Signals of a stop, and how long (s) a process has after each.
 _ESCALATION = ((signal.SIGINT, 2.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 2.0))
+#: So much longer (s) the recorder has after the first: what it has not written is lost.
+_TO_WRITE_S = 8.0
 #: Nodes have this long (s) to leave by themselves after a completed run.
 _LEAVE_S = 3.0
 #: The recorder hears the last messages within this time (s) after the plant has stopped.
@@ -366,7 +368,8 @@ class _Run:
                     break
                 for process in group:
                     process.send(number)
-                self._wait_for(group, patience_s)
+                writes = group is groups[2] and number == signal.SIGINT
+                self._wait_for(group, patience_s + _TO_WRITE_S * writes)
             if running and group is groups[0] and first == 0:
                 self._wait_for(groups[2], _HEAR_S)
         self._server.finish(_END_S)

@@ -30,14 +30,15 @@ class Polar(NamedTuple):
 MODEL_VERTICAL_RATE = 0.05
 #: Slower than this drag is taken as at this (m/s).
 _SLOWEST = 0.05
-#: Where the search for a speed begins (m/s), and how often it is bettered.
-_TYPICAL, _PASSES = 0.3, 5
+#: Where the search for a speed begins (m/s).
+_TYPICAL = 0.3
 #: Drag and lift polynomials are not believed beyond this angle of attack (rad), in steering and
 #: where it is sought to the end.
 LARGEST_ALPHA, LARGEST_SOUGHT = math.radians(15.0), math.radians(40.0)
-#: Passes in which the angle of attack of most glides is found; of a shallow one it takes more,
-#: until it changes by less than this (rad).
-_FEW, _MANY, _FOUND = 4, 60, 1e-3
+#: Passes in which the angle of attack of most glides is found, and where drag changes with the
+#: speed, the speed with it; of a shallow one it takes more, until it changes by less than this
+#: (rad).
+_FEW, _FEW_WITH_SPEED, _MANY, _FOUND = 4, 6, 60, 1e-3
 #: From twice so many passes on each goes less of the way: at the shallowest glide they alternate.
 _STEADIED = 6.0
 
@@ -68,9 +69,46 @@ def _at_speed(speed, polar):
 
 
 @kernel
-def _passes(polar):
-    """How often a speed has to be found: once where drag does not change with it."""
-    return 1 if polar.n == 0.0 else _PASSES
+def _better_alpha(alpha, theta, polar):
+    """The angle of attack (rad) after a pass more; drag as at 1 m/s."""
+    drag, offset = polar.K_D0 / polar.K_D, polar.K_L0 / polar.K_D
+    slope = math.tan(theta - alpha)
+    half = 0.5 * polar.K_L / polar.K_D * slope
+    root = half * half - (drag + offset * slope)
+    better = -half
+    if root > 0.0:
+        better += math.sqrt(root) if half > 0.0 else -math.sqrt(root)
+    most = LARGEST_SOUGHT if polar.to_the_end else LARGEST_ALPHA
+    return min(most, max(-most, better))
+
+
+@kernel
+def _speed_at(steep, alpha, given, is_rate, polar):
+    """Speed (m/s) of a glide whose angle of attack is known; see `_glide_at`."""
+    if is_rate:
+        return given / math.sin(steep - alpha)
+    return math.sqrt(abs(given) / glide_force(alpha, polar))
+
+
+@kernel
+def _glide_at(steep, given, is_rate, polar):
+    """Speed (m/s) and angle of attack (rad) of the steady glide at a pitch (rad).
+
+    ``given`` is its vertical rate (m/s), or else its weight in water (N). A speed by a rate has a
+    sign if pitch and rate disagree. Where drag changes with the speed each pass betters both.
+    Shallower than the polar allows, the angle of the best glide is given, 15 deg at most, or 40.
+    """
+    alpha, last, there = 0.0, 0.0, _at_speed(_TYPICAL, polar)
+    few = _FEW if polar.n == 0.0 else _FEW_WITH_SPEED
+    for number in range(_MANY if polar.to_the_end else few):
+        if number >= few:
+            if abs(alpha - last) <= _FOUND:
+                break
+            alpha = last + min(0.5, _STEADIED / number) * (alpha - last)
+        last, alpha = alpha, _better_alpha(alpha, steep, there)
+        if polar.n != 0.0:
+            there = _at_speed(abs(_speed_at(steep, alpha, given, is_rate, there)), polar)
+    return _speed_at(steep, alpha, given, is_rate, there), alpha
 
 
 @kernel
@@ -78,28 +116,8 @@ def glide_alpha(theta, polar):
     """Angle of attack (rad) of the steady glide at pitch ``theta`` (rad); drag as at 1 m/s.
 
     Lift and drag balance a vertical weight: K_D0 + K_D a^2 + (K_L0 + K_L a) tan(theta - a) = 0.
-    Shallower than the polar allows, the angle of the best glide is given, 15 deg at most, or 40.
     """
-    most, passes = LARGEST_ALPHA, _FEW
-    if polar.to_the_end:
-        most, passes = LARGEST_SOUGHT, _MANY
-    drag, offset = polar.K_D0 / polar.K_D, polar.K_L0 / polar.K_D
-    lift = 0.5 * polar.K_L / polar.K_D
-    alpha, last = 0.0, 0.0
-    for number in range(passes):
-        if number >= _FEW:
-            if abs(alpha - last) <= _FOUND:
-                break
-            share = min(0.5, _STEADIED / number)
-            alpha = last + share * (alpha - last)
-        slope = math.tan(theta - alpha)
-        half = lift * slope
-        root = half * half - (drag + offset * slope)
-        last, alpha = alpha, -half
-        if root > 0.0:
-            alpha += math.sqrt(root) if half > 0.0 else -math.sqrt(root)
-        alpha = min(most, max(-most, alpha))
-    return alpha
+    return _glide_at(theta, 0.0, True, replace(polar, n=0.0))[1]
 
 
 @kernel
@@ -122,22 +140,8 @@ def glide_force(alpha, polar):
 def glide_vertical_rate(theta, net_heaviness, polar):
     """Vertical rate (m/s, + down) of the steady glide at a pitch with so much weight (kg)."""
     steep = steepen(theta, polar)
-    alpha, speed = 0.0, _TYPICAL
-    for _ in range(_passes(polar)):
-        there = _at_speed(speed, polar)
-        alpha = glide_alpha(steep, there)
-        speed = math.sqrt(abs(net_heaviness) * GRAVITY / glide_force(alpha, there))
+    speed, alpha = _glide_at(steep, net_heaviness * GRAVITY, False, polar)
     return -speed * math.sin(steep - alpha)
-
-
-@kernel
-def _speed_of_rate(steep, vertical_rate, polar):
-    """Speed (m/s), with a sign if pitch and rate disagree, and angle of attack (rad)."""
-    alpha, speed = 0.0, _TYPICAL
-    for _ in range(_passes(polar)):
-        alpha = glide_alpha(steep, _at_speed(abs(speed), polar))
-        speed = vertical_rate / math.sin(steep - alpha)
-    return speed, alpha
 
 
 @kernel
@@ -146,7 +150,7 @@ def glide_net_heaviness(theta, vertical_rate, polar):
     steep = abs(steepen(theta, polar))
     if vertical_rate >= 0.0:
         steep = -steep
-    speed, alpha = _speed_of_rate(steep, vertical_rate, polar)
+    speed, alpha = _glide_at(steep, vertical_rate, True, polar)
     weight = glide_force(alpha, _at_speed(abs(speed), polar)) * speed * speed / GRAVITY
     return weight if vertical_rate >= 0.0 else -weight
 
@@ -155,7 +159,7 @@ def glide_net_heaviness(theta, vertical_rate, polar):
 def glide_horizontal_speed(theta, vertical_rate, polar):
     """Horizontal speed through the water (m/s) from pitch (rad) and vertical rate (m/s)."""
     steep = steepen(theta, polar)
-    _, alpha = _speed_of_rate(steep, vertical_rate, polar)
+    _, alpha = _glide_at(steep, vertical_rate, True, polar)
     return abs(vertical_rate / math.tan(steep - alpha))
 
 
@@ -168,5 +172,5 @@ def steady_horizontal_speed(theta, net_heaviness, polar):
 @kernel
 def glide_speed(theta, vertical_rate, polar):
     """Speed through the water (m/s) and angle of attack (rad) from pitch and vertical rate."""
-    speed, alpha = _speed_of_rate(steepen(theta, polar), vertical_rate, polar)
+    speed, alpha = _glide_at(steepen(theta, polar), vertical_rate, True, polar)
     return abs(speed), alpha
