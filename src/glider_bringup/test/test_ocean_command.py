@@ -11,6 +11,8 @@ import xarray
 
 from glider_base.settings import ConfigurationError
 from glider_bringup.commands.ocean import ocean
+from glider_bringup.showing.ocean import in_words, mission_in
+from glider_model.ocean import grid_file
 
 #: A mission of a day in the sea of `sea_file`.
 MISSION = """
@@ -53,15 +55,128 @@ def told(capsys, *args, **options):
 
 def test_it_tells_what_is_in_a_file(sea_file, capsys):
     found = told(capsys, sea_file)
-    assert found['variables'] == ['uo', 'vo']
-    assert found['times'] == {
+    currents = found['currents']
+    assert [(one['name'], one['low'], one['high']) for one in currents['variables']] == [
+        ('vo', pytest.approx(0.4), pytest.approx(0.4)),
+        ('uo', pytest.approx(0.3), pytest.approx(0.3)),
+    ]
+    assert currents['times'] == {
         **{'first': '2026-03-01T00:00Z', 'last': '2026-03-04T00:00Z'},
         **{'count': 4, 'step_h': 24.0},
     }
-    assert found['depth_m'] == {'first': 0.5, 'last': 1100.0, 'count': 3}
-    assert found['land_share'] == pytest.approx(9 / 441)
-    assert found['speed_mps'] == pytest.approx({'rms': 0.5, 'max': 0.5})
-    assert found['mission'] is None
+    assert currents['depth_m'] == {'first': 0.5, 'last': 1100.0, 'count': 3}
+    assert currents['land_share'] == pytest.approx(9 / 441)
+    assert currents['speed_mps'] == pytest.approx({'rms': 0.5, 'max': 0.5})
+    assert (found['water'], found['bottom'], found['mission']) == (None, None, None)
+
+
+def test_of_what_is_too_large_there_are_no_numbers_or_those_of_its_surface(
+    sea_file, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(grid_file, 'MAX_BYTES', 5000)
+    seen = told(capsys, sea_file)['currents']['seen']
+    assert seen['depth_m'] == {'first': 0.5, 'last': 0.5}
+    monkeypatch.setattr(grid_file, 'MAX_BYTES', 100)
+    currents = told(capsys, sea_file)['currents']
+    assert currents['seen'] is None and currents['variables'][0]['low'] is None
+    with pytest.raises(ConfigurationError, match=r'sea.nc is too large \(allowed: the window of'):
+        ocean(sea_file, out=tmp_path / 'sea.png')
+
+
+#: Names and units of temperature and salinity, and what CF calls the first.
+LAYOUTS = {
+    'cmems': ('thetao', 'degrees_C', 'sea_water_potential_temperature', 'so', '1e-3'),
+    'hycom': ('water_temp', 'degC', 'sea_water_temperature', 'salinity', 'psu'),
+}
+
+
+def hydrography(sea_file, layout):
+    """Water of 5 to 15 degC and 34 to 35 psu, warmer by the day and colder by the level."""
+    with xarray.open_dataset(sea_file) as sea:
+        t, z, x = (sea[name] for name in ('time', 'depth', 'longitude'))
+        day, level = t.copy(data=np.arange(4.0)), z.copy(data=np.arange(3.0))
+        there = xarray.ones_like(sea.uo).where(sea.uo.notnull())
+        warm = there * (13.0 - 4.0 * level + (day - 2.0) * 10.0 + (x - 122.0) * 2.0)
+        salt = there * (34.0 + 0.5 * level)
+        name, unit, standard, salinity, thousandth = LAYOUTS[layout]
+        warm.attrs = {'standard_name': standard, 'units': unit}
+        salt.attrs = {'standard_name': 'sea_water_salinity', 'units': thousandth}
+        return xarray.Dataset({name: warm, salinity: salt}).load()
+
+
+@pytest.mark.parametrize('layout', LAYOUTS)
+def test_it_tells_of_temperature_and_salinity_alone(layout, sea_file, tmp_path, capsys):
+    """In the middle of its time, at all levels; of HYCOM from packed integers."""
+    path, picture = tmp_path / 'ts.nc', tmp_path / 'ts.png'
+    pack = {'dtype': 'int16', 'scale_factor': 0.001, 'add_offset': 20.0, '_FillValue': -30000}
+    data = hydrography(sea_file, layout)
+    packed = {name: pack for name in data} if layout == 'hycom' else {}
+    data.to_netcdf(path, engine='scipy', encoding=packed)
+    found = told(capsys, path, out=picture)
+    temperature, temperature_unit, standard, salinity, salinity_unit = LAYOUTS[layout]
+    assert found['currents'] is None and found['refused'] == {}
+    assert found['water']['variables'] == [
+        {
+            **{'name': temperature, 'what': 'temperature', 'standard_name': standard},
+            **{'units': temperature_unit, 'unit': 'degC'},
+            **{'low': pytest.approx(3.0, abs=1e-3), 'high': pytest.approx(15.0, abs=1e-3)},
+        },
+        {
+            **{'name': salinity, 'what': 'salinity', 'standard_name': 'sea_water_salinity'},
+            **{'units': salinity_unit, 'unit': 'psu'},
+            **{'low': pytest.approx(34.0, abs=1e-3), 'high': pytest.approx(35.0, abs=1e-3)},
+        },
+    ]
+    assert found['water']['seen'] == {
+        **{'time': '2026-03-03T00:00Z', 'depth_m': {'first': 0.5, 'last': 1100.0}},
+    }
+    assert matplotlib.image.imread(picture).std() > 0.05
+
+
+def test_it_tells_of_the_bottom_beside_the_water_and_of_what_cannot_be_used(
+    sea_file, tmp_path, capsys
+):
+    data = hydrography(sea_file, 'cmems')
+    deep = data.so.isel(time=0, depth=0, drop=True) * 0.0 + 100.0 * (data.latitude - 34.0)
+    deep.attrs = {'standard_name': 'sea_floor_depth_below_geoid', 'units': 'm'}
+    path = tmp_path / 'static.nc'
+    data.drop_vars('so').assign(deptho=deep).to_netcdf(path, engine='scipy')
+    found = told(capsys, path)
+    (bottom,) = found['bottom']['variables']
+    assert (bottom['name'], bottom['low'], bottom['high']) == (
+        *('deptho', pytest.approx(100.0), pytest.approx(300.0)),
+    )
+    assert found['bottom']['land_share'] == pytest.approx(9 / 441)
+    assert found['refused']['water'].startswith('no salinity ')
+    rows = dict(in_words(found))
+    assert rows['depth of the bottom'].endswith('m): 100.00 to 300.00 m')
+    assert rows['water'].startswith('cannot be used: no salinity ')
+
+
+@pytest.mark.parametrize('kind', ['water', 'bottom'])
+def test_whether_a_mission_is_covered_by_water_or_bottom(kind, sea_file, tmp_path, capsys):
+    data = hydrography(sea_file, 'cmems')
+    if kind == 'bottom':
+        data = xarray.Dataset(
+            {'elevation': -200.0 + 0.0 * data.so.isel(time=0, depth=0, drop=True)}
+        )
+        data.elevation.attrs['units'] = 'm'
+    path, picture, mission = (tmp_path / name for name in ('part.nc', 'part.png', 'crossing.yaml'))
+    data.to_netcdf(path, engine='scipy')
+    mission.write_text(MISSION)
+    found = told(capsys, path, mission=str(mission), out=picture)
+    assert found['mission']['covered'] is True
+    drawn = mission_in(found, str(mission)).panels[0]
+    wanted = 200.0 if kind == 'bottom' else 3.0 + 2.0 * (drawn.longitudes - 122.0)
+    is_water = np.isfinite(drawn.values)
+    np.testing.assert_allclose(
+        drawn.values[is_water], np.broadcast_to(wanted, drawn.values.shape)[is_water], atol=1e-5
+    )
+    assert matplotlib.image.imread(picture).std() > 0.05
+    mission.write_text(MISSION.replace('36.0, 122.0', '35.05, 121.05'))
+    with pytest.raises(ConfigurationError, match='on the path is land'):
+        ocean(path, mission=str(mission), as_json=True)
+    assert json.loads(capsys.readouterr().out)['mission']['covered'] is False
 
 
 def test_it_tells_whether_a_mission_is_covered_and_draws_it(sea_file, tmp_path, capsys):

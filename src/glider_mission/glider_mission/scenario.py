@@ -266,25 +266,25 @@ class Scenario(Settings):
 
     def resolved_current(self, current: SumOfCurrents) -> SumOfCurrents:
         """A current with what it has to know of the mission."""
-        return current.resolved(self.path.course_rad(), self._mission() if current.field else None)
+        return current.resolved(self.path.course_rad(), self.mission() if current.field else None)
 
     def resolved_water(self) -> WaterSettings:
         """Its water, which knows where and when the mission is."""
         grid = self.water.grid
         if not grid.file:
             return self.water
-        return self.water.model_copy(update={'grid': grid.resolved(self._mission())})
+        return self.water.model_copy(update={'grid': grid.resolved(self.mission())})
 
     def _bathymetry(self) -> BathymetrySettings:
         """Chart of the bottom, which knows where the mission is, if there is one."""
         chart = self.bathymetry
-        return chart.resolved(self._mission()) if chart.file else chart
+        return chart.resolved(self.mission()) if chart.file else chart
 
     def bottom(self) -> NamedTuple:
         """Kernel parameters of the bottom."""
         return self.plant_settings().bottom()
 
-    def _mission(self) -> Mission:
+    def mission(self) -> Mission:
         """Where and when it is flown."""
         origin = self.origin.params()
         corners = self.path.points(0)

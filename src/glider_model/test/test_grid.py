@@ -215,9 +215,35 @@ def test_what_is_no_file_is_refused(tmp_path):
 def test_what_is_in_a_file(tmp_path):
     path = written(dataset('hycom'), tmp_path / 'sea.nc', packed=True)
     found = contents(path)
-    assert found.variables == ['water_u', 'water_v']
-    np.testing.assert_allclose(found.axes.depths, DEPTHS)
-    assert found.axes.times[0] == TIMES[0].astype('M8[s]').astype(float)
+    assert list(found.parts) == ['currents'] and not found.refused
+    currents = found.parts['currents']
+    assert [one.name for one in currents.variables] == ['water_v', 'water_u']
+    np.testing.assert_allclose(currents.axes['depth'], DEPTHS)
+    assert currents.axes['time'][0] == TIMES[0].astype('M8[s]').astype(float)
+
+
+def test_a_part_that_cannot_be_used_is_told_beside_one_that_can(tmp_path):
+    path = written(xarray.merge([dataset(), hydrography(temperature='K')]), tmp_path / 'sea.nc')
+    found = contents(path)
+    assert list(found.parts) == ['currents']
+    assert found.refused['water'].startswith("thetao: units = 'K' (allowed: degrees_C")
+
+
+@pytest.mark.parametrize(
+    ('change', 'says'),
+    [
+        (lambda data: data.drop_vars('so'), r'no salinity \(allowed: .* it has thetao'),
+        (lambda data: data.rename(latitude='node'), r'dimension node is no axis; a mesh'),
+        (
+            lambda data: data[['so']].rename(so='foo').drop_attrs(),
+            r'no currents, no temperature and salinity, and no bottom \(allowed: .* it has foo\)',
+        ),
+    ],
+)
+def test_a_file_of_which_nothing_can_be_used_is_refused_by_name(change, says, tmp_path):
+    path = written(change(hydrography()), tmp_path / 'sea.nc')
+    with pytest.raises(ValueError, match=rf'file {path}: .*{says}'):
+        contents(path)
 
 
 def test_another_file_is_told_from_the_one_that_was_flown(tmp_path):

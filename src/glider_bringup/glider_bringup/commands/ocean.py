@@ -25,7 +25,7 @@ def ocean(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help='Image file: png, svg or pdf, of the currents, and of the mission.'),
+        typer.Option(help='Image file: png, svg or pdf, of what it has, and of the mission.'),
     ] = None,
     make: Annotated[
         int | None,
@@ -47,9 +47,10 @@ def ocean(
     ] = 0.0,
     as_json: Json = False,
 ) -> None:
-    """Tell what is in a file of currents, whether it covers a mission, and draw it.
+    """Tell what is in a file, whether it covers a mission, and draw it.
 
-    Exit code 2: it is no grid of currents, or does not cover the mission.
+    That is what can be used of it: currents, temperature and salinity, depth of the bottom. Exit
+    code 2: there is nothing of these, or it does not cover the mission.
     """
     if make is not None:
         if file.exists():
@@ -60,7 +61,7 @@ def ocean(
         refused = ''
         if mission is not None:
             try:
-                sea = mission_in(file, mission)
+                sea = mission_in(told, mission)
             except ConfigurationError as error:
                 sea, refused = None, str(error)
             told['mission'] = {'scenario': mission, 'covered': not refused, 'reason': refused}

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Currents of an ocean model as people see them: what is in a file, and a chart."""
+"""Files of ocean models as people see them: what is in one, and charts of it."""
 
 import math
 from pathlib import Path
@@ -14,140 +14,245 @@ from glider_bringup.showing.figure import GREEN, ORANGE, new_figure
 from glider_mission.chart import place_told
 from glider_mission.disk import save_figure
 from glider_mission.routing.plan import Plan
-from glider_mission.scenario import Scenario, load_scenario
-from glider_model.ocean.grid_file import Axes, Loaded, Window, contents, load, told_time
+from glider_mission.scenario import Scenario, load_scenario, told_of
+from glider_model.ocean.bottom import BathymetrySettings
+from glider_model.ocean.fields.grid import loaded_window
+from glider_model.ocean.grid_file import GRIDS, Loaded, LoadedBottom, Part, contents, told_time
 
 #: Arrows along either side of a chart.
 _ARROWS = 22
+#: A mission without the files that it has itself.
+_NO_FILES = {
+    'current': {'speed_mps': 0.0, 'direction_deg': 0.0},
+    'water.grid': {},
+    'bathymetry': {},
+}
+
+
+class Panel(NamedTuple):
+    """A chart of one quantity."""
+
+    title: str
+    label: str  #: of the colours
+    colours: str
+    latitudes: np.ndarray  #: float64[y] (deg)
+    longitudes: np.ndarray  #: float64[x] (deg)
+    values: np.ndarray  #: float[y, x]; nan: land
+    #: velocities to the north and to the east, float[y, x]
+    arrows: tuple[np.ndarray, np.ndarray] | None = None
 
 
 class Sea(NamedTuple):
-    """Water to be drawn."""
+    """What is to be drawn."""
 
     title: str
-    loaded: Loaded
+    panels: list[Panel]
     scenario: Scenario | None
 
 
-def look(file: Path) -> tuple[dict[str, Any], Sea | None]:
+def look(file: Path) -> tuple[dict[str, Any], Sea]:
     """What is in a file, and its uppermost water in the middle of its time, if that is not huge.
 
     Raises
     ------
     ConfigurationError
-        Naming the file, and what is missing in it.
+        Naming the file, and why nothing of it can be used.
     """
     try:
         found = contents(file)
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
-    axes = found.axes
     told = {
         'file': str(file),
-        'variables': found.variables,
         'source': found.source,
-        **_extent(axes),
-        'land_share': None,
-        'speed_mps': None,
+        **dict.fromkeys((*GRIDS, 'bottom')),
+        **{name: _told(name, part) for name, part in found.parts.items()},
+        'refused': found.refused,
         'mission': None,
     }
-    middle = float(axes.times[len(axes.times) // 2])
-    everywhere = Window(
-        *(axes.latitudes[0], axes.latitudes[-1], axes.longitudes[0], axes.longitudes[-1]),
-        *(0.0, middle, 0.0),
-    )
-    try:
-        loaded = load(file, everywhere)
-    except ValueError:  # too large to look at as a whole
-        return told, None
-    speed = np.hypot(*np.moveaxis(loaded.water[0, 0], -1, 0))[~loaded.land]
-    told['land_share'] = float(loaded.land.mean())
-    if len(speed):
-        rms, most = math.sqrt(float(np.mean(speed**2))), float(speed.max())
-        told['speed_mps'] = {'rms': rms, 'max': most}
-    return told, Sea(f'{file.name}, {told_time(middle)}', loaded, None)
+    seen = {name: part.seen for name, part in found.parts.items() if part.seen}
+    panels = [panel for name, one in seen.items() for panel in _panels(name, _uppermost(one))]
+    return told, Sea(file.name, panels, None)
 
 
-def _extent(axes: Axes) -> dict[str, Any]:
-    """How far the axes of a file go."""
-    times, *places = axes
-    return {
-        'times': {
-            'first': told_time(times[0]),
-            'last': told_time(times[-1]),
-            'count': len(times),
-            'step_h': float(np.median(np.diff(times))) / 3600.0 if len(times) > 1 else None,
-        },
-        **{
-            name: {'first': one[0], 'last': one[-1], 'count': len(one)}
-            for name, one in zip(('depth_m', 'latitude_deg', 'longitude_deg'), places, strict=True)
-        },
+def _uppermost(seen: Loaded | LoadedBottom) -> Loaded | LoadedBottom:
+    """The same with one level."""
+    if isinstance(seen, LoadedBottom):
+        return seen
+    axes = seen.axes._replace(depths=seen.axes.depths[:1])
+    return seen._replace(axes=axes, water=seen.water[:, :1])
+
+
+def _told(name: str, part: Part) -> dict[str, Any]:
+    """What a part of a file is, how far it goes, and the range of its numbers."""
+    variables = [{**one._asdict(), 'low': None, 'high': None} for one in part.variables]
+    told = {'variables': variables, **_extent(part.axes), 'seen': None, 'land_share': None}
+    if name == 'currents':
+        told['speed_mps'] = None
+    if part.seen is None:  # too large to look at as a whole
+        return told
+    if isinstance(part.seen, LoadedBottom):
+        land = part.seen.depth <= 0.0
+        numbers = [part.seen.depth[~land]]
+    else:
+        axes, land = part.seen.axes, part.seen.land
+        numbers = list(np.moveaxis(part.seen.water[0][:, ~land], -1, 0))
+        depth = {'first': axes.depths[0], 'last': axes.depths[-1]}
+        told['seen'] = {'time': told_time(axes.times[0]), 'depth_m': depth}
+    told['land_share'] = float(land.mean())
+    if not land.all():
+        for one, values in zip(variables, numbers, strict=True):
+            one |= {'low': float(values.min()), 'high': float(values.max())}
+        if name == 'currents':
+            speed = np.hypot(*(values[0] for values in numbers))
+            rms = math.sqrt(float(np.mean(speed**2)))
+            told['speed_mps'] = {'rms': rms, 'max': float(speed.max())}
+    return told
+
+
+def _extent(axes: dict[str, np.ndarray]) -> dict[str, Any]:
+    """How far the axes of a part go."""
+    names = {'depth': 'depth_m', 'latitude': 'latitude_deg', 'longitude': 'longitude_deg'}
+    told = {
+        names[axis]: {'first': one[0], 'last': one[-1], 'count': len(one)}
+        for axis, one in axes.items()
+        if axis in names
     }
+    times = axes.get('time')
+    if times is None:
+        return told
+    step = float(np.median(np.diff(times))) / 3600.0 if len(times) > 1 else None
+    ends = {'first': told_time(times[0]), 'last': told_time(times[-1])}
+    return {'times': {**ends, 'count': len(times), 'step_h': step}, **told}
 
 
 def in_words(told: dict[str, Any]) -> list[tuple[str, str]]:
     """Name and text of each line of what is in a file."""
-    times, depth = told['times'], told['depth_m']
-    step = f', every {times["step_h"]:g} h' if times['step_h'] else ', a steady sea'
-    south, north = told['latitude_deg'], told['longitude_deg']
-    corners = [place_told(south[k], (north[k] + 180.0) % 360.0 - 180.0) for k in ('first', 'last')]
-    rows = [
-        ('velocities', ' and '.join(told['variables'])),
-        ('source', told['source'] or '-'),
-        ('times', f'{times["first"]} to {times["last"]}, {times["count"]}{step}'),
-        ('depths', f'{depth["first"]:g} to {depth["last"]:g} m, {depth["count"]}'),
-        ('places', f'{corners[0]} to {corners[1]}, {south["count"]} x {north["count"]}'),
-    ]
-    if told['land_share'] is not None:
-        rows.append(('land', f'{100.0 * told["land_share"]:.1f} % of the uppermost level'))
-    if told['speed_mps']:
-        speed = told['speed_mps']
-        rows.append(('speed there', f'rms {speed["rms"]:.2f} m/s, at most {speed["max"]:.2f} m/s'))
+    rows, before = [('source', told['source'] or '-')], []
+    for name in (*GRIDS, 'bottom'):
+        part = told[name]
+        if not part:
+            continue
+        for one in part['variables']:
+            text = f'{one["name"]} ({one["standard_name"]}, {one["units"] or "no units"})'
+            if one['low'] is not None:
+                text += f': {one["low"]:.2f} to {one["high"]:.2f} {one["unit"]}'
+            rows.append((one['what'], text))
+        if part.get('speed_mps'):
+            speed = part['speed_mps']
+            text = f'rms {speed["rms"]:.2f} m/s, at most {speed["max"]:.2f} m/s'
+            rows.append(('speed', f'{text}, at the uppermost level'))
+        where = _where(part)
+        rows += [row for row in where if row not in before]
+        before = where
+    rows += [(name, f'cannot be used: {reason}') for name, reason in told['refused'].items()]
     if told['mission']:
         covered = 'is covered' if told['mission']['covered'] else 'is not covered'
         rows.append(('mission', f'{told["mission"]["scenario"]} {covered}'))
     return rows
 
 
-def mission_in(file: Path, name: str) -> Sea:
-    """Water that a mission meets at its start, if it flies in the currents of a file.
+def _where(part: dict[str, Any]) -> list[tuple[str, str]]:
+    """Lines of how far a part goes."""
+    rows = []
+    if 'times' in part:
+        times, depth = part['times'], part['depth_m']
+        step = f', every {times["step_h"]:g} h' if times['step_h'] else ', a steady sea'
+        rows = [
+            ('times', f'{times["first"]} to {times["last"]}, {times["count"]}{step}'),
+            ('depths', f'{depth["first"]:g} to {depth["last"]:g} m, {_levels(depth["count"])}'),
+        ]
+    if part['seen']:
+        depth = part['seen']['depth_m']
+        text = f'{part["seen"]["time"]}, {depth["first"]:g} to {depth["last"]:g} m'
+        rows.append(('ranges are of', text))
+    south, north = part['latitude_deg'], part['longitude_deg']
+    corners = [place_told(south[k], (north[k] + 180.0) % 360.0 - 180.0) for k in ('first', 'last')]
+    rows.append(('places', f'{corners[0]} to {corners[1]}, {south["count"]} x {north["count"]}'))
+    if part['land_share'] is not None:
+        of = 'the uppermost level' if 'times' in part else 'the chart'
+        rows.append(('land', f'{100.0 * part["land_share"]:.1f} % of {of}'))
+    return rows
+
+
+def _levels(count: int) -> str:
+    return '1 level' if count == 1 else f'{count} levels'
+
+
+def mission_in(told: dict[str, Any], name: str) -> Sea:
+    """What a mission meets at its start, if it flies in the water and over the bottom of a file.
 
     Raises
     ------
     ConfigurationError
         If the file does not cover it, and why.
     """
-    field = {'kind': 'grid', 'file': str(file.resolve())}
-    scenario = load_scenario(name, {'current.field': field})
-    params = scenario.current_settings().field.params()
-    axes = Axes(params.times, params.depths, params.latitudes, params.longitudes)
-    none = np.zeros((len(axes.latitudes), len(axes.longitudes)), dtype=bool)
-    loaded = Loaded(axes, params.water, (), none)
-    return Sea(f'{file.name} at the start of {scenario.name}', loaded, scenario)
+    file = Path(told['file']).resolve()
+    scenario = load_scenario(name, _NO_FILES)
+    mission, panels = scenario.mission(), []
+    with told_of('', ValueError):
+        for part, wanted in GRIDS.items():
+            if told[part]:
+                loaded, begin = loaded_window(file, mission, wanted)
+                step = np.searchsorted(loaded.axes.times, begin, side='right') - 1
+                axes = loaded.axes._replace(times=loaded.axes.times[step:])
+                panels += _panels(part, loaded._replace(axes=axes, water=loaded.water[step:]))
+        if told['bottom']:
+            chart = BathymetrySettings(file=str(file)).resolved(mission).params()
+            panels += _panels('bottom', LoadedBottom(*chart[:3]))
+    return Sea(f'{file.name} at the start of {scenario.name}', panels, scenario)
+
+
+def _panels(name: str, seen: Loaded | LoadedBottom) -> list[Panel]:
+    """Charts of the mean current over the levels, of the uppermost water, or of the bottom."""
+    if isinstance(seen, LoadedBottom):
+        depth = np.where(seen.depth > 0.0, seen.depth, np.nan)
+        return [Panel('bottom', 'depth of the bottom (m)', 'Blues', *seen[:2], depth)]
+    (time, *_), levels, *places = seen.axes
+    at = f'at {levels[0]:g} m, {told_time(time)}'
+    if name == 'currents':
+        share = np.gradient(levels) if len(levels) > 1 else np.ones(1)
+        mean = np.tensordot(share / share.sum(), seen.water[0], axes=1)
+        arrows = tuple(np.where(seen.land, np.nan, mean[..., k]) for k in (0, 1))
+        title = f'current {at}'
+        if len(levels) > 1:
+            title = f'mean current, {levels[0]:g} to {levels[-1]:g} m, {told_time(time)}'
+        return [Panel(title, 'speed (m/s)', 'Blues', *places, np.hypot(*arrows), arrows)]
+    water = np.where(seen.land, np.nan, np.moveaxis(seen.water[0, 0], -1, 0))
+    return [
+        Panel(
+            *(f'{one.what} {at}', f'{one.what} ({one.unit})', colours),
+            *(*places, values),
+        )
+        for one, colours, values in zip(GRIDS[name], ('viridis', 'Purples'), water, strict=True)
+    ]
 
 
 def draw_sea(sea: Sea, file: Path) -> None:
-    """Draw a chart of the mean current over the levels that were read, and the path of a mission.
+    """Draw charts of a sea, and the path of a mission.
 
     Raises
     ------
     ConfigurationError
-        If the image cannot be written.
+        If the image cannot be written, or all there is is too large.
     """
-    axes, water = sea.loaded.axes, sea.loaded.water[0]
-    levels = axes.depths
-    share = np.gradient(levels) if len(levels) > 1 else np.ones(1)
-    mean = np.tensordot(share / share.sum(), water, axes=1)
-    north, east = (np.where(sea.loaded.land, np.nan, mean[..., k]) for k in (0, 1))
-    depths = f'{levels[0]:g} m' if len(levels) == 1 else f'{levels[0]:g} to {levels[-1]:g} m'
-    label = 'speed of the mean current (m/s)'
-    axis = _draw_current(axes.latitudes, axes.longitudes, north, east, label)
-    axis.set_title(f'{sea.title}, {depths}')
-    axis.set_aspect(1.0 / math.cos(math.radians(float(np.mean(axes.latitudes)))))
-    axis.set_facecolor('#c9c2b8')
-    if sea.scenario:
-        _draw_path(axis, sea.scenario)
-    save_figure(axis.figure, file, 150)
+    if not sea.panels:
+        raise ConfigurationError(
+            f'{file}: not drawn: all of {sea.title} is too large (allowed: the window of a '
+            'mission, by --mission)'
+        )
+    rows, columns = -(-len(sea.panels) // 2), min(2, len(sea.panels))
+    figure = new_figure(8.0 * columns, 6.5 * rows)
+    has_land = any(np.isnan(panel.values).any() for panel in sea.panels)
+    figure.suptitle(f'{sea.title} (grey: land)' if has_land else sea.title)
+    for place, panel in enumerate(sea.panels, 1):
+        axis = _draw_panel(figure, (rows, columns, place), panel)
+        axis.set_title(panel.title)
+        axis.set_aspect(1.0 / math.cos(math.radians(float(np.mean(panel.latitudes)))))
+        axis.set_facecolor('#c9c2b8')
+        if sea.scenario:
+            _draw_path(axis, sea.scenario)
+    save_figure(figure, file, 150)
 
 
 def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
@@ -162,7 +267,9 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
     latitudes, longitudes = on_chart(chart.norths, chart.easts, origin)
     north, east = np.moveaxis(chart.current[0], -1, 0)
     label = 'depth-averaged current at the start (m/s)'
-    axis = _draw_current(latitudes, longitudes, north, east, label)
+    speed = np.hypot(north, east)
+    panel = Panel('', label, 'Blues', latitudes, longitudes, speed, (north, east))
+    axis = _draw_panel(new_figure(8.0, 6.5), (1, 1, 1), panel)
     axis.set_title(f'{scenario.name}: fronts every 12 h of each leg')
     axis.set_aspect(1.0 / math.cos(math.radians(origin.latitude)))
     for arrivals in made.route.fronts:
@@ -177,15 +284,16 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
     save_figure(axis.figure, file, 150)
 
 
-def _draw_current(latitudes, longitudes, north, east, label: str) -> Any:
-    """Axis of a new figure with a current (m/s): how fast it is, and arrows."""
-    figure = new_figure(8.0, 6.5)
-    axis = figure.add_subplot(xlabel='longitude (deg)', ylabel='latitude (deg)')
-    drawn = axis.pcolormesh(longitudes, latitudes, np.hypot(north, east), cmap='Blues')
-    figure.colorbar(drawn, label=label)
-    rows, columns = (slice(None, None, -(-len(one) // _ARROWS)) for one in (latitudes, longitudes))
-    places = longitudes[columns], latitudes[rows]
-    axis.quiver(*places, east[rows, columns], north[rows, columns], width=0.002)
+def _draw_panel(figure: Any, place: tuple[int, int, int], panel: Panel) -> Any:
+    """Axis of a figure with colours, and with arrows of a current."""
+    axis = figure.add_subplot(*place, xlabel='longitude (deg)', ylabel='latitude (deg)')
+    latitudes, longitudes = panel.latitudes, panel.longitudes
+    drawn = axis.pcolormesh(longitudes, latitudes, panel.values, cmap=panel.colours)
+    figure.colorbar(drawn, label=panel.label)
+    if panel.arrows:
+        thin = [slice(None, None, -(-len(one) // _ARROWS)) for one in (latitudes, longitudes)]
+        north, east = (one[tuple(thin)] for one in panel.arrows)
+        axis.quiver(longitudes[thin[1]], latitudes[thin[0]], east, north, width=0.002)
     return axis
 
 

@@ -5,12 +5,12 @@
 Variables and axes are found by what the CF conventions call them, in whatever order: velocities to
 the east and to the north, or temperature and salinity, on axes of time, depth, latitude and
 longitude, as CMEMS and HYCOM write them. Of a file only the window that is asked for is read, step
-by step. What is no such grid is refused by name.
+by step. What is no such grid is refused by name. Charts of the bottom have no time and no depth.
 """
 
 import hashlib
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime, timezone
 from pathlib import Path
@@ -43,19 +43,26 @@ class Wanted(NamedTuple):
     what: str
     names: dict[str, str]  #: what CF calls a variable of a name that says nothing of that
     units: dict[str, float]  #: what makes m/s, degC or psu of them
+    unit: str  #: which of these
 
 
 _EAST, _NORTH = 'eastward_sea_water_velocity', 'northward_sea_water_velocity'
 POTENTIAL = 'sea_water_potential_temperature'
 #: What is read of a file, in this order.
 VELOCITIES = (
-    Wanted('velocity to the north', {'vo': _NORTH, 'water_v': _NORTH}, _SPEEDS),
-    Wanted('velocity to the east', {'uo': _EAST, 'water_u': _EAST}, _SPEEDS),
+    Wanted('velocity to the north', {'vo': _NORTH, 'water_v': _NORTH}, _SPEEDS, 'm/s'),
+    Wanted('velocity to the east', {'uo': _EAST, 'water_u': _EAST}, _SPEEDS, 'm/s'),
 )
 TEMPERATURE_AND_SALINITY = (
-    Wanted('temperature', {'thetao': POTENTIAL, 'water_temp': 'sea_water_temperature'}, _CELSIUS),
-    Wanted('salinity', dict.fromkeys(('so', 'salinity'), 'sea_water_salinity'), _PSU),
+    Wanted(
+        'temperature',
+        {'thetao': POTENTIAL, 'water_temp': 'sea_water_temperature'},
+        *(_CELSIUS, 'degC'),
+    ),
+    Wanted('salinity', dict.fromkeys(('so', 'salinity'), 'sea_water_salinity'), _PSU, 'psu'),
 )
+#: What a grid is for, and what is read of it; a file may have several.
+GRIDS = {'currents': VELOCITIES, 'water': TEMPERATURE_AND_SALINITY}
 #: What of a grid no regular axes have, by names of dimensions or coordinates: what it is called.
 _OTHER_GRIDS = {
     's_rho': 'levels that follow the bottom, as ROMS and CROCO have',
@@ -165,18 +172,31 @@ def fingerprint(path: Path) -> str:
     return digest.hexdigest()[:16]
 
 
+def _named(dataset: 'xarray.Dataset') -> dict[str, str | None]:
+    """Standard name of each variable."""
+    return {str(name): one.attrs.get('standard_name') for name, one in dataset.data_vars.items()}
+
+
+def _listed(dataset: 'xarray.Dataset') -> str:
+    """Names of the variables that a file has, to be told."""
+    return ', '.join(list(_named(dataset))[:12]) or 'none'
+
+
+def _candidates(dataset: 'xarray.Dataset', wanted: Wanted) -> dict[str, str]:
+    """What CF calls each variable that may be what is wanted."""
+    named, known = _named(dataset), wanted.names
+    found = {name: told for name, told in named.items() if told in known.values()}
+    return found or {name: known[name] for name in known if name in named}
+
+
 def _variable(dataset: 'xarray.Dataset', wanted: Wanted) -> tuple[str, str]:
     """Name of a variable, and what CF calls it."""
-    named = {str(name): one.attrs.get('standard_name') for name, one in dataset.data_vars.items()}
-    known = wanted.names
-    found = {name: told for name, told in named.items() if told in known.values()}
-    found = found or {name: known[name] for name in known if name in named}
+    found, known = _candidates(dataset, wanted), wanted.names
     if not found:
-        listed = ', '.join(list(named)[:12]) or 'none'
         raise ValueError(
             f'no {wanted.what} (allowed: a variable of standard_name '
             f'{" or ".join(dict.fromkeys(known.values()))}, or called {" or ".join(known)}; it '
-            f'has {listed})'
+            f'has {_listed(dataset)})'
         )
     if len(found) > 1:
         raise ValueError(f'several of {wanted.what}: {", ".join(found)} (allowed: one)')
@@ -345,10 +365,18 @@ def load(
         chosen, axes, whole = _select(layout, window)
         if needed is not None:
             _refuse_uncovered(whole, needed)
-        size = 8 * math.prod(map(len, chosen.values()))
-        if size > MAX_BYTES:
-            raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
+        _refuse_large(_bytes(8, chosen))
         return _read(layout, chosen, axes)
+
+
+def _bytes(each: int, chosen: dict[str, np.ndarray]) -> int:
+    """Bytes of a window, of so many at every point."""
+    return each * math.prod(map(len, chosen.values()))
+
+
+def _refuse_large(size: int) -> None:
+    if size > MAX_BYTES:
+        raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
 
 
 def _select(layout: _Layout, window: Window | None) -> tuple[dict[str, np.ndarray], Axes, Axes]:
@@ -458,7 +486,7 @@ def _fill_land(levels: np.ndarray) -> np.ndarray:
     return levels
 
 
-#: Bottoms by what they are called in CF, else by name, and whether they are heights.
+#: Whether a bottom is a height, by its standard name, else by its name.
 _BOTTOMS = {
     'height_above_mean_sea_level': True,
     'height_above_reference_ellipsoid': True,
@@ -467,11 +495,8 @@ _BOTTOMS = {
     'sea_floor_depth_below_mean_sea_level': False,
     'sea_floor_depth_below_sea_surface': False,
     'sea_floor_depth': False,
-    'elevation': True,
-    'z': True,
-    'deptho': False,
-    'bathymetry': False,
 }
+_BOTTOM_NAMES = {'elevation': True, 'z': True, 'deptho': False, 'bathymetry': False}
 
 
 class LoadedBottom(NamedTuple):
@@ -499,58 +524,161 @@ def load_bottom(path: Path, window: Window, needed: Window) -> LoadedBottom:
         Naming the file, and what is missing in it or what of the mission it does not cover.
     """
     with _opened(path) as dataset:
-        name, scale = _bottom(dataset)
-        axes = _find_axes(dataset, name, ('latitude', 'longitude'))
-        values = {
-            axis: np.array(dataset.variables[one].values, float) for axis, one in axes.items()
-        }
-        values['longitude'] = _unwrapped(values['longitude'], 0.5 * (window.west + window.east))
-        whole = Axes(np.zeros(1), np.zeros(1), *(np.sort(values[a]) for a in _AXES[2:]))
+        layout = _bottom_layout(dataset, 0.5 * (window.west + window.east))
+        values = layout.values
+        whole = Axes(np.zeros(1), np.zeros(1), *(np.sort(values[axis]) for axis in _AXES[2:]))
         _refuse_uncovered(whole, needed)
         chosen = {
             'latitude': _chosen(values['latitude'], window.south, window.north),
             'longitude': _chosen(values['longitude'], window.west, window.east),
         }
-        size = 4 * math.prod(map(len, chosen.values()))
-        if size > MAX_BYTES:
-            raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
-        depth = scale * _cut(dataset[name], {axis: axes[axis] for axis in chosen}, chosen)
-        depth = np.nan_to_num(np.maximum(depth, 0.0)).astype(np.float32)
-        return LoadedBottom(*(values[axis][chosen[axis]] for axis in chosen), depth)
+        return _read_bottom(layout, chosen)
 
 
-def _bottom(dataset: 'xarray.Dataset') -> tuple[str, float]:
-    """Name of the variable of the bottom, and what makes a depth in m of it."""
-    named = {str(name): one.attrs.get('standard_name') for name, one in dataset.data_vars.items()}
-    found = [name for name, standard in named.items() if standard in _BOTTOMS]
-    found = found or [name for name in named if name.lower() in _BOTTOMS]
+def _bottom_layout(dataset: 'xarray.Dataset', middle: float | None = None) -> _Layout:
+    """Where the depth of the bottom and its axes are, by the middle of a window (deg).
+
+    Raises
+    ------
+    ValueError
+        Naming what is missing, or is no regular grid.
+    """
+    name, standard, scale = _bottom(dataset)
+    axes = _find_axes(dataset, name, _AXES[2:])
+    values = {axis: np.array(dataset.variables[one].values, float) for axis, one in axes.items()}
+    longitudes = values['longitude']
+    if middle is None:
+        middle = 0.5 * (longitudes.min() + longitudes.max())
+    values['longitude'] = _unwrapped(longitudes, middle)
+    return _Layout(dataset, [name], (standard,), [scale], axes, values)
+
+
+def _read_bottom(layout: _Layout, chosen: dict[str, np.ndarray]) -> LoadedBottom:
+    """Depths of a window."""
+    _refuse_large(_bytes(4, chosen))
+    (name,), (scale,) = layout.variables, layout.scales
+    axes = {axis: layout.axes[axis] for axis in chosen}
+    depth = scale * _cut(layout.dataset[name], axes, chosen)
+    depth = np.nan_to_num(np.maximum(depth, 0.0)).astype(np.float32)
+    return LoadedBottom(*(layout.values[axis][chosen[axis]] for axis in chosen), depth)
+
+
+def _bottoms(dataset: 'xarray.Dataset') -> dict[str, tuple[str, bool]]:
+    """What each variable is that may be the bottom, and whether it is a height."""
+    named = _named(dataset)
+    found = {name: (one, _BOTTOMS[one]) for name, one in named.items() if one in _BOTTOMS}
+    known = {name: name.lower() for name in named if name.lower() in _BOTTOM_NAMES}
+    return found or {name: (one, _BOTTOM_NAMES[one]) for name, one in known.items()}
+
+
+def _bottom(dataset: 'xarray.Dataset') -> tuple[str, str, float]:
+    """Name of the variable of the bottom, what it is, and what makes a depth in m of it."""
+    found = _bottoms(dataset)
     if len(found) != 1:
         raise ValueError(
             f'{len(found)} variables of the depth of the bottom (allowed: one of standard_name '
-            f'{", ".join(list(_BOTTOMS)[:7])}, or called {", ".join(list(_BOTTOMS)[7:])}; it has '
-            f'{", ".join(list(named)[:12]) or "none"})'
+            f'{", ".join(_BOTTOMS)}, or called {", ".join(_BOTTOM_NAMES)}; it has '
+            f'{_listed(dataset)})'
         )
-    name, units = found[0], str(dataset[found[0]].attrs.get('units', 'm')).strip()
+    ((name, (standard, is_height)),) = found.items()
+    units = str(dataset[name].attrs.get('units', 'm')).strip()
     if units not in _LENGTHS:
         raise ValueError(f'{name}: units = {units!r} (allowed: {", ".join(_LENGTHS)})')
-    is_height = _BOTTOMS[named[name] if named[name] in _BOTTOMS else name.lower()]
-    return name, -_LENGTHS[units] if is_height else _LENGTHS[units]
+    return name, standard, -_LENGTHS[units] if is_height else _LENGTHS[units]
+
+
+class Variable(NamedTuple):
+    """A variable that can be used."""
+
+    name: str
+    what: str
+    standard_name: str  #: what it is taken for, in CF
+    units: str  #: as the file says
+    unit: str  #: what is made of them
+
+
+class Part(NamedTuple):
+    """What of a file can be used for one purpose."""
+
+    variables: tuple[Variable, ...]
+    axes: dict[str, np.ndarray]  #: each increasing; a bottom has neither time nor depth
+    #: in the middle of its time, the uppermost level alone if all are too many; None: so is it
+    seen: Loaded | LoadedBottom | None
 
 
 class Contents(NamedTuple):
     """What is in a file."""
 
-    variables: list[str]  #: to the east and to the north
-    axes: Axes
     source: str  #: as the file says
+    parts: dict[str, Part]  #: of currents, water and bottom those that can be used
+    refused: dict[str, str]  #: those that are there and cannot be used, and why
 
 
 def contents(path: Path) -> Contents:
-    """What is in a file, of which no velocity is read; raises as `load`."""
+    """What is in a file.
+
+    Raises
+    ------
+    ValueError
+        Naming the file, if nothing of it can be used, and why.
+    """
     with _opened(path) as dataset:
-        layout = _layout(dataset, VELOCITIES)
         source = dataset.attrs.get('source') or dataset.attrs.get('title') or ''
-        return Contents(layout.variables[::-1], _select(layout, None)[1], str(source))
+        found = Contents(str(source), {}, {})
+        for name, wanted in GRIDS.items():
+            if any(_candidates(dataset, one) for one in wanted):
+                _add_part(found, name, _water_part, dataset, wanted)
+        if _bottoms(dataset):
+            _add_part(found, 'bottom', _bottom_part, dataset)
+        if found.parts:
+            return found
+        names = [*(name for one in sum(GRIDS.values(), ()) for name in one.names), *_BOTTOM_NAMES]
+        nothing = (
+            'no currents, no temperature and salinity, and no bottom (allowed: variables of such '
+            f'standard_name, or called {", ".join(names)}; it has {_listed(dataset)})'
+        )
+        raise ValueError('; '.join(found.refused.values()) or nothing)
+
+
+def _add_part(found: Contents, name: str, make: Callable[..., Part], *args) -> None:
+    """Add a part to contents, or why it cannot be used."""
+    try:
+        found.parts[name] = make(*args)
+    except ValueError as error:
+        found.refused[name] = str(error)
+
+
+def _water_part(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> Part:
+    layout = _layout(dataset, wanted)
+    chosen, axes, _ = _select(layout, None)
+    time = slice(len(axes.times) // 2, len(axes.times) // 2 + 1)
+    seen = None
+    for levels in (len(axes.depths), 1):
+        some = {**chosen, 'time': chosen['time'][time], 'depth': chosen['depth'][:levels]}
+        if _bytes(8, some) <= MAX_BYTES:
+            there = axes._replace(times=axes.times[time], depths=axes.depths[:levels])
+            seen = _read(layout, some, there)
+            break
+    told = [(one.what, one.unit) for one in wanted]
+    return Part(_variables(layout, told), dict(zip(_AXES, axes, strict=True)), seen)
+
+
+def _bottom_part(dataset: 'xarray.Dataset') -> Part:
+    layout = _bottom_layout(dataset)
+    chosen = {axis: np.argsort(layout.values[axis], kind='stable') for axis in _AXES[2:]}
+    axes = {axis: layout.values[axis][chosen[axis]] for axis in chosen}
+    seen = _read_bottom(layout, chosen) if _bytes(4, chosen) <= MAX_BYTES else None
+    return Part(_variables(layout, [('depth of the bottom', 'm')]), axes, seen)
+
+
+def _variables(layout: _Layout, told: list[tuple[str, str]]) -> tuple[Variable, ...]:
+    """Variables of a layout, of which it is told what they are, and the unit made of theirs."""
+    return tuple(
+        Variable(name, what, standard, str(layout.dataset[name].attrs.get('units', '')), unit)
+        for name, standard, (what, unit) in zip(
+            layout.variables, layout.standards, told, strict=True
+        )
+    )
 
 
 def told_time(seconds: float) -> str:
