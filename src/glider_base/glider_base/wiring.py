@@ -203,7 +203,7 @@ NAVIGATION = Wired(
 GUIDANCE = Wired(
     'guidance',
     'glider_guidance',
-    inputs=('odom', 'altitude'),
+    inputs=('odom', 'altitude', 'battery'),
     outputs=('reference', 'tracking_error', 'current_estimate'),
 )
 CONTROL = Wired(

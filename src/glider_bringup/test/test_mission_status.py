@@ -10,8 +10,10 @@ from rclpy.parameter import Parameter
 
 import glider_bringup as glider
 from glider_base.ros.wire import qos
-from glider_base.wiring import at_rest
+from glider_base.signals import Battery
+from glider_base.wiring import WHEN_SILENT, at_rest
 from glider_guidance.nodes.guidance_node import GuidanceNode
+from glider_model.vehicle.file import load_vehicle
 
 DIVES = {'profile.depth_m': 100.0, 'profile.surface_every_dives': 2, 'profile.wait_s': 60.0}
 STILL = {'current.speed_mps': 0.0, 'dives': 0}
@@ -38,6 +40,20 @@ def test_next_surfacing_and_arrival_come_when_they_are_foretold():
     assert flight.status.leg == 2 and abs(flight.status.to_go_m) < 30.0
 
 
+def test_energy_that_is_left_is_what_the_ledger_has_not_spent():
+    flight = glider.Flight('current_8deg', {**DIVES, **STILL, 'path': LEGS})
+    assert flight.status.energy_left_wh == float('inf')  # nothing was heard yet
+    flight.until(t_s=300.0)
+    before, told = flight.state, flight.status
+    flight.until(t_s=600.0)
+    *spent_j, _power, _call = flight.state.kept.mission.plant.ledger
+    capacity_wh = load_vehicle('zhang2021').energy.capacity.value
+    left_wh = flight.status.energy_left_wh
+    assert left_wh == pytest.approx(capacity_wh - sum(spent_j) / 3600.0, abs=1e-3)
+    assert told.energy_left_wh > left_wh + 0.01
+    assert flight.restore(before).status == told
+
+
 def test_to_go_grows_for_who_is_carried_back():
     flight = glider.Flight(
         'current_8deg', {**DIVES, 'current.speed_mps': 0.6, 'current.direction_deg': 180.0}
@@ -62,10 +78,14 @@ def test_a_node_tells_it_once_a_second_and_answers_orders(context):
     heard, executor = [], SingleThreadedExecutor(context=context)
     listener.create_subscription(DiagnosticArray, 'mission/status', heard.append, qos.LATCHED)
     executor.add_node(listener)
-    inputs = at_rest('odom'), at_rest('altitude')
+    battery = Battery(12.0, -0.5, 15.5, 20.0, 0.775)
+
+    def step(tick: int) -> None:
+        inputs = {'odom': at_rest('odom'), 'battery': battery}
+        node.step(tick * 10**8, *[inputs[item.topic.name] for item in node.inputs])
 
     def told(tick: int) -> dict[str, str]:
-        node.step(tick * 10**8, *inputs[: len(node.inputs)])
+        step(tick)
         before = len(heard)
         while len(heard) == before:
             executor.spin_once(timeout_sec=30.0)
@@ -76,12 +96,16 @@ def test_a_node_tells_it_once_a_second_and_answers_orders(context):
         first = told(0)
         assert first['stage'] == 'surface preparation' and first['order'] == ''
         assert float(first['to_go_m']) == pytest.approx(25000.0)
+        assert float(first['energy_left_wh']) == pytest.approx(12.0 * 15.5)
         node.set_parameters_atomically([Parameter('profile.depth_m', value=200.0)])
-        node.step(5 * 10**8, *inputs[: len(node.inputs)])
+        step(5)
         assert told(10)['order'] == 'taken: profile.depth_m'
         assert len(heard) == 2
         node.set_parameters_atomically([Parameter('profile.depth_m', value=9000.0)])
-        assert told(20)['order'].startswith('order refused: ')
+        battery = Battery(*WHEN_SILENT['battery'])
+        last = told(20)
+        assert last['order'].startswith('order refused: ')
+        assert float(last['energy_left_wh']) == float('inf')
     finally:
         node.close()
         node.destroy_node()

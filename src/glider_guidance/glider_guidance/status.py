@@ -5,7 +5,7 @@
 import math
 from typing import NamedTuple
 
-from glider_base.signals import TICK_S
+from glider_base.signals import TICK_S, Battery
 from glider_guidance.guidance import GuidanceParams, GuidanceState, locate
 from glider_guidance.orders import is_surfaced
 from glider_guidance.path.curve import path_piece
@@ -28,10 +28,11 @@ class Status(NamedTuple):
     current_east_mps: float
     next_surfacing_s: float  #: time to it (s); 0.0 at the surface
     dives: int  #: completed
+    energy_left_wh: float  #: what the battery says is left (Wh)
 
 
-def status_of(state: GuidanceState, params: GuidanceParams) -> Status:
-    """How a mission goes, by guidance after a tick."""
+def status_of(state: GuidanceState, params: GuidanceParams, battery: Battery) -> Status:
+    """How a mission goes, by guidance after a tick, and what the battery said in it."""
     path, profile = params.path, params.profile
     place = locate(state.s, state.gate.odometry, params)
     piece, s = path_piece(state.s, path)
@@ -56,7 +57,14 @@ def status_of(state: GuidanceState, params: GuidanceParams) -> Status:
         current_east_mps=current.current_e,
         next_surfacing_s=_to_surface_s(state.profile, place.depth, profile),
         dives=state.profile.dives,
+        energy_left_wh=_left_wh(battery),
     )
+
+
+def _left_wh(battery: Battery) -> float:
+    """Energy that is left in a battery (Wh); infinite if it is not measured."""
+    is_measured = battery.voltage >= 0.0 and battery.charge >= 0.0
+    return battery.voltage * battery.charge if is_measured else math.inf
 
 
 def _dive_s(params: ProfileParams) -> float:

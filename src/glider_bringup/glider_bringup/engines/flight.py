@@ -9,7 +9,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from glider_base.settings import ConfigurationError
-from glider_base.signals import NOT_FINITE, TICK_S
+from glider_base.signals import NOT_FINITE, TICK_S, Battery
+from glider_base.wiring import WHEN_SILENT
 from glider_bringup.engines.direct import (
     MissionParams,
     MissionState,
@@ -42,7 +43,8 @@ from glider_mission.disk import VANISHED, DiskError
 from glider_mission.routing.pilot import LOOK_TICKS, Pilot
 from glider_mission.scenario import Scenario
 
-_STAGE, _NO_PROGRESS, _ODOM = (COLUMNS[name] for name in ('stage', 'no_progress', 'odom'))
+_STAGE, _NO_PROGRESS = COLUMNS['stage'], COLUMNS['no_progress']
+_ODOM, _BATTERY = COLUMNS['odom'], COLUMNS['battery']
 
 #: Called now and then with the ticks flown and the depth (m).
 Progress = Callable[[int, float], None]
@@ -80,6 +82,7 @@ class Kept(NamedTuple):
     tick: int  #: ticks flown
     stage: int  #: of guidance, at the last one; -1: there was none
     no_progress: int  #: what guidance told of that then
+    battery: Battery  #: what it said then
     own: tuple[Order, ...]  #: what it orders itself by that, to come
     settings: GuidanceSettings  #: by the orders that hold
     followed: tuple[Order, ...]  #: those that were given in flight, and held until now
@@ -101,6 +104,7 @@ class Held:
         state, self._params = mission or mission_of(scenario)
         self._held = hold(state, self._params)
         self.tick, self._stage, self._no_progress = 0, -1, 0
+        self._battery = Battery(*WHEN_SILENT['battery'])
         self._scenario, self._settings = scenario, scenario.guidance_settings()
         self._own: tuple[Order, ...] = ()
         self._followed: tuple[Order, ...] = ()
@@ -114,6 +118,7 @@ class Held:
             tick=self.tick,
             stage=self._stage,
             no_progress=self._no_progress,
+            battery=self._battery,
             own=self._own,
             settings=self._settings,
             followed=self._followed,
@@ -123,13 +128,15 @@ class Held:
     @property
     def status(self) -> Status:
         """How the mission goes, by guidance."""
-        return status_of(held_state(self._held).guidance, self._settings.params())
+        guidance = held_state(self._held).guidance
+        return status_of(guidance, self._settings.params(), self._battery)
 
     def restore(self, kept: Kept) -> None:
         """Go on from there."""
         set_held(self._held, kept.mission)
         self.tick, self._stage, self._waiting = kept.tick, kept.stage, kept.waiting
         self._no_progress, self._own = kept.no_progress, kept.own
+        self._battery = kept.battery
         self._tell(kept.settings, kept.followed)
 
     def order(self, order: Order) -> None:
@@ -175,9 +182,9 @@ class Held:
         return rows, is_over
 
     def _look(self, row: np.ndarray) -> None:
-        """Note what guidance told at the last tick, and what it orders itself by that."""
+        """Note what guidance and battery told at the last tick, and what it orders itself."""
         before, self._no_progress = self._no_progress, int(row[_NO_PROGRESS])
-        self._stage = int(row[_STAGE])
+        self._stage, self._battery = int(row[_STAGE]), Battery(*row[_BATTERY].tolist())
         if self._no_progress and not before:
             order = reaction(self._settings, self._no_progress, row[_ODOM], self.tick)
             self._own = (order,) if order else ()

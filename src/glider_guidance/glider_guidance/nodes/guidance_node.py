@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Guidance as a node: odom in; reference, tracking_error, current_estimate and path out."""
+"""Guidance as a node: odom and battery in; reference, path and mission/status out."""
 
 import sys
 
@@ -14,7 +14,7 @@ from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.process import run
 from glider_base.settings import ConfigurationError
-from glider_base.signals import TICK_NS, Water
+from glider_base.signals import TICK_NS, Battery, Water
 from glider_base.wiring import MAP
 from glider_guidance.block import GUIDANCE
 from glider_guidance.order import Order
@@ -68,13 +68,13 @@ class GuidanceNode(BlockNode):
             self.waiting += [order] if order else []
         if stamp_ns // SECOND_NS != self.second:
             self.second = stamp_ns // SECOND_NS
-            self.tell_status(stamp_ns)
+            self.tell_status(stamp_ns, Battery(*inputs[-1]))
 
-    def tell_status(self, stamp_ns: int) -> None:
+    def tell_status(self, stamp_ns: int, battery: Battery) -> None:
         """Publish how the mission goes, once a second."""
         told = {
             name: value if isinstance(value, str | int) else round(value, 3)
-            for name, value in status_of(self.state, self.params)._asdict().items()
+            for name, value in status_of(self.state, self.params, battery)._asdict().items()
         }
         said, name = self.block.say(*self.flags), self.get_fully_qualified_name()
         values = {**told, 'order': self.answer}
