@@ -602,7 +602,8 @@ class Part(NamedTuple):
 
     variables: tuple[Variable, ...]
     axes: dict[str, np.ndarray]  #: each increasing; a bottom has neither time nor depth
-    #: in the middle of its time, the uppermost level alone if all are too many; None: so is it
+    #: in the middle of its time: all levels, or the uppermost if all are too large to be read;
+    #: None if that is, too
     seen: Loaded | LoadedBottom | None
 
 
@@ -649,6 +650,7 @@ def _add_part(found: Contents, name: str, make: Callable[..., Part], *args) -> N
 
 
 def _water_part(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> Part:
+    """Water of a dataset; errors as `_layout`."""
     layout = _layout(dataset, wanted)
     chosen, axes, _ = _select(layout, None)
     time = slice(len(axes.times) // 2, len(axes.times) // 2 + 1)
@@ -664,6 +666,7 @@ def _water_part(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> Part:
 
 
 def _bottom_part(dataset: 'xarray.Dataset') -> Part:
+    """Bottom of a dataset; errors as `_bottom_layout`."""
     layout = _bottom_layout(dataset)
     chosen = {axis: np.argsort(layout.values[axis], kind='stable') for axis in _AXES[2:]}
     axes = {axis: layout.values[axis][chosen[axis]] for axis in chosen}
