@@ -26,26 +26,29 @@ LANES = {
     'mutants': ('-m', 'mutants'),
     'soak': ('-m', 'soak'),
 }
-#: So many runs of tests go on at a time: two processors have something to do while a test waits.
-AT_ONCE = 3
-#: Files of tests that are runs of their own: they share no flight with the others of their folder.
+#: So many runs of tests go on at a time: processors have something to do while a test waits.
+AT_ONCE = 4
+#: Files of tests by the folder that they are in: each line is a run of its own, of two to three
+#: minutes, and the rest of the folder is one more. The longest first, so that none is waited for.
 APART = (
-    (ROOT, ('autopilot', 'benchmarks', 'driver_restart', 'faults', 'live_view')),
-    (
-        ROOT,
-        ('message_faults', 'my_law', 'outside_recorder', 'rudder', 'slow_machine')
-        + ('two_gliders', 'your_vehicle'),
-    ),
+    (ROOT, ('tutorial', 'slow_machine', 'theory')),
+    (ROOT, ('my_law', 'outside_recorder')),
+    (f'{SOURCES}/glider_studies', ('random_faults', 'forecasts', 'fault_matrix', 'montecarlo')),
     (
         f'{SOURCES}/glider_bringup',
         ('actuator_errors', 'afloat', 'bottom', 'failing_parts', 'fin', 'guard_flights')
         + ('lyapunov', 'missed_fixes', 'real_vehicles', 'reckoned_run', 'righting'),
     ),
+    (f'{SOURCES}/glider_bringup', ('kills', 'launch', 'replay', 'runner', 'vanished')),
+    (ROOT, ('faults', 'live_view')),
+    (ROOT, ('autopilot', 'driver_restart', 'your_vehicle')),
+    (ROOT, ('message_faults', 'rudder', 'two_gliders')),
     (
         f'{SOURCES}/glider_bringup',
-        ('full_disk', 'held_flight', 'hostile_input', 'kills', 'launch', 'replay', 'runner')
-        + ('vanished',),
+        ('full_disk', 'held_flight', 'hostile_input', 'lost_input', 'no_progress', 'orders')
+        + ('own_sensors',),
     ),
+    (ROOT, ('benchmarks', 'flight_digests', 'mutants', 'site', 'soak')),
 )
 
 
@@ -78,8 +81,7 @@ def main(arguments):
         files = [f'test/test_{name}.py' for name in own]
         rest[folder] += [f'--ignore={file}' for file in files]
         apart.append((folder, files))
-    runs = [*rest.items()]
-    runs[3:3] = apart  # the longest first, so that nobody waits for one alone
+    runs = [*list(rest.items())[:2], *apart, *list(rest.items())[2:]]
     codes = side_by_side([sys.executable, '-m', 'pytest'], runs)
     failed = dict.fromkeys(
         os.path.relpath(f'{folder}/test', ROOT)

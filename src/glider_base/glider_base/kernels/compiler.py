@@ -103,13 +103,15 @@ class KernelCompiler(CompilerBase):
 
 
 _meminfos = NRTContext.get_meminfos
+#: Whether anything is counted in values of a type.
+_is_counted = {}
 
 
 def _meminfos_if_any(self, builder, kind, value):
     """What is counted in a value, without taking it apart where nothing is."""
-    if not self._context.data_model_manager[kind].contains_nrt_meminfo():
-        return []
-    return _meminfos(self, builder, kind, value)
+    if kind not in _is_counted:
+        _is_counted[kind] = self._context.data_model_manager[kind].contains_nrt_meminfo()
+    return _meminfos(self, builder, kind, value) if _is_counted[kind] else []
 
 
 class _Uncollected(event.Listener):
