@@ -203,7 +203,7 @@ NAVIGATION = Wired(
 GUIDANCE = Wired(
     'guidance',
     'glider_guidance',
-    inputs=('odom', 'altitude', 'battery'),
+    inputs=('odom', 'altitude'),
     outputs=('reference', 'tracking_error', 'current_estimate'),
 )
 CONTROL = Wired(

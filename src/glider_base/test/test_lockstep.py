@@ -99,7 +99,7 @@ class Block(StepNode):
 INPUTS = {
     CURRENT: ['ground_truth/odom'],
     NAVIGATION: ['joint_states', 'measured_odom'],
-    GUIDANCE: ['odom', 'battery'],
+    GUIDANCE: ['odom'],
     CONTROL: ['reference', 'odom', 'joint_states'],
     GUARD: ['demand', 'reference', 'odom', 'joint_states', 'health', 'battery'],
 }
@@ -606,7 +606,7 @@ def test_malformed_message_ends_no_node(make_graph, context, lockstep, raw):
 def test_other_frames_are_refused_and_named(make_graph, context, field, frame):
     """A driver in NED looks right to everything but the vehicle."""
     graph = make_graph(lockstep=False, input_max_age_s=1.0, without=())
-    item, _ = graph.blocks[GUIDANCE].inputs
+    (item,) = graph.blocks[GUIDANCE].inputs
     message = deserialize_message(item.topic.codec.encode(TICK_NS, 17 * (0.5,)), Odometry)
     if field == 'child_frame_id':
         message.child_frame_id = frame
@@ -753,7 +753,7 @@ def test_free_running_node_notices_stale_input_and_recovers(make_graph):
 )
 def test_free_running_input_keeps_the_newest_and_counts_what_lacks(make_graph, stamps, kept, lost):
     graph = make_graph(lockstep=False, input_max_age_s=1.0)
-    item, _ = graph.blocks[GUIDANCE].inputs
+    (item,) = graph.blocks[GUIDANCE].inputs
     for stamp_s in stamps:
         raw = item.topic.codec.encode(round(stamp_s * 1e9), 17 * (stamp_s,))
         item.subscription.callback(raw, {})

@@ -10,8 +10,8 @@ from rclpy.parameter import Parameter
 
 import glider_bringup as glider
 from glider_base.ros.wire import qos
-from glider_base.signals import Battery
-from glider_base.wiring import WHEN_SILENT, at_rest
+from glider_base.ros.wire.topics import TOPICS
+from glider_base.wiring import at_rest
 from glider_guidance.nodes.guidance_node import GuidanceNode
 from glider_model.vehicle.file import load_vehicle
 
@@ -78,14 +78,10 @@ def test_a_node_tells_it_once_a_second_and_answers_orders(context):
     heard, executor = [], SingleThreadedExecutor(context=context)
     listener.create_subscription(DiagnosticArray, 'mission/status', heard.append, qos.LATCHED)
     executor.add_node(listener)
-    battery = Battery(12.0, -0.5, 15.5, 20.0, 0.775)
-
-    def step(tick: int) -> None:
-        inputs = {'odom': at_rest('odom'), 'battery': battery}
-        node.step(tick * 10**8, *[inputs[item.topic.name] for item in node.inputs])
+    inputs = at_rest('odom'), at_rest('altitude')
 
     def told(tick: int) -> dict[str, str]:
-        step(tick)
+        node.step(tick * 10**8, *inputs[: len(node.inputs)])
         before = len(heard)
         while len(heard) == before:
             executor.spin_once(timeout_sec=30.0)
@@ -96,16 +92,16 @@ def test_a_node_tells_it_once_a_second_and_answers_orders(context):
         first = told(0)
         assert first['stage'] == 'surface preparation' and first['order'] == ''
         assert float(first['to_go_m']) == pytest.approx(25000.0)
-        assert float(first['energy_left_wh']) == pytest.approx(12.0 * 15.5)
+        assert first['energy_left_wh'] == 'inf'  # no battery has said anything
         node.set_parameters_atomically([Parameter('profile.depth_m', value=200.0)])
-        step(5)
+        node.step(5 * 10**8, *inputs[: len(node.inputs)])
         assert told(10)['order'] == 'taken: profile.depth_m'
         assert len(heard) == 2
         node.set_parameters_atomically([Parameter('profile.depth_m', value=9000.0)])
-        battery = Battery(*WHEN_SILENT['battery'])
+        node.on_battery(TOPICS['battery'].codec.encode(0, (12.0, -0.5, 15.5, 20.0, 0.775)))
         last = told(20)
         assert last['order'].startswith('order refused: ')
-        assert float(last['energy_left_wh']) == float('inf')
+        assert float(last['energy_left_wh']) == pytest.approx(12.0 * 15.5)
     finally:
         node.close()
         node.destroy_node()

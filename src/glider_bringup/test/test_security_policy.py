@@ -60,6 +60,7 @@ def rights(node: str) -> dict[str, set[str]]:
         subscribe |= {*block.inputs}
     if node == GUIDANCE:
         publish |= {'path', 'mission/status'}
+        subscribe.add('battery')
     if node == PLANT:
         subscribe |= {'recorded', 'heard'}
     if node == RECORDER:

@@ -19,10 +19,7 @@ from glider_guidance.yo.stage import STAGE_NAMES
 @block_tick.body(GuidanceParams)
 @kernel
 def guidance_tick(state, t_s, inputs, params, dt):
-    """One tick: odom, altitude in; reference, tracking_error, current_estimate out.
-
-    The battery comes too, for `status_of` alone: nothing is steered by it.
-    """
+    """One tick: odom, altitude in; reference, tracking_error, current_estimate out."""
     odometry = odometry_from_wire(inputs[0])
     state = hear_fixes(state, odometry, covariance_from_wire(inputs[0]), dt)
     state, out = guidance_step(state, odometry, inputs[1][0], params, dt)

@@ -128,7 +128,7 @@ def fly_held(held, log, dt):
         )
         odom = believed[0]
         guidance, guided, stage = guidance_tick(
-            guidance, t_s, (odom, measured.altitude, measured.battery), params.guidance, dt
+            guidance, t_s, (odom, measured.altitude), params.guidance, dt
         )
         seen = (guided[0], odom, joints)
         control, controlled, limits = control_tick(control, t_s, seen, params.control, dt)

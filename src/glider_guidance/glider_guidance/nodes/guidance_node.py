@@ -13,9 +13,10 @@ from glider_base.frames import water_to_wire
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.process import run
+from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS, Battery, Water
-from glider_base.wiring import MAP
+from glider_base.wiring import MAP, WHEN_SILENT
 from glider_guidance.block import GUIDANCE
 from glider_guidance.order import Order
 from glider_guidance.orders import changed, due, reaction
@@ -37,6 +38,8 @@ class GuidanceNode(BlockNode):
         self.create_service(Trigger, 'abort', self.on_abort)
         self.publish_path = self.add_output('path')
         self.publish_status, self.second = self.add_output('mission/status'), -1
+        # for the status alone: no input, as nothing is steered by it
+        self._subscription(TOPICS['battery'], self.on_battery, gated=False)
         self.tell_path(0)
         self.start_up()
 
@@ -45,6 +48,7 @@ class GuidanceNode(BlockNode):
         super().forget()
         self.waiting, self.first_ns = list(self.settings.orders), None
         self.answer = ''  #: to the last order
+        self.battery = Battery(*WHEN_SILENT['battery'])
 
     def tell_path(self, stamp_ns: int) -> None:
         """Publish the path that is followed from a tick on."""
@@ -68,13 +72,17 @@ class GuidanceNode(BlockNode):
             self.waiting += [order] if order else []
         if stamp_ns // SECOND_NS != self.second:
             self.second = stamp_ns // SECOND_NS
-            self.tell_status(stamp_ns, Battery(*inputs[-1]))
+            self.tell_status(stamp_ns)
 
-    def tell_status(self, stamp_ns: int, battery: Battery) -> None:
+    def on_battery(self, raw: bytes) -> None:
+        """Remember what the battery says."""
+        self.battery = Battery(*TOPICS['battery'].codec.decode(raw)[1])
+
+    def tell_status(self, stamp_ns: int) -> None:
         """Publish how the mission goes, once a second."""
         told = {
             name: value if isinstance(value, str | int) else round(value, 3)
-            for name, value in status_of(self.state, self.params, battery)._asdict().items()
+            for name, value in status_of(self.state, self.params, self.battery)._asdict().items()
         }
         said, name = self.block.say(*self.flags), self.get_fully_qualified_name()
         values = {**told, 'order': self.answer}

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from glider_base.kernel import kernel, replace
 from glider_model.vehicle.file import VehicleParams
+from glider_model.vehicle.hydrodynamics import power_of_speed
 from glider_model.vehicle.rigid_body import GRAVITY
 
 
@@ -64,7 +65,7 @@ def _at_speed(speed, polar):
     """Polar whose drag does not change with speed, as at a speed (m/s)."""
     if polar.n == 0.0:
         return polar
-    drag = polar.K_D0 * max(speed, _SLOWEST) ** polar.n
+    drag = polar.K_D0 * power_of_speed(max(speed, _SLOWEST), polar.n)
     return replace(polar, K_D0=drag, n=0.0)
 
 

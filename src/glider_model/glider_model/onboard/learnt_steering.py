@@ -31,8 +31,9 @@ BANK, AT_LIMIT = 0.5, 0.9
 #: Turn rate over u (rad/s) of who is steered by its turn in any case; and the deviation (rad/s) of
 #: one that is known, of which this share is no difference.
 STRONG_STEERING, WELL_KNOWN, NO_DIFFERENCE = 6e-3, 3e-4, 0.4
-#: A way of steering is kept so long at least; lookahead of who steers well, as by adverse yaw (s).
-KEPT_S, WELL_S = 300.0, 150.0
+#: A way of steering is kept so long at least; lookahead of who steers well, as by adverse yaw;
+#: and when a vehicle learns that does not bank to turn (s).
+KEPT_S, WELL_S, NEVER_S = 300.0, 150.0, 1e9
 
 
 class SteeringLearningSettings(Settings):
@@ -59,7 +60,7 @@ class SteeringLearningSettings(Settings):
         return derived(
             SteeringParams,
             self,
-            after_s=self.after_s if most > 0.0 else math.inf,
+            after_s=self.after_s if most > 0.0 else NEVER_S,
             slowest_glide=vehicle.slowest_glide,
             power=steering_exponents(vehicle),
             bank=min(BANK, most),
@@ -86,7 +87,7 @@ class SteeringParams(NamedTuple):
     noise: float
     correlation_s: float
     smoothing_s: float
-    after_s: float  #: infinite for a vehicle that does not bank to turn
+    after_s: float  #: `NEVER_S` for a vehicle that does not bank to turn
     roll_per_s: float
     approach_s: float
     slowest_glide: float  #: vertical rate below which it turns over (m/s)

@@ -29,6 +29,12 @@ def _body_damping(linear, quadratic, rate, inertia):
 
 
 @kernel
+def power_of_speed(speed, exponent):
+    """A speed (m/s) to a power; to that of a laminar boundary layer by a root, which is faster."""
+    return 1.0 / math.sqrt(speed) if exponent == -0.5 else speed**exponent
+
+
+@kernel
 def parasitic_drag(speed, vehicle):
     """K_D0 (kg/m) at a speed (m/s); that of the file is at 1 m/s.
 
@@ -36,7 +42,7 @@ def parasitic_drag(speed, vehicle):
     """
     if vehicle.speed_exponent == 0.0:
         return vehicle.K_D0
-    return vehicle.K_D0 * speed**vehicle.speed_exponent
+    return vehicle.K_D0 * power_of_speed(speed, vehicle.speed_exponent)
 
 
 @kernel
