@@ -31,9 +31,8 @@ BANK, AT_LIMIT = 0.5, 0.9
 #: Turn rate over u (rad/s) of who is steered by its turn in any case; and the deviation (rad/s) of
 #: one that is known, of which this share is no difference.
 STRONG_STEERING, WELL_KNOWN, NO_DIFFERENCE = 6e-3, 3e-4, 0.4
-#: A way of steering is kept so long at least; lookahead of who steers well, as by adverse yaw;
-#: and when a vehicle learns that does not bank to turn (s).
-KEPT_S, WELL_S, NEVER_S = 300.0, 150.0, 1e9
+#: A way of steering is kept so long at least; lookahead of who steers well, as by adverse yaw (s).
+KEPT_S, WELL_S = 300.0, 150.0
 
 
 class SteeringLearningSettings(Settings):
@@ -60,7 +59,6 @@ class SteeringLearningSettings(Settings):
         return derived(
             SteeringParams,
             self,
-            after_s=self.after_s if most > 0.0 else NEVER_S,
             slowest_glide=vehicle.slowest_glide,
             power=steering_exponents(vehicle),
             bank=min(BANK, most),
@@ -87,12 +85,12 @@ class SteeringParams(NamedTuple):
     noise: float
     correlation_s: float
     smoothing_s: float
-    after_s: float  #: `NEVER_S` for a vehicle that does not bank to turn
+    after_s: float
     roll_per_s: float
     approach_s: float
     slowest_glide: float  #: vertical rate below which it turns over (m/s)
     power: tuple[float, float]  #: n in dive and climb
-    bank: float  #: sine of the roll at which a vehicle has to turn (-)
+    bank: float  #: sine of the roll at which a vehicle has to turn (-); 0: it does not bank to
 
 
 class SteeringState(NamedTuple):
@@ -207,7 +205,7 @@ def learn(steering, measured, speed, params, dt):
     sine_rate = steering.sine_rate + share * (measured.phi_dot - steering.sine_rate)
     yaw_rate = steering.yaw_rate + share * (measured.psi_dot - steering.yaw_rate)
     dive, climb = steering.dive, steering.climb
-    if steady_s > params.after_s:
+    if params.bank > 0.0 and steady_s > params.after_s:
         flown = dive if down else climb
         flown = learn_steering(flown, sine, cube, sine_rate, yaw_rate, params, dt)
         flown = choose_steering(flown, sine / ratio, params.bank)
