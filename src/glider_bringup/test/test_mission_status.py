@@ -2,14 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a mission goes, as a pilot is told: what is foretold comes true, and orders are answered."""
 
+import math
+
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.qos import ReliabilityPolicy
+from sensor_msgs.msg import BatteryState
 
 import glider_bringup as glider
 from glider_base.ros.wire import qos
+from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.wiring import at_rest
 from glider_guidance.nodes.guidance_node import GuidanceNode
@@ -102,7 +107,23 @@ def test_a_node_tells_it_once_a_second_and_answers_orders(context):
         last = told(20)
         assert last['order'].startswith('order refused: ')
         assert float(last['energy_left_wh']) == pytest.approx(12.0 * 15.5)
+        # sensor_msgs says of what is not measured NaN
+        node.on_battery(to_cdr(BatteryState(voltage=12.0, charge=15.5, current=math.nan)))
+        assert told(30)['energy_left_wh'] == 'inf'
+        node.on_battery(b'no battery')
+        assert told(40)['energy_left_wh'] == 'inf'
     finally:
         node.close()
         node.destroy_node()
         listener.destroy_node()
+
+
+def test_a_free_running_node_hears_a_battery_that_is_not_reliable(context):
+    """As drivers publish what sensors say."""
+    node = GuidanceNode(context=context, parameter_overrides=[Parameter('lockstep', value=False)])
+    try:
+        (heard,) = node.get_subscriptions_info_by_topic('battery')
+        assert heard.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT
+    finally:
+        node.close()
+        node.destroy_node()

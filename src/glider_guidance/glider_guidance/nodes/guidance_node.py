@@ -13,6 +13,8 @@ from glider_base.frames import water_to_wire
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.process import run
+from glider_base.ros.wire import qos
+from glider_base.ros.wire.codec import MessageError
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS, Battery, Water
@@ -39,7 +41,8 @@ class GuidanceNode(BlockNode):
         self.publish_path = self.add_output('path')
         self.publish_status, self.second = self.add_output('mission/status'), -1
         # for the status alone: no input, as nothing is steered by it
-        self._subscription(TOPICS['battery'], self.on_battery, gated=False)
+        heard = None if self.ticks.lockstep else qos.FREE
+        self._subscription(TOPICS['battery'], self.on_battery, gated=False, profile=heard)
         self.tell_path(0)
         self.start_up()
 
@@ -75,8 +78,12 @@ class GuidanceNode(BlockNode):
             self.tell_status(stamp_ns)
 
     def on_battery(self, raw: bytes) -> None:
-        """Remember what the battery says."""
-        self.battery = Battery(*TOPICS['battery'].codec.decode(raw)[1])
+        """Remember what the battery says: nothing, if a number of it is NaN or it is damaged."""
+        try:
+            values = TOPICS['battery'].codec.decode(raw)[1]
+        except MessageError:
+            values = WHEN_SILENT['battery']
+        self.battery = Battery(*values)
 
     def tell_status(self, stamp_ns: int) -> None:
         """Publish how the mission goes, once a second."""
