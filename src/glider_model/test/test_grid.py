@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Currents from files of ocean models: against xarray's own interpolation, and what is refused."""
 
+import math
+
 import numpy as np
 import pytest
 import xarray
@@ -62,7 +64,8 @@ def written(data, path, packed=False, engine='scipy'):
     pytest.importorskip(engine)
     pack = {'dtype': 'int16', 'scale_factor': np.float32(0.001), '_FillValue': np.int16(-30000)}
     encoding = {name: dict(pack) for name in data.data_vars} if packed else {}
-    encoding['time'] = {'units': 'hours since 2000-01-01', 'dtype': 'float64'}
+    if 'time' in data.coords:
+        encoding['time'] = {'units': 'hours since 2000-01-01', 'dtype': 'float64'}
     data.to_netcdf(path, encoding=encoding, engine=engine)
     return path
 
@@ -347,6 +350,28 @@ def test_a_chart_that_does_not_serve_is_refused_by_name(place, attributes, text,
     settings = BathymetrySettings(file=str(tmp_path / 'chart.nc')).resolved(mission(place))
     with pytest.raises(ValueError, match=f'file .*chart.nc: .*{text}'):
         settings.params()
+
+
+@pytest.mark.parametrize('wrong', [math.nan, 35.0])
+def test_a_chart_of_the_bottom_whose_latitudes_are_in_no_order_is_no_chart(wrong, tmp_path):
+    data = chart(tmp_path / 'chart.nc', 'elevation', sign=-1.0, units='m')
+    latitudes = data.lat.values.copy()
+    latitudes[7] = wrong
+    lat = data.lat.copy(data=latitudes)
+    path = written(data.assign_coords(lat=lat).to_dataset(), tmp_path / 'wrong.nc')
+    with pytest.raises(ValueError, match='lat: neither increases nor decreases'):
+        contents(path)
+    settings = BathymetrySettings(file=str(path)).resolved(mission((36.0, 122.0)))
+    with pytest.raises(ValueError, match='lat: neither increases nor decreases'):
+        settings.params()
+
+
+def test_a_chart_is_land_where_it_has_no_number(tmp_path):
+    data = chart(tmp_path / 'chart.nc', 'elevation', sign=-1.0, units='m').astype(float)
+    data[0, :3] = [math.nan, math.inf, -math.inf]
+    path = written(data.to_dataset(), tmp_path / 'holes.nc')
+    seen = contents(path).parts['bottom'].seen
+    assert seen.depth[0, :3].tolist() == [0.0, 0.0, 0.0] and np.all(seen.depth[1:] >= 100.0)
 
 
 def test_a_path_over_land_is_refused(tmp_path):

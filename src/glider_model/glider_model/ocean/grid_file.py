@@ -307,12 +307,17 @@ def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
                     f'{dimension}: units = {units!r} (allowed: {", ".join(_LENGTHS)})'
                 )
             values[axis] *= _LENGTHS[units] * (-1.0 if one.attrs.get('positive') == 'up' else 1.0)
-        steps = np.diff(values[axis])
-        is_axis = np.isfinite(values[axis]).all() and (np.all(steps > 0) or np.all(steps < 0))
-        if not len(values[axis]) or not is_axis:
-            raise ValueError(f'{dimension}: neither increases nor decreases all along')
+        _refuse_no_axis(dimension, values[axis])
     standards = tuple(standard for _, standard in found)
     return _Layout(dataset, names, standards, scales, axes, values)
+
+
+def _refuse_no_axis(dimension: str, values: np.ndarray) -> None:
+    """Refuse numbers that are not in order, or none."""
+    steps = np.diff(values)
+    is_axis = np.isfinite(values).all() and (np.all(steps > 0) or np.all(steps < 0))
+    if not len(values) or not is_axis:
+        raise ValueError(f'{dimension}: neither increases nor decreases all along')
 
 
 def _chosen(values: np.ndarray, low: float, high: float) -> np.ndarray:
@@ -546,6 +551,8 @@ def _bottom_layout(dataset: 'xarray.Dataset', middle: float | None = None) -> _L
     name, standard, scale = _bottom(dataset)
     axes = _find_axes(dataset, name, _AXES[2:])
     values = {axis: np.array(dataset.variables[one].values, float) for axis, one in axes.items()}
+    for axis, dimension in axes.items():
+        _refuse_no_axis(dimension, values[axis])
     longitudes = values['longitude']
     if middle is None:
         middle = 0.5 * (longitudes.min() + longitudes.max())
@@ -559,7 +566,7 @@ def _read_bottom(layout: _Layout, chosen: dict[str, np.ndarray]) -> LoadedBottom
     (name,), (scale,) = layout.variables, layout.scales
     axes = {axis: layout.axes[axis] for axis in chosen}
     depth = scale * _cut(layout.dataset[name], axes, chosen)
-    depth = np.nan_to_num(np.maximum(depth, 0.0)).astype(np.float32)
+    depth = np.where(np.isfinite(depth), np.maximum(depth, 0.0), 0.0).astype(np.float32)
     return LoadedBottom(*(layout.values[axis][chosen[axis]] for axis in chosen), depth)
 
 
