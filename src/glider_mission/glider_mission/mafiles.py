@@ -9,6 +9,7 @@ first, in degrees and minutes as one number: -5230.0 is 52 deg 30 min W. Angles 
 as in files that pilots publish.
 """
 
+import codecs
 import math
 import re
 from collections.abc import Sequence
@@ -137,8 +138,8 @@ def _read(file: Path, behaviors: Sequence[str]) -> _File:
 
     A ValueError names file, line, value and what is allowed.
     """
-    # Comments are in whatever encoding the pilot's editor had.
-    text = read_bytes(file).decode('latin-1')
+    # Comments are in whatever encoding the pilot's editor had, which may begin with its mark.
+    text = read_bytes(file).removeprefix(codecs.BOM_UTF8).decode('latin-1')
     lines = [
         _Line(f'{file}: line {number}', line.partition('#')[0].strip())
         for number, line in enumerate(text.split('\n'), 1)
@@ -213,6 +214,8 @@ def read_goto_list(file: Path) -> list[tuple[float, float]]:
     read = _read(file, ['goto_list'])
     _check(read, ['num_waypoints'])
     found = [_place(line) for line in _section(read, 'waypoints')]
+    if not found:
+        raise ValueError(f'{read.name}: no waypoints (allowed: one and more)')
     where, count = read.arguments.get('num_waypoints', (read.name, len(found)))
     if count not in range(1, len(found) + 1):
         raise ValueError(
@@ -230,14 +233,16 @@ def _place(line: _Line) -> tuple[float, float]:
         longitude = latitude = math.nan
     if not (len(words) >= 2 and abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         raise ValueError(
-            f'{line.where}: {line.text}: no waypoint (allowed: longitude and latitude, degrees '
-            'and minutes as one number, such as -5230.000 4730.500)'
+            f'{line.where}: {shown(line.text)}: no waypoint (allowed: longitude and latitude, '
+            'degrees and minutes as one number, such as -5230.000 4730.500)'
         )
     return latitude, longitude
 
 
 def _degrees(value: float) -> float:
-    """Degrees of degrees and minutes as one number; NaN if there are 60 minutes or more."""
+    """Degrees of degrees and minutes as one number; NaN if it is none, as with 60 minutes."""
+    if not math.isfinite(value):
+        return math.nan
     whole = math.trunc(value / 100.0)
     minutes = value - 100.0 * whole
     return round(whole + minutes / 60.0, _PLACE_DECIMALS) if abs(minutes) < 60.0 else math.nan

@@ -5,7 +5,7 @@
 import json
 import math
 import shlex
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from copy import deepcopy
 from pathlib import Path
@@ -487,7 +487,7 @@ def make_scenario(
     own, in_vehicle = split_changes(changes or {})
     fields = {field: shown(value) for field, value in (changes or {}).items()}
     for field, value in own.items():
-        if not _set_field(values, field, value):
+        if not _set_field(values, field, value, own):
             del fields[field]
     if fields:
         before = values.get('changed')
@@ -592,14 +592,15 @@ def _find_vehicle(
     return scenario.model_copy(update={'vehicle': name})
 
 
-def _replaced(name: str, value: Any) -> tuple[str, ...]:
-    """Names of the fields beside one that a value of it replaces."""
+def _replaced(field: str, value: Any, given: Collection[str]) -> list[str]:
+    """Names of the fields beside one that a value of it replaces; files, none that are given."""
+    parents, _, name = field.rpartition('.')
     if name != MAFILES:
-        return _alternatives(name)
+        return [*_alternatives(name)]
     try:
-        return tuple(read_profile(value))
+        return [other for other in read_profile(value) if f'{parents}.{other}' not in given]
     except ValueError:  # refused later
-        return ()
+        return []
 
 
 def _alternatives(name: str) -> tuple[str, ...]:
@@ -619,12 +620,15 @@ def overlap(field: str, other: str) -> bool:
     return any(name.startswith(f'{other}.') or f'{other}.'.startswith(name) for name in names)
 
 
-def _set_field(values: dict, field: str, value) -> bool:
-    """Set a field by its dotted name, making the mappings on the way; whether that changes it."""
+def _set_field(values: dict, field: str, value, given: Collection[str]) -> bool:
+    """Set a field by its dotted name, making the mappings on the way; whether that changes it.
+
+    It is one of those that are ``given``.
+    """
     holder, last = holder_of(values, field), field.rpartition('.')[2]
     is_plain = isinstance(value, str | int | float)  # of an array one cannot ask it
     is_new = not is_plain or last not in holder or holder[last] != value
-    for other in _replaced(last, value):
+    for other in _replaced(field, value, given):
         holder.pop(other, None)
     holder[last] = deepcopy(value)  # which may be changed by a field inside it
     return is_new

@@ -130,6 +130,11 @@ def test_round_numbers_come_back_to_the_last_bit(tmp_path_factory, tenths, grams
     assert ProfileSettings(**read_profile(str(folder / 'yo10.ma'))) == profile
 
 
+def test_lines_end_and_files_begin_as_editors_of_windows_have_them(write):
+    marked = '\xef\xbb\xbf' + YO.partition('\n')[2].replace('\n', '\r\n')
+    assert read_profile(write('win.ma', marked)) == read_profile(write('yo10.ma', YO))
+
+
 def test_what_was_read_is_written_as_it_was(write):
     profile = ProfileSettings(**read_profile(write('yo10.ma', YO)))
     written = mafiles('a mission', [], profile)['yo10.ma'].split('\n')
@@ -167,9 +172,10 @@ def test_a_yo_and_surfacings_by_hand_are_the_profile(write):
 
 
 def test_a_yo_without_end_never_surfaces_and_off_is_off(write):
+    """Whatever the scenario said before."""
     text = YO.replace('(nodim)    6', '(nodim) -1').replace('(m)  20#', '(m) -1 #')
-    changes = {'profile.clearance_m': 10.0, 'profile.mafiles': write('yo10.ma', text)}
-    profile = load_scenario('slocum_shelf', changes).profile
+    scenario = write('mine.yaml', 'profile: {clearance_m: 10.0, surface_every_dives: 2}\n')
+    profile = load_scenario(scenario, {'profile.mafiles': write('yo10.ma', text)}).profile
     assert (profile.surface_every_dives, profile.clearance_m) == (0, 0.0)
 
 
@@ -178,6 +184,19 @@ def test_a_yo_is_a_sawtooth_though_the_mission_was_a_path_in_3d(write):
     changes = {'profile.mafiles': write('yo10.ma', only)}
     assert load_scenario('spline').profile.mode == 'path'
     assert load_scenario('spline', changes).profile.mode == 'profile'
+
+
+@pytest.mark.parametrize('first', ['profile.depth_m', 'profile.mafiles'])
+def test_a_field_and_files_are_changed_at_once_only_if_they_agree(write, first):
+    """Whichever of the two comes first."""
+    for depth_m, is_same in ((180.0, True), (90.0, False)):
+        changes = {'profile.depth_m': depth_m, 'profile.mafiles': write('yo10.ma', YO)}
+        changes = {first: changes[first], **changes}
+        if is_same:
+            assert load_scenario('survey', changes).profile.depth_m == 180.0
+            continue
+        with pytest.raises(ConfigurationError, match='depth_m = 90.0: mafiles say 180.0'):
+            load_scenario('survey', changes)
 
 
 def test_a_field_is_said_once_and_a_run_does_not_need_the_files(write, tmp_path):
@@ -214,6 +233,8 @@ def test_a_mission_goes_to_the_waypoints_of_a_list(write):
         ('behavior_name=', '# ', r'behavior_name = missing \(allowed: behavior_name=goto_list'),
         ('713.000', '760.000', 'line 13: .*allowed: longitude and latitude'),
         ('713.000', 'west', 'line 13'),
+        ('713.000', 'inf', "line 13: 'inf\\\\t-5433.500': no waypoint"),
+        ('713.000', '1e400', 'line 13'),
         ('(nodim) 2', '(nodim) 4', r'num_waypoints = 4 \(allowed: 1 to 3'),
         ('(nodim) 2', '(nodim) 1.5', r'num_waypoints = 1.5 \(allowed: 1 to 3'),
         ('<end:waypoints>', '', 'needed: <start:waypoints> and <end:waypoints>'),
