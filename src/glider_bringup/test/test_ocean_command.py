@@ -166,6 +166,7 @@ def test_whether_a_mission_is_covered_by_water_or_bottom(kind, sea_file, tmp_pat
     mission.write_text(MISSION)
     found = told(capsys, path, mission=str(mission), out=picture)
     assert found['mission']['covered'] is True
+    assert dict(in_words(found))['mission'] == f'{mission} is covered by {kind}'
     drawn = mission_in(found, str(mission)).panels[0]
     wanted = 200.0 if kind == 'bottom' else 3.0 + 2.0 * (drawn.longitudes - 122.0)
     is_water = np.isfinite(drawn.values)

@@ -142,6 +142,13 @@ def test_what_was_read_is_written_as_it_was(write):
         assert f'b_arg: {line}' in written
 
 
+def test_a_list_without_waypoints_is_none(write):
+    text = '<start:b_arg>\n<end:b_arg>\n<start:waypoints>\n# none yet\n<end:waypoints>\n'
+    file = write('goto_l10.ma', f'behavior_name=goto_list\n{text}')
+    with pytest.raises(ConfigurationError, match=r'goto_l10.ma: no waypoints \(allowed: one'):
+        load_scenario('survey', {'path.waypoints_latlon': file})
+
+
 def test_a_list_by_hand_is_read_as_a_slocum_does(write):
     found = np.array(read_goto_list(write('goto_l10.ma', GOTO)))
     expected = [(39.0, -73.0 - 18.8 / 60.0), (-54.0 - 33.5 / 60.0, 7.0 + 13.0 / 60.0)]

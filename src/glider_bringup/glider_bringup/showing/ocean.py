@@ -147,7 +147,8 @@ def in_words(told: dict[str, Any]) -> list[tuple[str, str]]:
         before = where
     rows += [(name, f'cannot be used: {reason}') for name, reason in told['refused'].items()]
     if told['mission']:
-        covered = 'is covered' if told['mission']['covered'] else 'is not covered'
+        used = ', '.join(name for name in (*GRIDS, 'bottom') if told[name])
+        covered = f'is covered by {used}' if told['mission']['covered'] else 'is not covered'
         rows.append(('mission', f'{told["mission"]["scenario"]} {covered}'))
     return rows
 
