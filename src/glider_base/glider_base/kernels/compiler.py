@@ -3,10 +3,12 @@
 """What numba does for kernels in vain, and is spared here.
 
 A kernel that others call is inlined by them, so that no machine code of its own is ever run. numba
-makes it all the same. And for each tuple that is bound to a name numba takes apart all numbers in
-it, to count references, though there are none in most.
+makes it all the same. For each tuple that is bound to a name numba takes apart all numbers in it,
+to count references, though there are none in most. And what has been inlined is optimised as if it
+were new: in the loop of a flight are hundreds of numbers that change, and LLVM rewrites them all
+for each pass over loops, though what loops there are within have been dealt with in their kernels.
 
-Both stand on what is not public in numba. With any other numba than the one that they were
+All of that stands on what is not public in numba. With any other numba than the one that they were
 written for, kernels are compiled as numba does it. With any of them, Python looks for no garbage
 while something is compiled.
 """
@@ -25,12 +27,41 @@ from numba.core.typed_passes import NativeLowering
 WRITTEN_FOR = '0.61.'
 #: Kind of a library in the cache; how names of environments of functions begin in a module.
 _BITCODE, _ENVIRONMENT = 'inlined', '_ZN08NumbaEnv'
+#: Code of so many basic blocks, as the tick of a block has, is large. Passes over it, by their
+#: names in llvmlite, are those of -O3, but none over loops.
+_LARGE = 500
+_BEFORE_INLINING = ('cfg_simplification', 'sroa')
+_AFTER_INLINING = (
+    *('ipsccp', 'sroa', 'instruction_combining', 'cfg_simplification', 'jump_threading'),
+    *('cfg_simplification', 'gvn', 'memcpy_optimization', 'sccp', 'instruction_combining'),
+    *('jump_threading', 'dead_store_elimination', 'aggressive_dead_code_elimination'),
+    *('cfg_simplification', 'instruction_combining', 'global_dce'),
+)
+#: What is inlined though nobody said so, in instructions, as at -O3.
+_SMALL = 275
 
 
 class _Library(JITCodeLibrary):
     """Code of a kernel. The engine that makes machine code never gets one that is inlined."""
 
-    is_inlined = False
+    is_kernel = is_inlined = False
+
+    def _optimize_final_module(self):
+        blocks = sum(1 for function in self._final_module.functions for _ in function.blocks)
+        if self.is_inlined or not self.is_kernel or blocks < _LARGE:
+            return super()._optimize_final_module()
+        passes = ll.create_module_pass_manager()
+        passes.add_target_library_info(ll.get_process_triple())
+        self._codegen._tm.add_analysis_passes(passes)
+        passes.add_type_based_alias_analysis_pass()
+        passes.add_basic_alias_analysis_pass()
+        for name in _BEFORE_INLINING:
+            getattr(passes, f'add_{name}_pass')()
+        passes.add_function_inlining_pass(_SMALL)
+        passes.add_refprune_pass()
+        for name in _AFTER_INLINING:
+            getattr(passes, f'add_{name}_pass')()
+        passes.run(self._final_module)
 
     def _finalize_final_module(self):
         if not self.is_inlined:
@@ -79,6 +110,7 @@ class _Lowering(NativeLowering):
         codegen, flags = state.targetctx.codegen(), state.flags
         library = state.library = codegen.create_library(state.func_id.func_qualname)
         library.enable_object_caching()
+        library.is_kernel = True
         library.is_inlined = bool(flags.forceinline and flags.no_cpython_wrapper)
         changed = super().run_pass(state)
         if not library.is_inlined:
