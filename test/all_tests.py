@@ -28,8 +28,8 @@ LANES = {
 }
 #: So many runs of tests go on at a time: processors have something to do while a test waits.
 AT_ONCE = 4
-#: Files of tests by the folder that they are in: each line is a run of its own, of two to three
-#: minutes, and the rest of the folder is one more. The longest first, so that none is waited for.
+#: Files of tests by the folder that they are in: each entry is a run of its own, of some minutes,
+#: and the rest of the folder is one more. The small ones come last: no long one is waited for.
 APART = (
     (ROOT, ('tutorial', 'slow_machine', 'theory')),
     (ROOT, ('my_law', 'outside_recorder')),

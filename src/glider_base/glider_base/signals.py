@@ -131,7 +131,7 @@ class Adaptation(NamedTuple):
 
 
 #: Of a law that learns nothing.
-NOTHING_LEARNT = Adaptation(*(13 * (0.0,)))
+NOTHING_LEARNT = Adaptation(*(0.0 for _ in Adaptation._fields))
 
 
 class Health(NamedTuple):

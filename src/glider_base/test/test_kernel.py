@@ -14,8 +14,8 @@ from numba.core import event
 from glider_base.kernel import compiling_told
 
 
-def test_compiling_is_told_before_it_begins_once_and_only_then():
-    told, seen = [], []
+def make_halves():
+    """A function and one that calls it, neither compiled yet."""
 
     @numba.njit
     def half(x):
@@ -25,6 +25,12 @@ def test_compiling_is_told_before_it_begins_once_and_only_then():
     def quarter(x):
         return half(half(x))
 
+    return half, quarter
+
+
+def test_compiling_is_told_before_it_begins_once_and_only_then():
+    told, seen = [], []
+    _, quarter = make_halves()
     with compiling_told(lambda: told.append(len(quarter.signatures))):
         seen.append(quarter(4.0))  # compiles two functions
         seen.append(quarter(4))  # and again for another type
@@ -38,14 +44,7 @@ def test_compiling_is_told_before_it_begins_once_and_only_then():
 @pytest.mark.parametrize('is_on', [True, False])
 def test_no_garbage_is_looked_for_while_something_is_compiled(is_on):
     """Not in what is compiled within it either; afterwards, or after a failure, as before."""
-
-    @numba.njit
-    def half(x):
-        return 0.5 * x
-
-    @numba.njit
-    def quarter(x):
-        return half(half(x))
+    half, quarter = make_halves()
 
     @numba.njit
     def wrong(x):

@@ -107,11 +107,16 @@ def test_a_node_tells_it_once_a_second_and_answers_orders(context):
         last = told(20)
         assert last['order'].startswith('order refused: ')
         assert float(last['energy_left_wh']) == pytest.approx(12.0 * 15.5)
+        assert told(7000)['energy_left_wh'] == 'inf'  # the battery has been silent too long
+        node.on_battery(
+            TOPICS['battery'].codec.encode(7 * 10**11, (12.0, -0.5, 15.5, 20.0, 0.775))
+        )
+        assert float(told(7010)['energy_left_wh']) == pytest.approx(12.0 * 15.5)
         # sensor_msgs says of what is not measured NaN
         node.on_battery(to_cdr(BatteryState(voltage=12.0, charge=15.5, current=math.nan)))
-        assert told(30)['energy_left_wh'] == 'inf'
+        assert told(7020)['energy_left_wh'] == 'inf'
         node.on_battery(b'no battery')
-        assert told(40)['energy_left_wh'] == 'inf'
+        assert told(7030)['energy_left_wh'] == 'inf'
     finally:
         node.close()
         node.destroy_node()

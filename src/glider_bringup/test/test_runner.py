@@ -40,6 +40,7 @@ say()
 end = time.monotonic() + {seconds}
 while not stop and time.monotonic() < end:
     time.sleep(0.01)
+time.sleep({writing})
 say(complete=not stop, counts={{}})
 """
 
@@ -52,8 +53,8 @@ def node(setup: str = CALM, loop: str = 'pass') -> list[str]:
     return python(WAIT.format(setup=setup, loop=loop))
 
 
-def recorder(seconds: float = 1e9) -> list[str]:
-    return python(RECORD.format(seconds=seconds))
+def recorder(seconds: float = 1e9, writing: float = 0.0) -> list[str]:
+    return python(RECORD.format(seconds=seconds, writing=writing))
 
 
 def after(seconds: float, action: str) -> list[str]:
@@ -163,6 +164,14 @@ def test_deaf_node_is_killed(fly):
     result, _ = fly(commands)
     assert result.culprit == PLANT
     assert time.monotonic() - started < 30.0, 'it waited for a time-out'
+
+
+def test_recorder_that_writes_for_seconds_is_waited_for(fly):
+    """Any other process that does not leave is killed after three."""
+    commands = {RECORDER: recorder(writing=4.0), PLANT: after(0.3, LEAVE)}
+    result, _ = fly(commands)
+    assert (result.status, result.culprit) == ('failed', PLANT)
+    assert result.progress['complete'] is False
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])

@@ -41,14 +41,18 @@ _AFTER_INLINING = (
 _SMALL = 275
 
 
+def _blocks_of(module):
+    return sum(1 for function in module.functions for _ in function.blocks)
+
+
 class _Library(JITCodeLibrary):
     """Code of a kernel. The engine that makes machine code never gets one that is inlined."""
 
     is_kernel = is_inlined = False
 
     def _optimize_final_module(self):
-        blocks = sum(1 for function in self._final_module.functions for _ in function.blocks)
-        if self.is_inlined or not self.is_kernel or blocks < _LARGE:
+        is_run = self.is_kernel and not self.is_inlined
+        if not is_run or _blocks_of(self._final_module) < _LARGE:
             return super()._optimize_final_module()
         passes = ll.create_module_pass_manager()
         passes.add_target_library_info(ll.get_process_triple())

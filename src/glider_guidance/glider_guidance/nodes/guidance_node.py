@@ -18,7 +18,7 @@ from glider_base.ros.wire.codec import MessageError
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS, Battery, Water
-from glider_base.wiring import MAP, WHEN_SILENT
+from glider_base.wiring import MAP, SLOW_S, WHEN_SILENT
 from glider_guidance.block import GUIDANCE
 from glider_guidance.order import Order
 from glider_guidance.orders import changed, due, reaction
@@ -51,7 +51,7 @@ class GuidanceNode(BlockNode):
         super().forget()
         self.waiting, self.first_ns = list(self.settings.orders), None
         self.answer = ''  #: to the last order
-        self.battery = Battery(*WHEN_SILENT['battery'])
+        self.battery, self.battery_ns = Battery(*WHEN_SILENT['battery']), 0  #: and when it said so
 
     def tell_path(self, stamp_ns: int) -> None:
         """Publish the path that is followed from a tick on."""
@@ -80,16 +80,18 @@ class GuidanceNode(BlockNode):
     def on_battery(self, raw: bytes) -> None:
         """Remember what the battery says: nothing, if a number of it is NaN or it is damaged."""
         try:
-            values = TOPICS['battery'].codec.decode(raw)[1]
+            self.battery_ns, values = TOPICS['battery'].codec.decode(raw)
         except MessageError:
             values = WHEN_SILENT['battery']
         self.battery = Battery(*values)
 
     def tell_status(self, stamp_ns: int) -> None:
         """Publish how the mission goes, once a second."""
+        is_silent = stamp_ns - self.battery_ns > SLOW_S['battery'] * SECOND_NS
+        battery = Battery(*WHEN_SILENT['battery']) if is_silent else self.battery
         told = {
             name: value if isinstance(value, str | int) else round(value, 3)
-            for name, value in status_of(self.state, self.params, self.battery)._asdict().items()
+            for name, value in status_of(self.state, self.params, battery)._asdict().items()
         }
         said, name = self.block.say(*self.flags), self.get_fully_qualified_name()
         values = {**told, 'order': self.answer}
