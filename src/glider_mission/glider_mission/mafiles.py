@@ -313,6 +313,17 @@ def _value(name: str, of: _Of, where: str, value: float) -> float:
     return int(made) if is_whole else made
 
 
+def from_folder(values: Any, folder: Path) -> Any:
+    """Values of a scenario's file, with the paths of a Slocum's files from the folder it is in."""
+    if isinstance(values, str):
+        return str(folder / values) if values.lower().endswith(SUFFIX) else values
+    if isinstance(values, list):
+        return [from_folder(value, folder) for value in values]
+    if isinstance(values, dict):
+        return {name: from_folder(value, folder) for name, value in values.items()}
+    return values
+
+
 def with_mafiles(profile: Any) -> Any:
     """A profile as a person wrote it, with what its files say in place of their names.
 

@@ -39,7 +39,7 @@ from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.chart import charted, in_metres
 from glider_mission.mafiles import FIELD as MAFILES
-from glider_mission.mafiles import read_profile, with_mafiles
+from glider_mission.mafiles import from_folder, read_profile, with_mafiles
 from glider_mission.rules import Rules
 from glider_model.ocean.bottom import BathymetrySettings
 from glider_model.ocean.current_settings import CurrentSettings, SumOfCurrents
@@ -459,7 +459,7 @@ def read_scenario(name: str = DEFAULT_SCENARIO) -> ScenarioSource:
     Errors are those of `scenario_path` and `read_yaml`.
     """
     path = scenario_path(name)
-    values = read_yaml(path)
+    values = from_folder(read_yaml(path), path.parent)
     values.setdefault('name', path.stem)
     return ScenarioSource(path, values)
 

@@ -218,6 +218,23 @@ def test_a_field_is_said_once_and_a_run_does_not_need_the_files(write, tmp_path)
     assert load_scenario(str(scenario)) == read
 
 
+def test_files_of_a_scenario_lie_beside_it_wherever_it_is_flown_from(write, tmp_path, monkeypatch):
+    places = [(36.1, 122.0), (36.2, 122.1)]
+    for name, text in mafiles('a mission', places, ProfileSettings()).items():
+        (tmp_path / name).write_text(text)
+    scenario, path = tmp_path / 's.yaml', 'path: {kind: waypoints, waypoints_latlon: goto_l10.ma}'
+    order = 'orders: [{at_s: 60, path: {kind: waypoints, waypoints_latlon: goto_l10.ma}}]'
+    scenario.write_text(f'{path}\n{order}\nprofile: {{mafiles: [yo10.ma, surfac10.ma]}}\n')
+    (tmp_path / 'elsewhere').mkdir()
+    monkeypatch.chdir(tmp_path / 'elsewhere')
+    flown = load_scenario(scenario)
+    assert flown.path.waypoints_latlon == [(36.1, 122.0), (36.2, 122.1)]
+    assert flown.orders[0].path.waypoints == flown.path.waypoints
+    (tmp_path / 'yo10.ma').unlink()
+    with pytest.raises(ConfigurationError, match=str(tmp_path / 'yo10.ma')):
+        load_scenario(scenario)
+
+
 def test_a_mission_goes_to_the_waypoints_of_a_list(write):
     places = [(47.5, -52.5), (47.51, -52.49), (47.52, -52.5)]
     files = mafiles('a mission', places, ProfileSettings())
