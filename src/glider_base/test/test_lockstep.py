@@ -11,7 +11,7 @@ import time
 from collections import Counter, defaultdict
 
 import pytest
-import rclpy
+import rclpy.clock
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import SetParameters
@@ -787,7 +787,7 @@ def test_diagnostics_of_another_namespace_do_not_concern_a_glider(name, namespac
 
 
 def test_every_message_is_told_by_whom_whatever_else_there_is_to_do(context):
-    """A stranger is told apart by that alone, and timers are a matter of rclpy."""
+    """A stranger is told apart by that alone, and timers in no gate are a matter of rclpy."""
     node, gate, infos = rclpy.create_node('listener', context=context), Gate(), []
     node.create_subscription(
         *(Header, 'words', lambda raw, info: infos.append(info), 10),
@@ -815,6 +815,37 @@ def test_every_message_is_told_by_whom_whatever_else_there_is_to_do(context):
     node.destroy_node()
     assert len(infos) >= 2000
     assert all(info.get(GID) for info in infos)
+
+
+def test_timers_in_a_gate_are_called_until_they_are_destroyed_or_cancelled(context):
+    node, called = rclpy.create_node('ringing', context=context), Counter()
+
+    def ring(name: str, then=lambda: None):
+        def act() -> None:
+            called[name] += 1
+            then()
+
+        return node.create_timer(0.002, act, gate, clock=clock)
+
+    def end_others() -> None:
+        if called['first'] == 10:
+            node.destroy_timer(destroyed)
+            cancelled.cancel()
+            called['before'] = called['destroyed'] + called['cancelled']
+            ring('new')
+
+    gate = Gate()
+    clock = rclpy.clock.Clock(clock_type=rclpy.clock.ClockType.STEADY_TIME)
+    ring('first', end_others)
+    destroyed, cancelled = ring('destroyed'), ring('cancelled')
+    with make_executor(context=context) as executor:
+        executor.add_node(node)
+        end = time.monotonic() + 60.0
+        while min(called['first'], 2 * called['new']) < 40 and time.monotonic() < end:
+            executor.spin_once(timeout_sec=0.1)
+    node.destroy_node()
+    assert called['new'] >= 20
+    assert 0 < called['before'] == called['destroyed'] + called['cancelled']
 
 
 def test_who_was_woken_before_its_context_was_shut_down_does_not_wait_for_ever(context):

@@ -12,6 +12,7 @@ from std_srvs.srv import Trigger
 from glider_base.frames import water_to_wire
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
+from glider_base.ros.lockstep.executor import take
 from glider_base.ros.lockstep.process import run
 from glider_base.ros.wire import qos
 from glider_base.ros.wire.codec import MessageError
@@ -40,9 +41,9 @@ class GuidanceNode(BlockNode):
         self.create_service(Trigger, 'abort', self.on_abort)
         self.publish_path = self.add_output('path')
         self.publish_status, self.second = self.add_output('mission/status'), -1
-        # for the status alone: no input, as nothing is steered by it
+        # for the status alone: no input, as nothing is steered by it, and taken when it is told
         heard = None if self.ticks.lockstep else qos.FREE
-        self._subscription(TOPICS['battery'], self.on_battery, gated=False, profile=heard)
+        self.hears_battery = self._subscription(TOPICS['battery'], self.on_battery, profile=heard)
         self.tell_path(0)
         self.start_up()
 
@@ -87,6 +88,8 @@ class GuidanceNode(BlockNode):
 
     def tell_status(self, stamp_ns: int) -> None:
         """Publish how the mission goes, once a second."""
+        while (raw := take(self.hears_battery)) is not None:
+            self.on_battery(raw)
         is_silent = stamp_ns - self.battery_ns > SLOW_S['battery'] * SECOND_NS
         battery = Battery(*WHEN_SILENT['battery']) if is_silent else self.battery
         told = {

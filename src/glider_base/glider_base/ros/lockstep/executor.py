@@ -3,8 +3,8 @@
 """An executor that spends little on a message, and what nodes need to go with it.
 
 The executors of rclpy make a new wait set of all entities for each message, which costs more than
-everything else in a tick. `TickExecutor` keeps its wait set, hands messages of `Gate`
-subscriptions straight to their callbacks, and leaves all that is rare (timers, services,
+everything else in a tick. `TickExecutor` keeps its wait set, hands messages of subscriptions in a
+`Gate` straight to their callbacks, calls timers in one, and leaves all that is rare (services,
 parameters, shutdown) to rclpy. A node waits for one input only, the one that comes last in a tick,
 and takes the others by hand when that one is there.
 
@@ -17,8 +17,10 @@ from contextlib import ExitStack
 from functools import cache
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.subscription import Subscription
+from rclpy.timer import Timer
 
 from glider_base.ros.hearing import gids
 
@@ -31,6 +33,8 @@ except ImportError:
 #: in a node.
 _RARE = {'timers': 'timer', 'services': 'service', 'clients': 'client'}
 _GUARDS = ('_guard', '_sigint_gc')
+#: Kinds of what is ready, of which none is in a gate.
+_RARELY = ('guard_condition', 'service', 'client')
 _MESSAGE_ONLY = Subscription.CallbackType.MessageOnly
 #: Waits no longer (s) than this, then looks whether its context is still good. rclpy answers a
 #: signal by waking executors first and shutting contexts down after: one that was quicker would
@@ -53,7 +57,7 @@ def can_wait() -> bool:
 
 
 class Gate(CallbackGroup):
-    """Lets the executor wait for the subscriptions in ``awaited`` only."""
+    """Lets the executor wait for the subscriptions in ``awaited`` only, and for all timers."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -61,8 +65,8 @@ class Gate(CallbackGroup):
         self._is_open = not can_take()
 
     def can_execute(self, entity) -> bool:
-        """Whether the executor shall wait for this subscription."""
-        return self._is_open or entity in self.awaited
+        """Whether the executor shall wait for it."""
+        return self._is_open or entity in self.awaited or isinstance(entity, Timer)
 
     def beginning_execution(self, entity) -> bool:
         """Nothing to hold back: there is one thread."""
@@ -92,6 +96,18 @@ def take(subscription: Subscription):
     return None if taken is None else taken[0]
 
 
+def _call(timer: Timer) -> bool:
+    """Begin the next period of a timer; not if a callback has ended or cancelled it meanwhile."""
+    try:
+        with timer.handle:
+            is_due = timer.is_ready()
+            if is_due:
+                timer.handle.call_timer()
+    except InvalidHandle:
+        return False
+    return is_due
+
+
 def make_executor(**kwargs) -> SingleThreadedExecutor:
     """A `TickExecutor`, or what comes closest to it in this rclpy."""
     if can_take() and can_wait():
@@ -109,21 +125,26 @@ class TickExecutor(SingleThreadedExecutor):
         self._wait_set = None
         self._in_use = ExitStack()
         self._gated: list[Subscription] = []
+        self._timers: list[Timer] = []
         self._others: list[tuple] = []
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Wait for something to do, and do it."""
         if self._wait_set is None:
             self._gather()
-        ready, is_other_ready = self._wait(timeout_sec)
+        ready, due, is_other_ready = self._wait(timeout_sec)
         for subscription in ready:
             taken = take_with_info(subscription)
             if taken is not None:
                 wants_info = subscription._callback_type is not _MESSAGE_ONLY
                 subscription.callback(*(taken if wants_info else taken[:1]))
-        if is_other_ready or not ready:
+        if is_other_ready or not (ready or due):
             self._scatter()
             super().spin_once(timeout_sec=0.0)
+            return
+        for timer in due:
+            if _call(timer):
+                timer.callback()
 
     def can_execute(self, entity) -> bool:
         """Whether rclpy may see to it: not to what is in a gate, it would not tell by whom."""
@@ -148,7 +169,10 @@ class TickExecutor(SingleThreadedExecutor):
                 else:
                     rare.append(('subscription', subscription.handle))
             for collection, kind in _RARE.items():
-                rare += [(kind, entity.handle) for entity in getattr(node, collection)]
+                for entity in getattr(node, collection):
+                    if kind == 'timer' and isinstance(entity.callback_group, Gate):
+                        self._timers.append(entity)
+                    rare.append((kind, entity.handle))
         kinds = [kind for kind, _ in rare] + ['subscription'] * len(self._gated)
         handles = [handle for _, handle in rare] + [item.handle for item in self._gated]
         for handle in [*handles, self.context.handle]:
@@ -160,11 +184,14 @@ class TickExecutor(SingleThreadedExecutor):
 
     def _scatter(self) -> None:
         """Forget the wait set, and let go of what was in it."""
-        self._wait_set, self._others, self._gated = None, [], []
+        self._wait_set, self._others, self._gated, self._timers = None, [], [], []
         self._in_use.close()
 
-    def _wait(self, timeout_sec: float | None) -> tuple[list[Subscription], bool]:
-        """Wait until something is ready: the gated subscriptions, and whether others are."""
+    def _wait(self, timeout_sec: float | None) -> tuple[list[Subscription], list[Timer], bool]:
+        """Wait until something is ready: what is so in gates, and whether anything else is.
+
+        Of a timer that was destroyed a guard condition tells: it is not asked again.
+        """
         wait_set = self._wait_set
         wait_set.clear_entities()
         gated = [item for item in self._gated if item.callback_group.can_execute(item)]
@@ -173,9 +200,12 @@ class TickExecutor(SingleThreadedExecutor):
         for add, handle in self._others:
             add(handle)
         wait_set.wait(int(1e9 * (_LOOK_S if timeout_sec is None else timeout_sec)))
-        pointers = set(wait_set.get_ready_entities('subscription'))
-        ready = [item for item in gated if item.handle.pointer in pointers]
-        is_other_ready = len(ready) < len(pointers) or any(
-            wait_set.get_ready_entities(kind) for kind in ('guard_condition', *_RARE.values())
+        came, rang = (set(wait_set.get_ready_entities(kind)) for kind in ('subscription', 'timer'))
+        ready = [item for item in gated if item.handle.pointer in came]
+        due = [item for item in self._timers if item.handle.pointer in rang] if rang else []
+        is_other_ready = (
+            len(ready) < len(came)
+            or len(due) < len(rang)
+            or any(wait_set.get_ready_entities(kind) for kind in _RARELY)
         )
-        return ready, is_other_ready
+        return ready, due, is_other_ready

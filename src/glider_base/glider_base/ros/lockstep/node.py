@@ -228,7 +228,7 @@ class TickNode(Node):
 
     def wall_timer(self, period_s: float, callback):
         """Timer on the steady clock, whatever use_sim_time says."""
-        return self.create_timer(period_s, callback, clock=self.steady_clock)
+        return self.create_timer(period_s, callback, self.gate, clock=self.steady_clock)
 
     # ------------------------------------------------------------------ start
 

@@ -42,7 +42,7 @@ class StepNode(TickNode):
     def begin(self) -> None:
         """Act at 10 Hz from now on, in the free-running mode."""
         self._cycle_s = None
-        self._timer = self.create_timer(TICK_S, self._on_cycle, clock=self.cycle_clock)
+        self._timer = self.create_timer(TICK_S, self._on_cycle, self.gate, clock=self.cycle_clock)
 
     def pause(self) -> None:
         """Act no more, until `begin`."""
