@@ -4,6 +4,7 @@
 
 import gc
 import signal
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -12,6 +13,35 @@ gc.set_threshold(100_000)  # what is imported and compiled stays
 # an example may wait for a compiler, or for a processor that others use
 settings.register_profile('glider', deadline=None)
 settings.load_profile('glider')
+
+
+#: Files of tests that take longest, by name: they are begun first. Those of `FLIGHT` share a flight
+#: and are run by one process, one after the other.
+FLIGHT = ('bag_readers', 'nodes_and_direct', 'report_page', 'verify_flights')
+LONG = (
+    *('tutorial', 'random_faults', 'my_law', *FLIGHT, 'faults', 'autopilot', 'not_finite'),
+    *('experiments_command', 'door', 'rudder', 'orders', 'slow_machine', 'two_gliders', 'kills'),
+    *('message_faults', 'lockstep', 'validate', 'forecasts', 'model_water', 'failing_parts'),
+)
+
+
+def pytest_collection_modifyitems(items):
+    """Put the longest first, that no process is left with one at the end."""
+    order = {f'test_{name}.py': number for number, name in enumerate(LONG)}
+    items.sort(key=lambda item: order.get(item.path.name, len(LONG)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Give each process whole files, and all of `FLIGHT` to one."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Files(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            name = nodeid.partition('::')[0]
+            return 'flight' if Path(name).stem.removeprefix('test_') in FLIGHT else name
+
+    return Files(config, log)
 
 
 @pytest.fixture
