@@ -15,13 +15,14 @@ settings.register_profile('glider', deadline=None)
 settings.load_profile('glider')
 
 
-#: Files of tests that take longest, by name: they are begun first. Those of `FLIGHT` share a flight
-#: and are run by one process, one after the other.
+#: Files of tests that take longest, by name: they are begun first. Those of `FLIGHT` share a
+#: flight, and are run by one process, one after the other.
 FLIGHT = ('bag_readers', 'nodes_and_direct', 'report_page', 'verify_flights')
 LONG = (
-    *('tutorial', 'random_faults', 'my_law', *FLIGHT, 'faults', 'autopilot', 'not_finite'),
-    *('experiments_command', 'door', 'rudder', 'orders', 'slow_machine', 'two_gliders', 'kills'),
-    *('message_faults', 'lockstep', 'validate', 'forecasts', 'model_water', 'failing_parts'),
+    *('tutorial', *FLIGHT, 'my_law', 'faults', 'autopilot', 'not_finite', 'random_faults'),
+    *('replay', 'door', 'rudder', 'own_sensors', 'your_vehicle', 'experiments_command'),
+    *('montecarlo', 'kills', 'failing_parts', 'lockstep', 'sweep', 'slow_machine'),
+    *('flight_digests', 'verify', 'two_gliders', 'bottom', 'runner', 'validate', 'mutants'),
 )
 
 

@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Imported where commands are forked (`command_line`): they need not load it again."""
 
+import gc
+
 import glider_studies.workers  # noqa: F401  # Dask takes longest of all
 from glider_bringup.warm_up import fly_one_tick, score_nothing
 
 fly_one_tick()
 score_nothing()
+gc.freeze()  # a copy that looked for garbage in all that would copy it

@@ -38,7 +38,8 @@ from glider_base.settings import Settings, number
 from glider_base.signals import TICK_NS, not_finite
 from glider_base.wiring import WHEN_SILENT
 
-_STARTUP_PERIOD_S = 0.03
+#: A node looks for its peers this often (s), and after a while in so small a share of its wait.
+_STARTUP_PERIOD_S, _STARTUP_SHARE = 0.03, 0.02
 #: A node in lockstep says after so many ticks how many events it has told of.
 COUNT_TICKS = 64
 #: Who starts a node by hand is told what it waits for, after this time and then this often (s).
@@ -263,7 +264,10 @@ class TickNode(Node):
             if self._said != missing[0]:
                 self._said = missing[0]
                 self.report(health.STARTING, missing[0])
-            if time.monotonic() - self._created_s > _PATIENCE_S:
+            waited_s = time.monotonic() - self._created_s
+            period_s = max(_STARTUP_PERIOD_S, min(1.0, _STARTUP_SHARE * waited_s))
+            self._startup_timer.timer_period_ns = int(1e9 * period_s)
+            if waited_s > _PATIENCE_S:
                 self.get_logger().warning(
                     f'waits for its peers: {"; ".join(missing)}', throttle_duration_sec=_REMIND_S
                 )
