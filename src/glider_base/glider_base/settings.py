@@ -5,6 +5,7 @@
 import math
 import re
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin
 
@@ -319,7 +320,12 @@ def _refuse_flags_for_numbers(model: type[Settings], values: Any, source: str) -
 
 def file_names(folder: Path) -> list[str]:
     """Names of the YAML files that come with a package in ``folder``."""
-    return sorted(path.stem for path in folder.glob('*.yaml'))
+    return [*_stems(folder)]
+
+
+@cache
+def _stems(folder: Path) -> tuple[str, ...]:
+    return tuple(sorted(path.stem for path in folder.glob('*.yaml')))
 
 
 def find_file(what: str, name: str, folder: Path) -> Path:

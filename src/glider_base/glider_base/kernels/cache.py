@@ -205,12 +205,15 @@ class KernelCache(FunctionCache):
 
         Classes of a notebook, the program itself and functions are made anew in each session.
         """
-        classes = list(_classes(getattr(sig, 'args', sig)))
+        kinds = getattr(sig, 'args', sig)
+        classes = list(_classes(kinds))
         if any(one.__module__ == '__main__' or '<locals>' in one.__qualname__ for one in classes):
             return False
         modules = {one.__module__ for one in classes} | {self._py_func.__module__}
         digest = closure(frozenset(modules), len(BODIES), len(HOLDERS))
-        name = f'{self._impl.filename_base}{self._ending}.{digest}'
+        own = hashlib.sha256(' '.join(kind.name for kind in kinds).encode()).hexdigest()[:16]
+        # an index of one signature: of all that are in it numba makes the types
+        name = f'{self._impl.filename_base}{self._ending}.{digest}.{own}'
         self._cache_file = IndexDataCacheFile(self._cache_path, name, digest)
         return True
 

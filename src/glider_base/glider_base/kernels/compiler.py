@@ -4,9 +4,11 @@
 
 A kernel that others call is inlined by them, so that no machine code of its own is ever run. numba
 makes it all the same. For each tuple that is bound to a name numba takes apart all numbers in it,
-to count references, though there are none in most. And what has been inlined is optimised as if it
-were new: in the loop of a flight are hundreds of numbers that change, and LLVM rewrites them all
-for each pass over loops, though what loops there are within have been dealt with in their kernels.
+to count references, though there are none in most. Of each class of tuples it asks whether it is
+any of the kinds of values that it knows, before it takes it for what it is. And what has been
+inlined is optimised as if it were new: in the loop of a flight are hundreds of numbers that
+change, and LLVM rewrites them all for each pass over loops, though what loops there are within
+have been dealt with in their kernels.
 
 All of that stands on what is not public in numba. With any other numba than the one that they were
 written for, kernels are compiled as numba does it. With any of them, Python looks for no garbage
@@ -23,6 +25,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.environment import lookup_environment
 from numba.core.runtime.context import NRTContext
 from numba.core.typed_passes import NativeLowering
+from numba.core.typing import typeof
 
 WRITTEN_FOR = '0.61.'
 #: Kind of a library in the cache; how names of environments of functions begin in a module.
@@ -150,6 +153,16 @@ def _meminfos_if_any(self, builder, kind, value):
     return _meminfos(self, builder, kind, value) if _is_counted[kind] else []
 
 
+_typeof_of_any = typeof.typeof_impl
+_typeof_of_tuple = _typeof_of_any.dispatch(tuple)
+
+
+def _typeof(value, context):
+    """Type of a value; of a tuple without asking of its class whether it is any other kind."""
+    of = _typeof_of_tuple if isinstance(value, tuple) else _typeof_of_any
+    return of(value, context)
+
+
 class _Uncollected(event.Listener):
     """Has Python look for no garbage from the outermost compilation's start to its end."""
 
@@ -175,3 +188,4 @@ if numba.__version__.startswith(WRITTEN_FOR):
     OPTIONS['pipeline_class'] = KernelCompiler
     JITCPUCodegen._library_class = _Library  # also of what is read from the cache
     NRTContext.get_meminfos = _meminfos_if_any
+    typeof.typeof_impl = _typeof
