@@ -7,11 +7,31 @@ import os
 import subprocess
 import sys
 
+from typing import NamedTuple
+
 import numba
 import pytest
-from numba.core import event
+from numba.core import event, types
 
 from glider_base.kernel import compiling_told
+
+
+class Inner(NamedTuple):
+    x: float
+    both: tuple[int, int]
+
+
+class Outer(NamedTuple):
+    inner: Inner
+    told: bool
+
+
+def test_tuples_have_the_types_that_numba_says_they_have():
+    inner = types.NamedTuple((types.float64, types.UniTuple(types.intp, 2)), Inner)
+    assert numba.typeof(Outer(Inner(0.5, (1, 2)), True)) == types.NamedTuple(
+        (inner, types.boolean), Outer
+    )
+    assert numba.typeof((1, 0.5)) == types.Tuple((types.intp, types.float64))
 
 
 def make_halves():

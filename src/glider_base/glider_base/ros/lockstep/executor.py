@@ -138,13 +138,12 @@ class TickExecutor(SingleThreadedExecutor):
             if taken is not None:
                 wants_info = subscription._callback_type is not _MESSAGE_ONLY
                 subscription.callback(*(taken if wants_info else taken[:1]))
-        if is_other_ready or not (ready or due):
-            self._scatter()
-            super().spin_once(timeout_sec=0.0)
-            return
         for timer in due:
             if _call(timer):
                 timer.callback()
+        if is_other_ready or not (ready or due):
+            self._scatter()
+            super().spin_once(timeout_sec=0.0)
 
     def can_execute(self, entity) -> bool:
         """Whether rclpy may see to it: not to what is in a gate, it would not tell by whom."""
@@ -188,10 +187,7 @@ class TickExecutor(SingleThreadedExecutor):
         self._in_use.close()
 
     def _wait(self, timeout_sec: float | None) -> tuple[list[Subscription], list[Timer], bool]:
-        """Wait until something is ready: what is so in gates, and whether anything else is.
-
-        Of a timer that was destroyed a guard condition tells: it is not asked again.
-        """
+        """Wait until something is ready: what is so in gates, and whether anything else is."""
         wait_set = self._wait_set
         wait_set.clear_entities()
         gated = [item for item in self._gated if item.callback_group.can_execute(item)]
