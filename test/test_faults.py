@@ -29,8 +29,7 @@ PER_TICK = [
     topic.full_name('/glider') for topic in recorded_topics(['measured_odom']) if topic.per_tick
 ]
 START_S = 200.0  #: for the processes to come up, at worst with every kernel to compile
-#: Within which a run ends by itself: the runner gives nodes 5 s and the recorder 13 s, and scores.
-STOP_S = 30.0
+STOP_S = 10.0  #: within which a run ends by itself
 TICK_TIMEOUT_S = 5.0  #: after which the plant gives up a node that is silent
 FLOWN_BYTES = 300_000  #: of recording: several chunks are on disk
 

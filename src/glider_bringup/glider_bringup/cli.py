@@ -179,7 +179,7 @@ def main() -> int:
     except OSError as error:
         _tell(f'{error.filename or "input or output"}: {error.strerror or error}'[:MAX_LINE])
         code = EXIT_USAGE if error.errno in _USAGE else EXIT_FAILED
-    gc.freeze()  # nor at the end
+    gc.freeze()  # no use in looking through it at the end either
     return code if _flushed() else code or EXIT_FAILED
 
 

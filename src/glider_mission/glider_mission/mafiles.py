@@ -27,6 +27,8 @@ SUFFIX = '.ma'
 REACHED_M = 100.0
 #: Field of a profile that names such files.
 FIELD = 'mafiles'
+#: Field of a path that may name a goto list.
+PLACES = 'waypoints_latlon'
 #: Degrees, and kg, that are read are rounded to so many decimals, so that 30 deg come back.
 _DECIMALS = 9
 #: Latitudes and longitudes (deg) likewise: 11 micrometres.
@@ -313,14 +315,21 @@ def _value(name: str, of: _Of, where: str, value: float) -> float:
     return int(made) if is_whole else made
 
 
-def from_folder(values: Any, folder: Path) -> Any:
-    """Values of a scenario's file, with the paths of a Slocum's files from the folder it is in."""
+def from_folder(values: Any, folder: Path, is_named: bool = False) -> Any:
+    """Values of a scenario's file, with the paths of a Slocum's files from the folder it is in.
+
+    What ``is_named`` stands in a field that names such files.
+    """
     if isinstance(values, str):
-        return str(folder / values) if values.lower().endswith(SUFFIX) else values
+        is_file = is_named and values.lower().endswith(SUFFIX)
+        return str(folder / values) if is_file else values
     if isinstance(values, list):
-        return [from_folder(value, folder) for value in values]
+        return [from_folder(value, folder, is_named) for value in values]
     if isinstance(values, dict):
-        return {name: from_folder(value, folder) for name, value in values.items()}
+        return {
+            name: from_folder(value, folder, name in (FIELD, PLACES))
+            for name, value in values.items()
+        }
     return values
 
 

@@ -224,10 +224,12 @@ def test_files_of_a_scenario_lie_beside_it_wherever_it_is_flown_from(write, tmp_
         (tmp_path / name).write_text(text)
     scenario, path = tmp_path / 's.yaml', 'path: {kind: waypoints, waypoints_latlon: goto_l10.ma}'
     order = 'orders: [{at_s: 60, path: {kind: waypoints, waypoints_latlon: goto_l10.ma}}]'
-    scenario.write_text(f'{path}\n{order}\nprofile: {{mafiles: [yo10.ma, surfac10.ma]}}\n')
+    profile = 'profile: {mafiles: [yo10.ma, surfac10.ma]}'
+    scenario.write_text(f'description: as in yo10.ma\n{path}\n{order}\n{profile}\n')
     (tmp_path / 'elsewhere').mkdir()
     monkeypatch.chdir(tmp_path / 'elsewhere')
     flown = load_scenario(scenario)
+    assert flown.description == 'as in yo10.ma'
     assert flown.path.waypoints_latlon == [(36.1, 122.0), (36.2, 122.1)]
     assert flown.orders[0].path.waypoints == flown.path.waypoints
     (tmp_path / 'yo10.ma').unlink()

@@ -29,8 +29,8 @@ try:
 except ImportError:
     _rclpy = None
 
-#: Kinds of entities that `TickExecutor` waits for and does not handle itself, by their collection
-#: in a node.
+#: Kinds of entities beside subscriptions, by their collection in a node. Of these `TickExecutor`
+#: handles itself what is a timer and in a gate.
 _RARE = {'timers': 'timer', 'services': 'service', 'clients': 'client'}
 _GUARDS = ('_guard', '_sigint_gc')
 #: Kinds of what is ready, of which none is in a gate.
