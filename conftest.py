@@ -15,14 +15,14 @@ settings.register_profile('glider', deadline=None)
 settings.load_profile('glider')
 
 
-#: Files of tests that take longest, by name: they are begun first. Those of `FLIGHT` share a
-#: flight, and are run by one process, one after the other.
+#: Files of tests that take longest, by name: they are begun first, those that start many processes
+#: beside others that do not. Those of `FLIGHT` share a flight, and are run by one process.
 FLIGHT = ('bag_readers', 'nodes_and_direct', 'report_page', 'verify_flights')
 LONG = (
-    *('tutorial', *FLIGHT, 'my_law', 'faults', 'autopilot', 'not_finite', 'random_faults'),
-    *('replay', 'door', 'rudder', 'own_sensors', 'your_vehicle', 'experiments_command'),
-    *('montecarlo', 'kills', 'failing_parts', 'lockstep', 'sweep', 'slow_machine'),
-    *('flight_digests', 'verify', 'two_gliders', 'bottom', 'runner', 'validate', 'mutants'),
+    *('tutorial', *FLIGHT, 'my_law', 'not_finite', 'random_faults', 'failing_parts', 'faults'),
+    *('autopilot', 'validate', 'replay', 'door', 'own_sensors', 'flight_digests', 'your_vehicle'),
+    *('experiments_command', 'rudder', 'bottom', 'kills', 'montecarlo', 'lockstep', 'sweep'),
+    *('slow_machine', 'verify', 'two_gliders', 'guard_flights', 'runner', 'mutants'),
 )
 
 
