@@ -34,13 +34,16 @@ from glider_mission.choices import Combination
 TASKS_AHEAD = 2
 #: How long a scheduler may take to answer, and how often it is looked at (s).
 CONNECT_S, LOOK_S = 5.0, 2.0
-#: Workers of this machine log nothing: what matters is told by the commands. A task whose worker
-#: died is given to one more before it is tried by itself.
+#: A task whose worker died is given to one more before it is tried by itself.
 _CONFIG = {
-    'distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED': 'critical',
     'distributed.scheduler.allowed-failures': 1,
     'distributed.worker.multiprocessing-method': 'forkserver',
 }
+
+# Here and in workers, which are copies of a process that has imported this, Dask logs nothing:
+# what matters is told by the commands.
+for _name in ('distributed', 'distributed.client', 'tornado.application'):
+    logging.getLogger(_name).setLevel(logging.CRITICAL)
 
 WORKER_DIED = 'the worker process died each time it flew this'
 SCHEDULER_GONE = 'the scheduler of the workers is gone'
@@ -206,6 +209,7 @@ def _local_cluster(workers: int, folder: str) -> LocalCluster:
         dashboard_address='127.0.0.1:0',
         memory_limit=0,  # a worker that nears a limit would pause for good
         local_directory=folder,
+        silence_logs=logging.CRITICAL,
     )
 
 
@@ -223,8 +227,6 @@ def worker_pool(
     which they will fly, are compiled here, so that workers of this machine do not all compile the
     same; ``tell`` gets a line then. Raises ConfigurationError if no scheduler answers.
     """
-    for name in ('distributed', 'distributed.client', 'tornado.application'):
-        logging.getLogger(name).setLevel(logging.CRITICAL)
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(_CONFIG))
         if scheduler is None:

@@ -3,6 +3,7 @@
 """Sweeps as a person flies them: the same file whatever happens on the way."""
 
 import json
+import logging
 import math
 import os
 import random
@@ -260,6 +261,15 @@ def test_task_that_kills_its_workers_is_given_up_and_the_others_are_done():
     done = {tuple(outcome.task): outcome.result for outcome in outcomes if not outcome.died}
     assert sum(done.values()) == sum(sum(task) for task in tasks) - 3
     assert all(result == sum(task) for task, result in done.items())
+
+
+def test_what_dask_logs_in_a_worker_is_not_for_the_person():
+    def heard(name):
+        return logging.getLogger(name).isEnabledFor(logging.WARNING)
+
+    names = 'distributed.worker.state_machine', 'distributed.nanny', 'tornado.application'
+    with worker_pool(1) as workers:
+        assert [outcome.result for outcome in workers.outcomes(heard, names)] == [False] * 3
 
 
 def test_no_scheduler_at_the_address(tmp_path, monkeypatch, capsys):
