@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-gc.set_threshold(100_000)  # what is imported and compiled stays
+import command_line
+
+gc.set_threshold(500_000)  # what is imported and compiled stays
 # an example may wait for a compiler, or for a processor that others use
 settings.register_profile('glider', deadline=None)
 settings.load_profile('glider')
@@ -27,8 +29,12 @@ LONG = (
 
 
 def pytest_configure(config):
-    """Have each process begin to collect elsewhere: pytest rewrites a new file in the first one."""
+    """Have each process begin to collect elsewhere: pytest rewrites a new file in the first one.
+
+    What commands are forked from begins meanwhile, before a test has workers of Dask forked.
+    """
     if hasattr(config, 'workerinput'):
+        command_line.forks()
         own = config.workerinput
         begin = len(config.args) * int(own['workerid'][2:]) // own['workercount']
         config.args[:] = config.args[begin:] + config.args[:begin]

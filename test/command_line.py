@@ -52,7 +52,7 @@ def glider(*arguments, columns=160, timeout=300.0, preexec_fn=None, **variables)
 
 
 @cache
-def _forks():
+def forks():
     """Context of processes that are forked, its server running."""
     context = multiprocessing.get_context('forkserver')
     context.set_forkserver_preload([LOADED])
@@ -94,7 +94,7 @@ class Started:
     def __init__(self, words, env, folder, module='glider_bringup.cli', preexec_fn=None) -> None:
         self._files = [Path(folder) / name for name in ('stdout', 'stderr')]
         how = list(map(str, words)), env, os.getcwd(), self._files, module, preexec_fn
-        self._process = _forks().Process(target=_become, args=how)
+        self._process = forks().Process(target=_become, args=how)
         self._process.start()
         self.pid = self._process.pid
 
