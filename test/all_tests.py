@@ -24,7 +24,7 @@ LANES = {
 }
 #: All of them, file by file, so many at a time: processors have something to do while one waits.
 ALL = (
-    *('-m', 'pytest', '--numprocesses=3', '--dist=loadfile', '--no-loadscope-reorder'),
+    *('-m', 'pytest', '--numprocesses=4', '--dist=loadfile', '--no-loadscope-reorder'),
     *(str(path) for path in (ROOT / 'test', *sorted(SOURCES.glob('*/test')))),
 )
 

@@ -293,6 +293,41 @@ def test_what_is_crowded_is_found(tmp_path):
     ]
 
 
+#: What the adaptive law is made of, and how many lines and numbers it may have.
+LAW = (
+    'glider_control/glider_control/laws/adaptive.py',
+    'glider_control/glider_control/surfaces/fin.py',
+    'glider_guidance/glider_guidance/methods/los_current.py',
+    'glider_model/glider_model/onboard/learnt_steering.py',
+)
+LAW_LINES, LAW_NUMBERS, KERNEL_LINES = 650, 45, 60
+
+
+def numbers(tree: ast.Module) -> list[str]:
+    """Names of the constants of a module, and of the fields of settings in it."""
+    found = []
+    for node in tree.body:
+        if isinstance(node, ast.Assign):
+            found += [one.id for one in ast.walk(node.targets[0]) if isinstance(one, ast.Name)]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.AnnAssign) and isinstance(node.value, ast.Call):
+            if getattr(node.value.func, 'id', '') in ('number', 'positive'):
+                found.append(node.target.id)
+    return found
+
+
+def test_the_adaptive_law_goes_into_one_head():
+    texts = [(SOURCES / name).read_text(encoding='utf-8') for name in LAW]
+    trees = [ast.parse(text) for text in texts]
+    assert sum(text.count('\n') for text in texts) <= LAW_LINES
+    named = [name for tree in trees for name in numbers(tree)]
+    assert {'INTEGRAL_MAX', 'MOST_DEVIATIONS', 'build_up_s', 'kp', 'prior_radps'} <= set(named)
+    assert len(named) <= LAW_NUMBERS
+    for node in (node for tree in trees for node in ast.walk(tree)):
+        if isinstance(node, ast.FunctionDef):
+            assert node.end_lineno - node.lineno < KERNEL_LINES, node.name
+
+
 # ---------------------------------------------------------------------- the map
 
 MAP = SOURCES.parent / 'docs' / 'architecture.md'

@@ -28,8 +28,8 @@ from glider_model.onboard.learnt_steering import (
 from glider_model.onboard.righting import Righting, make_righting
 from glider_model.vehicle.file import Vehicle
 
-#: Integrals wait this long after a turn-over (s), and are held within this (N m).
-LEARN_AFTER_S, INTEGRAL_MAX = 20.0, 3.0
+#: Integrals are held within this (N m).
+INTEGRAL_MAX = 3.0
 
 
 class RollSettings(Settings):
@@ -123,7 +123,8 @@ def adaptive_step(state, seen, params, dt):
         u, _ = steer_to(phase, error, wanted.psi_dot, u, steering.ratio, limit, params.steering)
         command = math.asin(u)
     roll = filter_command(state.roll, command, params.roll_filter, dt)
-    learns = steering.steady_s > LEARN_AFTER_S
+    # what is measured is of this phase once a low pass has forgotten the turn-over
+    learns = steering.steady_s > params.steering.smoothing_s
     learns_p, learns_q = learns and not seen.roll_held, learns and not seen.pitch_held
     e_p, e_q = wrap_angle(now.phi - roll.value), now.theta - wanted.theta
     rate_p, rate_q = now.phi_dot - roll.rate, now.theta_dot - wanted.theta_dot

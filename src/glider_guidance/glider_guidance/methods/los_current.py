@@ -21,8 +21,8 @@ from glider_model.vehicle.file import Vehicle
 #: behind a desired track that moves aside this share is made up for beforehand.
 TURN_SHARE, OFFSET_AHEAD = 0.46, 0.5
 #: A phase that can hardly be steered is entered on its heading: the vehicle turns to it so long
-#: before the turn-over (s) for each `WELL_S` of its lookahead but the first, and so long at most.
-READY_S, READY_S_MAX = 60.0, 100.0
+#: before the turn-over (s), less by the share that `WELL_S` is of its lookahead.
+READY_S = 120.0
 #: Position pulls the cross-track error that goes by the way over ground in this time (s), and lets
 #: it differ by so much at most (m).
 BESIDE_S, BESIDE_M = 60.0, 5.0
@@ -82,7 +82,7 @@ def lead_turns(drift, seen, lookahead_s, next_s):
     coming, past = TURN_SHARE * across * leg.lead_s, TURN_SHARE * drift
     offset = turn_offset(leg.to_turn_s, leg.glided_s, coming, past)
     moved = turn_offset(leg.to_turn_s - 1.0, leg.glided_s + 1.0, coming, past) - offset
-    ready_s = min(READY_S_MAX, READY_S * (next_s / WELL_S - 1.0))
+    ready_s = READY_S * (1.0 - WELL_S / next_s)
     return drift, offset + OFFSET_AHEAD * lookahead_s * moved, leg.to_turn_s < ready_s
 
 

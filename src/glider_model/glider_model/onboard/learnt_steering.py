@@ -20,8 +20,8 @@ from glider_model.vehicle.steering import STEERING_SPEED, steering_exponents
 #: Below this speed nothing is learnt (m/s); what the model does not explain, as a gust, counts as
 #: so many standard deviations at most.
 LEARN_SPEED, MOST_DEVIATIONS = 0.15, 3.0
-#: Largest bandwidth (rad/s), longest lookahead (s), and smallest k that is of importance (-).
-BANDWIDTH_MAX, LOOKAHEAD_MAX_S, SMALLEST_KICK = 0.12, 1500.0, 1e-3
+#: Largest bandwidth (rad/s), and smallest k that is of importance (-).
+BANDWIDTH_MAX, SMALLEST_KICK = 0.12, 1e-3
 #: A weak vehicle is fed this of psi_s', times by how much alpha outdoes beta / z (-); and it is
 #: rolled to this share of the roll at which it turns fastest.
 FED, SHARE_OF_PEAK = 0.5, 0.7
@@ -232,7 +232,7 @@ def heading_gains(slope, k, params):
     rest = max(0.0, (a + fed * beta * q) ** 2 - 4.0 * fed * beta)
     x = 2.0 * beta / (a - fed * beta * q + math.sqrt(rest))
     a = beta * (1.0 + fed * q * x) / x
-    return min(BANDWIDTH_MAX, a), min(LOOKAHEAD_MAX_S, 1.0 / x), fed
+    return min(BANDWIDTH_MAX, a), 1.0 / x, fed
 
 
 @kernel
