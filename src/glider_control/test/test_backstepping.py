@@ -19,6 +19,8 @@ from glider_control.law import Bank, Seen
 from glider_control.laws.backstepping import (
     SCALE_ALPHA,
     SCALE_PITCH_RATE,
+    SCALE_ROLL_RATE,
+    SCALE_SIDE,
     SCALE_V2,
     BacksteppingSettings,
     backstepping_step,
@@ -26,6 +28,7 @@ from glider_control.laws.backstepping import (
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
 from glider_model.vehicle.file import load_vehicle
+from glider_model.vehicle.rigid_body import GRAVITY
 
 BANK = Bank(math.radians(30.0), FilterParams(0.5, 0.08))
 DT = 0.1
@@ -151,6 +154,28 @@ def test_constant_moments_are_learnt_whatever_they_are_called():
     assert phi @ plant.state.channels.pitch_theta == pytest.approx(
         phi @ plant.theta_star, abs=0.01
     )
+
+
+def test_each_parameter_moves_by_its_regressor_times_the_compensated_error_of_the_rate():
+    """Equation by equation: theta_i' = Gamma (Phi_i K2bar - sigma theta_i), in roll and pitch."""
+    state, phi, theta = SETTINGS.initial_state(), 0.02, -0.48
+    for _ in range(250):
+        before = state.channels
+        state, *_ = step(state, measured(phi=phi, theta=theta), reference())
+    now = state.channels
+    side = -0.4 * GRAVITY * math.cos(theta) * math.sin(phi) / SCALE_SIDE
+    dynamic = SPEED**2 * ALPHA / SCALE_ALPHA, SPEED**2 / SCALE_V2
+    for channel, regressors, was, is_, params in (
+        (now.roll, (side, now.roll.rate.value / SCALE_ROLL_RATE),
+         before.roll_theta, now.roll_theta, PARAMS.roll),
+        (now.pitch, (*dynamic, now.pitch.rate.value / SCALE_PITCH_RATE),
+         before.pitch_theta, now.pitch_theta, PARAMS.pitch),
+    ):  # fmt: skip
+        was, is_, phi_i = np.array(was), np.array(is_), np.array([1.0, *regressors])
+        assert abs(channel.k2) > params.dead_zone and np.abs(is_).max() < params.bound
+        moved = DT * params.gamma * (phi_i * channel.k2 - params.sigma * was)
+        assert np.abs(moved).min() > 0.0
+        assert is_ - was == pytest.approx(moved, rel=1e-6)
 
 
 def test_parameters_stay_within_the_projection():

@@ -16,10 +16,14 @@ from glider_control.control import (
     SATURATED_BUOYANCY,
     SATURATED_PITCH,
     SATURATED_ROLL,
+    SATURATED_SURFACE,
     control_step,
 )
+from glider_control.intake import REFUSED
 from glider_control.settings import ControlSettings
+from glider_control.stall import watch_stall
 from glider_control.vertical_rate import rate_error
+from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.glide_polar import glide_vertical_rate
 from glider_model.plant.plant import PlantSettings, plant_odometry, plant_step
 from glider_model.plant.trim import solve_trim
@@ -351,3 +355,21 @@ def test_mirrored_flight_is_the_mirror_image():
         column = COLUMNS.index(name)
         assert np.array_equal(starboard.log[:, column], -port.log[:, column]), name
     assert np.array_equal(starboard.down, port.down)
+
+
+def test_what_control_tells_is_a_bit_for_each_thing():
+    bits = SATURATED_BUOYANCY, SATURATED_PITCH, SATURATED_ROLL, SATURATED_SURFACE, REFUSED
+    assert [bit.bit_count() for bit in bits] == [1] * 5
+    assert np.bitwise_or.reduce(bits) == sum(bits)
+
+
+@pytest.mark.parametrize(
+    ('v_d', 'rate', 'led_s'),
+    [(-0.2, -0.21, 0.0), (-0.2, -0.19, -99.9), (0.2, 0.21, -99.9), (0.2, 0.19, -99.9)],
+)
+def test_who_is_led_out_of_a_stall_is_so_until_it_rises_as_it_is_asked_to(v_d, rate, led_s):
+    """In a dive for as long as was meant."""
+    params = ControlSettings(vehicle='zhang2021').params()
+    now = Measured(0.0, 0.5, 0.0, 0.0, 0.0, 0.0, rate)
+    wanted = Reference(*(8 * (0.0,)), v_d, *(3 * (0.0,)))
+    assert watch_stall(-100.0, now, wanted, 0.4, params, TICK_S) == pytest.approx(led_s)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from glider_base.signals import TICK_S
 from glider_base.wiring import NO_ECHO
-from glider_guidance.yo.end_of_path import WayLeft
+from glider_guidance.yo.end_of_path import WayLeft, next_dive
 from glider_guidance.yo.machine import (
     INITIAL_PROFILE,
     NO_END,
@@ -310,3 +310,38 @@ def test_estimated_time_is_that_of_the_flight(dives):
         ticks += 1
     estimate = mission_time_s(point.params, dives)
     assert estimate == pytest.approx(ticks * TICK_S, rel=0.05)
+
+
+@quick
+@given(st.floats(2.0, 40.0), st.floats(0.3, 0.95), st.booleans(), st.floats(0.0, 1.0))
+def test_the_last_dives_take_up_the_way_that_is_left(top, share, is_surfaced, above):
+    """Down, up to the upper turn, down and up for good, at the mean rate: two dives of one depth.
+
+    One that rises has its way to the upper turn to go before them.
+    """
+    params = ProfileSettings(depth_m=200.0, top_depth_m=top).params(0, PUMP, POLAR)
+    depth = 0.0 if is_surfaced else top + above * (200.0 - top)
+    turn = top + (0.5 + 0.5 * share) * (200.0 - top)
+    way = 4.0 * (turn - top) + (2.0 * top if is_surfaced else depth)
+    left = WayLeft(way / params.glide_rate, 0.0)
+    assert next_dive(left, depth, is_surfaced, 0.0, 3, params) == pytest.approx(turn)
+
+
+def test_the_last_of_so_many_dives_is_left_out_where_the_path_ends_before_it():
+    """Two of three are done once the vehicle is up: there is one to come, but no way for it."""
+    params = ProfileSettings(depth_m=200.0, top_depth_m=5.0).params(3, PUMP, POLAR)
+    state = INITIAL_PROFILE._replace(stage=GLIDING_UP, dives=1, turn_depth=200.0, depth=200.0)
+    moved = profile_step(state, 100.0, -0.2, NO_ECHO, WayLeft(10.0, 0.0), params)
+    assert moved.turn_depth == 0.0
+
+
+@pytest.mark.parametrize('known', [{}, {'lead_up_s': 1.0}, {'lead_down_s': 1.0}])
+def test_the_first_turn_of_a_vehicle_that_sinks_too_fast_is_led_by_more(known):
+    """By the square of how much faster it is; one that has turned knows how long that takes."""
+    params = ProfileSettings(depth_m=200.0).params(0, PUMP, POLAR)
+    state = INITIAL_PROFILE._replace(stage=GLIDING_DOWN, turn_depth=200.0, depth=200.0, **known)
+    rate = 1.4 * params.dive_rate
+    lead_s = 1.0 if known else params.lead_s
+    lead = rate * lead_s * (1.0 if known else 1.4**2)
+    for depth, stage in ((200.1 - lead, INFLECTING_UP), (199.9 - lead, GLIDING_DOWN)):
+        assert profile_step(state, depth, rate, NO_ECHO, NO_END, params).stage == stage

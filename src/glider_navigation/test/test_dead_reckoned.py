@@ -179,6 +179,25 @@ def test_a_forecast_changes_with_time_and_depth_as_it_says(dives):
     assert led[1] == pytest.approx(0.2 * 0.75 * WAY_S, rel=0.02)
 
 
+def test_changes_of_a_forecast_are_told_from_what_it_said_at_the_start(dives):
+    step = {'kind': 'steps', 'steps': [{'at_s': 300.0, 'north_mps': 0.0, 'east_mps': 0.2}]}
+    forecast = {'components': [*FORECAST['components'], step]}
+    track = navigate(dives([30.0]), current='forecast', forecast=forecast)
+    assert tuple(track.state.column) == pytest.approx(CURRENT + OFF)
+
+
+@pytest.mark.parametrize(('has_fixes', 'drift'), [(True, DRIFT), (False, CURRENT + OFF)])
+def test_who_comes_up_believes_in_the_drift_of_the_last_stay_if_fixes_told_it(
+    dives, has_fixes, drift
+):
+    """Else in the forecast; there is no fix yet in the second stay."""
+    truth = dives([30.0, 40.0], [has_fixes, False])
+    for name in ('q', 'seen_depths', 'has_fix', 'places'):
+        setattr(truth, name, getattr(truth, name)[: truth.cycle + 500])
+    track = navigate(truth, current='forecast', forecast=FORECAST)
+    assert tuple(track.state.stay.drift) == pytest.approx(drift, abs=0.02)
+
+
 def test_a_forecast_of_changes_that_do_not_come_is_left_out(dives):
     """The sea is steady. The forecast of its first way holds, and swings from way to way."""
     truth = dives([30.0, 40.0, 200.0, 120.0, 310.0, 75.0, 20.0, 250.0])

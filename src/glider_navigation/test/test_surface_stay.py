@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from glider_base.signals import Vector
 from glider_navigation.method import Fix
 from glider_navigation.surface_stay import (
+    LOST_DRIFT_STD,
+    _begin_at,
     begin,
     counts,
     drifted_variance,
@@ -127,6 +129,18 @@ def test_without_a_fix_the_place_drifts_and_is_known_less():
     drifted = (600.0 * DRIFT_STD) ** 2 + WANDERS * 600.0**3 / 3.0
     assert drifted_variance(stay) == pytest.approx(drifted)
     assert stay.known.pp == pytest.approx(400.0 + drifted)
+
+
+def test_who_begins_anew_at_a_fix_knows_of_its_surfacing_what_it_may_have_drifted_since():
+    stay = begin(Vector(0.0, 0.0), 100.0**2, Vector(0.2, 0.0))
+    for _ in range(600):
+        stay = wait(stay, 1.0)
+    anew = _begin_at(stay, Fix(True, 1000.0, 50.0, 25.0))
+    assert tuple(anew.place) == (1000.0, 50.0)
+    assert tuple(anew.came_up) == pytest.approx((880.0, 50.0))
+    assert anew.known.pp == 25.0
+    drifted = (600.0 * LOST_DRIFT_STD) ** 2 + WANDERS * 600.0**3 / 3.0
+    assert anew.known.cc == pytest.approx(25.0 + drifted)
 
 
 @pytest.mark.parametrize('minutes', [3.0, 10.0])
