@@ -313,18 +313,26 @@ def test_estimated_time_is_that_of_the_flight(dives):
 
 
 @quick
-@given(st.floats(2.0, 40.0), st.floats(0.3, 0.95), st.booleans(), st.floats(0.0, 1.0))
-def test_the_last_dives_take_up_the_way_that_is_left(top, share, is_surfaced, above):
+@given(
+    st.floats(2.0, 40.0),
+    st.floats(0.3, 0.95),
+    st.booleans(),
+    st.floats(0.0, 1.0),
+    st.floats(0.0, 60.0),
+    st.floats(0.0, 1.0),
+)
+def test_the_last_dives_take_up_the_way_that_is_left(top, share, is_up, above, lead_s, drift):
     """Down, up to the upper turn, down and up for good, at the mean rate: two dives of one depth.
 
-    One that rises has its way to the upper turn to go before them.
+    One that rises has its way to the upper turn to go before them. In each of two turns of a dive
+    the current carries the vehicle on.
     """
     params = ProfileSettings(depth_m=200.0, top_depth_m=top).params(0, PUMP, POLAR)
-    depth = 0.0 if is_surfaced else top + above * (200.0 - top)
+    depth = 0.0 if is_up else top + above * (200.0 - top)
     turn = top + (0.5 + 0.5 * share) * (200.0 - top)
-    way = 4.0 * (turn - top) + (2.0 * top if is_surfaced else depth)
-    left = WayLeft(way / params.glide_rate, 0.0)
-    assert next_dive(left, depth, is_surfaced, 0.0, 3, params) == pytest.approx(turn)
+    way = 4.0 * (turn - top) + (2.0 * top if is_up else depth)
+    left = WayLeft(way / params.glide_rate + 4.0 * lead_s * drift, drift)
+    assert next_dive(left, depth, is_up, lead_s, 3, params) == pytest.approx(turn)
 
 
 def test_the_last_of_so_many_dives_is_left_out_where_the_path_ends_before_it():
