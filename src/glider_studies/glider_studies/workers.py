@@ -34,16 +34,13 @@ from glider_mission.choices import Combination
 TASKS_AHEAD = 2
 #: How long a scheduler may take to answer, and how often it is looked at (s).
 CONNECT_S, LOOK_S = 5.0, 2.0
-#: A task whose worker died is given to one more before it is tried by itself.
+#: Workers of this machine begin with `dask_setup`. A task whose worker died is given to one more
+#: before it is tried by itself.
 _CONFIG = {
     'distributed.scheduler.allowed-failures': 1,
     'distributed.worker.multiprocessing-method': 'forkserver',
+    'distributed.worker.preload': [__name__],
 }
-
-# Here and in workers, which are copies of a process that has imported this, Dask logs nothing:
-# what matters is told by the commands.
-for _name in ('distributed', 'distributed.client', 'tornado.application'):
-    logging.getLogger(_name).setLevel(logging.CRITICAL)
 
 WORKER_DIED = 'the worker process died each time it flew this'
 SCHEDULER_GONE = 'the scheduler of the workers is gone'
@@ -62,6 +59,12 @@ class Outcome(NamedTuple):
     task: Any
     died: bool  #: whether it killed every worker that was given it
     result: Any = None  #: what the function returned
+
+
+def dask_setup(worker: Any = None) -> None:
+    """Have Dask log nothing in this process: what matters is told by the commands."""
+    for name in ('distributed', 'distributed.client', 'tornado.application'):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def _call(code: str, function: Callable, task: Any) -> Any:
@@ -227,6 +230,7 @@ def worker_pool(
     which they will fly, are compiled here, so that workers of this machine do not all compile the
     same; ``tell`` gets a line then. Raises ConfigurationError if no scheduler answers.
     """
+    dask_setup()
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(_CONFIG))
         if scheduler is None:
