@@ -24,6 +24,7 @@ from glider_control.laws.backstepping import (
     SCALE_V2,
     BacksteppingSettings,
     backstepping_step,
+    learnt_moments,
 )
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
@@ -176,6 +177,40 @@ def test_each_parameter_moves_by_its_regressor_times_the_compensated_error_of_th
         moved = DT * params.gamma * (phi_i * channel.k2 - params.sigma * was)
         assert np.abs(moved).min() > 0.0
         assert is_ - was == pytest.approx(moved, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ('channel', 'number'), [*(('roll', i) for i in range(3)), *(('pitch', i) for i in range(4))]
+)
+def test_the_moment_takes_off_what_each_parameter_says(channel, number):
+    """tau = ... - Phi^T theta, before anything is learnt; and each is told under its own name."""
+    state = SETTINGS.initial_state()
+    for _ in range(50):
+        state, *_ = step(state, measured(phi=0.05, theta=-0.4), reference())
+    name = f'{channel}_theta'
+    theta = [0.0] * len(getattr(state.channels, name))
+    theta[number] = 0.5
+    known = state._replace(channels=state.channels._replace(**{name: tuple(theta)}))
+    now, wanted = measured(phi=0.05, theta=-0.4), reference()
+    after, *without = step(state, now, wanted)
+    _, *told = step(known, now, wanted)
+    rate = getattr(after.channels, channel).rate.value
+    side = -0.4 * GRAVITY * math.cos(-0.4) * math.sin(0.05) / SCALE_SIDE
+    phi = {
+        'roll': (1.0, side, rate / SCALE_ROLL_RATE),
+        'pitch': (
+            1.0,
+            SPEED**2 * ALPHA / SCALE_ALPHA,
+            SPEED**2 / SCALE_V2,
+            rate / SCALE_PITCH_RATE,
+        ),
+    }[channel]
+    moved = np.subtract(told, without)
+    at = 0 if channel == 'roll' else 1
+    assert moved[at] == pytest.approx(-0.5 * phi[number], rel=1e-9) and moved[1 - at] == 0.0
+    learnt = learnt_moments(known.channels, PARAMS)
+    names = [one for one in learnt._fields if one.startswith(channel) and one.endswith('_nm')]
+    assert [getattr(learnt, one) for one in names] == theta
 
 
 def test_parameters_stay_within_the_projection():

@@ -21,8 +21,8 @@ from glider_control.control import (
 )
 from glider_control.intake import REFUSED
 from glider_control.settings import ControlSettings
-from glider_control.stall import watch_stall
-from glider_control.vertical_rate import rate_error
+from glider_control.stall import BEGINS_S, leave_stall, watch_stall
+from glider_control.vertical_rate import Trim, rate_error
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.glide_polar import glide_vertical_rate
 from glider_model.plant.plant import PlantSettings, plant_odometry, plant_step
@@ -373,3 +373,16 @@ def test_who_is_led_out_of_a_stall_is_so_until_it_rises_as_it_is_asked_to(v_d, r
     now = Measured(0.0, 0.5, 0.0, 0.0, 0.0, 0.0, rate)
     wanted = Reference(*(8 * (0.0,)), v_d, *(3 * (0.0,)))
     assert watch_stall(-100.0, now, wanted, 0.4, params, TICK_S) == pytest.approx(led_s)
+
+
+@pytest.mark.parametrize(
+    ('v_d', 'left_s', 'm_b'), [(0.2, 1.0, 0.0), (0.2, -1.0, 0.4), (-0.2, 1.0, 0.4)]
+)
+def test_the_pump_of_who_stalls_in_a_dive_waits_in_the_middle_until_shortly_before_the_end(
+    v_d, left_s, m_b
+):
+    wanted = Reference(*(8 * (0.0,)), v_d, *(3 * (0.0,)))
+    led, trim, reference = leave_stall(-BEGINS_S - left_s, 0.4, Trim(0.1, 0.2), wanted)
+    assert led == m_b
+    assert trim == (Trim(0.0, 0.0) if v_d > 0.0 else Trim(0.1, 0.2))
+    assert reference.theta == math.copysign(math.radians(60.0), -v_d)

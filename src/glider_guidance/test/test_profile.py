@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from glider_base.signals import TICK_S
 from glider_base.wiring import NO_ECHO
-from glider_guidance.yo.end_of_path import WayLeft, next_dive
+from glider_guidance.yo.end_of_path import WayLeft, lower_turn, next_dive
 from glider_guidance.yo.machine import (
     INITIAL_PROFILE,
+    NEAR_TICKS,
     NO_END,
     PITCH_OVER,
     ProfileSettings,
@@ -353,3 +354,24 @@ def test_the_first_turn_of_a_vehicle_that_sinks_too_fast_is_led_by_more(known):
     lead = rate * lead_s * (1.0 if known else 1.4**2)
     for depth, stage in ((200.1 - lead, INFLECTING_UP), (199.9 - lead, GLIDING_DOWN)):
         assert profile_step(state, depth, rate, NO_ECHO, NO_END, params).stage == stage
+
+
+@quick
+@given(st.floats(0.0, 100.0), st.floats(100.0, 190.0), st.floats(0.0, 60.0), st.floats(0.0, 1.0))
+def test_a_dive_turns_where_the_rest_of_the_path_takes_it_up(depth, turn, lead_s, drift):
+    params = ProfileSettings(depth_m=200.0, top_depth_m=5.0).params(0, PUMP, POLAR)
+    way = (turn - depth) + turn
+    left = WayLeft(way / params.glide_rate + lead_s * drift, drift)
+    assert lower_turn(200.0, left, depth, lead_s, params) == pytest.approx(turn)
+    assert lower_turn(90.0, left, depth, lead_s, params) == 90.0
+
+
+def test_a_bottom_that_is_near_for_three_seconds_turns_a_dive():
+    """Not one that is heard too near for less, by whatever swims there."""
+    params = ProfileSettings(depth_m=200.0, clearance_m=10.0).params(0, PUMP, POLAR)
+    state = INITIAL_PROFILE._replace(stage=GLIDING_DOWN, turn_depth=200.0, depth=200.0)
+    for _ in range(NEAR_TICKS):
+        state = profile_step(state, 100.0, 0.2, 5.0, NO_END, params)
+        assert state.stage == GLIDING_DOWN
+    assert profile_step(state, 100.0, 0.2, NO_ECHO, NO_END, params).near_ticks == 0
+    assert profile_step(state, 100.0, 0.2, 5.0, NO_END, params).stage == INFLECTING_UP

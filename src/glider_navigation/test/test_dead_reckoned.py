@@ -14,10 +14,12 @@ from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation.current_belief import Uncertainty, initial_belief
 from glider_navigation.forecast import Trust, weigh
+from glider_navigation.intake import take_in
 from glider_navigation.method import Fix, Heard, method_step
-from glider_navigation.methods.dead_reckoned import Drift, Way, place_covariance
+from glider_navigation.methods.dead_reckoned import Drift, Way, _dive, place_covariance
 from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
 from glider_navigation.settings import NavigationSettings
+from glider_navigation.surface_stay import begin, drifted_variance, wait
 
 #: Current and drift at the surface (m/s, north and east), and how the vehicle flies.
 CURRENT, DRIFT = np.array([0.12, -0.09]), np.array([0.20, -0.02])
@@ -196,6 +198,30 @@ def test_who_comes_up_believes_in_the_drift_of_the_last_stay_if_fixes_told_it(
         setattr(truth, name, getattr(truth, name)[: truth.cycle + 500])
     track = navigate(truth, current='forecast', forecast=FORECAST)
     assert tuple(track.state.stay.drift) == pytest.approx(drift, abs=0.02)
+
+
+def test_a_stay_without_a_fix_makes_a_way_longer_and_less_known():
+    """By how it drifted meanwhile, and by how well that is known."""
+    settings = NavigationSettings(method='dead_reckoned')
+    way = settings.initial_state().method.way._replace(variance=400.0, through=Vector(30.0, -5.0))
+    stay = begin(Vector(7.0, 8.0), 25.0, Vector(0.2, -0.1))
+    for _ in range(600):
+        stay = wait(stay, 1.0)
+    longer = _dive(way, stay)
+    assert tuple(longer.through) == pytest.approx((150.0, -65.0))
+    assert longer.variance == pytest.approx(400.0 + drifted_variance(stay))
+    assert drifted_variance(stay) > 50.0**2
+
+
+def test_what_the_altimeter_says_is_no_echo_where_it_is_no_number():
+    settings = NavigationSettings(method='dead_reckoned')
+    odom = (0.0,) * 13
+    rest = Joints(0.0, 0.0, 0.0, 0.0), odom, odometry_from_wire(odom)
+    heard = Heard(*rest, Imu(1.0, *(6 * (0.0,)), False), 3.0, Fix(False, 0.0, 0.0, 0.0), math.nan)
+    state, params = settings.initial_state().intake, settings.params().intake
+    for altitude, taken in ((math.nan, 0.0), (12.5, 12.5)):
+        _, told = take_in(state, heard._replace(altitude=altitude), params, TICK_S)
+        assert told.altitude == taken
 
 
 def test_a_forecast_of_changes_that_do_not_come_is_left_out(dives):

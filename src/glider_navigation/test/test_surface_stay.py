@@ -153,3 +153,17 @@ def test_true_fixes_far_from_where_it_believed_to_be_are_believed_in_a_strong_dr
         stay = hear_fix(stay, Fix(True, place, 0.0, 25.0))
     assert stay.place.n == pytest.approx(place, abs=10.0)
     assert hear_fix(stay, Fix(True, place + 1e4, 0.0, 25.0)).place == stay.place
+
+
+@pytest.mark.parametrize(
+    ('later_s', 'aside_m', 'believed'),
+    [(15.0, 110.0, True), (15.0, 140.0, False), (9.0, 5.0, False)],
+)
+def test_a_fix_far_off_is_confirmed_by_one_near_it_and_a_while_later(later_s, aside_m, believed):
+    """100 m beside it and what it may have drifted since, 10 s later at the soonest."""
+    stay = wait(begin(Vector(0.0, 0.0), 25.0, Vector(0.0, 0.0)), 600.0)
+    stay = hear_fix(stay, Fix(True, 5e4, 0.0, 25.0))
+    assert stay.fixes == 0
+    stay = hear_fix(wait(stay, later_s), Fix(True, 5e4, aside_m, 25.0))
+    assert stay.fixes == believed
+    assert (tuple(stay.place) == (5e4, aside_m)) == believed
