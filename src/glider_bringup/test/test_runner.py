@@ -146,12 +146,13 @@ def test_crash_shows_its_last_line(fly):
     assert 'no good' in result.reason
 
 
-def test_plant_that_blames_a_peer_is_believed_over_those_who_left(fly):
+@pytest.mark.parametrize('late_s', [0.3, 2.0])
+def test_plant_that_blames_a_peer_is_believed_over_those_who_left(fly, late_s):
     blame = "print('fatal: guidance_node did not publish', file=sys.stderr, flush=True)"
     commands = {
         'guidance_node': node(),
         'control_node': after(0.2, LEAVE),
-        PLANT: after(0.5, f'{blame} or sys.exit(3)'),
+        PLANT: after(0.2 + late_s, f'{blame} or sys.exit(3)'),
     }
     result, _ = fly(commands)
     assert (result.status, result.culprit) == ('failed', 'guidance_node')
