@@ -49,7 +49,7 @@ class SteeringLearningSettings(Settings):
     disturbance_drift_radps: float = number(0.00005, (0.0, 0.1), 'change of d in 1000 s (rad/s)')
     noise_radps: float = positive(0.0002, 0.1, 'yaw rate that is not explained (rad/s)')
     correlation_s: float = positive(60.0, 600.0, 'for how long that is one and the same (s)')
-    smoothing_s: float = positive(20.0, 200.0, 'low pass on u and yaw rate (s)')
+    smoothing_s: float = positive(20.0, 200.0, 'low pass on u and yaw rate, wait of integrals (s)')
     after_s: float = number(30.0, (0.0, 600.0), 'learning begins so long after an inflection (s)')
     roll_per_s: float = positive(0.032, 1.0, 'rho: u for each second of cross-track (1/s)')
     approach_s: float = number(60.0, (0.0, 3600.0), 'tau: cross-track is closed no faster (s)')
