@@ -118,7 +118,8 @@ class RecordedLog:
         self._flags: list[tuple[int, str, float]] = []
         self._unusable: dict[tuple[str, int], str] = {}
         self._lacks = ''
-        self._log = np.full((2 * BLOCK_TICKS, ROW), np.nan)
+        self._log = np.empty((2 * BLOCK_TICKS, ROW))
+        self._begun = 0  #: rows that are NaN but for what was put there; the others are not touched
         self._start, self._over = 0, False
 
     def blocks(self) -> Iterator[np.ndarray]:
@@ -139,7 +140,7 @@ class RecordedLog:
                     found[name] = decode(self._codecs[name], batch, chosen)
             yield from self._put(found)
         while not self._over:
-            yield self._shift()
+            yield from self._shift()
 
     @property
     def _needed(self) -> tuple[str, ...]:
@@ -165,6 +166,12 @@ class RecordedLog:
                     if key in _FLAGS
                 ]
 
+    def _begin(self, rows: int) -> None:
+        """Have at least so many rows begun."""
+        if rows > self._begun:
+            self._log[self._begun : rows] = np.nan
+            self._begun = rows
+
     def _put(self, found: dict[str, Decoded]) -> Iterator[np.ndarray]:
         """Put messages into their rows; gives the rows that are far behind."""
         while found and not self._over:
@@ -176,28 +183,31 @@ class RecordedLog:
                     self._unusable.setdefault((name, int(stamps_ns[row]) // TICK_NS), why)
                     usable[row] = False
                 now = usable & (ticks < len(self._log))
+                self._begin(1 + int(ticks[now].max(initial=-1)))
                 self._log[ticks[now], COLUMNS[name]] = values[now]
                 if len(rest := np.flatnonzero(usable & ~now)):
                     later[name] = Decoded(stamps_ns[rest], values[rest], own[rest], {})
             found = later
             if found:  # a recorder from outside keeps no strict order
-                yield self._shift()
+                yield from self._shift()
 
-    def _shift(self) -> np.ndarray:
+    def _shift(self) -> Iterator[np.ndarray]:
         """The first block up to a tick that lacks something; then the second takes its place."""
-        numbers = self._log[:BLOCK_TICKS, [COLUMNS[name].start for name in self._needed]]
+        self._begin(min(self._begun + 1, BLOCK_TICKS))
+        block = self._log[: min(self._begun, BLOCK_TICKS)]
+        numbers = block[:, [COLUMNS[name].start for name in self._needed]]
         missing = np.flatnonzero(np.any(np.isnan(numbers), axis=1))
         rows = int(missing[0]) if len(missing) else BLOCK_TICKS
-        block = self._log[:rows].copy()
+        if len(missing):
+            self._over, self._lacks = True, self._what_lacks(rows)
         block[:, [COLUMNS[name] for name in _FLAGS if name != 'stage']] = 0.0
         for tick, column, value in self._flags:
             block[max(0, tick - self._start) :, COLUMNS[column]] = value
-        if len(missing):
-            self._over, self._lacks = True, self._what_lacks(rows)
-        self._log[:BLOCK_TICKS], self._log[BLOCK_TICKS:] = self._log[BLOCK_TICKS:], np.nan
-        self._start += BLOCK_TICKS
         self.ticks += rows
-        return block
+        yield block[:rows]
+        self._begun = max(0, self._begun - BLOCK_TICKS)
+        self._log[: self._begun] = self._log[BLOCK_TICKS:][: self._begun]
+        self._start += BLOCK_TICKS
 
     def _what_lacks(self, row: int) -> str:
         """Why a tick is not whole, in words."""
