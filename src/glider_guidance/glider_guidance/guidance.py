@@ -189,13 +189,11 @@ def hear_fixes(state, odometry, known, dt):
 
 
 @kernel
-def _start(state, odometry, params):
-    """State at the first tick: closest point of the path, filters at the measured attitude."""
+def _start(state, odometry, s, params):
+    """State at the first tick, at ``s`` (m) of the path: filters at the measured attitude."""
     q_w, q_x, q_y, q_z = odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
     _, theta, psi = euler_from_quaternion(q_w, q_x, q_y, q_z)
-    follows_path = params.profile.follows_path
-    s = path_closest(odometry.p_n, odometry.p_e, odometry.p_d, not follows_path, params.path)
-    stage = GLIDING_DOWN if follows_path else SURFACE_PREPARATION
+    stage = GLIDING_DOWN if params.profile.follows_path else SURFACE_PREPARATION
     profile = replace(
         state.profile,
         stage=stage,
@@ -218,10 +216,8 @@ def _start(state, odometry, params):
 
 
 @kernel
-def _change_path(state, odometry, params):
-    """State at the first tick of another path: its closest point; who was at the end dives on."""
-    x, follows_path = odometry, params.profile.follows_path
-    s = path_closest(x.p_n, x.p_e, x.p_d, not follows_path, params.path)
+def _change_path(state, s, params):
+    """State at the first tick of another path, at its ``s`` (m); who was at the end dives on."""
     profile = state.profile
     if profile.stage == AT_END_OF_PATH:
         profile = replace(profile, stage=SURFACE_PREPARATION, ticks=0)
@@ -453,10 +449,13 @@ def guidance_step(
     """
     gate = gate_step(state.gate, odometry, params.gate, dt)
     odometry = gate.odometry
-    if state.tick == 0:
-        state = _start(state, odometry, params)
-    if state.path_id != params.path_id:
-        state = _change_path(state, odometry, params)
+    if state.tick == 0 or state.path_id != params.path_id:
+        x, horizontal = odometry, not params.profile.follows_path
+        s = path_closest(x.p_n, x.p_e, x.p_d, horizontal, params.path)
+        if state.tick == 0:
+            state = _start(state, odometry, s, params)
+        else:
+            state = _change_path(state, s, params)
     place = locate(state.s, odometry, params)
     profile, doing = advance(state, place, altitude, params, dt)
     progress = watch_progress(state.progress, state.tick, state.s, state.profile.stage, profile)
