@@ -4,9 +4,12 @@
 
 import gc
 
+from numba.core.registry import cpu_target
+
 import glider_studies.workers  # noqa: F401  # Dask takes longest of all
 from glider_bringup.warm_up import fly_one_tick, score_nothing
 
 fly_one_tick()
 score_nothing()
+cpu_target.target_context.refresh()  # what some of them compile with
 gc.freeze()  # a copy that looked for garbage in all that would copy it

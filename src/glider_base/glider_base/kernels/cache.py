@@ -25,6 +25,9 @@ from typing import NamedTuple
 import numba
 from numba.core import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.runtime import rtsys
+
+from glider_base.kernels.compiler import OPTIONS
 
 #: What is kept at most (bytes), and how old it was before it is marked as used again (s).
 LARGEST, USED_S = 2_000_000_000, 86_400.0
@@ -221,7 +224,12 @@ class KernelCache(FunctionCache):
         """What was compiled for a signature, or None."""
         if not self._select(sig):
             return None
-        found = super().load_overload(sig, target_context)
+        if OPTIONS:  # else numba loads all that it compiles with
+            rtsys.initialize(target_context)
+        else:
+            target_context.refresh()
+        with self._guard_against_spurious_io_errors():
+            found = self._load_overload(sig, target_context)
         if found is not None:
             path = self._cache_file._index_path
             if time.time() - os.stat(path).st_mtime > USED_S:

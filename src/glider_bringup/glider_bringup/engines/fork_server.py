@@ -3,9 +3,8 @@
 """Process that starts the nodes of a run as copies of itself: what they share is imported once.
 
 To import the mathematics is most of the start of a node, and a run over nodes has eight processes.
-So is what numba loads before its first kernel. It imports nothing that starts threads other than
-those of numpy, which a fork ends in good order; rclpy is imported by each node. A node that is not
-a Python module is executed.
+It imports nothing that starts threads other than those of numpy, which a fork ends in good order;
+rclpy is imported by each node. A node that is not a Python module is executed.
 
 It gets one line of JSON on standard input: a list of ``[name, command, standard output, standard
 error, signal]``, the signal being what a node gets when this process ends. What it has to say goes
@@ -117,11 +116,9 @@ def main() -> None:
 
     plan = json.loads(sys.stdin.buffer.readline())
     if any(_is_module(command) for _, command, *_ in plan):
-        from numba.core.registry import cpu_target
-
+        gc.disable()
         importlib.import_module(SHARED)
-        cpu_target.typing_context.refresh()
-        cpu_target.target_context.refresh()
+        gc.enable()
     gc.freeze()
     for name, *how in plan:
         pid = _start(server, name, *how)
