@@ -18,7 +18,7 @@ from glider_base.ros.wire.topics import recorded_topics
 from glider_bringup.engines.processes import node_environment
 
 DEADLINE_S = 300.0
-DURATION_S = 80
+DURATION_S = 40
 FLOWN_BYTES = 300_000  #: of recording: several chunks are on disk
 #: Scenario by namespace.
 GLIDERS = {'alpha': 'rough_water', 'beta': 'current_8deg'}

@@ -10,7 +10,6 @@ the vehicles do not know their place, and break on the way.
 import math
 from collections.abc import Iterator
 from functools import partial
-from itertools import product
 from typing import Any, get_args
 
 import numpy as np
@@ -43,6 +42,9 @@ RECKONS = {
 STEERS = {'control.law': 'adaptive', 'guidance.los.method': 'los_current'}
 #: Sections that the plant alone is told: half of the flights draw from these only.
 PLANT_SECTIONS = ('perturb', 'initial', 'water')
+#: What says which loop is compiled, beside whether there are faults; and a flight to compile it.
+LOOP = ('vehicle', 'control.law', *RECKONS)
+FIRST = {'dives': 0, 'duration_s': 1.0, 'profile.depth_m': 60.0, 'profile.net_heaviness_kg': 0.1}
 #: Share of the flights by dead reckoning and with faults, and how many of them.
 BREAKS, FAULTS = 0.33, 2
 #: Most fields changed in one flight.
@@ -144,18 +146,15 @@ def _fly(changes: dict[str, Any]) -> tuple[str, str]:
 
 def fuzz(seed: int, count: int, counter: Counter) -> None:
     """Fly ``count`` cases; refused before the flight, or finite to its end, is well."""
-    loops = [{'guidance.los.method': method} for method in GUIDANCES]
-    loops.append({**RECKONS, 'faults': sample_faults(0, FAULTS, 1.0)})
-    flights = [{'control.law': law, **loop} for law, loop in product(LAWS, loops)]
-    flights += [
-        {'vehicle': name, **STEERS, 'profile.net_heaviness_kg': 0.1}
-        for name in vehicle_names()
-        if load_vehicle(name).steers_by
-    ]
-    for changes in flights:  # has kernels compiled, which is no case's fault
-        _fly({'dives': 0, 'duration_s': 1.0, 'profile.depth_m': SHALLOW_M[1], **changes})
+    compiled = []
     for case in range(count):
         changes = draw_changes(seed, case)
+        loop = {name: changes[name] for name in LOOP if name in changes}
+        if 'faults' in changes:
+            loop['faults'] = sample_faults(0, FAULTS, 1.0)
+        if loop not in compiled:  # which is no case's fault
+            compiled.append(loop)
+            _fly({**FIRST, **loop})
         told = ' '.join(f'--set {name}={value}' for name, value in changes.items())
         outcome, why = outcome_of(partial(_fly, changes), time_limit_after)
         counter.add(f'./glider run --engine direct {told}', outcome, why)
