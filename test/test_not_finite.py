@@ -85,7 +85,7 @@ def test_failed_run_is_reported(glider, blown, tmp_path):
     assert page.returncode == 0, page.stderr
     text = (tmp_path / 'report.html').read_text()
     assert '✕ Failed' in text
-    assert 'The run failed at ' in text
+    assert 'Stopped after ' in text
 
 
 def test_scored_again_it_has_failed_too(blown, tmp_path):

@@ -146,10 +146,7 @@ def _came_up(off: list[float], learns: bool) -> str:
 def _how_bad(card: dict[str, Any], traces: Traces) -> list[str]:
     """How the run ended, if not as it was to, and its largest errors if they are large."""
     problems = []
-    if card['status'] in STOPPED:
-        ended = 'was aborted' if card['status'] == 'aborted' else 'failed'
-        problems.append(f'The run {ended} at {span(card["sim_time_s"])}: {card["reason"]}.')
-    elif card['status'] in ('lost', 'surfaced'):
+    if card['status'] in (*STOPPED, 'lost', 'surfaced'):
         problems.append(_ended(card))
     place = ((reckoned(card) or {}).get('error_m') or {}).get('worst') or 0.0
     worst = max(card['cross_track_m'].get('max_run') or 0.0, place)
@@ -162,7 +159,10 @@ def _how_bad(card: dict[str, Any], traces: Traces) -> list[str]:
 
 
 def findings(run: FlownRun) -> list[tuple[str, str]]:
-    """What went wrong, and what is worth a look: kind (problem, note, fine) and sentence."""
+    """What went wrong, and what is worth a look: kind (problem, note, fine) and sentence.
+
+    What the verdict says already is not said again.
+    """
     card, traces = run.card, run.traces
 
     def at(time_s: float | None) -> str:
@@ -211,4 +211,6 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
         messages = ', and no message was lost' if card['messages_recorded'] else ''
         fine = f'Nothing went wrong: the run is complete, the course could be held{messages}.'
         return [('fine', fine), *(('note', text) for text in notes)]
-    return [*(('problem', text) for text in problems), *(('note', text) for text in notes)]
+    said = verdict(card, run.rules.settle_s)
+    listed = [*(('problem', text) for text in problems), *(('note', text) for text in notes)]
+    return [(kind, text) for kind, text in listed if text not in said]
