@@ -499,7 +499,16 @@ def make_scenario(
         here = any(overlap(field, name) for field in own)
         return None if here else yaml_line(path, location)
 
-    scenario = validate(_kind(values), values, str(path), path.parent, line_of, changed)
+    try:
+        scenario = validate(_kind(values), values, str(path), path.parent, line_of, changed)
+    except ConfigurationError as error:
+        told = [str(error)]
+        if isinstance(values.get(VEHICLE), str):  # a wrong one is not found out only later
+            try:
+                _vehicle_called(values[VEHICLE], path.parent, f'{path}{changed}')
+            except ConfigurationError as other:
+                told.append(str(other))
+        raise ConfigurationError('\n'.join(told)) from None
     scenario = _find_vehicle(scenario, path.parent, in_vehicle, f'{path}{changed}')
     if not recorded:
         with told_of(f'{path}{changed}: '):
@@ -577,19 +586,24 @@ def _find_vehicle(
     scenario: Scenario, folder: Path, changes: dict[str, Any], source: str
 ) -> Scenario:
     """Scenario whose vehicle is known to be good, wherever nodes are started from."""
-    beside = folder / scenario.vehicle
-    name = scenario.vehicle
-    if name not in vehicle_names() and beside.suffix and is_file(beside):
-        name = str(beside.resolve())
-    with told_of(f'{source}: '):
-        path = vehicle_path(name)
-    name = changed_vehicle(name if name in vehicle_names() else str(path.resolve()), changes)
+    name = changed_vehicle(_vehicle_called(scenario.vehicle, folder, source), changes)
     vehicle = load_vehicle(name)
     with told_of(f'{source}: '):
         perturbed(vehicle.params(), scenario.perturb)
         scenario.control.steering(vehicle.steers_by)
         check_actuators(scenario.faults, vehicle.steers_by)
     return scenario.model_copy(update={'vehicle': name})
+
+
+def _vehicle_called(name: str, folder: Path, source: str) -> str:
+    """Name of a vehicle that comes with the package, or full path of another one's file."""
+    if name in vehicle_names():
+        return name
+    beside = folder / name
+    if beside.suffix and is_file(beside):
+        name = str(beside.resolve())
+    with told_of(f'{source}: '):
+        return str(vehicle_path(name).resolve())
 
 
 def _replaced(field: str, value: Any, given: Collection[str]) -> list[str]:

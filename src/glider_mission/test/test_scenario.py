@@ -307,6 +307,15 @@ def test_vehicle_file_with_a_mistake_is_refused_with_the_scenario(field, value, 
     assert allowed in message
 
 
+def test_a_vehicle_that_there_is_not_is_told_with_all_else_that_is_wrong(tmp_path):
+    values = {'vehicle': 'submarine', 'profile': {'depth_m': -5.0}, 'seed': -1}
+    path = write(tmp_path, values)
+    lines = refusal(path).splitlines()
+    assert len(lines) == 3 and all(line.startswith(str(path)) for line in lines)
+    for said in ('seed = -1', 'profile.depth_m = -5', "vehicle = 'submarine'"):
+        assert sum(said in line for line in lines) == 1
+
+
 def test_current_table_is_looked_for_beside_the_scenario(tmp_path, monkeypatch):
     (tmp_path / 'profile.csv').write_text('depth_m,north_mps,east_mps\n0,0.1,0.2\n100,0,0\n')
     components = [{'kind': 'table', 'file': 'profile.csv'}]
