@@ -32,7 +32,7 @@ RECKONED = {
     'sensors.compass_bias_deg': 1.0,
     'sensors.declination_deg': -8.0,
     'sensors.chart_declination_deg': -7.0,
-    'sensors.gps_first_fix_s': 30.0,
+    'sensors.gps_first_fix_s': 20.0,
     'sensors.also_fitted': '[altitude]',
     'sensors.altimeter_std_m': 0.2,
     'water.bottom_m': 120.0,
@@ -40,9 +40,10 @@ RECKONED = {
     'water.wind_from_deg': 45.0,
     'profile.depth_m': 25.0,
     'profile.surface_every_dives': 1,
-    'profile.wait_s': 130.0,
+    'profile.prepare_s': 10.0,
+    'profile.wait_s': 70.0,
 }
-RECKONED_S = 500
+RECKONED_S = 380
 
 #: What tells how a result came about, not what it is.
 HOW = {'engine', 'wall_time_s', 'real_time_factor', 'messages_recorded'}
