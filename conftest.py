@@ -24,8 +24,7 @@ LONG = (
     *('tutorial', *FLIGHT, 'my_law', 'not_finite', 'random_faults', 'failing_parts', 'faults'),
     *('autopilot', 'validate', 'replay', 'door', 'own_sensors', 'flight_digests', 'your_vehicle'),
     *('experiments_command', 'rudder', 'bottom', 'kills', 'montecarlo', 'lockstep', 'sweep'),
-    *('slow_machine', 'verify', 'two_gliders', 'guard_flights', 'runner', 'mutants', 'live_view'),
-    *('message_faults', 'driver_restart', 'benchmarks', 'experiments', 'forecasts'),
+    *('slow_machine', 'verify', 'two_gliders', 'guard_flights', 'runner', 'mutants'),
 )
 
 

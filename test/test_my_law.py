@@ -328,7 +328,8 @@ def test_help_names_it_and_a_wrong_gain_is_told(machine):
 
 def test_a_run_whose_law_is_not_installed_is_told_in_one_line_each(machine, nodes):
     text = (nodes.folder / 'scenario.yaml').read_text().replace('sliding', 'gliding')
-    other = machine.folder / 'other.yaml'
+    other = machine.folder / 'elsewhere' / 'other.yaml'
+    shutil.copytree(nodes.folder, other.parent, ignore=shutil.ignore_patterns('*.mcap'))
     other.write_text(text.replace('vector_field', 'scalar_field'))
     command = ['-m', 'glider_bringup.cli', 'verify', nodes.folder, '--settings', other]
     done = machine.start(*command)
