@@ -9,6 +9,8 @@ digest is that of the numbers of some topics, tick by tick, over ten hours by th
 of those that there were when the table was made first, and of no more of their numbers than they
 had then. What has been added since (the truth apart from what is believed, navigation, the
 covariance of odom) is not in it, so that the table also says that adding it changed no flight.
+Short flights, in each of which something happens that is rare in ten hours, are those by which
+changes of kernels are noticed (`mutants.trial`); all their numbers are in their digests.
 Sine and exponential belong to the C library: on another one the last bits differ, and so does the
 digest of the probe, of what the library makes of some arguments.
 """
@@ -26,6 +28,7 @@ from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.scenario import load_scenario
+from mutants.trial import FLIGHTS, digest_of
 
 DURATION_S = 36000.0
 #: Scenario and changed fields of each mission.
@@ -103,7 +106,8 @@ def digest(mission: str, way: str) -> str:
 def table() -> dict:
     """Digests of all flights, and of the library they were made with."""
     flights = {f'{mission} {way}': digest(mission, way) for mission in MISSIONS for way in WAYS}
-    return {'probe': probe(), 'duration_s': DURATION_S, 'flights': flights}
+    short = {name: digest_of(name) for name in FLIGHTS}
+    return {'probe': probe(), 'duration_s': DURATION_S, 'flights': flights, 'short': short}
 
 
 @pytest.fixture(scope='module')
@@ -125,6 +129,18 @@ def test_ten_hours_have_the_bits_that_they_had(made, mission, way):
     if probe() != made['probe']:
         pytest.skip('another mathematical library than the table was made with')
     assert digest(mission, way) == made['flights'][f'{mission} {way}']
+
+
+@pytest.mark.parametrize('name', FLIGHTS)
+def test_short_flights_have_the_bits_that_they_had(made, name):
+    if probe() != made['probe']:
+        pytest.skip('another mathematical library than the table was made with')
+    assert digest_of(name) == made['short'][name]
+
+
+def test_each_short_flight_is_another_one(made):
+    assert set(made['short']) == set(FLIGHTS)
+    assert len(set(made['short'].values())) == len(FLIGHTS)
 
 
 if __name__ == '__main__':

@@ -26,16 +26,85 @@ from mutants.changes import Change, mutated
 SLOW_S, HANGS_S = 2.0, 20.0
 #: The flights: yos to this depth (m), for so long (s), in which every stage comes.
 FLIGHT = {'dives': 0, 'duration_s': 400.0, 'profile.depth_m': 12.0}
-FLIGHTS = (
-    ('current_8deg', FLIGHT),
-    ('current_8deg', {**FLIGHT, 'control.law': 'pid', 'guidance.los.method': 'los_zhang2021'}),
-    ('current_12deg', {**FLIGHT, 'guidance.los.method': 'alos', 'perturb.K_MY': 0.3}),
-    ('slocum_shelf', FLIGHT),
-    ('seaglider_1000m', {**FLIGHT, 'profile.surface_every_dives': 1}),
-    ('rough_water', {**FLIGHT, 'navigation.method': 'dead_reckoned'}),
-    ('survey', FLIGHT),
-    ('helix', {'dives': 0, 'duration_s': 400.0}),
-)
+#: One without a position under water, which comes up after each dive and hears where it is.
+RECKONED = {
+    **{**FLIGHT, 'duration_s': 700.0, 'profile.surface_every_dives': 1, 'profile.wait_s': 60.0},
+    **{'profile.prepare_s': 10.0, 'sensors.gps_first_fix_s': 10.0},
+    **{'navigation.method': 'dead_reckoned'},
+}
+#: Orders of every kind.
+ORDERS = [
+    {'at_s': 60.0, 'depth_m': 10.0, 'pitch_deg': 25.0, 'wait_s': 20.0},
+    {'at_s': 62.0, 'path': {'kind': 'straight', 'course_deg': 90.0, 'length_m': 500.0}},
+    {'at_s': 150.0, 'hold': True},
+    {'at_s': 220.0, 'resume': True},
+    {'at_s': 340.0, 'abort': True},
+]
+#: Flights by their names: a scenario, and what is changed in it.
+FLIGHTS = {
+    'adaptive': ('current_8deg', FLIGHT),
+    'pid': (
+        'current_8deg',
+        {**FLIGHT, 'control.law': 'pid', 'guidance.los.method': 'los_zhang2021'},
+    ),
+    'backstepping': ('current_8deg', {**FLIGHT, 'control.law': 'backstepping'}),
+    'alos': (
+        'current_12deg',
+        {**FLIGHT, 'guidance.los.method': 'alos', 'perturb.K_MY': 0.3},
+    ),
+    'fin': ('slocum_shelf', FLIGHT),
+    'seaglider': ('seaglider_1000m', {**FLIGHT, 'profile.surface_every_dives': 1}),
+    'rough': ('rough_water', {**FLIGHT, 'navigation.method': 'dead_reckoned'}),
+    'survey': ('survey', FLIGHT),
+    'helix': ('helix', {'dives': 0, 'duration_s': 400.0}),
+    'end of the path': (
+        'current_8deg',
+        {**FLIGHT, 'path.length_m': 150.0, 'path.at_end': 'stop', 'profile.depth_m': 20.0},
+    ),
+    'fixes': ('reckoned_12deg', RECKONED),
+    'wild fixes': (
+        'reckoned_12deg',
+        {
+            **RECKONED,
+            'faults': [
+                {'kind': 'spike', 'sensor': 'fix', 'error': 900.0, 'share': 0.3, 'at_s': 60.0}
+            ],
+        },
+    ),
+    'tide, few samples': (
+        'reckoned_12deg',
+        {
+            **{**RECKONED, 'navigation.current': 'tidal', 'sensors.fix_missed_pattern': '010'},
+            **{'sensors.imu_period_s': 4.0, 'sensors.gyro': False},
+        },
+    ),
+    'forecast': (
+        'reckoned_12deg',
+        {
+            **{**RECKONED, 'navigation.current': 'forecast'},
+            **{'navigation.forecast.speed_mps': 0.3, 'navigation.forecast.direction_deg': 20.0},
+        },
+    ),
+    'orders': (
+        'current_8deg',
+        {**FLIGHT, 'profile.prepare_s': 0.0, 'profile.top_depth_m': 5.0, 'orders': ORDERS},
+    ),
+    'roll mass that sticks': (
+        'current_8deg',
+        {**FLIGHT, 'faults': [{'kind': 'stuck', 'actuator': 'roll_mass', 'at_s': 80.0}]},
+    ),
+    'wild samples': (
+        'current_8deg',
+        {
+            **FLIGHT,
+            'faults': [
+                {'kind': 'spike', 'sensor': 'depth', 'error': 30.0, 'share': 0.02, 'at_s': 60.0},
+                {'kind': 'spike', 'sensor': 'heading', 'error': 90.0, 'share': 0.02, 'at_s': 60.0},
+            ],
+        },
+    ),
+    'hardly turns': ('current_8deg', {**FLIGHT, 'perturb.K_MY': 0.02, 'perturb.K_MR': 0.05}),
+}
 
 
 class TooSlow(BaseException):
@@ -107,21 +176,20 @@ def run_tests(tests: str, known: dict[str, float]) -> tuple[bool, dict[str, floa
     return code != pytest.ExitCode.OK, times
 
 
-def fly_all() -> str:
-    """Digest of all that is recorded of the flights, to the last bit."""
-    from glider_base.signals import TICK_S
-    from glider_bringup.engines.direct import fly
-    from glider_bringup.engines.flight import mission_of
-    from glider_mission.blocks import ROW
+def digest_of(name: str) -> str:
+    """Digest of all numbers of a flight, to the last bit."""
+    from glider_bringup.engines.flight import fly
     from glider_mission.scenario import load_scenario
 
     digest = hashlib.sha256()
-    for name, fields in FLIGHTS:
-        state, params = mission_of(load_scenario(name, fields))
-        log = np.empty((round(fields['duration_s'] / TICK_S), ROW))
-        _, rows, _ = fly(state, params, log, TICK_S)
-        digest.update(log[:rows].tobytes())
-    return digest.hexdigest()
+
+    class Taker:
+        def add(self, log: np.ndarray) -> None:
+            digest.update(np.ascontiguousarray(log).tobytes())
+
+    scenario, fields = FLIGHTS[name]
+    fly(load_scenario(scenario, fields), [Taker()])
+    return digest.hexdigest()[:32]
 
 
 def judge(asked: dict) -> dict:
@@ -132,14 +200,18 @@ def judge(asked: dict) -> dict:
     np.seterr(all='ignore')
     if asked['change'] is None:
         _, times = run_tests(asked['tests'], {})
-        return {'times': times, 'flights': fly_all() if asked.get('fly', True) else None}
+        return {
+            'times': times,
+            'flights': [*map(digest_of, FLIGHTS)] if asked.get('fly', True) else [],
+        }
     sys.meta_path.insert(0, _Loader(Change(*asked['change'])))
     try:
         fails, _ = run_tests(asked['tests'], asked['times'])
         if fails:
             return {'by': 'tests'}
         signal.setitimer(signal.ITIMER_REAL, 10.0 * HANGS_S)
-        return {'by': '' if fly_all() == asked['flights'] else 'flights'}
+        flown = zip(map(digest_of, FLIGHTS), asked['flights'], strict=True)
+        return {'by': '' if all(now == before for now, before in flown) else 'flights'}
     except (Exception, TooSlow):
         return {'by': 'flights'}
 
