@@ -33,11 +33,13 @@ def save_late(self, overloads):
 IndexDataCacheFile._save_index = save_late
 doubled(eval(sys.argv[1]))
 """
-#: What a later process finds.
+#: What a later process finds, and whether it has loaded what numba compiles with.
 FIND = """
+import sys
 from doubling import doubled
 
 print(doubled(3), doubled(0.25), sum(doubled.stats.cache_misses.values()))
+print('numba.np.linalg' in sys.modules)
 """
 
 
@@ -60,7 +62,7 @@ def test_processes_that_compile_for_different_types_do_not_get_each_others_code(
     both = [start(COMPILE, number) for number in ('3', '0.25')]
     assert [one.wait(60.0) for one in both] == [0, 0]
     found, _ = start(FIND).communicate(timeout=300.0)
-    assert found.split() == ['6', '0.5', '0']
+    assert found.split() == ['6', '0.5', '0', 'False']
 
 
 #: Modules of a package: one kernel calls another's, one a slot that is filled elsewhere.
