@@ -23,14 +23,14 @@ import scipy.optimize  # noqa: F401
 from mutants.changes import Change, mutated
 
 #: A test that takes longer (s), not compiled, is left out; with a change it has so long, and a
-#: flight, which takes 4 to 11 s on an idle machine.
+#: flight, which takes 4 to 13 s on an idle machine.
 SLOW_S, HANGS_S, FLIES_S = 2.0, 20.0, 90.0
 #: The flights: yos to this depth (m), for so long (s), in which every stage comes.
 FLIGHT = {'dives': 0, 'duration_s': 400.0, 'profile.depth_m': 12.0}
 #: One without a position under water, which comes up after each dive and hears where it is.
 RECKONED = {
-    **{**FLIGHT, 'duration_s': 700.0, 'profile.surface_every_dives': 1, 'profile.wait_s': 60.0},
-    **{'profile.prepare_s': 10.0, 'sensors.gps_first_fix_s': 10.0},
+    **{'dives': 0, 'duration_s': 1060.0, 'profile.depth_m': 20.0, 'profile.prepare_s': 10.0},
+    **{'profile.surface_every_dives': 1, 'profile.wait_s': 60.0, 'sensors.gps_first_fix_s': 10.0},
     **{'navigation.method': 'dead_reckoned'},
 }
 #: Orders of every kind.
@@ -62,6 +62,17 @@ FLIGHTS = {
         'current_8deg',
         {**FLIGHT, 'path.length_m': 150.0, 'path.at_end': 'stop', 'profile.depth_m': 20.0},
     ),
+    'end of the path against the current': (
+        'current_8deg',
+        {
+            **{**FLIGHT, 'duration_s': 600.0, 'path.length_m': 300.0, 'path.at_end': 'stop'},
+            **{'profile.depth_m': 20.0, 'current.speed_kn': 0.3, 'current.angle_deg': 180.0},
+        },
+    ),
+    'faster than its file': (
+        'current_8deg',
+        {**FLIGHT, 'profile.depth_m': 20.0, 'perturb.K_D0': 0.5},
+    ),
     'fixes': ('reckoned_12deg', RECKONED),
     'wild fixes': (
         'reckoned_12deg',
@@ -84,6 +95,7 @@ FLIGHTS = {
         {
             **{**RECKONED, 'navigation.current': 'forecast'},
             **{'navigation.forecast.speed_mps': 0.3, 'navigation.forecast.direction_deg': 20.0},
+            **{'navigation.forecast.share_std': 0.5},
         },
     ),
     'orders': (
