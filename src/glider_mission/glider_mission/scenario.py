@@ -499,17 +499,20 @@ def make_scenario(
         here = any(overlap(field, name) for field in own)
         return None if here else yaml_line(path, location)
 
+    line = line_of((VEHICLE,))
+    in_line = f'{path}:{line}{changed}' if line else f'{path}{changed}'
     try:
         scenario = validate(_kind(values), values, str(path), path.parent, line_of, changed)
     except ConfigurationError as error:
         told = [str(error)]
         if isinstance(values.get(VEHICLE), str):  # a wrong one is not found out only later
             try:
-                _vehicle_called(values[VEHICLE], path.parent, f'{path}{changed}')
+                _vehicle_called(values[VEHICLE], path.parent, in_line)
             except ConfigurationError as other:
                 told.append(str(other))
         raise ConfigurationError('\n'.join(told)) from None
-    scenario = _find_vehicle(scenario, path.parent, in_vehicle, f'{path}{changed}')
+    name = changed_vehicle(_vehicle_called(scenario.vehicle, path.parent, in_line), in_vehicle)
+    scenario = _with_vehicle(scenario, name, f'{path}{changed}')
     if not recorded:
         with told_of(f'{path}{changed}: '):
             _check_glide(scenario)
@@ -582,11 +585,8 @@ def told_of(what: str, kind: type[ValueError] = ConfigurationError) -> Iterator[
         raise ConfigurationError(f'{what}{error}') from None
 
 
-def _find_vehicle(
-    scenario: Scenario, folder: Path, changes: dict[str, Any], source: str
-) -> Scenario:
+def _with_vehicle(scenario: Scenario, name: str, source: str) -> Scenario:
     """Scenario whose vehicle is known to be good, wherever nodes are started from."""
-    name = changed_vehicle(_vehicle_called(scenario.vehicle, folder, source), changes)
     vehicle = load_vehicle(name)
     with told_of(f'{source}: '):
         perturbed(vehicle.params(), scenario.perturb)

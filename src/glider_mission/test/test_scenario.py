@@ -308,11 +308,12 @@ def test_vehicle_file_with_a_mistake_is_refused_with_the_scenario(field, value, 
 
 
 def test_a_vehicle_that_there_is_not_is_told_with_all_else_that_is_wrong(tmp_path):
-    values = {'vehicle': 'submarine', 'profile': {'depth_m': -5.0}, 'seed': -1}
-    path = write(tmp_path, values)
+    text = 'profile:\n  depth_m: -5.0\nseed: -1\nvehicle: submarine\n'
+    path = write(tmp_path, text)
     lines = refusal(path).splitlines()
-    assert len(lines) == 3 and all(line.startswith(str(path)) for line in lines)
-    for said in ('seed = -1', 'profile.depth_m = -5', "vehicle = 'submarine'"):
+    assert len(lines) == 3 and all(line.startswith(f'{path}:') for line in lines)
+    assert any(line.startswith(f"{path}:4: vehicle = 'submarine'") for line in lines)
+    for said in ('seed = -1', 'profile.depth_m = -5'):
         assert sum(said in line for line in lines) == 1
 
 

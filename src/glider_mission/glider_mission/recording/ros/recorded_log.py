@@ -119,7 +119,7 @@ class RecordedLog:
         self._unusable: dict[tuple[str, int], str] = {}
         self._lacks = ''
         self._log = np.empty((2 * BLOCK_TICKS, ROW))
-        self._begun = 0  #: rows that are NaN but for what was put there; others are memory
+        self._begun = 0  #: rows in use: NaN but for what was put there
         self._start, self._over = 0, False
 
     def blocks(self) -> Iterator[np.ndarray]:
