@@ -697,12 +697,13 @@ def test_a_node_without_its_inputs_repeats_that_it_is_not_well(make_graph, conte
 
 
 def test_speed_is_kept_without_drift(make_graph):
-    graph = make_graph(last_tick=40, speed=10.0)
+    graph = make_graph(last_tick=200, speed=10.0)
     graph.spin_until_over()
     times = [wall_s for wall_s, *_ in graph.plant.log]
-    # tick k is not published before start + k * 10 ms, and answered soon after
-    assert times[40] - times[0] > 0.4 - 0.05
-    assert times[40] - times[0] < 0.4 + 2.0
+    # tick k is not published before start + k * 10 ms, and answered soon after; the first one
+    # later than others where processors are busy
+    assert times[200] - times[0] > 2.0 - 0.25
+    assert times[200] - times[0] < 2.0 + 2.0
 
 
 def test_pause_holds_the_run_and_is_not_taken_for_a_fault(make_graph, context):

@@ -20,11 +20,13 @@ from glider_control.control import (
     control_step,
 )
 from glider_control.intake import REFUSED
+from glider_control.law import bank_carefully
 from glider_control.settings import ControlSettings
 from glider_control.stall import BEGINS_S, leave_stall, watch_stall
 from glider_control.vertical_rate import Trim, rate_error
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.glide_polar import glide_vertical_rate
+from glider_model.onboard.righting import Righting
 from glider_model.plant.plant import PlantSettings, plant_odometry, plant_step
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle, vehicle_names
@@ -386,3 +388,16 @@ def test_the_pump_of_who_stalls_in_a_dive_waits_in_the_middle_until_shortly_befo
     assert led == m_b
     assert trim == (Trim(0.0, 0.0) if v_d > 0.0 else Trim(0.1, 0.2))
     assert reference.theta == math.copysign(math.radians(60.0), -v_d)
+
+
+@pytest.mark.parametrize('law', ['adaptive', 'backstepping', 'pid'])
+@pytest.mark.parametrize(('m_b', 'share'), [(0.3, 1.0), (-0.9, 1.0), (0.7, 1.0), (0.8, 1.0 / 3.0)])
+def test_who_is_left_less_than_a_quarter_of_its_righting_rolls_a_third_as_far_and_fast(
+    law, m_b, share
+):
+    params = ControlSettings(vehicle='zhang2021', law=law).params().law
+    params = params._replace(righting=Righting(at_rest=2.0, lever=-2.0))
+    careful = bank_carefully(m_b, params)
+    assert careful.roll_limit == pytest.approx(share * params.roll_limit)
+    rate = share * params.roll_filter.rate_limit
+    assert careful.roll_filter == params.roll_filter._replace(rate_limit=pytest.approx(rate))

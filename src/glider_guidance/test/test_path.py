@@ -420,6 +420,10 @@ def test_closest_of_equal_turns_seen_from_above_is_the_first():
             'waypoints 1 and 2 coincide: .* are 0.500 m apart',
         ),
         (
+            {'kind': 'waypoints', 'waypoints': [[0.0, 0.0], [4.0, 0.0], [9.5, 0.0]]},
+            'the whole path is 9.500 m long .allowed: >= 10.0 m',
+        ),
+        (
             {'kind': 'waypoints', 'waypoints': [[0.0, 0.0], [5.0, 0.0, 10.0]]},
             'all waypoints need a depth, or none',
         ),

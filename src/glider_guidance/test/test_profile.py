@@ -18,6 +18,7 @@ from glider_guidance.yo.machine import (
     NO_END,
     PITCH_OVER,
     ProfileSettings,
+    look_ahead_s,
     mission_time_s,
     profile_step,
     profile_targets,
@@ -102,6 +103,16 @@ def test_so_many_dives_are_flown_and_counted(dives):
     again = [INFLECTING_DOWN, *ROUND[1:]] * (dives - 1)
     assert point.stages == [*ROUND, *again, WAITING_ON_SURFACE]
     assert point.state.dives == dives
+
+
+@pytest.mark.parametrize('depth_m', [20.0, 60.0])
+def test_the_rest_of_the_path_is_looked_at_for_four_dives(depth_m):
+    """With their turns, but by far not for a fifth."""
+    point = Point(dives=4, depth_m=depth_m, prepare_s=0.0)
+    while point.state.dives < 4:
+        point.tick()
+    took_s = TICK_S * len(point.depths)
+    assert took_s < look_ahead_s(point.params) < 1.2 * took_s + 8.0 * 6.0 * point.params.lead_s
 
 
 class Walker(Point):

@@ -15,8 +15,10 @@ from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation.flight_model import (
     INITIAL_FLIGHT,
+    INITIAL_ZERO,
     Flight,
     at_the_surface,
+    find_zero,
     follow_depth,
     reckon_speed,
     weigh_speed,
@@ -156,3 +158,43 @@ def _across(theta, alpha, speed, polar):
     """Drag times sine plus lift times cosine of the path: no force acts across a weight."""
     drag = polar.K_D0 * speed**polar.n + polar.K_D * alpha**2
     return drag * math.cos(theta - alpha) + polar.K_L * alpha * math.sin(theta - alpha)
+
+
+@kernel
+def _zero_of(zero, depths, every, dt):
+    for i in range(len(depths)):
+        zero = find_zero(zero, depths[i], i % every == 0, True, dt)
+    return zero
+
+
+def zero_of(depths, zero=INITIAL_ZERO, period_s=TICK_S):
+    """Offset (m) after a stay with a fix, of which each tick shows a depth (m)."""
+    zero = find_zero(zero, 50.0, True, False, TICK_S)  # it dived before
+    return _zero_of(zero, np.array(depths, float), round(period_s / TICK_S), TICK_S)
+
+
+@pytest.mark.parametrize('shown', [3.1, 4.4, -3.1, 12.0, 19.9, -19.9])
+def test_what_is_shown_with_a_fix_is_the_offset(shown):
+    """Once ten seconds have shown it; it stays for the next dive."""
+    assert zero_of([shown] * 98).offset == 0.0
+    zero = zero_of([shown] * 102)
+    assert zero.offset == pytest.approx(shown)
+    assert find_zero(zero, 80.0, True, False, TICK_S).offset == zero.offset
+    assert zero_of([0.0] * 200, zero).offset == 0.0
+
+
+@pytest.mark.parametrize('shown', [0.0, 2.9, -2.9, 20.1, -20.1])
+def test_waves_and_what_no_sensor_is_off_by_are_no_offset(shown):
+    assert zero_of([shown] * 600).offset == 0.0
+
+
+@pytest.mark.parametrize(('shown', 'then'), [(7.9, 5.0), (2.1, 5.0), (8.1, 8.1), (1.9, 1.9)])
+def test_an_offset_changes_by_more_than_waves_do(shown, then):
+    assert zero_of([shown] * 102, zero_of([5.0] * 102)).offset == pytest.approx(then)
+
+
+def test_an_offset_is_that_of_five_samples_and_averaged():
+    assert zero_of([8.0] * 160, period_s=4.0).offset == 0.0
+    assert zero_of([8.0] * 162, period_s=4.0).offset == pytest.approx(8.0)
+    waves = 8.0 + np.sin(2.0 * math.pi * np.arange(200) / 40.0)
+    assert zero_of(waves).shown == pytest.approx(8.0, abs=0.2)
