@@ -25,6 +25,8 @@ LONG = (
     *('autopilot', 'validate', 'replay', 'door', 'own_sensors', 'flight_digests', 'your_vehicle'),
     *('experiments_command', 'rudder', 'bottom', 'kills', 'montecarlo', 'lockstep', 'sweep'),
     *('slow_machine', 'verify', 'two_gliders', 'guard_flights', 'runner', 'mutants'),
+    *('message_faults', 'live_view', 'driver_restart', 'forecasts', 'experiments', 'benchmarks'),
+    *('stability_map', 'vehicle_fields', 'soak'),
 )
 
 

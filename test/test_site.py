@@ -121,11 +121,10 @@ def test_search_finds_a_page(site):
 
 @needs_mkdocs
 def test_a_dead_link_ends_the_build(tmp_path):
-    for name in ('docs', 'mkdocs.yml'):
-        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-        copy(ROOT / name, tmp_path / name)
-    with (tmp_path / 'docs/security.md').open('a') as page:
-        page.write('\n[nowhere](nowhere.md)\n')
+    shutil.copytree(ROOT / 'docs/making', tmp_path / 'docs/making')
+    how, _, _ = (ROOT / 'mkdocs.yml').read_text().partition('\nnav:')
+    (tmp_path / 'mkdocs.yml').write_text(how)
+    (tmp_path / 'docs/index.md').write_text('# One page\n\n[nowhere](nowhere.md)\n')
     program = tmp_path / 'docs/making/pages.py'
     done = subprocess.run([sys.executable, program], capture_output=True, text=True)
     assert done.returncode == 1
