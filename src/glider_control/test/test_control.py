@@ -22,7 +22,7 @@ from glider_control.control import (
 from glider_control.intake import REFUSED
 from glider_control.law import bank_carefully
 from glider_control.settings import ControlSettings
-from glider_control.stall import BEGINS_S, leave_stall, watch_stall
+from glider_control.stall import BEGINS_S, REST_S, STALL_S, leave_stall, watch_stall
 from glider_control.vertical_rate import Trim, rate_error
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.glide_polar import glide_vertical_rate
@@ -231,6 +231,15 @@ def test_a_vertical_rate_that_the_depth_does_not_follow_is_put_right(shows, take
     assert abs(off - taken) < 0.005
 
 
+@pytest.mark.parametrize('rate', [0.1, -0.3])
+def test_a_depth_that_stands_still_puts_a_rate_right_in_ten_minutes(rate):
+    error = 0.0
+    for _ in range(6000):
+        error, off = rate_error(error, rate, 0.0, TICK_S)
+    assert error == pytest.approx(rate * (1.0 - math.exp(-1.0)), rel=1e-3)
+    assert off == pytest.approx(error - math.copysign(0.01, rate))
+
+
 def travel(column):
     """Way that a motor is sent (m or rad)."""
     return float(np.sum(np.abs(np.diff(column))))
@@ -401,3 +410,27 @@ def test_who_is_left_less_than_a_quarter_of_its_righting_rolls_a_third_as_far_an
     assert careful.roll_limit == pytest.approx(share * params.roll_limit)
     rate = share * params.roll_filter.rate_limit
     assert careful.roll_filter == params.roll_filter._replace(rate_limit=pytest.approx(rate))
+
+
+@pytest.mark.parametrize(
+    ('theta', 'm_b', 'rate', 'stalls'),
+    [
+        (-0.5, 0.95, 0.0, True),
+        (-0.5, 0.95, 0.04, True),  # a quarter of what is asked for is 0.05
+        (-0.5, 0.95, 0.06, False),
+        (-0.1, 0.95, 0.0, False),  # the nose is hardly down
+        (-0.5, 0.30, 0.0, False),  # no more than its glide takes
+    ],
+)
+def test_who_is_heavy_with_its_nose_down_and_does_not_sink_for_two_minutes_stalls(
+    theta, m_b, rate, stalls
+):
+    params = ControlSettings(vehicle='zhang2021').params()
+    now = Measured(0.0, theta, 0.0, 0.0, 0.0, 0.0, rate)
+    wanted = Reference(*(4 * (0.0,)), math.radians(-30.0), *(3 * (0.0,)), 0.2, *(3 * (0.0,)))
+    stall_s, times = 0.0, []
+    for _ in range(round((STALL_S + 1.0) / TICK_S)):
+        stall_s = watch_stall(stall_s, now, wanted, m_b, params, TICK_S)
+        times.append(stall_s)
+    assert max(times) == pytest.approx(STALL_S if stalls else 0.0, abs=0.15)
+    assert min(times) == (-REST_S if stalls else 0.0)

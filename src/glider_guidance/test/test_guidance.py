@@ -404,3 +404,14 @@ def test_vehicle_that_steers_weakly_approaches_by_a_smaller_angle():
     assert dive_s['dive'] > 1.5 * dive_s['none'] == 1.5 * dive_s['climb']
     assert headings['none'] < 1.2 * headings['dive'] < 0.0
     assert headings['climb'] == headings['none']
+
+
+def test_the_target_is_led_on_by_no_more_than_three_metres_per_second():
+    """Along a path whose parameter is no length of it: the vehicle is set ahead by half of it."""
+    legs = [(0.0, 0.0), (400.0, 300.0), (800.0, -300.0), (1600.0, 0.0)]
+    guidance = GuidanceSettings.model_validate({'path': {'kind': 'spline', 'waypoints': legs}})
+    flight = Flight(guidance).fly(5.0)
+    flight.point = flight.point._replace(n=1600.0, e=0.0)
+    flight.fly(200.0)
+    fast = np.hypot(np.diff(flight.t_n), np.diff(flight.t_e))[60:] / TICK_S
+    assert fast.max() == pytest.approx(3.0, rel=1e-3)

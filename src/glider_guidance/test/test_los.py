@@ -179,6 +179,18 @@ def test_the_turn_onto_the_path_is_one_that_a_glider_can_follow(
 
 
 @quick
+@given(courses, st.floats(0.1, 0.5), st.floats(-0.95, 0.69), st.sampled_from([-1.0, 1.0]))
+def test_a_path_is_come_to_by_as_much_as_the_current_across_leaves(course, speed, against, side):
+    """Square to it, in a current along it that is faster than the vehicle."""
+    along, starboard = unit(course, 0.0)[:2], unit(course + math.pi / 2.0, 0.0)[:2]
+    across = -side * against * speed
+    current = 4.0 * speed * along + across * starboard
+    heading = approach_heading(course, side * math.pi / 2.0, 4.0 * speed, speed, *current)
+    comes = side * (across + speed * math.sin(heading - course))
+    assert comes == pytest.approx(max(0.3, 0.9 - against) * speed, rel=1e-6)
+
+
+@quick
 @given(courses, st.floats(0.05, 0.5), st.floats(1.001, 5.0), st.sampled_from([-1.0, 1.0]))
 def test_infeasible_course_is_flown_square_to_it_against_the_current(course, speed, excess, side):
     starboard = unit(course + math.pi / 2.0, 0.0)[:2]

@@ -135,6 +135,7 @@ def test_how_much_the_sea_wanders_is_learnt():
         changing = take_mean(changing, [sign * 0.3, sign * 0.1], 5400.0)
         assert still.q < before[0] and changing.q > before[1]
     assert still.q < 0.3 * first
+    assert still.q == pytest.approx(0.8 * before[0]), 'four ways count'
     assert changing.q > 10.0 * first
 
 

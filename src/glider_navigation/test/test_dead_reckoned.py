@@ -16,7 +16,13 @@ from glider_navigation.current_belief import Uncertainty, initial_belief
 from glider_navigation.forecast import Trust, weigh
 from glider_navigation.intake import take_in
 from glider_navigation.method import Fix, Heard, method_step
-from glider_navigation.methods.dead_reckoned import Drift, Way, _dive, place_covariance
+from glider_navigation.methods.dead_reckoned import (
+    Drift,
+    Way,
+    _dive,
+    _unforeseen,
+    place_covariance,
+)
 from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
 from glider_navigation.settings import NavigationSettings
 from glider_navigation.surface_stay import begin, drifted_variance, wait
@@ -198,6 +204,14 @@ def test_who_comes_up_believes_in_the_drift_of_the_last_stay_if_fixes_told_it(
         setattr(truth, name, getattr(truth, name)[: truth.cycle + 500])
     track = navigate(truth, current='forecast', forecast=FORECAST)
     assert tuple(track.state.stay.drift) == pytest.approx(drift, abs=0.02)
+
+
+def test_of_a_drift_the_water_that_is_believed_is_taken_off():
+    settings = NavigationSettings(method='dead_reckoned')
+    params, state = settings.params().method, settings.initial_state().method
+    current = state.current._replace(mean=Vector(0.1, -0.05))
+    left = _unforeseen(Vector(0.3, 0.2), Vector(5.0, 7.0), 60.0, current, state.trust, params)
+    assert tuple(left) == pytest.approx((0.2, 0.25))
 
 
 def test_a_stay_without_a_fix_makes_a_way_longer_and_less_known():

@@ -167,3 +167,15 @@ def test_a_fix_far_off_is_confirmed_by_one_near_it_and_a_while_later(later_s, as
     stay = hear_fix(wait(stay, later_s), Fix(True, 5e4, aside_m, 25.0))
     assert stay.fixes == believed
     assert (tuple(stay.place) == (5e4, aside_m)) == believed
+
+
+def test_the_drift_early_in_a_stay_is_that_of_its_first_quarter_of_an_hour_or_first_fix():
+    stay = begin(Vector(0.0, 0.0), 25.0, Vector(0.1, 0.0))
+    soon = stay_with(stay, [(300.0, 60.0, 5.0, 25.0), (590.0, 200.0, 9.0, 25.0)])
+    assert (soon.early.drift, soon.early.t_s) == (soon.drift, 890.0)
+    late = stay_with(stay, [(1200.0, 300.0, -20.0, 25.0)])
+    assert (late.early.drift, late.early.t_s) == (late.drift, 1200.0)
+    for one in soon, late:
+        later = stay_with(one, [(600.0, 900.0, 90.0, 25.0)])
+        assert later.early == one.early
+        assert later.drift != one.drift
