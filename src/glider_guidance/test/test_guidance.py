@@ -407,7 +407,7 @@ def test_vehicle_that_steers_weakly_approaches_by_a_smaller_angle():
 
 
 def test_the_target_is_led_on_by_no_more_than_three_metres_per_second():
-    """Along a path whose parameter is no length of it: the vehicle is set ahead by half of it."""
+    """Along a path whose parameter is no length of it, to a vehicle that is set to its end."""
     legs = [(0.0, 0.0), (400.0, 300.0), (800.0, -300.0), (1600.0, 0.0)]
     guidance = GuidanceSettings.model_validate({'path': {'kind': 'spline', 'waypoints': legs}})
     flight = Flight(guidance).fly(5.0)
