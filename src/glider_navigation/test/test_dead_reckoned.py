@@ -238,6 +238,26 @@ def test_what_the_altimeter_says_is_no_echo_where_it_is_no_number():
         assert told.altitude == taken
 
 
+def test_a_depth_that_jumps_is_left_until_none_was_believed_for_long():
+    """Not the first one, wherever the vehicle is."""
+    settings = NavigationSettings(method='dead_reckoned')
+    odom = (0.0,) * 13
+    rest = Joints(0.0, 0.0, 0.0, 0.0), odom, odometry_from_wire(odom)
+    imu = Imu(1.0, *(6 * (0.0,)), False)
+    state, params = settings.initial_state().intake, settings.params().intake
+    far = 300.0 + 2.0 * params.gate.depth_jump
+    heard = Heard(*rest, imu, 300.0, Fix(False, 0.0, 0.0, 0.0), 0.0)
+    state, told = take_in(state, heard, params, TICK_S)
+    assert told.depth == 300.0
+    waited_s = 0.0
+    while told.depth == 300.0:
+        state, told = take_in(state, heard._replace(depth=far), params, TICK_S)
+        waited_s += TICK_S
+        assert waited_s < params.hold_s + 1.0
+    assert told.depth == far
+    assert waited_s == pytest.approx(params.hold_s, abs=2.0 * TICK_S)
+
+
 def test_a_forecast_of_changes_that_do_not_come_is_left_out(dives):
     """The sea is steady. The forecast of its first way holds, and swings from way to way."""
     truth = dives([30.0, 40.0, 200.0, 120.0, 310.0, 75.0, 20.0, 250.0])
