@@ -422,15 +422,18 @@ def test_who_is_left_less_than_a_quarter_of_its_righting_rolls_a_third_as_far_an
         (-0.5, 0.30, 0.0, False),  # no more than its glide takes
     ],
 )
+@pytest.mark.parametrize('down', [1.0, -1.0], ids=['dive', 'climb'])
 def test_who_is_heavy_with_its_nose_down_and_does_not_sink_for_two_minutes_stalls(
-    theta, m_b, rate, stalls
+    down, theta, m_b, rate, stalls
 ):
+    """Or light with its nose up."""
     params = ControlSettings(vehicle='zhang2021').params()
-    now = Measured(0.0, theta, 0.0, 0.0, 0.0, 0.0, rate)
-    wanted = Reference(*(4 * (0.0,)), math.radians(-30.0), *(3 * (0.0,)), 0.2, *(3 * (0.0,)))
+    now = Measured(0.0, down * theta, 0.0, 0.0, 0.0, 0.0, down * rate)
+    pitch, v_d = down * math.radians(-30.0), down * 0.2
+    wanted = Reference(*(4 * (0.0,)), pitch, *(3 * (0.0,)), v_d, *(3 * (0.0,)))
     stall_s, times = 0.0, []
     for _ in range(round((STALL_S + 1.0) / TICK_S)):
-        stall_s = watch_stall(stall_s, now, wanted, m_b, params, TICK_S)
+        stall_s = watch_stall(stall_s, now, wanted, down * m_b, params, TICK_S)
         times.append(stall_s)
     assert max(times) == pytest.approx(STALL_S if stalls else 0.0, abs=0.15)
     assert min(times) == (-REST_S if stalls else 0.0)
