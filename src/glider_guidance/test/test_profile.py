@@ -105,10 +105,10 @@ def test_so_many_dives_are_flown_and_counted(dives):
     assert point.state.dives == dives
 
 
-@pytest.mark.parametrize('depth_m', [20.0, 60.0])
-def test_the_rest_of_the_path_is_looked_at_for_four_dives(depth_m):
-    """With their turns, but by far not for a fifth."""
-    point = Point(dives=4, depth_m=depth_m, prepare_s=0.0)
+@pytest.mark.parametrize(('depth_m', 'pump'), [(20.0, PUMP), (60.0, PUMP), (60.0, 10.0 * PUMP)])
+def test_the_rest_of_the_path_is_looked_at_for_four_dives(depth_m, pump):
+    """With their turns, which a strong pump hardly takes time for."""
+    point = Point(dives=4, pump=pump, depth_m=depth_m, prepare_s=0.0)
     while point.state.dives < 4:
         point.tick()
     took_s = TICK_S * len(point.depths)
