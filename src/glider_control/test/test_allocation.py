@@ -85,6 +85,16 @@ def test_allocation_makes_the_moments_asked_for(vehicle, x_share, mu_share, phi,
 
 
 @every_vehicle
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_pitch_moments_are_made_until_hardly_any_gravity_is_left_for_them(vehicle, side):
+    """A fifth of it, which is 78 deg nose up or down."""
+    _, limits = parts(vehicle)
+    x_p, theta = 0.3 * limits.x_p_max, side * math.acos(0.21)
+    _, tau_q = moments(0.1, x_p, 0.0, 0.0, theta, limits)
+    assert allocate_pitch(tau_q, 0.1, 0.0, 0.0, theta, limits) == pytest.approx(x_p, abs=1e-9)
+
+
+@every_vehicle
 @quick
 @given(any_moment, any_moment, st.floats(-math.pi, math.pi), st.floats(-1.57, 1.57))
 def test_allocation_stays_within_the_ranges(vehicle, tau_p, tau_q, phi, theta):
