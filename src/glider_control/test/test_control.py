@@ -23,9 +23,9 @@ from glider_control.intake import REFUSED
 from glider_control.law import bank_carefully
 from glider_control.settings import ControlSettings
 from glider_control.stall import BEGINS_S, REST_S, STALL_S, leave_stall, watch_stall
-from glider_control.vertical_rate import Trim, rate_error
+from glider_control.vertical_rate import Trim, rate_error, vertical_rate_law
 from glider_model.onboard.attitude_filter import Measured
-from glider_model.onboard.glide_polar import glide_vertical_rate
+from glider_model.onboard.glide_polar import glide_net_heaviness, glide_vertical_rate
 from glider_model.onboard.righting import Righting
 from glider_model.plant.plant import PlantSettings, plant_odometry, plant_step
 from glider_model.plant.trim import solve_trim
@@ -437,3 +437,17 @@ def test_who_is_heavy_with_its_nose_down_and_does_not_sink_for_two_minutes_stall
         times.append(stall_s)
     assert max(times) == pytest.approx(STALL_S if stalls else 0.0, abs=0.15)
     assert min(times) == (-REST_S if stalls else 0.0)
+
+
+@pytest.mark.parametrize('down', [1.0, -1.0], ids=['dive', 'climb'])
+@pytest.mark.parametrize(('learnt', 'counts'), [(-0.3, -0.3), (-0.8, -0.5), (0.4, 0.4)])
+def test_a_hull_has_half_of_the_drag_in_its_file_at_least(down, learnt, counts):
+    params = ControlSettings(vehicle='zhang2021').params()
+    pitch, v_d = down * math.radians(-30.0), down * 0.2
+    wanted = Reference(*(4 * (0.0,)), pitch, *(3 * (0.0,)), v_d, *(3 * (0.0,)))
+    now = Measured(0.0, pitch, 0.0, 0.0, 0.0, 0.0, v_d)
+    glide = glide_net_heaviness(pitch, v_d, params.polar)
+    far = Joints(-0.9 * down, 0.0, 0.0, 0.0)  # nothing is learnt while the pump is on its way
+    m_b, trim = vertical_rate_law(Trim(0.0, learnt * abs(glide)), now, wanted, far, params, TICK_S)
+    assert m_b == pytest.approx((1.0 + counts) * glide)
+    assert trim.drag == learnt * abs(glide)
