@@ -198,6 +198,8 @@ def test_infeasible_course_is_flown_square_to_it_against_the_current(course, spe
     heading, _, feasible = crab_heading(course, speed, current[0], current[1])
     assert not feasible
     assert unit(heading, 0.0)[:2] == pytest.approx(-side * starboard, abs=1e-9)
+    approaching = approach_heading(course, 0.0, speed, speed, *current)
+    assert unit(approaching, 0.0)[:2] == pytest.approx(-side * starboard, abs=1e-9)
 
 
 @quick
