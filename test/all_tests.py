@@ -44,7 +44,7 @@ def main(arguments):
         paths = [str(ROOT / 'test'), os.environ.get('PYTHONPATH', '')]
         os.environ['PYTHONPATH'] = os.pathsep.join(filter(None, paths))
         words = (*LANES[lane], *arguments[2:])
-    # logs of flights are kept and forgotten: to give their memory back takes a tenth of such tests
+    # logs of flights are kept and forgotten: to give their memory back, page by page, takes time
     os.environ |= {f'MALLOC_{what}_THRESHOLD_': str(1 << 30) for what in ('MMAP', 'TRIM')}
     os.environ.pop('PYTHONDONTWRITEBYTECODE', None)  # hundreds of processes would read it again
     os.execv(sys.executable, [sys.executable, *words])

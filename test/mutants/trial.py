@@ -23,7 +23,7 @@ import scipy.optimize  # noqa: F401
 from mutants.changes import Change, mutated
 
 #: A test that takes longer (s), not compiled, is left out; with a change it has so long, and a
-#: flight, which takes 4 to 13 s on an idle machine.
+#: flight so long.
 SLOW_S, HANGS_S, FLIES_S = 2.0, 20.0, 90.0
 #: The flights: yos to this depth (m), for so long (s), in which every stage comes.
 FLIGHT = {'dives': 0, 'duration_s': 400.0, 'profile.depth_m': 12.0}

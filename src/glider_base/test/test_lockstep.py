@@ -700,10 +700,11 @@ def test_speed_is_kept_without_drift(make_graph):
     graph = make_graph(last_tick=200, speed=10.0)
     graph.spin_until_over()
     times = [wall_s for wall_s, *_ in graph.plant.log]
-    # tick k is not published before start + k * 10 ms, and answered soon after; the first one
-    # later than others where processors are busy
-    assert times[200] - times[0] > 2.0 - 0.25
-    assert times[200] - times[0] < 2.0 + 2.0
+    # tick k is not published before start + k * 10 ms, and answered soon after: of those of the
+    # first second at least one, however busy the processors are
+    start = min(time_s - 0.01 * k for k, time_s in enumerate(times[:100]))
+    assert times[200] - start > 2.0 - 0.05
+    assert times[200] - start < 2.0 + 2.0
 
 
 def test_pause_holds_the_run_and_is_not_taken_for_a_fault(make_graph, context):

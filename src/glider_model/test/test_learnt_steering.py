@@ -341,7 +341,7 @@ def test_kicked_vehicle_holds_its_heading_at_the_bank_at_which_it_does_not_turn(
     """
     c = -b / np.sin(np.radians(null_deg)) ** 2
     gain, _ = steer_to(known(b, c, -k, is_kicked=True), 1.0, 0.0, 0.0, 1.0, 1e9, PARAMS)
-    left, dt = np.radians(error_deg), 2.0  # in 4 s a strong one turns by 0.3 deg
+    left, dt = np.radians(error_deg), 2.0  # in 4 s a strong one turns by more than 0.2 deg
     for _ in range(40000):
         sine = min(LIMIT, max(-LIMIT, -gain * left))
         left += dt * (b * sine + c * sine**3)
