@@ -12,12 +12,16 @@ covariance of odom) is not in it, so that the table also says that adding it cha
 Short flights, in each of which something happens that is rare in ten hours, are those by which
 changes of kernels are noticed (`mutants.trial`); all their numbers are in their digests.
 Sine and exponential belong to the C library: on another one the last bits differ, and so does the
-digest of the probe, of what the library makes of some arguments.
+digest of the probe, of what the library makes of some arguments. Linear algebra is no part of it:
+its last bits are others on each kind of processor.
 """
 
 import hashlib
 import json
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -136,6 +140,30 @@ def test_short_flights_have_the_bits_that_they_had(made, name):
     if probe() != made['probe']:
         pytest.skip('another mathematical library than the table was made with')
     assert digest_of(name) == made['short'][name]
+
+
+#: What NumPy finds of this processor beyond what it takes for granted.
+_FOUND = np.show_config(mode='dicts')['SIMD Extensions'].get('found', [])
+_LONG = [name for name in _FOUND if name.startswith('AVX512')]
+#: Kinds of processors, as OpenBLAS calls them, whose linear algebra this one can do.
+_KINDS = {'Nehalem': True, 'Haswell': 'FMA3' in _FOUND, 'SkylakeX': 'AVX512_SKX' in _FOUND}
+
+
+@pytest.mark.parametrize('kind', [kind for kind, is_here in _KINDS.items() if is_here])
+def test_a_flight_has_the_bits_that_it_has_on_other_kinds_of_processors(kind):
+    program = 'from mutants.trial import digest_of; print(digest_of("seaglider"))'
+    paths = [str(Path(__file__).parent), os.environ.get('PYTHONPATH', '')]
+    environment = {**os.environ, 'OPENBLAS_CORETYPE': kind, 'PYTHONPATH': os.pathsep.join(paths)}
+    if kind != 'SkylakeX':
+        environment['NPY_DISABLE_CPU_FEATURES'] = ' '.join(_LONG)
+    done = subprocess.run(
+        [sys.executable, '-c', program],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == digest_of('seaglider')
 
 
 def test_each_short_flight_is_another_one(made):

@@ -8,6 +8,7 @@ import numpy as np
 
 from glider_base.frames import from_geodetic
 from glider_base.kernel import kernel
+from glider_base.linear import solve
 from glider_base.noise import random_stream
 from glider_base.signals import TICK_S
 from glider_mission.routing.fronts import Chart, current_on
@@ -108,6 +109,38 @@ def erroneous(chart: Chart, error_mps: float, error_km: float, seed: int, member
     return chart._replace(current=(chart.current + error).astype(np.float32))
 
 
+@kernel
+def _alike(t_s, n, e, one, length):
+    """How far errors at a time (s) and place (m) are those at an observation, 1 at its own."""
+    away2 = (n - one[1]) ** 2 + (e - one[2]) ** 2
+    return math.exp(-away2 / (2.0 * length**2) - abs(t_s - one[0]) / _ERROR_S)
+
+
+@kernel
+def _alike_each_other(seen, length):
+    """`_alike` of observations, float64[n, n]."""
+    found = np.empty((len(seen), len(seen)))
+    for i in range(len(seen)):
+        for j in range(len(seen)):
+            found[i, j] = _alike(seen[i, 0], seen[i, 1], seen[i, 2], seen[j], length)
+    return found
+
+
+@kernel
+def _correct(current, times, norths, easts, seen, weights, length):
+    """Add to a current what observations tell of it, by their weights, float64[n, 2] (m/s)."""
+    for t in range(len(times)):
+        for i in range(len(norths)):
+            for j in range(len(easts)):
+                v_n, v_e = 0.0, 0.0
+                for k in range(len(seen)):
+                    alike = _alike(times[t], norths[i], easts[j], seen[k], length)
+                    v_n += alike * weights[k, 0]
+                    v_e += alike * weights[k, 1]
+                current[t, i, j, 0] += v_n
+                current[t, i, j, 1] += v_e
+
+
 def observed(chart: Chart, seen: np.ndarray, error_mps: float, error_km: float) -> Chart:
     """A chart corrected by what was observed: optimal interpolation (Gandin 1963).
 
@@ -127,17 +160,11 @@ def observed(chart: Chart, seen: np.ndarray, error_mps: float, error_km: float) 
     off = seen[:, 3:] - told
     error_mps = max(error_mps, math.sqrt(float(np.mean(off**2))))
 
-    def alike(t: np.ndarray, n: np.ndarray, e: np.ndarray) -> np.ndarray:
-        away = (n[..., None] - seen[:, 1]) ** 2 + (e[..., None] - seen[:, 2]) ** 2
-        since = np.abs(t[..., None] - seen[:, 0]) / _ERROR_S
-        return error_mps**2 * np.exp(-away / (2.0 * length**2) - since)
-
-    covariance = alike(*seen[:, :3].T) + OBSERVED_STD**2 * np.eye(len(seen))
-    weights = np.linalg.solve(covariance, off)
-    n, e = np.meshgrid(norths, easts, indexing='ij')
+    alike = _alike_each_other(seen, length)
+    covariance = error_mps**2 * alike + OBSERVED_STD**2 * np.eye(len(seen))
+    weights = error_mps**2 * solve(covariance, off)
     current = chart.current.copy()
-    for k, t_s in enumerate(times):
-        current[k] += alike(np.full_like(n, t_s), n, e) @ weights
+    _correct(current, times, norths, easts, seen, weights, length)
     return chart._replace(current=current)
 
 
