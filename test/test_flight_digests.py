@@ -10,7 +10,8 @@ of those that there were when the table was made first, and of no more of their 
 had then. What has been added since (the truth apart from what is believed, navigation, the
 covariance of odom) is not in it, so that the table also says that adding it changed no flight.
 Short flights, in each of which something happens that is rare in ten hours, are those by which
-changes of kernels are noticed (`mutants.trial`); all their numbers are in their digests.
+changes of kernels are noticed (`mutants.trial`); all their numbers are in their digests, and those
+of ticks from states along them in which some numbers were changed.
 Sine and exponential belong to the C library: on another one the last bits differ, and so does the
 digest of the probe, of what the library makes of some arguments. Linear algebra is no part of it:
 its last bits are others on each kind of processor.

@@ -45,9 +45,9 @@ def mutants(
 ) -> None:
     """Change one thing in a kernel of control, guidance or navigation, and see who notices.
 
-    First the fast tests of the package, then short flights, to the last bit, which
-    test_flight_digests has too. What nobody notices is printed; exit code 1 if that is more
-    than one in twenty.
+    First the fast tests of the package, then short flights, and ticks from disturbed states along
+    them, to the last bit, which test_flight_digests has too. What nobody notices is printed; exit
+    code 1 if that is more than one in twenty.
     """
     drawn = _drawn(picked(package, Package), count, seed)
     with counter('changes', len(drawn)) as update:

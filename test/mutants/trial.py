@@ -13,6 +13,7 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Iterator
 
 import hypothesis
 import numba  # noqa: F401 what takes long to load is loaded once
@@ -41,6 +42,18 @@ ORDERS = [
     {'at_s': 220.0, 'resume': True},
     {'at_s': 340.0, 'abort': True},
 ]
+#: Orders on the way, and at the end of a path: another path, which ends behind the vehicle.
+SURFACE_ORDERS = [
+    {'at_s': 20.0, 'hold': True},
+    {'at_s': 60.0, 'resume': True},
+    {'at_s': 100.0, 'depth_m': 11.0},
+    {
+        'at_s': 430.0,
+        'path': {'kind': 'waypoints', 'waypoints': [[-900.0, 0.0], [-500.0, 0.0], [-300.0, 20.0]]},
+    },
+]
+#: Every sample, for three seconds.
+ALL = {'share': 1.0, 'for_s': 3.0}
 #: Flights by their names: a scenario, and what is changed in it.
 FLIGHTS = {
     'adaptive': ('current_8deg', FLIGHT),
@@ -96,6 +109,9 @@ FLIGHTS = {
             **{**RECKONED, 'navigation.current': 'forecast'},
             **{'navigation.forecast.speed_mps': 0.3, 'navigation.forecast.direction_deg': 20.0},
             **{'navigation.forecast.share_std': 0.5},
+            'navigation.forecast.components': [
+                {'kind': 'tidal', 'speed_mps': 0.2, 'direction_deg': 300.0, 'period_s': 900.0}
+            ],
         },
     ),
     'orders': (
@@ -117,7 +133,97 @@ FLIGHTS = {
         },
     ),
     'hardly turns': ('current_8deg', {**FLIGHT, 'perturb.K_MY': 0.02, 'perturb.K_MR': 0.05}),
+    'light': (
+        'current_8deg',
+        {**FLIGHT, 'profile.depth_m': 20.0, 'perturb.net_heaviness_kg': -0.25},
+    ),
+    'stall': (
+        'seaglider_1000m',
+        {
+            **{**FLIGHT, 'duration_s': 600.0, 'navigation.method': 'known'},
+            **{'profile.depth_m': 20.0, 'profile.pitch_deg': 29.4},
+            **{'profile.net_heaviness_kg': 0.08, 'perturb.pitch_trim_m': -0.0071},
+            **{
+                'perturb.K_D0': 0.82,
+                'perturb.K_D': 0.78,
+                'perturb.K_L': 1.16,
+                'perturb.K_M': 0.86,
+            },
+        },
+    ),
+    'fin, deeper': ('slocum_shelf', {**FLIGHT, 'duration_s': 700.0, 'profile.depth_m': 60.0}),
+    'near the bottom': (
+        'slocum_shelf',
+        {
+            **{**FLIGHT, 'duration_s': 600.0, 'profile.depth_m': 40.0},
+            **{'water.bottom_m': 30.0, 'profile.clearance_m': 10.0},
+        },
+    ),
+    'few samples': (
+        'current_8deg',
+        {**FLIGHT, 'sensors.imu_period_s': 0.5, 'sensors.gyro': False},
+    ),
+    'position is lost': (
+        'current_8deg',
+        {
+            **FLIGHT,
+            'faults': [
+                {'kind': 'spike', 'sensor': 'position', 'error': 5e4, **ALL, 'at_s': 100.0},
+                {'kind': 'spike', 'sensor': 'velocity', 'error': 50.0, **ALL, 'at_s': 200.0},
+            ],
+        },
+    ),
+    'no progress': (
+        'current_8deg',
+        {
+            **{**FLIGHT, 'duration_s': 700.0, 'current.angle_deg': 180.0, 'current.speed_kn': 1.2},
+            **{'path.length_m': 5000.0, 'path.at_end': 'stop', 'profile.wait_s': 20.0},
+            **{'guidance.no_progress_surfacings': 1, 'profile.surface_every_dives': 1},
+        },
+    ),
+    'orders at the surface': (
+        'current_8deg',
+        {
+            **{**FLIGHT, 'duration_s': 600.0, 'path.length_m': 60.0, 'path.at_end': 'stop'},
+            **{'profile.depth_m': 20.0, 'orders': SURFACE_ORDERS},
+        },
+    ),
+    'by its weight': (
+        'reckoned_12deg',
+        {
+            **{**RECKONED, 'duration_s': 2300.0, 'profile.wait_s': 1850.0},
+            **{'navigation.dead_reckoned.speed_by': 'buoyancy', 'sensors.depth_offset_m': 4.0},
+            **{'sensors.imu_period_s': 30.0, 'sensors.imu_missed_share': 0.5},
+        },
+    ),
+    'fixes that contradict': (
+        'reckoned_12deg',
+        {
+            **{**RECKONED, 'duration_s': 2000.0, 'profile.depth_m': 40.0},
+            'profile.surface_every_dives': 2,
+            'faults': [{'kind': 'biased', 'sensor': 'fix', 'error': 900.0, 'at_s': 700.0}],
+        },
+    ),
+    'fixes set aside': (
+        'reckoned_12deg',
+        {
+            **{**RECKONED, 'duration_s': 900.0},
+            'faults': [
+                {
+                    **{'kind': 'spike', 'sensor': 'fix', 'error': 3000.0, 'share': 1.0},
+                    **{'at_s': 300.0, 'for_s': 300.0},
+                },
+            ],
+        },
+    ),
 }
+
+
+#: What is disturbed after every so many ticks of a flight, so often, in which share of all its
+#: numbers, for how many ticks it is flown on, and by which factors.
+DISTURBED = ('navigation', 'guidance', 'control', 'guard')
+EVERY, TIMES, SHARES, TICKS = 400, 10, (0.01, 0.05, 0.3), 3
+FACTORS = (-1.0, 0.0, 0.5, 0.9, 1.1, 2.0, 10.0, 1000.0)
 
 
 class TooSlow(BaseException):
@@ -190,19 +296,75 @@ def run_tests(tests: str, known: dict[str, float]) -> tuple[bool, dict[str, floa
 
 
 def digest_of(name: str) -> str:
-    """Digest of all numbers of a flight, to the last bit."""
-    from glider_bringup.engines.flight import fly
+    """Digest of all numbers of a flight, and of some ticks from states that are disturbed."""
+    from glider_bringup.engines.flight import Held, mission_of
+    from glider_mission.blocks import ROW
     from glider_mission.scenario import load_scenario
 
-    digest = hashlib.sha256()
-
-    class Taker:
-        def add(self, log: np.ndarray) -> None:
-            digest.update(np.ascontiguousarray(log).tobytes())
-
     scenario, fields = FLIGHTS[name]
-    fly(load_scenario(scenario, fields), [Taker()])
+    scenario = load_scenario(scenario, fields)
+    held, params = Held(scenario), mission_of(scenario)[1]
+    rng, digest = np.random.default_rng(len(name)), hashlib.sha256()
+    log, is_over = np.empty((EVERY, ROW)), False
+    while not is_over:
+        rows, is_over = held.fly(log)
+        digest.update(np.ascontiguousarray(log[:rows]).tobytes())
+        for _ in range(TIMES):
+            for part in _ticks_of(held.keep().mission, params, rng):
+                digest.update(part)
     return digest.hexdigest()[:32]
+
+
+def _ticks_of(state, params, rng) -> Iterator[bytes]:
+    """Numbers of some ticks from a state with something else in it, and the state after them."""
+    from glider_bringup.engines.direct import fly
+    from glider_mission.blocks import ROW
+
+    share, log = rng.choice(SHARES), np.zeros((TICKS, ROW))
+    state = disturbed(state, share, rng, (bool, int, float))
+    if rng.random() < 0.5:  # whole numbers there tell what is in an array
+        params = disturbed(params, share, rng, (bool, float))
+    try:
+        after, rows, _ = fly(state, params, log, 0.1)
+    except (ArithmeticError, ValueError, IndexError) as error:
+        yield type(error).__name__.encode()  # as plain Python has it where compiled code has NaN
+        return
+    for numbers in (log[:rows], np.array(list(_numbers(after)), dtype=float)):
+        yield np.where(np.isnan(numbers), np.nan, numbers).tobytes()
+
+
+def disturbed(mission, share: float, rng, kinds: tuple[type, ...]):
+    """State or parameters of a mission with a share of their numbers of some kinds changed.
+
+    Of all blocks but plant and current, which are no part of what is changed by `mutants`.
+    """
+    return mission._replace(
+        **{name: _disturbed(getattr(mission, name), share, rng, kinds) for name in DISTURBED}
+    )
+
+
+def _disturbed(value, share, rng, kinds):
+    if isinstance(value, tuple):
+        parts = [_disturbed(one, share, rng, kinds) for one in value]
+        return value._make(parts) if hasattr(value, '_make') else tuple(parts)
+    if type(value) not in kinds or rng.random() > share:
+        return value
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int):
+        return int(rng.integers(0, 8))
+    if value == 0.0:
+        return float(rng.normal())
+    return value * float(rng.choice(FACTORS))
+
+
+def _numbers(value) -> Iterator[float]:
+    """All numbers of a state, one after another."""
+    if isinstance(value, tuple | np.ndarray):
+        for one in value:
+            yield from _numbers(one)
+    else:
+        yield value
 
 
 def judge(asked: dict) -> dict:

@@ -1,3 +1,3 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The vocabulary: kernels, settings, signals, frames, noise, linear equations, files and errors."""
+"""The vocabulary: kernels, settings, signals, frames, noise, equations, files and errors."""

@@ -9,7 +9,7 @@ import pytest
 
 from glider_base.signals import Reference
 from glider_control.law import Bank, Seen
-from glider_control.laws.adaptive import INTEGRAL_MAX, AdaptiveSettings, adaptive_step
+from glider_control.laws.adaptive import AdaptiveSettings, adaptive_step
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
 from glider_model.vehicle.file import load_vehicle
@@ -54,7 +54,7 @@ def test_each_phase_has_an_integral_of_its_own_and_within_its_bound(rate):
         now = measured(theta=theta + 0.3, phi=0.3, vertical_rate=rate)
         state, *_ = step(state, now, reference(theta=theta, v_d=rate))
     flown, other = (0, 1) if down else (1, 0)
-    assert state.pitch_integral[flown] == state.roll_integral[flown] == INTEGRAL_MAX
+    assert state.pitch_integral[flown] == state.roll_integral[flown] == 3.0
     assert state.pitch_integral[other] == state.roll_integral[other] == 0.0
 
 

@@ -10,11 +10,13 @@ import pytest
 from glider_base.frames import odometry_from_wire
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Imu, Joints, Vector
+from glider_model.ocean.density import SURFACE_PRESSURE
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
+from glider_navigation.block import navigation_tick
 from glider_navigation.current_belief import Uncertainty, initial_belief
 from glider_navigation.forecast import Trust, weigh
-from glider_navigation.intake import take_in
+from glider_navigation.intake import is_refusing, take_in
 from glider_navigation.method import Fix, Heard, method_step
 from glider_navigation.methods.dead_reckoned import (
     Drift,
@@ -236,6 +238,56 @@ def test_what_the_altimeter_says_is_no_echo_where_it_is_no_number():
     for altitude, taken in ((math.nan, 0.0), (12.5, 12.5)):
         _, told = take_in(state, heard._replace(altitude=altitude), params, TICK_S)
         assert told.altitude == taken
+
+
+def _first(**changes):
+    """What the intake makes of the first sample, and whether something was refused."""
+    settings = NavigationSettings(method='dead_reckoned')
+    odom = (0.0,) * 13
+    rest = Joints(0.0, 0.0, 0.0, 0.0), odom, odometry_from_wire(odom)
+    heard = Heard(*rest, Imu(1.0, *(6 * (0.0,)), False), 3.0, Fix(False, 0.0, 0.0, 0.0), 0.0)
+    state, params = settings.initial_state().intake, settings.params().intake
+    state, told = take_in(state, heard._replace(**changes), params, TICK_S)
+    return told, is_refusing(state)
+
+
+@pytest.mark.parametrize('side', [-1.0, 1.0])
+def test_no_depth_beyond_that_of_any_sea_is_taken_in(side):
+    told, refuses = _first(depth=11_900.0 * side)
+    assert (told.depth, refuses) == (11_900.0 * side, False)
+    told, refuses = _first(depth=12_100.0 * side)
+    assert abs(told.depth) < 1.0
+    assert refuses
+
+
+@pytest.mark.parametrize('place', [(9e7, 0.0), (0.0, -9e7), (1.1e8, 0.0), (0.0, -1.1e8)])
+def test_no_fix_that_is_farther_than_the_earth_is_round_twice_is_taken_in(place):
+    told, refuses = _first(fix=Fix(True, *place, 25.0))
+    is_far = max(map(abs, place)) > 1e8
+    assert told.fix == (Fix(False, 0.0, 0.0, 0.0) if is_far else Fix(True, *place, 25.0))
+    assert refuses == is_far
+
+
+def test_who_has_lost_its_attitude_tells_of_none_and_of_all_else():
+    """Its quaternion is nothing, which no gate believes; all else stands where it does."""
+    settings = NavigationSettings(method='dead_reckoned')
+    state, params = settings.initial_state(), settings.params()
+    nan = math.nan
+    for k in range(round(params.intake.hold_s / TICK_S) + 2):
+        q = (1.0, 0.0, 0.0, 0.0) if k == 0 else (nan, nan, nan, nan)
+        imu = (*q, 0.0, 0.0, 0.0, 0.0)
+        sensors = (
+            (0.0,) * 4,
+            (0.0,) * 13,
+            imu,
+            (SURFACE_PRESSURE,),
+            (-1.0, *(4 * (0.0,))),
+            (0.0,),
+        )
+        state, (odom, *_), _ = navigation_tick(state, k * TICK_S, sensors, params, TICK_S)
+        assert len(odom) == 17
+        assert (odom[3:7] == (0.0,) * 4) == (k * TICK_S > params.intake.hold_s)
+        assert np.isfinite(odom).all()
 
 
 def test_a_depth_that_jumps_is_left_until_none_was_believed_for_long():
