@@ -54,6 +54,8 @@ SURFACE_ORDERS = [
 ]
 #: Every sample, for three seconds.
 ALL = {'share': 1.0, 'for_s': 3.0}
+#: A current that falls to 1/e within so much depth (m).
+SHEAR = {'kind': 'shear', 'law': 'exponential', 'depth_m': 5.0}
 #: Flights by their names: a scenario, and what is changed in it.
 FLIGHTS = {
     'adaptive': ('current_8deg', FLIGHT),
@@ -110,7 +112,8 @@ FLIGHTS = {
             **{'navigation.forecast.speed_mps': 0.3, 'navigation.forecast.direction_deg': 20.0},
             **{'navigation.forecast.share_std': 0.5},
             'navigation.forecast.components': [
-                {'kind': 'tidal', 'speed_mps': 0.2, 'direction_deg': 300.0, 'period_s': 900.0}
+                {'kind': 'tidal', 'speed_mps': 0.2, 'direction_deg': 300.0, 'period_s': 900.0},
+                {**SHEAR, 'speed_mps': 0.1, 'direction_deg': 0.0},
             ],
         },
     ),
