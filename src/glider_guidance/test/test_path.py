@@ -219,6 +219,16 @@ def test_a_spline_parameter_is_near_its_arc_length():
     assert length == pytest.approx(1000.0 * angles[-1], rel=2e-3)
 
 
+@pytest.mark.parametrize('s', [150.0, 420.0, 700.0])
+def test_tangent_of_a_curve_in_all_three_directions(s):
+    """A spline that climbs and turns: by the points beside, as it is flown."""
+    bent = [(0.0, 0.0, 20.0), (250.0, 120.0, 60.0), (450.0, 30.0, 30.0), (600.0, 300.0, 90.0)]
+    params = SplinePath(kind='spline', waypoints=bent).params()
+    numeric = (point(s + 0.01, params) - point(s - 0.01, params)) / 0.02
+    assert np.min(abs(numeric)) > 0.01
+    np.testing.assert_allclose(tangent(s, params), numeric, atol=1e-6)
+
+
 @pytest.mark.parametrize('direction', ['cw', 'ccw'])
 def test_helix_against_its_closed_form(direction):
     radius, turns, descent = 80.0, 2.5, 120.0
