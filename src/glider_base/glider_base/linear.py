@@ -3,7 +3,7 @@
 """Linear equations, to the same bits on every processor.
 
 LAPACK solves them too, but its last bits are those of a BLAS that is another one for each kind of
-processor. A flight grows them: ten days on, they are metres.
+processor, and a flight makes them grow.
 """
 
 import numpy as np

@@ -229,17 +229,6 @@ def test_a_stay_without_a_fix_makes_a_way_longer_and_less_known():
     assert drifted_variance(stay) > 50.0**2
 
 
-def test_what_the_altimeter_says_is_no_echo_where_it_is_no_number():
-    settings = NavigationSettings(method='dead_reckoned')
-    odom = (0.0,) * 13
-    rest = Joints(0.0, 0.0, 0.0, 0.0), odom, odometry_from_wire(odom)
-    heard = Heard(*rest, Imu(1.0, *(6 * (0.0,)), False), 3.0, Fix(False, 0.0, 0.0, 0.0), math.nan)
-    state, params = settings.initial_state().intake, settings.params().intake
-    for altitude, taken in ((math.nan, 0.0), (12.5, 12.5)):
-        _, told = take_in(state, heard._replace(altitude=altitude), params, TICK_S)
-        assert told.altitude == taken
-
-
 def _first(**changes):
     """What the intake makes of the first sample, and whether something was refused."""
     settings = NavigationSettings(method='dead_reckoned')
@@ -249,6 +238,11 @@ def _first(**changes):
     state, params = settings.initial_state().intake, settings.params().intake
     state, told = take_in(state, heard._replace(**changes), params, TICK_S)
     return told, is_refusing(state)
+
+
+def test_what_the_altimeter_says_is_no_echo_where_it_is_no_number():
+    for altitude, taken in ((math.nan, 0.0), (12.5, 12.5)):
+        assert _first(altitude=altitude)[0].altitude == taken
 
 
 @pytest.mark.parametrize('side', [-1.0, 1.0])
