@@ -177,12 +177,12 @@ def package(tmp_path):
             for name, text in {'__init__': '', **PARTS, **changed}.items():
                 (tmp_path / folder / 'parts' / f'{name}.py').write_text(text)
 
-        def call(self, folder: str) -> list[tuple[float, int]]:
+        def call(self, folder: str, program: str = CALL) -> list[tuple[float, int]]:
             env = dict(os.environ, GLIDER_CACHE=str(tmp_path / 'cache'))
             env['PYTHONDONTWRITEBYTECODE'] = '1'  # what is written within a second looks the same
             path = [str(tmp_path / folder), env.get('PYTHONPATH', '')]
             env['PYTHONPATH'] = os.pathsep.join(path)
-            command = [sys.executable, '-c', CALL]
+            command = [sys.executable, '-c', program]
             done = subprocess.run(command, env=env, stdout=subprocess.PIPE, text=True, check=True)
             words = [line.split() for line in done.stdout.splitlines()]
             return [(float(answer), int(misses)) for answer, misses in words]
@@ -208,6 +208,37 @@ def test_another_checkout_finds_what_is_there(package):
     package.write('there')
     package.call('here')
     assert package.call('there') == [(4.0, 0), (6.0, 0), (0.0, 0), (6.0, 0)]
+
+
+#: An edit while a program runs: told of before and after it is imported.
+EDITED = """
+import importlib
+from pathlib import Path
+from parts import laws
+
+def say(x):
+    print(laws.made(x), sum(laws.made.stats.cache_misses.values()))
+
+say(1.0)
+path = Path(laws.__file__)
+path.write_text(path.read_text().replace('* x', '* x * x'))
+say(5)
+importlib.reload(laws)
+say(5)
+"""
+
+
+def test_an_edit_flies_when_it_is_imported_and_not_before(package):
+    made = '\n@kernel\ndef made(x):\n    return scaled(x, Params(2.0))\n'
+    package.write('here', laws=PARTS['laws'] + made)
+    only = EDITED.partition('path =')[0]
+    assert package.call('here', only) == [(6.0, 1)]
+    assert package.call('here', EDITED) == [(6.0, 0), (30.0, 1), (150.0, 1)]
+    assert package.call('here', only) == [(6.0, 1)]
+    assert package.call('here', only) == [(6.0, 0)]
+    assert package.call('here', only.replace('1.0', '5')) == [(150.0, 1)]
+    package.write('here', laws=PARTS['laws'] + made)
+    assert package.call('here', only.replace('1.0', '5')) == [(30.0, 1)]
 
 
 def test_what_was_not_used_for_longest_is_forgotten_first(monkeypatch, tmp_path):

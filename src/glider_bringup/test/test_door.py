@@ -473,12 +473,16 @@ def level_step(state, seen, params, dt):
 """
 
 
+def run_cell(text):
+    """The law of a cell of a notebook, from its settings to its step."""
+    names = {'__name__': '__main__'}
+    exec(compile(text, '<ipython-input-1>', 'exec'), names)
+    return names['LevelLaw']
+
+
 @pytest.fixture(scope='module')
 def level_law():
-    """A law that a notebook has, from its settings to its step."""
-    names = {'__name__': '__main__'}
-    exec(compile(CELL, '<ipython-input-1>', 'exec'), names)
-    return names['LevelLaw']
+    return run_cell(CELL)
 
 
 def level(seen):
@@ -492,6 +496,8 @@ def test_law_of_a_program_is_flown_as_a_class_and_as_a_function(level_law, tmp_p
     changes = {'dives': 0, 'duration_s': 400.0}
     one = glider.fly('current_8deg', changes, law=level_law, out=tmp_path / 'one', bag=True)
     two = glider.fly('current_8deg', changes, law=level)
+    with compiling_told(lambda: pytest.fail('a law that was flown before is compiled again')):
+        glider.fly('current_8deg', changes, law=level)
     shipped = glider.fly('current_8deg', changes)
     assert (one.score['controller'], two.score['controller']) == ('LevelLaw', 'level')
     xarray.testing.assert_equal(one.to_xarray(), two.to_xarray())
@@ -512,6 +518,18 @@ def test_law_of_a_program_is_flown_as_a_class_and_as_a_function(level_law, tmp_p
     line = command_line.glider('verify', one.folder)
     assert line.returncode == 2
     assert 'LevelLaw' in line.stderr and 'Traceback' not in line.stderr
+
+
+def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
+    changes = {'dives': 0, 'duration_s': 400.0}
+    before = glider.fly('current_8deg', changes, law=level_law)
+    other = run_cell(CELL.replace('-20.0 * seen.measured.phi_dot', '3.0'))
+    after = glider.fly('current_8deg', changes, law=other)
+    assert before.score['controller'] == after.score['controller'] == 'LevelLaw'
+    assert abs(before.to_xarray().odom_roll).max() < 0.01
+    assert abs(after.to_xarray().odom_roll).max() > 0.2
+    again = glider.fly('current_8deg', changes, law=level_law)
+    xarray.testing.assert_equal(again.to_xarray(), before.to_xarray())
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@
 
 import inspect
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import numba
@@ -43,6 +44,7 @@ def own_law(law: type[LawSettings] | Callable) -> type[LawSettings]:
     return _stateless(function)
 
 
+@cache
 def _stateless(function: Callable) -> type[LawSettings]:
     """Settings without a field, of a law that is a function of what it sees."""
     # compiled for this session alone, as whoever calls it is: see KernelCache

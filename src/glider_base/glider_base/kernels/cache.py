@@ -7,7 +7,8 @@ files of the functions it calls. Here a kernel is kept under a digest over the s
 modules that its code can come from: its own module and what that imports, the modules of the types
 that it is compiled for, and those of the bodies that these types choose for slots. A change
 compiles again what it can reach, and nothing else. Paths are not in it: another checkout finds
-what is there.
+what is there. Of a file that was written after the start of the program nobody knows whether the
+program runs what is in it: nothing that can come from it is kept, or looked for.
 """
 
 import fcntl
@@ -50,6 +51,8 @@ class Body(NamedTuple):
 BODIES: list[Body] = []
 #: Top-level modules that hold kernels.
 HOLDERS: set[str] = set()
+#: When the program began (s).
+_STARTED_S = time.time()
 
 
 @cache
@@ -108,10 +111,10 @@ def _reach(modules: Iterable[str], seen: dict[str, bytes]) -> None:
 
 
 @cache
-def closure(modules: frozenset[str], bodies: int, holders: int) -> str:
-    """Digest of all sources that code of some modules can come from.
+def closure(modules: frozenset[str], bodies: int, kernels: int) -> str | None:
+    """Digest of all sources that code of some modules can come from; None if one is too new.
 
-    It is kept for so many of `BODIES` and `HOLDERS`: more may change it.
+    It is kept for so many of `BODIES` and of kernels: more may change it.
     """
     seen: dict[str, bytes] = {}
     _reach(modules, seen)
@@ -123,6 +126,9 @@ def closure(modules: frozenset[str], bodies: int, holders: int) -> str:
             if body.slot in seen and body.params in seen and body.kernel not in seen
         }
         _reach(chosen, seen)
+    paths = [_file_of(module) for module in seen]
+    if any(not os.path.isfile(one) or os.stat(one).st_mtime > _STARTED_S for one in paths):
+        return None
     digest = hashlib.sha256(numba.__version__.encode())
     for module in sorted(seen):
         digest.update(module.encode() + b'\0' + seen[module])
@@ -197,9 +203,11 @@ class KernelCache(FunctionCache):
     """
 
     _impl_class = _Impl
+    made = 0  #: so many; for a kernel that is imported anew, another one
 
     def __init__(self, function, ending: str = '') -> None:
         super().__init__(function)
+        KernelCache.made += 1
         self._ending = ending  #: of the names of its files
         HOLDERS.add(function.__module__.partition('.')[0])
 
@@ -213,7 +221,9 @@ class KernelCache(FunctionCache):
         if any(one.__module__ == '__main__' or '<locals>' in one.__qualname__ for one in classes):
             return False
         modules = {one.__module__ for one in classes} | {self._py_func.__module__}
-        digest = closure(frozenset(modules), len(BODIES), len(HOLDERS))
+        digest = closure(frozenset(modules), len(BODIES), KernelCache.made)
+        if digest is None:
+            return False
         own = hashlib.sha256(' '.join(kind.name for kind in kinds).encode()).hexdigest()[:16]
         # an index of one signature: of all that are in it numba makes the types
         name = f'{self._impl.filename_base}{self._ending}.{digest}.{own}'

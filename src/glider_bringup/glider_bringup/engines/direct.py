@@ -64,6 +64,11 @@ class MissionState(NamedTuple):
 class HeldType(types.StructRef):
     """Type of `HeldMission` in compiled code."""
 
+    @property
+    def key(self):
+        """What tells it from others: the types of its fields. numba goes by their names alone."""
+        return self._fields
+
 
 class HeldMission(structref.StructRefProxy):
     """State and parameters of a mission, where compiled code finds them and changes them.
