@@ -228,13 +228,13 @@ def test_report_from_the_bag_is_that_of_the_flight(flown, tmp_path):
     assert (tmp_path / 'run.png').stat().st_size > 10_000
 
 
-def told_of(off, inside, rms=0.01):
+def told_of(off, inside, rms=0.01, worst=0.02):
     """Part of a scorecard: how far off the path it came up, and how many in their ellipses."""
     return {
         'surfacing_cross_track_m': off,
         'error_m': {'p50': 5.0, 'p95': 50.0, 'worst': 60.0},
         'ellipse_95_share': inside / len(off) if off else None,
-        'dac_error_mps': {'rms': rms, 'worst': rms},
+        'dac_error_mps': {'rms': rms, 'worst': worst},
     }
 
 
@@ -259,7 +259,9 @@ def test_navigation_is_told_in_words():
     )
     assert '5.00 m or less half of the times, by 60 m at worst' in place
     assert ellipses == 'The 95 % ellipses hold 6 of 6 true places.'
-    assert '0.019 kn' in current
+    assert current.endswith('off by 0.019 kn (rms), 0.039 kn at worst.')
+    one = navigation_notes(told_of([20.0, 10.0], 2, worst=0.01), learns=True)
+    assert one[-1].endswith('off by 0.019 kn.')
     still = navigation_notes(learnt, learns=False)[0]
     assert still == 'Came up 753 m off its path the first time, later at most 85 m.'
     too_sure = navigation_notes(told_of([100.0] * 13, 8), learns=True)

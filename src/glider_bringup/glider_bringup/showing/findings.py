@@ -120,11 +120,11 @@ def navigation_notes(told: dict[str, Any], learns: bool) -> list[str]:
         too_sure = ': its ellipses are too small' if chance < UNLIKELY else ''
         notes.append(f'{text}{too_sure}.')
     if told['dac_error_mps']['rms'] is not None:
-        rms, worst = (told['dac_error_mps'][name] / KNOT_MPS for name in ('rms', 'worst'))
-        notes.append(
-            'The depth-averaged current that it estimated after its fixes was off by '
-            f'{rms:.3f} kn (rms), {worst:.3f} kn at worst.'
-        )
+        kinds = ('rms', 'worst')
+        rms, worst = (f'{told["dac_error_mps"][name] / KNOT_MPS:.3f} kn' for name in kinds)
+        off_by = rms if rms == worst else f'{rms} (rms), {worst} at worst'
+        text = 'The depth-averaged current that it estimated after its fixes was off by'
+        notes.append(f'{text} {off_by}.')
     return notes
 
 
