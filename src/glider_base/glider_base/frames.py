@@ -255,13 +255,11 @@ class OriginSettings(Settings):
     def _in_utc(cls, text: str) -> str:
         try:
             moment = datetime.fromisoformat(text.replace('Z', '+00:00')) if text else None
-        except ValueError:
+            if moment is not None and moment.tzinfo is not None:
+                moment = moment.astimezone(UTC).replace(tzinfo=None)
+        except (ValueError, OverflowError):
             raise ValueError('not a time (allowed: as 2026-03-01 or 2026-03-01T06:00Z)') from None
-        if moment is None:
-            return ''
-        if moment.tzinfo is not None:
-            moment = moment.astimezone(UTC).replace(tzinfo=None)
-        return f'{moment.isoformat()}Z'
+        return '' if moment is None else f'{moment.isoformat()}Z'
 
     @property
     def time_s(self) -> float:

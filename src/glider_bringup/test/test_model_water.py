@@ -18,7 +18,7 @@ def sea(path, warmer_north=0.0):
     pytest.importorskip('h5netcdf')
     latitudes, longitudes = np.arange(35.0, 37.01, 0.5), np.arange(121.0, 123.01, 0.5)
     column = 5.0 + 8.0 * np.exp(-DEPTHS / 50.0)
-    north = warmer_north * (latitudes - 36.0)
+    north = np.clip(warmer_north * (latitudes - 36.0), -10.0, 20.0)
     warm = column[None, :, None, None] + north[None, None, :, None] + np.zeros((1, 1, 1, 5))
     dims = ('time', 'depth', 'latitude', 'longitude')
     data = xarray.Dataset(

@@ -96,7 +96,7 @@ def hydrography(sea_file, layout):
         t, z, x = (sea[name] for name in ('time', 'depth', 'longitude'))
         day, level = t.copy(data=np.arange(4.0)), z.copy(data=np.arange(3.0))
         there = xarray.ones_like(sea.uo).where(sea.uo.notnull())
-        warm = there * (13.0 - 4.0 * level + (day - 2.0) * 10.0 + (x - 122.0) * 2.0)
+        warm = there * (13.0 - 4.0 * level + (day - 2.0) * 3.0 + (x - 122.0) * 2.0)
         salt = there * (34.0 + 0.5 * level)
         name, unit, standard, salinity, thousandth = LAYOUTS[layout]
         warm.attrs = {'standard_name': standard, 'units': unit}
@@ -168,7 +168,7 @@ def test_whether_a_mission_is_covered_by_water_or_bottom(kind, sea_file, tmp_pat
     assert found['mission']['covered'] is True
     assert dict(in_words(found))['mission'] == f'{mission} is covered by {kind}'
     drawn = mission_in(found, str(mission)).panels[0]
-    wanted = 200.0 if kind == 'bottom' else 3.0 + 2.0 * (drawn.longitudes - 122.0)
+    wanted = 200.0 if kind == 'bottom' else 10.0 + 2.0 * (drawn.longitudes - 122.0)
     is_water = np.isfinite(drawn.values)
     np.testing.assert_allclose(
         drawn.values[is_water], np.broadcast_to(wanted, drawn.values.shape)[is_water], atol=1e-5

@@ -59,10 +59,11 @@ def places(waypoints: Any) -> list[tuple[float, float]]:
 
     A ValueError names the waypoint, its value and what is allowed.
     """
+    told = 'waypoints_latlon'
     if isinstance(waypoints, str) and waypoints.lower().endswith(SUFFIX):
-        waypoints = read_goto_list(Path(waypoints))
+        told, waypoints = f'file {waypoints}', read_goto_list(Path(waypoints))
     if not isinstance(waypoints, list | tuple) or len(waypoints) < 2:
-        raise ValueError('waypoints_latlon: no list of waypoints (allowed: 2 and more)')
+        raise ValueError(f'{told}: no list of waypoints to fly along (allowed: 2 and more)')
     found = []
     for number, point in enumerate(waypoints):
         name = f'waypoints_latlon.{number}'

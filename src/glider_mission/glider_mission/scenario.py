@@ -11,6 +11,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
 import pydantic
 from pydantic import Field
 
@@ -44,6 +45,8 @@ from glider_mission.rules import Rules
 from glider_model.ocean.bottom import BathymetrySettings
 from glider_model.ocean.current_settings import CurrentSettings, SumOfCurrents
 from glider_model.ocean.field import Mission
+from glider_model.ocean.fields.grid import GridFileSettings
+from glider_model.ocean.grid_file import told_time
 from glider_model.ocean.water import WaterSettings
 from glider_model.onboard.gate import GateSettings
 from glider_model.plant.faults.settings import (
@@ -64,6 +67,8 @@ DEFAULT_SCENARIO = 'current_8deg'
 #: Field that names the vehicle, and what the names of fields in its file begin with.
 VEHICLE = 'vehicle'
 
+#: A straight way is looked at at so many places, whether it leads over land.
+ALONG = 2000
 #: The farthest that a belief may jump at a fix (m).
 JUMP_M = 1e8
 
@@ -291,9 +296,22 @@ class Scenario(Settings):
         return Mission(
             origin=self.origin,
             places=tuple(to_geodetic(float(n), float(e), origin) for n, e, _ in corners),
-            deepest_m=self.profile.depth_m,
+            # wherever a fault or an order lets it go
+            deepest_m=max(self.profile.depth_m, load_vehicle(self.vehicle).rated_depth_m),
             lasts_s=self.duration_s,
         )
+
+    def ways(self) -> Iterator[tuple[str, np.ndarray]]:
+        """Places that it is led through (m), float64[n, 3], each time with what they are.
+
+        A way that is straight is looked at all along, one that is planned at its corners.
+        """
+        start = (self.initial.north_m, self.initial.east_m, 0.0)
+        paths = [(f'of orders.{i}', one.path) for i, one in enumerate(self.orders) if one.path]
+        is_straight = self.guidance.route == 'straight' and not paths
+        yield 'on the path', np.vstack((start, self.path.points(ALONG if is_straight else 0)))
+        for what, path in paths:
+            yield what, path.points(0)
 
     def constant_current(self) -> tuple[float, float]:
         """Constant part of the current, north and east (m/s)."""
@@ -545,28 +563,56 @@ def _check_glide(scenario: Scenario) -> None:
 def _with_known_fields(scenario: Scenario) -> Scenario:
     """Scenario that says which files its currents are from, once they were read."""
     told = {'current': scenario.current, 'navigation.forecast': scenario.navigation.forecast}
+    starts = {}
     for name, current in told.items():
         if current.field is None:
             continue
         with told_of(f'{name}.field.', ValueError):
             field = current.field.known()
-            scenario.resolved_current(current).field.params()
+            resolved = scenario.resolved_current(current).field
+            resolved.params()
+            if isinstance(resolved, GridFileSettings):
+                check_ways(scenario, resolved)
+                starts[f'{name}.field.file'] = resolved.start_s
         told[name] = current.model_copy(update={'field': field})
     bathymetry = scenario.bathymetry
     if bathymetry.file:
         with told_of('bathymetry.', ValueError):
             bathymetry = bathymetry.known()
             scenario.bottom()
+            check_ways(scenario, bathymetry.resolved(scenario.mission()))
     water = scenario.water
     if water.grid.file:
         with told_of('water.grid.', ValueError):
             water = water.model_copy(update={'grid': water.grid.known()})
-            scenario.resolved_water().params()
+            resolved = scenario.resolved_water()
+            resolved.params()
+            check_ways(scenario, resolved.grid)
+            starts['water.grid.file'] = resolved.grid.start_s
+    check_starts(starts)
     forecast = {'forecast': told['navigation.forecast']}
     navigation = scenario.navigation.model_copy(update=forecast)
     changed = {'current': told['current'], 'navigation': navigation}
     changed |= {'bathymetry': bathymetry, 'water': water}
     return scenario.model_copy(update=changed)
+
+
+def check_ways(scenario: Scenario, grid: GridFileSettings) -> None:
+    """Refuse a mission that leads over land of a file, or beyond what is read of it."""
+    origin = scenario.origin.params()
+    for what, places in scenario.ways():
+        grid.check_places((to_geodetic(float(n), float(e), origin) for n, e, _ in places), what)
+
+
+def check_starts(starts: dict[str, float | None]) -> None:
+    """Refuse files that a mission without a time would meet at different times (s since 1970)."""
+    found = {name: start_s for name, start_s in starts.items() if start_s is not None}
+    if len(set(found.values())) > 1:
+        begin = ', '.join(f'{name} at {told_time(start_s)}' for name, start_s in found.items())
+        raise ConfigurationError(
+            f'origin.time: missing, and files begin at different times: {begin} (allowed: the '
+            'start of the mission, within the times of all of them)'
+        )
 
 
 def load_scenario(

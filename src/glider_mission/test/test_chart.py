@@ -127,6 +127,9 @@ def test_orders_may_be_in_degrees():
         ({'path': {'kind': 'waypoints', 'waypoints_latlon': RING, 'waypoints': [[0, 0], [9, 9]]}},
          'other places than waypoints_latlon'),
         ({'origin': {'time': 'yesterday'}}, r"origin.time = 'yesterday': not a time \(allowed: "),
+        ({'origin': {'time': '0001-01-01T00:00+09:00'}}, r'not a time \(allowed: '),
+        ({'path': {'kind': 'waypoints', 'waypoints_latlon': [[10, 0], [10, 0]]}},
+         r'are 0.000 m apart \(allowed: >= 1.0 m\)'),
     ],
 )  # fmt: skip
 def test_what_makes_no_mission_is_refused_by_name(values, text):

@@ -147,6 +147,11 @@ def test_a_list_without_waypoints_is_none(write):
     file = write('goto_l10.ma', f'behavior_name=goto_list\n{text}')
     with pytest.raises(ConfigurationError, match=r'goto_l10.ma: no waypoints \(allowed: one'):
         load_scenario('survey', {'path.waypoints_latlon': file})
+    file = write(
+        'goto_l10.ma', f'behavior_name=goto_list\n{text}'.replace('# none', '1 2\n# none')
+    )
+    with pytest.raises(ConfigurationError, match=r'file .*goto_l10.ma: no list .*: 2 and more'):
+        load_scenario('survey', {'path.waypoints_latlon': file})
 
 
 def test_a_list_by_hand_is_read_as_a_slocum_does(write):

@@ -140,6 +140,10 @@ def test_a_cast_in_netcdf(tmp_path):
     values.to_netcdf(tmp_path / 'cast.nc', engine='h5netcdf')
     found = WaterSettings.model_validate({'profile': 'cast.nc'}, context={'folder': tmp_path})
     assert found.profile == [[0.0, 1025.0], [50.0, 1026.0], [400.0, 1029.5]]
+    values['Z'] = ('N', np.negative(depth), {'standard_name': 'depth', 'positive': 'up'})
+    values.to_netcdf(tmp_path / 'heights.nc', engine='h5netcdf')
+    found = WaterSettings.model_validate({'profile': 'heights.nc'}, context={'folder': tmp_path})
+    assert found.profile == [[0.0, 1025.0], [50.0, 1026.0], [400.0, 1029.5]]
 
 
 @pytest.mark.parametrize(

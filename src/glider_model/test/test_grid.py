@@ -147,6 +147,79 @@ def test_a_sea_round_the_earth_has_no_seam(start, longitude, tmp_path):
     assert len(params.longitudes) < 20
 
 
+@pytest.mark.parametrize('read', [grid, lambda path, *places: bottom_of(path, *places)])
+@pytest.mark.parametrize(('west', 'east'), [(-80.0, 10.0), (-170.0, 170.0), (10.0, 350.0)])
+def test_behind_the_ends_of_a_file_is_no_water(read, west, east, tmp_path):
+    """A file of a part of the earth: what lies between its ends on the other side is not in it."""
+    longitudes = np.arange(west, east + 1.0, 2.0)
+    data = dataset(latitudes=np.arange(9.0, 11.5, 0.5), longitudes=longitudes)
+    there = xarray.full_like(data.uo[0, 0], -100.0, dtype=float).drop_vars(['time', 'depth'])
+    there.attrs = {'standard_name': 'height_above_mean_sea_level', 'units': 'm'}
+    path = written(data.assign(elevation=there), tmp_path / 'sea.nc')
+    outside = (0.5 * (west + east) + 180.0 + 180.0) % 360.0 - 180.0
+    for place in ((10.0, outside), (10.0, outside + 3.0)):
+        with pytest.raises(
+            ValueError, match=r'longitude of the path .*but not .* as the file has'
+        ):
+            read(path, place)
+    for inside in (west + 0.5, east - 0.5, 0.5 * (west + east)):
+        assert read(path, (10.0, (inside + 180.0) % 360.0 - 180.0))
+
+
+@pytest.mark.parametrize('layout', LAYOUTS)
+@pytest.mark.parametrize('attrs', [{'positive': 'up'}, {}])
+def test_depths_may_be_told_as_heights(layout, attrs, tmp_path):
+    data = dataset(layout)
+    name = LAYOUTS[layout][1][1]
+    below = data.assign_coords({name: (name, -data[name].values, {'units': 'm', **attrs})})
+    down, up = (
+        grid(written(one, tmp_path / f'{k}.nc'), (36.0, 122.0))
+        for k, one in enumerate((data, below))
+    )
+    for depth in (0.0, 40.0, 333.0, 900.0):
+        found = interpolate(0.0, depth, 36.1, 122.1, up)
+        assert found == interpolate(0.0, depth, 36.1, 122.1, down)
+
+
+@pytest.mark.parametrize(
+    ('change', 'says'),
+    [
+        (lambda u: u.where(u.time != u.time[2]), r'uo at 2026-03-0\dT12:00Z: no number around'),
+        (
+            lambda u: u.where(u.longitude != 122.0, 9999.0),
+            r'uo at .*: 9999 m/s \(allowed: -10 to 10',
+        ),
+    ],
+)
+def test_a_step_without_water_is_refused_by_its_time(change, says, tmp_path):
+    data = dataset()
+    path = written(data.assign(uo=change(data.uo)), tmp_path / 'sea.nc')
+    with pytest.raises(ValueError, match=f'file {path}: {says}'):
+        grid(path, (36.0, 122.0))
+
+
+@pytest.mark.parametrize(
+    'told',
+    [
+        {'units': 'days since 2026-01-01', 'calendar': '360_day'},
+        {'units': 'days since 0001-01-01', 'calendar': 'standard'},
+        {'units': 'moons since 2026-01-01'},
+    ],
+)
+def test_times_of_another_calendar_are_refused(told, tmp_path):
+    data = dataset().assign_coords(time=('time', np.arange(4.0), {'axis': 'T', **told}))
+    data.to_netcdf(tmp_path / 'sea.nc', engine='scipy')
+    with pytest.raises(ValueError, match=r'no times of this world \(allowed: such as'):
+        grid(tmp_path / 'sea.nc', (36.0, 122.0))
+
+
+def test_a_file_that_was_written_anew_is_read_anew(tmp_path):
+    path = written(dataset(), tmp_path / 'sea.nc')
+    before = interpolate(0.0, 10.0, 36.1, 122.1, grid(path, (36.0, 122.0)))
+    written(dataset(seed=7), path)
+    assert interpolate(0.0, 10.0, 36.1, 122.1, grid(path, (36.0, 122.0))) != before
+
+
 def test_land_is_told_and_has_the_water_beside_it(tmp_path):
     data = dataset()
     shore = (data.longitude < 121.0) | (data.depth > 500.0)
@@ -418,6 +491,11 @@ def hydrography(layout='cmems', **units):
         'longitude': ('longitude', longitudes, {'units': 'degrees_east'}),
     }
     return xarray.Dataset(variables, coords)
+
+
+def bottom_of(path, *places):
+    """Kernel parameters of the bottom of a mission."""
+    return BathymetrySettings(file=str(path)).resolved(mission(*places)).params()
 
 
 def params_of(path, *places):

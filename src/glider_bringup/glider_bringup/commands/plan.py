@@ -66,7 +66,8 @@ def _told(made: Any, scenario: Scenario) -> dict[str, Any]:
         'arrival_h': {f'p{p}': _hours(made.arrival_s(float(p))) for p in (10, 50, 90)},
         'waypoints_h': [_hours(one) for one in made.route.passed_s],
         'straight_h': _hours(made.straight_s),
-        'mission_h': scenario.duration_s / 3600.0,
+        'mission_h': made.end_s / 3600.0,
+        'dives': scenario.dives if made.end_s < scenario.duration_s else None,
         'wh': made.wh,
         'surfacings': math.ceil(time_s / made.pace.cycle_s) if math.isfinite(time_s) else None,
         'speed_mps': made.pace.speed,
@@ -84,7 +85,10 @@ def _rows(told: dict[str, Any]) -> list[tuple[str, str]]:
     bands = when(arrival['p50'])
     if len(set(arrival.values())) > 1:
         bands += f' (p10 {when(arrival["p10"])}, p90 {when(arrival["p90"])})'
-    reach = 'yes' if told['reachable'] else f'not in {span(3600.0 * told["mission_h"])}'
+    its_time = span(3600.0 * told['mission_h'])
+    if told['dives']:
+        its_time = f'its {told["dives"]} dives, {its_time}'
+    reach = 'yes' if told['reachable'] else f'not in {its_time}'
     rows = [
         ('reachable', reach),
         ('arrival, planned', bands),

@@ -14,10 +14,11 @@ from glider_bringup.showing.figure import GREEN, ORANGE, new_figure
 from glider_mission.chart import place_told
 from glider_mission.disk import save_figure
 from glider_mission.routing.plan import Plan
-from glider_mission.scenario import Scenario, load_scenario, told_of
+from glider_mission.scenario import Scenario, check_ways, load_scenario, told_of
 from glider_model.ocean.bottom import BathymetrySettings
-from glider_model.ocean.fields.grid import loaded_window
+from glider_model.ocean.fields.grid import GridSettings
 from glider_model.ocean.grid_file import GRIDS, Loaded, LoadedBottom, Part, contents, told_time
+from glider_model.ocean.water import ModelWaterSettings
 
 #: Arrows along either side of a chart.
 _ARROWS = 22
@@ -192,15 +193,18 @@ def mission_in(told: dict[str, Any], name: str) -> Sea:
     scenario = load_scenario(name, _NO_FILES)
     mission, panels = scenario.mission(), []
     with told_of('', ValueError):
-        for part, wanted in GRIDS.items():
+        for part, kind in (('currents', GridSettings), ('water', ModelWaterSettings)):
             if told[part]:
-                loaded, begin = loaded_window(file, mission, wanted)
+                grid = kind(file=str(file)).resolved(mission)
+                check_ways(scenario, grid)
+                loaded, begin = grid.loaded()
                 step = np.searchsorted(loaded.axes.times, begin, side='right') - 1
                 axes = loaded.axes._replace(times=loaded.axes.times[step:])
                 panels += _panels(part, loaded._replace(axes=axes, water=loaded.water[step:]))
         if told['bottom']:
-            chart = BathymetrySettings(file=str(file)).resolved(mission).params()
-            panels += _panels('bottom', LoadedBottom(*chart[:3]))
+            chart = BathymetrySettings(file=str(file)).resolved(mission)
+            check_ways(scenario, chart)
+            panels += _panels('bottom', LoadedBottom(*chart.params()[:3]))
     return Sea(f'{file.name} at the start of {scenario.name}', panels, scenario)
 
 

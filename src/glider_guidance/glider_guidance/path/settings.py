@@ -317,7 +317,8 @@ def _check_waypoints(waypoints: list[tuple[float, ...]]) -> list[tuple[float, ..
 
 def _hint(points: list[tuple[float, float, float]]) -> str:
     """What to say of waypoints so close together that could be degrees."""
-    if any(abs(point[0]) > 90.0 or abs(point[1]) > 180.0 for point in points):
+    north, east = (max(abs(point[k]) for point in points) for k in range(2))
+    if north > 90.0 or east > 180.0 or max(north, east) < MIN_LEG_M:
         return ''
     return '; metres north and east of the start, not latitude and longitude'
 

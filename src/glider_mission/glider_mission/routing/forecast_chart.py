@@ -13,6 +13,7 @@ from glider_base.noise import random_stream
 from glider_base.signals import TICK_S
 from glider_mission.routing.fronts import Chart, current_on
 from glider_mission.scenario import Scenario, told_of
+from glider_model.ocean.bottom import bottom_depth
 from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
 from glider_model.ocean.current_settings import CurrentSettings
 from glider_model.ocean.fields.grid import GridSettings
@@ -55,6 +56,7 @@ def _lattice(scenario: Scenario, params: CurrentParams) -> tuple[np.ndarray, np.
             for limit, one, edge in zip((np.maximum, np.minimum), (low, high), edges, strict=True)
         )
     step = max(STEP_M, float((high - low).max()) / _MOST)
+    high = np.maximum(high, low + step)  # beyond a narrow grid is the water of its edge
     return tuple(np.arange(a, b + 1e-6, step) for a, b in zip(low, high, strict=True))
 
 
@@ -71,6 +73,10 @@ def forecast_of(scenario: Scenario) -> tuple[Chart, np.ndarray]:
         current = CurrentSettings(field=GridSettings(file=told.file))
     steady = [one for one in current.components if one.kind != 'gauss_markov']
     settings = scenario.resolved_current(current.model_copy(update={'components': steady}))
+    late_s, grid = 3600.0 * told.late_h, settings.field
+    if isinstance(grid, GridSettings):
+        grid = grid.resolved(grid.mission.model_copy(update={'earlier_s': late_s}))
+        settings = settings.model_copy(update={'field': grid})
     with told_of('forecast: ', ValueError):
         params = settings.params(0)
     norths, easts = _lattice(scenario, params)
@@ -78,12 +84,14 @@ def forecast_of(scenario: Scenario) -> tuple[Chart, np.ndarray]:
     depths = (np.arange(_LEVELS) + 0.5) * scenario.profile.depth_m / _LEVELS
     means = np.empty((len(times), len(norths), len(easts), 2), dtype=np.float32)
     nothing = CurrentState(0, np.zeros(0))
-    late_s = 3600.0 * told.late_h
     _depth_means(params, nothing, times - late_s, norths, easts, depths, means)
     chart = Chart(times, norths, easts, means)
     land = np.zeros(means.shape[1:3], dtype=bool)
-    if isinstance(settings.field, GridSettings):
-        land = settings.field.land_at(norths, easts)
+    if isinstance(grid, GridSettings):
+        land = grid.land_at(norths, easts)
+    if scenario.bathymetry.file:
+        bottom = scenario.bottom()
+        land |= np.array([[bottom_depth(n, e, bottom) <= 0.0 for e in easts] for n in norths])
     if told.error_mps > 0.0:
         chart = erroneous(chart, told.error_mps, told.error_km, scenario.seed, 0)
     return chart, land

@@ -59,6 +59,7 @@ class Plan(NamedTuple):
     straight_s: float  #: along straight legs, by the forecast; infinite: not in the time
     pace: Pace
     chart: Chart
+    end_s: float  #: when it is over: by its time, or by its dives
 
     @property
     def reachable(self) -> bool:
@@ -208,6 +209,19 @@ def waypoints_of(scenario: Scenario) -> np.ndarray:
     return np.vstack((start, corners[1:] if is_there else corners))
 
 
+def _leads_over(chart: Chart, land: np.ndarray, route: np.ndarray) -> bool:
+    """Whether straight legs lead over land, by the nearest points of a chart, bool[n, m]."""
+    step = chart.norths[1] - chart.norths[0]
+    for a, b in zip(route, route[1:], strict=False):
+        share = np.linspace(0.0, 1.0, 2 + int(2.0 * np.hypot(*(b - a)) / step))[:, None]
+        places = ((1.0 - share) * a + share * b - (chart.norths[0], chart.easts[0])) / step
+        rows, columns = np.rint(places).astype(int).T
+        rows, columns = rows.clip(0, len(land) - 1), columns.clip(0, land.shape[1] - 1)
+        if land[rows, columns].any():
+            return True
+    return False
+
+
 def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None) -> Plan:
     """Plan a mission by its forecast; errors as `forecast_of`.
 
@@ -215,6 +229,9 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
     """
     chart, land = forecast_of(scenario)
     pace, end_s = pace_of(scenario), scenario.duration_s
+    if scenario.dives:
+        cycles = scenario.dives / max(1, scenario.profile.surface_every_dives)
+        end_s = min(end_s, cycles * pace.cycle_s)
     waypoints = waypoints_of(scenario)
     route = route_through(with_land(chart, land), waypoints, 0.0, pace.speed, end_s)
     progress(1)
@@ -226,4 +243,6 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
         arrivals.append(sailed_s(sea, route.corners, 0.0, pace.speed, end_s))
         progress(member + 2)
     straight_s = sailed_s(chart, waypoints, 0.0, pace.speed, end_s)
-    return Plan(route, np.array(arrivals), straight_s, pace, chart)
+    if _leads_over(chart, land, waypoints):
+        straight_s = math.inf
+    return Plan(route, np.array(arrivals), straight_s, pace, chart, end_s)

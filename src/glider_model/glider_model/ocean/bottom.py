@@ -19,7 +19,7 @@ from glider_base.frames import (
 from glider_base.kernel import kernel, replace
 from glider_base.slot import slot
 from glider_model.ocean.field import Mission, bracket
-from glider_model.ocean.fields.grid import GridFileSettings, mission_window, widened
+from glider_model.ocean.fields.grid import Chart, GridFileSettings, mission_window, widened
 from glider_model.ocean.grid_file import LoadedBottom, load_bottom
 
 #: Chart around the path that is read too, as far as the file has it (m).
@@ -72,6 +72,20 @@ def _charted_depth(n, e, params):
 class BathymetrySettings(GridFileSettings):
     """A chart of the bottom, from a file as GEBCO writes it."""
 
+    def chart(self) -> Chart:
+        """What is read of the file, and where on it there is land."""
+        chart = self._charted()
+
+        def is_land(latitude: float, longitude: float) -> bool:
+            place = from_geodetic(latitude, longitude, chart.origin)
+            return bottom_depth(*place, chart) <= 0.0
+
+        return Chart(chart.latitudes, chart.longitudes, is_land)
+
+    def _charted(self) -> ChartedBottom:
+        loaded = _loaded(self.file, self.stamp, self.mission)
+        return ChartedBottom(*loaded, self.mission.origin.params())
+
     def params(self) -> ChartedBottom:
         """Kernel parameters.
 
@@ -80,22 +94,15 @@ class BathymetrySettings(GridFileSettings):
         ValueError
             Naming the file, and what of it or of the mission is at fault.
         """
-        return ChartedBottom(*_loaded(self.file, self.mission), self.mission.origin.params())
+        self.check_places(self.mission.places, 'on the path')
+        return self._charted()
 
 
 @functools.lru_cache(maxsize=4)
-def _loaded(file: str, mission: Mission) -> LoadedBottom:
-    """What a mission needs of a chart."""
+def _loaded(file: str, stamp: tuple[int, int], mission: Mission) -> LoadedBottom:
+    """What a mission needs of a version of a chart."""
     needed = mission_window(mission)
-    loaded = load_bottom(Path(file), widened(needed, MARGIN_M), needed)
-    chart = ChartedBottom(*loaded, mission.origin.params())
-    for latitude, longitude in mission.places:
-        if bottom_depth(*from_geodetic(latitude, longitude, chart.origin), chart) <= 0.0:
-            raise ValueError(
-                f'file {file}: {latitude:.4f}, {longitude:.4f} on the path is land (allowed: '
-                'water)'
-            )
-    return loaded
+    return load_bottom(Path(file), widened(needed, MARGIN_M), needed)
 
 
 @kernel

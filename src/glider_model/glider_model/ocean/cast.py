@@ -13,7 +13,7 @@ import numpy as np
 
 from glider_base.kernel import kernel
 from glider_base.signals import SEA_WATER_DENSITY
-from glider_model.ocean.columns import MAX_ROWS, check_rows, read_columns
+from glider_model.ocean.columns import MAX_ROWS, check_rows, is_height, read_columns
 from glider_model.ocean.density import SPECIFIC_WEIGHT, displacing, immersed
 
 #: Columns of a file: density, or what it follows from by TEOS-10.
@@ -186,6 +186,8 @@ def _read_netcdf(path: Path, source: str) -> list[tuple[int, dict[str, float]]]:
             f'{source}: no profile along one dimension (allowed: variables {", ".join(COLUMNS)}, '
             f'or of standard_name {", ".join(_STANDARD_NAMES)})'
         )
+    if is_height(found['depth_m']):
+        found['depth_m'] = -found['depth_m']
     table = np.stack(list(found.values()), axis=1)
     table = table[np.isfinite(table).all(axis=1)]
     column = list(found).index('depth_m')

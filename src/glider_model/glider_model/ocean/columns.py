@@ -7,6 +7,8 @@ import io
 import math
 from pathlib import Path
 
+import numpy as np
+
 from glider_base.errors import ConfigurationError, shown
 from glider_base.files import read_text
 
@@ -98,3 +100,8 @@ def _number(text: str, where: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f'{where} = {shown(text)}: not a finite number')
     return value
+
+
+def is_height(depths: np.ndarray) -> bool:
+    """Whether depths are told as heights: none of them is below the surface, but some above it."""
+    return bool(np.any(depths < 0.0) and not np.any(depths > 0.0))

@@ -24,8 +24,11 @@ class Mission(Settings):
     places: tuple[tuple[float, float], ...] = Field(
         (), description='Latitude and longitude of the corners of its path (deg).'
     )
-    deepest_m: float = Field(1000.0, description='Depth of its dives (m).')
+    deepest_m: float = Field(1000.0, description='Depth that its vehicle may dive to (m).')
     lasts_s: float = Field(0.0, description='Time that it may last (s).')
+    earlier_s: float = Field(
+        0.0, description='Time before its start of which the water is asked for, too (s).'
+    )
 
 
 class FieldSettings(Settings):

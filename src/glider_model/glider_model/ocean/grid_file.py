@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from glider_base.files import is_file
+from glider_model.ocean.columns import is_height
 
 if TYPE_CHECKING:
     import xarray
@@ -44,22 +45,30 @@ class Wanted(NamedTuple):
     names: dict[str, str]  #: what CF calls a variable of a name that says nothing of that
     units: dict[str, float]  #: what makes m/s, degC or psu of them
     unit: str  #: which of these
+    least: float  #: beyond these it is none of the sea
+    most: float
 
 
 _EAST, _NORTH = 'eastward_sea_water_velocity', 'northward_sea_water_velocity'
 POTENTIAL = 'sea_water_potential_temperature'
 #: What is read of a file, in this order.
 VELOCITIES = (
-    Wanted('velocity to the north', {'vo': _NORTH, 'water_v': _NORTH}, _SPEEDS, 'm/s'),
-    Wanted('velocity to the east', {'uo': _EAST, 'water_u': _EAST}, _SPEEDS, 'm/s'),
+    Wanted(
+        'velocity to the north', {'vo': _NORTH, 'water_v': _NORTH}, _SPEEDS, 'm/s', -10.0, 10.0
+    ),
+    Wanted('velocity to the east', {'uo': _EAST, 'water_u': _EAST}, _SPEEDS, 'm/s', -10.0, 10.0),
 )
 TEMPERATURE_AND_SALINITY = (
     Wanted(
         'temperature',
         {'thetao': POTENTIAL, 'water_temp': 'sea_water_temperature'},
-        *(_CELSIUS, 'degC'),
+        *(_CELSIUS, 'degC', -5.0, 50.0),
     ),
-    Wanted('salinity', dict.fromkeys(('so', 'salinity'), 'sea_water_salinity'), _PSU, 'psu'),
+    Wanted(
+        'salinity',
+        dict.fromkeys(('so', 'salinity'), 'sea_water_salinity'),
+        *(_PSU, 'psu', 0.0, 60.0),
+    ),
 )
 #: What a grid is for, and what is read of it; a file may have several.
 GRIDS = {'currents': VELOCITIES, 'water': TEMPERATURE_AND_SALINITY}
@@ -74,6 +83,8 @@ _OTHER_GRIDS = {
 }
 #: Bytes of a window at most.
 MAX_BYTES = 400_000_000
+#: A step of an axis is a hole if it is so many times as wide as those beside it.
+HOLE_STEPS = 2.5
 #: The fingerprint of a file is made of its size and so many bytes at either end.
 _ENDS = 1_000_000
 
@@ -260,8 +271,11 @@ def _times(variable: 'xarray.Variable') -> np.ndarray:
     """Times of an axis (s since 1970, UTC)."""
     import xarray
 
-    decoded = xarray.decode_cf(xarray.Dataset(coords={'time': ('time', *_bare(variable))}))
-    values = decoded['time'].values
+    try:
+        decoded = xarray.decode_cf(xarray.Dataset(coords={'time': ('time', *_bare(variable))}))
+        values = decoded['time'].values
+    except (ValueError, ImportError, OverflowError):  # of other calendars, by a library for them
+        values = np.empty(0)
     if values.dtype.kind != 'M':
         calendar = variable.attrs.get('calendar', 'none')
         raise ValueError(
@@ -306,7 +320,8 @@ def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
                 raise ValueError(
                     f'{dimension}: units = {units!r} (allowed: {", ".join(_LENGTHS)})'
                 )
-            values[axis] *= _LENGTHS[units] * (-1.0 if one.attrs.get('positive') == 'up' else 1.0)
+            is_up = one.attrs.get('positive') == 'up' or is_height(values[axis])
+            values[axis] *= _LENGTHS[units] * (-1.0 if is_up else 1.0)
         _refuse_no_axis(dimension, values[axis])
     standards = tuple(standard for _, standard in found)
     return _Layout(dataset, names, standards, scales, axes, values)
@@ -371,7 +386,7 @@ def load(
         if needed is not None:
             _refuse_uncovered(whole, needed)
         _refuse_large(_bytes(8, chosen))
-        return _read(layout, chosen, axes)
+        return _read(layout, chosen, axes, wanted)
 
 
 def _bytes(each: int, chosen: dict[str, np.ndarray]) -> int:
@@ -438,15 +453,32 @@ def _refuse_uncovered(axes: Axes, window: Window) -> None:
         ('latitude', axes.latitudes, window.south, window.north),
         ('longitude', axes.longitudes, window.west, window.east),
     ):
-        if low < values[0] or high > values[-1]:
+        first, last = _hole(values)
+        if low < values[0] or high > values[-1] or (low < last and high > first):
+            hole = f', but not {first:.3f} to {last:.3f}' if first < last else ''
             raise ValueError(
                 f'the {name} of the path goes from {low:.3f} to {high:.3f} deg '
-                f'(allowed: within {values[0]:.3f} to {values[-1]:.3f}, as the file has it)'
+                f'(allowed: within {values[0]:.3f} to {values[-1]:.3f}{hole}, as the file has it)'
             )
 
 
-def _read(layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes) -> Loaded:
-    """Numbers of a window, with the nearest water in place of land and bottom."""
+def _hole(values: np.ndarray) -> tuple[float, float]:
+    """Where an axis has no points (deg): behind its ends, if they are turned to the same side."""
+    steps = [float(step) for step in np.diff(values)]
+    widest = max(range(len(steps)), key=steps.__getitem__, default=0)
+    beside = steps[max(0, widest - 1) : widest] + steps[widest + 1 : widest + 2]
+    if not steps or steps[widest] <= (HOLE_STEPS * max(beside) if beside else 180.0):
+        return math.inf, -math.inf
+    return float(values[widest]), float(values[widest + 1])
+
+
+def _read(
+    layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes, wanted: tuple[Wanted, ...] = ()
+) -> Loaded:
+    """Numbers of a window, with the nearest water in place of land and bottom.
+
+    A step without any, and numbers that are none of what is ``wanted``, are refused.
+    """
     shape = tuple(len(one) for one in axes)
     water = np.empty((*shape, 2), dtype=np.float32)
     present = [axis for axis in _AXES[1:] if axis in layout.axes]
@@ -456,10 +488,24 @@ def _read(layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes) -> Loaded:
             part = layout.dataset[name].isel({layout.axes['time']: int(index)})
             read = _cut(part, {axis: layout.axes[axis] for axis in present}, chosen)
             read = layout.scales[component] * read.reshape(shape[1:])
+            if wanted:
+                what = f'{name} at {told_time(axes.times[step])}'
+                _refuse_no_water(what, read, wanted[component])
             if step == 0:
                 land |= ~np.isfinite(read[0])
             water[step, ..., component] = _fill_land(read)
     return Loaded(axes, water, layout.standards, land)
+
+
+def _refuse_no_water(what: str, read: np.ndarray, wanted: Wanted) -> None:
+    """Refuse numbers of a step that are missing, or are none of the sea."""
+    found = read[np.isfinite(read)]
+    allowed = f'{wanted.least:g} to {wanted.most:g} {wanted.unit}'
+    if not len(found):
+        raise ValueError(f'{what}: no number around the mission (allowed: {allowed})')
+    for one in (float(found.min()), float(found.max())):
+        if not wanted.least <= one <= wanted.most:
+            raise ValueError(f'{what}: {one:g} {wanted.unit} (allowed: {allowed})')
 
 
 def _cut(part: 'xarray.DataArray', axes: dict[str, str], chosen: dict[str, np.ndarray]):

@@ -14,7 +14,7 @@ and Stokes drift together. It is as if the water there went faster by that much.
 import functools
 import math
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import pydantic
@@ -36,9 +36,8 @@ from glider_model.ocean.density import (
     displacing,
     immersed,
 )
-from glider_model.ocean.field import Mission
-from glider_model.ocean.fields.grid import GridFileSettings, interpolate, loaded_window
-from glider_model.ocean.grid_file import POTENTIAL, TEMPERATURE_AND_SALINITY, Axes
+from glider_model.ocean.fields.grid import GridFileSettings, interpolate
+from glider_model.ocean.grid_file import POTENTIAL
 
 #: The drift of wind is whole above the first depth, and there is none below the second (m).
 WIND_WHOLE_M, WIND_NONE_M = 0.5, 1.5
@@ -67,6 +66,8 @@ class ModelWaterParams(NamedTuple):
 class ModelWaterSettings(GridFileSettings):
     """Temperature and salinity of an ocean model, from a file."""
 
+    of: ClassVar[str] = 'water'
+
     def params(self, hull_compression_per_m: float) -> ModelWaterParams:
         """Kernel parameters.
 
@@ -75,7 +76,9 @@ class ModelWaterSettings(GridFileSettings):
         ValueError
             Naming the file, and what of it or of the mission is at fault.
         """
-        axes, begin, water = _loaded(self.file, self.mission)
+        (axes, *_), begin = self.loaded()
+        water = _density(self, self.stamp)
+        self.check_places(self.mission.places, 'on the path')
         origin = self.mission.origin.params()
         n, e = (
             from_geodetic(*self.mission.places[0], origin) if self.mission.places else (0.0, 0.0)
@@ -97,16 +100,16 @@ class ModelWaterSettings(GridFileSettings):
 
 
 @functools.lru_cache(maxsize=4)
-def _loaded(file: str, mission: Mission) -> tuple[Axes, float, np.ndarray]:
-    """What a mission needs of a file, its start (s since 1970), and the water of the params."""
-    loaded, begin = loaded_window(Path(file), mission, TEMPERATURE_AND_SALINITY)
+def _density(settings: ModelWaterSettings, stamp: tuple[int, int]) -> np.ndarray:
+    """The water of the params, of a version of a file."""
+    loaded, _ = settings.loaded()
     temperature, salinity = (loaded.water[..., i].astype(float) for i in range(2))
     depths = loaded.axes.depths[:, None, None]
     density, temperature = density_of(
-        f'file {file}', depths, temperature, salinity, loaded.standards[0] == POTENTIAL
+        f'file {settings.file}', depths, temperature, salinity, loaded.standards[0] == POTENTIAL
     )
     water = np.stack((density / SEA_WATER_DENSITY - 1.0, temperature), axis=-1)
-    return loaded.axes, begin, water.astype(np.float32)
+    return water.astype(np.float32)
 
 
 @kernel

@@ -9,8 +9,10 @@ is carried out of it finds the water of its edge.
 
 import functools
 import math
+import os
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 import pydantic
@@ -20,21 +22,24 @@ from glider_base.frames import Origin, OriginSettings, on_chart
 from glider_base.kernel import kernel
 from glider_base.settings import Settings, beside
 from glider_model.ocean.field import FieldSettings, Mission, bracket, field_velocity
-from glider_model.ocean.grid_file import (
-    VELOCITIES,
-    Loaded,
-    Wanted,
-    Window,
-    fingerprint,
-    load,
-)
+from glider_model.ocean.grid_file import GRIDS, Loaded, Window, fingerprint, load
 
 #: Water around the path that is read too, as far as the file has it (m).
 MARGIN_M = 150_000.0
 
 
+class Chart(NamedTuple):
+    """What is read of a file, and where on it there is land."""
+
+    latitudes: np.ndarray  #: (deg), increasing
+    longitudes: np.ndarray
+    is_land: Callable[[float, float], bool]  #: at a latitude and longitude (deg)
+
+
 class GridFileSettings(Settings):
     """A file with a grid on the chart of a mission."""
+
+    of: ClassVar[str] = 'currents'  #: which of `GRIDS` is read
 
     file: str = Field(
         '', max_length=4000, description='NetCDF file, relative to the folder of the scenario.'
@@ -51,6 +56,58 @@ class GridFileSettings(Settings):
     def resolved(self, mission: Mission) -> 'GridFileSettings':
         """Copy that knows where and when it is flown."""
         return self.model_copy(update={'mission': mission})
+
+    @property
+    def stamp(self) -> tuple[int, int]:
+        """What tells another version of its file: time of the last change (ns), and size."""
+        try:
+            told = os.stat(self.file)
+        except OSError:  # who reads it says so
+            return 0, 0
+        return told.st_mtime_ns, told.st_size
+
+    def loaded(self) -> tuple[Loaded, float]:
+        """What a mission needs of its file, and its start (s since 1970); errors as `load`."""
+        return _loaded(self.file, self.stamp, self.mission, self.of)
+
+    @property
+    def start_s(self) -> float | None:
+        """Start of a mission (s since 1970); None if its file has the water of one time."""
+        loaded, start_s = self.loaded()
+        return start_s if len(loaded.axes.times) > 1 else None
+
+    def chart(self) -> Chart:
+        """What is read of the file, and where there is land, by the nearest point of its grid."""
+        _, _, latitudes, longitudes = self.loaded()[0].axes
+        land = self.loaded()[0].land
+
+        def is_land(latitude: float, longitude: float) -> bool:
+            row = np.abs(latitudes - latitude).argmin()
+            return bool(land[row, np.abs(longitudes - longitude).argmin()])
+
+        return Chart(latitudes, longitudes, is_land)
+
+    def check_places(self, places: Iterable[tuple[float, float]], what: str) -> None:
+        """Refuse places (deg) that are on land, or beyond what is read around the path.
+
+        Raises
+        ------
+        ValueError
+            Naming the file, the place, and ``what`` it is: such as 'on the path'.
+        """
+        latitudes, longitudes, is_land = self.chart()
+        for place in places:
+            at = _beside(place, self.mission.origin.longitude_deg)
+            told = f'file {self.file}: {place[0]:.4f}, {place[1]:.4f} {what} is'
+            axes = zip(at, (latitudes, longitudes), strict=True)
+            if not all(axis[0] <= one <= axis[-1] for one, axis in axes):
+                raise ValueError(
+                    f'{told} beyond what is read of it (allowed: within {latitudes[0]:.3f} to '
+                    f'{latitudes[-1]:.3f}, {longitudes[0]:.3f} to {longitudes[-1]:.3f}, around '
+                    'the path as far as it has water)'
+                )
+            if is_land(*at):
+                raise ValueError(f'{told} land (allowed: water)')
 
     def known(self) -> 'GridFileSettings':
         """Copy with the fingerprint of its file.
@@ -76,7 +133,7 @@ class GridSettings(GridFileSettings, FieldSettings):
 
     def land_at(self, norths: np.ndarray, easts: np.ndarray) -> np.ndarray:
         """Where there is land, by the nearest points of the grid, bool[n, m]."""
-        loaded, _ = _loaded(self.file, self.mission)
+        loaded, _ = self.loaded()
         places = on_chart(norths, easts, self.mission.origin.params())
         nearest = [
             np.abs(axis[None, :] - one[:, None]).argmin(axis=1)
@@ -92,7 +149,8 @@ class GridSettings(GridFileSettings, FieldSettings):
         ValueError
             Naming the file, and what of it or of the mission is at fault.
         """
-        loaded, begin = _loaded(self.file, self.mission)
+        loaded, begin = self.loaded()
+        self.check_places(self.mission.places, 'on the path')
         axes = loaded.axes
         return GridParams(
             times=axes.times - begin,
@@ -105,29 +163,13 @@ class GridSettings(GridFileSettings, FieldSettings):
 
 
 @functools.lru_cache(maxsize=4)
-def _loaded(file: str, mission: Mission) -> tuple[Loaded, float]:
-    """What a mission needs of a file, and its start (s since 1970)."""
-    return loaded_window(Path(file), mission, VELOCITIES)
-
-
-def loaded_window(
-    path: Path, mission: Mission, wanted: tuple[Wanted, ...]
-) -> tuple[Loaded, float]:
-    """What a mission needs of a file, and its start (s since 1970); errors as `load`."""
+def _loaded(file: str, stamp: tuple[int, int], mission: Mission, of: str) -> tuple[Loaded, float]:
+    """What a mission needs of a version of a file, and its start (s since 1970)."""
     needed = mission_window(mission)
-    loaded = load(path, widened(needed, MARGIN_M), needed, wanted)
-    for place in mission.places:
-        row, column = (
-            int(np.argmin(np.abs(values - one)))
-            for values, one in zip(
-                loaded.axes[2:], _beside(place, mission.origin.longitude_deg), strict=True
-            )
-        )
-        if loaded.land[row, column]:
-            raise ValueError(
-                f'file {path}: {place[0]:.4f}, {place[1]:.4f} on the path is land, by the nearest '
-                'point of its grid (allowed: water)'
-            )
+    window = widened(needed, MARGIN_M)
+    begin_s, lasts_s = window.begin - mission.earlier_s, window.lasts + mission.earlier_s
+    window = window._replace(begin=begin_s, lasts=lasts_s)
+    loaded = load(Path(file), window, needed, GRIDS[of])
     begin = float(loaded.axes.times[0]) if math.isnan(needed.begin) else needed.begin
     return loaded, begin
 
