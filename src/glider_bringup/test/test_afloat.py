@@ -56,3 +56,16 @@ def test_no_vehicle_swings_at_the_surface(vehicle, method, law):
     moved = np.abs(np.diff(steering, axis=0)).max(axis=1)
     assert rests.sum() > 600
     assert moved[rests[1:] & rests[:-1]].max() == 0.0
+
+
+@pytest.mark.parametrize('offset_m', [-1.5, 0.95, 2.9])
+@pytest.mark.parametrize('name', ['slocum_shelf', 'seaglider_1000m'])
+def test_an_offset_of_the_depth_sensor_keeps_no_vehicle_at_the_surface(name, offset_m):
+    """It is as deep as waves are high, and shows a vehicle that floats below the surface."""
+    changes = {'sensors.depth_offset_m': offset_m, 'profile.depth_m': 150.0, 'dives': 0}
+    motion = Motion()
+    fly(load_scenario(name, {**changes, 'duration_s': 14_400.0}), [motion])
+    depth, *_ = motion.result()
+    goes_down = np.diff((depth > 120.0).astype(int)) == 1
+    assert np.count_nonzero(goes_down) >= 4  # it dives on
+    assert depth.max() < 165.0

@@ -81,6 +81,17 @@ def test_a_pressure_that_freezes_in_the_dive_brings_a_vehicle_up_that_reckons(
     assert not flown.drops.any()
 
 
+@pytest.mark.parametrize(
+    ('name', 'error_m'), [('current_8deg', -240.0), ('seaglider_1000m', -150.0)]
+)
+def test_a_vehicle_that_is_shown_above_the_water_does_not_dive(name, error_m):
+    """Though nobody answers, by which it would know that it is at the surface."""
+    above = broken('biased', sensor='depth', error=error_m)
+    flown = fly(name, 3000.0, [broken('no_contact'), above])
+    assert flown.first(rows.SURFACES) < 10.0
+    assert flown.depth.max() < 5.0
+
+
 @pytest.mark.parametrize('changes', [RECKONED, {}])
 def test_a_pressure_that_freezes_before_the_dive_is_no_reason_to_dive(changes):
     flown = fly('current_8deg', 4000.0, [broken('frozen', sensor='depth', at_s=20.0)], **changes)

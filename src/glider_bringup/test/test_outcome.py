@@ -20,7 +20,9 @@ from glider_model.vehicle.file import load_vehicle
 TRUTH, BELIEF = COLUMNS['ground_truth/odom'], slice(*[COLUMNS['odom'].start + i for i in (0, 13)])
 
 
-def scores(depth, guard=0, believed=None, vehicle='zhang2021', north=0.0, target=0.0, e2=0.0):
+def scores(
+    depth, guard=0, believed=None, vehicle='zhang2021', north=0.0, target=0.0, e2=0.0, rules=None
+):
     """Scores of a made-up flight at some true depths (m), with what the guard tells."""
     log = np.zeros((len(depth), ROW))
     log[:, TRUTH.start + 1], log[:, TRUTH.start + 2] = north, -depth
@@ -34,7 +36,7 @@ def scores(depth, guard=0, believed=None, vehicle='zhang2021', north=0.0, target
     log[:, COLUMNS['guard']] = guard
     scorer = Scorer(vehicle=load_vehicle(vehicle))
     scorer.add(log)
-    return scorer.result(Rules(0.0, 1000.0))
+    return scorer.result(rules or Rules(0.0, 1000.0))
 
 
 def ticks(seconds):
@@ -69,6 +71,38 @@ def from_s(start_s, bits):
 )
 def test_status_is_what_became_of_the_vehicle(depth, guard, status):
     assert scores(depth, guard)['status'] == status
+
+
+@pytest.mark.parametrize(('deepest_m', 'is_told'), [(1039.0, False), (1041.0, True)])
+def test_a_depth_that_it_is_not_rated_for_is_told_whatever_was_measured(deepest_m, is_told):
+    told = scores(DIVE / 900.0 * deepest_m, believed=DIVE)
+    assert told['status'] == 'completed'
+    assert ('deeper than it is rated for, 1,000 m, at' in told['reason']) == is_told
+
+
+@pytest.mark.parametrize(
+    ('dives', 'lasts_s', 'status'),
+    [(1, 4000.0, 'completed'), (2, 4000.0, 'unfinished'), (2, 5000.0, 'completed')],
+)
+def test_a_mission_is_unfinished_if_its_time_is_over_before_its_dives(dives, lasts_s, status):
+    rules = Rules(0.0, 1000.0, dives=dives, duration_s=lasts_s)
+    told = scores(np.maximum(DIVE, 6.0), rules=rules)
+    assert told['status'] == status
+    deep = '; 6 m deep at the end'
+    says = f'dives flown when its time was over: 1 of 2{deep}' if status == 'unfinished' else ''
+    assert told['reason'] == says
+
+
+def test_a_vehicle_that_is_too_light_to_dive_has_not_completed_its_mission(tmp_path):
+    changes = ('duration_s=3000', 'faults=[{kind: mass, mass_kg: -1.0}]')
+    sets = [word for change in changes for word in ('--set', change)]
+    done = command_line.glider('run', '--engine', 'direct', '--out', tmp_path / 'run', *sets)
+    assert done.returncode == 3
+    card = json.loads((tmp_path / 'run/score.json').read_text())
+    assert (card['status'], card['dives']) == ('unfinished', 0)
+    page = (tmp_path / 'run/report.html').read_text(encoding='utf-8')
+    assert 'Unfinished: dives flown when its time was over: 0 of 1.' in page
+    assert 'Nothing went wrong' not in page
 
 
 @pytest.mark.parametrize('beyond_m', [-0.1, 0.1])

@@ -140,7 +140,9 @@ def watch(
     if out_s > OUT_S + limits.settled_s:
         own_zero = _averaged(own_zero, own, state.own, dt)
         odom_zero = _averaged(odom_zero, shown.odom, shown.odom_before, dt)
-    if max(abs(own_zero), abs(odom_zero)) > limits.offset_m:
+    # two samples that agree show it higher above the water than any offset does: nobody flies
+    is_above = far_s == 0.0 and raw != state.raw and max(own, state.own) < -limits.offset_m
+    if is_above or max(abs(own_zero), abs(odom_zero)) > limits.offset_m:
         told |= DEPTH_WRONG
     elif _offset(own_zero) != 0.0 or _offset(odom_zero) != 0.0:
         told |= DEPTH_OFFSET

@@ -35,7 +35,7 @@ from glider_control.settings import ControlLawSettings, ControlSettings, check_l
 from glider_guard.settings import GuardLimitSettings, GuardSettings
 from glider_guidance.order import Order
 from glider_guidance.orders import check_orders
-from glider_guidance.path.settings import PathSettings, StraightPath
+from glider_guidance.path.settings import MAX_DEPTH_M, PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.chart import charted, in_metres
@@ -297,7 +297,7 @@ class Scenario(Settings):
             origin=self.origin,
             places=tuple(to_geodetic(float(n), float(e), origin) for n, e, _ in corners),
             # wherever a fault or an order lets it go
-            deepest_m=max(self.profile.depth_m, load_vehicle(self.vehicle).rated_depth_m),
+            deepest_m=min(MAX_DEPTH_M, load_vehicle(self.vehicle).rated_depth_m),
             lasts_s=self.duration_s,
         )
 
@@ -382,6 +382,7 @@ class Scenario(Settings):
             self.duration_s,
             self.origin.params() if self.is_charted else None,
             self.shallowest_m,
+            0 if self._holds else self.dives,
         )
 
     def _glide_s(self) -> float:

@@ -32,9 +32,9 @@ AHEAD_S = 60.0
 FIXED_S, LEAST_SAMPLES = 10.0, 5
 #: It is averaged over so many samples at most.
 AVERAGED = 100
-#: A smaller one is left: waves, and an antenna that is out before the hull is; a larger one is no
-#: offset (m).
-LEAST_M, LARGEST_M = 3.0, 20.0
+#: A smaller one is left: waves, and an antenna that is out before the hull is. It is less than the
+#: depth below which guidance takes a vehicle for surfaced. A larger one is no offset (m).
+LEAST_M, LARGEST_M = 0.5, 20.0
 
 
 class Flight(NamedTuple):

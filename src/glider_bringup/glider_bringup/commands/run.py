@@ -174,7 +174,7 @@ def _exit_code(card: dict, has_room: bool) -> int:
         return EXIT_INTERRUPTED if card['reason'].startswith('stopped by') else EXIT_FAILED
     if card['status'] == 'lost' or not has_room:
         return EXIT_FAILED
-    return EXIT_SURFACED if card['status'] == 'surfaced' else 0
+    return EXIT_SURFACED if card['status'] in ('surfaced', 'unfinished') else 0
 
 
 @contextmanager

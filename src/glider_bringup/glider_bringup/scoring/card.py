@@ -20,7 +20,7 @@ from glider_mission.run_folder import SCORE_FILE
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import load_vehicle
 
-STATUSES = ('completed', 'surfaced', 'lost', 'infeasible', 'aborted', 'failed')
+STATUSES = ('completed', 'unfinished', 'surfaced', 'lost', 'infeasible', 'aborted', 'failed')
 #: Statuses of runs that were not flown to their end.
 STOPPED = ('aborted', 'failed')
 

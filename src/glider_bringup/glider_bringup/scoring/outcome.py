@@ -22,6 +22,9 @@ from glider_mission.rules import Rules
 from glider_model.ocean.bottom import least_height
 
 COMPLETED, SURFACED, LOST, INFEASIBLE = 'completed', 'surfaced', 'lost', 'infeasible'
+UNFINISHED = 'unfinished'
+#: A turn overshoots the rated depth by less than this share of it, and this (m).
+OVERSHOOT_SHARE, OVERSHOOT_M = 0.04, 15.0
 #: The pace is known once so much of the path has been made good (-).
 LEAST_SHARE = 0.02
 #: All has been done for so long (s), and the vehicle has not come up by this (m): nothing is left.
@@ -52,7 +55,11 @@ def ends_mission(told: np.ndarray) -> np.ndarray:
 
 
 def outcome_of(
-    depth: np.ndarray, told: np.ndarray, crush_depth_m: float, infeasible: bool
+    depth: np.ndarray,
+    told: np.ndarray,
+    hull: tuple[float, float],
+    infeasible: bool,
+    missing: str = '',
 ) -> Outcome:
     """What became of a vehicle.
 
@@ -62,29 +69,36 @@ def outcome_of(
         True one (m).
     told : int64[ticks]
         Rows of the guard; see `as_told`.
-    crush_depth_m : float
-        Infinite if nobody knows.
+    hull : tuple of 2 float
+        Depth that it is rated for, and at which it gives way (m); infinite if nobody knows.
     infeasible : bool
         The course could not be held.
+    missing : str
+        What of its mission it has not flown in its time; empty: nothing.
     """
     if not len(depth):
         return Outcome(COMPLETED, '')
+    rated_m, crush_m = hull
+    deepest_m, end_m = float(np.max(depth)), float(depth[-1])
+    if deepest_m > crush_m:
+        return Outcome(LOST, _beyond(depth, crush_m, 'its hull bears'))
+    is_ended = ends_mission(told[-1:])[0]
+    reasons = [_ended(told) if is_ended else missing]
+    if (is_ended or missing) and end_m > AFLOAT_M:
+        reasons.append(f'{end_m:,.0f} m deep at the end')
+        if is_ended and _nothing_is_left(depth, told):
+            return Outcome(LOST, f'{"; ".join(reasons)}, and nothing left to try')
+    if deepest_m > rated_m + max(OVERSHOOT_M, OVERSHOOT_SHARE * rated_m):
+        reasons.append(_beyond(depth, rated_m, 'it is rated for'))
+    status = INFEASIBLE if infeasible else UNFINISHED if missing else COMPLETED
+    return Outcome(SURFACED if is_ended else status, '; '.join(filter(None, reasons)))
+
+
+def _beyond(depth: np.ndarray, limit_m: float, what: str) -> str:
+    """That a vehicle was deeper than a limit (m), and when first."""
+    at_s = TICK_S * int(np.argmax(depth > limit_m))
     deepest_m = float(np.max(depth))
-    if deepest_m > crush_depth_m:
-        at_s = TICK_S * int(np.argmax(depth > crush_depth_m))
-        return Outcome(
-            LOST,
-            f'deeper than its hull bears, {crush_depth_m:,.0f} m, at {at_s:,.1f} s; '
-            f'deepest {deepest_m:,.1f} m',
-        )
-    if not ends_mission(told[-1:])[0]:
-        return Outcome(INFEASIBLE if infeasible else COMPLETED, '')
-    reason, end_m = _ended(told), float(depth[-1])
-    if end_m > AFLOAT_M:
-        reason += f'; {end_m:,.0f} m deep at the end'
-        if _nothing_is_left(depth, told):
-            return Outcome(LOST, f'{reason}, and nothing left to try')
-    return Outcome(SURFACED, reason)
+    return f'deeper than {what}, {limit_m:,.0f} m, at {at_s:,.1f} s; deepest {deepest_m:,.1f} m'
 
 
 def arrival_of(

@@ -126,7 +126,9 @@ class Scorer:
             if scenario.navigation.jumps:
                 self.topics = ('fix', 'believed_current', 'current_velocity')
         self._steers_by = vehicle.steers_by if vehicle else ''
-        self._crush_depth_m = vehicle.crush_depth_m if vehicle else math.inf
+        self._hull = (math.inf, math.inf)  #: depth that it is rated for and that it bears (m)
+        if vehicle:
+            self._hull = vehicle.rated_depth_m, vehicle.crush_depth_m
         self._has_weight = bool(vehicle and vehicle.drop_weight)
         self._bottom = None if bottom is NO_BOTTOM else BottomWatch(bottom)
         self._truth = TrueMotion()
@@ -187,7 +189,7 @@ class Scorer:
         """
         series, ticks = self._series, self.ticks
         depth, told = series('depth'), as_told(series('guard').astype(np.int64) & ALL)
-        flies = ~ends_mission(told) & ~(np.maximum.accumulate(depth) > self._crush_depth_m)
+        flies = ~ends_mission(told) & ~(np.maximum.accumulate(depth) > self._hull[1])
         steady, scored = windows(depth, series('rate_ref') > 0.0, rules, TICK_S)
         steady &= flies
         heading, has_whole_mean = _heading_fluctuation_deg(series('heading'))
@@ -206,7 +208,10 @@ class Scorer:
         way_m, time_s = self._along_path_m(), seconds(ticks)
         held = ~(series('infeasible')[scored & flies] > 0.0)
         infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)
-        ended = outcome_of(depth, told, self._crush_depth_m, infeasible)
+        missing = ''
+        if dives < rules.dives and time_s >= rules.duration_s:
+            missing = f'dives flown when its time was over: {dives} of {rules.dives}'
+        ended = outcome_of(depth, told, self._hull, infeasible, missing)
         pace_m = way_m if ended.status in (COMPLETED, INFEASIBLE) else None
         return {
             **ended._asdict(),

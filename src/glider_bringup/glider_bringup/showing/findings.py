@@ -45,9 +45,14 @@ def _ended(card: dict[str, Any]) -> str:
     status = card['status']
     if status in STOPPED:
         return f'Stopped after {span(card["sim_time_s"])}: {card["reason"]}.'
+    ended = '' if status == 'completed' else f'{status.capitalize()}: '
     if status == 'infeasible':
-        return 'The current was too strong to hold the course for half of the time or more.'
-    return '' if status == 'completed' else f'{status.capitalize()}: {card["reason"]}.'
+        ended = 'The estimated current was too strong to hold the course for half of the time or '
+        ended += 'more. ' if card['reason'] else 'more.'
+    reason = card['reason']
+    if not reason:
+        return ended
+    return f'{ended}{reason}.' if ended else f'{reason[0].upper()}{reason[1:]}.'
 
 
 def _worst(card: dict[str, Any]) -> str:
@@ -146,7 +151,7 @@ def _came_up(off: list[float], learns: bool) -> str:
 def _how_bad(card: dict[str, Any], traces: Traces) -> list[str]:
     """How the run ended, if not as it was to, and its largest errors if they are large."""
     problems = []
-    if card['status'] in (*STOPPED, 'lost', 'surfaced'):
+    if _ended(card) and card['status'] != 'infeasible':
         problems.append(_ended(card))
     place = ((reckoned(card) or {}).get('error_m') or {}).get('worst') or 0.0
     worst = max(card['cross_track_m'].get('max_run') or 0.0, place)

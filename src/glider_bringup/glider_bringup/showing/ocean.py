@@ -11,6 +11,7 @@ import numpy as np
 from glider_base.frames import on_chart
 from glider_base.settings import ConfigurationError
 from glider_bringup.showing.figure import GREEN, ORANGE, new_figure
+from glider_bringup.showing.words import count
 from glider_mission.chart import place_told
 from glider_mission.disk import save_figure
 from glider_mission.routing.plan import Plan
@@ -160,9 +161,10 @@ def _where(part: dict[str, Any]) -> list[tuple[str, str]]:
     if 'times' in part:
         times, depth = part['times'], part['depth_m']
         step = f', every {times["step_h"]:g} h' if times['step_h'] else ', a steady sea'
+        levels = count(depth['count'], 'level')
         rows = [
             ('times', f'{times["first"]} to {times["last"]}, {times["count"]}{step}'),
-            ('depths', f'{depth["first"]:g} to {depth["last"]:g} m, {_levels(depth["count"])}'),
+            ('depths', f'{depth["first"]:g} to {depth["last"]:g} m, {levels}'),
         ]
     if part['seen']:
         depth = part['seen']['depth_m']
@@ -175,10 +177,6 @@ def _where(part: dict[str, Any]) -> list[tuple[str, str]]:
         of = 'the uppermost level' if 'times' in part else 'the chart'
         rows.append(('land', f'{100.0 * part["land_share"]:.1f} % of {of}'))
     return rows
-
-
-def _levels(count: int) -> str:
-    return '1 level' if count == 1 else f'{count} levels'
 
 
 def mission_in(told: dict[str, Any], name: str) -> Sea:

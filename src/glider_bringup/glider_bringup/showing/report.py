@@ -21,6 +21,7 @@ from glider_model.ocean.current_settings import KNOT_MPS
 
 _BADGES = {
     'completed': '✓ Completed',
+    'unfinished': '! Unfinished',
     'surfaced': '! Surfaced',
     'lost': '✕ Lost',
     'infeasible': '! Infeasible',

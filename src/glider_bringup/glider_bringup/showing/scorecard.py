@@ -22,6 +22,7 @@ from glider_model.ocean.current_settings import KNOT_MPS
 STYLES = {
     'completed': 'green',
     'infeasible': 'yellow',
+    'unfinished': 'yellow',
     'surfaced': 'yellow',
     'lost': 'bold red',
     'aborted': 'red',

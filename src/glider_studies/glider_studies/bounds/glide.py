@@ -177,7 +177,7 @@ def steering_loop(glide: Glide) -> SteeringLoop:
     law, seen = params.control.law, _seen(state, params)
     fin = params.control.steering
     if hasattr(fin, 'turn_rate'):
-        ask, roll_filter = _ask_fin(state, fin), None
+        ask, roll_filter = lambda seen: steer(state.control.steering, seen, fin, TICK_S)[1], None
         limit = params.control.allocation.delta_max
         speed_ratio = (glide.speed / STEERING_SPEED) ** 2
         b, k = state.control.steering.known.b * fin.turn_rate * speed_ratio, 0.0
@@ -263,15 +263,6 @@ def _ask_law(state: MissionState, law: NamedTuple, roll_filter):
         after, _, _ = law_step(before, seen, law, TICK_S)
         pull = after.roll.rate / (TICK_S * 2.0 * roll_filter.frequency)
         return value + pull / (0.5 * roll_filter.frequency)
-
-    return ask
-
-
-def _ask_fin(state: MissionState, fin: NamedTuple):
-    """Angle (rad) of the fin."""
-
-    def ask(seen: Seen, value: float = 0.0) -> float:
-        return steer(state.control.steering, seen, fin, TICK_S)[1]
 
     return ask
 

@@ -39,7 +39,7 @@ VECTORS = {
     'final_state.velocity_mps': ('frd', ('forward', 'starboard', 'down')),
 }
 #: Those of before come first: a result keeps a status as its place among them.
-STATUSES = ('completed', 'infeasible', 'failed', 'surfaced', 'lost')
+STATUSES = ('completed', 'infeasible', 'failed', 'surfaced', 'lost', 'unfinished')
 #: Names in a result that are no figures, apart from its dimensions.
 NOT_FIGURES = {'status', 'reason', *(dimension for dimension, _ in VECTORS.values())}
 
