@@ -484,7 +484,10 @@ def read_scenario(name: str = DEFAULT_SCENARIO) -> ScenarioSource:
 
 
 def make_scenario(
-    source: ScenarioSource, changes: dict[str, Any] | None = None, recorded: bool = False
+    source: ScenarioSource,
+    changes: dict[str, Any] | None = None,
+    recorded: bool = False,
+    kind: type[Scenario] | None = None,
 ) -> Scenario:
     """Scenario of a file with some of its fields changed.
 
@@ -496,6 +499,8 @@ def make_scenario(
         ``vehicle.`` are fields of the vehicle's file.
     recorded : bool
         It has been flown: nobody asks any more whether the vehicle is rated for its depth.
+    kind : type of Scenario, optional
+        That of its law; by default the last one that this program brought by that name.
 
     Raises
     ------
@@ -521,7 +526,9 @@ def make_scenario(
     line = line_of((VEHICLE,))
     in_line = f'{path}:{line}{changed}' if line else f'{path}{changed}'
     try:
-        scenario = validate(_kind(values), values, str(path), path.parent, line_of, changed)
+        scenario = validate(
+            kind or _kind(values), values, str(path), path.parent, line_of, changed
+        )
     except ConfigurationError as error:
         told = [str(error)]
         if isinstance(values.get(VEHICLE), str):  # a wrong one is not found out only later
@@ -537,6 +544,20 @@ def make_scenario(
             _check_glide(scenario)
             return _with_known_fields(scenario)
     return scenario
+
+
+def changed_scenario(
+    scenario: Scenario, changes: dict[str, Any], law: type[LawSettings] | None = None
+) -> Scenario:
+    """A scenario as it was loaded, with some of its fields changed; see `make_scenario`.
+
+    Its law stays the very one that it was, unless another one is named, or is given.
+    """
+    values = scenario.model_dump(mode='json', exclude_none=True, exclude={'current': {'seed'}})
+    own, flown = type(scenario.control.chosen), scenario.control.law
+    stays = law in (None, own) and changes.get('control.law', flown) == flown
+    kind = type(scenario) if stays and 'control' not in changes else None
+    return make_scenario(ScenarioSource(Path(scenario.name), values), changes, kind=kind)
 
 
 def split_changes(changes: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

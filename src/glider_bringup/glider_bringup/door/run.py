@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from glider_base.files import parse_yaml
 from glider_base.ros.places import given_domain
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
@@ -41,10 +40,9 @@ from glider_mission.run_folder import (
 from glider_mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
-    ScenarioSource,
+    changed_scenario,
     know_law,
     load_scenario,
-    make_scenario,
 )
 
 if TYPE_CHECKING:
@@ -147,15 +145,13 @@ def chosen_scenario(
         duration = number('--duration', str(duration), 'full', TICK_S, 1e8)
     if law is not None and controller is not None:
         raise ConfigurationError(f'--controller {controller}: not with a law of your own')
-    if law is not None:
-        controller = know_law(own_law(law))
+    own = own_law(law) if law is not None else None
+    if own:
+        controller = know_law(own)
     fields = chosen_fields(fields, controller, guidance, seed, duration)
     if not isinstance(scenario, Scenario):
         return load_scenario(str(scenario), fields)
-    if not fields:
-        return scenario
-    values = parse_yaml(scenario.to_yaml(), scenario.name)  # all of it is validated again
-    return make_scenario(ScenarioSource(Path(scenario.name), values), fields)
+    return changed_scenario(scenario, fields, own) if fields else scenario
 
 
 # long: most of it says what its parameters are.
