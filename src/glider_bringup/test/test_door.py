@@ -533,6 +533,14 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
         glider.fly('current_8deg', changes, law=level_law),
     ):
         xarray.testing.assert_equal(again.to_xarray(), before.to_xarray())
+    for choices, name in (
+        ({'controller': 'pid'}, 'pid'),
+        ({'law': level}, 'level'),
+        ({'set': {'control.law': 'LevelLaw'}}, 'LevelLaw'),
+    ):
+        run = glider.fly(before.scenario, duration=1.0, **choices)
+        assert run.score['controller'] == name
+        assert ('LevelLaw' in run.scenario.to_yaml()) is (name == 'LevelLaw')
 
 
 @pytest.mark.parametrize(

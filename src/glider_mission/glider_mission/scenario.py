@@ -31,7 +31,13 @@ from glider_base.settings import (
 )
 from glider_base.wiring import SENSORS
 from glider_control.law import LawSettings
-from glider_control.settings import ControlLawSettings, ControlSettings, check_law, with_law
+from glider_control.settings import (
+    LAWS,
+    ControlLawSettings,
+    ControlSettings,
+    check_law,
+    with_law,
+)
 from glider_guard.settings import GuardLimitSettings, GuardSettings
 from glider_guidance.order import Order
 from glider_guidance.orders import check_orders
@@ -557,6 +563,8 @@ def changed_scenario(
     own, flown = type(scenario.control.chosen), scenario.control.law
     stays = law in (None, own) and changes.get('control.law', flown) == flown
     kind = type(scenario) if stays and 'control' not in changes else None
+    if not stays and flown not in LAWS:  # gains that others do not know
+        del values['control'][flown]
     return make_scenario(ScenarioSource(Path(scenario.name), values), changes, kind=kind)
 
 
