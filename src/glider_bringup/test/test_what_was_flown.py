@@ -85,6 +85,18 @@ def test_python_tells_it_too():
     assert run.score['changed']['current.speed_kn'] == '0.6'
 
 
+def test_a_run_whose_vehicle_was_changed_is_flown_on_with_it(tmp_path):
+    fields = {'vehicle.hydrodynamics.K_D0': 8.0, 'seed': 3}
+    run = fly('current_8deg', {**fields, 'vehicle.moving_mass.rate': 0.01}, duration=5.0)
+    again = fly(run.scenario, {'vehicle.moving_mass.rate': 0.02})
+    other = fly('current_8deg', {**fields, 'vehicle.moving_mass.rate': 0.02}, duration=5.0)
+    assert again.scenario == other.scenario
+    assert again.to_xarray().equals(other.to_xarray())
+    page = again.report(tmp_path / 'report.html').read_text(encoding='utf-8')
+    assert 'vehicle: vehicle.yaml' in page
+    assert 'zhang2021\\0' not in page
+
+
 @pytest.mark.parametrize('command', ['score', 'report'])
 @pytest.mark.parametrize('name', ['scenario.yaml', 'vehicle.yaml'])
 def test_a_scenario_that_was_exchanged_is_refused(changed, tmp_path, command, name):

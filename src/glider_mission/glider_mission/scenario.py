@@ -64,7 +64,13 @@ from glider_model.plant.faults.settings import (
 )
 from glider_model.plant.plant import SURFACE_S, InitialSettings, PlantSettings
 from glider_model.plant.sensors import SensorSettings
-from glider_model.vehicle.file import changed_vehicle, load_vehicle, vehicle_names, vehicle_path
+from glider_model.vehicle.file import (
+    changed_vehicle,
+    load_vehicle,
+    vehicle_names,
+    vehicle_parts,
+    vehicle_path,
+)
 from glider_model.vehicle.perturb import PerturbSettings, perturbed
 from glider_navigation.settings import NavigationLawSettings, NavigationSettings
 
@@ -560,6 +566,8 @@ def changed_scenario(
     Its law stays the very one that it was, unless another one is named, or is given.
     """
     values = scenario.model_dump(mode='json', exclude_none=True, exclude={'current': {'seed'}})
+    values[VEHICLE], in_vehicle = vehicle_parts(scenario.vehicle)
+    changes = {f'{VEHICLE}.{name}': value for name, value in in_vehicle.items()} | changes
     own, flown = type(scenario.control.chosen), scenario.control.law
     stays = law in (None, own) and changes.get('control.law', flown) == flown
     kind = type(scenario) if stays and 'control' not in changes else None

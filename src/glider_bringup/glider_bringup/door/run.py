@@ -33,6 +33,7 @@ from glider_mission.recording.mcap_reader import Bag
 from glider_mission.run_folder import (
     REPORT_FILE,
     TRACES_FILE,
+    VEHICLE_FILE,
     make_run_folder,
     scenario_of,
     write_scenario,
@@ -122,7 +123,7 @@ class Run:
         else:
             tracer = make_tracer(self.scenario)
             tracer.add(self._rows())
-            text = self.scenario.to_yaml()
+            text = self.scenario.to_yaml(vehicle=VEHICLE_FILE)
             name = Path(self.scenario.name)
             flown = flown_run(name, self.scenario, text, self.score, tracer.result())
         write_whole(file, report_page(flown))

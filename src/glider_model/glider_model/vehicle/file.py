@@ -398,7 +398,7 @@ def changed_vehicle(name: str, changes: dict[str, Any]) -> str:
     return f'{name}\0{json.dumps(changes)}' if changes else name
 
 
-def _parts(name: str) -> tuple[str, dict[str, Any]]:
+def vehicle_parts(name: str) -> tuple[str, dict[str, Any]]:
     """What `changed_vehicle` was given."""
     name, _, changes = name.partition('\0')
     return name, json.loads(changes or '{}')
@@ -406,12 +406,12 @@ def _parts(name: str) -> tuple[str, dict[str, Any]]:
 
 def vehicle_path(name: str) -> Path:
     """File of a vehicle given by name, or by path; a ConfigurationError if there is none."""
-    return find_file('vehicle', _parts(name)[0], VEHICLE_FOLDER)
+    return find_file('vehicle', vehicle_parts(name)[0], VEHICLE_FOLDER)
 
 
 def vehicle_file(name: str) -> bytes:
     """Content of a file that loads to a vehicle: its own or, if fields are changed, a new one."""
-    path, (_, changes) = vehicle_path(name), _parts(name)
+    path, (_, changes) = vehicle_path(name), vehicle_parts(name)
     if not changes:
         return read_bytes(path)
     return yaml_text(_changed_values(read_yaml(path), changes)).encode()
@@ -435,7 +435,7 @@ def steers_by(settings: Settings) -> str:
 @lru_cache(maxsize=16)
 def _read_vehicle(path: Path, name: str, mtime_ns: int, size: int) -> Vehicle:
     """Vehicle of a file in this version: every block of a mission asks for it."""
-    _, changes = _parts(name)
+    _, changes = vehicle_parts(name)
 
     def line_of(location: tuple[str, ...]) -> int | None:
         where = '.'.join(location)
