@@ -97,6 +97,25 @@ def test_a_run_whose_vehicle_was_changed_is_flown_on_with_it(tmp_path):
     assert 'zhang2021\\0' not in page
 
 
+def test_waypoints_in_degrees_say_anew_where_it_starts():
+    """A scenario that was loaded and then changed is the one that is loaded with all of it."""
+    places, moved = [[36.0, 122.0], [36.1, 122.1]], [[36.5, 122.5], [36.6, 122.6]]
+    path = {'kind': 'waypoints', 'waypoints_latlon': places}
+    ordered = {'path': path, 'orders': [{'at_s': 60.0, 'path': path}]}
+    for before, fields in (
+        ({'path': path}, {'path.waypoints_latlon': moved}),
+        ({'path': path}, {'path': {**path, 'waypoints_latlon': moved}}),
+        ({}, {'path': path}),
+        (ordered, {'origin.latitude_deg': 36.02}),
+        ({'path': path, 'origin.latitude_deg': 36.02}, {'path.waypoints_latlon': places[::-1]}),
+        ({'path': path, 'initial.north_m': 50.0}, {'path.waypoints_latlon': moved}),
+    ):
+        flown = fly(load_scenario('current_8deg', before), fields, duration=0.1)
+        at_once = fly('current_8deg', {**before, **fields}, duration=0.1)
+        assert flown.scenario == at_once.scenario
+        assert flown.to_xarray().equals(at_once.to_xarray())
+
+
 @pytest.mark.parametrize('command', ['score', 'report'])
 @pytest.mark.parametrize('name', ['scenario.yaml', 'vehicle.yaml'])
 def test_a_scenario_that_was_exchanged_is_refused(changed, tmp_path, command, name):

@@ -20,6 +20,8 @@ from glider_mission.mafiles import SUFFIX, read_goto_list
 MAX_STRETCH = 0.05
 #: Waypoints in metres that are given beside those in degrees may be off by this (m).
 _SAME_M = 1.0
+#: What waypoints in degrees say of the rest of a scenario, unless it says that itself.
+_SAID = {'origin': {'latitude_deg', 'longitude_deg'}, 'initial': {'north_m', 'east_m'}}
 #: Letters of each axis, + first, and its range (deg). A flat chart has no poles.
 _AXES = {'latitude': ('NS', -85.0, 85.0), 'longitude': ('EW', -180.0, 360.0)}
 _TEXT = re.compile(
@@ -137,16 +139,29 @@ def charted(values: dict[str, Any]) -> dict[str, Any]:
     except (KeyError, TypeError, ValueError):  # no such path, or one that is refused later
         return values
     origin, initial = values.get('origin', {}), values.get('initial', {})
-    if isinstance(origin, dict) and not {'latitude_deg', 'longitude_deg'} & set(origin):
+    if isinstance(origin, dict) and not _SAID['origin'] & set(origin):
         origin = {**origin, **_middle(points)}
         values = {**values, 'origin': origin}
-    if isinstance(initial, dict) and not {'north_m', 'east_m'} & set(initial):
+    if isinstance(initial, dict) and not _SAID['initial'] & set(initial):
         try:
             start = from_geodetic(*points[0], OriginSettings.model_validate(origin).params())
         except ValueError:  # refused later
             return values
         initial = {'depth_m': 0.1, **initial, 'north_m': start[0], 'east_m': start[1]}
         values = {**values, 'initial': initial}
+    return values
+
+
+def uncharted(values: dict[str, Any]) -> dict[str, Any]:
+    """Values of a scenario without what was made of its waypoints in degrees, to be made anew."""
+    for part, names in _SAID.items():
+        rest = {name: value for name, value in values[part].items() if name not in names}
+        if charted({**values, part: rest})[part] == values[part]:
+            values = {**values, part: rest}
+    for holder in (values, *values['orders']):
+        path = holder.get('path', {})
+        if 'waypoints_latlon' in path:
+            del path['waypoints']
     return values
 
 

@@ -44,7 +44,7 @@ from glider_guidance.orders import check_orders
 from glider_guidance.path.settings import MAX_DEPTH_M, PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
-from glider_mission.chart import charted, in_metres
+from glider_mission.chart import charted, in_metres, uncharted
 from glider_mission.mafiles import FIELD as MAFILES
 from glider_mission.mafiles import from_folder, read_profile, with_mafiles
 from glider_mission.rules import Rules
@@ -563,9 +563,15 @@ def changed_scenario(
 ) -> Scenario:
     """A scenario as it was loaded, with some of its fields changed; see `make_scenario`.
 
-    Its law stays the very one that it was, unless another one is named, or is given.
+    Its law stays the very one that it was, unless another one is named, or is given. Waypoints in
+    degrees say anew where its origin is, and where it starts.
     """
     values = scenario.model_dump(mode='json', exclude_none=True, exclude={'current': {'seed'}})
+    for part in ('origin', 'initial'):
+        values[part] = getattr(scenario, part).model_dump(mode='json', exclude_unset=True)
+    path = changes.get('path', values['path'])
+    if 'path.waypoints' not in changes and isinstance(path, dict) and 'waypoints_latlon' in path:
+        values = uncharted(values)
     values[VEHICLE], in_vehicle = vehicle_parts(scenario.vehicle)
     changes = {f'{VEHICLE}.{name}': value for name, value in in_vehicle.items()} | changes
     own, flown = type(scenario.control.chosen), scenario.control.law
