@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Flights from Python, and runs that were flown."""
 
-import weakref
+import atexit
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field
@@ -32,6 +32,7 @@ from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.run_folder import (
     REPORT_FILE,
+    SCENARIO_FILE,
     TRACES_FILE,
     VEHICLE_FILE,
     make_run_folder,
@@ -303,10 +304,10 @@ def open_run(path: str | Path) -> Run:
     with ExitStack() as stack:
         attachments = Bag(path).attachments if has_bag(path) else {}
         scenario = stack.enter_context(scenario_of(path, attachments)).scenario
-        run = Run(scenario, card, path, partial(_rows_of, path, scenario.vehicle))
-        # what an MCAP file brings is there as long as the run is
-        weakref.finalize(run, stack.pop_all().close)
-    return run
+        if not (path / SCENARIO_FILE).is_file():
+            # what a bag alone brings is there as long as the program: scenarios name its vehicle
+            atexit.register(stack.pop_all().close)
+    return Run(scenario, card, path, partial(_rows_of, path, scenario.vehicle))
 
 
 def _rows_of(path: Path, vehicle: str) -> np.ndarray:
