@@ -2,14 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """A flight in one's own hands: the bits of a flight at once, however it is cut up or carried."""
 
+import math
 import pickle
 import subprocess
 import sys
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import glider_bringup as glider
+from glider_base.kernel import kernel
+from glider_bringup.engines.direct import NotFiniteError
+from glider_control.law import LawSettings, law_step
 from glider_guard.rows import LATCHED
 
 WATERS = {
@@ -123,6 +128,57 @@ def test_it_arrives():
     short = {'path.waypoints': [[0, 0], [300, 0]], 'profile.depth_m': 60.0}
     flight = glider.Flight('survey', short)
     assert flight.until('arrival').name == 'arrival'
+
+
+class Failing(NamedTuple):
+    at: int
+
+
+class Called(NamedTuple):
+    times: int
+
+
+class FailingLaw(LawSettings):
+    """Holds pitch, until it was called so often."""
+
+    at: int = 1_000_000
+
+    def params(self, vehicle, bank):
+        return Failing(self.at)
+
+    def initial_state(self):
+        return Called(0)
+
+
+@law_step.body(Failing)
+@kernel
+def failing_step(state, seen, params, dt):
+    pitch = 25.0 * (seen.reference.theta - seen.measured.theta) - 40.0 * seen.measured.theta_dot
+    if state.times == params.at:
+        pitch = math.nan
+    return Called(state.times + 1), -20.0 * seen.measured.phi_dot, pitch
+
+
+def test_a_law_that_fails_ends_it_at_one_tick_however_it_is_cut_up():
+    fields = {'profile.depth_m': 15.0}
+    flight = glider.Flight('current_8deg', fields, law=FailingLaw)
+    surfaced = flight.until('surfacing')
+    at = flight.state.kept.mission.control.law.times + 10
+    flight.step(10)
+    ended = set()
+    for step in (1, 7, 600):
+        failing = glider.Flight(
+            'current_8deg', {**fields, 'control.FailingLaw.at': at}, law=FailingLaw
+        )
+        failing.until(t_s=0.1 * (surfaced.tick - 100))
+        assert failing.until('surfacing') == surfaced
+        with pytest.raises(NotFiniteError, match='wrench is not finite') as error:
+            while True:
+                failing.step(step)
+        assert failing.is_over and failing.step() == ('end', surfaced.tick + 10)
+        assert numbers(failing) == numbers(flight)
+        ended.add(str(error.value))
+    assert len(ended) == 1
 
 
 @pytest.mark.parametrize(

@@ -194,7 +194,8 @@ class Flight:
         Raises
         ------
         NotFiniteError
-            Where a number is none any more, with its name and tick; the flight is over then.
+            Where a number is none any more, with its name and tick; the flight is over then, and
+            stands where all were finite.
         """
         if event != 'end' and event not in EVENTS:
             allowed = ', '.join((*EVENTS, 'end'))
@@ -260,22 +261,29 @@ class Flight:
         while not self._past.is_over and self.tick < last_tick:
             ticks = int(min(_LOOK_TICKS, last_tick - self.tick))
             before = self.state if event in EVENTS else None
-            log = self._advance(ticks)
+            log, fault = self._advance(ticks)
             if before and len(begins := _begins(event, log, before.past)):
-                if begins[0] + 1 < len(log):  # again, and no further
+                if fault or begins[0] + 1 < len(log):  # again, and no further
                     self.restore(before)._advance(int(begins[0]) + 1)
                 return Event(event, self.tick)
+            if fault:
+                raise NotFiniteError(fault)
         return Event('end' if self._past.is_over else 'time', self.tick)
 
-    def _advance(self, ticks: int) -> np.ndarray:
-        """Fly some ticks, one at least; their rows, float64[n, ROW]."""
+    def _advance(self, ticks: int) -> tuple[np.ndarray, str]:
+        """Fly some ticks, one at least; their rows, float64[n, ROW], until one is not finite.
+
+        Gives in words what is not, and the flight is over then.
+        """
         first, past = self.tick, self._past
         rows, is_over = self._held.fly(self._log[:ticks])
-        log = self._log[:rows]
-        good = finite_rows(log)
+        good, fault = finite_rows(self._log[:rows]), ''
         if good < rows:
-            self._past = past._replace(is_over=True)
-            raise NotFiniteError(fault_of(log[good], first + good))
-        is_under = bool(_under(log, past.is_under)[-1])
-        self._past = Past(log[-1].copy(), is_under, is_over, past.orders)
-        return log
+            fault, is_over = fault_of(self._log[good], first + good), True
+            self._held.tick = first + good
+        log = self._log[:good]
+        row, is_under = past.row, past.is_under
+        if good:
+            row, is_under = log[-1].copy(), bool(_under(log, is_under)[-1])
+        self._past = Past(row, is_under, is_over, past.orders)
+        return log, fault
