@@ -6,6 +6,7 @@ import csv
 import gc
 import io
 import json
+import pickle
 import subprocess
 import sys
 from contextlib import nullcontext
@@ -500,6 +501,11 @@ def test_law_of_a_program_is_flown_as_a_class_and_as_a_function(level_law, tmp_p
     changes = {'dives': 0, 'duration_s': 400.0}
     one = glider.fly('current_8deg', changes, law=level_law, out=tmp_path / 'one', bag=True)
     two = glider.fly('current_8deg', changes, law=level)
+    carried = glider.Flight('current_8deg', changes, law=level)
+    carried.step(1000)
+    state = pickle.loads(pickle.dumps(carried.state))
+    carried.restore(state).until()
+    assert carried.now['odom_pitch'] == two.to_xarray().odom_pitch.values[-1]
     with compiling_told(lambda: pytest.fail('a law that was flown before is compiled again')):
         glider.fly('current_8deg', changes, law=level)
     shipped = glider.fly('current_8deg', changes)

@@ -44,6 +44,12 @@ def own_law(law: type[LawSettings] | Callable) -> type[LawSettings]:
     return _stateless(function)
 
 
+class Nothing(NamedTuple):
+    """What such a function keeps; here, so that a state can be pickled."""
+
+    nothing: int
+
+
 @cache
 def _stateless(function: Callable) -> type[LawSettings]:
     """Settings without a field, of a law that is a function of what it sees."""
@@ -53,15 +59,12 @@ def _stateless(function: Callable) -> type[LawSettings]:
     class Params(NamedTuple):
         nothing: int
 
-    class State(NamedTuple):
-        nothing: int
-
     class Stateless(LawSettings):
         def params(self, vehicle, bank) -> Params:
             return Params(0)
 
-        def initial_state(self) -> State:
-            return State(0)
+        def initial_state(self) -> Nothing:
+            return Nothing(0)
 
     @law_step.body(Params)
     @numba.njit(error_model='numpy', forceinline=True)
