@@ -165,6 +165,34 @@ def test_damaged_score_is_refused(flown, tmp_path, call, damage):
     assert (code, 'not a scorecard' in ' '.join(err.split())) == (2, True)
 
 
+@pytest.mark.parametrize(
+    ('field', 'value', 'told'),
+    [
+        ('sim_time_s', None, 'sim_time_s = None'),
+        ('distance_along_path_m', None, 'distance_along_path_m = None'),
+        ('settle_s', 'x', "settle_s = 'x'"),
+        ('end_of_path_m', 'x', "end_of_path_m = 'x'"),
+        ('depth_m.max', None, 'depth_m: max, overshoot: some are known'),
+        ('cross_track_m.rms_steady', None, 'cross_track_m: max_steady, rms_steady: some'),
+        ('navigation.dac_error_mps.worst', None, 'navigation.dac_error_mps: rms, worst: some'),
+    ],
+)
+def test_damage_to_a_score_is_named(flown, known, tmp_path, call, field, value, told):
+    for name in ('scenario.yaml', 'vehicle.yaml', 'traces.npz'):
+        shutil.copy(flown.folder / name, tmp_path / name)
+    card = json.loads((flown.folder / 'score.json').read_text())
+    *groups, name = field.split('.')
+    part = card
+    for group in groups:
+        part = part[group]
+    part[name] = value
+    (tmp_path / 'score.json').write_text(json.dumps(card))
+    for others in (('score',), ('report',), ('compare', known.folder)):
+        code, _, err = call(*others, tmp_path)
+        assert (code, 'Traceback' in err) == (2, False)
+        assert 'score.json' in err and told in ' '.join(err.split())
+
+
 # ---------------------------------------------------------------------------------- report
 
 

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 
 from glider_base.files import is_file, read_json
-from glider_base.settings import ConfigurationError
+from glider_base.settings import ConfigurationError, mistakes
 from glider_bringup.engines.flight import Outcome, Taker, fly
 from glider_bringup.scoring.score import Scorer, scores_of
 from glider_mission.disk import write_whole
@@ -105,6 +105,13 @@ class _Figures(_Part):
     model_config = ConfigDict(extra='allow')
     __pydantic_extra__: dict[str, _Figure]
 
+    @model_validator(mode='after')
+    def _are_known_together(self):
+        names = sorted(type(self).model_fields.keys() - {'max_all'})  # settled, but never steady
+        if len({getattr(self, name) is None for name in names}) > 1:
+            raise ValueError(f'{", ".join(names)}: some are known, others are not')
+        return self
+
 
 def _part(names: str = '', **kinds: Any) -> Any:
     """Kind of a part with at least figures of these names, and others, each with its kind."""
@@ -150,7 +157,11 @@ _Navigation = _part(
 _State = _part(position_ned_m=_Triple, attitude_rpy_rad=_Triple, velocity_mps=_Triple)
 #: A scorecard: what it has to have, and what is shown of it. Older runs lack what has a default.
 _Card = _part(
-    'sim_time_s wall_time_s real_time_factor distance_along_path_m',
+    'wall_time_s real_time_factor',
+    sim_time_s=Annotated[float, Field(ge=0.0)],
+    distance_along_path_m=float,
+    settle_s=(_Figure, None),
+    end_of_path_m=(_Figure, None),
     scenario=str,
     changed=(dict[str, str], {}),
     vehicle=str,
@@ -192,10 +203,13 @@ def read_score(run: Path) -> dict:
             )
         return {}
     card = read_json(path)
-    try:  # only a run without a tick has no final state
-        is_card = _Card.model_validate(card).final_state or not card['ticks']
-    except ValidationError:
-        is_card = False
-    if not is_card:
-        raise ConfigurationError(f'{path}: not a scorecard of this program')
+    try:
+        read = _Card.model_validate(card)
+    except ValidationError as error:
+        ((_, wrong), *_) = mistakes(error, _Card)
+    else:  # only a run without a tick has no final state
+        unknown = read.final_state is None or read.depth_m.max is None
+        wrong = 'final_state, depth_m.max: not known' if read.ticks and unknown else ''
+    if wrong:
+        raise ConfigurationError(f'{path}: not a scorecard of this program: {wrong}')
     return card
