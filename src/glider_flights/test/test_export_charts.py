@@ -72,6 +72,7 @@ def test_og1_has_what_its_manual_wants(og1):
     with xarray.open_dataset(og1, engine='h5netcdf') as read:
         assert set(VARIABLES) <= set(read.variables)
         assert set(GLOBALS) <= set(read.attrs)
+        assert 'vehicle: vehicle.yaml' in read.attrs['scenario_yaml']
         assert read.encoding['unlimited_dims'] == {'N_MEASUREMENTS'}
         assert all(name.isupper() for name in read.variables)
         for name, variable in read.variables.items():

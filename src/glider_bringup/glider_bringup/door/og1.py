@@ -26,7 +26,7 @@ from glider_mission.disk import whole_file
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.recorded_log import read_back
-from glider_mission.run_folder import scenario_of
+from glider_mission.run_folder import VEHICLE_FILE, scenario_of
 from glider_mission.scenario import Scenario
 from glider_model.ocean.density import depth_at
 from glider_model.vehicle.file import load_vehicle, vehicle_file
@@ -242,6 +242,6 @@ def _about(
         'geospatial_lat_max': float(dataset['LATITUDE'].max()),
         'geospatial_lon_min': float(dataset['LONGITUDE'].min()),
         'geospatial_lon_max': float(dataset['LONGITUDE'].max()),
-        'scenario_yaml': scenario.to_yaml(),
+        'scenario_yaml': scenario.to_yaml(vehicle=VEHICLE_FILE),
         'vehicle_yaml': vehicle_file(scenario.vehicle).decode(),
     }
