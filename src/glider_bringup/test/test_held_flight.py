@@ -185,11 +185,19 @@ def test_a_law_that_fails_ends_it_at_one_tick_however_it_is_cut_up():
     ('act', 'named'),
     [
         (lambda flight: flight.until('lunch'), "event = 'lunch'.*surfacing, arrival, guard, end"),
+        (lambda flight: flight.until(['guard']), r"event = \['guard'\].*surfacing, arrival"),
+        (lambda flight: flight.until(t_s=math.nan), 't_s = nan.*seconds, or inf'),
+        (lambda flight: flight.until(t_s=-math.inf), 't_s = -inf.*seconds, or inf'),
+        (lambda flight: flight.until(t_s='x'), "t_s = 'x'.*seconds, or inf"),
         (lambda flight: flight.step(0), 'n = 0.*1 and more'),
+        (lambda flight: flight.step(2.5), r'n = 2\.5.*1 and more'),
+        (lambda flight: flight.step(math.nan), 'n = nan.*1 and more'),
         (lambda flight: glider.Flight('nowhere'), 'nowhere'),
         (lambda flight: glider.Flight(law=abs, controller='pid'), '--controller pid'),
     ],
 )
 def test_what_cannot_be_done_is_said(at_once, act, named):
+    flight = at_once[1]
     with pytest.raises(glider.ConfigurationError, match=named):
-        act(at_once[1])
+        act(flight)
+    assert flight.t_s == END_S

@@ -4,11 +4,13 @@
 
 import math
 from collections.abc import Callable, Mapping
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from glider_base.errors import shown
 from glider_base.settings import ConfigurationError, validate
 from glider_base.signals import TICK_S
 from glider_bringup.console import compiling
@@ -171,8 +173,8 @@ class Flight:
 
     def step(self, n: int = 1) -> Event:
         """Fly ``n`` ticks of 0.1 s, or until the mission ends; raises as `until`."""
-        if n < 1:
-            raise ConfigurationError(f'n = {n}: not usable (allowed: 1 and more)')
+        if not isinstance(n, Integral) or n < 1:
+            raise ConfigurationError(f'n = {shown(n)}: not usable (allowed: ticks, 1 and more)')
         return self._fly(self.tick + n, 'end')
 
     def until(self, event: str = 'end', *, t_s: float = math.inf) -> Event:
@@ -197,9 +199,11 @@ class Flight:
             Where a number is none any more, with its name and tick; the flight is over then, and
             stands where all were finite.
         """
-        if event != 'end' and event not in EVENTS:
+        if event not in (*EVENTS, 'end'):
             allowed = ', '.join((*EVENTS, 'end'))
-            raise ConfigurationError(f'event = {event!r}: unknown (allowed: {allowed})')
+            raise ConfigurationError(f'event = {shown(event)}: unknown (allowed: {allowed})')
+        if not isinstance(t_s, Real) or not t_s > -math.inf:
+            raise ConfigurationError(f't_s = {shown(t_s)}: not usable (allowed: seconds, or inf)')
         return self._fly(round(t_s / TICK_S) if math.isfinite(t_s) else math.inf, event)
 
     def order(self, **asked: Any) -> Order:
