@@ -7,6 +7,7 @@ The net heaviness is that of the whole vehicle, by its buoyancy engine, in water
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
@@ -75,11 +76,12 @@ def solve_trim(
         ('net buoyancy', net_heaviness_kg, 'kg', vehicle.m_b_max),
         ('roll mass', roll_mass_deg, 'deg', math.degrees(vehicle.mu_max)),
         ('fin', fin_deg, 'deg', math.degrees(vehicle.delta_max)),
-        ('pitch', pitch_deg, 'deg', 80.0),
-        ('pitch mass', pitch_mass_m, 'm', vehicle.x_p_max),
+        ('pitch', pitch_deg, 'deg', 80.0)
+        if pitch_mass_m is None
+        else ('pitch mass', pitch_mass_m, 'm', vehicle.x_p_max),
     )
     for name, number, unit, limit in checks:
-        if number is not None and not abs(number) <= limit * (1.0 + 1e-12):
+        if not isinstance(number, Real) or not abs(number) <= limit * (1.0 + 1e-12):
             raise ConfigurationError(
                 f'{name} = {number} {unit}: out of range (allowed: -{limit:g} to {limit:g} {unit})'
             )
