@@ -80,6 +80,30 @@ def test_points_may_be_an_array():
     assert 'path.waypoints' in load_scenario('survey', {'path.waypoints': points}).changed
 
 
+def test_numbers_of_numpy_are_told_as_others_are():
+    runs = [
+        fly(
+            'current_8deg',
+            {
+                'current.speed_kn': number(0.5),
+                'profile': {'depth_m': number(100.0)},
+                'vehicle.hydrodynamics.K_D0': number(8.0),
+            },
+            seed=whole(3),
+            duration=0.1,
+        )
+        for number, whole in ((float, int), (np.float32, np.int64))
+    ]
+    assert runs[0].scenario == runs[1].scenario
+    assert runs[0].score['changed'] == runs[1].score['changed']
+
+
+@pytest.mark.parametrize('scenario', ['survey', load_scenario('survey')])
+def test_a_field_without_a_name_is_refused(scenario):
+    with pytest.raises(ConfigurationError, match=r'--set 3: no name \(allowed: .*dotted name'):
+        fly(scenario, {3: 1})
+
+
 def test_python_tells_it_too():
     run = fly('current_8deg', {'current.speed_kn': 0.6}, duration=1.0)
     assert run.score['changed']['current.speed_kn'] == '0.6'

@@ -519,16 +519,16 @@ def make_scenario(
     ConfigurationError
         Naming file, field, value and allowed range.
     """
-    path, values = source.path, deepcopy(source.values)
-    own, in_vehicle = split_changes(changes or {})
-    fields = {field: shown(value) for field, value in (changes or {}).items()}
+    path, values, changes = source.path, deepcopy(source.values), _plain(changes or {})
+    own, in_vehicle = split_changes(changes)
+    fields = {field: shown(value) for field, value in changes.items()}
     for field, value in own.items():
         if not _set_field(values, field, value, own):
             del fields[field]
     if fields:
         before = values.get('changed')
         values['changed'] = {**(before if isinstance(before, dict) else {}), **fields}
-    changed = told_changes(changes or {})
+    changed = told_changes(changes)
 
     def line_of(location: tuple[str, ...]) -> int | None:
         name = '.'.join(location)
@@ -558,6 +558,15 @@ def make_scenario(
     return scenario
 
 
+def _plain(value: Any) -> Any:
+    """A value without NumPy: numbers and lists are told as others are."""
+    if isinstance(value, dict):
+        return {name: _plain(inner) for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
 def changed_scenario(
     scenario: Scenario, changes: dict[str, Any], law: type[LawSettings] | None = None
 ) -> Scenario:
@@ -584,6 +593,11 @@ def changed_scenario(
 
 def split_changes(changes: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Fields of the scenario, and those of its vehicle by their names in the vehicle's file."""
+    for field in changes:
+        if not isinstance(field, str):
+            raise ConfigurationError(
+                f'--set {shown(field)}: no name (allowed: fields by dotted name, current.speed_kn)'
+            )
     inside = {field for field in changes if field.startswith(f'{VEHICLE}.')}
     return (
         {field: value for field, value in changes.items() if field not in inside},
