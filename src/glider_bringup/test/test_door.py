@@ -496,6 +496,10 @@ def level(seen):
     return -20.0 * seen.measured.phi_dot, 25.0 * error - 40.0 * seen.measured.theta_dot
 
 
+def three_moments(seen):
+    return 0.0, 0.0, 0.0
+
+
 def test_law_of_a_program_is_flown_as_a_class_and_as_a_function(level_law, tmp_path):
     """They are one law: the same flight, each under its name."""
     changes = {'dives': 0, 'duration_s': 400.0}
@@ -561,12 +565,15 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
         (lambda state, seen: (0.0, 0.0), {}, ['one parameter']),
         (level, {'engine': 'nodes'}, ['nodes', 'direct']),
         (level, {'controller': 'pid'}, ['pid']),
+        (three_moments, {}, ['law three_moments', 'expected 2, got 3', 'roll and pitch']),
+        (run_cell(CELL.replace('count + 1', 'count + 0.5')), {}, ['law LevelLaw', 'Turns', '0.0']),
     ],
 )
 def test_law_that_cannot_be_flown_is_told(law, choices, words):
     with pytest.raises(glider.ConfigurationError) as error:
         glider.fly('current_8deg', law=law, **choices)
     assert all(word in str(error.value) for word in words)
+    assert len(str(error.value).splitlines()) == 1
 
 
 def test_depth_is_drawn_downward_and_nothing_else(data):

@@ -2,12 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The loop of a law with a method that was never flown here is compiled, once; this is told."""
 
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 
 import numpy as np
+from numba.core.errors import NumbaError
 
+from glider_base.errors import ConfigurationError
 from glider_base.kernel import compiling_told
 from glider_base.signals import TICK_S
 from glider_bringup.engines.direct import fly_held, hold
@@ -24,8 +27,9 @@ DEPTH_M = 100.0
 Tell = Callable[[str], Callable[[], None] | None]
 
 
-def told(combination: Combination, tell: Tell) -> AbstractContextManager[None]:
-    """Tell what is compiled in the block, if anything is."""
+@contextmanager
+def told(combination: Combination, tell: Tell) -> Iterator[None]:
+    """Tell what is compiled in the block, if anything is; what cannot be is refused."""
     law, method, navigation, breaks, steered = combination
     words = [f'law {law} with method {method}', f'position {navigation.replace("_", " ")}']
     if breaks:
@@ -33,7 +37,20 @@ def told(combination: Combination, tell: Tell) -> AbstractContextManager[None]:
     if steered:
         words.append(f'vehicle {vehicle_path(steered).stem}')
     line = f'compiling the mathematics for {", ".join(words)}, once; up to half a minute'
-    return compiling_told(partial(tell, line))
+    try:
+        with compiling_told(partial(tell, line)):
+            yield
+    except NumbaError as error:
+        raise ConfigurationError(
+            f'law {law} with method {method}: cannot be compiled: {_reason(error)} (allowed: roll '
+            'and pitch moment of a function; numbers that keep their type, 0.0 for a float)'
+        ) from None
+
+
+def _reason(error: NumbaError) -> str:
+    """The innermost of what numba says, in a line."""
+    text = re.sub(r'\x1b\[\d+m', '', str(error)).partition('During:')[0]
+    return re.split(r'pipeline \(step: [^)]*\)', text)[-1].strip().partition('\n')[0]
 
 
 def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
