@@ -130,6 +130,17 @@ def test_it_arrives():
     assert flight.until('arrival').name == 'arrival'
 
 
+def test_a_state_of_another_law_or_navigation_is_refused():
+    flight = glider.Flight('current_8deg')
+    flight.step(10)
+    before = numbers(flight)
+    for name, law in (('current_8deg', 'pid'), ('reckoned_12deg', None)):
+        other = glider.Flight(name, controller=law)
+        with pytest.raises(glider.ConfigurationError, match='state: of another flight'):
+            flight.restore(other.state)
+        assert numbers(flight) == before and flight.tick == 10
+
+
 class Failing(NamedTuple):
     at: int
 

@@ -150,7 +150,11 @@ class Flight:
         return FlightState(self._held.keep(), self._past)
 
     def restore(self, state: FlightState) -> 'Flight':
-        """Go on from a state, of this flight or of another one of the same scenario."""
+        """Go on from a state, of this flight or of another one of the same scenario.
+
+        One with another law, method or navigation is refused. Whether numbers of the scenario are
+        others is not known: the parameters are those of this flight.
+        """
         self._held.restore(state.kept)
         self._past = state.past
         return self

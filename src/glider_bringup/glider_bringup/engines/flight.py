@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numba import typeof
 
 from glider_base.settings import ConfigurationError
 from glider_base.signals import NOT_FINITE, TICK_S, Battery
@@ -132,7 +133,17 @@ class Held:
         return status_of(guidance, self._settings.params(), self._battery)
 
     def restore(self, kept: Kept) -> None:
-        """Go on from there."""
+        """Go on from there.
+
+        Raises
+        ------
+        ConfigurationError
+            If it is of a mission with another law, or other blocks.
+        """
+        if typeof(kept.mission) != typeof(held_state(self._held)):
+            raise ConfigurationError(
+                'state: of another flight (allowed: of the same scenario and the same law)'
+            )
         set_held(self._held, kept.mission)
         self.tick, self._stage, self._waiting = kept.tick, kept.stage, kept.waiting
         self._no_progress, self._own = kept.no_progress, kept.own
