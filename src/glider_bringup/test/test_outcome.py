@@ -89,19 +89,23 @@ def test_a_mission_is_unfinished_if_its_time_is_over_before_its_dives(dives, las
     told = scores(np.maximum(DIVE, 6.0), rules=rules)
     assert told['status'] == status
     deep = '; 6 m deep at the end'
-    says = f'dives flown when its time was over: 1 of 2{deep}' if status == 'unfinished' else ''
+    says = (
+        f'dives flown, of those that there was time for: 1 of 2{deep}'
+        if status == 'unfinished'
+        else ''
+    )
     assert told['reason'] == says
 
 
 def test_a_vehicle_that_is_too_light_to_dive_has_not_completed_its_mission(tmp_path):
-    changes = ('duration_s=3000', 'faults=[{kind: mass, mass_kg: -1.0}]')
+    changes = ('duration_s=12000', 'faults=[{kind: mass, mass_kg: -1.0}]')
     sets = [word for change in changes for word in ('--set', change)]
     done = command_line.glider('run', '--engine', 'direct', '--out', tmp_path / 'run', *sets)
     assert done.returncode == 3
     card = json.loads((tmp_path / 'run/score.json').read_text())
     assert (card['status'], card['dives']) == ('unfinished', 0)
     page = (tmp_path / 'run/report.html').read_text(encoding='utf-8')
-    assert 'Unfinished: dives flown when its time was over: 0 of 1.' in page
+    assert 'Unfinished: dives flown, of those that there was time for: 0 of 1.' in page
     assert 'Nothing went wrong' not in page
 
 

@@ -27,7 +27,7 @@ class Rules(NamedTuple):
     duration_s: float = math.inf  #: time that the mission has (s)
     origin: Origin | None = None  #: of its chart, if people read its places in degrees
     shallowest_m: float = math.inf  #: depth of dives by which they are counted, if less (m)
-    dives: int = 0  #: that end it; 0: none do
+    dives: int = 0  #: that it is to fly in its time; 0: nobody asks
 
     @property
     def margin_s(self) -> float:

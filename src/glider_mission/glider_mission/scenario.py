@@ -79,6 +79,8 @@ DEFAULT_SCENARIO = 'current_8deg'
 #: Field that names the vehicle, and what the names of fields in its file begin with.
 VEHICLE = 'vehicle'
 
+#: There is ample time for a dive in so many times what its glides take (-).
+AMPLE = 1.25
 #: A straight way is looked at at so many places, whether it leads over land.
 ALONG = 2000
 #: The farthest that a belief may jump at a fix (m).
@@ -394,8 +396,14 @@ class Scenario(Settings):
             self.duration_s,
             self.origin.params() if self.is_charted else None,
             self.shallowest_m,
-            0 if self._holds else self.dives,
+            self._due_dives(),
         )
+
+    def _due_dives(self) -> int:
+        """Dives that it is to fly, as far as there is ample time for them; 0: it is not asked."""
+        stay_s = self.profile.wait_s + self.profile.prepare_s
+        fit = self.duration_s / (AMPLE * 2.0 * self._glide_s() + stay_s)
+        return 0 if self._holds else min(self.dives, int(fit))
 
     def _glide_s(self) -> float:
         """Time of a glide to the depth of the lower turn (s); infinite along a path in 3-D."""

@@ -34,7 +34,7 @@ FIXED_S, LEAST_SAMPLES = 10.0, 5
 AVERAGED = 100
 #: A smaller one is left: waves, and an antenna that is out before the hull is. It is less than the
 #: depth below which guidance takes a vehicle for surfaced. A larger one is no offset (m).
-LEAST_M, LARGEST_M = 0.5, 20.0
+LEAST_M, LARGEST_M = 0.9, 20.0
 
 
 class Flight(NamedTuple):

@@ -210,7 +210,7 @@ class Scorer:
         infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)
         missing = ''
         if dives < rules.dives and time_s >= rules.duration_s:
-            missing = f'dives flown when its time was over: {dives} of {rules.dives}'
+            missing = f'dives flown, of those that there was time for: {dives} of {rules.dives}'
         ended = outcome_of(depth, told, self._hull, infeasible, missing)
         pace_m = way_m if ended.status in (COMPLETED, INFEASIBLE) else None
         return {
