@@ -155,8 +155,8 @@ ROWS = (
     Row(
         DEPTH_WRONG,
         'depth_wrong',
-        'at the surface the depth is not 0 by more than that, or under water it jumps and stays '
-        'there',
+        'at the surface the depth is not 0 by more than that, it is that far above the water, or '
+        'under water it jumps and stays there',
         'offset_max_m, jump_m, gate.hold_s',
         'the measured depth is wrong at the surface, or has jumped',
     ),
