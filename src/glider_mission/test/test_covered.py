@@ -168,3 +168,16 @@ def test_a_plan_along_a_section_is_that_of_the_same_water_all_round(latitudes, t
     assert narrow.straight_s == pytest.approx(there.straight_s, rel=1e-6)
     erring = plan(mission(files, **{'duration_s': 4e5, 'forecast.error_mps': 0.02}))
     assert np.isfinite(erring.arrivals_s).all() and np.ptp(erring.arrivals_s) > 100.0
+
+
+def test_a_mission_that_was_flown_is_not_flown_again_in_another_sea(tmp_path):
+    file = tmp_path / 'flown.yaml'
+    file.write_text(mission(sea(tmp_path / 'sea.nc')).to_yaml())
+    flown = load_scenario(str(file), recorded=True)
+    assert flown.current_settings().params()
+    sea(tmp_path / 'sea.nc', lambda t, z: 0.2)
+    with pytest.raises(ConfigurationError, match='sea.nc: not the one that was flown'):
+        flown.current_settings().params()
+    (tmp_path / 'sea.nc').unlink()
+    with pytest.raises(ConfigurationError, match='sea.nc: No such file'):
+        flown.current_settings().params()

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError
 from glider_base.files import is_file
 from glider_model.ocean.columns import is_height
 
@@ -136,31 +137,31 @@ def _opened(path: Path) -> Iterator['xarray.Dataset']:
 
     Raises
     ------
-    ValueError
+    ConfigurationError
         Naming the file; also of what is found wrong in it.
     """
     import xarray
 
     if not is_file(path):
-        raise ValueError(f'file {path}: no such file')
+        raise ConfigurationError(f'file {path}: no such file')
     with open(path, 'rb') as file:
         is_hdf = file.read(4) == b'\x89HDF'
     try:
         engine = 'h5netcdf' if is_hdf else 'scipy'
         dataset = xarray.open_dataset(path, engine=engine, decode_times=False)
     except ModuleNotFoundError:
-        raise ValueError(
+        raise ConfigurationError(
             f'file {path}: NetCDF-4 takes the library h5netcdf; install it with: ./glider python '
             '-m pip install --no-deps -r requirements-flights.txt'
         ) from None
     except Exception as error:  # of libraries, of many types, for files that are none
-        text = f'{type(error).__name__}: {error}'.splitlines()[0][:200]
-        raise ValueError(f'file {path}: not a NetCDF file that xarray reads: {text}') from None
+        text = f'xarray reads: {type(error).__name__}: {error}'.splitlines()[0][:200]
+        raise ConfigurationError(f'file {path}: not a NetCDF file that {text}') from None
     with dataset:
         try:
             yield dataset
         except ValueError as error:
-            raise ValueError(f'file {path}: {error}') from None
+            raise ConfigurationError(f'file {path}: {error}') from None
 
 
 def fingerprint(path: Path) -> str:
@@ -168,7 +169,7 @@ def fingerprint(path: Path) -> str:
 
     Raises
     ------
-    ValueError
+    ConfigurationError
         If it cannot be read.
     """
     try:
@@ -179,7 +180,7 @@ def fingerprint(path: Path) -> str:
             file.seek(max(0, size - _ENDS))
             digest.update(file.read(_ENDS))
     except OSError as error:
-        raise ValueError(f'file {path}: {error.strerror}') from None
+        raise ConfigurationError(f'file {path}: {error.strerror}') from None
     return digest.hexdigest()[:16]
 
 

@@ -18,6 +18,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
+from glider_base.errors import ConfigurationError
 from glider_base.frames import Origin, OriginSettings, on_chart
 from glider_base.kernel import kernel
 from glider_base.settings import Settings, beside
@@ -59,7 +60,15 @@ class GridFileSettings(Settings):
 
     @property
     def stamp(self) -> tuple[int, int]:
-        """What tells another version of its file: time of the last change (ns), and size."""
+        """What tells another version of its file: time of the last change (ns), and size.
+
+        Raises
+        ------
+        ConfigurationError
+            If the file is not the one that was flown.
+        """
+        if self.fingerprint:
+            self.known()
         try:
             told = os.stat(self.file)
         except OSError:  # who reads it says so
@@ -92,7 +101,7 @@ class GridFileSettings(Settings):
 
         Raises
         ------
-        ValueError
+        ConfigurationError
             Naming the file, the place, and ``what`` it is: such as 'on the path'.
         """
         latitudes, longitudes, is_land = self.chart()
@@ -101,25 +110,25 @@ class GridFileSettings(Settings):
             told = f'file {self.file}: {place[0]:.4f}, {place[1]:.4f} {what} is'
             axes = zip(at, (latitudes, longitudes), strict=True)
             if not all(axis[0] <= one <= axis[-1] for one, axis in axes):
-                raise ValueError(
+                raise ConfigurationError(
                     f'{told} beyond what is read of it (allowed: within {latitudes[0]:.3f} to '
                     f'{latitudes[-1]:.3f}, {longitudes[0]:.3f} to {longitudes[-1]:.3f}, around '
                     'the path as far as it has water)'
                 )
             if is_land(*at):
-                raise ValueError(f'{told} land (allowed: water)')
+                raise ConfigurationError(f'{told} land (allowed: water)')
 
     def known(self) -> 'GridFileSettings':
         """Copy with the fingerprint of its file.
 
         Raises
         ------
-        ValueError
+        ConfigurationError
             If there is no such file, or it is another one.
         """
         found = fingerprint(Path(self.file))
         if self.fingerprint not in ('', found):
-            raise ValueError(
+            raise ConfigurationError(
                 f'file {self.file}: not the one that was flown (its fingerprint is {found}, '
                 f'allowed: {self.fingerprint}, or an empty one)'
             )
@@ -146,7 +155,7 @@ class GridSettings(GridFileSettings, FieldSettings):
 
         Raises
         ------
-        ValueError
+        ConfigurationError
             Naming the file, and what of it or of the mission is at fault.
         """
         loaded, begin = self.loaded()
