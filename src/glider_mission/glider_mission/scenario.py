@@ -315,15 +315,15 @@ class Scenario(Settings):
             lasts_s=self.duration_s,
         )
 
-    def ways(self) -> Iterator[tuple[str, np.ndarray]]:
+    def ways(self, along: bool) -> Iterator[tuple[str, np.ndarray]]:
         """Places that it is led through (m), float64[n, 3], each time with what they are.
 
-        A way that is straight is looked at all along, one that is planned at its corners.
+        A way that is straight is looked at all ``along``, one that is planned at its corners.
         """
         start = (self.initial.north_m, self.initial.east_m, 0.0)
         paths = [(f'of orders.{i}', one.path) for i, one in enumerate(self.orders) if one.path]
-        is_straight = self.guidance.route == 'straight' and not paths
-        yield 'on the path', np.vstack((start, self.path.points(ALONG if is_straight else 0)))
+        along = along and self.guidance.route == 'straight' and not paths
+        yield 'on the path', np.vstack((start, self.path.points(ALONG if along else 0)))
         for what, path in paths:
             yield what, path.points(0)
 
@@ -629,7 +629,7 @@ def _check_glide(scenario: Scenario) -> None:
 def _with_known_fields(scenario: Scenario) -> Scenario:
     """Scenario that says which files its currents are from, once they were read."""
     told = {'current': scenario.current, 'navigation.forecast': scenario.navigation.forecast}
-    starts = {}
+    starts, is_charted = {}, bool(scenario.bathymetry.file)
     for name, current in told.items():
         if current.field is None:
             continue
@@ -638,22 +638,22 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
             resolved = scenario.resolved_current(current).field
             resolved.params()
             if isinstance(resolved, GridFileSettings):
-                check_ways(scenario, resolved)
+                check_ways(scenario, resolved, name == 'current' and not is_charted)
                 starts[f'{name}.field.file'] = resolved.start_s
         told[name] = current.model_copy(update={'field': field})
     bathymetry = scenario.bathymetry
-    if bathymetry.file:
+    if is_charted:
         with told_of('bathymetry.', ValueError):
             bathymetry = bathymetry.known()
             scenario.bottom()
-            check_ways(scenario, bathymetry.resolved(scenario.mission()))
+            check_ways(scenario, bathymetry.resolved(scenario.mission()), True)
     water = scenario.water
     if water.grid.file:
         with told_of('water.grid.', ValueError):
             water = water.model_copy(update={'grid': water.grid.known()})
             resolved = scenario.resolved_water()
             resolved.params()
-            check_ways(scenario, resolved.grid)
+            check_ways(scenario, resolved.grid, not is_charted)
             starts['water.grid.file'] = resolved.grid.start_s
     check_starts(starts)
     forecast = {'forecast': told['navigation.forecast']}
@@ -663,10 +663,14 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
     return scenario.model_copy(update=changed)
 
 
-def check_ways(scenario: Scenario, grid: GridFileSettings) -> None:
-    """Refuse a mission that leads over land of a file, or beyond what is read of it."""
+def check_ways(scenario: Scenario, grid: GridFileSettings, along: bool) -> None:
+    """Refuse a mission that leads over land of a file, or beyond what is read of it.
+
+    Its legs are looked at all ``along`` by a chart of the bottom, or where there is none: a grid
+    of currents is coarse, and has land for a coast that is some kilometres away.
+    """
     origin = scenario.origin.params()
-    for what, places in scenario.ways():
+    for what, places in scenario.ways(along):
         grid.check_places((to_geodetic(float(n), float(e), origin) for n, e, _ in places), what)
 
 

@@ -119,6 +119,14 @@ def test_a_mission_over_land_or_out_of_its_file_is_refused(
     assert mission(file, waypoints=AWAY, **through([36.3, 122.0], [36.2, 122.2]))
 
 
+def test_a_coarse_coast_of_the_current_does_not_close_water_that_is_charted(tmp_path):
+    files = sea(tmp_path / 'sea.nc', land=island), bottom(tmp_path / 'bottom.nc')
+    past = [[36.05, 121.9], [36.05, 122.1]]
+    with pytest.raises(ConfigurationError, match='sea.nc: .* on the path is land'):
+        mission(files[0], waypoints=past)
+    assert mission(*files, waypoints=past)
+
+
 @pytest.mark.parametrize('kind', ['current', 'bottom'])
 def test_a_planned_route_goes_round_land_that_straight_legs_do_not(kind, tmp_path):
     files = [sea(tmp_path / 'sea.nc', land=island if kind == 'current' else None)]
@@ -149,6 +157,9 @@ def test_files_that_begin_at_other_times_need_the_time_of_the_mission(tmp_path):
     assert mission(both)
     with pytest.raises(ConfigurationError, match=r'origin.time: missing, .* 2026-02-24T06:00Z'):
         mission(both, **{'origin.time': ''})
+    planned = {'forecast.file': str(tmp_path / 'other.nc'), 'origin.time': ''}
+    with pytest.raises(ConfigurationError, match=r'origin.time: missing, .* forecast.file at'):
+        plan(mission(first, **planned))
 
 
 def test_a_plan_ends_with_the_dives_of_its_mission(tmp_path):

@@ -194,14 +194,14 @@ def mission_in(told: dict[str, Any], name: str) -> Sea:
         for part, kind in (('currents', GridSettings), ('water', ModelWaterSettings)):
             if told[part]:
                 grid = kind(file=str(file)).resolved(mission)
-                check_ways(scenario, grid)
+                check_ways(scenario, grid, not told['bottom'])
                 loaded, begin = grid.loaded()
                 step = np.searchsorted(loaded.axes.times, begin, side='right') - 1
                 axes = loaded.axes._replace(times=loaded.axes.times[step:])
                 panels += _panels(part, loaded._replace(axes=axes, water=loaded.water[step:]))
         if told['bottom']:
             chart = BathymetrySettings(file=str(file)).resolved(mission)
-            check_ways(scenario, chart)
+            check_ways(scenario, chart, True)
             panels += _panels('bottom', LoadedBottom(*chart.params()[:3]))
     return Sea(f'{file.name} at the start of {scenario.name}', panels, scenario)
 

@@ -12,7 +12,7 @@ from glider_base.linear import solve
 from glider_base.noise import random_stream
 from glider_base.signals import TICK_S
 from glider_mission.routing.fronts import Chart, current_on
-from glider_mission.scenario import Scenario, told_of
+from glider_mission.scenario import Scenario, check_starts, told_of
 from glider_model.ocean.bottom import bottom_depth
 from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
 from glider_model.ocean.current_settings import CurrentSettings
@@ -79,6 +79,9 @@ def forecast_of(scenario: Scenario) -> tuple[Chart, np.ndarray]:
         settings = settings.model_copy(update={'field': grid})
     with told_of('forecast: ', ValueError):
         params = settings.params(0)
+    true = scenario.resolved_current(scenario.current).field
+    if isinstance(grid, GridSettings) and isinstance(true, GridSettings):
+        check_starts({'current.field.file': true.start_s, 'forecast.file': grid.start_s})
     norths, easts = _lattice(scenario, params)
     times = np.arange(0.0, scenario.duration_s + STEP_S, STEP_S)
     depths = (np.arange(_LEVELS) + 0.5) * scenario.profile.depth_m / _LEVELS

@@ -27,6 +27,8 @@ from glider_model.ocean.grid_file import GRIDS, Loaded, Window, fingerprint, loa
 
 #: Water around the path that is read too, as far as the file has it (m).
 MARGIN_M = 150_000.0
+#: A place is not beyond a file by what it was rounded (deg).
+EDGE_DEG = 1e-9
 
 
 class Chart(NamedTuple):
@@ -109,7 +111,7 @@ class GridFileSettings(Settings):
             at = _beside(place, self.mission.origin.longitude_deg)
             told = f'file {self.file}: {place[0]:.4f}, {place[1]:.4f} {what} is'
             axes = zip(at, (latitudes, longitudes), strict=True)
-            if not all(axis[0] <= one <= axis[-1] for one, axis in axes):
+            if not all(axis[0] - EDGE_DEG <= one <= axis[-1] + EDGE_DEG for one, axis in axes):
                 raise ConfigurationError(
                     f'{told} beyond what is read of it (allowed: within {latitudes[0]:.3f} to '
                     f'{latitudes[-1]:.3f}, {longitudes[0]:.3f} to {longitudes[-1]:.3f}, around '
