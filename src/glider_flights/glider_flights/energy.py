@@ -8,6 +8,7 @@ Their energy is a sum of fields of a vehicle file, each times what was done of i
 phase, cc pumped out, cc times depth). Least squares find them, none below zero.
 """
 
+from collections import Counter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +19,7 @@ from glider_base.errors import ConfigurationError
 from glider_flights.folders import Progress, read_each, said
 from glider_flights.netcdf import names_of, read, refuse_missing
 from glider_flights.record import SURFACE_DEPTH_M, at_times, vertical_rate
-from glider_flights.seaglider import seaglider_files
+from glider_flights.seaglider import DIVE_FILE, seaglider_files
 from glider_flights.slocum import Sensors, read_sensors, slocum_files
 
 #: Fields of a vehicle file that are fitted, and their units.
@@ -93,7 +94,9 @@ MASSES = {'pitch': 'pitch_mass', 'roll': 'roll_mass'}
 
 def seaglider_uses(place: Path, progress: Progress) -> Uses:
     """Pumpings of all dives, by current, voltage and time of the motor."""
-    dives, left_out = read_each(seaglider_files(place), progress, _pumpings)
+    files, strangers = _of_one_vehicle(place)
+    dives, left_out = read_each(files, progress, _pumpings)
+    left_out |= strangers
     if not sum(len(dive.joules) for dive in dives):
         why = '; '.join(said(left_out))
         raise ConfigurationError(f'{place}: no pumping in its {len(dives)} files; {why}')
@@ -109,6 +112,26 @@ def seaglider_uses(place: Path, progress: Progress) -> Uses:
         {field: float(took / way) for field, (took, way) in moved.items() if way > 0.0},
         said(left_out),
     )
+
+
+def _of_one_vehicle(place: Path) -> tuple[list[Path], dict[str, str]]:
+    """Files of dives by the vehicle that most are of, each dive once; why others are left out."""
+    files, left_out, dives = seaglider_files(place), {}, set()
+    named = {path: DIVE_FILE.fullmatch(path.name) for path in files}
+    counts = Counter(told[1] for told in named.values() if told).most_common()
+    if len(counts) > 1 and counts[0][1] == counts[1][1]:
+        vehicles = ', '.join(sorted(dict(counts)))
+        raise ConfigurationError(
+            f'{place}: files of several vehicles, {vehicles} (allowed: those of one, or most of '
+            'one)'
+        )
+    for path, told in named.items():
+        if told and told[1] != counts[0][0]:
+            left_out[path.name] = f'it is of {told[1]}, most are of {counts[0][0]}'
+        elif told and told[2] in dives:
+            left_out[path.name] = 'another file is of its dive'
+        dives.add(told[2] if told and path.name not in left_out else '')
+    return [path for path in files if path.name not in left_out], left_out
 
 
 class _Dive(NamedTuple):

@@ -22,6 +22,11 @@ _UNITS = {
 }
 #: What is text, or may be.
 _TEXTS = ('model', 'vehicle', 'fix_quality')
+#: So large are values that are missing, where a file does not say which they are.
+FILLS = 1e20
+_SINCE_1970 = re.compile(
+    r'seconds\s+since\s+1970-0?1-0?1([T ]0?0:0?0(:0?0(\.0*)?)?)?\s*(Z|UTC|\+00:?00)?'
+)
 #: By our name, what each name in a file is multiplied by, best name first.
 Names = dict[str, dict[str, float]]
 
@@ -82,9 +87,12 @@ def read(
                     if key.endswith('time'):
                         values = _seconds(values.astype(float), unit)
                     elif key not in _TEXTS:
-                        values = values.astype(float) * (scales or {}).get(unit, names[name])
+                        is_up = key == 'depth_m' and variable.attrs.get('positive') == 'up'
+                        scale = -names[name] if is_up else names[name]
+                        scale = math.copysign((scales or {}).get(unit, scale), scale)
+                        values = scale * values.astype(float)
                     found[key] = values
-    except (OSError, ValueError, TypeError, KeyError, RuntimeError) as error:
+    except (OSError, ValueError, TypeError, KeyError, RuntimeError, ImportError) as error:
         raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
     return found
 
@@ -104,6 +112,8 @@ def fixes_of(found: dict[str, np.ndarray]) -> np.ndarray:
     times = found.get('fix_time', found.get('time', none))
     if not len(latitude) == len(longitude) == len(times):
         return np.empty((0, 3))
+    # CF has longitudes to 360 degrees, too
+    longitude = np.where((longitude > 180.0) & (longitude <= 360.0), longitude - 360.0, longitude)
     table = np.stack([times, latitude, longitude], axis=-1)
     good = np.isfinite(table).all(axis=-1) & (np.abs(table[:, 1:]) <= (90.0, 180.0)).all(axis=-1)
     return table[good][np.unique(table[good, 0], return_index=True)[1]]
@@ -114,7 +124,9 @@ def _seconds(values: np.ndarray, units: str) -> np.ndarray:
     import xarray
 
     units = units or 'seconds since 1970-1-1'
-    if re.match(r'seconds\s+since\s+1970-0?1-0?1\b', units):
+    if _SINCE_1970.fullmatch(units):
         return values
+    values = np.where(np.abs(values) < FILLS, values, math.nan)
     decoded = xarray.coding.times.decode_cf_datetime(values, units)
-    return np.asarray(decoded, 'datetime64[ns]').astype(np.int64) * 1e-9
+    decoded = np.asarray(decoded, 'datetime64[ns]')
+    return np.where(np.isnat(decoded), math.nan, decoded.astype(np.int64) * 1e-9)

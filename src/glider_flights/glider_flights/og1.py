@@ -27,6 +27,7 @@ from glider_flights.folders import (
 from glider_flights.navigation import DENSITY
 from glider_flights.netcdf import SUFFIXES, datasets, fixes_of, names_of, read, refuse_missing
 from glider_flights.record import (
+    LONGEST_GAP_S,
     Flight,
     LogFile,
     OnBoard,
@@ -43,8 +44,13 @@ from glider_flights.slocum import POLAR
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import Vehicle
 
-#: Units of which the values are multiplied by something else than `variables.yaml` says.
-SCALES = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0, 'cm/s': 1e-2, 'cm s-1': 1e-2}
+#: Units of which the values are multiplied by something else than `variables.yaml` says; which
+#: way they count it says.
+SCALES = {
+    **dict.fromkeys(('rad', 'radian', 'radians', 'm', 'm/s', 'm s-1', 'kg'), 1.0),
+    **dict.fromkeys(('cm', 'cm/s', 'cm s-1'), 1e-2),
+    **{'bar': 10.0, 'kPa': 0.1, 'hPa': 0.01, 'mbar': 0.01, 'Pa': 1e-4},
+}
 
 
 def og1_files(place: Path) -> list[Path]:
@@ -104,7 +110,9 @@ def _read(path: Path) -> LogFile:
     fixes, notes = fixes_of(known), []
     if 'pressure' in known:
         latitude = fixes[0, 1] if len(fixes) else _middle(known)[0]
-        known['depth_m'] = -gsw().z_from_p(known['pressure'], latitude)
+        by_pressure = -gsw().z_from_p(known['pressure'], latitude)
+        told = known.get('depth_m', by_pressure)
+        known['depth_m'] = np.where(np.isfinite(by_pressure), by_pressure, told)
     needed = {key: wanted[key] for key in ('time', 'depth_m', 'pitch_rad')}
     refuse_missing(path, known, needed, 'of a flight in OG1 or CF')
     if 'heading_rad' in known:
@@ -119,9 +127,9 @@ def _read(path: Path) -> LogFile:
     own_s = known['time']
     samples = Samples(
         own_s,
-        at_times(own_s, own_s, known['depth_m']),
-        at_times(own_s, own_s, known['pitch_rad']),
-        angles_at_times(own_s, own_s, known.get('heading_rad', nothing)),
+        at_times(own_s, own_s, known['depth_m'], LONGEST_GAP_S),
+        at_times(own_s, own_s, known['pitch_rad'], LONGEST_GAP_S),
+        angles_at_times(own_s, own_s, known.get('heading_rad', nothing), LONGEST_GAP_S),
         known.get('buoyancy_kg', nothing),
     )
     own_polar = _own_polar(path)

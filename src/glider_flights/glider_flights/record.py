@@ -175,19 +175,29 @@ def local_metres(origin_deg: np.ndarray, latitude_deg, longitude_deg) -> np.ndar
     return np.stack([north, turned * scale * METRES_PER_DEGREE], axis=-1)
 
 
-def at_times(time_s: np.ndarray, own_s: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values with times of their own at other times, NaN beyond them and where there are none."""
+def at_times(
+    time_s: np.ndarray, own_s: np.ndarray, values: np.ndarray, gap_s: float = math.inf
+) -> np.ndarray:
+    """Values with times of their own at other times, linear between them.
+
+    NaN beyond them, where there are none, and inside a gap that is longer than ``gap_s``.
+    """
     good = np.isfinite(own_s) & np.isfinite(values)
     if not good.any():
         return np.full(len(time_s), math.nan)
     order = np.argsort(own_s[good], kind='stable')
     own_s, values = own_s[good][order], values[good][order]
-    return np.interp(time_s, own_s, values, left=math.nan, right=math.nan)
+    found = np.interp(time_s, own_s, values, left=math.nan, right=math.nan)
+    after = np.searchsorted(own_s, time_s).clip(1, None)
+    lasts_s = np.append(own_s, math.inf)[after] - own_s[after - 1]
+    return np.where((lasts_s > gap_s) & ~np.isin(time_s, own_s), math.nan, found)
 
 
-def angles_at_times(time_s: np.ndarray, own_s: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def angles_at_times(
+    time_s: np.ndarray, own_s: np.ndarray, angles: np.ndarray, gap_s: float = math.inf
+) -> np.ndarray:
     """The same for angles (rad), across north."""
-    east, north = (at_times(time_s, own_s, part(angles)) for part in (np.sin, np.cos))
+    east, north = (at_times(time_s, own_s, part(angles), gap_s) for part in (np.sin, np.cos))
     return np.arctan2(east, north)
 
 
@@ -288,7 +298,7 @@ def _segments(files: list[LogFile], origin: np.ndarray) -> tuple[list[Segment], 
     segments = []
     for one in cuts:
         middle = 0.5 * (one.before.time_s[-1] + one.after.time_s[0])
-        file = [file for file in files if file.begin_s <= middle][-1]
+        file = ([file for file in files if file.begin_s <= middle] or files[:1])[-1]
         segments.append(Segment(file.name, *one, file.on_board(one.samples), file.polar))
     return segments, notes
 

@@ -16,6 +16,7 @@ from glider_base.errors import ConfigurationError
 from glider_flights.folders import Progress, files_in, of_one_flight, read_each
 from glider_flights.netcdf import SUFFIXES, fixes_of, names_of, read, refuse_missing
 from glider_flights.record import (
+    LONGEST_GAP_S,
     Flight,
     Instruments,
     LogFile,
@@ -121,8 +122,8 @@ def _samples(found: dict[str, np.ndarray], declination: float) -> Samples:
         buoyancy = at_times(time_s, own_s, weighed)
         known = at_times(time_s, own_s, np.isfinite(weighed).astype(float))
         buoyancy[known < 0.5] = math.nan
-    heading = angles_at_times(time_s, time_s, found['heading_rad']) + declination
-    pitch = at_times(time_s, time_s, found['pitch_rad'])
+    heading = angles_at_times(time_s, time_s, found['heading_rad'], LONGEST_GAP_S) + declination
+    pitch = at_times(time_s, time_s, found['pitch_rad'], LONGEST_GAP_S)
     return Samples(time_s, found['depth_m'], pitch, heading, buoyancy)
 
 

@@ -26,6 +26,7 @@ from glider_flights.folders import (
 from glider_flights.netcdf import names_of
 from glider_flights.record import (
     DIVE_DEPTH_M,
+    LONGEST_GAP_S,
     NOT_KNOWN,
     Cut,
     Fixes,
@@ -437,8 +438,8 @@ def _before(time_s: np.ndarray, own_s: np.ndarray, values: np.ndarray) -> np.nda
 
 def _samples(sensors: Sensors, declined: float) -> Samples:
     time_s, depth_m = sensors['m_depth']
-    heading = angles_at_times(time_s, *sensors['m_heading']) - declined
-    pitch = at_times(time_s, *sensors['m_pitch'])
+    heading = angles_at_times(time_s, *sensors['m_heading'], LONGEST_GAP_S) - declined
+    pitch = at_times(time_s, *sensors['m_pitch'], LONGEST_GAP_S)
     return Samples(time_s, depth_m, pitch, heading, np.full(len(time_s), math.nan))
 
 

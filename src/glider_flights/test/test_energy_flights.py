@@ -3,6 +3,7 @@
 """``./glider energy`` on flights that are made up here, of which it is known what they took."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -89,6 +90,19 @@ def test_another_vehicle_is_predicted_as_far_off_as_it_is(tmp_path):
     told = energy(other, '--fit-on', mine)
     assert told['predicted_parts'] == 9
     assert told['error_percent'] == pytest.approx(-20.0, abs=1e-3)
+
+
+def test_dives_of_another_vehicle_and_copies_are_left_out(tmp_path):
+    folder = write_dives(tmp_path / 'a', 4)
+    alone = energy(folder)
+    other = write_dives(tmp_path / 'b', 2, factor=3.0)
+    for number in (1, 2):
+        (other / f'p171{number:04d}.nc').rename(folder / f'p180{number:04d}.nc')
+    shutil.copy(folder / 'p1710003.nc', folder / 'p1710003.copy.nc')
+    told = energy(folder)
+    notes = ' '.join(told.pop('notes'))
+    assert told == {name: value for name, value in alone.items() if name != 'notes'}
+    assert all(name in notes for name in ('p1800001.nc', 'p1800002.nc', 'p1710003'))
 
 
 def test_what_lacks_is_named(tmp_path):

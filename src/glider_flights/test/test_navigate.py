@@ -501,6 +501,68 @@ def test_a_flight_in_og1_is_navigated(tmp_path):
     assert summary(flight, rows)['dac_difference_mps']['median'] == pytest.approx(0.02, abs=0.003)
 
 
+def in_bar(data):
+    import gsw
+
+    pressure = gsw.p_from_z(-data.DEPTH, ORIGIN[0]) / 10.0
+    return data.assign(PRES=pressure.assign_attrs(units='bar')).drop_vars('DEPTH')
+
+
+def in_days(data):
+    """Of which one is missing, and one is what NetCDF fills with."""
+    time = (data.TIME / 86_400.0).copy()
+    time[7], time[11] = math.nan, 9.96921e36
+    days = {'units': 'days since 1970-01-01'}
+    fixed = (data.TIME_GPS / 86_400.0).assign_attrs(days)
+    return data.assign(TIME=time.assign_attrs(days), TIME_GPS=fixed)
+
+
+def from_noon(data):
+    noon = {'units': 'seconds since 1970-01-01 12:00:00'}
+    times = {name: (data[name] - 43_200.0).assign_attrs(noon) for name in ('TIME', 'TIME_GPS')}
+    return data.assign(times)
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        lambda data: data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS % 360.0),
+        lambda data: data.assign(DEPTH=(-data.DEPTH).assign_attrs(units='m', positive='up')),
+        lambda data: data.assign(DEPTH=(100.0 * data.DEPTH).assign_attrs(units='cm')),
+        lambda data: data.assign(PRES=math.nan * data.DEPTH),
+        in_bar,
+        in_days,
+        from_noon,
+    ],
+)
+def test_a_flight_in_og1_is_the_same_however_it_is_told(change, tmp_path):
+    change(og1(4)).to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
+    rows = navigated(read_flight(tmp_path, None, quiet))
+    assert len(rows) == 4
+    for row in rows:
+        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
+
+
+@pytest.mark.parametrize('names', [['DEPTH'], ['PITCH', 'HEADING']])
+def test_no_line_is_drawn_over_what_is_missing_for_most_of_a_dive(names, tmp_path):
+    data = og1(2)
+    since_s = (data.TIME - START_S) % CYCLE_S
+    is_kept = (since_s < 1200.0) | (since_s > 6000.0)
+    changed = {name: data[name].where(is_kept) for name in names}
+    data.assign(changed).to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
+    with pytest.raises(ConfigurationError, match='no samples for a large part'):
+        navigated(read_flight(tmp_path, None, quiet))
+
+
+def test_samples_that_begin_late_in_a_dive_are_no_fault_of_the_program(tmp_path):
+    data = og1(1)
+    since_s = data.TIME - START_S
+    late = data.where((since_s > 5000.0) | np.isfinite(data.TIME_GPS), drop=True)
+    late.drop_vars('MAGNETIC_VARIATION').to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
+    with pytest.raises(ConfigurationError, match='no samples for a large part'):
+        navigated(read_flight(tmp_path, None, quiet))
+
+
 def test_magnetic_heading_of_og1_is_turned_by_the_field_of_the_earth(tmp_path):
     """In 2020 the compass pointed 18 deg west of north off Newfoundland (IGRF-14)."""
     pytest.importorskip('ppigrf')

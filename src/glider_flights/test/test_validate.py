@@ -274,6 +274,12 @@ def test_a_flight_in_og1_gives_the_same_figures(file, dive, tmp_path):
     dataset.to_netcdf(tmp_path / 'sg123_delayed.nc', engine='scipy')
     words = ('--vehicle', 'slocum_g2', '--fit', 'mass,Cd0')
     one, other = report(file, *words), report(str(tmp_path), *words)
+    for scale, units in ((1.0, 'cm/s'), (0.01, 'm s-1')):
+        rising = (scale * dataset.GLIDER_VERT_VELO_MODEL).assign_attrs(units=units)
+        told = dataset.assign(GLIDER_VERT_VELO_MODEL=rising)
+        told.to_netcdf(tmp_path / 'sg123_delayed.nc', engine='scipy')
+        again = report(str(tmp_path), *words)['peer']['w_rmse_cmps']
+        assert again == pytest.approx(other['peer']['w_rmse_cmps'], rel=1e-6)
     assert other['kind'] == 'og1'
     assert other['w_rmse_cmps'] == pytest.approx(one['w_rmse_cmps'], abs=0.01)
     assert other['peer']['w_rmse_cmps'] == pytest.approx(one['peer']['w_rmse_cmps'], abs=0.01)

@@ -145,6 +145,8 @@ def _sample(base: Scenario, seed: int, faults: int) -> dict[str, Any]:
     """A plant of a scenario by its seed, with as many faults: fields of a scenario."""
     vehicle = load_vehicle(base.vehicle).params()
     plant = sample_plant(seed, vehicle, base.navigation.jumps)
+    if base.water.profile is not None or base.water.grid.file:  # the density is told
+        plant = {**plant, 'water': {}}
     drawn = sample_faults(seed, faults, base.duration_s)
     return {**plant, 'faults': drawn} if faults else plant
 
@@ -347,7 +349,9 @@ def report(
     plants = []
     for plant, frame in airframes.items():
         sampled = _sample(base, seed + plant, faults)
-        fields = {**changes, 'dives': 0, **sampled}
+        water = {f'water.{name}': value for name, value in sampled['water'].items()}
+        fields = {**changes, 'dives': 0, **sampled, **water}
+        del fields['water']
         runs = {controller: flight for (i, controller), flight in flights.items() if i == plant}
         again = {law: run_command(name, fields, f'--controller {law}') for law in runs}
         plants.append(

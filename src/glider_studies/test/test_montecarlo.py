@@ -256,6 +256,23 @@ def test_command_of_a_plant_flies_it_again(study, tmp_path):
     assert flown == one['flights']['pid']
 
 
+@pytest.mark.parametrize(
+    'water', ['water.bottom_m=400', 'water.profile=[[0,1024.0],[100,1027.0],[1200,1030.0]]']
+)
+def test_command_of_a_plant_flies_it_in_its_own_water(water, tmp_path):
+    options = ('--plants', 1, '--seed', 7, '--controller', 'pid', '--duration', 900)
+    folder = tmp_path / 'study'
+    process = glider('montecarlo', 'current_12deg', '--set', water, *options, '--out', folder)
+    assert process.returncode == 0, process.stderr
+    (one,) = json.loads((folder / RESULT_FILE).read_text())['flown']
+    words = shlex.split(one['commands']['pid'])
+    process = glider(*words[1:], '--json', '--out', tmp_path / 'again')
+    assert process.returncode == 0, process.stderr
+    card = json.loads(process.stdout)
+    assert judge({'infeasible': False, **card}) == one['flights']['pid']
+    assert (card['bottom'] is None) == ('bottom' not in water)
+
+
 def test_table_names_the_worst_plant_and_its_command():
     process = glider('montecarlo', 'current_8deg', '--plants', 1, '--controller', 'pid', *OPTIONS)
     assert process.returncode == 0, process.stderr

@@ -320,6 +320,26 @@ def test_changed_sweep_does_not_resume(flown, change, words, tmp_path, monkeypat
     assert list((tmp_path / 'out').iterdir()) == [tmp_path / 'out' / JOURNAL_FILE]
 
 
+def test_a_sweep_is_another_one_with_another_file_in_any_of_its_cells(tmp_path):
+    path = tmp_path / 'waters.yaml'
+    path.write_text(
+        'scenario: current_8deg\n'
+        'dimensions:\n'
+        '  water:\n'
+        '    kind: variants\n'
+        '    variants:\n'
+        f'      a: {{water.profile: {tmp_path}/a.csv}}\n'
+        f'      b: {{water.profile: {tmp_path}/b.csv}}\n'
+    )
+    digests = set()
+    for density in (1027.0, 1027.5):
+        for name, below in (('a', 1027.0), ('b', density)):
+            rows = f'depth_m,density_kgpm3\n0,1025\n1000,{below}\n'
+            (tmp_path / f'{name}.csv').write_text(rows)
+        digests.add(load_sweep(str(path)).digest)
+    assert len(digests) == 2
+
+
 def test_sweep_that_is_complete_is_not_flown_again(flown, result, monkeypatch, capsys):
     arguments = ['sweep', str(flown.file), '--out', str(flown.out), '--resume', '--json']
     monkeypatch.setattr(sys, 'argv', ['glider', *arguments])

@@ -136,6 +136,8 @@ class UniformDimension(_DrawnDimension):
     def _in_order(self):
         if self.high <= self.low:
             raise ValueError(f'high = {self.high} does not lie above low = {self.low}')
+        if not math.isfinite(self.high - self.low):
+            raise ValueError(f'high = {self.high}: too far from low = {self.low}')
         return self
 
     def _draw(self, draw: np.random.Generator) -> np.ndarray:
@@ -252,6 +254,8 @@ class Plan:
         except ConfigurationError as error:
             raise ConfigurationError(f'{path}: {error}') from None
         checked = self._check_values()
+        #: digests of the scenarios of all values
+        self.scenarios = [_digest(one) for one in checked]
         #: laws and methods that cells may have
         found = [combination_of(one) for one in checked]
         steered = {steers_by(one): its.steered for one, its in zip(checked, found, strict=True)}
@@ -340,8 +344,7 @@ class Plan:
 
     def described(self) -> Scenario:
         """Scenario of the first cell as results tell it, whose vehicle has no folder."""
-        name = vehicle_path(self.first.vehicle).stem
-        return self.first.model_copy(update={'vehicle': name})
+        return _described(self.first)
 
     @cached_property
     def digest(self) -> str:
@@ -349,12 +352,22 @@ class Plan:
         parts = {
             'code': source_digest(),
             'sweep': self.text,
-            'scenario': self.described().model_dump(mode='json'),
+            'scenarios': self.scenarios,
             'set': self.common,
             'coordinates': [[axis.name, axis.values] for axis in self.axes],
             'vehicles': self.vehicles,
         }
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _described(scenario: Scenario) -> Scenario:
+    """A scenario whose vehicle has no folder."""
+    return scenario.model_copy(update={'vehicle': vehicle_path(scenario.vehicle).stem})
+
+
+def _digest(scenario: Scenario) -> str:
+    """Digest of a scenario, with what it has of files."""
+    return hashlib.sha256(_described(scenario).model_dump_json().encode()).hexdigest()
 
 
 def vehicle_digest(vehicle: str) -> str:
