@@ -165,7 +165,7 @@ SENSORS = ('measured_odom', 'imu', 'pressure', 'fix', 'altitude')
 #: Those of them of which a vehicle has samples now and then, and not in every tick.
 SAMPLED = ('imu', 'pressure', 'fix', 'altitude', 'battery')
 #: Age (s) from which on a topic is silent that need not be told often.
-SLOW_S = {'battery': 600.0}
+SLOW_S = {'battery': 600.0, 'health': 10.0}
 #: What stands for a topic that may be silent for as long as it likes: under water there is no fix,
 #: far above the bottom no echo. A vehicle need not say how it is, either: less than nothing is not
 #: measured.
@@ -175,6 +175,8 @@ WHEN_SILENT = {
     'health': (0.0, -1.0, -1.0),
     'battery': (-1.0, 0.0, -1.0, -1.0, -1.0),
 }
+#: Of those of them, what says how the vehicle is: a number that is NaN is not measured.
+CONDITION = ('health', 'battery')
 #: What ways to navigate may tell beside odom; the same holds for them as for `SENSORS`.
 BELIEFS = ('believed_current', 'believed_surface_current')
 

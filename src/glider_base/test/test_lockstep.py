@@ -743,6 +743,27 @@ def test_free_running_node_notices_stale_input_and_recovers(make_graph):
     assert graph.spin(lambda: len(control.steps) > before + 2) is None
 
 
+def test_free_running_node_notices_silence_though_the_clock_was_set_back(make_graph, monkeypatch):
+    graph = make_graph(last_tick=10**9, lockstep=False, input_max_age_s=0.3)
+    control, guidance = graph.blocks[CONTROL], graph.blocks[GUIDANCE]
+    assert graph.spin(lambda: len(control.steps) > 2) is None
+    guidance.mute_from_ns, before, now_s = 0, control.stale_steps, control.now_s
+    monkeypatch.setattr(control, 'now_s', lambda: now_s() - 3600.0)
+    assert graph.spin(lambda: control.stale_steps > before + 2) is None
+
+
+def test_who_may_be_silent_does_not_tell_a_node_the_time(make_graph):
+    graph = make_graph(lockstep=False)
+    guard = graph.blocks[GUARD]
+    stamps_s = {'odom': 5.0, 'demand': 4.9, 'health': 3600.0, 'battery': 7200.0}
+    for item in guard.inputs:
+        if item.topic.name in stamps_s:
+            stamp_ns = round(stamps_s[item.topic.name] * 1e9)
+            raw = item.topic.codec.encode(stamp_ns, item.topic.codec.width * (0.5,))
+            item.subscription.callback(raw, {})
+    assert guard._newest_ns() == 5_000_000_000
+
+
 @pytest.mark.parametrize(
     ('stamps', 'kept', 'lost'),
     [

@@ -207,6 +207,33 @@ def test_number_that_is_not_finite_is_named(value, place):
     assert ODOM.fields[place] in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ('name', 'numbers', 'read'),
+    [
+        ('health', (1.0, math.nan, 5.0), (1.0, -1.0, 5.0)),
+        ('health', (math.nan, 23700.0, math.nan), (0.0, 23700.0, -1.0)),
+        ('battery', (5.0, *(4 * (math.nan,))), (5.0, 0.0, -1.0, -1.0, -1.0)),
+    ],
+)
+def test_what_is_not_measured_of_a_vehicle_does_not_hide_what_is(name, numbers, read):
+    codec = TOPICS[name].codec
+    raw = codec.encode(7, numbers)
+    assert codec.decode(raw) == (7, read)
+    assert codec.decode(to_cdr(deserialize_message(raw, codec.message_type))) == (7, read)
+    _, values, _ = codec.decode_many(np.frombuffer(raw, np.uint8)[None])
+    assert tuple(values[0]) == read
+    with pytest.raises(MessageError, match='inf'):
+        codec.decode(codec.encode(7, (math.inf, *numbers[1:])))
+
+
+def test_a_stamp_of_more_nanoseconds_than_a_second_has_is_none():
+    message = deserialize_message(ODOM.encode(0, 13 * (0.0,)), Odometry)
+    message.header.stamp.sec, message.header.stamp.nanosec = 2**31 - 1, 2**32 - 1
+    for read in (ODOM.decode, ODOM.decode_stamp):
+        with pytest.raises(MessageError, match='nanosec is 4294967295'):
+            read(serialize_message(message))
+
+
 def test_finite_numbers_whose_sum_overflows_are_taken():
     numbers = 13 * (1.7e308,)
     assert ODOM.decode(ODOM.encode(0, numbers)) == (0, numbers)

@@ -11,6 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import BatteryState
+from std_srvs.srv import Trigger
 
 import glider_bringup as glider
 from glider_base.ros.wire import qos
@@ -131,4 +132,19 @@ def test_a_free_running_node_hears_a_battery_that_is_not_reliable(context):
         assert heard.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT
     finally:
         node.close()
+        node.destroy_node()
+
+
+def test_an_abort_before_a_node_is_configured_is_not_forgotten(context):
+    told = {'lockstep': False, 'managed': True}
+    overrides = [Parameter(name, value=value) for name, value in told.items()]
+    node = GuidanceNode(context=context, parameter_overrides=overrides)
+    try:
+        assert node.on_abort(Trigger.Request(), Trigger.Response()).success
+        node.on_configure(None)
+        assert node.state.profile.aborted
+        node.orders.clear()  # it has been told
+        node.on_configure(None)
+        assert not node.state.profile.aborted
+    finally:
         node.destroy_node()

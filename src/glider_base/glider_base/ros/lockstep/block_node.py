@@ -74,8 +74,10 @@ class BlockNode(StepNode, LifecycleNodeMixin):
             super().on_ready()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start from nothing."""
+        """Start from nothing, but for an order to come up."""
         self.forget()
+        if self.orders.keys() & {health.ABORT, health.SURFACE}:
+            self.state = self.block.surface(self.state)
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -36,7 +36,6 @@ from glider_base.ros.wire.codec import MessageError, NotFiniteFieldError, to_cdr
 from glider_base.ros.wire.topics import TOPICS, Topic, topic_of
 from glider_base.settings import Settings, number
 from glider_base.signals import TICK_NS, not_finite
-from glider_base.wiring import WHEN_SILENT
 
 #: A node looks for its peers this often (s), and after a while in so small a share of its wait.
 _STARTUP_PERIOD_S, _STARTUP_SHARE = 0.03, 0.02
@@ -450,7 +449,7 @@ class TickNode(Node):
         try:
             item.accept_newest(raw, self.now_s(), self.ticks.input_max_age_s)
         except NotFiniteFieldError as error:
-            if item.topic.name not in WHEN_SILENT:  # a receiver without a fix has no place
+            if item.topic.name not in ('fix', 'altitude'):  # without a fix or an echo
                 self.refuse(item, partial(str, error))
         except MessageError as error:
             self.refuse(item, partial(str, error))

@@ -91,7 +91,9 @@ class StepNode(TickNode):
 
     def _newest_ns(self) -> int:
         """Stamp of the newest input; as long as there is none, the time."""
-        stamp_ns = max(item.stamp_ns for item in self._ticking)
+        # who may be silent does not tell the time
+        needed = [item for item in self._ticking if item.topic.name not in WHEN_SILENT]
+        stamp_ns = max(item.stamp_ns for item in needed)
         return stamp_ns if stamp_ns >= 0 else self.get_clock().now().nanoseconds
 
     def condition(self) -> health.Condition:
@@ -106,6 +108,11 @@ class StepNode(TickNode):
     def _cycles_since(self, now_s: float) -> int:
         """Cycles that there should have been since the last one, this one included."""
         since_s = TICK_S if self._cycle_s is None else now_s - self._cycle_s
+        if since_s < 0.0:  # the clock was set back: nothing came later than now
+            for item in self.inputs:
+                item.arrived_s = min(item.arrived_s, now_s)
+                item.owner.heard_s = min(item.owner.heard_s, now_s)
+            self._tell_s = min(self._tell_s, now_s)
         self._cycle_s = now_s
         return max(1, round(since_s / TICK_S))
 

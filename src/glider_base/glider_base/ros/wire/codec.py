@@ -123,14 +123,19 @@ class Codec:
     width : int, optional
         Numbers of the tuple, if it has more than there are fields: those after them are 0.0, and
         not in the message.
+    unmeasured : sequence of float, optional
+        What stands for each number that is NaN, if NaN says that it is not measured.
     """
 
-    def __init__(self, template, fields, stamp: str = 'header.stamp', width: int = 0) -> None:
+    def __init__(
+        self, template, fields, stamp: str = 'header.stamp', width: int = 0, unmeasured=()
+    ) -> None:
         self.message_type = type(template)
         self.fields = tuple(fields)
         self.width = max(width, len(self.fields))
         self._absent = (self.width - len(self.fields)) * (0.0,)
         self._stamp_path = stamp
+        self._unmeasured = tuple(unmeasured)[: len(self.fields)]
         raw = to_cdr(template)
         raw += bytes(-len(raw) % 4)  # the middleware sends whole words
         places = {place.path: place for place in cdr_places(template)}
@@ -203,8 +208,7 @@ class Codec:
             return self._decode_foreign(raw, check_frames)
         numbers = self._in_order(self._struct.unpack(raw))
         values = tuple(map(float, numbers[2:])) if self._has_integers else numbers[2:]
-        self._refuse_non_finite(values)
-        return numbers[0] * _SECOND_NS + numbers[1], values + self._absent
+        return _stamp_ns(*numbers[:2]), self._measured(values) + self._absent
 
     def decode_many(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Stamps and numbers of n serialized messages uint8[n, size] at once.
@@ -225,13 +229,15 @@ class Codec:
         values = np.zeros((len(rows), self.width))
         for i, name in enumerate(self._columns[2:]):
             values[:, i] = table[name]
+        if self._unmeasured:
+            said = values[:, : len(self.fields)]
+            np.copyto(said, self._unmeasured, where=np.isnan(said))
         return sec * _SECOND_NS + nanosec, values, own & (nanosec < _SECOND_NS)
 
     def decode_stamp(self, raw: bytes) -> int:
         """Stamp (ns) of a serialized message; its numbers are not looked at."""
         if len(raw) == self.size:
-            sec, nanosec = _STAMP.unpack_from(raw, self._stamp_at)
-            return sec * _SECOND_NS + nanosec
+            return _stamp_ns(*_STAMP.unpack_from(raw, self._stamp_at))
         return self._stamp_of(self.message(raw))
 
     def message(self, raw: bytes):
@@ -249,19 +255,30 @@ class Codec:
             if frame.rpartition('/')[2] != name:  # a prefix, as of a vehicle, is not our business
                 raise MessageError(f'{path} is {frame[:80]!r} (allowed: {name!r})')
         values = tuple(float(_get(message, path)) for path in self.fields)
-        self._refuse_non_finite(values)
-        return self._stamp_of(message), values + self._absent
+        return self._stamp_of(message), self._measured(values) + self._absent
 
     def _stamp_of(self, message) -> int:
         time = operator.attrgetter(self._stamp_path)(message)
-        return time.sec * _SECOND_NS + time.nanosec
+        return _stamp_ns(time.sec, time.nanosec)
 
-    def _refuse_non_finite(self, values) -> None:
+    def _measured(self, values: tuple[float, ...]) -> tuple[float, ...]:
+        """Numbers with what stands for those that are not measured; others are finite."""
         if math.isfinite(sum(values)):
-            return
+            return values
+        if self._unmeasured:
+            pairs = zip(values, self._unmeasured, strict=True)
+            values = tuple(other if math.isnan(one) else one for one, other in pairs)
         for path, value in zip(self.fields, values, strict=True):
             if not math.isfinite(value):
                 raise NotFiniteFieldError(f'{path} is {value}')
+        return values
+
+
+def _stamp_ns(sec: int, nanosec: int) -> int:
+    """Stamp in ns; a `MessageError` if it is none."""
+    if nanosec >= _SECOND_NS:
+        raise MessageError(f'stamp.nanosec is {nanosec} (allowed: < {_SECOND_NS})')
+    return sec * _SECOND_NS + nanosec
 
 
 def _split(message, path: str) -> tuple[str, int | None]:

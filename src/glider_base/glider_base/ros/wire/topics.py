@@ -19,7 +19,7 @@ from std_msgs.msg import Header
 from glider_base import wiring
 from glider_base.ros.wire import qos
 from glider_base.ros.wire.codec import Codec, set_field
-from glider_base.wiring import PORTS, SURFACE, WIRING, Port, present
+from glider_base.wiring import CONDITION, PORTS, SURFACE, WHEN_SILENT, WIRING, Port, present
 
 
 def message_class(type_name: str) -> type:
@@ -28,7 +28,7 @@ def message_class(type_name: str) -> type:
     return getattr(import_module(f'{package}.msg'), name)
 
 
-def _codec(port: Port, steers_by: str = '') -> Codec:
+def _codec(port: Port, steers_by: str = '', unmeasured: tuple[float, ...] = ()) -> Codec:
     """Codec of a per-tick message, from what the wiring and the vehicle say of it."""
     message = message_class(port.message)()
     if port.frame:
@@ -43,7 +43,7 @@ def _codec(port: Port, steers_by: str = '') -> Codec:
     for path, value in port.constants:
         set_field(message, path, value)
     stamp = 'header.stamp' if port.fields else 'clock'
-    return Codec(message, fields, stamp, len(port.fields))
+    return Codec(message, fields, stamp, len(port.fields), unmeasured)
 
 
 class Topic(NamedTuple):
@@ -81,7 +81,9 @@ class Topic(NamedTuple):
 
 
 def _per_tick(name: str) -> Topic:
-    codec, needed_by = _codec(PORTS[name]), (wired.node for wired in wiring.readers(name))
+    unmeasured = WHEN_SILENT[name] if name in CONDITION else ()
+    codec = _codec(PORTS[name], unmeasured=unmeasured)
+    needed_by = (wired.node for wired in wiring.readers(name))
     return Topic(name, codec.message_type, wiring.publisher(name).node, tuple(needed_by), codec)
 
 
