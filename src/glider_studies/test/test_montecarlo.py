@@ -256,13 +256,10 @@ def test_command_of_a_plant_flies_it_again(study, tmp_path):
     assert flown == one['flights']['pid']
 
 
-@pytest.mark.parametrize(
-    'water', ['water.bottom_m=400', 'water.profile=[[0,1024.0],[100,1027.0],[1200,1030.0]]']
-)
-def test_command_of_a_plant_flies_it_in_its_own_water(water, tmp_path):
+def test_command_of_a_plant_flies_it_over_its_own_bottom(tmp_path):
     options = ('--plants', 1, '--seed', 7, '--controller', 'pid', '--duration', 900)
-    folder = tmp_path / 'study'
-    process = glider('montecarlo', 'current_12deg', '--set', water, *options, '--out', folder)
+    folder, water = tmp_path / 'study', ('--set', 'water.bottom_m=400')
+    process = glider('montecarlo', 'current_12deg', *water, *options, '--out', folder)
     assert process.returncode == 0, process.stderr
     (one,) = json.loads((folder / RESULT_FILE).read_text())['flown']
     words = shlex.split(one['commands']['pid'])
@@ -270,7 +267,14 @@ def test_command_of_a_plant_flies_it_in_its_own_water(water, tmp_path):
     assert process.returncode == 0, process.stderr
     card = json.loads(process.stdout)
     assert judge({'infeasible': False, **card}) == one['flights']['pid']
-    assert (card['bottom'] is None) == ('bottom' not in water)
+    assert card['bottom']['least_height_m'] > 0.0
+
+
+def test_a_plant_flies_in_the_water_of_a_cast():
+    cast = {'water.profile': [[0.0, 1024.0], [100.0, 1027.0], [1200.0, 1030.0]]}
+    for one in make_scenarios('current_12deg', cast, ['pid'], 2, 7).values():
+        assert one.water.profile == cast['water.profile']
+        assert one.plant_settings().params()
 
 
 def test_table_names_the_worst_plant_and_its_command():
