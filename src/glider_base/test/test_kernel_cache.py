@@ -232,7 +232,7 @@ def test_an_edit_flies_when_it_is_imported_and_not_before(package):
     made = '\n@kernel\ndef made(x):\n    return scaled(x, Params(2.0))\n'
     package.write('here', laws=PARTS['laws'] + made)
     only = EDITED.partition('path =')[0]
-    assert package.call('here', EDITED) == [(6.0, 1), (30.0, 1), (150.0, 1)]
+    assert package.call('here', EDITED) == [(6.0, 1), (30.0, 2), (150.0, 1)]
     assert package.call('here', only.replace('1.0', '5')) == [(150.0, 1)]
     package.write('here', laws=PARTS['laws'] + made)
     assert package.call('here', only + 'say(5)') == [(6.0, 0), (30.0, 1)]
