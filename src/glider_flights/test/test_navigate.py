@@ -502,10 +502,14 @@ def test_a_flight_in_og1_is_navigated(tmp_path):
 
 
 def in_bar(data):
-    import gsw
-
+    gsw = pytest.importorskip('gsw')
     pressure = gsw.p_from_z(-data.DEPTH, ORIGIN[0]) / 10.0
     return data.assign(PRES=pressure.assign_attrs(units='bar')).drop_vars('DEPTH')
+
+
+def without_pressure(data):
+    pytest.importorskip('gsw')
+    return data.assign(PRES=math.nan * data.DEPTH)
 
 
 def in_days(data):
@@ -529,7 +533,7 @@ def from_noon(data):
         lambda data: data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS % 360.0),
         lambda data: data.assign(DEPTH=(-data.DEPTH).assign_attrs(units='m', positive='up')),
         lambda data: data.assign(DEPTH=(100.0 * data.DEPTH).assign_attrs(units='cm')),
-        lambda data: data.assign(PRES=math.nan * data.DEPTH),
+        without_pressure,
         in_bar,
         in_days,
         from_noon,
@@ -558,7 +562,7 @@ def test_samples_that_begin_late_in_a_dive_are_no_fault_of_the_program(tmp_path)
     data = og1(1)
     since_s = data.TIME - START_S
     late = data.where((since_s > 5000.0) | np.isfinite(data.TIME_GPS), drop=True)
-    late.drop_vars('MAGNETIC_VARIATION').to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
+    late.assign(MAGNETIC_VARIATION=0.0).to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
     with pytest.raises(ConfigurationError, match='no samples for a large part'):
         navigated(read_flight(tmp_path, None, quiet))
 

@@ -77,8 +77,8 @@ class ModelWaterSettings(GridFileSettings):
             Naming the file, and what of it or of the mission is at fault.
         """
         (axes, *_), begin = self.loaded()
-        water = _density(self, self.stamp)
         self.check_places(self.mission.places, 'on the path')
+        water = _density(self, self.stamp)
         origin = self.mission.origin.params()
         n, e = (
             from_geodetic(*self.mission.places[0], origin) if self.mission.places else (0.0, 0.0)
