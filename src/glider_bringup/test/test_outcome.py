@@ -3,13 +3,15 @@
 """What became of a vehicle: the same word wherever it is told, by its true depth."""
 
 import json
+import re
+from importlib.resources import files
 
 import numpy as np
 import pytest
 
 import command_line
 from glider_base.signals import TICK_S
-from glider_bringup.scoring.card import fly_scored
+from glider_bringup.scoring.card import STATUSES, fly_scored
 from glider_bringup.scoring.score import Scorer
 from glider_guard.rows import CRUSHING, LEAK, NOT_RISING, STUCK_ROLL
 from glider_mission.blocks import COLUMNS, ROW
@@ -107,6 +109,14 @@ def test_a_vehicle_that_is_too_light_to_dive_has_not_completed_its_mission(tmp_p
     page = (tmp_path / 'run/report.html').read_text(encoding='utf-8')
     assert 'Unfinished: dives flown, of those that there was time for: 0 of 1.' in page
     assert 'Nothing went wrong' not in page
+
+
+@pytest.mark.parametrize('status', STATUSES)
+def test_every_status_has_a_colour_of_its_badge(status):
+    """White words on a ground of none are not read."""
+    style = (files('glider_bringup') / 'showing/web/page.css').read_text()
+    grounds = re.findall(r'([^{}]*)\{ background: var\(--(?:good|warn|alert)\)', style)
+    assert any(re.search(rf'\.badge\b.*\.{status}\b', one) for one in grounds)
 
 
 @pytest.mark.parametrize('beyond_m', [-0.1, 0.1])
