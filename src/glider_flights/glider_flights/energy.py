@@ -8,7 +8,6 @@ Their energy is a sum of fields of a vehicle file, each times what was done of i
 phase, cc pumped out, cc times depth). Least squares find them, none below zero.
 """
 
-from collections import Counter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +15,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from glider_base.errors import ConfigurationError
-from glider_flights.folders import Progress, read_each, said
+from glider_flights.folders import Progress, read_each, said, usual_vehicle
 from glider_flights.netcdf import names_of, read, refuse_missing
 from glider_flights.record import SURFACE_DEPTH_M, at_times, vertical_rate
 from glider_flights.seaglider import DIVE_FILE, seaglider_files
@@ -118,16 +117,10 @@ def _of_one_vehicle(place: Path) -> tuple[list[Path], dict[str, str]]:
     """Files of dives by the vehicle that most are of, each dive once; why others are left out."""
     files, left_out, dives = seaglider_files(place), {}, set()
     named = {path: DIVE_FILE.fullmatch(path.name) for path in files}
-    counts = Counter(told[1] for told in named.values() if told).most_common()
-    if len(counts) > 1 and counts[0][1] == counts[1][1]:
-        vehicles = ', '.join(sorted(dict(counts)))
-        raise ConfigurationError(
-            f'{place}: files of several vehicles, {vehicles} (allowed: those of one, or most of '
-            'one)'
-        )
+    vehicle = usual_vehicle(place, [told[1] for told in named.values() if told])
     for path, told in named.items():
-        if told and told[1] != counts[0][0]:
-            left_out[path.name] = f'it is of {told[1]}, most are of {counts[0][0]}'
+        if told and told[1] != vehicle:
+            left_out[path.name] = f'it is of {told[1]}, most are of {vehicle}'
         elif told and told[2] in dives:
             left_out[path.name] = 'another file is of its dive'
         dives.add(told[2] if told and path.name not in left_out else '')

@@ -3,7 +3,7 @@
 """Which files are those of a flight, and the libraries that read them."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from datetime import datetime, timezone
 from pathlib import Path
@@ -119,20 +119,29 @@ def of_one_flight(
     return kept, notes
 
 
-def _strangers(place: Path, files: list[File]) -> dict[str, str]:
-    """Files that are not of the flight that most of them are of, by name, and why not."""
-    vehicles = Counter(file.vehicle for file in files if file.vehicle).most_common()
-    if len(vehicles) > 1 and vehicles[0][1] == vehicles[1][1]:
+def usual_vehicle(place: Path, vehicles: Iterable[str]) -> str:
+    """The vehicle that most files are of; empty without any.
+
+    Raises ConfigurationError if no vehicle has more than each of the others.
+    """
+    counts = Counter(vehicles).most_common()
+    if len(counts) > 1 and counts[0][1] == counts[1][1]:
         raise ConfigurationError(
-            f'{place}: files of several vehicles, {", ".join(sorted(dict(vehicles)))} '
+            f'{place}: files of several vehicles, {", ".join(sorted(dict(counts)))} '
             '(allowed: those of one, or most of one)'
         )
+    return counts[0][0] if counts else ''
+
+
+def _strangers(place: Path, files: list[File]) -> dict[str, str]:
+    """Files that are not of the flight that most of them are of, by name, and why not."""
+    vehicle = usual_vehicle(place, [file.vehicle for file in files if file.vehicle])
     found, dates = {}, {}
     for file in files:
         time_s = file.time_s
         dated = time_s[(time_s > 0.0) & (time_s < LATEST_S)]
-        if file.vehicle and file.vehicle != vehicles[0][0]:
-            found[file.name] = f'it is of {file.vehicle}, most are of {vehicles[0][0]}'
+        if file.vehicle and file.vehicle != vehicle:
+            found[file.name] = f'it is of {file.vehicle}, most are of {vehicle}'
         elif len(dated):
             dates[file.name] = dated
         else:
