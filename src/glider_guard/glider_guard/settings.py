@@ -123,6 +123,11 @@ class GuardLimitSettings(Settings):
         259200.0, (0.0, 1e8), 'longest time without the antenna out of the water (s); 0.0: any'
     )
 
+    def margin_m(self, rated_m: float) -> float:
+        """Way (m) by which a turn may overshoot the rated depth (m)."""
+        share = self.depth_margin_share * rated_m if math.isfinite(rated_m) else 0.0
+        return max(self.depth_margin_m, share)
+
 
 class GuardSettings(GuardLimitSettings):
     """Everything the guard node is told."""
@@ -154,11 +159,6 @@ class GuardSettings(GuardLimitSettings):
             return self.imu_period_s
         return self.imu_period_s * math.ceil(math.log(RARE) / math.log(self.imu_missed_share))
 
-    def _margin_m(self, rated_m: float) -> float:
-        """Way (m) by which a turn may overshoot the rated depth (m)."""
-        share = self.depth_margin_share * rated_m if math.isfinite(rated_m) else 0.0
-        return max(self.depth_margin_m, share)
-
     def params(self) -> GuardParams:
         """Kernel parameters."""
         vehicle = load_vehicle(self.vehicle)
@@ -171,7 +171,7 @@ class GuardSettings(GuardLimitSettings):
                 DepthLimits,
                 self,
                 rated=rated_m,
-                margin=self._margin_m(rated_m),
+                margin=self.margin_m(rated_m),
                 crush=vehicle.crush_depth_m,
                 drop_margin=vehicle.drop_margin_m,
                 led_m=self.led_m + 6.0 * self.depth_resolution_m,

@@ -16,6 +16,7 @@ from glider_base.signals import TICK_NS, TICK_S
 from glider_bringup.scoring.scores import seconds
 from glider_guard.block import TELL_EVERY_NS
 from glider_guard.rows import DROPS, ROWS, SURFACES
+from glider_guard.settings import GuardLimitSettings
 from glider_guard.witness import AFLOAT_M
 from glider_guidance.path.curve import path_closest, path_length, path_point
 from glider_mission.rules import Rules
@@ -23,8 +24,8 @@ from glider_model.ocean.bottom import least_height
 
 COMPLETED, SURFACED, LOST, INFEASIBLE = 'completed', 'surfaced', 'lost', 'infeasible'
 UNFINISHED = 'unfinished'
-#: A turn overshoots the rated depth by less than this share of it, and this (m).
-OVERSHOOT_SHARE, OVERSHOOT_M = 0.04, 15.0
+#: How far a turn may overshoot the rated depth: as the guard has it, unless it is told otherwise.
+LIMITS = GuardLimitSettings()
 #: The pace is known once so much of the path has been made good (-).
 LEAST_SHARE = 0.02
 #: All has been done for so long (s), and the vehicle has not come up by this (m): nothing is left.
@@ -59,7 +60,7 @@ def outcome_of(
     told: np.ndarray,
     hull: tuple[float, float],
     infeasible: bool,
-    missing: str = '',
+    missing: str,
 ) -> Outcome:
     """What became of a vehicle.
 
@@ -88,7 +89,7 @@ def outcome_of(
         reasons.append(f'{end_m:,.0f} m deep at the end')
         if is_ended and _nothing_is_left(depth, told):
             return Outcome(LOST, f'{"; ".join(reasons)}, and nothing left to try')
-    if deepest_m > rated_m + max(OVERSHOOT_M, OVERSHOOT_SHARE * rated_m):
+    if deepest_m > rated_m + LIMITS.margin_m(rated_m):
         reasons.append(_beyond(depth, rated_m, 'it is rated for'))
     status = INFEASIBLE if infeasible else UNFINISHED if missing else COMPLETED
     return Outcome(SURFACED if is_ended else status, '; '.join(filter(None, reasons)))
