@@ -19,7 +19,7 @@ from glider_base.frames import (
 from glider_base.kernel import kernel, replace
 from glider_base.slot import slot
 from glider_model.ocean.field import Mission, bracket
-from glider_model.ocean.fields.grid import Chart, GridFileSettings, mission_window, widened
+from glider_model.ocean.fields.grid import Coast, GridFileSettings, mission_window, widened
 from glider_model.ocean.grid_file import LoadedBottom, load_bottom
 
 #: Chart around the path that is read too, as far as the file has it (m).
@@ -72,7 +72,7 @@ def _charted_depth(n, e, params):
 class BathymetrySettings(GridFileSettings):
     """A chart of the bottom, from a file as GEBCO writes it."""
 
-    def chart(self) -> Chart:
+    def coast(self) -> Coast:
         """What is read of the file, and where on it there is land."""
         chart = self._charted()
 
@@ -80,7 +80,7 @@ class BathymetrySettings(GridFileSettings):
             place = from_geodetic(latitude, longitude, chart.origin)
             return bottom_depth(*place, chart) <= 0.0
 
-        return Chart(chart.latitudes, chart.longitudes, is_land)
+        return Coast(chart.latitudes, chart.longitudes, is_land)
 
     def _charted(self) -> ChartedBottom:
         loaded = _loaded(self.file, self.stamp, self.mission)

@@ -31,7 +31,7 @@ MARGIN_M = 150_000.0
 EDGE_DEG = 1e-9
 
 
-class Chart(NamedTuple):
+class Coast(NamedTuple):
     """What is read of a file, and where on it there is land."""
 
     latitudes: np.ndarray  #: (deg), increasing
@@ -87,16 +87,15 @@ class GridFileSettings(Settings):
         loaded, start_s = self.loaded()
         return start_s if len(loaded.axes.times) > 1 else None
 
-    def chart(self) -> Chart:
+    def coast(self) -> Coast:
         """What is read of the file, and where there is land, by the nearest point of its grid."""
-        _, _, latitudes, longitudes = self.loaded()[0].axes
-        land = self.loaded()[0].land
+        (*_, latitudes, longitudes), _, _, land = self.loaded()[0]
 
         def is_land(latitude: float, longitude: float) -> bool:
             row = np.abs(latitudes - latitude).argmin()
             return bool(land[row, np.abs(longitudes - longitude).argmin()])
 
-        return Chart(latitudes, longitudes, is_land)
+        return Coast(latitudes, longitudes, is_land)
 
     def check_places(self, places: Iterable[tuple[float, float]], what: str) -> None:
         """Refuse places (deg) that are on land, or beyond what is read around the path.
@@ -106,7 +105,7 @@ class GridFileSettings(Settings):
         ConfigurationError
             Naming the file, the place, and ``what`` it is: such as 'on the path'.
         """
-        latitudes, longitudes, is_land = self.chart()
+        latitudes, longitudes, is_land = self.coast()
         for place in places:
             at = _beside(place, self.mission.origin.longitude_deg)
             told = f'file {self.file}: {place[0]:.4f}, {place[1]:.4f} {what} is'
