@@ -45,6 +45,14 @@ def test_a_plan_in_json_and_as_a_picture(tmp_path, capsys):
     assert matplotlib.image.imread(picture).std() > 0.05
 
 
+def test_a_plan_ends_when_the_dives_of_its_mission_are_flown(capsys):
+    plan('slocum_shelf', as_json=True)
+    told = json.loads(capsys.readouterr().out)
+    flown = glider.fly('slocum_shelf').score
+    assert (told['reachable'], told['dives'], flown['dives']) == (False, 4, 4)
+    assert told['mission_h'] == pytest.approx(flown['sim_time_s'] / 3600.0, rel=0.1)
+
+
 def test_a_planned_flight_has_its_route_as_orders_and_flies_so_to_the_same_bits(tmp_path):
     scenario, first, again = load_scenario('eddies_hard', SHORT), Rows(), Rows()
     flight = fly(scenario, [first])
