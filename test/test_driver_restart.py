@@ -200,8 +200,10 @@ def test_successor_is_told_with_its_gid_and_is_no_stranger(flight):
 def test_recording_goes_on(flight):
     _, (killed_s, _, ended_s), bag = flight
     with bag.open('rb') as stream:
-        read = make_reader(stream).iter_messages(topics=['/glider/odom'])
-        stamps_s = [message.log_time / 1e9 for _, _, message in read]
+        reader = make_reader(stream)
+        begin_s = reader.get_summary().statistics.message_start_time / 1e9
+        stamps_s = [m.log_time / 1e9 for _, _, m in reader.iter_messages(topics=['/glider/odom'])]
+    assert begin_s == pytest.approx(stamps_s[0], abs=1.0)  # with the path, which has no stamp
     gaps_s = [after - before for before, after in zip(stamps_s[:-1], stamps_s[1:], strict=True)]
     assert AWAY_S < max(gaps_s) < ended_s - killed_s
     assert stamps_s[-1] - stamps_s[gaps_s.index(max(gaps_s)) + 1] > 1.0

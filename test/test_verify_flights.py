@@ -29,6 +29,7 @@ from glider_base.frames import (
 )
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.health import ABORT, PARAMETERS_SET
+from glider_base.ros.lockstep.step_node import Passing
 from glider_base.ros.places import NAMESPACE, domain_id
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.qos import EVENTS
@@ -153,7 +154,8 @@ class Vehicle:
     """A flight on a vehicle's own clock: steps that come when they come, as the nodes take them.
 
     Steps are computed here, not by what is tested. Each block takes the newest inputs it has; now
-    and then one is late, comes twice, or is not there in time.
+    and then one is late, comes twice, or is not there in time. Without a new stamp a node says its
+    answer again, and a step stands for the ticks by which the stamps have gone on.
     """
 
     def __init__(self, scenario, folder) -> None:
@@ -163,6 +165,8 @@ class Vehicle:
         self.order = 0
         self.told, self.saturation = None, (0, 0)
         self.command = Joints(0.0, 0.0, 0.0, 0.0)
+        self.passing = {'guidance': Passing(1.0), 'control': Passing(1.0)}
+        self.answers = {}
         points = scenario.path.points(500)
         self.put('path', to_cdr(path_message(points)))
 
@@ -173,6 +177,10 @@ class Vehicle:
 
     def publish(self, name: str, stamp_ns: int, values) -> None:
         self.put(name, TOPICS[name].codec.encode(stamp_ns, values))
+
+    def repeat(self, block: str) -> None:
+        for answer in self.answers[block]:
+            self.publish(*answer)
 
     def measure(self, stamp_ns: int) -> None:
         water = Water(0.1, 0.0, 0.0)
@@ -185,11 +193,14 @@ class Vehicle:
     def guide(self) -> None:
         stamp_ns, odom = self.odom
         odometry = odometry_from_wire(odom)
-        self.guidance, out = guidance_step(
-            self.guidance, odometry, NO_ECHO, self.params.guidance, TICK_S
-        )
-        self.publish('tracking_error', stamp_ns, out.error)
-        self.publish('current_estimate', stamp_ns, water_to_wire(out.current))
+        passed = self.passing['guidance'].ticks(stamp_ns)
+        for _ in range(passed):
+            self.guidance, out = guidance_step(
+                self.guidance, odometry, NO_ECHO, self.params.guidance, TICK_S
+            )
+        if not passed:
+            self.repeat('guidance')
+            return
         if (out.stage, out.infeasible) != self.told:
             self.told = (out.stage, out.infeasible)
             self.put(
@@ -201,7 +212,12 @@ class Vehicle:
                 ),
             )
         self.reference = (stamp_ns, reference_to_wire(out.reference))
-        self.publish('reference', *self.reference)
+        self.answers['guidance'] = [
+            ('tracking_error', stamp_ns, out.error),
+            ('current_estimate', stamp_ns, water_to_wire(out.current)),
+            ('reference', *self.reference),
+        ]
+        self.repeat('guidance')
 
     def abort(self) -> None:
         self.guidance = guidance_abort(self.guidance)
@@ -212,16 +228,19 @@ class Vehicle:
     def steer(self) -> None:
         inputs = (self.reference, self.odom, self.joints)
         stamp_ns = max(one[0] for one in inputs)
-        self.control, out = control_step(
-            self.control,
-            odometry_from_wire(self.odom[1]),
-            self.joints[1],
-            reference_from_wire(self.reference[1]),
-            self.params.control,
-            TICK_S,
-        )
-        self.publish('wrench', stamp_ns, wrench_to_wire(out.wrench))
-        self.publish('adaptation', stamp_ns, out.adaptation)
+        passed = self.passing['control'].ticks(stamp_ns)
+        for _ in range(passed):
+            self.control, out = control_step(
+                self.control,
+                odometry_from_wire(self.odom[1]),
+                self.joints[1],
+                reference_from_wire(self.reference[1]),
+                self.params.control,
+                TICK_S,
+            )
+        if not passed:
+            self.repeat('control')
+            return
         told, told_ns = self.saturation
         if out.saturation != told and stamp_ns - told_ns >= 1_000_000_000:
             self.saturation = (out.saturation, stamp_ns)
@@ -233,7 +252,12 @@ class Vehicle:
                     )
                 ),
             )
-        self.publish('demand', stamp_ns, out.command)
+        self.answers['control'] = [
+            ('wrench', stamp_ns, wrench_to_wire(out.wrench)),
+            ('adaptation', stamp_ns, out.adaptation),
+            ('demand', stamp_ns, out.command),
+        ]
+        self.repeat('control')
         self.command = out.command
 
 

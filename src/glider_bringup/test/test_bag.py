@@ -273,6 +273,21 @@ def test_event_from_before_the_beginning_of_time_is_of_the_first_tick(tmp_path):
     assert (message.log_time, message.data) == (0, b'\0\1\0\0')
 
 
+def test_bag_is_as_long_as_its_run_whatever_stamps_events_have():
+    """A path is stamped 0, and a stranger tells with a clock of its own."""
+    written = []
+    order = TickSorter(['a'], 10, lambda *message: written.append(message[1]))
+    begin, end = 1_700_000_000, 1_700_000_050
+    order.add_event('path', 0, b'')
+    order.add_event('/diagnostics', 5_000_000_000, b'')
+    for stamp in range(begin, end, 10):
+        order.add('a', stamp, b'')
+        order.write_complete(lambda stamp_ns: False)
+    order.write_rest()
+    assert len(written) == 7
+    assert (min(written), max(written)) == (begin, end)
+
+
 def test_incomplete_ticks_are_written_at_the_end_and_gaps_are_counted():
     written = []
     order = TickSorter(['a', 'b'], 10, lambda *message: written.append(message))

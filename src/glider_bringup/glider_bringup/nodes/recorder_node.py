@@ -267,7 +267,8 @@ class RecorderNode(TickNode):
     def save(self) -> None:
         """Write what has come as far as it is complete, and let the plant go on."""
         if not self.ticks.lockstep:
-            self.order.write_rest()
+            if self.order.begun:  # what is told before the first tick is recorded with it
+                self.order.write_rest()
             self.bag.flush()
             return
         if self.order.heard_ns > self.heard_ns:

@@ -18,11 +18,13 @@ from glider_model.plant.block import PLANT, plant_move, plant_outputs
 
 
 @kernel
-def _answer(state, params, stamps_ns, inputs, table, dt):
-    """Outputs and flags of every tick, row by row."""
+def _answer(state, params, stamps_ns, passed, inputs, table, dt):
+    """Outputs and flags of every step, row by row."""
     for k in range(len(stamps_ns)):
-        t_s = stamps_ns[k] // TICK_NS * TICK_S
-        state, outputs, flags = block_tick(state, t_s, rows_at(inputs, k), params, dt)
+        now = stamps_ns[k] // TICK_NS
+        for tick in range(now + 1 - passed[k], now + 1):
+            t_s = tick * TICK_S
+            state, outputs, flags = block_tick(state, t_s, rows_at(inputs, k), params, dt)
         put(table, k, 0, outputs)
         put(table, k, table.shape[1] - len(flags), (flags,))
     return state
@@ -72,11 +74,15 @@ class RecordedBlock:
         return present(self.block.wired.outputs, optional_topics(self.settings))
 
     def run(
-        self, stamps_ns: np.ndarray, inputs: dict[str, np.ndarray]
+        self,
+        stamps_ns: np.ndarray,
+        inputs: dict[str, np.ndarray],
+        passed: np.ndarray | None = None,
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        """Outputs float64[n, m] by topic, and flags int64[n, k], of the ticks at stamps int64[n].
+        """Outputs float64[n, m] by topic, and flags int64[n, k], of the steps at stamps int64[n].
 
-        Inputs are float64[n, m] by topic; of the plant's, the last row may lack.
+        Inputs are float64[n, m] by topic; of the plant's, the last row may lack. In a step
+        ``passed`` ticks pass, int64[n], or one.
         """
         wired = self.block.wired
         widths = {name: len(FIELDS[name]) for name in wired.outputs}
@@ -87,7 +93,8 @@ class RecordedBlock:
         if self.block is PLANT:
             self.state = _move(self.state, self.params, rows, table, TICK_S)
         else:
-            self.state = _answer(self.state, self.params, stamps_ns, rows, table, TICK_S)
+            passed = np.ones(len(table), np.int64) if passed is None else passed
+            self.state = _answer(self.state, self.params, stamps_ns, passed, rows, table, TICK_S)
         ends = np.cumsum([*widths.values()])
         outputs = dict(zip(widths, np.split(table, ends, axis=1)[:-1], strict=True))
         outputs = {name: outputs[name] for name in self.outputs}

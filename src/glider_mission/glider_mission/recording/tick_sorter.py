@@ -22,6 +22,7 @@ class TickSorter:
         write: Callable[[str, int, bytes], None],
     ) -> None:
         self._queues: dict[str, deque[tuple[int, bytes]]] = {name: deque() for name in topics}
+        self._first_ns = 0
         self._newest_ns: dict[str, int] = {}
         self._events: list[tuple[int, str, bytes]] = []
         self._period_ns = period_ns
@@ -32,6 +33,7 @@ class TickSorter:
     def add(self, topic: str, stamp_ns: int, payload: bytes) -> None:
         """Take a message of a per-tick topic."""
         if not self._newest_ns:  # all topics begin with the same tick
+            self._first_ns = stamp_ns
             self._newest_ns = dict.fromkeys(self._queues, stamp_ns - self._period_ns)
         due_ns = self._newest_ns[topic] + self._period_ns
         self.lost += max(0, (stamp_ns - due_ns) // self._period_ns)
@@ -46,9 +48,10 @@ class TickSorter:
     def add_event(self, topic: str, stamp_ns: int, payload: bytes) -> None:
         """Take a message that belongs to a tick, but does not come with every tick.
 
-        One that is stamped before the beginning of time, as that of anybody may be, is of tick 0.
+        One with a stamp outside of the run, as that of anybody may be, is recorded with the first
+        tick, or with the one that is due.
         """
-        self._events.append((max(0, stamp_ns), topic, payload))
+        self._events.append((stamp_ns, topic, payload))
 
     def write_complete(self, end_tick: Callable[[int], bool], until_ns: float = math.inf) -> bool:
         """Hand on every tick that is complete, with its events; whether anything went to disk.
@@ -61,6 +64,11 @@ class TickSorter:
             self._write_tick()
             on_disk = end_tick(self.written_ns) or on_disk
         return on_disk
+
+    @property
+    def begun(self) -> bool:
+        """Whether a message of any tick has come."""
+        return bool(self._newest_ns)
 
     def write_rest(self) -> None:
         """Hand on everything, also of ticks that are not complete."""
@@ -81,7 +89,8 @@ class TickSorter:
             self._write_events(stamp_ns)
 
     def _write_events(self, until_ns: float = math.inf) -> None:
+        due_ns = max(self._newest_ns.values(), default=-self._period_ns) + self._period_ns
         for stamp_ns, topic, payload in sorted(self._events):
             if stamp_ns <= until_ns:
-                self._write(topic, stamp_ns, payload)
+                self._write(topic, max(self._first_ns, min(stamp_ns, due_ns)), payload)
         self._events = [event for event in self._events if event[0] > until_ns]

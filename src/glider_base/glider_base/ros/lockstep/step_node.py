@@ -16,6 +16,34 @@ _TELL_EVERY_S = 10.0
 _AHEAD = 0.25
 
 
+class Passing:
+    """Time that passes in the steps of a free-running node, by the stamps that these are given.
+
+    A step stands for as many ticks as the stamps have gone on by: more than one if a message was
+    lost or a cycle missed, but no more than an input may be old. Over many steps no time is lost
+    and none is added; in between the steps may be ahead of the stamps, so that jitter does not
+    make one of two. The clock of a vehicle that was set back goes on with one tick.
+    """
+
+    def __init__(self, max_age_s: float) -> None:
+        self._most = max(1, round(max_age_s / TICK_S))
+        self._stamp_ns = -1  #: of the last cycle
+        self._passed_ns = 0  #: up to where time has passed in the steps
+
+    def ticks(self, stamp_ns: int) -> int:
+        """Ticks that have passed with a stamp; 0 if it is no step."""
+        before_ns, self._stamp_ns = self._stamp_ns, stamp_ns
+        if stamp_ns == before_ns:
+            return 0
+        if not 0 < stamp_ns - before_ns <= self._most * TICK_NS or before_ns < 0:
+            self._passed_ns = stamp_ns
+            return self._most if before_ns >= 0 and stamp_ns > before_ns else 1
+        behind = (stamp_ns - self._passed_ns) / TICK_NS
+        ticks = max(round(behind), int(behind > -_AHEAD))
+        self._passed_ns += ticks * TICK_NS
+        return ticks
+
+
 class StepNode(TickNode):
     """Guidance, control, current: a step per tick, and the free-running timer around it."""
 
@@ -29,8 +57,7 @@ class StepNode(TickNode):
         self.missed = 0  #: those of them that there were not: the machine was too slow
         self.passed = 1  #: ticks that have passed since the last step, this one included
         self._cycle_s: float | None = None
-        self._stamp_ns = -1  #: of the last cycle
-        self._passed_ns = 0  #: up to where time has passed in the steps
+        self._passing = Passing(self.ticks.input_max_age_s)
         self._told = (0, 0, 0)
         self._tell_s = -float('inf')
 
@@ -80,9 +107,10 @@ class StepNode(TickNode):
                 self.event(stamp_ns, health.OK, 'inputs are fresh again')
         if stale:
             self.on_stale(stamp_ns, due)
-        elif not self._pass(stamp_ns):
+        elif not (passed := self._passing.ticks(stamp_ns)):
             self.repeat()
         else:
+            self.passed = passed
             silent = {name: WHEN_SILENT[name] for name in old}
             self.step(
                 stamp_ns, *[silent.get(item.topic.name, item.values) for item in self.inputs]
@@ -115,27 +143,6 @@ class StepNode(TickNode):
             self._tell_s = min(self._tell_s, now_s)
         self._cycle_s = now_s
         return max(1, round(since_s / TICK_S))
-
-    def _pass(self, stamp_ns: int) -> bool:
-        """Let the time of the stamps pass; whether it does.
-
-        A step stands for as many ticks as the stamps have gone on by: more than one if a message
-        was lost or a cycle missed, but no more than an input may be old. Over many steps no time
-        is lost and none is added; in between the steps may be ahead of the stamps, so that jitter
-        does not make one of two. The clock of a vehicle that was set back goes on with one tick.
-        """
-        before_ns, self._stamp_ns = self._stamp_ns, stamp_ns
-        if stamp_ns == before_ns:
-            return False
-        most = max(1, round(self.ticks.input_max_age_s / TICK_S))
-        behind = (stamp_ns - self._passed_ns) / TICK_NS
-        if not 0 < stamp_ns - before_ns <= most * TICK_NS or before_ns < 0:
-            self.passed = most if before_ns >= 0 and stamp_ns > before_ns else 1
-            self._passed_ns = stamp_ns
-            return True
-        self.passed = max(round(behind), int(behind > -_AHEAD))
-        self._passed_ns += self.passed * TICK_NS
-        return self.passed > 0
 
     @property
     def _ticking(self) -> list[Input]:

@@ -62,6 +62,19 @@ class Series:
     def __len__(self) -> int:
         return self._count
 
+    def without_repeats(self) -> 'Series':
+        """The same without messages that only say the one before them again."""
+        stamps_ns, bits = self.stamps_ns, self.values.view(np.int64)
+        again = (stamps_ns[1:] == stamps_ns[:-1]) & np.all(bits[1:] == bits[:-1], axis=1)
+        kept = np.flatnonzero(~np.append(False, again & self.own[1:] & self.own[:-1]))
+        places = {int(place): i for i, place in enumerate(kept)}
+        one = Series(self.codec)
+        one._count = len(kept)
+        one.stamps_ns, one.values, one.own = stamps_ns[kept], self.values[kept], self.own[kept]
+        one.raw = {places[i]: raw for i, raw in self.raw.items()}
+        one.unusable = {places[i]: why for i, why in self.unusable.items() if i in places}
+        return one
+
     def payload(self, index: int) -> bytes:
         """Bytes of a message; empty if they were not kept."""
         if self.own[index]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from glider_base.files import read_yaml
+from glider_base.ros.lockstep.node import TickSettings
 from glider_base.ros.parameters import from_parameters
 from glider_base.settings import ConfigurationError, Settings
 from glider_mission.blocks import BLOCKS
@@ -13,13 +14,18 @@ from glider_mission.recording.mcap_reader import Bag
 from glider_mission.run_folder import PARAMETERS_FILE, SCENARIO_FILE, find_scenario
 from glider_mission.scenario import Scenario, load_scenario
 
+#: After this time (s) an input is old, if nobody says another.
+OLD_S = TickSettings().input_max_age_s
+
 
 class Told(NamedTuple):
     """What the nodes of a recorded run were told."""
 
     blocks: dict[str, Settings | None]  #: by name of the block; None: it is not known
     source: str  #: where it stands
-    lockstep: bool | None  #: None: it does not say
+    lockstep: bool | None = None  #: None: it does not say
+    #: free-running: time (s) after which an input was old
+    max_age_s: float = OLD_S
 
     @property
     def steers_by(self) -> str:
@@ -49,15 +55,15 @@ def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
     """
     folder = path if path.is_dir() else path.parent
     parameters = folder / PARAMETERS_FILE
-    lockstep = _lockstep(read_yaml(parameters)) if parameters.is_file() else None
+    how = _how(read_yaml(parameters)) if parameters.is_file() else ()
     if file is not None:
         values = read_yaml(file)
         if _sections(values):
             return _from_parameters(values, str(file))
-        return Told(_from_scenario(load_scenario(str(file), recorded=True)), str(file), lockstep)
+        return Told(_from_scenario(load_scenario(str(file), recorded=True)), str(file), *how)
     found = find_scenario(bag.files[0], folder, bag.attachments, scratch)
     if found is not None:
-        return Told(_from_scenario(found.scenario), found.source, lockstep)
+        return Told(_from_scenario(found.scenario), found.source, *how)
     if parameters.is_file():
         return _from_parameters(read_yaml(parameters), str(parameters))
     raise ConfigurationError(
@@ -80,11 +86,15 @@ def _sections(values: dict) -> dict[str, dict]:
     }
 
 
-def _lockstep(values: dict) -> bool | None:
-    """Whether the nodes of a parameter file keep step; None if it does not say."""
-    said = [section.get('lockstep') for section in _sections(values).values()]
-    said = [one for one in said if isinstance(one, bool)]
-    return all(said) if said else None
+def _how(values: dict) -> tuple[bool | None, float]:
+    """How the nodes of a parameter file act: whether in step, and when an input is old (s)."""
+    sections = _sections(values).values()
+
+    def told(name: str, kind: type) -> list:
+        return [one for section in sections if isinstance(one := section.get(name), kind)]
+
+    in_step = told('lockstep', bool)
+    return all(in_step) if in_step else None, max(told('input_max_age_s', float), default=OLD_S)
 
 
 def _from_parameters(values: dict, source: str) -> Told:
@@ -96,4 +106,4 @@ def _from_parameters(values: dict, source: str) -> Told:
         told = node in sections or '**' in sections
         settings = from_parameters(block.settings, given, f'{source}: {node}') if told else None
         found[block.wired.name] = settings
-    return Told(found, source, _lockstep(values))
+    return Told(found, source, *_how(values))

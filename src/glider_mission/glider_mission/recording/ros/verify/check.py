@@ -92,6 +92,7 @@ class Check:
         self.differing: Counter[str] = Counter()
         self.notes: list[str] = []
         self.flags = np.zeros((len(stamps_ns), len(block.block.flags)), np.int64)
+        self.passed = np.ones(len(stamps_ns), np.int64)  #: ticks that pass in a step
         self.ticks = 0
         #: paths that guidance followed, one after the other, and from when (ns)
         self.paths = [(block.settings.path, 0)] if block.block.wired == wiring.GUIDANCE else []
@@ -153,7 +154,9 @@ class Check:
         """Outputs of the steps from start to end; rows are the messages of the inputs."""
         series = self.recording.series
         inputs = {name: series[name].values[index] for name, index in rows.items()}
-        computed, self.flags[start:end] = self.block.run(self.stamps_ns[start:end], inputs)
+        computed, self.flags[start:end] = self.block.run(
+            self.stamps_ns[start:end], inputs, self.passed[start:end]
+        )
         self.ticks = end
         return computed
 

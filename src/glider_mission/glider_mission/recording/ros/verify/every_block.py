@@ -7,6 +7,7 @@ change in one block therefore shows in that block and in no other.
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -76,9 +77,9 @@ def verify(
         if reason:
             yield Verdict(name, SKIPPED, reason)
             continue
-        work = in_lockstep if lockstep else free_running
+        work = in_lockstep if lockstep else partial(free_running, max_age_s=told.max_age_s)
         recorded = RecordedBlock(block, settings)
-        yield work(recorded, recording, lambda share, name=name: progress(name, share))
+        yield work(recorded, recording, progress=partial(progress, name))
 
 
 def report(bag: Bag, recording: Recording, told: Told, verdicts: list[Verdict]) -> dict:

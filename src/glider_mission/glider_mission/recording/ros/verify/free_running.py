@@ -3,9 +3,11 @@
 """A block of a free-running recording: which inputs a step had is found by trying."""
 
 import itertools
+from copy import copy
 
 import numpy as np
 
+from glider_base.ros.lockstep.step_node import Passing
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording, Series
 from glider_mission.recording.ros.verify.check import Check, Track, Verdict
@@ -29,19 +31,28 @@ def _by_stamp(series: Series, stamps_ns: np.ndarray) -> tuple[Track, list[int]]:
     return Track(series, index), [*left, *range(j, len(series))]
 
 
-def free_running(block: RecordedBlock, recording: Recording, progress) -> Verdict:
+def free_running(
+    block: RecordedBlock, recording: Recording, max_age_s: float, progress
+) -> Verdict:
     """Compare a block step by step, each with the inputs that it must have had.
 
     A step carries the newest stamp among its inputs. That names the input of guidance. Of those of
-    control it names one; the others may be a message older, which is found out by trying.
+    control it names one; the others may be a message older, which is found out by trying. In a
+    cycle without a new stamp a node says its answer again. ``max_age_s`` is `input_max_age_s`.
     """
     wired = block.block.wired
     ours = wired.inputs + wired.outputs
-    series = {name: one for name, one in recording.series.items() if name in ours}
+    series = {
+        name: one.without_repeats() for name, one in recording.series.items() if name in ours
+    }
+    recording = copy(recording)
+    recording.series = series
     # what is published first is published while an input is stale, too
     marker = next(name for name in reversed(wired.outputs) if name in series)
     stamps_ns = series[marker].stamps_ns
     check = Check(block, recording, stamps_ns)
+    passing = Passing(max_age_s)
+    check.passed[:] = [passing.ticks(int(stamp_ns)) for stamp_ns in stamps_ns]
     outputs = check.tracks(
         lambda one: _by_stamp(one, stamps_ns),
         'which belongs to no step',
