@@ -42,7 +42,7 @@ FLOORS = {
     'glider_model': (('vehicle', 'ocean'), ('onboard', 'plant'), ('nodes',)),
     'glider_mission': (
         ('mafiles',),
-        ('blocks', 'chart', 'disk', 'rules'),
+        ('blocks', 'changes', 'chart', 'disk', 'rules'),
         ('scenario',),
         ('choices', 'planned', 'routing', 'run_folder'),
         ('recording',),

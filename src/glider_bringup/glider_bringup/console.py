@@ -28,7 +28,7 @@ from rich.text import Text
 from glider_base.errors import EXIT_INTERRUPTED, ConfigurationError, printable
 from glider_base.signals import TICK_S
 from glider_control.settings import ControlLawSettings
-from glider_mission.scenario import parse_assignment
+from glider_mission.changes import parse_assignment
 
 
 class _PlainConsole(Console):

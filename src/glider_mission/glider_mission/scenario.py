@@ -2,10 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenarios: one validated YAML file that says everything about a mission."""
 
-import json
 import math
-import shlex
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from copy import deepcopy
 from pathlib import Path
@@ -15,8 +13,8 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_base.errors import clipped, shown, told_changes
-from glider_base.files import is_file, parse_yaml, read_yaml, yaml_line, yaml_text
+from glider_base.errors import shown, told_changes
+from glider_base.files import is_file, read_yaml, yaml_line, yaml_text
 from glider_base.frames import OriginSettings, to_geodetic
 from glider_base.settings import (
     ConfigurationError,
@@ -25,7 +23,6 @@ from glider_base.settings import (
     beside,
     file_names,
     find_file,
-    holder_of,
     number,
     validate,
 )
@@ -44,9 +41,16 @@ from glider_guidance.orders import check_orders
 from glider_guidance.path.settings import MAX_DEPTH_M, PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
+from glider_mission.changes import (
+    VEHICLE,
+    overlap,
+    plain,
+    set_field,
+    split_changes,
+    told_fields,
+)
 from glider_mission.chart import charted, in_metres, uncharted
-from glider_mission.mafiles import FIELD as MAFILES
-from glider_mission.mafiles import from_folder, read_profile, with_mafiles
+from glider_mission.mafiles import from_folder, with_mafiles
 from glider_mission.rules import Rules
 from glider_model.ocean.bottom import BathymetrySettings
 from glider_model.ocean.current_settings import CurrentSettings, SumOfCurrents
@@ -76,8 +80,6 @@ from glider_navigation.settings import NavigationLawSettings, NavigationSettings
 
 SCENARIO_FOLDER = Path(__file__).parent / 'scenarios'
 DEFAULT_SCENARIO = 'current_8deg'
-#: Field that names the vehicle, and what the names of fields in its file begin with.
-VEHICLE = 'vehicle'
 
 #: There is ample time for a dive in so many times what its glides take (-).
 AMPLE = 1.25
@@ -91,14 +93,6 @@ LONG_RUN_S = 20000.0
 SETTLE_LONG_S, SETTLE_SHORT_S = 7200.0, 1800.0
 #: Of a short run this share is left out at most.
 SETTLE_SHARE = 0.5
-
-#: Fields of which only one can be given: setting one of them by hand replaces the other.
-_ALTERNATIVES = (
-    ('speed_kn', 'speed_mps'),
-    ('angle_deg', 'direction_deg'),
-    ('descent_per_turn_m', 'slope_deg'),
-    ('waypoints', 'waypoints_latlon'),
-)
 
 
 class RouteForecast(Settings):
@@ -527,11 +521,11 @@ def make_scenario(
     ConfigurationError
         Naming file, field, value and allowed range.
     """
-    path, values, changes = source.path, deepcopy(source.values), _plain(changes or {})
+    path, values, changes = source.path, deepcopy(source.values), plain(changes or {})
     own, in_vehicle = split_changes(changes)
     fields = {field: shown(value) for field, value in changes.items()}
     for field, value in own.items():
-        if not _set_field(values, field, value, own):
+        if not set_field(values, field, value, own):
             del fields[field]
     if fields:
         before = values.get('changed')
@@ -566,15 +560,6 @@ def make_scenario(
     return scenario
 
 
-def _plain(value: Any) -> Any:
-    """A value without NumPy: numbers and lists are told as others are."""
-    if isinstance(value, dict):
-        return {name: _plain(inner) for name, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-
-
 def changed_scenario(
     scenario: Scenario, changes: dict[str, Any], law: type[LawSettings] | None = None
 ) -> Scenario:
@@ -597,20 +582,6 @@ def changed_scenario(
     if not stays and flown not in LAWS:  # gains that others do not know
         del values['control'][flown]
     return make_scenario(ScenarioSource(Path(scenario.name), values), changes, kind=kind)
-
-
-def split_changes(changes: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Fields of the scenario, and those of its vehicle by their names in the vehicle's file."""
-    for field in changes:
-        if not isinstance(field, str):
-            raise ConfigurationError(
-                f'--set {shown(field)}: no name (allowed: fields by dotted name, current.speed_kn)'
-            )
-    inside = {field for field in changes if field.startswith(f'{VEHICLE}.')}
-    return (
-        {field: value for field, value in changes.items() if field not in inside},
-        {field.partition('.')[2]: changes[field] for field in changes if field in inside},
-    )
 
 
 def _check_glide(scenario: Scenario) -> None:
@@ -720,73 +691,3 @@ def _vehicle_called(name: str, folder: Path, source: str) -> str:
         name = str(beside.resolve())
     with told_of(f'{source}: '):
         return str(vehicle_path(name).resolve())
-
-
-def _replaced(field: str, value: Any, given: Collection[str]) -> list[str]:
-    """Names of the fields beside one that a value of it replaces; files, none that are given."""
-    parents, _, name = field.rpartition('.')
-    if name != MAFILES:
-        return [*_alternatives(name)]
-    try:
-        return [other for other in read_profile(value) if f'{parents}.{other}' not in given]
-    except ValueError:  # refused later
-        return []
-
-
-def _alternatives(name: str) -> tuple[str, ...]:
-    """Names of the fields of which only one can be given, this one among them."""
-    return next((pair for pair in _ALTERNATIVES if name in pair), (name,))
-
-
-def overlap(field: str, other: str) -> bool:
-    """Whether setting one field, given by its dotted name, undoes what set the other.
-
-    Which vehicle flies, and what is changed in it, are two things.
-    """
-    if VEHICLE in (field, other):
-        return field == other
-    *parents, last = field.split('.')
-    names = ['.'.join((*parents, name)) + '.' for name in _alternatives(last)]
-    return any(name.startswith(f'{other}.') or f'{other}.'.startswith(name) for name in names)
-
-
-def _set_field(values: dict, field: str, value, given: Collection[str]) -> bool:
-    """Set a field by its dotted name, making the mappings on the way; whether that changes it.
-
-    It is one of those that are ``given``.
-    """
-    holder, last = holder_of(values, field), field.rpartition('.')[2]
-    is_plain = isinstance(value, str | int | float)  # of an array one cannot ask it
-    is_new = not is_plain or last not in holder or holder[last] != value
-    for other in _replaced(field, value, given):
-        holder.pop(other, None)
-    holder[last] = deepcopy(value)  # which may be changed by a field inside it
-    return is_new
-
-
-def told_fields(changed: dict[str, str]) -> str:
-    """Fields that were changed, as a person set them."""
-    return ', '.join(f'{field}={value}' for field, value in changed.items())
-
-
-def parse_assignment(text: str) -> tuple[str, Any]:
-    """Field and value of a ``path.to.field=value`` option; the value is read as YAML.
-
-    Raises
-    ------
-    ConfigurationError
-        If the text has not this form.
-    """
-    field, sign, value = text.partition('=')
-    field = field.strip()
-    if not sign or not all(field.split('.')):
-        raise ConfigurationError(f'--set {clipped(text)}: expected path.to.field=value')
-    return field, parse_yaml(value, f'--set {clipped(text)}')
-
-
-def run_command(name: str, changes: dict[str, Any], options: str = '') -> str:
-    """Shell command that flies a scenario with some fields changed, by the direct engine."""
-    fields = (f'{field}={json.dumps(value)}' for field, value in changes.items())
-    sets = [f'--set {shlex.quote(field)}' for field in fields]
-    words = ['./glider run', shlex.quote(name), '--engine direct', options, *sets]
-    return ' '.join(word for word in words if word)

@@ -11,13 +11,8 @@ from hypothesis import strategies as st
 
 from glider_base.settings import ConfigurationError
 from glider_guidance.settings import OLD_NAMES
-from glider_mission.scenario import (
-    DEFAULT_SCENARIO,
-    Scenario,
-    load_scenario,
-    parse_assignment,
-    scenario_names,
-)
+from glider_mission.changes import parse_assignment
+from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, scenario_names
 from glider_model.onboard.gate import GateSettings
 from glider_model.vehicle.file import vehicle_path
 

@@ -16,7 +16,8 @@ import numpy as np
 from glider_bringup.scoring.card import finite, fly_scored
 from glider_bringup.scoring.navigation import FOURTH
 from glider_bringup.scoring.scores import SCORES, studied
-from glider_mission.scenario import Scenario, load_scenario, run_command
+from glider_mission.changes import run_command
+from glider_mission.scenario import Scenario, load_scenario
 from glider_model.plant.sensors import SensorSettings
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import VehicleParams, load_vehicle

@@ -19,8 +19,9 @@ import command_line
 from glider_base.settings import ConfigurationError
 from glider_bringup import cli
 from glider_bringup.scoring.one_hertz import Recorder
+from glider_mission.changes import parse_assignment
 from glider_mission.run_folder import make_result_folder
-from glider_mission.scenario import load_scenario, parse_assignment
+from glider_mission.scenario import load_scenario
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle
 from glider_studies import bottoms, forecasts, routes

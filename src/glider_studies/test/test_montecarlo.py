@@ -25,11 +25,12 @@ from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.score import Scorer
 from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.changes import parse_assignment
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.recorded_log import RecordedLog
 from glider_mission.rules import Rules
 from glider_mission.run_folder import make_result_folder
-from glider_mission.scenario import load_scenario, parse_assignment
+from glider_mission.scenario import load_scenario
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.perturb import (
     ADDED_MASS,

@@ -13,7 +13,8 @@ from glider_base.signals import TICK_S
 from glider_bringup.engines.flight import fly
 from glider_guard.rows import LATCHED, ORDERED, TOO_HEAVY
 from glider_mission.blocks import COLUMNS, ROW
-from glider_mission.scenario import load_scenario, parse_assignment
+from glider_mission.changes import parse_assignment
+from glider_mission.scenario import load_scenario
 from glider_studies.commands.experiments import app
 from glider_studies.hunt import oracle, search
 from glider_studies.hunt.missions import draw_mission, due_s

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from glider_base.settings import find_field, unit_of
 from glider_bringup import cli
-from glider_mission.scenario import Scenario, load_scenario, overlap
+from glider_mission.changes import overlap
+from glider_mission.scenario import Scenario, load_scenario
 from glider_studies.sweep.plan import (
     GridDimension,
     LogUniformDimension,

@@ -13,8 +13,9 @@ import yaml
 import command_line
 from glider_base.settings import ConfigurationError
 from glider_bringup.scoring.card import fly_scored
+from glider_mission.changes import parse_assignment
 from glider_mission.recording.mcap_reader import Bag
-from glider_mission.scenario import load_scenario, parse_assignment
+from glider_mission.scenario import load_scenario
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle, vehicle_path
 from glider_studies.montecarlo import make_scenarios

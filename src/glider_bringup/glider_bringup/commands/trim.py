@@ -12,7 +12,7 @@ import typer
 from glider_base.errors import EXIT_FAILED
 from glider_base.settings import ConfigurationError
 from glider_bringup.console import Json, changed_fields, messages, print_table
-from glider_mission.scenario import split_changes
+from glider_mission.changes import split_changes
 from glider_model.plant.trim import Trim, solve_trim
 from glider_model.vehicle.coefficients import LIFT_AND_DRAG
 from glider_model.vehicle.file import changed_vehicle, load_vehicle

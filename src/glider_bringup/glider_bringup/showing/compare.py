@@ -15,7 +15,7 @@ from glider_bringup.showing.panels import ACTUATORS, FLOWN, SPACE, SURFACE, flow
 from glider_bringup.showing.scorecard import engine_text, event_texts, flown_text, show
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page
 from glider_bringup.showing.words import small, span
-from glider_mission.scenario import told_fields
+from glider_mission.changes import told_fields
 
 #: Captions of the panels of curves that are laid over each other.
 _OVERLAID = {

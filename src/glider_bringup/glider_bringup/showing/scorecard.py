@@ -14,8 +14,8 @@ from rich.table import Table
 from glider_bringup.console import output
 from glider_bringup.scoring.scores import SCORES, Score, reckoned
 from glider_bringup.showing.words import span, way
+from glider_mission.changes import told_fields
 from glider_mission.chart import place_told
-from glider_mission.scenario import told_fields
 from glider_model.ocean.current_settings import KNOT_MPS
 
 #: Colours of what became of a run.

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 from glider_bringup.engines.flight import fly
 from glider_bringup.scoring.card import fly_scored, scorecard
 from glider_guard.rows import LATCHED, ROWS
+from glider_mission.changes import run_command
 from glider_mission.choices import Combination, combination_of
-from glider_mission.scenario import Scenario, run_command
+from glider_mission.scenario import Scenario
 from glider_studies.hunt.missions import Mission, draw_mission
 from glider_studies.hunt.oracle import Truth, Verdict, judge, unfounded
 from glider_studies.paper.experiments import Experiment, Study, make_study

@@ -22,8 +22,9 @@ from glider_bringup.scoring.card import finite
 from glider_bringup.scoring.one_hertz import Record, Recorder
 from glider_bringup.scoring.score import Scorer, scores_of
 from glider_guidance.los import crab_heading
+from glider_mission.changes import run_command
 from glider_mission.choices import Combination, combination_of
-from glider_mission.scenario import Scenario, load_scenario, run_command
+from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.current_settings import KNOT_MPS
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.perturb import perturbed

@@ -15,7 +15,8 @@ import xarray
 
 from glider_base.kernel import source_digest
 from glider_base.settings import find_field, unit_of
-from glider_mission.scenario import VEHICLE, Scenario
+from glider_mission.changes import VEHICLE
+from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import Vehicle
 from glider_studies.sweep.plan import Axis, Plan
 

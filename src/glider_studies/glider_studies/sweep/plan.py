@@ -30,14 +30,13 @@ from glider_base.settings import (
     find_file,
     validate,
 )
+from glider_mission.changes import overlap, run_command
 from glider_mission.choices import Combination, combination_of
 from glider_mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
     make_scenario,
-    overlap,
     read_scenario,
-    run_command,
     scenario_names,
 )
 from glider_model.vehicle.file import steers_by, vehicle_file, vehicle_path
