@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError, shown
 from glider_bringup.scoring.card import finite, fly_scored
 from glider_bringup.scoring.navigation import FOURTH
 from glider_bringup.scoring.scores import SCORES, studied
-from glider_mission.changes import run_command
+from glider_mission.changes import overlap, run_command
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.plant.sensors import SensorSettings
 from glider_model.plant.trim import solve_trim
@@ -142,14 +143,22 @@ def airframe(vehicle: VehicleParams, plant: VehicleParams) -> dict[str, Any]:
     }
 
 
-def _sample(base: Scenario, seed: int, faults: int) -> dict[str, Any]:
-    """A plant of a scenario by its seed, with as many faults: fields of a scenario."""
+def _drawn(base: Scenario, seed: int, faults: int) -> dict[str, Any]:
+    """What is drawn of a plant of a scenario by its seed, with as many faults."""
     vehicle = load_vehicle(base.vehicle).params()
     plant = sample_plant(seed, vehicle, base.navigation.jumps)
     if base.water.profile is not None or base.water.grid.file:  # the density is told
         plant = {**plant, 'water': {}}
     drawn = sample_faults(seed, faults, base.duration_s)
     return {**plant, 'faults': drawn} if faults else plant
+
+
+def _sample(base: Scenario, seed: int, faults: int) -> dict[str, Any]:
+    """Fields of a scenario for a plant: what is not drawn is as the scenario says."""
+    plant = _drawn(base, seed, faults)
+    for section in ('perturb', 'sensors'):
+        plant[section] = getattr(base, section).model_dump(exclude_defaults=True) | plant[section]
+    return plant
 
 
 def _turn_rate_over_roll(vehicle: VehicleParams, sign: float) -> float | None:
@@ -180,11 +189,12 @@ def make_scenarios(
 ) -> dict[tuple[int, str], Scenario]:
     """Scenario of every flight, by plant and controller.
 
-    Of a scenario by name or path and ``changes``, fields by dotted name; its seed, perturb, water
-    and sensors give way to the plant's, its faults to those drawn, if any are. Raises
-    ConfigurationError, naming field, value and allowed range.
+    Of a scenario by name or path and ``changes``, fields by dotted name. What is drawn of its
+    seed, perturb, water and sensors gives way to the plant's, its faults to those drawn, if any
+    are. Raises ConfigurationError, naming field, value and allowed range.
     """
     base = load_scenario(name, {**changes, 'dives': 0})
+    _check_changes(changes, _drawn(base, seed, faults))
     scenarios = {}
     for plant in range(plants):
         sampled = _sample(base, seed + plant, faults)
@@ -200,6 +210,23 @@ def make_scenarios(
             law = base.control.model_copy(update={'law': controller})
             scenarios[plant, controller] = base.model_copy(update={**sections, 'control': law})
     return scenarios
+
+
+def _check_changes(changes: dict[str, Any], plant: dict[str, Any]) -> None:
+    """Refuse to change what a study says of each flight itself, such as what is drawn."""
+    sections = {'perturb', 'water', 'sensors'}
+    drawn = plant.keys() - sections
+    drawn |= {f'{section}.{name}' for section in sections for name in plant[section]}
+    for field, value in changes.items():
+        if any(overlap(field, one) for one in drawn):
+            why = 'drawn for each plant from --seed (allowed: fields that are not)'
+        elif field == 'control.law':
+            why = 'each plant is flown by each law (allowed: --controller)'
+        elif field == 'dives' and value != 0:
+            why = 'each plant is flown for as long (allowed: --duration)'
+        else:
+            continue
+        raise ConfigurationError(f'--set {field}={shown(value)}: {why}')
 
 
 def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:

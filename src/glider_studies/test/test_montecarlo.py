@@ -271,6 +271,33 @@ def test_command_of_a_plant_flies_it_over_its_own_bottom(tmp_path):
     assert card['bottom']['least_height_m'] > 0.0
 
 
+@pytest.mark.parametrize(
+    ('field', 'value', 'allowed'),
+    [
+        ('seed', 5, 'fields that are not'),
+        ('perturb.K_D0', 1.2, 'fields that are not'),
+        ('sensors', {'gps_std_m': 9.0}, 'fields that are not'),
+        ('water.pycnocline_rise', 0.001, 'fields that are not'),
+        ('control.law', 'pid', '--controller'),
+        ('dives', 4, '--duration'),
+    ],
+)
+def test_what_a_study_says_itself_cannot_be_set(field, value, allowed):
+    """It was accepted, told in the command of each plant, and not flown."""
+    with pytest.raises(ConfigurationError, match=rf'--set {field}=.*allowed: {allowed}'):
+        make_scenarios('reckoned_12deg', {field: value}, ['pid'], 1, 0)
+
+
+def test_what_is_not_drawn_of_sensors_and_vehicle_is_as_it_was_set():
+    told = {'sensors.gyro': False, 'sensors.fix_missed_share': 0.5, 'perturb.roll_range': 0.5}
+    (one,) = make_scenarios('reckoned_12deg', told, ['pid'], 1, 0).values()
+    assert (one.sensors.gyro, one.sensors.fix_missed_share) == (False, 0.5)
+    assert one.perturb.roll_range == 0.5
+    (plain,) = make_scenarios('reckoned_12deg', {}, ['pid'], 1, 0).values()
+    assert one.perturb.K_D0 == plain.perturb.K_D0 != 1.0
+    assert one.sensors.gps_std_m == plain.sensors.gps_std_m
+
+
 def test_a_plant_flies_in_the_water_of_a_cast():
     cast = {'water.profile': [[0.0, 1024.0], [100.0, 1027.0], [1200.0, 1030.0]]}
     for one in make_scenarios('current_12deg', cast, ['pid'], 2, 7).values():
