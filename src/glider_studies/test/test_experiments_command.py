@@ -20,6 +20,7 @@ from glider_base.settings import ConfigurationError
 from glider_bringup import cli
 from glider_bringup.scoring.one_hertz import Recorder
 from glider_mission.changes import parse_assignment
+from glider_mission.planned import horizontal_speed
 from glider_mission.run_folder import make_result_folder
 from glider_mission.scenario import load_scenario
 from glider_model.plant.trim import solve_trim
@@ -47,7 +48,6 @@ from glider_studies.paper.judges import (
     judge_limits,
     judge_survey,
 )
-from glider_studies.paper.measures import horizontal_speed
 from glider_studies.workers import worker_pool
 
 ROW_FIELDS = {'case', 'controller', 'guidance', 'status', 'finite', 'cross_track_m', 'command'}

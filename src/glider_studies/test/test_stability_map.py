@@ -99,12 +99,39 @@ def test_limit_of_physics_is_that_of_the_formula(tmp_path):
     done = glider('trim', 'zhang2021', '--json', '--net-heaviness-kg', 0.4, '--pitch-deg', -30)
     glide = json.loads(done.stdout)
     horizontal = glide['speed_mps'] * math.cos(math.radians(glide['glide_deg'])) / KNOT_MPS
-    assert stability.horizontal_kn == pytest.approx(horizontal, rel=1e-3)
+    assert stability.horizontal_kn == pytest.approx([horizontal] * 2, rel=1e-3)
     for i, speed in enumerate(SPEEDS):
         for j, angle in enumerate(np.radians(ANGLES)):
-            left = stability.horizontal_kn**2 - (speed * math.sin(angle)) ** 2
+            left = horizontal**2 - (speed * math.sin(angle)) ** 2
             holds = left >= 0.0 and math.sqrt(left) + speed * math.cos(angle) > 0.0
-            assert stability.feasible[i, j] == holds, (speed, angle)
+            assert (stability.feasible[:, i, j] == holds).all(), (speed, angle)
+
+
+def test_each_panel_has_the_limit_of_its_own_vehicle_and_glide(tmp_path):
+    """U_h by the balance of weight, lift and drag; all panels were told that of the first."""
+    light = {'profile.net_heaviness_kg': 0.2}
+    who = {
+        'light': light,
+        'heavy': {'profile.net_heaviness_kg': 0.4},
+        'steep': {**light, 'profile.pitch_deg': 50.0},
+        'fouled': {**light, 'vehicle.hydrodynamics.K_D0': 30.0},
+        'seaglider': {**light, 'vehicle': 'seaglider'},
+    }
+    dimensions = {**DIMENSIONS, 'who': {'kind': 'variants', 'variants': who}}
+    stability = load_map(write(tmp_path, [1.0], dimensions=dimensions))
+    told = dict(zip(stability.panels, stability.horizontal_kn, strict=True))
+    assert told['heavy'] == pytest.approx(math.sqrt(2.0) * told['light'], rel=0.01)
+    for name, drag, pitch in ('light', 7.5, 30.0), ('steep', 7.5, 50.0), ('fouled', 30.0, 30.0):
+        angles = np.radians(np.linspace(0.01, 20.0, 200_001))
+        forces = drag + 400.0 * angles**2, 458.0 * angles
+        off = np.abs(np.arctan2(*forces) - np.radians(pitch) - angles)
+        best = int(np.argmin(off))
+        speed = math.sqrt(0.2 * 9.81 / math.hypot(*(force[best] for force in forces)))
+        across = speed * math.cos(math.radians(pitch) + angles[best])
+        assert told[name] == pytest.approx(across / KNOT_MPS, rel=0.01)
+    assert told['seaglider'] == pytest.approx(0.727, rel=0.01)  # ./glider trim
+    rows = {row['panel']: row for row in shares(stability)}
+    assert rows['heavy']['feasible'] > rows['light']['feasible'] > rows['fouled']['feasible']
 
 
 def test_shares_add_up(tmp_path):
@@ -116,7 +143,7 @@ def test_shares_add_up(tmp_path):
     assert rows[0]['stable'] == 0.5 and rows[0]['critical'] == 0.25
     assert rows[0]['infeasible'] == pytest.approx(1.0 / 24.0)
     stability = load_map(tmp_path / 'sweep.nc')
-    held = stability.feasible[:2].sum() / stability.feasible.sum()
+    held = stability.feasible[0, :2].sum() / stability.feasible[0].sum()
     assert rows[0]['stable_of_feasible'] == pytest.approx(held)
 
 

@@ -43,8 +43,7 @@ def draw(
         study.draw_map(stability, image)
     rows = study.shares(stability)
     if as_json:
-        found = {'image': str(image), 'horizontal_kn': stability.horizontal_kn, 'panels': rows}
-        print(json.dumps(found))
+        print(json.dumps({'image': str(image), 'panels': rows}))
         return
     headings = ['share of the cells', *(row['panel'] or 'flights' for row in rows)]
     lines = (
@@ -57,7 +56,8 @@ def draw(
 
 
 def _share(name: str, value: float | None) -> str:
-    """Text of a row of shares: a share, a number of cells, or a dash where there is none."""
+    """Text of a row: a share, a number of cells, a speed, or a dash where there is none."""
     if value is None:
         return '-'
-    return str(value) if name == 'cells' else f'{value:.1%}'
+    forms = {'cells': '{}', 'horizontal_kn': '{:.2f}'}
+    return forms.get(name, '{:.1%}').format(value)

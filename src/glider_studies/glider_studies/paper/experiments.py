@@ -24,13 +24,14 @@ from glider_bringup.scoring.score import Scorer, scores_of
 from glider_guidance.los import crab_heading
 from glider_mission.changes import run_command
 from glider_mission.choices import Combination, combination_of
+from glider_mission.planned import horizontal_speed
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.current_settings import KNOT_MPS
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.perturb import perturbed
 from glider_studies.montecarlo import airframe, sample_plant
 from glider_studies.paper.judges import JUDGES, Check, figure_of, judge_limits
-from glider_studies.paper.measures import MEASURES, horizontal_speed
+from glider_studies.paper.measures import MEASURES
 from glider_studies.workers import Pool, Progress
 
 RESULT_FILE = 'experiments.json'

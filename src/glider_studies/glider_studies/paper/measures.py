@@ -12,9 +12,8 @@ from glider_bringup.scoring.one_hertz import Record
 from glider_bringup.scoring.score import windows
 from glider_bringup.scoring.scores import largest, rms
 from glider_guidance.los import crab_heading
+from glider_mission.planned import horizontal_speed
 from glider_mission.scenario import Scenario
-from glider_model.onboard.glide_polar import make_polar, steady_horizontal_speed
-from glider_model.vehicle.file import Vehicle, load_vehicle
 
 #: Time between two samples of a `Record` (s).
 _SAMPLE_S = 1.0
@@ -116,13 +115,6 @@ def measure_crab(record: Record, scenario: Scenario) -> dict[str, Any]:
     best, _, _ = crab_heading(scenario.path.course_rad(), speed, north, east)
     error = _wrap_deg(record.heading[steady] - math.degrees(best))
     return {'crab_error_deg': _mean(np.abs(error))}
-
-
-def horizontal_speed(scenario: Scenario, vehicle: Vehicle | None = None) -> float:
-    """U_h (m/s) that the polar of its vehicle gives for a scenario's pitch and net heaviness."""
-    polar = make_polar((vehicle or load_vehicle(scenario.vehicle)).params())
-    pitch = -math.radians(scenario.profile.pitch_deg)
-    return steady_horizontal_speed(pitch, scenario.profile.net_heaviness_kg, polar)
 
 
 #: Measurements by their name in the file of experiments.

@@ -7,6 +7,7 @@ physics, |V sin d| = U_h, is a straight line, and where no progress is left, a c
 """
 
 import math
+import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,10 +20,11 @@ from glider_bringup.door.netcdf import read_dataset
 from glider_bringup.showing.figure import new_figure
 from glider_guidance.los import crab_heading
 from glider_mission.disk import save_figure
+from glider_mission.planned import horizontal_speed
 from glider_mission.scenario import Scenario
 from glider_model.ocean.current_settings import KNOT_MPS
 from glider_model.vehicle.file import Vehicle
-from glider_studies.paper.measures import horizontal_speed
+from glider_studies.sweep.netcdf import GLIDE_MPS
 
 #: Largest steady cross-track error of a stable and of a critical flight (m).
 STABLE_M, CRITICAL_M = 10.0, 50.0
@@ -61,8 +63,8 @@ class StabilityMap(NamedTuple):
     angle_deg: np.ndarray  #: float64[m]
     panels: list[str]  #: names of the values of the third dimension; one empty name without
     classes: np.ndarray  #: int[panels, n, m], index of `CLASSES`
-    feasible: np.ndarray  #: bool[n, m], what physics allows
-    horizontal_kn: float  #: U_h, horizontal speed through the water
+    feasible: np.ndarray  #: bool[panels, n, m], what physics allows
+    horizontal_kn: list[float]  #: U_h of each panel, horizontal speed through the water
     measure: Measure
 
 
@@ -96,7 +98,9 @@ def load_map(file: Path, by: str = 'steady') -> StabilityMap:
         raise ConfigurationError(
             f'{file}: {others[0]} has {len(panels)} values (allowed: <= {MAX_PANELS} panels)'
         )
-    horizontal_mps, vehicle = _horizontal_speed(file, data)
+    first_mps, vehicle = _horizontal_speed(file, data)
+    told = data[others[0]].attrs.get(GLIDE_MPS, first_mps) if others else first_mps
+    glides_mps = np.broadcast_to(told, len(panels))
     speeds, angles = data[speed].values, data[angle].values
     return StabilityMap(
         title=data.attrs['title'],
@@ -105,8 +109,8 @@ def load_map(file: Path, by: str = 'steady') -> StabilityMap:
         angle_deg=angles,
         panels=panels,
         classes=classes.reshape(len(panels), len(speeds), len(angles)),
-        feasible=_feasible(horizontal_mps, speeds, angles),
-        horizontal_kn=horizontal_mps / KNOT_MPS,
+        feasible=np.array([_feasible(one, speeds, angles) for one in glides_mps]),
+        horizontal_kn=(glides_mps / KNOT_MPS).tolist(),
         measure=measure,
     )
 
@@ -125,14 +129,15 @@ def _dimensions(file: Path, data: xarray.Dataset) -> tuple[str, str, list[str]]:
 
 
 def _horizontal_speed(file: Path, data: xarray.Dataset) -> tuple[float, str]:
-    """U_h (m/s) that the polar of the vehicle in the file gives, and the vehicle's name."""
+    """U_h (m/s) of the first flight by the polar of its vehicle, and the names of all vehicles."""
     vehicle, scenario = (
         validate(
             model, parse_yaml(data.attrs[f'{what}_yaml'], f'{file}: {what}'), f'{file}: {what}'
         )
         for what, model in (('vehicle', Vehicle), ('scenario', Scenario))
     )
-    return horizontal_speed(scenario, vehicle), vehicle.name
+    others = [key[8:-5] for key in data.attrs if re.fullmatch('vehicle_.+_yaml', key)]
+    return horizontal_speed(scenario, vehicle), ', '.join((vehicle.name, *others))
 
 
 def _classify(data: xarray.Dataset, measure: Measure) -> np.ndarray:
@@ -167,10 +172,17 @@ def shares(stability: StabilityMap) -> list[dict[str, Any]]:
     -------
     list of dict
         ``panel``, ``cells``, a share for each of `CLASSES`, ``feasible`` (share of the cells in
-        which physics allows to hold the path), and ``stable_of_feasible``, None if no cell is.
+        which physics allows to hold the path), ``stable_of_feasible``, None if no cell is, and
+        ``horizontal_kn``, U_h.
     """
-    rows, feasible = [], stability.feasible
-    for name, classes in zip(stability.panels, stability.classes, strict=True):
+    rows = []
+    for name, classes, feasible, horizontal_kn in zip(
+        stability.panels,
+        stability.classes,
+        stability.feasible,
+        stability.horizontal_kn,
+        strict=True,
+    ):
         held = classes[feasible] == CLASSES.index(STABLE)
         rows.append(
             {
@@ -179,6 +191,7 @@ def shares(stability: StabilityMap) -> list[dict[str, Any]]:
                 **{one: float(np.mean(classes == i)) for i, one in enumerate(CLASSES)},
                 'feasible': float(np.mean(feasible)),
                 'stable_of_feasible': float(np.mean(held)) if len(held) else None,
+                'horizontal_kn': horizontal_kn,
             }
         )
     return rows
@@ -239,7 +252,7 @@ def draw_map(stability: StabilityMap, file: Path) -> None:
     axes = figure.subplots(rows, columns, squeeze=False, subplot_kw=polar)
     panels = zip(axes.flat, stability.panels, stability.classes, shares(stability), strict=False)
     for axis, name, classes, share in panels:
-        _draw_panel(axis, stability, classes)
+        _draw_panel(axis, stability, classes, share['horizontal_kn'])
         axis.set_title(_title(name, share))
     for axis in axes.flat[count:]:
         axis.set_visible(False)
@@ -262,11 +275,11 @@ def _title(name: str, share: dict[str, Any]) -> str:
     return f'{name.replace("_", " ")}\n{stable}' if name else stable
 
 
-def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray) -> None:
+def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray, glide: float) -> None:
     """Cells, the path, the limits of physics, and the points of the paper."""
     from matplotlib.colors import ListedColormap
 
-    angles, glide = stability.angle_deg, stability.horizontal_kn
+    angles = stability.angle_deg
     speed = np.maximum(_edges(stability.speed_kn, ALONE_KN), 0.0)
     angle = _edges(angles, ALONE_DEG)
     if len(angles) > 1 and angles[0] >= 0.0 and angles[-1] <= 180.0:
@@ -314,8 +327,9 @@ def _legend(stability: StabilityMap) -> list:
     for name in CLASSES if failed else CLASSES[:-1]:
         text, look = _MEANING[name].format(stability.measure), {'edgecolor': 'black'}
         handles.append(Patch(facecolor=_COLOURS[name], linewidth=0.5, label=text, **look))
+    glides = dict.fromkeys(f'{one:.2f}' for one in stability.horizontal_kn)
     limits = {
-        '-': f'cross current = speed of the glide U_h = {stability.horizontal_kn:.2f} kn',
+        '-': f'cross current = speed of the glide U_h = {", ".join(glides)} kn',
         '--': 'no progress along the path is left',
     }
     for style, what in limits.items():

@@ -16,9 +16,10 @@ import xarray
 from glider_base.kernel import source_digest
 from glider_base.settings import find_field, unit_of
 from glider_mission.changes import VEHICLE
+from glider_mission.planned import horizontal_speed
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import Vehicle
-from glider_studies.sweep.plan import Axis, Plan
+from glider_studies.sweep.plan import Plan
 
 #: Units by how names in a scorecard end, in the spelling of UDUNITS.
 _UNITS = {
@@ -39,6 +40,9 @@ VECTORS = {
     'final_state.attitude_rpy_rad': ('rpy', ('roll', 'pitch', 'yaw')),
     'final_state.velocity_mps': ('frd', ('forward', 'starboard', 'down')),
 }
+#: Parts of a scenario that say how fast it glides, and the attribute of a dimension over them that
+#: has the horizontal speed through the water of each value.
+_GLIDE, GLIDE_MPS = {VEHICLE, 'profile'}, 'horizontal_speed_mps'
 #: Those of before come first: a result keeps a status as its place among them.
 STATUSES = ('completed', 'infeasible', 'failed', 'surfaced', 'lost', 'unfinished')
 #: Names in a result that are no figures, apart from its dimensions.
@@ -70,14 +74,18 @@ def _description_and_unit(name: str) -> tuple[str, str]:
     return (field.description or '', unit_of(field)) if field is not None else ('', '')
 
 
-def _coordinate(axis: Axis) -> tuple[str, np.ndarray, dict[str, str]]:
-    """Dimension, values and attributes of a coordinate."""
+def _coordinate(plan: Plan, number: int) -> tuple[str, np.ndarray, dict[str, Any]]:
+    """Dimension, values and attributes of a coordinate by the number of its dimension."""
+    axis = plan.axes[number]
     description, unit = _description_and_unit(axis.field)
-    attributes = {'long_name': axis.name.replace('_', ' ')}
+    attributes: dict[str, Any] = {'long_name': axis.name.replace('_', ' ')}
     if axis.field:
         attributes['scenario_field'] = axis.field
     if description:
         attributes['description'] = description
+    changed = {field.partition('.')[0] for changes in axis.changes for field in changes}
+    if changed & _GLIDE:
+        attributes[GLIDE_MPS] = [horizontal_speed(one) for one in plan.along(number)]
     if all(isinstance(value, bool) for value in axis.values):
         values = np.array(axis.values, dtype=np.int8)
     elif all(isinstance(value, int | float) for value in axis.values):
@@ -115,7 +123,7 @@ def make_dataset(plan: Plan, records: Iterable[dict[str, Any]]) -> xarray.Datase
             'status': (dimensions, status.reshape(plan.shape), flags),
             'reason': (dimensions, reasons.reshape(plan.shape), why),
         },
-        coords={axis.name: _coordinate(axis) for axis in plan.axes},
+        coords={axis.name: _coordinate(plan, i) for i, axis in enumerate(plan.axes)},
         attrs=_attributes(plan),
     )
     for name in sorted(figures):

@@ -302,18 +302,21 @@ class Plan:
 
         Returns a scenario for each, the first cell's first.
         """
-        checked = []
-        for number, axis in enumerate(self.axes):
-            for i, value in enumerate(axis.values):
-                places = [0] * len(self.axes)
-                places[number] = i
-                try:
-                    checked.append(make_scenario(self.source, self._changes(places)))
-                except ConfigurationError as error:
-                    where = f'{self.path}: dimensions.{axis.name}: {value}'
-                    lines = (f'{where}: {line}' for line in str(error).splitlines())
-                    raise ConfigurationError('\n'.join(lines)) from None
-        return checked
+        return [one for number in range(len(self.axes)) for one in self.along(number)]
+
+    def along(self, number: int) -> list[Scenario]:
+        """Scenario of each value of a dimension by its number, beside the first of the others."""
+        axis, found = self.axes[number], []
+        for i, value in enumerate(axis.values):
+            places = [0] * len(self.axes)
+            places[number] = i
+            try:
+                found.append(make_scenario(self.source, self._changes(places)))
+            except ConfigurationError as error:
+                where = f'{self.path}: dimensions.{axis.name}: {value}'
+                lines = (f'{where}: {line}' for line in str(error).splitlines())
+                raise ConfigurationError('\n'.join(lines)) from None
+        return found
 
     def _changes(self, places: Iterable[int]) -> dict[str, Any]:
         steps = (axis.changes[place] for axis, place in zip(self.axes, places, strict=True))
