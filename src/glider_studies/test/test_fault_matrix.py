@@ -72,3 +72,13 @@ def test_a_clean_mission_that_is_told_of_is_seen():
     assert all(
         one.passed for one in judge_clean([{**told, 'hours': 1e3, 'guard': {'events': []}}])
     )
+
+
+def test_clean_flights_have_all_come_to_their_end():
+    """One of 36 that failed took 30 of 1,080 h with it: a thousand were left, and it passed."""
+    whole = {'hours': 30.0, 'status': 'completed', 'guard': {'events': []}}
+    whole |= {'case': 'any', 'controller': 'pid'}
+    assert all(check.passed for check in judge_clean([whole] * 36))
+    for status in ('failed', 'infeasible'):
+        checks = judge_clean([whole] * 35 + [{**whole, 'status': status}])
+        assert [one.value for one in checks if not one.passed] == [status]

@@ -154,7 +154,7 @@ def judge_stays(rows: list[dict]) -> list[Check]:
 
 
 def judge_clean(rows: list[dict]) -> list[Check]:
-    """Whether the guard had nothing to say, in hours enough."""
+    """Whether the guard had nothing to say, in hours enough, and each flight came to its end."""
     hours = sum(row['hours'] for row in rows if row['status'] == 'completed')
     told = [
         Check(f'{row["case"]}, {row["controller"]}', event['row'], 'nothing reported', False)
@@ -164,7 +164,9 @@ def judge_clean(rows: list[dict]) -> list[Check]:
     enough = Check(
         'hours flown', f'{hours:,.0f} h', f'{LEAST_CLEAN_H:,.0f} h', hours >= LEAST_CLEAN_H
     )
-    return [enough, Check('reported by the guard', str(len(told)), '0', not told), *told]
+    ended = [check for row in rows for check in within(row, {}) if not check.passed]
+    reported = Check('reported by the guard', str(len(told)), '0', not told)
+    return [enough, reported, *told, *ended]
 
 
 def _faults_of(row: dict, deepest_m: float) -> str:
