@@ -58,8 +58,19 @@ def bench(
     Every time stands beside its ratio to a floor, which is measured in the same run: what the
     same work costs without this stack. Use an idle machine.
     """
+    if against and not (against / 'glider').is_file():
+        raise typer.BadParameter(
+            f'{against} has no file glider (allowed: the folder of another checkout)',
+            param_hint="'--against'",
+        )
+    names = picked(only, Section)
+    if only and ('against' in names) != bool(against):
+        raise typer.BadParameter(
+            'neither without the other (allowed: --only against --against DIR)',
+            param_hint="'--only against' / '--against'",
+        )
     figures, options = machine(), {'against': {'checkout': against}}
-    for name in picked(only, Section):
+    for name in names:
         section = importlib.import_module(name)
         with messages.status(name) as status:
 

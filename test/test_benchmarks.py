@@ -94,3 +94,21 @@ def test_bench_of_the_command_line_sends_to_the_script(glider):
     done = glider('bench')
     assert (done.returncode, done.stdout) == (2, '')
     assert './glider' in done.stderr
+
+
+@pytest.mark.parametrize(
+    ('options', 'told'),
+    [
+        (['--against', str(FOLDER)], 'has no file glider'),
+        (['--only', 'against'], 'neither without the other'),
+        (['--only', 'compute', '--against', str(FOLDER.parent)], 'neither without the other'),
+    ],
+)
+def test_bench_beside_no_other_checkout_is_refused(monkeypatch, options, told):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    import bench
+
+    monkeypatch.setattr(bench, 'machine', lambda: pytest.fail('measures'))
+    done = CliRunner().invoke(bench.app, options)
+    output = ' '.join(done.output.replace('│', '').split())
+    assert (done.exit_code, told in output) == (2, True), output
