@@ -336,11 +336,14 @@ def _rows(
 
 
 def pooled(flights: list[dict]) -> dict[str, Any]:
-    """How well vehicles knew where they were, over all surfacings of what is told of them."""
+    """How well vehicles knew where they were, over all surfacings of what is told of them.
 
-    def mean(name: str, weight: str, some: list[dict]) -> float:
+    A figure without data is None.
+    """
+
+    def mean(name: str, weight: str, some: list[dict]) -> float | None:
         weights = sum(one[weight] for one in some)
-        return weights and sum(one[name] * one[weight] for one in some) / weights
+        return sum(one[name] * one[weight] for one in some) / weights if weights else None
 
     later = [error for one in flights for error in one['surfacing_error_m'][FOURTH:]]
     beside = [abs(m) for one in flights for m in one['surfacing_cross_track_m'][FOURTH:]]

@@ -23,6 +23,7 @@ from glider_base.signals import TICK_S
 from glider_bringup.engines.direct import fly_held, held_state, hold
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.again import score_again
+from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.score import Scorer
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.changes import parse_assignment
@@ -41,12 +42,14 @@ from glider_model.vehicle.perturb import (
     perturbed,
 )
 from glider_studies import montecarlo
+from glider_studies.commands.montecarlo import _print_study
 from glider_studies.montecarlo import (
     NAVIGATION,
     RESULT_FILE,
     airframe,
     judge,
     make_scenarios,
+    report,
     sample_plant,
     spread,
 )
@@ -311,6 +314,23 @@ def test_table_names_the_worst_plant_and_its_command():
     for words in ('p50 / p95 / worst', 'statically unstable', 'steer weakly', 'plant 0'):
         assert words in process.stdout
     assert './glider run current_8deg --engine direct --controller pid' in process.stdout
+
+
+@pytest.mark.parametrize('method', ['dead_reckoned', 'known'])
+def test_table_of_a_study_too_short_for_a_fourth_surfacing(method, capsys):
+    """It ended in a traceback, and told a share of 0 where nobody reckoned."""
+    name, changes = 'reckoned_12deg', {**SHORT, 'profile.depth_m': 60.0, 'settle_s': 10.0}
+    changes |= {'profile.surface_every_dives': 1, 'navigation.method': method}
+    (scenario,) = make_scenarios(name, changes, ['pid'], 1, 0).values()
+    _, scores = fly_scored(scenario)
+    flown, frames = {(0, 'pid'): judge(scores)}, {0: {'unstable': 0, 'weak_steering': 0}}
+    study = report(name, changes, 0, 0, flown, frames)
+    _print_study(study)
+    told, printed = study['rows'][0]['navigation'], capsys.readouterr().out
+    assert (told['surfacings'] > 0, told['error_m']) == (True, None)
+    assert (told['ellipse_95_share'] is None) == (method == 'known')
+    assert (told['innovation_squared'] is None) == (method == 'known')
+    assert ('inside the 95 % ellipse' in printed) == (method == 'dead_reckoned')
 
 
 @pytest.mark.parametrize(

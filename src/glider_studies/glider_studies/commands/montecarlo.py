@@ -92,8 +92,9 @@ def _print_study(study: dict) -> None:
     """Print the result of a Monte Carlo study for a person."""
     from glider_bringup.scoring.scores import studied
 
-    def show(figure: dict) -> str:
-        return ' / '.join('-' if x is None else f'{x:,.3f}' for x in figure.values())
+    def show(figure: dict | float | None) -> str:
+        figures = figure.values() if isinstance(figure, dict) else [figure]
+        return ' / '.join('-' if x is None else f'{x:,.3f}' for x in figures)
 
     rows = study['rows']
     told = [row['navigation'] for row in rows]
@@ -101,13 +102,13 @@ def _print_study(study: dict) -> None:
         'diverged': [str(row['diverged']) for row in rows],
         **{label: [show(row[key]) for row in rows] for key, label in studied()},
     }
-    if any(one['ellipse_95_share'] for one in told):
+    if any(one['ellipse_95_share'] is not None for one in told):
         lines |= {
             'surfacings': [f'{one["surfacings"]:,}' for one in told],
             'position error, from the 4th (m)': [show(one['error_m']) for one in told],
             'cross-track, from the 4th (m)': [show(one['cross_track_m']) for one in told],
-            'inside the 95 % ellipse': [f'{one["ellipse_95_share"]:.3f}' for one in told],
-            'innovation squared': [f'{one["innovation_squared"]:.2f}' for one in told],
+            'inside the 95 % ellipse': [show(one['ellipse_95_share']) for one in told],
+            'innovation squared': [show(one['innovation_squared']) for one in told],
         }
     lines |= {
         'plants statically unstable': [str(row['statically_unstable']) for row in rows],

@@ -128,7 +128,7 @@ def judge_hard(rows: list[dict]) -> list[Check]:
             f'{what} of {known["surfacings"]} surfacings',
             known[name],
             f'{low} to {high}',
-            low <= known[name] <= high,
+            known[name] is not None and low <= known[name] <= high,
         )
         for what, name, (low, high) in (
             ('inside 95 %', 'ellipse_95_share', INSIDE),
@@ -142,7 +142,7 @@ def judge_stays(rows: list[dict]) -> list[Check]:
     long = [row for row in rows if row['hours'] >= LONG_H]
     known = pooled([row['navigation'] for row in long])
     what, inside = f'inside 95 % of {known["surfacings"]} surfacings', known['ellipse_95_share']
-    checks = [Check(what, inside, STAY_INSIDE, inside >= STAY_INSIDE)]
+    checks = [Check(what, inside, STAY_INSIDE, (inside or 0.0) >= STAY_INSIDE)]
     short = {row['dive_m']: _later(row) for row in rows if row['hours'] < LONG_H}
     for row in long:
         dac, error = row['navigation']['dac_error_mps']['worst'], _later(row)
