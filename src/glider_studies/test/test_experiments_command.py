@@ -14,6 +14,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import command_line
 from glider_base.settings import ConfigurationError
@@ -120,6 +121,27 @@ def test_a_piece_has_its_place_if_a_tenth_is_lost_without_it():
         'here, idle: cross_track_m.max_steady': False,
         'here, needed: cross_track_m.max_steady': True,
     }
+
+
+def test_a_flight_that_is_cut_short_is_a_verdict_and_a_table(capsys):
+    """They ended in a traceback, after all flights of all groups."""
+    from glider_studies.paper import tables
+
+    built_for = {'built_for': ['here', 'cross_track_m.max_steady']}
+    lost = made_up(case='here, whole', cross_track_m__max_steady=None, status='failed')
+    ablation = [lost, made_up(case='here, piece') | built_for]
+    survey = [made_up(), made_up('pid')]
+    del survey[1]['legs'][1]
+    planned = {'ablation': judge_ablation, 'survey': judge_survey}
+    found = report(
+        [Experiment('', name, '', '', '', [], judge) for name, judge in planned.items()],
+        [ablation, survey],
+    )
+    assert [one['verdict'] for one in found['experiments']] == [FAILED, PASSED]
+    tables.show(found, Console(width=120))
+    shown = capsys.readouterr().out
+    assert 'here, piece: cross_track_m.max_steady = 0.500, allowed -' in shown
+    assert 'leg on course 180 deg' in shown
 
 
 def test_command_of_a_row_flies_the_same_scenario(planned):
@@ -403,8 +425,6 @@ def test_command_prints_one_json_object_and_nothing_else(paths):
 
 
 def test_result_for_a_person_fits_a_narrow_terminal(paths, capsys):
-    from rich.console import Console
-
     from glider_studies.paper import tables
 
     result = json.loads(paths.stdout)

@@ -34,7 +34,7 @@ class Check(NamedTuple):
 
     what: str
     value: float | str | None
-    limit: float | str  #: or what is required
+    limit: float | str | None  #: or what is required
     passed: bool
 
 
@@ -207,10 +207,11 @@ def judge_ablation(rows: list[dict]) -> list[Check]:
     for case, row in by_case.items():
         where, name = row.get('built_for', ('', ''))
         if where and case.startswith(f'{where}, '):
-            least = EARNED * figure_of(by_case[f'{where}, whole'], name)
-            without = figure_of(row, name)
+            whole, without = figure_of(by_case[f'{where}, whole'], name), figure_of(row, name)
+            least = None if whole is None else EARNED * whole
             lost = row['status'] != 'completed' or without is None
-            checks.append(Check(f'{case}: {name}', without, least, lost or without >= least))
+            earned = least is not None and (lost or without >= least)
+            checks.append(Check(f'{case}: {name}', without, least, earned))
     return checks
 
 

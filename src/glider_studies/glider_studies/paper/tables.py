@@ -108,13 +108,16 @@ def _steering(rows: list[dict]) -> list[str]:
 
 def _survey(rows: list[dict], said: dict[str, Any]) -> Table:
     """Closest pass of each waypoint, and the heading in each leg."""
-    legs = rows[0]['legs']
+    legs = max((row['legs'] for row in rows), key=len)
     table = _table(['', *(LAW_NAMES[row['controller']] for row in rows)], [])
     for i in range(len(rows[0]['waypoints_closest_m'])):
         passes = (f'{row["waypoints_closest_m"][i]:.2f} m' for row in rows)
         table.add_row(f'waypoint {i}, closest pass', *passes)
     for i, leg in enumerate(legs):
-        spreads = (f'{row["legs"][i]["heading_spread_deg"]:.1f} deg' for row in rows)
+        spreads = (
+            f'{row["legs"][i]["heading_spread_deg"]:.1f} deg' if i < len(row['legs']) else '-'
+            for row in rows
+        )
         table.add_row(f'leg on course {leg["course_deg"]:.0f} deg, spread of heading', *spreads)
     return table
 
@@ -147,7 +150,11 @@ def _ablation(rows: list[dict], said: dict[str, Any]) -> Table:
         place, name = row.get('built_for', ('', ''))
         if place == where:
             steady = {one: figures(one, piece) for one in places}
-            most = max(places, key=lambda one, by=steady: (by[one][1] or math.inf) / by[one][0])
+            times = {
+                one: (without or math.inf) / whole if whole else 0.0
+                for one, (whole, without) in steady.items()
+            }
+            most = max(places, key=times.get)
             built_for = f'{where}: {name.replace(".", ", ").replace("_", " ")}'
             both = (figures(where, piece, name), steady[most])
             first, second = ([*map(_number, pair)] for pair in both)
