@@ -111,6 +111,16 @@ def test_a_vehicle_that_is_too_light_to_dive_has_not_completed_its_mission(tmp_p
     assert 'Nothing went wrong' not in page
 
 
+@pytest.mark.parametrize('depth_m', [60.0, 100.0])
+def test_dives_count_wherever_the_upper_turn_is(depth_m):
+    """A mission that has flown its dives is over once it is up, and is told so."""
+    profile = {'profile.depth_m': depth_m, 'profile.top_depth_m': 30.0}
+    changes = {'dives': 2, 'duration_s': 4000.0, **profile}
+    _, told = fly_scored(load_scenario('current_8deg', changes), [])
+    assert (told['status'], told['dives']) == ('completed', 2)
+    assert told['sim_time_s'] < 2500.0
+
+
 @pytest.mark.parametrize('status', STATUSES)
 def test_every_status_has_a_colour_of_its_badge(status):
     """White words on a ground of none are not read."""

@@ -28,6 +28,7 @@ class Rules(NamedTuple):
     origin: Origin | None = None  #: of its chart, if people read its places in degrees
     shallowest_m: float = math.inf  #: depth of dives by which they are counted, if less (m)
     dives: int = 0  #: that it is to fly in its time; 0: nobody asks
+    top_m: float = 10.0  #: depth of the upper turn between dives (m)
 
     @property
     def margin_s(self) -> float:

@@ -242,6 +242,7 @@ class Scenario(Settings):
             bathymetry=self._bathymetry(),
             dives=0 if self._holds else self.dives,
             dive_depth_m=self.shallowest_m,
+            dive_top_m=self.profile.top_depth_m,
             afloat_s=self._afloat_s(),
             fitted=[name for name in SENSORS if name in self.topics],
             faults=self.vehicle_faults,
@@ -391,6 +392,7 @@ class Scenario(Settings):
             self.origin.params() if self.is_charted else None,
             self.shallowest_m,
             self._due_dives(),
+            self.profile.top_depth_m,
         )
 
     def _due_dives(self) -> int:

@@ -83,7 +83,7 @@ def _plant_params(vehicle='zhang2021', **density):
         0,
         0,
         0,
-        *dive_depths(1000.0),
+        *dive_depths(1000.0, 10.0),
         SensorSettings().params(0),
         NoFaults(),
         NO_ENERGY,

@@ -43,6 +43,8 @@ LARGEST_ERROR_J = 1e-6
 MOST_STEPS = 256
 #: A dive counts once the vehicle, having been below the first depth, is above the second (m)
 DIVE_BELOW_M, DIVE_ABOVE_M = 30.0, 20.0
+#: or as much deeper as the upper turn is deeper than this (m),
+USUAL_TOP_M = 10.0
 #: but in shallow profiles below and above these shares of their depth.
 DIVE_BELOW_SHARE, DIVE_ABOVE_SHARE = 0.7, 0.6
 #: Time at the surface after the last dive (s).
@@ -106,11 +108,12 @@ class PlantParams(NamedTuple):
     bottom: NamedTuple = NO_BOTTOM  #: flat, or by a chart
 
 
-def dive_depths(depth_m: float) -> tuple[float, float]:
-    """Depths (m) below and then above which a dive of a profile to ``depth_m`` counts."""
+def dive_depths(depth_m: float, top_m: float) -> tuple[float, float]:
+    """Depths (m) below and then above which a dive from ``top_m`` to ``depth_m`` counts."""
+    deeper_m = max(0.0, top_m - USUAL_TOP_M)
     return (
-        min(DIVE_BELOW_M, DIVE_BELOW_SHARE * depth_m),
-        min(DIVE_ABOVE_M, DIVE_ABOVE_SHARE * depth_m),
+        min(DIVE_BELOW_M + deeper_m, DIVE_BELOW_SHARE * depth_m),
+        min(DIVE_ABOVE_M + deeper_m, DIVE_ABOVE_SHARE * depth_m),
     )
 
 
@@ -144,6 +147,9 @@ class PlantSettings(Settings):
     )
     dive_depth_m: float = number(
         1000.0, (1.0, 12000.0), 'depth of the dives, by which they are counted (m)'
+    )
+    dive_top_m: float = number(
+        USUAL_TOP_M, (2.0, 1000.0), 'depth of the upper turn between them, as well (m)'
     )
     afloat_s: float = number(
         0.0,
@@ -189,7 +195,7 @@ class PlantSettings(Settings):
 
     def ends(self) -> dict[str, int | float]:
         """Kernel parameters, by name, of what an order in flight changes: when the run ends."""
-        below, above = dive_depths(self.dive_depth_m)
+        below, above = dive_depths(self.dive_depth_m, self.dive_top_m)
         return {
             'stop_after_dives': self.dives,
             'stop_afloat_ticks': round(self.afloat_s / TICK_S),
