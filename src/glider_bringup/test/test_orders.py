@@ -117,6 +117,23 @@ def test_who_holds_waits_at_the_surface_until_it_is_told_to_resume():
     assert flight.restore(before).until('end', t_s=5000.0).name == 'end'
 
 
+@pytest.mark.parametrize('start', [[0.0, 0.0], [-3000.0, 800.0]], ids=['on it', 'far before it'])
+def test_the_score_of_a_path_that_is_ordered_is_that_of_the_true_motion(start):
+    """North, then east: the way along either, and how far off it was, whatever it believed."""
+    east = {**EAST, 'start': start}
+    fields = {'profile.depth_m': 60.0, 'dives': 1, 'orders': [{'at_s': 500.0, 'path': east}]}
+    run = glider.fly('slocum_shelf', fields)
+    data = run.to_xarray()
+    north, east = (data[f'ground_truth_odom_{name}'].values for name in ('north', 'east'))
+    assert abs(data.odom_east.values - east).max() > 50.0
+    off = np.concatenate((east[:5000], start[0] - north[5000:]))
+    told = run.score['cross_track_m']['max_run'], run.score['distance_along_path_m']
+    along = north[4999] - north[0] + east[-1] - east[5000]
+    assert told == pytest.approx((abs(off).max(), along), abs=0.1)
+    at = [round(10 * t_s) for t_s in run.score['navigation']['surfacing_t_s']]
+    assert run.score['navigation']['surfacing_cross_track_m'] == pytest.approx(off[at], abs=0.1)
+
+
 @pytest.mark.parametrize('when', ['once', 'surfacing'])
 def test_another_path_is_entered_at_its_nearest_point(when):
     flight = ordered({'path': EAST, 'when': when}, **{'profile.surface_every_dives': 1})

@@ -38,7 +38,7 @@ from glider_bringup.scoring.outcome import (
     outcome_of,
 )
 from glider_bringup.scoring.scores import Flown, measured, seconds
-from glider_bringup.scoring.true_motion import TrueMotion
+from glider_bringup.scoring.true_motion import TrueMotion, jumps, told_course
 from glider_control.intake import REFUSED
 from glider_guard.rows import ALL, DROP, LATCHED, NOTE, REACTIONS, ROWS, SURFACE, reaction_of
 from glider_guidance.block import say_no_progress
@@ -71,6 +71,7 @@ _SERIES = (
     *('net_heaviness', 'pitch_mass', 'roll_mass', 'fin'),
 )
 _ODOM, _REFERENCE, _JOINTS = (COLUMNS[name] for name in ('odom', 'reference', 'joint_states'))
+_TARGET = slice(_REFERENCE.start, _REFERENCE.start + 2)
 _E2, _FIRST_JOINT = COLUMNS['tracking_error'].start + 1, _JOINTS.start
 
 
@@ -138,6 +139,8 @@ class Scorer:
         self._blocks: list[np.ndarray] = []
         self._first: np.ndarray | None = None
         self._last: np.ndarray | None = None
+        #: first tick of another path, rows before and at it, and its course there, if told
+        self._reroutes: list[tuple[int, np.ndarray, np.ndarray, float | None]] = []
         self._end: tuple[int, np.ndarray] | None = None
         self._stays: list[dict[str, Any]] = []
 
@@ -157,6 +160,10 @@ class Scorer:
             self._bottom.add(*np.ascontiguousarray(poses_from_wire(log[:, _ODOM])[:, :3].T))
         if self._first is None:
             self._first = self._last = log[0].copy()
+        for row in jumps(log[:, _TARGET], self._last[_TARGET]).tolist():
+            before = (log[row - 1] if row else self._last).copy()
+            tick = self.ticks - len(log) + row
+            self._reroutes.append((tick, before, log[row].copy(), told_course(told[row])))
         no_progress = log[:, COLUMNS['no_progress']]
         for row in begins(no_progress, self._last[COLUMNS['no_progress']]).tolist():
             said = say_no_progress(int(no_progress[row]))
@@ -236,14 +243,21 @@ class Scorer:
         }
 
     def _along_path_m(self) -> float:
-        """Way of the vehicle along its path (m): that of its target, and how far off it ends."""
+        """Way of the vehicle along its path (m): that of its target, and how far off it ends.
+
+        The way from one path to another, to which it is ordered, is none.
+        """
         if self._last is None:
             return 0.0
         target = np.stack((self._series('target_n'), self._series('target_e')), axis=1)
-        courses = self._course_rad, self._course_rad + math.pi  # looking ahead, looking back
-        ahead_m = _along_m(self._first, target, courses[0])
-        behind_m = _along_m(self._last, target[::-1], courses[1])
-        return float(np.sum(np.hypot(*np.diff(target, axis=0).T))) - ahead_m - behind_m
+        begin, first, course, way_m = 0, self._first, self._course_rad, 0.0
+        for tick, before, row, led in (*self._reroutes, (len(target), self._last, None, None)):
+            part = target[begin:tick]
+            ahead_m = _along_m(first, part, course)  # looking ahead, looking back
+            behind_m = _along_m(before, part[::-1], course + math.pi)
+            way_m += float(np.sum(np.hypot(*np.diff(part, axis=0).T))) - ahead_m - behind_m
+            begin, first, course = tick, row, course if led is None else led
+        return way_m
 
     def _actuator_travel(self) -> dict:
         """Ways that the actuators have gone, to and fro."""

@@ -2,15 +2,36 @@
 # SPDX-License-Identifier: Apache-2.0
 """The true motion, as ground_truth/odom tells it, and what it says of the cross-track error."""
 
+import math
+
 import numpy as np
 
 from glider_mission.blocks import COLUMNS
 
 _TRUTH, _ODOM_START = COLUMNS['ground_truth/odom'], COLUMNS['odom'].start
 _ODOM = slice(_ODOM_START, _ODOM_START + 13)
-_E2 = COLUMNS['tracking_error'].start + 1
+_E1, _E2 = COLUMNS['tracking_error'].start, COLUMNS['tracking_error'].start + 1
 #: Of the virtual target.
 _EAST, _NORTH = COLUMNS['reference'].start, COLUMNS['reference'].start + 1
+#: A target that moves farther than this between two ticks (m) is on another path: it moves no
+#: faster than 3 m/s, and a step on board stands for a second at most.
+JUMP_M = 3.0
+#: The course to a target is told by guidance's errors if it is so far away (m).
+_AWAY_M = 1.0
+
+
+def jumps(target: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Rows in which the virtual target, float64[n, 2], is on another path than a row earlier."""
+    steps = np.hypot(*np.diff(target, axis=0, prepend=before[np.newaxis]).T)
+    return np.flatnonzero(steps > JUMP_M)
+
+
+def told_course(row: np.ndarray) -> float | None:
+    """Course of the path (rad) by what guidance tells in a row; None of who is on its target."""
+    east, north = row[[_ODOM_START, _ODOM_START + 1]] - row[[_EAST, _NORTH]]
+    if math.hypot(east, north) <= _AWAY_M:
+        return None
+    return math.atan2(east, north) - math.atan2(row[_E2], row[_E1])
 
 
 class TrueMotion:
@@ -42,24 +63,31 @@ class TrueMotion:
             return log
         true = log.copy()
         true[:, _ODOM] = log[:, _TRUTH]
-        course = self._course_of_target(log[:, [_EAST, _NORTH]])
+        course = self._course_of_target(log)
         east, north = (true[:, i] - log[:, i] for i in (_ODOM_START, _ODOM_START + 1))
         true[:, _E2] += np.cos(course) * east - np.sin(course) * north
         return true
 
-    def _course_of_target(self, target: np.ndarray) -> np.ndarray:
-        """Course (rad) on which the virtual target, float64[n, 2] east and north, has come.
+    def _course_of_target(self, log: np.ndarray) -> np.ndarray:
+        """Course (rad) on which the virtual target of log rows, float64[n, ROW], has come.
 
-        While it stands still its course is the last one it had; before its first move it is that
-        of this move.
+        While it stands still its course is the last one it had. Where a path begins, it is that
+        by which guidance tells where the vehicle is, or of its next move.
         """
+        target = log[:, [_EAST, _NORTH]]
         before = target[0] if self._target is None else self._target
         way = np.diff(target, axis=0, prepend=before[np.newaxis])
-        moves = np.any(way != 0.0, axis=1)
-        if self._target is None and moves.any():
-            first = np.argmax(moves)
-            self._course = float(np.arctan2(way[first, 0], way[first, 1]))
-        last = np.maximum.accumulate(np.where(moves, np.arange(len(way)), -1))
-        course = np.where(last < 0, self._course, np.arctan2(way[last, 0], way[last, 1]))
+        begins = np.zeros(len(way), dtype=bool)
+        begins[jumps(target, before)] = True
+        begins[0] |= self._target is None
+        moves = np.any(way != 0.0, axis=1) & ~begins
+        course = np.arctan2(way[:, 0], way[:, 1])
+        for row in np.flatnonzero(begins).tolist():
+            told, after = told_course(log[row]), np.flatnonzero(moves[row:])
+            if told is None:
+                told = course[row + after[0]] if len(after) else self._course
+            course[row] = told
+        last = np.maximum.accumulate(np.where(moves | begins, np.arange(len(way)), -1))
+        course = np.where(last < 0, self._course, course[last])
         self._target, self._course = target[-1], float(course[-1])
         return course
