@@ -71,6 +71,14 @@ def test_endurance_and_range_are_those_of_the_usable_part(flown):
     assert told['range_km'] == pytest.approx(1e-3 * times * scores['distance_along_path_m'])
 
 
+def test_no_vehicle_flies_on_with_an_empty_battery():
+    """Not even one all of whose battery is usable: then nothing is left to keep."""
+    energy = {'vehicle.energy.capacity.value': 0.6, 'vehicle.energy.usable.value': 1.0}
+    changes = {**SHALLOW, **energy, 'dives': 0, 'duration_s': 2000.0}
+    _, scores = fly_scored(load_scenario('current_8deg', changes), [])
+    assert (scores['status'], scores['guard']['events'][0]['row']) == ('surfaced', 'battery')
+
+
 def test_the_card_says_it(flown):
     scenario, flight, scores, _ = flown
     rows = dict(card_rows(scorecard(scenario, 'direct', flight, scores)))

@@ -27,6 +27,8 @@ from glider_model.vehicle.file import load_vehicle
 STALL_MEAN_S, STALL_SAMPLES = 3.0, 2.0
 #: What is as improbable as this does not happen.
 RARE = 1e-9
+#: Share of a battery of which all is usable that is as good as nothing (-).
+EMPTY = 1e-6
 
 
 class GuardLimitSettings(Settings):
@@ -162,6 +164,7 @@ class GuardSettings(GuardLimitSettings):
     def params(self) -> GuardParams:
         """Kernel parameters."""
         vehicle = load_vehicle(self.vehicle)
+        energy = vehicle.energy
         limits, rated_m, gate = vehicle.params(), vehicle.rated_depth_m, self.gate.params()
         off, slowest = doubt(limits.errors), vehicle.slowest_pump_rate(rated_m)
         return GuardParams(
@@ -183,7 +186,7 @@ class GuardSettings(GuardLimitSettings):
             health=derived(
                 HealthLimits,
                 self,
-                reserve=1.0 - vehicle.energy.usable.value if vehicle.energy else 0.0,
+                reserve=max(1.0 - energy.usable.value, EMPTY) if energy else 0.0,
                 contact_s=self.contact_s or math.inf,
             ),
             weight=WeightLimits(
