@@ -134,6 +134,24 @@ def test_the_score_of_a_path_that_is_ordered_is_that_of_the_true_motion(start):
     assert run.score['navigation']['surfacing_cross_track_m'] == pytest.approx(off[at], abs=0.1)
 
 
+@pytest.mark.parametrize('duration_s', [1000.0, 1800.0], ids=['under way', 'arrived'])
+def test_it_arrives_where_it_is_ordered_to_and_goes_as_deep_as_it_is_ordered(duration_s):
+    corner = {'kind': 'waypoints', 'waypoints': [[0.0, 0.0], [200.0, 0.0], [200.0, 250.0]]}
+    orders = [{'at_s': 60.0, 'path': corner, 'depth_m': 50.0}]
+    fields = {**YO, 'orders': orders, 'current.speed_kn': 0.0, 'duration_s': duration_s}
+    run = glider.fly('current_8deg', fields, duration='full')
+    data, told = run.to_xarray(), run.score['arrival']
+    north, east = (data[f'ground_truth_odom_{name}'].values for name in ('north', 'east'))
+    up = np.flatnonzero(data.stage.values == 7)
+    assert told['arrived'] == bool(len(up)) == (duration_s > 1000.0)
+    at = up[0] if len(up) else -1
+    assert told['missed_m'] == pytest.approx(np.hypot(north[at] - 200.0, east[at] - 250.0))
+    assert told['left_m'] == pytest.approx(0.0 if len(up) else 250.0 - east[-1], abs=2.0)
+    assert told['eta_s'] == pytest.approx(1691.0, abs=100.0)
+    over_m = data.ground_truth_odom_depth.values.max() - 50.0
+    assert run.score['depth_m']['overshoot'] == pytest.approx(over_m)
+
+
 @pytest.mark.parametrize('when', ['once', 'surfacing'])
 def test_another_path_is_entered_at_its_nearest_point(when):
     flight = ordered({'path': EAST, 'when': when}, **{'profile.surface_every_dives': 1})

@@ -108,6 +108,7 @@ def arrival_of(
     tick: int,
     has_arrived: bool,
     rules: Rules,
+    made_m: float | None = None,
 ) -> dict[str, Any] | None:
     """Whether and when a vehicle came to the end of its path; None where that is not its end.
 
@@ -119,6 +120,8 @@ def arrival_of(
         The point of the path that guidance had come to by then (m).
     tick : int
         Of the arrival, else ticks of the run.
+    made_m : float, optional
+        Way made good (m), if orders led to that path: by default what is not left of it.
 
     Returns
     -------
@@ -134,8 +137,9 @@ def arrival_of(
     left_m, eta_s = 0.0, t_s
     if not has_arrived:
         left_m = length - path_closest(*target, 0.0, True, rules.path)
-        made_m = length - left_m
-        eta_s = t_s * length / made_m if made_m >= LEAST_SHARE * length else None
+        made_m = length - left_m if made_m is None else made_m
+        whole_m = made_m + left_m
+        eta_s = t_s * whole_m / made_m if made_m >= LEAST_SHARE * whole_m else None
     return {
         'arrived': has_arrived,
         't_s': t_s if has_arrived else None,

@@ -42,7 +42,8 @@ from glider_bringup.scoring.true_motion import TrueMotion, jumps, told_course
 from glider_control.intake import REFUSED
 from glider_guard.rows import ALL, DROP, LATCHED, NOTE, REACTIONS, ROWS, SURFACE, reaction_of
 from glider_guidance.block import say_no_progress
-from glider_guidance.orders import begins
+from glider_guidance.order import Order
+from glider_guidance.orders import begins, first_ticks
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS
 from glider_mission.rules import Rules
@@ -115,6 +116,8 @@ class Scorer:
         self, scenario: Scenario | None = None, *, vehicle: Vehicle | None = None
     ) -> None:
         faults, bottom, origin = (), NO_BOTTOM, OriginSettings()
+        self._waiting = list(scenario.orders) if scenario else []
+        self._followed: list[Order] = []  #: orders that held
         self.topics = ()  #: that it needs, beside those that are always read
         self._course_rad = 0.0  #: of the path at its start, if the target never moves along it
         self._readings = None
@@ -164,14 +167,25 @@ class Scorer:
             before = (log[row - 1] if row else self._last).copy()
             tick = self.ticks - len(log) + row
             self._reroutes.append((tick, before, log[row].copy(), told_course(told[row])))
+        self._look_for_end(log)
         no_progress = log[:, COLUMNS['no_progress']]
         for row in begins(no_progress, self._last[COLUMNS['no_progress']]).tolist():
             said = say_no_progress(int(no_progress[row]))
             self._stays += [{'t_s': seconds(self.ticks - len(log) + row), 'message': said}]
         self._last = log[-1].copy()
-        at_end = np.flatnonzero(log[:, COLUMNS['stage']] == AT_END_OF_PATH)
+
+    def _look_for_end(self, log: np.ndarray) -> None:
+        """Note which orders hold, and where it first comes to the end of the last path."""
+        begin, stage, path_from = self.ticks - len(log), log[:, COLUMNS['stage']], 0
+        before = np.concatenate(([self._last[COLUMNS['stage']] if begin else -1], stage[:-1]))
+        for row, order in first_ticks(self._waiting, begin, before):
+            self._waiting = [one for one in self._waiting if one is not order and not order.abort]
+            self._followed.append(order)
+            if order.path:
+                self._end, path_from = None, row
+        at_end = path_from + np.flatnonzero(stage[path_from:] == AT_END_OF_PATH)
         if self._end is None and len(at_end):
-            self._end = self.ticks - len(log) + int(at_end[0]), log[at_end[0]].copy()
+            self._end = begin + int(at_end[0]), log[at_end[0]].copy()
 
     @property
     def ticks(self) -> int:
@@ -208,7 +222,7 @@ class Scorer:
             steady=steady,
             scored=scored,
             whole=steady & has_whole_mean,
-            turn_m=rules.depth_m,
+            turn_m=max([rules.depth_m, *(one.depth_m for one in self._followed if one.depth_m)]),
         )
         believed = flown._replace(e2=series('told_e2'))
         turns_m = min(rules.depth_m, rules.shallowest_m), rules.top_m
@@ -274,6 +288,10 @@ class Scorer:
         """How far from the path's end it came up there, None if it did not; see `arrival_of`."""
         if self._last is None:
             return {'end_of_path_m': None, 'arrival': None}
+        made_m = None
+        for path in (order.path for order in self._followed if order.path):
+            rules = rules._replace(path=path.params(), ends=path.at_end == 'stop')
+            made_m = self._along_path_m()
         tick, row = self._end or (self.ticks, self._last)
         odometry, target = _odometry_of(row), self._last[_REFERENCE.start : _REFERENCE.start + 2]
         arrival = arrival_of(
@@ -282,6 +300,7 @@ class Scorer:
             tick=tick,
             has_arrived=self._end is not None,
             rules=rules,
+            made_m=made_m,
         )
         end_m = arrival['missed_m'] if arrival and arrival['arrived'] else None
         return {'end_of_path_m': end_m, 'arrival': arrival}
