@@ -597,6 +597,12 @@ def _check_glide(scenario: Scenario) -> None:
             f'initial.depth_m = {start_m:g}: deeper than the vehicle is rated for (allowed: <= '
             f'{rated_m:g} m, its rated_depth)'
         )
+    bottom_m = scenario.water.bottom_m
+    if bottom_m and start_m > bottom_m and not scenario.bathymetry.file:
+        raise ConfigurationError(
+            f'initial.depth_m = {start_m:g}: below the bottom (allowed: <= {bottom_m:g} m, '
+            'water.bottom_m)'
+        )
 
 
 def _with_known_fields(scenario: Scenario) -> Scenario:

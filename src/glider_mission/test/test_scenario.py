@@ -262,6 +262,13 @@ def test_assignment_of_another_form_is_refused(text):
         parse_assignment(text)
 
 
+def test_no_vehicle_starts_below_the_bottom():
+    changes = {'water.bottom_m': 50.0, 'profile.depth_m': 40.0}
+    assert load_scenario('current_8deg', {**changes, 'initial.depth_m': 50.0})
+    with pytest.raises(ConfigurationError, match=r'initial.depth_m = 80: .*<= 50 m, water'):
+        load_scenario('current_8deg', {**changes, 'initial.depth_m': 80.0})
+
+
 @pytest.mark.parametrize(
     'text', ['profile.depth_m=nan', 'profile.depth_m=.inf', 'profile.depth_m=', 'seed=x']
 )
