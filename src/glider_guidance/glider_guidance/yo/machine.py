@@ -49,7 +49,9 @@ class ProfileSettings(Settings):
         description='profile: sawtooth at fixed pitch over the path; path: full 3-D line of sight',
     )
     depth_m: float = number(1000.0, (10.0, 12000.0), 'depth of the lower turn (m)', tunable=True)
-    top_depth_m: float = number(10.0, (2.0, 1000.0), 'depth of the upper turn between dives (m)')
+    top_depth_m: float = number(
+        10.0, (2.0, 1000.0), 'depth of the upper turn between dives, half of depth_m at most (m)'
+    )
     pitch_deg: float = number(
         30.0, (8.0, 60.0), 'glide pitch, nose down diving and up climbing (deg)', tunable=True
     )
