@@ -148,6 +148,7 @@ def test_it_arrives_where_it_is_ordered_to_and_goes_as_deep_as_it_is_ordered(dur
     assert told['missed_m'] == pytest.approx(np.hypot(north[at] - 200.0, east[at] - 250.0))
     assert told['left_m'] == pytest.approx(0.0 if len(up) else 250.0 - east[-1], abs=2.0)
     assert told['eta_s'] == pytest.approx(1691.0, abs=100.0)
+    assert run.score['sim_time_s'] == pytest.approx(min(duration_s, 1750.0), abs=20.0)
     over_m = data.ground_truth_odom_depth.values.max() - 50.0
     assert run.score['depth_m']['overshoot'] == pytest.approx(over_m)
 

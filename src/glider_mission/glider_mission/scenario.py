@@ -266,7 +266,8 @@ class Scenario(Settings):
 
     def _afloat_s(self) -> float:
         """Time (s) afloat that ends a run: longer than any wait of its mission; 0: never."""
-        if self.path.at_end == 'continue' or self._holds:
+        paths = [self.path, *(one.path for one in self.orders if one.path)]
+        if self._holds or all(path.at_end == 'continue' for path in paths):
             return 0.0
         if not self.profile.surface_every_dives:
             return SURFACE_S
