@@ -176,6 +176,12 @@ def test_vehicle_by_path(edited):
             [1.0, -2.0, 3.0],
             'rigid_body.hull_inertia: value = [1.0, -2.0, 3.0] has a negative component',
         ),
+        (  # beside K_q < 0, which damps, it is easily written so, and was no damping at all
+            'hydrodynamics.linear_angular_damping.value',
+            [0.0, -5.0, -37.0],
+            'hydrodynamics.linear_angular_damping: value = [0.0, -5.0, -37.0] has a negative '
+            'component (allowed: >= 0)',
+        ),
         (
             'rigid_body.hull_inertia.value',
             [1.0, math.nan, 3.0],

@@ -84,10 +84,10 @@ class HydrodynamicsSettings(Settings):
         ge=-1.0,
         le=1.0,
     )
-    linear_damping: vector('kg/s', 'force over u, v, w; mostly none')
-    linear_angular_damping: vector('kg m^2/s', 'moment over p, q, r; mostly none')
-    quadratic_damping: vector('kg/m', 'force over u |u|, v |v|, w |w|; mostly none')
-    quadratic_angular_damping: vector('kg m^2', 'moment over p |p|, q |q|, r |r|; mostly none')
+    linear_damping: vector('kg/s', 'force over u, v, w; > 0 damps; mostly none', True)
+    linear_angular_damping: vector('kg m^2/s', 'moment over p, q, r; > 0 damps', True)
+    quadratic_damping: vector('kg/m', 'force over the square of u, v, w; > 0 damps')
+    quadratic_angular_damping: vector('kg m^2', 'moment over the square of p, q, r; > 0 damps')
 
     @pydantic.model_validator(mode='before')
     @classmethod
