@@ -23,7 +23,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from glider_base.ros.hearing.gids import GID
-from glider_base.ros.lockstep import clock, health, peers
+from glider_base.ros.lockstep import clock, health, peers, step_node
 from glider_base.ros.lockstep.clock import MAX_TICKS_AHEAD, ClockNode
 from glider_base.ros.lockstep.executor import Gate, make_executor
 from glider_base.ros.lockstep.process import Stop
@@ -765,6 +765,23 @@ def test_who_may_be_silent_does_not_tell_a_node_the_time(make_graph):
     before = len(guard.steps)
     assert graph.spin(lambda: len(guard.steps) > before + 5) is None
     assert max(guard.steps) < 10**18
+
+
+def test_health_that_comes_seldom_is_not_counted_as_lost_or_late(make_graph, monkeypatch):
+    """Every fifth tick, as it may: what is told of the line is told of what is due in each."""
+    monkeypatch.setattr(step_node, '_TELL_EVERY_S', 0.0)
+    graph = make_graph(last_tick=10**9, lockstep=False)
+    guard, place, told = graph.blocks[GUARD], SAID.index('health'), {}
+    monkeypatch.setattr(guard, 'event', lambda *said, **counts: told.update(counts))
+    say = graph.plant.publish[place]
+    graph.plant.publish[place] = lambda *said: graph.plant.tick % 5 or say(*said)
+    (demand,) = (one for one in guard.inputs if one.topic.name == 'demand')
+    assert graph.spin(lambda: len(guard.steps) > 12) is None
+    demand.subscription.callback(
+        demand.topic.codec.encode(demand.stamp_ns + 5 * TICK_NS, 3 * (0.0,)), {}
+    )
+    assert graph.spin(lambda: told.get('demand_lost')) is None
+    assert not told.get('health_lost') and not told.get('health_late')
 
 
 @pytest.mark.parametrize(

@@ -120,8 +120,7 @@ class StepNode(TickNode):
     def _newest_ns(self) -> int:
         """Stamp of the newest input; as long as there is none, the time."""
         # who may be silent does not tell the time
-        needed = [item for item in self._ticking if item.topic.name not in WHEN_SILENT]
-        stamp_ns = max(item.stamp_ns for item in needed)
+        stamp_ns = max(item.stamp_ns for item in self._ticking)
         return stamp_ns if stamp_ns >= 0 else self.get_clock().now().nanoseconds
 
     def condition(self) -> health.Condition:
@@ -147,7 +146,8 @@ class StepNode(TickNode):
     @property
     def _ticking(self) -> list[Input]:
         """Inputs of which a message is due in every tick."""
-        return [item for item in self.inputs if item.topic.name not in SAMPLED]
+        seldom = {*SAMPLED, *WHEN_SILENT}
+        return [item for item in self.inputs if item.topic.name not in seldom]
 
     def _count(self) -> None:
         """Count what came late, and tell now and then what was lost or late."""
