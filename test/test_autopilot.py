@@ -145,7 +145,10 @@ def test_it_leaves_when_the_plant_gives_up(waiting):
 @pytest.mark.parametrize(
     ('words', 'said'),
     [
-        (['--ros-args', '-p', 'control_node:law:=bang'], "control_node: parameter law = 'bang'"),
+        (  # in a namespace, where rcl knows no parameter of one node
+            ['--ros-args', '-r', '__ns:=/glider', '-p', 'control_node:law:=bang'],
+            "control_node: parameter law = 'bang'",
+        ),
         (['--ros-args', '-p', 'law:=pid'], 'navigation_node: parameter law: unknown'),
         (['--ros-args', '--params-file', 'nix.yaml'], 'bad command line'),
         (['--ros-args', '-p', 'nonsense'], 'bad command line'),

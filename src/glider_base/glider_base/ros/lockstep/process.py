@@ -4,7 +4,10 @@
 
 import gc
 import os
+import re
 import signal
+import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -23,6 +26,8 @@ from glider_base.settings import ConfigurationError
 _LINGER_S, _LINGER_SENT_AWAY_S = 0.3, 1.0
 #: Where Fast DDS looks for its settings, and ours.
 _FASTDDS, _PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE', Path(__file__).with_name('fastdds.xml')
+#: A parameter of one node: ``control_node:law:=pid``.
+_OF_NODE = re.compile(r'(\w+):(\w[^:=]*):=(.*)', re.DOTALL)
 
 
 class Stop(Exception):  # noqa: N818
@@ -58,7 +63,8 @@ def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _leave_to_rclpy)
     try:
-        rclpy.init(args=args)
+        with tempfile.TemporaryDirectory() as scratch:
+            rclpy.init(args=_in_any_namespace(sys.argv if args is None else args, Path(scratch)))
     except Exception as error:
         return _say(Stop(EXIT_USAGE, f'bad command line: {error}'))
     nodes, stop = [], Stop(0)
@@ -94,6 +100,23 @@ def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return _say(stop)
+
+
+def _in_any_namespace(args: Sequence[str], folder: Path) -> list[str]:
+    """Command line whose ``-p NODE:name:=value`` is for NODE in a namespace, too.
+
+    rcl takes it for one of a node in none, and has no word for others but in a file.
+    """
+    words = list(args)
+    for i, flag in enumerate(words[:-1]):
+        found = _OF_NODE.fullmatch(words[i + 1]) if flag in ('-p', '--param') else None
+        if found:
+            node, name, value = found.groups()
+            file = folder / f'{i}.yaml'
+            text = f'/**/{node}:\n  ros__parameters:\n    {name}: {value}\n'
+            file.write_text(text, encoding='utf-8')
+            words[i : i + 2] = ['--params-file', str(file)]
+    return words
 
 
 def _leave_to_rclpy(number, frame) -> None:
