@@ -118,6 +118,13 @@ def test_a_node_tells_it_once_a_second_and_answers_orders(context):
         assert told(7020)['energy_left_wh'] == 'inf'
         node.on_battery(b'no battery')
         assert told(7030)['energy_left_wh'] == 'inf'
+        # after an abort there are no more orders, as for a flight in one's hands
+        assert node.on_abort(None, Trigger.Response()).success
+        for order in (Parameter('profile.depth_m', value=300.0), Parameter('hold', value=True)):
+            said = node.set_parameters_atomically([order])
+            assert not said.successful and 'the mission is aborted' in said.reason
+        assert 'hold: the mission is aborted' in told(7040)['order']
+        assert node.set_parameters_atomically([Parameter('los.delta2', value=2.0)]).successful
     finally:
         node.close()
         node.destroy_node()

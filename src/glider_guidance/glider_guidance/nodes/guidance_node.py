@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Guidance as a node: odom and battery in; reference, path and mission/status out."""
 
+import re
 import sys
 
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
@@ -28,6 +30,8 @@ from glider_guidance.status import status_of
 #: Number of points of the published path.
 PATH_POINTS = 500
 SECOND_NS = 10**9
+#: Parameters that are orders.
+_ORDER = re.compile(r'path$|hold$|profile\.')
 
 
 class GuidanceNode(BlockNode):
@@ -103,8 +107,13 @@ class GuidanceNode(BlockNode):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]):
         """Set parameters at run time, and answer an order on `mission/status`."""
-        said = super().set_parameters_atomically(parameter_list)
-        names = ', '.join(parameter.name for parameter in parameter_list)
+        named = [parameter.name for parameter in parameter_list]
+        names = ', '.join(named)
+        if self.state.profile.aborted and any(map(_ORDER.match, named)):
+            reason = f'{names}: the mission is aborted (allowed: nothing more)'
+            said = SetParametersResult(successful=False, reason=reason)
+        else:
+            said = super().set_parameters_atomically(parameter_list)
         self.answer = f'taken: {names}' if said.successful else refused(said.reason)
         return said
 
@@ -132,6 +141,7 @@ class GuidanceNode(BlockNode):
 
     def on_abort(self, request, response):
         """Serve ``abort``."""
+        self.waiting.clear()
         self.answer = 'taken: abort'
         self.surface(health.ABORT)
         response.success = True
