@@ -118,6 +118,9 @@ def test_a_node_tells_it_once_a_second_and_answers_orders(context):
         assert told(7020)['energy_left_wh'] == 'inf'
         node.on_battery(b'no battery')
         assert told(7030)['energy_left_wh'] == 'inf'
+        degrees = '{"kind": "waypoints", "waypoints_latlon": [[36.0, 122.0], [36.05, 122.0]]}'
+        said = node.set_parameters_atomically([Parameter('path', value=degrees)])
+        assert not said.successful and 'no chart on board (allowed: waypoints, in m' in said.reason
         # after an abort there are no more orders, as for a flight in one's hands
         assert node.on_abort(None, Trigger.Response()).success
         for order in (Parameter('profile.depth_m', value=300.0), Parameter('hold', value=True)):

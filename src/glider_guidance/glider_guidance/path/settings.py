@@ -161,6 +161,20 @@ class _ThroughWaypoints(_PathSettings):
         'scenario makes of them.',
     )
 
+    @pydantic.model_validator(mode='before')
+    @classmethod
+    def _check_chart(cls, values):
+        if (
+            isinstance(values, dict)
+            and values.get('waypoints_latlon')
+            and 'waypoints' not in values
+        ):
+            raise ValueError(
+                'waypoints_latlon: there is no chart on board (allowed: waypoints, in m north and '
+                'east of the origin)'
+            )
+        return values
+
     @pydantic.field_validator('waypoints')
     @classmethod
     def _check_waypoints(cls, waypoints: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
