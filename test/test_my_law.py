@@ -77,6 +77,7 @@ BROKEN = {
         'gate': ('broken:Law', 'ValueError: its name is taken'),
         'number': ('broken:NUMBER', 'TypeError: it is no subclass of'),
         'bare': ('broken:Bare', 'ValueError: its field gain has no usable default'),
+        'idle': ('broken:Law', 'TypeError: it has no params and no initial_state'),
     },
     'glider.commands': {'dry': ('no_such_module:app', 'ModuleNotFoundError: No module named')},
     'glider.guidance_methods': {'los': ('broken:Law', 'ValueError: its name is taken')},
@@ -89,8 +90,11 @@ NUMBER = 1
 class Law(LawSettings): pass
 class Bare(LawSettings):
     gain: float
+    def params(self, vehicle, bank): pass
+    def initial_state(self): pass
 class Whirl(FieldSettings):
     kind: str = 'eddy'
+    def params(self): pass
 """
 
 

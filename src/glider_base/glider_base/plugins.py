@@ -156,6 +156,8 @@ def _load(point: EntryPoint, base: ClassT, taken: set[str], complete: bool) -> C
     loaded = point.load()
     if not (isinstance(loaded, type) and issubclass(loaded, base)):
         raise TypeError(f'it is no subclass of {base.__module__}.{base.__name__}')
+    if lacking := unwritten(loaded, base):
+        raise TypeError(f'it has no {lacking}')
     try:
         if complete:
             loaded()
@@ -164,6 +166,12 @@ def _load(point: EntryPoint, base: ClassT, taken: set[str], complete: bool) -> C
         field = '.'.join(map(str, first['loc']))
         raise ValueError(f'its field {field} has no usable default: {first["msg"]}') from None
     return loaded
+
+
+def unwritten(one: type, base: type) -> str:
+    """Methods that a subclass has to bring, and has not, as part of a sentence."""
+    names = (name for name in ('params', 'initial_state') if name in vars(base))
+    return ' and no '.join(name for name in names if getattr(one, name) is vars(base)[name])
 
 
 def _origin(point: EntryPoint) -> str:

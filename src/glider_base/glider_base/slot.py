@@ -21,6 +21,7 @@ from typing import Any
 
 from numba.extending import overload
 
+from glider_base.errors import ConfigurationError
 from glider_base.kernels.cache import BODIES, Body
 
 
@@ -38,7 +39,10 @@ def slot(stub: Callable) -> Callable:
         found = bodies.get(params_type)
         if found is None and not getattr(stub, 'is_default', False):
             known = ', '.join(sorted(one.__name__ for one in bodies))
-            raise TypeError(f'{stub.__name__}: no body for {params_type.__name__} (has: {known})')
+            raise ConfigurationError(
+                f'{stub.__name__}: no body for params of type {params_type.__name__} (allowed: a '
+                f'type for which @{stub.__name__}.body has one: {known})'
+            )
         return found or stub
 
     @functools.wraps(stub)
@@ -57,7 +61,8 @@ def slot(stub: Callable) -> Callable:
 
     @overload(call, jit_options={'error_model': 'numpy', 'forceinline': True}, strict=False)
     def choose(*types):
-        found = find(types[position].instance_class)
+        kind = types[position]
+        found = find(getattr(kind, 'instance_class', type(kind)))
         return getattr(found, 'py_func', found)
 
     call.body = body

@@ -567,6 +567,8 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
         (level, {'controller': 'pid'}, ['pid']),
         (three_moments, {}, ['law three_moments', 'expected 2, got 3', 'roll and pitch']),
         (run_cell(CELL.replace('count + 1', 'count + 0.5')), {}, ['law LevelLaw', 'Turns', '0.0']),
+        (run_cell(CELL.replace('def initial', 'def first')), {}, ['LevelLaw', 'no initial_state']),
+        (run_cell(CELL.partition('@law')[0]), {}, ['law_step: no body for params of type Level']),
     ],
 )
 def test_law_that_cannot_be_flown_is_told(law, choices, words):

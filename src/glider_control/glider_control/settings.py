@@ -193,6 +193,8 @@ def check_law(name: str, law: type) -> None:
             f'law {name}: not usable as a name (allowed: letters, digits and _, and none of '
             f'{", ".join(sorted(taken))})'
         )
+    if lacking := plugins.unwritten(law, LawSettings):
+        raise ConfigurationError(f'law {name}: it has no {lacking} (docs/your_law.md has both)')
     try:
         law()
     except pydantic.ValidationError as error:
