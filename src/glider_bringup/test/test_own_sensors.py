@@ -8,6 +8,7 @@ import time
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
@@ -235,6 +236,10 @@ def test_managed_node_acts_while_it_is_active_and_forgets_when_it_is_configured(
 
     try:
         flight.until(change.service_is_ready)
+        for number in (Transition.TRANSITION_ACTIVATE, 99):  # by its number, as managers ask
+            request = ChangeState.Request()
+            request.transition.id = number
+            assert not answer(change, request).success
         assert state_after('configure') == 'inactive'
         flight.wait(1.0)
         assert not vehicle.odom

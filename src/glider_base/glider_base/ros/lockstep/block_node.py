@@ -5,6 +5,7 @@
 import time
 
 from pydantic import Field
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from glider_base.block import Block, Telling, optional_topics
@@ -17,6 +18,8 @@ from glider_base.ros.parameters import changed_parameters, declare_settings
 from glider_base.settings import Settings
 from glider_base.signals import TICK_NS, TICK_S
 from glider_base.wiring import at_rest, present
+
+RCLError = rclpy_implementation.RCLError
 
 
 class BlockSettings(TickSettings):
@@ -70,8 +73,18 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         """Begin, or offer the services of a managed node."""
         if self.ticks.managed and not self.ticks.lockstep:
             LifecycleNodeMixin.__init__(self, enable_communication_interface=True)
+            self._change_state = self._service_change_state.callback
+            self._service_change_state.callback = self.on_change_state
         else:
             super().on_ready()
+
+    def on_change_state(self, request, response):
+        """Serve ``change_state``; rclpy lets a transition that there is not end the process."""
+        try:
+            return self._change_state(request, response)
+        except RCLError:
+            response.success = False
+            return response
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start from nothing, but for an order to come up."""
