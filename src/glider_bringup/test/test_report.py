@@ -494,6 +494,31 @@ def test_mistakes_end_with_one_message_and_exit_code_2(tmp_path, call):
     assert not list(tmp_path.rglob('*.part'))
 
 
+ARRIVAL = {
+    **{'arrived': True, 't_s': 9.0, 'missed_m': 1.0, 'left_m': 0.0, 'eta_s': 9.0},
+    **{'overrun_s': 0.0, 'place_latlon_deg': None},
+}
+EVENT = {'t_s': 1.0, 'row': 'leak', 'reaction': 'surface', 'message': 'wet'}
+
+
+@pytest.mark.parametrize(
+    ('part', 'told'),
+    [
+        ({'arrival': {**ARRIVAL, 't_s': None}}, 'arrival: t_s: not known, though it arrived'),
+        ({'arrival': {**ARRIVAL, 'arrived': False, 'left_m': None}}, 'arrival.left_m = None'),
+        ({'guard': {'events': [{**EVENT, 'row': []}]}}, 'guard.events.0.row = []'),
+        ({'guard': {'events': [{**EVENT, 'reaction': {}}]}}, 'guard.events.0.reaction: should'),
+    ],
+)
+def test_damaged_arrival_or_event_is_named(tmp_path, call, part, told):
+    one = fly(tmp_path)
+    two = altered(one, 'damaged', **part)
+    for use in (('score', two), ('report', two), ('compare', one, two)):
+        code, out, err = call(*use)
+        assert (code, out) == (2, '')
+        assert f'score.json: not a scorecard of this program: {told}' in ' '.join(err.split())
+
+
 def test_figure_needs_no_bag(tmp_path, call):
     folder = fly(tmp_path)
     for suffix, magic in (('png', b'\x89PNG'), ('pdf', b'%PDF'), ('svg', b'<?xml')):

@@ -121,13 +121,30 @@ def _part(names: str = '', **kinds: Any) -> Any:
     return create_model('Part', __base__=_Part if kinds else _Figures, **fields)
 
 
-_Event = _part(t_s=float, message=str)
+_Event = _part(t_s=float, message=str, row=(str, ''), reaction=(str, ''))
 _Fault = _part('t_s end_s', kind=str, message=str, when=str)
 #: What was taken out of the battery (Wh), and how long it lasts.
 _Energy = _part('wh wh_per_dive endurance_days range_km', by=_part('pump hotel masses calls'))
-_Arrival = _part(
-    't_s missed_m left_m eta_s overrun_s', arrived=bool, place_latlon_deg=_Pair | None
-)
+
+
+class _Arrival(_Part):
+    """What became of a mission that ends with its path."""
+
+    arrived: bool
+    t_s: _Figure
+    missed_m: float
+    left_m: float
+    eta_s: _Figure
+    overrun_s: _Figure
+    place_latlon_deg: _Pair | None
+
+    @model_validator(mode='after')
+    def _has_a_time(self):
+        if self.arrived and self.t_s is None:
+            raise ValueError('t_s: not known, though it arrived')
+        return self
+
+
 _Bottom = _part('t_s least_height_m', touched=bool)
 _Surfacing = _part(
     t_s=float,
@@ -144,7 +161,7 @@ _Surfacing = _part(
     dac_believed_mps=_Pair | None,
 )
 _Navigation = _part(
-    'ellipse_95_share',
+    ellipse_95_share=Annotated[float, Field(ge=0.0, le=1.0)] | None,
     method=str,
     surfacings=int,
     fixed=int,
