@@ -285,7 +285,7 @@ def test_navigation_is_told_in_words():
         'Came up 753 m off its path the first time, from surfacing 3 on at most 37 m: the '
         'current was learnt.'
     )
-    assert '5.00 m or less half of the times, by 60 m at worst' in place
+    assert place.endswith('by 5.00 m (median), by 60 m at worst.')
     assert ellipses == 'The 95 % ellipses hold 6 of 6 true places.'
     assert current.endswith('off by 0.019 kn (rms), 0.039 kn at worst.')
     one = navigation_notes(told_of([20.0, 10.0], 2, worst=0.01), learns=True)
@@ -298,6 +298,14 @@ def test_navigation_is_told_in_words():
     once = navigation_notes(told_of([20.0], 1, rms=None), learns=True)
     assert once[0] == 'Came up 20 m off its path.'
     assert len(once) == 3
+    assert once[2] == 'Its 95 % ellipse holds the true place.'
+
+
+def test_two_surfacings_are_told_one_by_one():
+    told = told_of([445.0, 24.0], 2) | {'error_m': {'p50': 700.0, 'p95': 1300.0, 'worst': 1370.0}}
+    came_up, place, *_ = navigation_notes(told, learns=True)
+    assert came_up == 'Came up 445 m off its path the first time, 24 m the second time.'
+    assert place == 'It surfaced off its estimated position by 1,370 m and by 30 m.'
     assert 'never came up' in navigation_notes(told_of([], 0), learns=True)[0]
 
 

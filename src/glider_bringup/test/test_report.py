@@ -250,6 +250,7 @@ def test_run_of_a_few_ticks_has_a_report(tmp_path, seconds):
     text, data = report_of(fly(tmp_path, duration_s=seconds))
     assert data['duration'] == seconds
     assert f'{seconds:g} s' in text.text
+    assert f'limit of 1 kg for {seconds:g} s (100 % of the time)' in text.text
     assert {panel['id'] for panel in data['panels']} >= {'track', 'space', 'depth', 'pitch'}
 
 

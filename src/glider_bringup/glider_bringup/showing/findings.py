@@ -108,16 +108,20 @@ def navigation_notes(told: dict[str, Any], learns: bool) -> list[str]:
         return ['It never came up, so its estimated position was never put to the proof.']
     notes = [_came_up(off, learns)]
     error = told['error_m']
-    if len(off) > 1:
-        notes.append(
-            f'It surfaced off its estimated position: by {small(error["p50"])} or less '
-            f'half of the times, by {small(error["worst"])} at worst.'
-        )
+    worst = small(error['worst'])
+    if len(off) == 1:
+        notes.append(f'It came up {worst} off its estimated position.')
+    elif len(off) == 2:  # p50 is their mean
+        other = small(abs(2.0 * error['p50'] - error['worst']))
+        notes.append(f'It surfaced off its estimated position by {worst} and by {other}.')
     else:
-        notes.append(f'It came up {small(error["worst"])} off its estimated position.')
+        text = f'It surfaced off its estimated position by {small(error["p50"])} (median)'
+        notes.append(f'{text}, by {worst} at worst.')
     if told['ellipse_95_share'] is not None:
         inside = round(told['ellipse_95_share'] * len(off))
-        text = f'The 95 % ellipses hold {inside} of {count(len(off), "true place")}'
+        text = f'The 95 % ellipses hold {inside} of {len(off)} true places'
+        if len(off) == 1:
+            text = f'Its 95 % ellipse {"holds" if inside else "does not hold"} the true place'
         # by chance, were each in its ellipse in 95 % of all cases
         chance = sum(
             math.comb(len(off), k) * 0.95**k * 0.05 ** (len(off) - k) for k in range(inside + 1)
@@ -138,6 +142,8 @@ def _came_up(off: list[float], learns: bool) -> str:
     text = f'Came up {small(off[0])} off its path'
     if len(off) == 1:
         return f'{text}.'
+    if len(off) == 2:
+        return f'{text} the first time, {small(off[1])} the second time.'
     rest = (i for i in range(1, len(off) - 1) if max(off[i:]) <= LEARNT_SHARE * off[0])
     since = next(rest, None)
     if since is None or not learns:
@@ -174,7 +180,9 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
         return span(time_s) if time_s else 'the start'
 
     def share(ticks: int) -> str:
-        return f'{span(ticks * TICK_S)} ({100.0 * ticks / traces.ticks:.2g} % of the time)'
+        percent = 100.0 * ticks / traces.ticks
+        text = f'{percent:.0f}' if percent >= 10.0 else f'{percent:.2g}'
+        return f'{span(ticks * TICK_S)} ({text} % of the time)'
 
     told = reckoned(card)
     problems, notes = _how_bad(card, traces), []
