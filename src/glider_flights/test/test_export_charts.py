@@ -182,6 +182,8 @@ def test_a_run_of_no_date_is_refused_unless_it_is_told(tmp_path):
     assert 'origin.time' in told('--to', 'og1')
     assert 'allowed: as 2026-03-01' in told('--to', 'og1', '--start', 'noon')
     assert 'not of mat' in told('--to', 'mat', '--start', '2026-03-01')
+    full = told('--to', 'og1', '--start', '2026-03-01', '--out', '/dev/full')
+    assert full == '/dev/full: cannot be written: No space left on device'
     words = ['export', str(run.folder), '--to', 'og1', '--start', '2026-03-01T06:00']
     assert CliRunner().invoke(app, words, catch_exceptions=False).exit_code == 0
     with xarray.open_dataset(run.folder / 'run.og1.nc', engine='h5netcdf') as read:

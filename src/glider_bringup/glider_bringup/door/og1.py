@@ -9,11 +9,13 @@ https://oceangliderscommunity.github.io/OG-format-user-manual/OG_Format.html
 
 from collections.abc import Callable
 from datetime import datetime, timezone
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
+from xarray.backends import H5NetCDFStore
 
 from glider_base.errors import ConfigurationError
 from glider_base.frames import on_chart, poses_from_wire
@@ -22,7 +24,7 @@ from glider_bringup.door.tracks import start_of
 from glider_bringup.scoring.card import read_score
 from glider_bringup.scoring.one_hertz import SECOND, Rows
 from glider_mission.blocks import COLUMNS
-from glider_mission.disk import whole_file
+from glider_mission.disk import write_whole
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.recorded_log import read_back
@@ -94,7 +96,7 @@ def write_og1(
         written.
     """
     try:
-        import h5netcdf  # noqa: F401 - xarray writes NetCDF 4 through it
+        import h5netcdf  # xarray writes NetCDF 4 through it
     except ImportError:
         raise ConfigurationError(
             'h5netcdf, which writes NetCDF 4, is not installed; install it with: '
@@ -119,13 +121,14 @@ def write_og1(
         if not len(rows):
             raise ConfigurationError(f'{run}: no tick was recorded (allowed: one and more)')
         dataset = flight_dataset(rows, scenario, card, began_s)
-    with whole_file(file) as stream:
-        dataset.to_netcdf(
-            stream.name,
-            engine='h5netcdf',
+    memory = BytesIO()  # where a disk is full HDF5 ends the process
+    with h5netcdf.File(memory, 'w') as store:
+        dataset.dump_to_store(
+            H5NetCDFStore(store),
             unlimited_dims=[DIMENSION],
             encoding={name: _encoding(dataset[name]) for name in dataset.variables},
         )
+    write_whole(file, memory.getvalue())
 
 
 def _encoding(variable: xarray.DataArray) -> dict[str, Any]:
