@@ -194,7 +194,8 @@ def test_report_of_a_launched_run_and_of_its_bag_alone(flown, tmp_path, call):
 
 def test_report_without_a_bag_is_made_of_what_was_kept(tmp_path, call):
     folder = fly(tmp_path)
-    assert call('report', folder, '--out', tmp_path / 'page.html')[0] == 0
+    code, out, _ = call('report', folder, '--out', tmp_path / 'page.html', '--json')
+    assert (code, json.loads(out)['file']) == (0, str(tmp_path / 'page.html'))
     _, data = read_page(tmp_path / 'page.html')
     assert data['duration'] == 300.0
 

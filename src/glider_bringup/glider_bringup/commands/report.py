@@ -34,7 +34,8 @@ def report(
         flown = read_run(run, update)
     with messages.status('writing the report'):
         write_whole(file, report_page(flown))
-    print_status(flown.card)
+    if not as_json:
+        print_status(flown.card)
     print_written('report', run, file, as_json)
     if show and not webbrowser.open(file.resolve().as_uri()):
         messages.print(f'no browser found; open {file} in one', style='red', soft_wrap=True)
