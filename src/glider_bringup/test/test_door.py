@@ -33,6 +33,7 @@ from glider_base.kernel import compiling_told
 from glider_base.settings import ConfigurationError
 from glider_bringup import console
 from glider_bringup.cli import OF_THE_SCRIPT, app
+from glider_bringup.door.export import write_mat
 
 #: Half of what is named north, east and down in the world of topics: x east, y north, z up.
 ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -391,6 +392,16 @@ def test_netcdf_keeps_numbers_units_and_attributes(export, data):
         assert yaml.safe_load(read.attrs['scenario_yaml'])['name'] == data.attrs['scenario']
         assert json.loads(read.attrs['score_json'])['seed'] == data.attrs['seed']
         assert 'zhang2021' in read.attrs['vehicle_yaml']
+
+
+def test_run_that_is_too_large_for_a_mat_file_is_refused(tmp_path):
+    """MATLAB reads no variable of 2 GB and more from such a file, and scipy writes none of 4."""
+    row = np.broadcast_to(0.0, 2**28)
+    one = ('time', row, {'units': 'm', 'long_name': 'depth'})
+    data = xarray.Dataset({'depth': one}, coords={'time': one})
+    with pytest.raises(ConfigurationError, match=r'run\.mat: .* 4\.3 GB .*allowed: netcdf, csv'):
+        write_mat(data, tmp_path / 'run.mat', print)
+    assert not list(tmp_path.iterdir())
 
 
 def test_csv_has_one_row_a_tick_under_names_with_units(export, data):

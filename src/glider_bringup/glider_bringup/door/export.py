@@ -9,6 +9,7 @@ from pathlib import Path
 import xarray
 from scipy.io import savemat
 
+from glider_base.errors import ConfigurationError
 from glider_bringup.door.netcdf import write_dataset
 from glider_bringup.door.run import Run
 from glider_mission.disk import whole_file
@@ -17,6 +18,8 @@ from glider_model.vehicle.file import vehicle_file
 
 #: Rows of a CSV file that are written at once: an hour.
 _ROWS = 36_000
+#: A variable of a MAT-file of version 5 has to be smaller.
+MAT_BYTES = 2**31
 
 #: Called with the rows that are written.
 Progress = Callable[[int], None]
@@ -56,7 +59,17 @@ def write_mat(dataset: xarray.Dataset, file: Path, progress: Progress) -> None:
 
     The fields of the first three are called alike; ``flags`` says what the numbers of a state or
     mask mean, ``about`` what was flown.
+
+    Raises
+    ------
+    ConfigurationError
+        If there are more numbers than such a file may have in a struct.
     """
+    if dataset.nbytes >= MAT_BYTES:
+        raise ConfigurationError(
+            f'{file}: cannot be written: the run has {dataset.nbytes / 1e9:.1f} GB of numbers, '
+            f'and a MAT-file takes less than {MAT_BYTES / 1e9:.1f} GB (allowed: netcdf, csv)'
+        )
     variables = {'time': dataset['time'], **dataset.data_vars}
     content = {
         'data': {name: variable.values for name, variable in variables.items()},
