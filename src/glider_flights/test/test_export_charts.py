@@ -118,6 +118,31 @@ def test_geojson_is_valid_and_where_the_vehicle_was(export, flown):
     assert len(surfacings) == len(flown.score['navigation']['reports'])
 
 
+def test_lines_are_cut_where_they_cross_the_date_line(tmp_path):
+    """No line goes round the world, and the box is small."""
+    path = {**CHANGES['path'], 'waypoints_latlon': [(36.0, 179.9999), (36.0, -179.99)]}
+    current = {'speed_kn': 1.0, 'direction_deg': 90.0}
+    changes = {'path': path, 'current': current, 'origin.time': '2026-03-01'}
+    run = glider.fly('survey', changes, duration=60.0, out=tmp_path / 'run', bag=True)
+
+    def exported(kind: str):
+        words = ['export', str(run.folder), '--to', kind, '--out', str(tmp_path / kind)]
+        assert CliRunner().invoke(app, words, catch_exceptions=False).exit_code == 0
+        return tmp_path / kind
+
+    route, track = json.loads(exported('geojson').read_text())['features']
+    for line in (route, track):
+        west, east = line['geometry']['coordinates']
+        assert (west[-1][0], east[0][0]) == (180.0, -180.0)
+        assert max(np.ptp([place[0] for place in part]) for part in (west, east)) < 0.02
+    times = track['properties']['times']
+    assert [len(part) for part in times] == [len(west), len(east)]
+    pytest.importorskip('h5netcdf')
+    with xarray.open_dataset(exported('og1'), engine='h5netcdf') as read:
+        assert read.geospatial_lon_min == pytest.approx(179.9999, abs=1e-5)
+        assert -180.0 <= read.geospatial_lon_max < -179.99
+
+
 def test_kml_and_gpx_say_the_same_as_geojson(export):
     fastkml, gpxpy = pytest.importorskip('fastkml'), pytest.importorskip('gpxpy')
     features = json.loads(export('geojson').read_text())['features']

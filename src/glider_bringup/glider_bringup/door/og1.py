@@ -219,6 +219,9 @@ def _compact(time_s: float) -> str:
 def _about(
     dataset: xarray.Dataset, scenario: Scenario, card: dict, serial: str, day: str
 ) -> dict[str, str]:
+    # over the date line the westernmost is the larger one
+    east = np.unwrap(dataset['LONGITUDE'], period=360.0)
+    west, east = ((float(one) + 180.0) % 360.0 - 180.0 for one in (east.min(), east.max()))
     nobody, now = 'not given', _compact(datetime.now(timezone.utc).timestamp())
     return {
         'Conventions': 'CF-1.10, OG-1.0',
@@ -243,8 +246,8 @@ def _about(
         'history': f'{now} written by ./glider export --to og1',
         'geospatial_lat_min': float(dataset['LATITUDE'].min()),
         'geospatial_lat_max': float(dataset['LATITUDE'].max()),
-        'geospatial_lon_min': float(dataset['LONGITUDE'].min()),
-        'geospatial_lon_max': float(dataset['LONGITUDE'].max()),
+        'geospatial_lon_min': west,
+        'geospatial_lon_max': east,
         'scenario_yaml': scenario.to_yaml(vehicle=VEHICLE_FILE),
         'vehicle_yaml': vehicle_file(scenario.vehicle).decode(),
     }

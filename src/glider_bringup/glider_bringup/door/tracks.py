@@ -5,7 +5,9 @@
 Where the vehicle was and where it believed to be, its waypoints, and where it came up.
 """
 
+import itertools
 import json
+import math
 from datetime import datetime, timedelta, timezone
 from itertools import zip_longest
 from pathlib import Path
@@ -121,6 +123,23 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
     )
 
 
+def _cut(places: list[list[float]], times: list[str]) -> tuple[list, list]:
+    """A line, longitude first, in parts on one side of the date line each; so are its times."""
+    parts, said = [places[:1]], [times[:1]]
+    for k, (one, after) in enumerate(itertools.pairwise(places), 1):
+        if abs(after[0] - one[0]) > 180.0:
+            edge = math.copysign(180.0, one[0])
+            share = (edge - one[0]) / ((after[0] + 2.0 * edge - one[0]) or 1.0)
+            rest = [a + share * (b - a) for a, b in zip(one[1:], after[1:], strict=True)]
+            parts[-1].append([edge, *rest])
+            parts.append([[-edge, *rest]])
+            said[-1] += times[k : k + 1]
+            said.append(times[k : k + 1])
+        parts[-1].append(after)
+        said[-1] += times[k : k + 1]
+    return parts, said
+
+
 def geojson(chart: Chart) -> bytes:
     """A FeatureCollection: lines of route and tracks, points of surfacings."""
 
@@ -131,13 +150,19 @@ def geojson(chart: Chart) -> bytes:
         geometry = {'type': kind, 'coordinates': coordinates}
         return {'type': 'Feature', 'properties': told, 'geometry': geometry}
 
+    def way(name: str, places: list[list[float]], times: list[str]) -> dict[str, Any]:
+        parts, said = _cut(places, times)
+        kind, inside, when = ('LineString', parts[0], said[0])
+        if len(parts) > 1:
+            kind, inside, when = ('MultiLineString', parts, said)
+        return feature(kind, inside, name=name, **({'times': when} if times else {}))
+
     features = []
     if chart.route:
-        features.append(feature('LineString', [at(place) for place in chart.route], name='route'))
+        features.append(way('route', [at(place) for place in chart.route], []))
     for line in chart.lines:
-        told = {'name': line.name} | ({'times': line.times} if line.times else {})
         pairs = zip(line.places, line.depths_m, strict=True)
-        features.append(feature('LineString', [at(*pair) for pair in pairs], **told))
+        features.append(way(line.name, [at(*pair) for pair in pairs], line.times))
     for point in chart.surfacings:
         told = {'name': point.name} | ({'time': point.time} if point.time else {}) | point.told
         features.append(feature('Point', at(point.place), **told))
