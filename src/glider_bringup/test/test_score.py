@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from glider_base.signals import TICK_S
 from glider_bringup.scoring.score import Scorer
-from glider_guidance.path.settings import WaypointPath
+from glider_guidance.path.settings import HelixPath, WaypointPath
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.rules import Rules
@@ -267,7 +267,7 @@ def test_end_of_the_path_is_told_from_where_the_vehicle_came_up():
     t = ticks(100.0)
     log = make_log(t, north=np.where(t < 60.0, 3.0 + 0.0 * t, t), east=4.0, depth=0.5)
     path = WaypointPath(kind='waypoints', waypoints=[(-400.0, 0.0), (0.0, 0.0)]).params()
-    log[:, COLUMNS['reference'].start + 1] = -100.0  # north of the target
+    log[:, COLUMNS['reference'].start + 1] = np.linspace(-400.0, -100.0, len(log))  # to the north
     told = score(log, path=path, ends=True, duration_s=70.0)
     assert told['end_of_path_m'] is None
     on_the_way = told['arrival']
@@ -284,6 +284,36 @@ def test_end_of_the_path_is_told_from_where_the_vehicle_came_up():
     assert arrival['arrived']
     assert arrival['t_s'] == pytest.approx(50.1, abs=1e-6)
     assert (arrival['left_m'], arrival['overrun_s'], arrival['place_latlon_deg']) == (0, 0, None)
+
+
+@pytest.mark.parametrize(
+    ('path', 'where', 'left_m'),
+    [
+        # there and back on one line, three quarters of it
+        (
+            WaypointPath(kind='waypoints', waypoints=[(0.0, 0.0), (200.0, 0.0), (0.0, 0.0)]),
+            lambda way_m: (200.0 - abs(300.0 * way_m - 200.0), 0.0 * way_m),
+            100.0,
+        ),
+        # two turns of three, from the south round by the west
+        (
+            HelixPath(kind='helix', radius_m=50.0, turns=3.0, course_deg=270.0, slope_deg=0.0),
+            lambda way_m: (
+                -50.0 * np.cos(4.0 * math.pi * way_m),
+                -50.0 * np.sin(4.0 * math.pi * way_m),
+            ),
+            100.0 * math.pi,
+        ),
+    ],
+)
+def test_way_that_is_left_of_a_path_that_comes_by_again(path, where, left_m):
+    t = ticks(100.0)
+    north, east = where(t / t[-1])
+    log = make_log(t, target_n=north, target_e=east)
+    told = score(log, path=path.params(), ends=True)['arrival']
+    length_m = path.params().knots[-1]
+    assert told['left_m'] == pytest.approx(left_m, abs=0.1)
+    assert told['eta_s'] == pytest.approx(100.0 * length_m / (length_m - left_m), rel=1e-3)
 
 
 def test_overshoot_is_what_is_beyond_the_target():

@@ -18,7 +18,7 @@ from glider_guard.block import TELL_EVERY_NS
 from glider_guard.rows import DROPS, ROWS, SURFACES
 from glider_guard.settings import GuardLimitSettings
 from glider_guard.witness import AFLOAT_M
-from glider_guidance.path.curve import path_closest, path_length, path_point
+from glider_guidance.path.curve import PathParams, path_closest, path_length, path_point
 from glider_mission.rules import Rules
 from glider_model.ocean.bottom import least_height
 
@@ -28,6 +28,8 @@ UNFINISHED = 'unfinished'
 LIMITS = GuardLimitSettings()
 #: The pace is known once so much of the path has been made good (-).
 LEAST_SHARE = 0.02
+#: Points of a path that are no farther apart (m) are one.
+SAME_M = 0.01
 #: All has been done for so long (s), and the vehicle has not come up by this (m): nothing is left.
 TRIES_S, CLIMBS_M = 600.0, 5.0
 
@@ -104,11 +106,11 @@ def _beyond(depth: np.ndarray, limit_m: float, what: str) -> str:
 
 def arrival_of(
     place: tuple[float, float],
-    target: tuple[float, float],
+    targets: np.ndarray,
     tick: int,
+    since: int,
     has_arrived: bool,
     rules: Rules,
-    made_m: float | None = None,
 ) -> dict[str, Any] | None:
     """Whether and when a vehicle came to the end of its path; None where that is not its end.
 
@@ -116,12 +118,12 @@ def arrival_of(
     ----------
     place : tuple of 2 float
         True one at the arrival, else at the end of the run, north and east (m).
-    target : tuple of 2 float
-        The point of the path that guidance had come to by then (m).
+    targets : float64[ticks, 2]
+        The points of the path that guidance had come to, north and east (m), since it follows it.
     tick : int
         Of the arrival, else ticks of the run.
-    made_m : float, optional
-        Way made good (m), if orders led to that path: by default what is not left of it.
+    since : int
+        Tick from which the path is followed.
 
     Returns
     -------
@@ -132,14 +134,14 @@ def arrival_of(
     """
     if rules.path is None or not rules.ends:
         return None
-    t_s, length = seconds(tick), path_length(rules.path)
+    t_s, length = seconds(tick), float(path_length(rules.path))
     end = path_point(length, rules.path)
     left_m, eta_s = 0.0, t_s
     if not has_arrived:
-        left_m = length - path_closest(*target, 0.0, True, rules.path)
-        made_m = length - left_m if made_m is None else made_m
-        whole_m = made_m + left_m
-        eta_s = t_s * whole_m / made_m if made_m >= LEAST_SHARE * whole_m else None
+        began_m, come_m = _come_from_to(targets, rules.path)
+        left_m, made_m = length - come_m, come_m - began_m
+        pace_s = (t_s - seconds(since)) / made_m if made_m >= LEAST_SHARE * length else None
+        eta_s = None if pace_s is None else t_s + left_m * pace_s
     return {
         'arrived': has_arrived,
         't_s': t_s if has_arrived else None,
@@ -149,6 +151,35 @@ def arrival_of(
         'overrun_s': None if eta_s is None else max(0.0, eta_s - rules.duration_s),
         'place_latlon_deg': list(to_geodetic(*place, rules.origin)) if rules.origin else None,
     }
+
+
+def _come_from_to(targets: np.ndarray, path: PathParams) -> tuple[float, float]:
+    """Parameters of the path (m) at the first and the last of the points on it.
+
+    Where the path comes by a point again, it is the time that fits the way between the two.
+    """
+    began_m = float(path_closest(*targets[0], 0.0, True, path))
+    way_m = float(np.sum(np.hypot(*np.diff(targets, axis=0).T)))
+    way_m += np.interp(began_m, path.knots, path.ways)
+    likely_m = float(np.interp(way_m, path.ways, path.knots))
+    found = [_closest_on(i, targets[-1], path) for i in range(len(path.knots) - 1)]
+    near_m = min(off_m for _, off_m in found) + SAME_M
+    come = min((s for s, off_m in found if off_m <= near_m), key=lambda s: abs(s - likely_m))
+    return began_m, come
+
+
+def _closest_on(i: int, point: np.ndarray, path: PathParams) -> tuple[float, float]:
+    """Parameter of the point on a piece of a path that is closest, and how far it is off (m)."""
+    start, end = path.knots[i : i + 2]
+    flat, steep = math.cos(path.slope), math.sin(path.slope)
+    piece = path._replace(
+        knots=np.array([0.0, end - start]),
+        coefficients=path.coefficients[i : i + 1],
+        bearing=path.bearing + (path.turn * start * flat / path.radius if path.radius else 0.0),
+        start_d=path.start_d + start * steep,
+    )
+    s = path_closest(*point, 0.0, True, piece)
+    return float(start + s), math.dist(point, path_point(s, piece)[:2])
 
 
 class BottomWatch:

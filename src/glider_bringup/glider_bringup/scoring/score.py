@@ -118,6 +118,7 @@ class Scorer:
         faults, bottom, origin = (), NO_BOTTOM, OriginSettings()
         self._waiting = list(scenario.orders) if scenario else []
         self._followed: list[Order] = []  #: orders that held
+        self._path_since = 0  #: tick from which the last path is followed
         self.topics = ()  #: that it needs, beside those that are always read
         self._course_rad = 0.0  #: of the path at its start, if the target never moves along it
         self._readings = None
@@ -182,7 +183,7 @@ class Scorer:
             self._waiting = [one for one in self._waiting if one is not order and not order.abort]
             self._followed.append(order)
             if order.path:
-                self._end, path_from = None, row
+                self._end, path_from, self._path_since = None, row, begin + row
         at_end = path_from + np.flatnonzero(stage[path_from:] == AT_END_OF_PATH)
         if self._end is None and len(at_end):
             self._end = begin + int(at_end[0]), log[at_end[0]].copy()
@@ -256,6 +257,10 @@ class Scorer:
             'final_state': self._final_state(),
         }
 
+    def _targets(self) -> np.ndarray:
+        """Points of the path that guidance had come to, north and east, float64[ticks, 2]."""
+        return np.stack((self._series('target_n'), self._series('target_e')), axis=1)
+
     def _along_path_m(self) -> float:
         """Way of the vehicle along its path (m): that of its target, and how far off it ends.
 
@@ -263,7 +268,7 @@ class Scorer:
         """
         if self._last is None:
             return 0.0
-        target = np.stack((self._series('target_n'), self._series('target_e')), axis=1)
+        target = self._targets()
         begin, first, course, way_m = 0, self._first, self._course_rad, 0.0
         for tick, before, row, led in (*self._reroutes, (len(target), self._last, None, None)):
             part = target[begin:tick]
@@ -288,19 +293,17 @@ class Scorer:
         """How far from the path's end it came up there, None if it did not; see `arrival_of`."""
         if self._last is None:
             return {'end_of_path_m': None, 'arrival': None}
-        made_m = None
         for path in (order.path for order in self._followed if order.path):
             rules = rules._replace(path=path.params(), ends=path.at_end == 'stop')
-            made_m = self._along_path_m()
         tick, row = self._end or (self.ticks, self._last)
-        odometry, target = _odometry_of(row), self._last[_REFERENCE.start : _REFERENCE.start + 2]
+        odometry = _odometry_of(row)
         arrival = arrival_of(
             place=(odometry.p_n, odometry.p_e),
-            target=(float(target[1]), float(target[0])),
+            targets=self._targets()[self._path_since :],
             tick=tick,
+            since=self._path_since,
             has_arrived=self._end is not None,
             rules=rules,
-            made_m=made_m,
         )
         end_m = arrival['missed_m'] if arrival and arrival['arrived'] else None
         return {'end_of_path_m': end_m, 'arrival': arrival}
