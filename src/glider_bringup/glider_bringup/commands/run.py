@@ -119,8 +119,9 @@ def run(
 ) -> None:
     """Fly a scenario; record it, write its report and print the scorecard.
 
-    Exit code 0: completed or infeasible. 3: surfaced, the guard ended the mission. 1: the vehicle
-    is lost, or the run failed. 2: what was asked for cannot be done. 130: interrupted.
+    Exit code 0: completed or infeasible. 3: surfaced, the guard ended the mission, or unfinished,
+    its dives were not flown. 1: the vehicle is lost, or the run failed. 2: what was asked for
+    cannot be done. 130: interrupted.
     """
     from glider_mission.run_folder import REPORT_FILE
 
