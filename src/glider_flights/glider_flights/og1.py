@@ -34,6 +34,7 @@ from glider_flights.record import (
     Polar,
     Samples,
     angles_at_times,
+    at_surface,
     at_times,
     instruments,
     put_together,
@@ -125,11 +126,13 @@ def _read(path: Path) -> LogFile:
         notes.append(f'{path.name}: no fix in LATITUDE_GPS, LONGITUDE_GPS')
     nothing = np.full(count, math.nan)
     own_s = known['time']
+    depth_m = at_times(own_s, own_s, known['depth_m'], LONGEST_GAP_S)
+    gap = LONGEST_GAP_S, at_surface(own_s, depth_m)
     samples = Samples(
         own_s,
-        at_times(own_s, own_s, known['depth_m'], LONGEST_GAP_S),
-        at_times(own_s, own_s, known['pitch_rad'], LONGEST_GAP_S),
-        angles_at_times(own_s, own_s, known.get('heading_rad', nothing), LONGEST_GAP_S),
+        depth_m,
+        at_times(own_s, own_s, known['pitch_rad'], *gap),
+        angles_at_times(own_s, own_s, known.get('heading_rad', nothing), *gap),
         known.get('buoyancy_kg', nothing),
     )
     own_polar = _own_polar(path)

@@ -9,7 +9,7 @@ Positions are north and east (m) of the first fix, angles in the world NED and t
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -30,6 +30,9 @@ NEAR_S = 30.0
 FAR_OFF_M, FASTEST_MPS = 1000.0, 4.0
 #: Longest time without a sample (s), and as a share of the segment; the larger of them counts.
 LONGEST_GAP_S, LONGEST_GAP = 900.0, 0.2
+
+#: No times at all.
+NEVER = np.empty(0)
 
 WHY_LEFT_OUT = {
     'short': f'shorter than {SHORTEST_SEGMENT_S:.0f} s',
@@ -166,6 +169,11 @@ def usual(values: Sequence[float]) -> float:
     return float(np.median(values)) if len(values) else math.nan
 
 
+def at_surface(time_s: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
+    """Those of some times at which it was at the surface, where it may record no attitude."""
+    return time_s[depth_m <= SURFACE_DEPTH_M]
+
+
 def local_metres(origin_deg: np.ndarray, latitude_deg, longitude_deg) -> np.ndarray:
     """North and east (m, last axis) of an origin (latitude, longitude in degrees)."""
     latitude_deg, longitude_deg = np.asarray(latitude_deg), np.asarray(longitude_deg)
@@ -176,11 +184,16 @@ def local_metres(origin_deg: np.ndarray, latitude_deg, longitude_deg) -> np.ndar
 
 
 def at_times(
-    time_s: np.ndarray, own_s: np.ndarray, values: np.ndarray, gap_s: float = math.inf
+    time_s: np.ndarray,
+    own_s: np.ndarray,
+    values: np.ndarray,
+    gap_s: float = math.inf,
+    idle_s: np.ndarray = NEVER,
 ) -> np.ndarray:
     """Values with times of their own at other times, linear between them.
 
-    NaN beyond them, where there are none, and inside a gap that is longer than ``gap_s``.
+    NaN beyond them, where there are none, and inside a gap that is longer than ``gap_s``. A gap
+    ends at the times ``idle_s``, when nothing needs to be known.
     """
     good = np.isfinite(own_s) & np.isfinite(values)
     if not good.any():
@@ -188,16 +201,17 @@ def at_times(
     order = np.argsort(own_s[good], kind='stable')
     own_s, values = own_s[good][order], values[good][order]
     found = np.interp(time_s, own_s, values, left=math.nan, right=math.nan)
-    after = np.searchsorted(own_s, time_s).clip(1, None)
-    lasts_s = np.append(own_s, math.inf)[after] - own_s[after - 1]
-    return np.where((lasts_s > gap_s) & ~np.isin(time_s, own_s), math.nan, found)
+    told_s = np.union1d(own_s, idle_s)
+    after = np.searchsorted(told_s, time_s).clip(1, None)
+    lasts_s = np.append(told_s, math.inf)[after] - told_s[after - 1]
+    return np.where((lasts_s > gap_s) & ~np.isin(time_s, told_s), math.nan, found)
 
 
 def angles_at_times(
-    time_s: np.ndarray, own_s: np.ndarray, angles: np.ndarray, gap_s: float = math.inf
+    time_s: np.ndarray, own_s: np.ndarray, angles: np.ndarray, *gap: Any
 ) -> np.ndarray:
     """The same for angles (rad), across north."""
-    east, north = (at_times(time_s, own_s, part(angles), gap_s) for part in (np.sin, np.cos))
+    east, north = (at_times(time_s, own_s, part(angles), *gap) for part in (np.sin, np.cos))
     return np.arctan2(east, north)
 
 

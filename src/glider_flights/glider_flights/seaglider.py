@@ -24,6 +24,7 @@ from glider_flights.record import (
     Polar,
     Samples,
     angles_at_times,
+    at_surface,
     at_times,
     instruments,
     put_together,
@@ -122,9 +123,11 @@ def _samples(found: dict[str, np.ndarray], declination: float) -> Samples:
         buoyancy = at_times(time_s, own_s, weighed)
         known = at_times(time_s, own_s, np.isfinite(weighed).astype(float))
         buoyancy[known < 0.5] = math.nan
-    heading = angles_at_times(time_s, time_s, found['heading_rad'], LONGEST_GAP_S) + declination
-    pitch = at_times(time_s, time_s, found['pitch_rad'], LONGEST_GAP_S)
-    return Samples(time_s, found['depth_m'], pitch, heading, buoyancy)
+    depth_m = found['depth_m']
+    gap = LONGEST_GAP_S, at_surface(time_s, depth_m)
+    heading = angles_at_times(time_s, time_s, found['heading_rad'], *gap) + declination
+    pitch = at_times(time_s, time_s, found['pitch_rad'], *gap)
+    return Samples(time_s, depth_m, pitch, heading, buoyancy)
 
 
 def _instruments(found: dict[str, np.ndarray], samples: Samples) -> Instruments:

@@ -37,6 +37,7 @@ from glider_flights.record import (
     Samples,
     Segment,
     angles_at_times,
+    at_surface,
     at_times,
     cut,
     instruments,
@@ -438,8 +439,9 @@ def _before(time_s: np.ndarray, own_s: np.ndarray, values: np.ndarray) -> np.nda
 
 def _samples(sensors: Sensors, declined: float) -> Samples:
     time_s, depth_m = sensors['m_depth']
-    heading = angles_at_times(time_s, *sensors['m_heading'], LONGEST_GAP_S) - declined
-    pitch = at_times(time_s, *sensors['m_pitch'], LONGEST_GAP_S)
+    gap = LONGEST_GAP_S, at_surface(time_s, depth_m)
+    heading = angles_at_times(time_s, *sensors['m_heading'], *gap) - declined
+    pitch = at_times(time_s, *sensors['m_pitch'], *gap)
     return Samples(time_s, depth_m, pitch, heading, np.full(len(time_s), math.nan))
 
 

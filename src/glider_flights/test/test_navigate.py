@@ -188,6 +188,20 @@ def test_declination_follows_from_the_way_a_slocum_reckons(tmp_path, write_dbd):
         assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
 
 
+def test_attitude_that_is_not_recorded_at_the_surface_takes_no_depth_from_it(tmp_path, write_dbd):
+    """A Slocum lies there for 20 minutes, and records depth alone until it has dived."""
+    pytest.importorskip('dbdreader')
+    table = sensors(3)
+    since_s = (table['m_depth'][0] - START_S) % CYCLE_S
+    told = (since_s > 700.0) & (since_s < CYCLE_S - 500.0)
+    for name in ('m_pitch', 'm_heading'):
+        table[name] = tuple(values[told] for values in table[name])
+    write_dbd(tmp_path / '00010000.dbd', table, True)
+    rows = navigated(read_flight(tmp_path, None, quiet))
+    for row in rows[1:-1]:
+        assert row.reckoned.seconds == pytest.approx(2.0 * LEG_S, abs=40.0)
+
+
 def test_a_fix_far_off_and_one_under_water_are_left_out(tmp_path, write_dbd):
     pytest.importorskip('dbdreader')
     table = sensors(2)
