@@ -139,7 +139,10 @@ def _take_turn(turn, turned, age_s, dives):
         dive = _learn(dive, turn.roll_s, off)
     else:
         climb = _learn(climb, turn.roll_s, off)
-    return Turn(dive, climb, _bounded(turn.d + D_SHARE * off / age_s), 0.0, 0.0)
+    d = _bounded(turn.d + D_SHARE * off / age_s)
+    if abs(turn.turned) > math.pi:
+        d = 0.0  # of more than half a turn between samples nothing tells how much it was
+    return Turn(dive, climb, d, 0.0, 0.0)
 
 
 @kernel

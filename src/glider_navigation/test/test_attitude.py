@@ -196,3 +196,12 @@ def test_a_turn_through_south_is_as_any_other(follow, period_s, way):
     assert wrapped(rows[:, 2] - turned[:, 2] - 0.5 * way) == pytest.approx(0.0, abs=1e-9)
     assert rows[:, 3:6] == pytest.approx(turned[:, 3:6], abs=1e-9)
     assert state.turn.dive.k == pytest.approx(same.turn.dive.k, rel=1e-9)
+
+
+def test_who_has_spun_between_samples_is_not_believed_to_spin_for_good(follow):
+    """A turn of a whole circle from sample to sample looks like none."""
+    motion = Motion(9000.0, 0.020)
+    t_s = TICK_S * np.arange(len(motion.psi))
+    motion.psi = motion.psi + np.cumsum(TICK_S * np.where(t_s < 6000.0, 0.2 * t_s / 6000.0, 0.0))
+    rows, _ = follow(motion, 30.0)
+    assert rms_deg(wrapped(rows[:, 2] - motion.psi)[t_s > 8000.0]) < 5.0
