@@ -138,7 +138,7 @@ def read_slocum(
         notes.append(f'm_gps_mag_var is not recorded: {told}')
     origin, fixes = _fixes(sensors)
     cuts, left_out = cut(fixes, _samples(sensors, declined))
-    ends = [one.before.time_s[-1] for one in cuts[1:]] + [math.inf]
+    ends = [*(one.before.time_s[-1] for one in cuts), math.inf][1:]
     segments = [
         Segment(
             _file_at(names, one.before.time_s[-1]),

@@ -249,6 +249,19 @@ def test_what_a_slocum_lacks_is_told(tmp_path, write_dbd):
     assert 'no file could be read' in told(str(tmp_path))
 
 
+@pytest.mark.parametrize(
+    ('surfaced', 'why'), [(700.0, 'no dive between two fixes'), (1e9, 'a large part of them')]
+)
+def test_a_slocum_without_one_whole_dive_says_so(tmp_path, write_dbd, surfaced, why):
+    """Its only dive has no end, or no samples."""
+    pytest.importorskip('dbdreader')
+    table = part(sensors(1), START_S, START_S + surfaced)
+    for name in ('m_depth', 'm_pitch', 'm_heading'):
+        table[name] = tuple(values[:20] for values in table[name])
+    write_dbd(tmp_path / '00010000.dbd', table, True)
+    assert why in told(str(tmp_path))
+
+
 def test_a_damaged_file_is_left_out_and_named(tmp_path, write_dbd):
     pytest.importorskip('dbdreader')
     write_dbd(tmp_path / '00010000.dbd', sensors(2), True)
