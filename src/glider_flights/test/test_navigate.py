@@ -670,6 +670,19 @@ def test_the_command_prints_what_was_agreed(tmp_path):
     assert 'p1230002' in shown.stdout
 
 
+def test_no_figure_of_a_long_row_is_cut_short_in_80_columns(tmp_path, write_dbd, monkeypatch):
+    pytest.importorskip('dbdreader')
+    monkeypatch.setenv('COLUMNS', '80')
+    table = sensors(3, currents=[np.array([-0.956, -0.844])] * 3)
+    for name in ('m_final_water_vx', 'm_final_water_vy'):
+        table[name] = (table[name][0], np.array([-0.7] * 3))
+    write_dbd(tmp_path / 'unit-2026-001-0-123.dbd', table, True)
+    shown = CliRunner().invoke(app, ['navigate', str(tmp_path)]).stdout
+    rows = [line for line in shown.splitlines() if '-001-0-1' in line]
+    assert len(rows) == 3
+    assert all(row.count('…') == 1 for row in rows), rows
+
+
 @pytest.mark.parametrize('method', ['known', 'nobody'])
 def test_a_method_that_no_recording_feeds_is_refused(tmp_path, method):
     write_dive(tmp_path / 'p1230001.nc', 0, 1)

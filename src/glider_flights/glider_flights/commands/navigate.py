@@ -70,7 +70,7 @@ def _segments_table(flight, rows) -> Table:
         'Mean current of the dive to north, east in cm/s: ours, on board, how far off\n'
         'Surfaced so far off the forecast, in m: with the last current, with ours'
     )
-    table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, pad_edge=False)
+    table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, padding=0)
     table.add_column('dive', no_wrap=True)
     for name in ('h', 'depth', 'way', 'current', 'on board', 'off', 'last', 'ours'):
         table.add_column(name, justify='right', no_wrap=True)
