@@ -336,7 +336,7 @@ def summary(flight: Flight, rows: list[Row], method: str = METHOD) -> dict[str, 
     """Figures of a flight, as `--json` prints them."""
     dac = [np.hypot(*(row.comparable_mps - row.segment.on_board.dac_mps)) for row in rows]
     told = [np.hypot(*(row.reckoned.told_mps - row.reckoned.dac_mps)) for row in rows]
-    way = [np.hypot(*(row.reckoned.way_m - row.segment.on_board.way_m)) for row in rows]
+    way = [_way_off(row) for row in rows]
     through_water = [np.hypot(*row.reckoned.way_m) for row in rows]
     ratio = [
         own / np.hypot(*row.segment.on_board.way_m)
@@ -372,11 +372,23 @@ def _why_far_off(rows: list[Row], dac: list[float]) -> list[str]:
         return []
     seconds = float(np.median([row.reckoned.seconds for row in rows]))
     apart_s = float(np.median([np.median(np.diff(row.segment.samples.time_s)) for row in rows]))
+    way_m = _spread([_way_off(row) for row in rows], 1)['median']
+    by_way = (
+        ''
+        if way_m is None
+        else (f', ways {way_m:.0f} m off those on board are {100.0 * way_m / seconds:.1f} cm/s')
+    )
     return [
         f'current {100.0 * off:.1f} cm/s off that on board: in dives of {seconds / 60.0:.0f} min '
-        f'{FIX_STD_M:g} m of each of two fixes are {140.0 * FIX_STD_M / seconds:.1f} cm/s, and '
-        f'samples {apart_s:.0f} s apart leave open when it left the surface and when it came back'
+        f'{FIX_STD_M:g} m of each of two fixes are {140.0 * FIX_STD_M / seconds:.1f} cm/s'
+        f'{by_way}, and samples {apart_s:.0f} s apart leave open when it left the surface and '
+        'when it came back'
     ]
+
+
+def _way_off(row: Row) -> float:
+    """How far our way through the water is off that on board (m)."""
+    return float(np.hypot(*(row.reckoned.way_m - row.segment.on_board.way_m)))
 
 
 def _spread(values: list[float], digits: int) -> dict[str, Any]:

@@ -4,6 +4,7 @@
 
 import json
 import math
+import re
 import struct
 from pathlib import Path
 
@@ -226,6 +227,22 @@ def test_a_current_of_another_time_is_not_compared(tmp_path, write_dbd):
     write_dbd(tmp_path / '00010000.dbd', table, True)
     flight = read_flight(tmp_path, None, quiet)
     assert summary(flight, navigated(flight))['dac_difference_mps']['segments'] == 1
+
+
+def test_a_current_that_is_far_off_by_the_way_is_told_so(tmp_path, write_dbd):
+    """The vehicle believes to be faster by 6 cm/s, and its current is as much another."""
+    pytest.importorskip('dbdreader')
+    table = sensors(2)
+    for name in ('m_final_water_vx', 'm_final_water_vy'):
+        table[name] = (table[name][0], table[name][1] + 0.05)
+    time_s, depth = table['m_depth']
+    speed = np.where(depth > 0.5, slocum_speed(PITCH, RATE) + 0.06, 0.0)
+    write_dbd(tmp_path / '00010000.dbd', table | {'m_speed': (time_s, speed)}, True)
+    flight = read_flight(tmp_path, None, quiet)
+    (note,) = summary(flight, navigated(flight))['notes']
+    metres, cmps = re.search(r'ways (\d+) m off those on board are ([\d.]+) cm/s', note).groups()
+    assert float(cmps) == pytest.approx(6.0, abs=0.5)
+    assert float(metres) == pytest.approx(0.06 * 2.0 * LEG_S, abs=30.0)
 
 
 def test_the_fullest_kind_of_file_is_read(tmp_path):
