@@ -212,6 +212,11 @@ def test_speed_is_compared_with_an_adcp(file, dive, tmp_path):
     found = report(*words)
     assert found['u_adcp_bias_cmps'] == pytest.approx(-5.0, abs=0.3)
     assert found['u_adcp_rmse_cmps'] == pytest.approx(5.0, abs=0.3)
+    np.save(measured, np.load(measured) + [[1e6], [0.0]])
+    other = report(*words)
+    assert other['u_adcp_rmse_cmps'] is None
+    assert 'no speed by an ADCP at the time' in other['notes'][0]
+    np.save(measured, np.load(measured) - [[1e6], [0.0]])
     table = tmp_path / 'speed.csv'
     np.savetxt(table, np.load(measured).T, delimiter=',')
     assert report(*words[:-1], str(table))['u_adcp_rmse_cmps'] == found['u_adcp_rmse_cmps']
@@ -394,6 +399,8 @@ def test_a_constant_that_runs_away_is_held_and_told(tmp_path):
 def test_one_table_of_all_flights_of_a_folder(dive, tmp_path):
     write_flight(tmp_path / 'long', [dive] * 4, vert_speed=None)
     write_flight(tmp_path / 'short', [dive] * 2, vert_speed=None)
+    of_another = np.stack([START_S - 1e6 + dive['time'], dive['speed']])
+    np.save(tmp_path / 'long' / 'U_measured.npy', of_another)
     (tmp_path / 'bad').mkdir()
     (tmp_path / 'bad' / 'p1230001.nc').write_bytes(b'no file')
     table = report('--all', str(tmp_path), '--vehicle', 'slocum_g2')
@@ -401,6 +408,8 @@ def test_one_table_of_all_flights_of_a_folder(dive, tmp_path):
     assert (row['flight'], row['segments']) == ('long', 4)
     for half in ('fit_on_first', 'fit_on_second'):
         assert row[half]['w_rmse_cmps'] < 0.5 < row[half]['unfitted']['w_rmse_cmps']
+        assert 'pitch_scale' not in row[half]['fitted']
+    assert 'no speed by an ADCP at the time' in ' '.join(row['notes'])
     assert 'too few dives, stretches under water: 2 (needed' in table['left_out']['short']
     assert table['left_out'].keys() == {'short', 'bad'}
     shown = CliRunner().invoke(app, ['validate', '--all', str(tmp_path), '--vehicle', 'slocum_g2'])

@@ -19,6 +19,7 @@ from glider_flights.validation.score import (
     STEERED_BY,
     Adcp,
     Pair,
+    measured,
     peer,
     rate_off,
     rms,
@@ -60,9 +61,11 @@ def validate(
     They are fitted to the whole flight, or out of sample: to one half of it, and tried on the
     other, or to another flight. With ``none`` nothing is fitted. Raises ConfigurationError.
     """
-    names = chosen('none' if fit_on == 'none' else fit, flight.kind, impose, adcp is not None)
     found = tracks(flight)
     check(found, impose)
+    foreign = adcp is not None and all(np.isnan(measured(one, adcp)).all() for one in found)
+    adcp = None if foreign else adcp
+    names = chosen('none' if fit_on == 'none' else fit, flight.kind, impose, adcp is not None)
     start = model_of(vehicle, flight)
     learnt_on, begun, tried = found, start, found
     if isinstance(fit_on, Flight):
@@ -107,7 +110,10 @@ def validate(
             'w_rmse_cmps': rms(rate_off(unfitted), 100.0),
             'peer_w_rmse_cmps': other_unfitted,
         },
-        'notes': flight.notes + ([why] if why else []) + at_bounds(names, begun, learnt),
+        'notes': flight.notes
+        + ['no speed by an ADCP at the time of the flight'] * foreign
+        + ([why] if why else [])
+        + at_bounds(names, begun, learnt),
     }
     if fit_on not in (None, 'none'):
         flown_there = [(track, fly(track, learnt, impose)) for track in learnt_on]
@@ -235,9 +241,9 @@ def validate_all(
 def _row(place: Path, vehicle: str | None, fit: str | None, cache: Path | None) -> dict[str, Any]:
     """Figures of one flight."""
     flight = read_whole(place, cache, lambda *_: None)
-    chosen = vehicle or VEHICLES[flight.kind]
+    chosen, adcp = vehicle or VEHICLES[flight.kind], find_adcp(place, None)
     halves = {
-        half: validate(flight, chosen, 'pitch', fit, None, lambda *_: None, half).report
+        half: validate(flight, chosen, 'pitch', fit, adcp, lambda *_: None, half).report
         for half in HALVES
     }
     energy, why = None, []

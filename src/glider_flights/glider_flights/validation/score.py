@@ -111,8 +111,13 @@ def rms(values: np.ndarray, scale: float) -> float | None:
 
 def speed_off(track: Track, flown: Simulated, adcp: Adcp) -> np.ndarray:
     """Simulated less measured speed (m/s) of the samples in the dive, as an ADCP looks ahead."""
-    measured = at_times(track.instruments.time_s, adcp.time_s, adcp.speed_mps)
-    return (flown.speed_mps - measured)[track.counts & (track.phase > 0.0)]
+    return flown.speed_mps[track.counts & (track.phase > 0.0)] - measured(track, adcp)
+
+
+def measured(track: Track, adcp: Adcp) -> np.ndarray:
+    """Speed by an ADCP (m/s) of the samples in the dive; NaN where there is none."""
+    speed = at_times(track.instruments.time_s, adcp.time_s, adcp.speed_mps)
+    return speed[track.counts & (track.phase > 0.0)]
 
 
 def _turn_rate(pairs, phase: float, by: str, power: float, recorded: bool) -> float | None:
