@@ -203,7 +203,7 @@ def test_recording_goes_on(flight):
         reader = make_reader(stream)
         begin_s = reader.get_summary().statistics.message_start_time / 1e9
         stamps_s = [m.log_time / 1e9 for _, _, m in reader.iter_messages(topics=['/glider/odom'])]
-    assert begin_s == pytest.approx(stamps_s[0], abs=1.0)  # with the path, which has no stamp
+    assert stamps_s[0] - begin_s < DEADLINE_S  # the path has no stamp, and comes first
     gaps_s = [after - before for before, after in zip(stamps_s[:-1], stamps_s[1:], strict=True)]
     assert AWAY_S < max(gaps_s) < ended_s - killed_s
     assert stamps_s[-1] - stamps_s[gaps_s.index(max(gaps_s)) + 1] > 1.0
