@@ -203,7 +203,9 @@ def test_a_law_that_fails_ends_it_at_one_tick_however_it_is_cut_up():
         (lambda flight: flight.step(0), 'n = 0.*1 and more'),
         (lambda flight: flight.step(2.5), r'n = 2\.5.*1 and more'),
         (lambda flight: flight.step(math.nan), 'n = nan.*1 and more'),
+        (lambda flight: flight.restore(None), 'state = None.*Flight.state'),
         (lambda flight: glider.Flight('nowhere'), 'nowhere'),
+        (lambda flight: glider.Flight(set=5), 'set = 5.*by dotted field name'),
         (lambda flight: glider.Flight(law=abs, controller='pid'), '--controller pid'),
     ],
 )

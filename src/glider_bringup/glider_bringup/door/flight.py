@@ -155,6 +155,10 @@ class Flight:
         One with another law, method or navigation is refused. Whether numbers of the scenario are
         others is not known: the parameters are those of this flight.
         """
+        if not isinstance(state, FlightState):
+            raise ConfigurationError(
+                f'state = {shown(state)}: not usable (allowed: what Flight.state gave)'
+            )
         self._held.restore(state.kept)
         self._past = state.past
         return self

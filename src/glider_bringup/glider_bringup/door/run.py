@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from glider_base.errors import shown
 from glider_base.ros.places import given_domain
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
@@ -143,6 +144,10 @@ def chosen_scenario(
     """The scenario that the arguments of `fly` ask for."""
     from glider_bringup.console import number
 
+    if not isinstance(fields, Mapping):
+        raise ConfigurationError(
+            f'set = {shown(fields)}: not usable (allowed: values by dotted field name)'
+        )
     if duration not in (None, 'full'):
         duration = number('--duration', str(duration), 'full', TICK_S, 1e8)
     if law is not None and controller is not None:
