@@ -5,7 +5,7 @@
 import pytest
 
 from glider_studies.paper.experiments import Experiment, described, fly, make_experiments
-from glider_studies.paper.judges import judge_clean, judge_faults
+from glider_studies.paper.judges import judge_clean, judge_faults, judge_hard, judge_stays
 
 FAULTS, PHASES = (list(entries) for entries in described('fault_matrix')['cases'])
 SHORT = {'duration_s': 9000.0}
@@ -82,3 +82,19 @@ def test_clean_flights_have_all_come_to_their_end():
     for status in ('failed', 'infeasible'):
         checks = judge_clean([whole] * 35 + [{**whole, 'status': status}])
         assert [one.value for one in checks if not one.passed] == [status]
+
+
+def test_surfacings_of_a_flight_that_failed_are_no_verdict():
+    """Those of the others were as they have to be, so that nobody missed the rest of it."""
+    known = {'surfacings': 100, 'fixed': 100, 'ellipse_95_share': 0.95, 'innovation_squared': 2.0}
+    known |= {'surfacing_error_m': [9.0, 5.0], 'surfacing_cross_track_m': [0.0, 0.0]}
+    known |= {'dac_error_mps': {'worst': 0.01}}
+    row = {'case': 'any', 'controller': 'pid', 'status': 'completed', 'navigation': known}
+    row |= {'dive_m': 200.0, 'hours': 0.1}
+    cut = {**row, 'status': 'failed', 'hours': 9.0}
+    never_up = {**cut, 'navigation': {**known, 'surfacing_error_m': []}}
+    for judge in (judge_hard, judge_stays):
+        assert all(one.passed for one in judge([row, {**row, 'hours': 9.0}]))
+        for bad in (cut, never_up):
+            failed = [one.value for one in judge([row, bad]) if not one.passed]
+            assert failed[-1] == 'failed'

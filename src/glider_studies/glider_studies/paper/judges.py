@@ -115,15 +115,21 @@ def judge_envelope(rows: list[dict]) -> list[Check]:
     return checks
 
 
-def _later(row: dict) -> float:
+def _not_ended(rows: list[dict]) -> list[Check]:
+    """Flights that did not come to their end: what they measured until then is no verdict."""
+    return [check for row in rows for check in within(row, {}) if not check.passed]
+
+
+def _later(row: dict) -> float | None:
     """Median error (m) at the surfacings that a stay came before, without the first of all."""
-    return float(np.median(row['navigation']['surfacing_error_m'][1:]))
+    later = row['navigation']['surfacing_error_m'][1:]
+    return float(np.median(later)) if later else None
 
 
 def judge_hard(rows: list[dict]) -> list[Check]:
     """Over all of them the ellipse is as large as it has to be."""
     known = pooled([row['navigation'] for row in rows])
-    return [
+    checks = [
         Check(
             f'{what} of {known["surfacings"]} surfacings',
             known[name],
@@ -135,6 +141,7 @@ def judge_hard(rows: list[dict]) -> list[Check]:
             ('innovation squared', 'innovation_squared', INNOVATION),
         )
     ]
+    return [*checks, *_not_ended(rows)]
 
 
 def judge_stays(rows: list[dict]) -> list[Check]:
@@ -146,11 +153,13 @@ def judge_stays(rows: list[dict]) -> list[Check]:
     short = {row['dive_m']: _later(row) for row in rows if row['hours'] < LONG_H}
     for row in long:
         dac, error = row['navigation']['dac_error_mps']['worst'], _later(row)
-        most = short[row['dive_m']] + STAY_MORE_M
+        beside = short[row['dive_m']]
+        most = None if beside is None else beside + STAY_MORE_M
         passed = dac is not None and dac <= STAY_DAC_MPS
         checks.append(Check(f'{row["case"]}: DAC error (m/s)', dac, STAY_DAC_MPS, passed))
-        checks.append(Check(f'{row["case"]}: error (m)', error, most, error <= most))
-    return checks
+        passed = error is not None and most is not None and error <= most
+        checks.append(Check(f'{row["case"]}: error (m)', error, most, passed))
+    return [*checks, *_not_ended(rows)]
 
 
 def judge_clean(rows: list[dict]) -> list[Check]:
@@ -164,9 +173,8 @@ def judge_clean(rows: list[dict]) -> list[Check]:
     enough = Check(
         'hours flown', f'{hours:,.0f} h', f'{LEAST_CLEAN_H:,.0f} h', hours >= LEAST_CLEAN_H
     )
-    ended = [check for row in rows for check in within(row, {}) if not check.passed]
     reported = Check('reported by the guard', str(len(told)), '0', not told)
-    return [enough, reported, *told, *ended]
+    return [enough, reported, *told, *_not_ended(rows)]
 
 
 def _faults_of(row: dict, deepest_m: float) -> str:
