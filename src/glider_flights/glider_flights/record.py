@@ -9,7 +9,7 @@ Positions are north and east (m) of the first fix, angles in the world NED and t
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -208,10 +208,16 @@ def at_times(
 
 
 def angles_at_times(
-    time_s: np.ndarray, own_s: np.ndarray, angles: np.ndarray, *gap: Any
+    time_s: np.ndarray,
+    own_s: np.ndarray,
+    angles: np.ndarray,
+    gap_s: float = math.inf,
+    idle_s: np.ndarray = NEVER,
 ) -> np.ndarray:
     """The same for angles (rad), across north."""
-    east, north = (at_times(time_s, own_s, part(angles), *gap) for part in (np.sin, np.cos))
+    east, north = (
+        at_times(time_s, own_s, part(angles), gap_s, idle_s) for part in (np.sin, np.cos)
+    )
     return np.arctan2(east, north)
 
 

@@ -226,8 +226,8 @@ class Scorer:
             turn_m=max([rules.depth_m, *(one.depth_m for one in self._followed if one.depth_m)]),
         )
         believed = flown._replace(e2=series('told_e2'))
-        turns_m = min(rules.depth_m, rules.shallowest_m), rules.top_m
-        dives = _count_dives(depth, *dive_depths(*turns_m))
+        shallowest_m = min(rules.depth_m, rules.shallowest_m)
+        dives = _count_dives(depth, *dive_depths(shallowest_m, rules.top_m))
         way_m, time_s = self._along_path_m(), seconds(ticks)
         held = ~(series('infeasible')[scored & flies] > 0.0)
         infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)

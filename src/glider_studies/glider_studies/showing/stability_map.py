@@ -136,8 +136,9 @@ def _horizontal_speed(file: Path, data: xarray.Dataset) -> tuple[float, str]:
         )
         for what, model in (('vehicle', Vehicle), ('scenario', Scenario))
     )
-    others = [key[8:-5] for key in data.attrs if re.fullmatch('vehicle_.+_yaml', key)]
-    return horizontal_speed(scenario, vehicle), ', '.join((vehicle.name, *others))
+    others = filter(None, (re.fullmatch('vehicle_(.+)_yaml', key) for key in data.attrs))
+    names = (vehicle.name, *(found[1] for found in others))
+    return horizontal_speed(scenario, vehicle), ', '.join(names)
 
 
 def _classify(data: xarray.Dataset, measure: Measure) -> np.ndarray:
