@@ -124,6 +124,17 @@ def test_fixes_and_what_they_told_of_the_current(flown, data):
     assert reports[-1]['dac_believed_mps'] is None
 
 
+@pytest.mark.parametrize('model', ['persistence', 'tidal'])
+def test_the_current_told_is_the_mean_of_the_last_way_in_a_tide_too(model):
+    """Of 0.2 m/s, which changes as much in five hours: to within 2 cm/s."""
+    tide = {'kind': 'tidal', 'speed_mps': 0.2, 'direction_deg': 60.0}
+    fields = {'current.components': [tide], 'navigation.current': model, 'dives': 0}
+    run = glider.fly('slocum_shelf', fields, duration=43200.0)
+    told = run.score['navigation']
+    assert told['surfacings'] >= 6
+    assert told['dac_error_mps']['worst'] < 0.02
+
+
 def test_the_bag_gives_the_same_score(flown):
     assert score_again(flown.folder)['navigation'] == flown.score['navigation']
 

@@ -71,6 +71,7 @@ class CurrentBelief(NamedTuple):
     weight: float = FIRST_WEIGHT  #: ways that q was learnt from
     glide: Vector = _STILL  #: mean velocity through the water in the last way taken in (m/s)
     way_s: float = 0.0  #: its time; 0.0: none yet
+    over: Regressors = Regressors(1.0, 0.0, 0.0)  #: of it
     carried: Vector = _STILL  #: change of the current since, by the drift at the surface (m/s)
     gap_s: float = 0.0  #: time since then for which nothing tells how the current has changed
 
@@ -95,10 +96,13 @@ def current_at(belief, t_s):
 
 
 @kernel
-def last_mean(belief, t_s):
-    """The same (m/s) as the last way told it, whatever the drift at the surface told since."""
-    now, carried = current_at(belief, t_s), belief.carried
-    return Vector(now.n - carried.n, now.e - carried.e)
+def last_mean(belief):
+    """Mean (m/s) over the last way taken in, whatever the drift at the surface told since."""
+    mean, cos, sin, h = belief.mean, belief.cos, belief.sin, belief.over
+    return Vector(
+        mean.n + h.cos * cos.n + h.sin * sin.n,
+        mean.e + h.cos * cos.e + h.sin * sin.e,
+    )
 
 
 @kernel
@@ -183,6 +187,7 @@ def take_in(belief, off, h, way_s, glide, variance, bias):
         weight=weight,
         glide=glide,
         way_s=way_s,
+        over=h,
         carried=Vector(0.0, 0.0),
         gap_s=0.0,
     )

@@ -380,7 +380,7 @@ def dead_reckoned_step(state, heard, params, dt):
     believed = Believed(
         odom=_odometry(place, attitude, flight, velocity),
         place=covariance,
-        current=_water(belief.last_mean(current, t_s), column, trust),
+        current=_water(belief.last_mean(current), column, trust),
         current_covariance=Covariance(wandering, 0.0, wandering),
         surface=stay.drift,
         surface_covariance=Covariance(stay.known.vv, 0.0, stay.known.vv),
