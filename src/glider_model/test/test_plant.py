@@ -445,6 +445,19 @@ def test_acceleration_of_a_heavy_body_at_rest(plant_params, start):
     assert np.abs(np.delete(rate, 2)).max() < 1e-15
 
 
+def test_a_weight_that_is_let_go_lifts_and_turns_nothing(plant_params, start):
+    """By W g / (m + a_33); the oil, which pitches a Slocum, has not moved (m/s, rad/s)."""
+    params = plant_params('slocum_g2')
+    v, state = params.vehicle, start(velocity=(0.0,) * 6)
+    kept, after = (
+        plant_step(state, Joints(0.0, 0.0, 0.0, 0.0), STILL, params, TICK_S, drops).motion
+        for drops in (False, True)
+    )
+    assert np.abs(np.subtract(after[-3:], kept[-3:])).max() < 1e-4
+    lifted_mps = v.drop_weight * GRAVITY / (v.m + v.a_33) * TICK_S
+    assert kept.w - after.w == pytest.approx(lifted_mps, rel=0.01)
+
+
 # ---------------------------------------------------------------------------------- wind
 
 WIND = {'wind_mps': 10.0, 'wind_from_deg': 300.0, 'leeway_share': 0.03}

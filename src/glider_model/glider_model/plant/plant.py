@@ -298,8 +298,8 @@ def plant_step(
             (water.v_d - state.water.v_d) / dt,
         )
     is_dropped = state.is_dropped or drops
-    start = _relieved(start, state.is_dropped, params.vehicle)
-    end = _relieved(end, is_dropped, params.vehicle)
+    if is_dropped:
+        body = _relieved(body)
     steps, motion, error = 1, state.motion, math.inf
     while error > LARGEST_ERROR_J and steps <= MOST_STEPS:
         motion, error = integrate(state.motion, start, end, water, water_rate, body, dt, steps)
@@ -335,11 +335,10 @@ def plant_step(
 
 
 @kernel
-def _relieved(joints, is_dropped, vehicle):
-    """Actuators of a vehicle, its net heaviness less the drop weight if that is gone."""
-    if not is_dropped or vehicle.drop_weight == 0.0:
-        return joints
-    return Joints(joints.m_b - vehicle.drop_weight, joints.x_p, joints.mu, joints.delta)
+def _relieved(body):
+    """What a motion goes by without the drop weight, if there is one."""
+    v = body.vehicle
+    return replace(body, vehicle=replace(v, ballast=v.ballast - v.drop_weight))
 
 
 @kernel
