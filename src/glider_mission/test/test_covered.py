@@ -57,13 +57,15 @@ def sea(path, east=lambda t, z: 0.0, land=None, hours=HOURS, latitudes=LATITUDES
     return {'current': {'field': {'kind': 'grid', 'file': str(path)}}}
 
 
-def bottom(path):
-    """File of a bottom of 3000 m with an island, in the layout of GEBCO."""
+def bottom(path, east=0.025, name='elevation'):
+    """File of a bottom of 3000 m with an island of a width, in the layout of GEBCO or CMEMS."""
     latitudes, longitudes = np.arange(35.5, 36.51, 0.01), np.arange(121.5, 122.51, 0.01)
     y, x = np.meshgrid(latitudes, longitudes, indexing='ij')
-    height = np.where((abs(y - 36.0) < 0.025) & (abs(x - 122.0) < 0.025), 20.0, -3000.0)
+    height = np.where((abs(y - 36.0) < 0.025) & (abs(x - 122.0) < east), 20.0, -3000.0)
+    if name == 'deptho':
+        height = np.where(height < 0.0, -height, np.nan)
     data = xarray.Dataset(
-        {'elevation': (('lat', 'lon'), height, {'units': 'm'})},
+        {name: (('lat', 'lon'), height, {'units': 'm'})},
         {
             'lat': ('lat', latitudes, {'units': 'degrees_north'}),
             'lon': ('lon', longitudes, {'units': 'degrees_east'}),
@@ -117,6 +119,13 @@ def test_a_mission_over_land_or_out_of_its_file_is_refused(
     with pytest.raises(ConfigurationError, match=rf'file .*f.nc: .*{says}'):
         mission(file, waypoints=waypoints, **changes)
     assert mission(file, waypoints=AWAY, **through([36.3, 122.0], [36.2, 122.2]))
+
+
+@pytest.mark.parametrize('name', ['elevation', 'deptho'])
+def test_land_of_one_point_of_a_chart_is_land(name, tmp_path):
+    file = bottom(tmp_path / 'f.nc', east=0.005, name=name)
+    with pytest.raises(ConfigurationError, match=r'36.0\d+, 12[12].\d+ on the path is land'):
+        mission(file, waypoints=[[36.001, 121.9], [36.002, 122.1003]])
 
 
 def test_a_coarse_coast_of_the_current_does_not_close_water_that_is_charted(tmp_path):

@@ -53,20 +53,20 @@ class ChartedBottom(NamedTuple):
 
     latitudes: np.ndarray  #: float64[y] (deg)
     longitudes: np.ndarray  #: float64[x] (deg), around the origin
-    depth: np.ndarray  #: float32[y, x] (m); 0: land
+    depth: np.ndarray  #: float32[y, x] (m); not above 0: land
     origin: Origin
 
 
 @bottom_depth.body(ChartedBottom)
 @kernel
 def _charted_depth(n, e, params):
-    """Linear between the points of the chart; beyond its edge that of the edge."""
+    """Linear between the points of the chart; beyond its edge that of the edge; 0: land."""
     latitude, longitude = on_chart(n, e, params.origin)
     y, y_next, f_y = bracket(latitude, params.latitudes)
     x, x_next, f_x = bracket(longitude, params.longitudes)
     south = (1.0 - f_x) * params.depth[y, x] + f_x * params.depth[y, x_next]
     north = (1.0 - f_x) * params.depth[y_next, x] + f_x * params.depth[y_next, x_next]
-    return (1.0 - f_y) * south + f_y * north
+    return max(0.0, (1.0 - f_y) * south + f_y * north)
 
 
 class BathymetrySettings(GridFileSettings):

@@ -556,7 +556,7 @@ class LoadedBottom(NamedTuple):
 
     latitudes: np.ndarray  #: (deg), increasing
     longitudes: np.ndarray  #: (deg), increasing, those nearest to the middle of the window
-    depth: np.ndarray  #: float32[latitude, longitude] (m); 0: land
+    depth: np.ndarray  #: float32[latitude, longitude] (m); not above 0: land
 
 
 def load_bottom(path: Path, window: Window, needed: Window) -> LoadedBottom:
@@ -613,7 +613,9 @@ def _read_bottom(layout: _Layout, chosen: dict[str, np.ndarray]) -> LoadedBottom
     (name,), (scale,) = layout.variables, layout.scales
     axes = {axis: layout.axes[axis] for axis in chosen}
     depth = scale * _cut(layout.dataset[name], axes, chosen)
-    depth = np.where(np.isfinite(depth), np.maximum(depth, 0.0), 0.0).astype(np.float32)
+    if not np.isfinite(depth).all():
+        depth = np.where(np.isfinite(depth), depth, -_fill_land(depth[None].copy())[0])
+    depth = depth.astype(np.float32)
     return LoadedBottom(*(layout.values[axis][chosen[axis]] for axis in chosen), depth)
 
 
