@@ -100,6 +100,16 @@ def test_no_straight_line_is_faster_than_the_fronts_say(seed):
     )
 
 
+@pytest.mark.parametrize(('along', 'across'), [(0.1, 0.0), (-0.2, 0.0), (0.0, 0.18), (-0.1, 0.18)])
+def test_who_sails_in_an_even_current_is_there_by_the_triangle_of_velocities(along, across):
+    """Over 6 km, of which the last ones are sailed in the current, too."""
+    chart = chart_of(lambda n, e: (across + 0.0 * n, along + 0.0 * e))
+    exact_s = 6000.0 / (along + math.sqrt(SPEED**2 - across**2))
+    way = np.array([[0.0, 0.0], [0.0, 6000.0]])
+    assert sailed_s(chart, way, 0.0, SPEED, END_S) == pytest.approx(exact_s, rel=1e-3)
+    assert sailed_s(chart, way, 0.0, SPEED, 0.99 * exact_s) == math.inf
+
+
 def test_nothing_sails_over_land():
     """An island across the way: the route leads around it, a closed bay is not left."""
     chart = chart_of(lambda n, e: (0.0 * n, 0.0 * e), 60_000.0, 41)

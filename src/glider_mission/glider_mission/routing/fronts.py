@@ -205,10 +205,12 @@ def sail(chart, t_s, route, speed, end_s):
         d_n, d_e = d_n / length, d_e / length
         along = (north - route[leg, 0]) * d_n + (east - route[leg, 1]) * d_e
         off = math.hypot(goal_n - north, goal_e - east)
-        is_last = leg == len(route) - 2
-        if off <= NEAR_M or (along >= length and not is_last):
-            if is_last:
-                break
+        if leg == len(route) - 2:
+            if off <= NEAR_M:
+                there_s = line_arrival(chart, t_s, north, east, goal_n, goal_e, speed)
+                if there_s < math.inf:
+                    return there_s if there_s <= end_s else math.inf
+        elif off <= NEAR_M or along >= length:
             leg += 1
             continue
         ahead = min(length, max(0.0, along) + _AHEAD_M)
@@ -227,7 +229,4 @@ def sail(chart, t_s, route, speed, end_s):
         north += _LOOK_S * ground_n
         east += _LOOK_S * ground_e
         t_s += _LOOK_S
-    if t_s >= end_s:
-        return math.inf
-    off = math.hypot(route[-1, 0] - north, route[-1, 1] - east)
-    return t_s + off / max(0.1, speed)
+    return math.inf
