@@ -272,6 +272,8 @@ def bent(data):
         (lambda one: one.assign(uo=one.uo.assign_attrs(units='knots')), "uo: units = 'knots'"),
         (lambda one: one.isel(latitude=[0, 2, 1]), 'latitude: neither increases nor decreases'),
         (lambda one: one.isel(longitude=0), 'uo: no axis of longitude'),
+        (lambda one: one.assign_coords(depth=one.depth.assign_attrs(positive='up')),
+         'depth: positive up, and no level below the surface'),
     ],
 )  # fmt: skip
 def test_what_is_no_regular_grid_is_refused_by_name(change, text, tmp_path):

@@ -323,6 +323,8 @@ def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
                 )
             is_up = one.attrs.get('positive') == 'up' or is_height(values[axis])
             values[axis] *= _LENGTHS[units] * (-1.0 if is_up else 1.0)
+            if len(one) and values[axis].max() < 0.0:
+                raise ValueError(f'{dimension}: positive up, and no level below the surface')
         _refuse_no_axis(dimension, values[axis])
     standards = tuple(standard for _, standard in found)
     return _Layout(dataset, names, standards, scales, axes, values)
