@@ -591,6 +591,12 @@ def _check_glide(scenario: Scenario) -> None:
     """Refuse a mission that its vehicle cannot fly, or water that there is not."""
     scenario.guidance_settings().check()
     check_orders(scenario.guidance_settings(), scenario.orders)
+    guidance, moved = scenario.guidance, [i for i, one in enumerate(scenario.orders) if one.path]
+    if moved and (guidance.route, guidance.replan) == ('planned', 'surfacing'):
+        raise ConfigurationError(
+            f'orders.{moved[0]}.path: not with a route that is planned anew, which leads back to '
+            "the path of the mission (allowed: guidance.replan = 'never')"
+        )
     scenario.water.check_stable()
     start_m, rated_m = scenario.initial.depth_m, load_vehicle(scenario.vehicle).rated_depth_m
     if start_m > rated_m:

@@ -146,6 +146,16 @@ def test_a_planned_route_goes_round_land_that_straight_legs_do_not(kind, tmp_pat
     assert np.hypot(*np.diff(made.route.corners, axis=0).T).sum() > 1.05 * 18_000.0
 
 
+def test_an_order_of_a_path_is_not_led_back_by_a_route_that_is_planned_anew(tmp_path):
+    still, anew = sea(tmp_path / 'sea.nc'), {'guidance.route': 'planned'}
+    moved = through([36.3, 122.0], [36.2, 122.2])
+    assert mission(still, waypoints=AWAY, **anew, **moved)
+    anew['guidance.replan'] = 'surfacing'
+    assert mission(still, waypoints=AWAY, **anew, **order(depth_m=900.0))
+    with pytest.raises(ConfigurationError, match='orders.0.path: not with a route that is plan'):
+        mission(still, waypoints=AWAY, **anew, **moved)
+
+
 def test_an_order_to_dive_deeper_meets_the_water_of_there(tmp_path):
     flown = mission(sea(tmp_path / 'sea.nc', lambda t, z: 0.3 - 6e-4 * z), **order(depth_m=900.0))
     params = flown.current_settings().params().field
