@@ -6,6 +6,7 @@ import json
 import math
 import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from glider_bringup.showing.words import small
 from glider_mission.disk import write_whole
 from glider_model.ocean.current_settings import KNOT_MPS
 
+DOCUMENT = Path(__file__).resolve().parents[3] / 'docs' / 'reports.md'
 RECKONED = {
     'navigation.method': 'dead_reckoned',
     'sensors.compass_bias_deg': 1.0,
@@ -385,3 +387,10 @@ def test_memory_and_bag_give_the_same_numbers(flown):
     bag = flown.to_xarray().isel(time=slice(0, memory.sizes['time']))
     for name in memory.data_vars:
         assert np.array_equal(memory[name], bag[name], equal_nan=True), name
+
+
+def test_panels_are_called_as_in_the_document(flown, tmp_path):
+    body, _ = read_page(flown.report(tmp_path / 'page.html'))
+    for called in re.findall(r'^\| ([A-Z][^|]*) \|', DOCUMENT.read_text(encoding='utf-8'), re.M):
+        parts = [called] if called in body else called.split(', ')
+        assert all(part in body for part in parts), called
