@@ -110,6 +110,20 @@ def test_who_sails_in_an_even_current_is_there_by_the_triangle_of_velocities(alo
     assert sailed_s(chart, way, 0.0, SPEED, 0.99 * exact_s) == math.inf
 
 
+@pytest.mark.parametrize('scale', [0.3, 1.0, 10.0])
+def test_short_legs_take_the_time_that_they_take_one_by_one(scale):
+    """Sharp corners are cut a little; a leg is not over before it has begun."""
+    corners = [[0, 0], [1500, 0], [1500, 1000], [500, 1000], [500, -500], [1500, -500]]
+    route = scale * np.array(corners, dtype=float)
+    v_n, v_e = 0.08, 0.13
+    chart = chart_of(lambda n, e: (v_n + 0.0 * n, v_e + 0.0 * e))
+    exact_s = 0.0
+    for way in np.diff(route, axis=0):
+        length = math.hypot(*way)
+        exact_s += length / made_good(v_n, v_e, *(way / length), SPEED)
+    assert sailed_s(chart, route, 0.0, SPEED, END_S) == pytest.approx(exact_s, rel=0.12)
+
+
 def test_nothing_sails_over_land():
     """An island across the way: the route leads around it, a closed bay is not left."""
     chart = chart_of(lambda n, e: (0.0 * n, 0.0 * e), 60_000.0, 41)

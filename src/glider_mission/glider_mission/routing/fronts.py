@@ -23,8 +23,9 @@ REACH = 5
 #: Slowest way made good that counts (m/s), and the longest piece of a line in one current (m).
 _SLOWEST, _PIECE_M = 0.02, 2500.0
 #: A vehicle on its way looks for what to do so often (s), aims so far ahead on its route (m), and
-#: is at a waypoint from this near on (m).
-_LOOK_S, _AHEAD_M, NEAR_M = 600.0, 3000.0, 1500.0
+#: is at a waypoint from this near on (m); nearer on a leg that is shorter than twice that, but not
+#: nearer than the last of these (m).
+_LOOK_S, _AHEAD_M, NEAR_M, _NEAREST_M = 600.0, 3000.0, 1500.0, 20.0
 
 #: Lines from a point to those around it, int64[n, 2] in steps to the north and to the east.
 STENCIL = np.array(
@@ -205,12 +206,13 @@ def sail(chart, t_s, route, speed, end_s):
         d_n, d_e = d_n / length, d_e / length
         along = (north - route[leg, 0]) * d_n + (east - route[leg, 1]) * d_e
         off = math.hypot(goal_n - north, goal_e - east)
+        near = min(NEAR_M, max(_NEAREST_M, NEAR_M * (0.5 * length / NEAR_M) ** 2))
         if leg == len(route) - 2:
             if off <= NEAR_M:
                 there_s = line_arrival(chart, t_s, north, east, goal_n, goal_e, speed)
                 if there_s < math.inf:
                     return there_s if there_s <= end_s else math.inf
-        elif off <= NEAR_M or along >= length:
+        elif off <= near or along >= length:
             leg += 1
             continue
         ahead = min(length, max(0.0, along) + _AHEAD_M)
@@ -226,7 +228,8 @@ def sail(chart, t_s, route, speed, end_s):
         else:
             turn = -speed if across > 0.0 else speed
             ground_n, ground_e = v_n - turn * c_e, v_e + turn * c_n
-        north += _LOOK_S * ground_n
-        east += _LOOK_S * ground_e
-        t_s += _LOOK_S
+        look_s = min(_LOOK_S, near / max(0.1, math.hypot(ground_n, ground_e)))
+        north += look_s * ground_n
+        east += look_s * ground_e
+        t_s += look_s
     return math.inf
