@@ -70,12 +70,21 @@ def quaternion_from_euler(phi, theta, psi):
 
 @kernel
 def euler_from_quaternion(q_w, q_x, q_y, q_z):
-    """Roll, pitch, heading (rad) of q_NB; pitch is held within +-pi/2 against rounding."""
+    """Roll, pitch, heading (rad) of q_NB."""
     phi = math.atan2(2.0 * (q_w * q_x + q_y * q_z), 1.0 - 2.0 * (q_x * q_x + q_y * q_y))
-    sine = 2.0 * (q_w * q_y - q_z * q_x)
-    theta = math.asin(min(1.0, max(-1.0, sine)))
-    psi = math.atan2(2.0 * (q_w * q_z + q_x * q_y), 1.0 - 2.0 * (q_y * q_y + q_z * q_z))
-    return phi, theta, psi
+    return phi, pitch_of(q_w, q_x, q_y, q_z), heading_of(q_w, q_x, q_y, q_z)
+
+
+@kernel
+def pitch_of(q_w, q_x, q_y, q_z):
+    """Pitch (rad) of q_NB alone, held within +-pi/2 against rounding."""
+    return math.asin(min(1.0, max(-1.0, 2.0 * (q_w * q_y - q_z * q_x))))
+
+
+@kernel
+def heading_of(q_w, q_x, q_y, q_z):
+    """Heading (rad) of q_NB alone."""
+    return math.atan2(2.0 * (q_w * q_z + q_x * q_y), 1.0 - 2.0 * (q_y * q_y + q_z * q_z))
 
 
 @kernel

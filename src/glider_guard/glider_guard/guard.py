@@ -9,7 +9,7 @@ block that fails is met with a reaction (`glider_guard.rows`) that needs none of
 import math
 from typing import NamedTuple
 
-from glider_base.frames import euler_from_quaternion, rotate_to_ned
+from glider_base.frames import pitch_of, rotate_to_ned
 from glider_base.kernel import kernel
 from glider_base.signals import SURFACE_TARGET, Battery, Covariance, Health, Joints, Odometry
 from glider_guard import rows
@@ -266,7 +266,7 @@ def guard_step(
     sent = _sent(last, taken.demand, state.told)
     followers, told = follow(state.followers, taken.joints, sent, params.actuators, dt)
     x, m_b = taken.gate.odometry, taken.joints.m_b
-    _, theta, _ = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
+    theta = pitch_of(x.q_w, x.q_x, x.q_y, x.q_z)
     _, _, rate = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
     sees = not state.told & rows.BLIND
     led, is_glide = led_rate(state.weight, theta, m_b, params.weight)

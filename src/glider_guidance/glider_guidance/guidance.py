@@ -9,7 +9,7 @@ does, in which direction the method would fly, and what control is asked for.
 import math
 from typing import NamedTuple
 
-from glider_base.frames import euler_from_quaternion, rotate_to_ned
+from glider_base.frames import heading_of, pitch_of, rotate_to_ned
 from glider_base.kernel import kernel, replace
 from glider_base.signals import SURFACE_TARGET, TICK_S, Odometry, Reference, TrackingError, Water
 from glider_guidance.current_observer import ObserverParams, ObserverState, observer_step
@@ -192,7 +192,7 @@ def hear_fixes(state, odometry, known, dt):
 def _start(state, odometry, s, params):
     """State at the first tick, at ``s`` (m) of the path: filters at the measured attitude."""
     q_w, q_x, q_y, q_z = odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
-    _, theta, psi = euler_from_quaternion(q_w, q_x, q_y, q_z)
+    theta, psi = pitch_of(q_w, q_x, q_y, q_z), heading_of(q_w, q_x, q_y, q_z)
     stage = GLIDING_DOWN if params.profile.follows_path else SURFACE_PREPARATION
     profile = replace(
         state.profile,
@@ -244,7 +244,7 @@ def path_time_s(params: GuidanceParams, current_n: float, current_e: float) -> f
 def locate(s, odometry, params):
     """Where the vehicle is relative to the path with the virtual target at ``s`` (m)."""
     q_w, q_x, q_y, q_z = odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
-    _, theta, psi = euler_from_quaternion(q_w, q_x, q_y, q_z)
+    theta, psi = pitch_of(q_w, q_x, q_y, q_z), heading_of(q_w, q_x, q_y, q_z)
     ground_n, ground_e, ground_d = rotate_to_ned(
         q_w, q_x, q_y, q_z, odometry.u, odometry.v, odometry.w
     )

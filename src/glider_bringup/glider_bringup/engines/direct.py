@@ -115,32 +115,32 @@ def fly_held(held, log, dt):
 
     The values of the state's current are changed where they lie.
     """
-    params = held.params
+    in_plant, in_current, in_navigation, in_guidance, in_control, in_guard = held.params
     plant, current, navigation, guidance, control, guard = held.state
     rows, finished = 0, False
     for row in range(log.shape[0]):
         t_s = plant.tick * dt
-        numbers, finished = plant_outputs(plant, params.plant)
+        numbers, finished = plant_outputs(plant, in_plant)
         measured = Measured(*numbers)
         joints, pressure = measured.joint_states, measured.pressure
         sensors = (measured.measured_odom, measured.imu, pressure, measured.fix, measured.altitude)
         place = odometry_from_wire(measured.ground_truth_odom)
         position = (place.p_n, place.p_e, place.p_d)
-        current, velocity = current_step_in_place(current, position, t_s, params.current, dt)
+        current, velocity = current_step_in_place(current, position, t_s, in_current, dt)
         water = water_to_wire(velocity)
         navigation, believed, phase = navigation_tick(
-            navigation, t_s, (joints, *sensors), params.navigation, dt
+            navigation, t_s, (joints, *sensors), in_navigation, dt
         )
         odom = believed[0]
         guidance, guided, stage = guidance_tick(
-            guidance, t_s, (odom, measured.altitude), params.guidance, dt
+            guidance, t_s, (odom, measured.altitude), in_guidance, dt
         )
         seen = (guided[0], odom, joints)
-        control, controlled, limits = control_tick(control, t_s, seen, params.control, dt)
+        control, controlled, limits = control_tick(control, t_s, seen, in_control, dt)
         condition = (measured.health, measured.battery, pressure, measured.altitude)
         heard = (controlled[0], guided[0], odom, joints, *condition)
-        guard, guarded, told = guard_tick(guard, t_s, heard, params.guard, dt)
-        plant = plant_move(plant, (guarded[0], water, guarded[1]), params.plant, dt)
+        guard, guarded, told = guard_tick(guard, t_s, heard, in_guard, dt)
+        plant = plant_move(plant, (guarded[0], water, guarded[1]), in_plant, dt)
         said = (phase, stage, limits, told)
         put(log, row, 0, (*numbers, water, *believed, *guided, *controlled, *guarded, *said))
         rows = row + 1
