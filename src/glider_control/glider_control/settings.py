@@ -18,7 +18,7 @@ from glider_control.intake import INITIAL_INTAKE, make_intake
 from glider_control.law import HeadingSettings, LawSettings
 from glider_control.surface import NoSteering, SurfaceLawSettings
 from glider_control.vertical_rate import Trim
-from glider_model.onboard.attitude_filter import Measured
+from glider_model.onboard.attitude_filter import STILL
 from glider_model.onboard.gate import GateSettings
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
@@ -159,15 +159,7 @@ class ControlSettings(ControlLawSettings):
         surface = self.steering(load_vehicle(self.vehicle).steers_by)
         return ControlState(
             tick=0,
-            measured=Measured(
-                phi=0.0,
-                theta=0.0,
-                psi=0.0,
-                phi_dot=0.0,
-                theta_dot=0.0,
-                psi_dot=0.0,
-                vertical_rate=0.0,
-            ),
+            measured=STILL,
             law=self.chosen.initial_state(),
             steering=surface.initial_state() if surface else NoSteering(),
             trim=Trim(0.0, 0.0),

@@ -18,7 +18,7 @@ from glider_guidance.method import LosGains, MethodSettings
 from glider_guidance.order import Order
 from glider_guidance.path.settings import PathSettings, StraightPath
 from glider_guidance.yo.machine import ProfileSettings
-from glider_model.onboard.attitude_filter import Measured
+from glider_model.onboard.attitude_filter import STILL
 from glider_model.onboard.command_filter import FilterParams
 from glider_model.onboard.gate import GateSettings
 from glider_model.onboard.glide_polar import glide_horizontal_speed, make_polar
@@ -260,5 +260,5 @@ class GuidanceSettings(GuidanceLawSettings):
 
     def initial_state(self) -> GuidanceState:
         """State before the first tick."""
-        followed = Followed(Measured(*(7 * (0.0,))), self.steering.initial_state())
+        followed = Followed(STILL, self.steering.initial_state())
         return GuidanceState(self.chosen.initial_state(), followed)

@@ -24,7 +24,7 @@ from pydantic import Field
 
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel, replace
-from glider_base.settings import Settings, number, positive
+from glider_base.settings import Settings, derived, number, positive
 from glider_base.signals import NOTHING_LEARNT
 from glider_control.heading import HeadingLawSettings, HeadingParams, heading_to_roll
 from glider_control.law import Bank, bank_carefully, law_learnt, law_step
@@ -56,16 +56,7 @@ class ChannelSettings(Settings):
 
     def params(self, inertia: float) -> 'ChannelParams':
         """Kernel parameters of a channel that turns an inertia (kg m^2)."""
-        return ChannelParams(
-            l1=self.l1_per_s,
-            b1=self.b1,
-            b2=self.b2,
-            gamma=self.gamma,
-            sigma=self.sigma_per_s,
-            dead_zone=self.dead_zone_radps,
-            bound=self.bound,
-            inertia=inertia,
-        )
+        return derived(ChannelParams, self, inertia=inertia)
 
 
 class RollChannelSettings(ChannelSettings):
@@ -101,12 +92,7 @@ class BacksteppingSettings(HeadingLawSettings):
 
     def initial_state(self) -> 'BacksteppingState':
         """State of a law that knows nothing yet."""
-        return BacksteppingState(
-            roll=Filtered(0.0, 0.0),
-            channels=INITIAL_CHANNELS,
-            heading_integral=0.0,
-            steady_s=0.0,
-        )
+        return BacksteppingState()
 
 
 class ChannelParams(NamedTuple):
@@ -162,10 +148,10 @@ INITIAL_CHANNELS = Channels(_AT_REST, _AT_REST, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0,
 class BacksteppingState(NamedTuple):
     """Channels, the roll filter and the integrator of the heading."""
 
-    roll: Filtered  #: phi_s
-    channels: Channels
-    heading_integral: float  #: (rad/s)
-    steady_s: float  #: time since the last turn-over (s)
+    roll: Filtered = Filtered(0.0, 0.0)  #: phi_s
+    channels: Channels = INITIAL_CHANNELS
+    heading_integral: float = 0.0  #: (rad/s)
+    steady_s: float = 0.0  #: time since the last turn-over (s)
 
 
 def channel_params(

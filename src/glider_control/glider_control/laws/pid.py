@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from glider_base.frames import wrap_angle
 from glider_base.kernel import kernel
-from glider_base.settings import number
+from glider_base.settings import derived, number
 from glider_control.heading import HeadingLawSettings, HeadingParams, heading_to_roll
 from glider_control.law import Bank, bank_carefully, law_step
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
@@ -33,13 +33,9 @@ class PidSettings(HeadingLawSettings):
 
     def params(self, vehicle: Vehicle, bank: Bank) -> 'PidParams':
         """Kernel parameters for a vehicle whose steering is known."""
-        return PidParams(
-            pitch_kp=self.pitch_kp,
-            pitch_ki=self.pitch_ki,
-            pitch_kd=self.pitch_kd,
-            roll_kp=self.roll_kp,
-            roll_ki=self.roll_ki,
-            roll_kd=self.roll_kd,
+        return derived(
+            PidParams,
+            self,
             heading=self.heading_params(vehicle),
             roll_limit=bank.limit,
             roll_filter=bank.filter,

@@ -20,6 +20,10 @@ class Measured(NamedTuple):
     vertical_rate: float
 
 
+#: Of a vehicle of which nothing has been measured yet.
+STILL = Measured(*(7 * (0.0,)))
+
+
 @kernel
 def _follow(state, measured, rate, share, dt):
     """Complementary filter of an angle: the rate carries it, the measurement corrects it."""

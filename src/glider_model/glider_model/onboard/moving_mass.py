@@ -25,14 +25,7 @@ class MovingMass(NamedTuple):
 
 def make_moving_mass(vehicle: VehicleParams) -> MovingMass:
     """Moving mass of a vehicle."""
-    return MovingMass(
-        s_x=vehicle.s_x,
-        s_z=vehicle.s_z,
-        m_p=vehicle.m_p,
-        x_p0=vehicle.x_p0,
-        R_p=vehicle.R_p,
-        pump_x=vehicle.pump_x,
-    )
+    return MovingMass(*(getattr(vehicle, name) for name in MovingMass._fields))
 
 
 @kernel
