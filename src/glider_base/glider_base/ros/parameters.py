@@ -27,7 +27,7 @@ from rclpy.parameter import Parameter
 
 from glider_base.errors import clipped, shown
 from glider_base.files import parse_json, parse_yaml
-from glider_base.settings import ConfigurationError, Settings, mistakes, validate
+from glider_base.settings import ConfigurationError, Settings, holder_of, mistakes, validate
 
 SettingsT = TypeVar('SettingsT', bound=Settings)
 
@@ -148,11 +148,7 @@ def _parse(leaf: _Leaf, value, source: str):
 def _nested(values: dict[str, Any]) -> dict[str, Any]:
     tree: dict[str, Any] = {}
     for name, value in values.items():
-        *owners, last = name.split('.')
-        branch = tree
-        for owner in owners:
-            branch = branch.setdefault(owner, {})
-        branch[last] = value
+        holder_of(tree, name)[name.rpartition('.')[2]] = value
     return tree
 
 
