@@ -95,7 +95,8 @@ def classes(
         if point.group != group:
             continue
         try:
-            loaded = _load(point, base, taken | set(found), complete)
+            loaded = point.load()
+            refuse_unusable(point.name, loaded, base, taken | set(found), complete)
             check(point.name, loaded)
             found[point.name] = loaded
         except (Exception, SystemExit) as error:  # it is not our code
@@ -103,10 +104,10 @@ def classes(
     return found
 
 
-def choice(found: dict[str, ClassT], default: str, group: str) -> tuple:
+def choice(found: dict[str, ClassT], default: str, group: str, words: str = '') -> tuple:
     """Field, as of `pydantic.create_model`, for the name of one of them."""
-    extra = {'others': others(group)}
-    field = pydantic.Field(default, description=listed(found), json_schema_extra=extra)
+    extra, words = {'others': others(group)}, words or listed(found)
+    field = pydantic.Field(default, description=words, json_schema_extra=extra)
     return Literal[tuple(found)], field
 
 
@@ -148,30 +149,32 @@ def _tell(point: EntryPoint, why: str) -> None:
         print(ConfigurationError(f'glider: {_origin(point)}: not usable: {why}'), file=sys.stderr)
 
 
-def _load(point: EntryPoint, base: ClassT, taken: set[str], complete: bool) -> ClassT:
-    if not point.name.isidentifier():
+def refuse_unusable(
+    name: str, one: Any, base: type, taken: set[str], complete: bool = True
+) -> None:
+    """Refuse what is no usable subclass of ``base``, or not by a name; see `classes`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Which say why, as part of a sentence.
+    """
+    if not name.isidentifier():
         raise ValueError('its name is no identifier (allowed: letters, digits and _)')
-    if point.name in taken:
+    if name in taken:
         raise ValueError(f'its name is taken (allowed: all but {", ".join(sorted(taken))})')
-    loaded = point.load()
-    if not (isinstance(loaded, type) and issubclass(loaded, base)):
+    if not (isinstance(one, type) and issubclass(one, base)):
         raise TypeError(f'it is no subclass of {base.__module__}.{base.__name__}')
-    if lacking := unwritten(loaded, base):
-        raise TypeError(f'it has no {lacking}')
+    methods = (name for name in ('params', 'initial_state') if name in vars(base))
+    if lacking := [name for name in methods if getattr(one, name) is vars(base)[name]]:
+        raise TypeError(f'it has no {" and no ".join(lacking)}')
     try:
         if complete:
-            loaded()
+            one()
     except pydantic.ValidationError as error:
         first = error.errors(include_url=False)[0]
         field = '.'.join(map(str, first['loc']))
         raise ValueError(f'its field {field} has no usable default: {first["msg"]}') from None
-    return loaded
-
-
-def unwritten(one: type, base: type) -> str:
-    """Methods that a subclass has to bring, and has not, as part of a sentence."""
-    names = (name for name in ('params', 'initial_state') if name in vars(base))
-    return ' and no '.join(name for name in names if getattr(one, name) is vars(base)[name])
 
 
 def _origin(point: EntryPoint) -> str:

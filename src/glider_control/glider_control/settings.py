@@ -63,18 +63,8 @@ SURFACE_LAWS = plugins.classes(plugins.SURFACE_LAWS, SurfaceLawSettings, surface
 _LawChoice = pydantic.create_model(
     '_LawChoice',
     __base__=Settings,
-    law=(
-        Literal[tuple(LAWS)],
-        Field(
-            'adaptive',
-            description='attitude law',
-            json_schema_extra={'others': plugins.others(plugins.CONTROL_LAWS)},
-        ),
-    ),
-    **{
-        name: (settings, Field(settings(), description=plugins.summary(settings)))
-        for name, settings in {**LAWS, **SURFACE_LAWS}.items()
-    },
+    law=plugins.choice(LAWS, 'adaptive', plugins.CONTROL_LAWS, 'attitude law'),
+    **plugins.sections({**LAWS, **SURFACE_LAWS}),
 )
 
 
@@ -98,7 +88,7 @@ class ControlLawSettings(_LawChoice):
     @property
     def chosen(self) -> LawSettings:
         """Gains of the law that was chosen."""
-        return getattr(self, self.law)
+        return getattr(self, self.law, None) or LAWS[self.law]()
 
     def steering(self, steers_by: str) -> SurfaceLawSettings | None:
         """Gains of steering by a surface of this name; None without a name.
@@ -113,13 +103,13 @@ class ControlLawSettings(_LawChoice):
                 f'the vehicle has a {steers_by}, which nothing steers by (allowed: '
                 f'{", ".join(SURFACE_LAWS)}; {plugins.others(plugins.SURFACE_LAWS)})'
             )
-        return getattr(self, steers_by) if steers_by else None
+        return getattr(self, steers_by, None) or SURFACE_LAWS[steers_by]() if steers_by else None
 
     def idle(self, steers_by: str) -> set[str]:
         """What does not fly, with the gains that it has anyway: laws of others, surfaces."""
         kinds = {**LAWS, **SURFACE_LAWS}
         names = (plugins.of_others(LAWS, laws) | set(SURFACE_LAWS)) - {self.law, steers_by}
-        return {name for name in names if getattr(self, name) == kinds[name]()}
+        return {name for name in names if getattr(self, name, None) == kinds[name]()}
 
 
 class ControlSettings(ControlLawSettings):
@@ -179,22 +169,10 @@ def check_law(name: str, law: type) -> None:
     ------
     ConfigurationError
     """
-    taken = {*TAKEN, *LAWS, *SURFACE_LAWS}
-    if not name.isidentifier() or name in taken:
-        raise ConfigurationError(
-            f'law {name}: not usable as a name (allowed: letters, digits and _, and none of '
-            f'{", ".join(sorted(taken))})'
-        )
-    if lacking := plugins.unwritten(law, LawSettings):
-        raise ConfigurationError(f'law {name}: it has no {lacking} (docs/your_law.md has both)')
     try:
-        law()
-    except pydantic.ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        field = '.'.join(map(str, first['loc']))
-        raise ConfigurationError(
-            f'law {name}: its field {field} has no usable default: {first["msg"]}'
-        ) from None
+        plugins.refuse_unusable(name, law, LawSettings, {*TAKEN, *LAWS, *SURFACE_LAWS})
+    except (TypeError, ValueError) as error:
+        raise ConfigurationError(f'law {name}: {error}; docs/your_law.md has one') from None
 
 
 def with_law(
