@@ -7,6 +7,8 @@ And how a process ends: its exit code, and the last words of a node that gives u
 
 import reprlib
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 #: Lines that an error has at most, but for one that says how many more there are.
@@ -90,6 +92,21 @@ def told_changes(changes: dict[str, Any]) -> str:
     told = [f'{clipped(field)}={shown(value)}' for field, value in changes.items()]
     more = [f'{len(told) - CHANGES_TOLD} more'] if len(told) > CHANGES_TOLD else []
     return ' with ' + ', '.join(told[:CHANGES_TOLD] + more) if told else ''
+
+
+@contextmanager
+def installed(library: str) -> Iterator[None]:
+    """Say of a library that is imported here, and is not there, how to get it.
+
+    Raises ConfigurationError.
+    """
+    try:
+        yield
+    except ImportError:
+        raise ConfigurationError(
+            f'{library}, is not installed; install it with: '
+            './glider python -m pip install --no-deps -r requirements-flights.txt'
+        ) from None
 
 
 def say_fatal(reason: object) -> None:

@@ -3,15 +3,14 @@
 """Which files are those of a flight, and the libraries that read them."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
-from glider_base.errors import ConfigurationError
+from glider_base.errors import ConfigurationError, installed
 
 #: There is no later date (s since 1970): the end of 2099.
 LATEST_S = 4.1e9
@@ -45,21 +44,6 @@ def files_in(place: Path, wanted: Callable[[Path], bool]) -> list[Path]:
             f'{folders[0]} and {folders[1]}; give one of them'
         )
     return files
-
-
-@contextmanager
-def installed(library: str) -> Iterator[None]:
-    """Say of a library that is imported here, and is not there, how to get it.
-
-    Raises ConfigurationError.
-    """
-    try:
-        yield
-    except ImportError:
-        raise ConfigurationError(
-            f'{library}, is not installed; install it with: '
-            './glider python -m pip install --no-deps -r requirements-flights.txt'
-        ) from None
 
 
 def gsw():

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_base.errors import ConfigurationError
+from glider_base.errors import ConfigurationError, installed
 from glider_base.files import read_yaml
-from glider_flights.folders import installed
 
 SUFFIXES = ('.nc', '.ncdf', '.nc4')
 #: Our unit in those of `variables.yaml`.

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
+from glider_base.errors import installed
 from glider_base.files import parse_yaml
 from glider_base.settings import validate
 from glider_flights.folders import (
     Progress,
     files_in,
     gsw,
-    installed,
     of_one_flight,
     read_each,
 )

@@ -14,13 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_base.errors import ConfigurationError
+from glider_base.errors import ConfigurationError, installed
 from glider_flights.folders import (
     LATEST_S,
     Progress,
     files_in,
     gsw,
-    installed,
     of_one_flight,
 )
 from glider_flights.netcdf import names_of

@@ -121,7 +121,7 @@ def test_a_file_of_temperature_and_salinity(csv):
 
 def test_without_gsw_one_sentence_says_how_to_get_it(csv, monkeypatch):
     monkeypatch.setitem(sys.modules, 'gsw', None)
-    with pytest.raises(ValidationError, match='takes the library gsw; install it with: ./glider'):
+    with pytest.raises(ValidationError, match='gsw, .* is not installed; install it with: ./gl'):
         csv('depth_m,temperature_degC,salinity_psu\n0,20,35\n')
 
 

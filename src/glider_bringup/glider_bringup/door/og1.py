@@ -17,7 +17,7 @@ import numpy as np
 import xarray
 from xarray.backends import H5NetCDFStore
 
-from glider_base.errors import ConfigurationError
+from glider_base.errors import ConfigurationError, installed
 from glider_base.frames import on_chart, poses_from_wire
 from glider_base.signals import TICK_NS
 from glider_bringup.door.tracks import start_of
@@ -95,13 +95,8 @@ def write_og1(
         If it has no bag, or no tick in it, if nobody knows when it was, or the file cannot be
         written.
     """
-    try:
+    with installed('h5netcdf, which writes NetCDF 4'):
         import h5netcdf  # xarray writes NetCDF 4 through it
-    except ImportError:
-        raise ConfigurationError(
-            'h5netcdf, which writes NetCDF 4, is not installed; install it with: '
-            './glider python -m pip install --no-deps -r requirements-flights.txt'
-        ) from None
     if not has_bag(run):
         raise ConfigurationError(
             f'{run}: no bag in it (allowed: a run over nodes, or one flown with --bag)'

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from glider_base.errors import ConfigurationError
-from glider_flights.folders import installed
+from glider_base.errors import ConfigurationError, installed
 from glider_flights.navigation import comparable_current, navigate
 from glider_flights.record import Flight, Segment, at_times, vertical_rate
 from glider_flights.validation.flying import RATE_S, Model, Simulated, Track

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from glider_base.errors import installed
 from glider_base.kernel import kernel
 from glider_base.signals import SEA_WATER_DENSITY
 from glider_model.ocean.columns import MAX_ROWS, check_rows, is_height, read_columns
@@ -148,13 +149,8 @@ def density_of(
     ValueError
         Naming the source, if there is no library for it.
     """
-    try:
+    with installed(f'{source}: gsw, which makes density of temperature and salinity'):
         import gsw
-    except ImportError:
-        raise ValueError(
-            f'{source}: density from temperature and salinity takes the library gsw; install it '
-            'with: ./glider python -m pip install --no-deps -r requirements-flights.txt'
-        ) from None
     pressure = gsw.p_from_z(-depth_m, _LATITUDE)
     salinity = gsw.SR_from_SP(salinity_psu)
     if is_potential:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from glider_base.errors import ConfigurationError
+from glider_base.errors import ConfigurationError, installed
 from glider_base.files import is_file
 from glider_model.ocean.columns import is_height
 
@@ -148,12 +148,10 @@ def _opened(path: Path) -> Iterator['xarray.Dataset']:
         is_hdf = file.read(4) == b'\x89HDF'
     try:
         engine = 'h5netcdf' if is_hdf else 'scipy'
-        dataset = xarray.open_dataset(path, engine=engine, decode_times=False)
-    except ModuleNotFoundError:
-        raise ConfigurationError(
-            f'file {path}: NetCDF-4 takes the library h5netcdf; install it with: ./glider python '
-            '-m pip install --no-deps -r requirements-flights.txt'
-        ) from None
+        with installed(f'file {path}: h5netcdf, which reads NetCDF 4'):
+            dataset = xarray.open_dataset(path, engine=engine, decode_times=False)
+    except ConfigurationError:
+        raise
     except Exception as error:  # of libraries, of many types, for files that are none
         text = f'xarray reads: {type(error).__name__}: {error}'.splitlines()[0][:200]
         raise ConfigurationError(f'file {path}: not a NetCDF file that {text}') from None
