@@ -17,7 +17,6 @@ from glider_bringup.engines.direct import (
     MissionState,
     NotFiniteError,
     blocks_of,
-    fly_blocks,
     fly_held,
     held_state,
     hold,
@@ -302,10 +301,8 @@ def fly(
         pilot = Pilot(scenario) if scenario.guidance.route == 'planned' else None
         start = time.perf_counter()
         try:
-            is_held = scenario.orders or pilot or scenario.guidance.no_progress != 'tell'
-            held = Held(scenario, (state, params)) if is_held else None
-            advance = _piloted(held, pilot) if held and pilot else held and held.fly
-            for log in blocks_of(advance) if advance else fly_blocks(state, params):
+            held = Held(scenario, (state, params))
+            for log in blocks_of(_piloted(held, pilot) if pilot else held.fly):
                 for taker in takers:
                     taker.add(log)
                 ticks += len(log)
