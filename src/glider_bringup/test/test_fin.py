@@ -11,7 +11,7 @@ from glider_bringup import load_scenario
 from glider_bringup.door.run import fly, open_run
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.card import fly_scored
-from glider_bringup.scoring.one_hertz import Recorder
+from glider_bringup.scoring.one_hertz import SECOND, Record, Rows
 from glider_mission.blocks import COLUMNS
 from glider_mission.run_folder import make_run_folder
 
@@ -25,13 +25,13 @@ def test_both_laws_hold_a_straight_path_in_a_current(law, real):
     """Cross-track error of a metre or two in the steady glide, with the vehicle level."""
     fin = {'vehicle.fin.area': 0.05 * real}
     fields = {**FIELDS, **fin, 'control.law': law, 'duration_s': 15000.0}
-    recorder = Recorder()
+    recorder = Rows(SECOND)
     flight, scores = fly_scored(load_scenario('current_8deg', fields), [recorder])
     assert flight.status == 'completed'
     assert scores['cross_track_m']['max_steady'] < 2.0
     assert scores['cross_track_m']['max_all'] < 6.0
     assert scores['guard']['events'] == []
-    record = recorder.result()
+    record = Record(recorder.result())
     assert np.abs(record.roll[1800:]).max() < 0.5
     angle = record.joints[:, Joints._fields.index('delta')]
     assert 0.05 < np.abs(angle).max() <= np.radians(26.0)

@@ -7,7 +7,7 @@ import pytest
 
 from glider_base.settings import ConfigurationError
 from glider_bringup.scoring.card import fly_scored
-from glider_bringup.scoring.one_hertz import Recorder
+from glider_bringup.scoring.one_hertz import SECOND, Record, Rows
 from glider_mission.scenario import load_scenario
 from glider_model.ocean.density import immersed
 
@@ -21,11 +21,11 @@ KNOWN = {'navigation.method': 'known', 'profile.surface_every_dives': 0, 'sensor
 
 def flown(name, known=KNOWN, **changes):
     fields = {name.replace('__', '.'): value for name, value in changes.items()}
-    recorder = Recorder()
+    recorder = Rows(SECOND)
     flight, scores = fly_scored(load_scenario(name, {'dives': 0, **known, **fields}), [recorder])
     assert flight.status == 'completed'
     assert scores['guard']['events'] == []
-    return scores, recorder.result()
+    return scores, Record(recorder.result())
 
 
 @pytest.mark.parametrize('name', ['slocum_shelf', 'seaglider_1000m'])

@@ -19,7 +19,7 @@ from rich.console import Console
 import command_line
 from glider_base.settings import ConfigurationError
 from glider_bringup import cli
-from glider_bringup.scoring.one_hertz import Recorder
+from glider_bringup.scoring.one_hertz import Record, Rows
 from glider_mission.changes import parse_assignment
 from glider_mission.planned import horizontal_speed
 from glider_mission.run_folder import make_result_folder
@@ -345,7 +345,7 @@ def test_numbers_that_json_does_not_have_are_told_as_none():
 
 def survey_record(heading):
     """Target along three legs, north, west and south, 2000 s each; heading as given (deg)."""
-    record = copy.copy(Recorder().result())
+    record = copy.copy(Record(Rows().result()))
     time_s = np.arange(6000.0)
     course = np.radians(np.repeat([0.0, -90.0, -180.0], 2000))
     record.time_s = time_s

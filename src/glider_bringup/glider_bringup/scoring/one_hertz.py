@@ -39,17 +39,6 @@ class Rows:
         return self._blocks[0]
 
 
-class Recorder(Rows):
-    """Takes log blocks as they come and keeps one row a second of them."""
-
-    def __init__(self) -> None:
-        super().__init__(SECOND)
-
-    def result(self) -> 'Record':
-        """What was kept of everything taken in so far."""
-        return Record(super().result())
-
-
 class Record:
     """What a log of one row a second, float64[n, ROW], says: arrays over time, NED, in deg."""
 

@@ -19,7 +19,7 @@ from glider_base.files import read_yaml
 from glider_bringup.engines.flight import fly as fly_mission
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.card import finite
-from glider_bringup.scoring.one_hertz import Record, Recorder
+from glider_bringup.scoring.one_hertz import SECOND, Record, Rows
 from glider_bringup.scoring.score import Scorer, scores_of
 from glider_guidance.los import crab_heading
 from glider_mission.changes import run_command
@@ -273,9 +273,9 @@ def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
         heading = law.heading._replace(steering_dive=steering.dive, steering_climb=steering.climb)
         control = params.control._replace(law=law._replace(heading=heading))
         params = params._replace(control=control)
-    scorer, recorder = Scorer(scenario), Recorder()
-    flight = fly_mission(scenario, [scorer, recorder], mission=(state, params))
-    record, scores = recorder.result(), scores_of(scenario, scorer)
+    scorer, kept = Scorer(scenario), Rows(SECOND)
+    flight = fly_mission(scenario, [scorer, kept], mission=(state, params))
+    record, scores = Record(kept.result()), scores_of(scenario, scorer)
     for measure in case.measures:
         scores.update(MEASURES[measure](record, scenario))
     row = _row(scores, flight.status == 'failed')
