@@ -47,17 +47,17 @@ def fly_recorded(
     attachments = [folder / SCENARIO_FILE, folder / VEHICLE_FILE]
     topics = scenario.topics
     recorded = recorded_topics(topics)
-    writer = BagWriter(folder, scenario.name, attachments=attachments, topics=recorded, sync=sync)
-    bag = LogWriter(writer, scenario.guidance_settings(), topics, steers_by(scenario))
-    flight = fly(scenario, [*takers, bag], progress)
+    bag = BagWriter(folder, scenario.name, attachments=attachments, topics=recorded, sync=sync)
+    writer = LogWriter(bag, scenario.guidance_settings(), topics, steers_by(scenario))
+    flight = fly(scenario, [*takers, writer], progress)
     try:
         if flight.status != 'aborted':
-            bag.finish(flight.reason)
+            writer.finish(flight.reason)
         bag.close()
     except DiskError as error:
         if not flight.reason:
             flight = flight._replace(status=ended(False, str(error)), reason=str(error))
-    return flight._replace(messages_recorded=bag.messages)
+    return flight._replace(messages_recorded=sum(bag.counts.values()))
 
 
 def fly_nodes(

@@ -130,12 +130,3 @@ class LogWriter:
         if failure:
             report = health.Report(_PLANT, health.FAILED, failure, stamp_ns, level=health.ERROR)
         self._bag.write('/diagnostics', stamp_ns, to_cdr(health.report_array(report)))
-
-    def close(self) -> None:
-        """Complete the bag."""
-        self._bag.close()
-
-    @property
-    def messages(self) -> int:
-        """Number of messages in the bag."""
-        return sum(self._bag.counts.values())
