@@ -329,7 +329,7 @@ def test_only_its_own_recorder_lets_the_plant_go_on(make_graph, context, name):
 INTERRUPTED = """
 import os, signal, sys
 from glider_base.ros.lockstep.node import TickNode
-from glider_base.ros.lockstep.process import run
+from glider_base.ros.lockstep.process import run_together
 
 
 class Interrupted(TickNode):
@@ -343,7 +343,7 @@ class Interrupted(TickNode):
         print('acted to the end', flush=True)
 
 
-sys.exit(run(Interrupted))
+sys.exit(run_together([Interrupted]))
 """
 
 

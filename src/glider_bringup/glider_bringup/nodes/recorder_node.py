@@ -22,7 +22,7 @@ from glider_base.ros.lockstep import health, peers
 from glider_base.ros.lockstep.executor import take, take_with_info
 from glider_base.ros.lockstep.node import TickNode
 from glider_base.ros.lockstep.peers import FAREWELL_S
-from glider_base.ros.lockstep.process import Stop, run
+from glider_base.ros.lockstep.process import Stop, entry
 from glider_base.ros.parameters import declare_settings
 from glider_base.ros.wire import qos, topics
 from glider_base.ros.wire.codec import MessageError, to_cdr
@@ -340,10 +340,7 @@ class RecorderNode(TickNode):
             self.report(health.FINISHED, stamp_ns=max(0, self.order.written_ns))
 
 
-def main(args=None) -> int:
-    """Run the node; returns its exit code."""
-    return run(RecorderNode, args)
-
+main = entry(RecorderNode)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -6,7 +6,7 @@ import sys
 
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
-from glider_base.ros.lockstep.process import run
+from glider_base.ros.lockstep.process import entry
 from glider_control.block import CONTROL
 
 
@@ -28,10 +28,7 @@ class ControlNode(BlockNode):
             self.event(stamp_ns, health.WARN, said, odom_refused=refused)
 
 
-def main(args=None) -> int:
-    """Run the node; returns its exit code."""
-    return run(ControlNode, args)
-
+main = entry(ControlNode)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -8,7 +8,7 @@ from std_srvs.srv import Trigger
 
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
-from glider_base.ros.lockstep.process import run
+from glider_base.ros.lockstep.process import entry
 from glider_base.signals import TICK_S, Joints
 from glider_guard.ascent import INITIAL_ASCENT, Rise, come_up
 from glider_guard.block import GUARD
@@ -80,10 +80,7 @@ class GuardNode(BlockNode):
         publish_command(stamp_ns, self._come_up(cycles))
 
 
-def main(args=None) -> int:
-    """Run the node; returns its exit code."""
-    return run(GuardNode, args)
-
+main = entry(GuardNode)
 
 if __name__ == '__main__':
     sys.exit(main())

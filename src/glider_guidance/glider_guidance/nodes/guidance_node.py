@@ -15,7 +15,7 @@ from glider_base.frames import water_to_wire
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.executor import take
-from glider_base.ros.lockstep.process import run
+from glider_base.ros.lockstep.process import entry
 from glider_base.ros.wire import qos
 from glider_base.ros.wire.codec import MessageError
 from glider_base.ros.wire.topics import TOPICS
@@ -168,10 +168,7 @@ def path_message(points, stamp_ns: int = 0) -> Path:
     return path
 
 
-def main(args=None) -> int:
-    """Run the node; returns its exit code."""
-    return run(GuidanceNode, args)
-
+main = entry(GuidanceNode)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -5,7 +5,7 @@
 import sys
 
 from glider_base.ros.lockstep.block_node import BlockNode
-from glider_base.ros.lockstep.process import run
+from glider_base.ros.lockstep.process import entry
 from glider_model.ocean.current_block import CURRENT
 
 
@@ -17,10 +17,7 @@ class CurrentNode(BlockNode):
         self.start_up()
 
 
-def main(args=None) -> int:
-    """Run the node; returns its exit code."""
-    return run(CurrentNode, args)
-
+main = entry(CurrentNode)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -6,7 +6,7 @@ import math
 import sys
 
 from glider_base.ros.lockstep.clock import ClockNode
-from glider_base.ros.lockstep.process import run
+from glider_base.ros.lockstep.process import entry
 from glider_base.ros.parameters import declare_settings
 from glider_base.signals import TICK_S
 from glider_base.wiring import at_rest, present
@@ -55,10 +55,7 @@ class PlantNode(ClockNode):
         return True
 
 
-def main(args=None) -> int:
-    """Run the node; returns its exit code."""
-    return run(PlantNode, args)
-
+main = entry(PlantNode)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -17,7 +17,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 
 from glider_base.ros.lockstep.executor import Gate, take
-from glider_base.ros.lockstep.process import run
+from glider_base.ros.lockstep.process import entry
 from glider_base.ros.parameters import declare_settings
 from glider_base.ros.wire import qos
 from glider_base.settings import ConfigurationError, Settings, number
@@ -91,10 +91,7 @@ class TfNode(Node):
         """Nothing to complete."""
 
 
-def main(args=None) -> int:
-    """Run the node; returns its exit code."""
-    return run(TfNode, args)
-
+main = entry(TfNode)
 
 if __name__ == '__main__':
     sys.exit(main())

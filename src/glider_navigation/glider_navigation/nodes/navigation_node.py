@@ -5,7 +5,7 @@
 import sys
 
 from glider_base.ros.lockstep.block_node import BlockNode
-from glider_base.ros.lockstep.process import run
+from glider_base.ros.lockstep.process import entry
 from glider_navigation.block import NAVIGATION
 
 
@@ -22,10 +22,7 @@ class NavigationNode(BlockNode):
         return self.settings.imu_period_s
 
 
-def main(args=None) -> int:
-    """Run the node; returns its exit code."""
-    return run(NavigationNode, args)
-
+main = entry(NavigationNode)
 
 if __name__ == '__main__':
     sys.exit(main())

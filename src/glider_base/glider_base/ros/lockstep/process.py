@@ -38,9 +38,9 @@ class Stop(Exception):  # noqa: N818
         self.code = code
 
 
-def run(node_type: Callable[[], Node], args=None) -> int:
-    """Life of the process of one node; see `run_together`."""
-    return run_together([node_type], args)
+def entry(node_type: Callable[[], Node]) -> Callable[..., int]:
+    """What runs a node as a process and returns its exit code; see `run_together`."""
+    return lambda args=None: run_together([node_type], args)
 
 
 def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
