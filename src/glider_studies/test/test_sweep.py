@@ -477,7 +477,7 @@ def test_largest_sweep_is_planned_as_it_is_flown(tmp_path, monkeypatch):
         'b': {**values, 'field': 'initial.east_m', 'stop': 999},
     }
     path.write_text(yaml.safe_dump({'dimensions': dimensions}))
-    monkeypatch.setattr(sweep_file.Plan, '_check_values', lambda plan: [load_scenario()])
+    monkeypatch.setattr(sweep_file.Plan, 'along', lambda plan, number: [load_scenario()])
     plan = load_sweep(str(path))
     assert plan.cells == sweep_file.MAX_CELLS
     chunks = make_chunks(plan, bytearray(plan.cells), 2)

@@ -18,7 +18,7 @@ from glider_base.settings import find_field, unit_of
 from glider_mission.changes import VEHICLE
 from glider_mission.planned import horizontal_speed
 from glider_mission.scenario import Scenario
-from glider_model.vehicle.file import Vehicle
+from glider_model.vehicle.file import Vehicle, vehicle_path
 from glider_studies.sweep.plan import Plan
 
 #: Units by how names in a scorecard end, in the spelling of UDUNITS.
@@ -148,7 +148,7 @@ def _attributes(plan: Plan) -> dict[str, str]:
         'sweep': plan.sweep.name,
         'sweep_yaml': plan.text,
         **({'set': json.dumps(plan.given)} if plan.given else {}),
-        'scenario_yaml': plan.first.to_yaml(vehicle=plan.described().vehicle),
+        'scenario_yaml': plan.first.to_yaml(vehicle=vehicle_path(plan.first.vehicle).stem),
         'vehicle_yaml': first[1],
         **{f'vehicle_{name}_yaml': text for name, text in others},
         'code_digest': source_digest(),

@@ -252,7 +252,8 @@ class Plan:
             self.source = read_scenario(self._scenario_name())
         except ConfigurationError as error:
             raise ConfigurationError(f'{path}: {error}') from None
-        checked = self._check_values()
+        # every value of every dimension, the first cell's first
+        checked = [one for number in range(len(self.axes)) for one in self.along(number)]
         #: digests of the scenarios of all values
         self.scenarios = [_digest(one) for one in checked]
         #: laws and methods that cells may have
@@ -297,13 +298,6 @@ class Plan:
                         )
             seen.update(dict.fromkeys(fields, place))
 
-    def _check_values(self) -> list[Scenario]:
-        """Check every value of every dimension, beside the first of all others.
-
-        Returns a scenario for each, the first cell's first.
-        """
-        return [one for number in range(len(self.axes)) for one in self.along(number)]
-
     def along(self, number: int) -> list[Scenario]:
         """Scenario of each value of a dimension by its number, beside the first of the others."""
         axis, found = self.axes[number], []
@@ -344,10 +338,6 @@ class Plan:
         """Scenario of the first cell."""
         return make_scenario(self.source, self.changes(0))
 
-    def described(self) -> Scenario:
-        """Scenario of the first cell as results tell it, whose vehicle has no folder."""
-        return _described(self.first)
-
     @cached_property
     def digest(self) -> str:
         """Digest of everything that the numbers follow from: inputs and code."""
@@ -362,14 +352,10 @@ class Plan:
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
-def _described(scenario: Scenario) -> Scenario:
-    """A scenario whose vehicle has no folder."""
-    return scenario.model_copy(update={'vehicle': vehicle_path(scenario.vehicle).stem})
-
-
 def _digest(scenario: Scenario) -> str:
-    """Digest of a scenario, with what it has of files."""
-    return hashlib.sha256(_described(scenario).model_dump_json().encode()).hexdigest()
+    """Digest of a scenario, whose vehicle has no folder, with what it has of files."""
+    described = scenario.model_copy(update={'vehicle': vehicle_path(scenario.vehicle).stem})
+    return hashlib.sha256(described.model_dump_json().encode()).hexdigest()
 
 
 def vehicle_digest(vehicle: str) -> str:
