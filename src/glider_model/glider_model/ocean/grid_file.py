@@ -271,7 +271,9 @@ def _times(variable: 'xarray.Variable') -> np.ndarray:
     import xarray
 
     try:
-        decoded = xarray.decode_cf(xarray.Dataset(coords={'time': ('time', *_bare(variable))}))
+        told = {name: text for name, text in variable.attrs.items() if name != 'bounds'}
+        bare = xarray.Dataset(coords={'time': ('time', variable.values, told)})
+        decoded = xarray.decode_cf(bare)
         values = decoded['time'].values
     except (ValueError, ImportError, OverflowError):  # of other calendars, by a library for them
         values = np.empty(0)
@@ -284,9 +286,12 @@ def _times(variable: 'xarray.Variable') -> np.ndarray:
     return values.astype('datetime64[ns]').astype(np.int64) / 1e9
 
 
-def _bare(variable: 'xarray.Variable') -> tuple[np.ndarray, dict]:
-    """Numbers of a variable, and what is said of them but their bounds."""
-    return variable.values, {k: v for k, v in variable.attrs.items() if k != 'bounds'}
+def _scale(name: str, told: dict, units: dict[str, float], default: str = '') -> float:
+    """What the numbers of a variable are multiplied by, as its attributes tell."""
+    unit = str(told.get('units', default)).strip()
+    if unit not in units:
+        raise ValueError(f'{name}: units = {unit!r} (allowed: {", ".join(units)})')
+    return units[unit]
 
 
 def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
@@ -304,23 +309,18 @@ def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
         both = ' and '.join(str(dataset[name].dims) for name in names)
         raise ValueError(f'{" and ".join(names)}: on different axes, {both}, as a '
                          'staggered grid has them (allowed: both at the same places)')  # fmt: skip
-    scales, values = [], {}
-    for one, name in zip(wanted, names, strict=True):
-        units = str(dataset[name].attrs.get('units', '')).strip()
-        if units not in one.units:
-            raise ValueError(f'{name}: units = {units!r} (allowed: {", ".join(one.units)})')
-        scales.append(one.units[units])
+    scales = [
+        _scale(name, dataset[name].attrs, one.units)
+        for one, name in zip(wanted, names, strict=True)
+    ]
+    values = {}
     for axis, dimension in axes.items():
         one = dataset.variables[dimension]
         values[axis] = _times(one) if axis == 'time' else np.array(one.values, dtype=float)
         if axis == 'depth':
-            units = str(one.attrs.get('units', 'm')).strip()
-            if units not in _LENGTHS:
-                raise ValueError(
-                    f'{dimension}: units = {units!r} (allowed: {", ".join(_LENGTHS)})'
-                )
+            scale = _scale(dimension, one.attrs, _LENGTHS, 'm')
             is_up = one.attrs.get('positive') == 'up' or is_height(values[axis])
-            values[axis] *= _LENGTHS[units] * (-1.0 if is_up else 1.0)
+            values[axis] *= scale * (-1.0 if is_up else 1.0)
             if len(one) and values[axis].max() < 0.0:
                 raise ValueError(f'{dimension}: positive up, and no level below the surface')
         _refuse_no_axis(dimension, values[axis])
@@ -511,17 +511,14 @@ def _refuse_no_water(what: str, read: np.ndarray, wanted: Wanted) -> None:
 
 def _cut(part: 'xarray.DataArray', axes: dict[str, str], chosen: dict[str, np.ndarray]):
     """Numbers of a variable where they are chosen along its axes, in the order of these."""
-    for axis, dimension in axes.items():
-        pieces = [part.isel({dimension: run}) for run in _runs(chosen[axis])]
-        part = pieces[0] if len(pieces) == 1 else _joined(pieces, dimension)
-    return np.asarray(part.transpose(*axes.values()).values, dtype=float)
-
-
-def _joined(pieces: list, dimension: str):
-    """Pieces of a variable one after the other."""
     import xarray
 
-    return xarray.concat([piece.load() for piece in pieces], dimension)
+    for axis, dimension in axes.items():
+        pieces = [part.isel({dimension: run}) for run in _runs(chosen[axis])]
+        if len(pieces) > 1:
+            pieces = [xarray.concat([piece.load() for piece in pieces], dimension)]
+        (part,) = pieces
+    return np.asarray(part.transpose(*axes.values()).values, dtype=float)
 
 
 def _fill_land(levels: np.ndarray) -> np.ndarray:
@@ -637,10 +634,8 @@ def _bottom(dataset: 'xarray.Dataset') -> tuple[str, str, float]:
             f'{_listed(dataset)})'
         )
     ((name, (standard, is_height)),) = found.items()
-    units = str(dataset[name].attrs.get('units', 'm')).strip()
-    if units not in _LENGTHS:
-        raise ValueError(f'{name}: units = {units!r} (allowed: {", ".join(_LENGTHS)})')
-    return name, standard, -_LENGTHS[units] if is_height else _LENGTHS[units]
+    scale = _scale(name, dataset[name].attrs, _LENGTHS, 'm')
+    return name, standard, -scale if is_height else scale
 
 
 class Variable(NamedTuple):
