@@ -140,7 +140,8 @@ if __name__ == '__main__':
         'experiments': (_fly_case, case),
     }
     with worker_pool(1) as pool:
-        print(pool.results(fly, studies, lambda done: None))
+        tasks = {name: (fly, study) for name, study in studies.items()}
+        print(pool.results(tasks, lambda done: None))
 """
 
 
