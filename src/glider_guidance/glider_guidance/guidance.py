@@ -488,17 +488,16 @@ def guidance_step(
     output = GuidanceOutput(
         reference, place.error, current, doing.leg.stage, is_infeasible, stays_at
     )
-    return GuidanceState(
+    return replace(
+        state,
         tick=state.tick + 1 if gate.seen else 0,
         gate=gate,
         profile=profile,
         s=s,
-        path_id=state.path_id,
         followed=followed,
         water=WaterState(water.observer, asked.speed),
         method=method if gate.seen else state.method,
         commanded=commanded,
         infeasible_ticks=infeasible_ticks,
         progress=progress,
-        fixes=state.fixes,
     ), output
