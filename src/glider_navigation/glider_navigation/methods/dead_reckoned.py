@@ -321,7 +321,21 @@ def _odometry(place, attitude, flight, velocity):
     q_w, q_x, q_y, q_z = quaternion_from_euler(angles.phi, angles.theta, angles.psi)
     u, v, w = rotate_to_body(q_w, q_x, q_y, q_z, velocity.n, velocity.e, flight.rate)
     p, q, r = attitude.p, attitude.q, attitude.r
-    odometry = Odometry(place.n, place.e, flight.depth, q_w, q_x, q_y, q_z, u, v, w, p, q, r)
+    odometry = Odometry(
+        p_n=place.n,
+        p_e=place.e,
+        p_d=flight.depth,
+        q_w=q_w,
+        q_x=q_x,
+        q_y=q_y,
+        q_z=q_z,
+        u=u,
+        v=v,
+        w=w,
+        p=p,
+        q=q,
+        r=r,
+    )
     return odometry_to_wire(odometry)
 
 
