@@ -13,6 +13,7 @@ from glider_base.settings import ConfigurationError
 from glider_bringup.commands.plan import plan
 from glider_bringup.engines.flight import fly
 from glider_bringup.engines.recorded import fly_recorded
+from glider_bringup.scoring.score import Scorer, scores_of
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
 
@@ -64,7 +65,9 @@ def test_a_planned_flight_has_its_route_as_orders_and_flies_so_to_the_same_bits(
     assert tuple(run.scenario.orders) == flight.orders
     kept = load_scenario(str(run.folder / 'scenario.yaml'))
     assert kept.guidance.route == 'straight'
-    assert not fly(kept, [again]).orders
+    scorer = Scorer(kept)
+    assert not fly(kept, [again, scorer]).orders
+    assert scores_of(kept, scorer)['arrival'] == run.score['arrival']
     one, other = (np.concatenate(rows.blocks) for rows in (first, again))
     assert one.tobytes() == other.tobytes()
 

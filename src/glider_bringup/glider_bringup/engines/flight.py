@@ -62,7 +62,10 @@ class Outcome(NamedTuple):
 
 
 class Taker(Protocol):
-    """What follows a flight: a score, traces, a bag."""
+    """What follows a flight: a score, traces, a bag.
+
+    One that has a method ``order`` is given the orders that come in flight, before their rows.
+    """
 
     def add(self, log: np.ndarray) -> None:
         """Take in the next rows, float64[n, ROW]; they are valid until the next are flown."""
@@ -251,8 +254,10 @@ def refuse_planned_route(scenario: Scenario) -> None:
         )
 
 
-def _piloted(held: Held, pilot: Pilot) -> Callable[[np.ndarray], tuple[int, bool]]:
-    """Fill a log as `Held.fly` does, by the orders of a pilot too."""
+def _piloted(
+    held: Held, pilot: Pilot, takers: Iterable[Taker]
+) -> Callable[[np.ndarray], tuple[int, bool]]:
+    """Fill a log as `Held.fly` does, by the orders of a pilot too, of which takers hear."""
     last: np.ndarray | None = None
 
     def advance(log: np.ndarray) -> tuple[int, bool]:
@@ -260,7 +265,8 @@ def _piloted(held: Held, pilot: Pilot) -> Callable[[np.ndarray], tuple[int, bool
         filled, is_over = 0, False
         while filled < len(log) and not is_over:
             if held.tick % LOOK_TICKS == 0 and (order := pilot.order(held.tick, last)):
-                held.order(order)
+                for one in (held, *(taker for taker in takers if hasattr(taker, 'order'))):
+                    one.order(order)
             ticks = LOOK_TICKS - held.tick % LOOK_TICKS
             rows, is_over = held.fly(log[filled : filled + ticks])
             filled += rows
@@ -302,7 +308,7 @@ def fly(
         start = time.perf_counter()
         try:
             held = Held(scenario, (state, params))
-            for log in blocks_of(_piloted(held, pilot) if pilot else held.fly):
+            for log in blocks_of(_piloted(held, pilot, takers) if pilot else held.fly):
                 for taker in takers:
                     taker.add(log)
                 ticks += len(log)

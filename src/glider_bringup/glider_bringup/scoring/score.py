@@ -175,6 +175,10 @@ class Scorer:
             self._stays += [{'t_s': seconds(self.ticks - len(log) + row), 'message': said}]
         self._last = log[-1].copy()
 
+    def order(self, order: Order) -> None:
+        """Take in an order that is given in flight, before the rows from its time on."""
+        self._waiting.append(order)
+
     def _look_for_end(self, log: np.ndarray) -> None:
         """Note which orders hold, and where it first comes to the end of the last path."""
         begin, stage, path_from = self.ticks - len(log), log[:, COLUMNS['stage']], 0

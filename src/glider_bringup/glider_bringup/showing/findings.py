@@ -69,7 +69,8 @@ def _worst(card: dict[str, Any]) -> str:
 def _flown(card: dict[str, Any]) -> str:
     time, along = span(card['sim_time_s']), way(card['distance_along_path_m'])
     depth, dives = f'{card["depth_m"]["max"]:,.0f} m', card['dives']
-    flown = f'{count(dives, "dive")} to {depth}' if dives else f'Down to {depth}'
+    by = ', at last down to' if card['status'] == 'lost' else ' to'
+    flown = f'{count(dives, "dive")}{by} {depth}' if dives else f'Down to {depth}'
     return f'{flown}, {along} along the path in {time}.'
 
 
