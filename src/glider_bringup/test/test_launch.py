@@ -45,7 +45,7 @@ def tf2(monkeypatch):
 
 def test_defaults_fly_the_default_scenario_in_lockstep_and_real_time(tmp_path):
     plan = plan_launch({}, tmp_path)
-    assert plan.parameters_file.parent == tmp_path
+    assert plan.parameters_file.parent == tmp_path / 'glider'
     assert plan.namespace == '/glider'
     assert plan.lockstep
     assert {node.executable for node in plan.nodes} == set(MODULES) - {RECORDER}
@@ -54,6 +54,12 @@ def test_defaults_fly_the_default_scenario_in_lockstep_and_real_time(tmp_path):
     assert all(entry['lockstep'] and not entry['record'] for entry in values.values())
     assert values['/glider/plant_node']['speed'] == 1.0
     assert values['/glider/plant_node']['dives'] == plan.scenario.dives == 1
+
+
+def test_gliders_of_one_launch_have_each_their_parameters(tmp_path):
+    one = plan_launch({'namespace': 'sea/one', 'controller': 'pid'}, tmp_path)
+    plan_launch({'namespace': 'sea/two'}, tmp_path)
+    assert parameters(one)['/sea/one/control_node']['law'] == 'pid'
 
 
 def test_arguments_reach_the_parameters(tmp_path):

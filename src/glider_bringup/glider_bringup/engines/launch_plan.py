@@ -173,8 +173,8 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     arguments : dict of str
         Text by name of the argument; what is not given takes its default.
     log_folder : Path
-        Where the parameter file goes if there is no recording. With one it lies in its folder,
-        beside scenario and vehicle.
+        Where the parameter file goes if there is no recording, in a folder called like the
+        namespace. With one it lies in its folder, beside scenario and vehicle.
 
     Raises
     ------
@@ -204,7 +204,8 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     record_to = None
     if text['record']:
         record_to = make_run_folder(scenario, Path(text['record']).expanduser())
-    folder = record_to or log_folder
+    folder = record_to or log_folder.joinpath(namespace[1:])  # a launch may start several gliders
+    folder.mkdir(parents=True, exist_ok=True)
     attached = (folder / SCENARIO_FILE, folder / VEHICLE_FILE) if record_to else ()
     parameters = node_parameters(
         scenario, speed=speed, lockstep=lockstep, record_to=record_to, attachments=attached
