@@ -152,6 +152,7 @@ def test_it_leaves_when_the_plant_gives_up(waiting):
         (['--ros-args', '-p', 'law:=pid'], 'navigation_node: parameter law: unknown'),
         (['--ros-args', '--params-file', 'nix.yaml'], 'bad command line'),
         (['--ros-args', '-p', 'nonsense'], 'bad command line'),
+        (['--ros-args', '-p', 'use_sim_time:=1'], "Trying to set parameter 'use_sim_time' to '1'"),
         (
             ['plant'],
             'autopilot: plant: no such part (allowed: navigation, guidance, control, guard)',

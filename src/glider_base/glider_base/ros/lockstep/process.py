@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import rclpy
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
@@ -81,7 +82,7 @@ def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
         pass
     except Stop as reason:
         stop = reason
-    except ConfigurationError as error:
+    except (ConfigurationError, ParameterException) as error:  # of a parameter of ROS itself
         stop = Stop(EXIT_USAGE, str(error))
     except Exception:
         if rclpy.ok():
