@@ -3,7 +3,7 @@
 """Who plans a route before the flight and, if asked to, anew at every surfacing.
 
 A pilot knows the forecast and what the vehicle tells at the surface: its place by fixes, and the
-mean current of the dive segment before. What was observed corrects the forecast. Where a planned
+mean current of the dive segment before the last. That corrects the forecast. Where a planned
 route gains too little to be worth the errors of the forecast, straight legs are flown.
 """
 
@@ -48,6 +48,7 @@ class Pilot:
         self._listen_s = min(_LISTEN_S, 0.5 * scenario.profile.wait_s)
         self._seen: list[tuple[float, ...]] = []
         self._last: tuple[float, np.ndarray] = (0.0, self._waypoints[0])
+        self._way: tuple[float, ...] = ()  #: middle of the last dive segment: time, north, east
         self._up_s = 0.0  #: time for which it has been at the surface
         self._was_told, self._is_straight = True, True
         self.orders: list[Order] = []  #: that it gave
@@ -83,12 +84,15 @@ class Pilot:
             self._next += 1
 
     def _look(self, t_s: float, place: np.ndarray, believed: np.ndarray) -> None:
-        """Note the current of the dive segment."""
-        before_s, before = self._last
-        self._last = t_s, place
+        """Note the current of the segment before the one that is over: this one is told later.
+
+        Navigation takes a dive segment in when it leaves the surface after it.
+        """
+        (before_s, before), way = self._last, self._way
+        self._last, self._way = (t_s, place), (0.5 * (t_s + before_s), *(0.5 * (place + before)))
         east, north = float(believed[0]), float(believed[1])
-        if before_s > 0.0 and math.isfinite(east) and math.isfinite(north) and (east or north):
-            self._seen.append((0.5 * (t_s + before_s), *(0.5 * (place + before)), north, east))
+        if way and math.isfinite(east) and math.isfinite(north) and (east or north):
+            self._seen.append((*way, north, east))
 
     def _told(self, t_s: float, place: np.ndarray) -> Order | None:
         """Order to follow the best route from a place; None where it follows that already."""
