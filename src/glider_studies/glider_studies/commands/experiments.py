@@ -87,9 +87,9 @@ def experiments(
             entry['counts'] = counts
             result |= counts
     if out:
+        write_whole(out / paper.RESULT_FILE, json.dumps(result, indent=2) + '\n')
         with messages.status('drawing'):
             drawn = paper_figures.draw(planned, rows, records, out)
-        write_whole(out / paper.RESULT_FILE, json.dumps(result, indent=2) + '\n')
         for file in drawn:
             messages.print(f'drawn: {file}', soft_wrap=True)
     if as_json:

@@ -47,13 +47,14 @@ class Drawing(NamedTuple):
 def draw(
     experiments: list[Experiment],
     rows: list[list[dict]],
-    records: list[list[Record | None]],
+    records: list[list[Record | None] | dict[str, Any]],
     folder: Path,
 ) -> list[Path]:
     """Draw what was flown into PNG files; returns them, by number of the figure."""
     flights = {
         (one.name, case.case, case.controller, case.guidance): record
         for one, kept in zip(experiments, records, strict=True)
+        if not one.study
         for case, record in zip(one.cases, kept, strict=True)
         if record is not None
     }
