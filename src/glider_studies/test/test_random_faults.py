@@ -19,6 +19,7 @@ from glider_studies.commands.experiments import app
 from glider_studies.hunt import oracle, search
 from glider_studies.hunt.missions import draw_mission, due_s
 from glider_studies.hunt.oracle import Truth, Verdict, _shown_s, judge, unfounded
+from glider_studies.paper.experiments import RESULT_FILE
 
 #: zhang2021 is rated for 1000 m, its hull bears 1250 m.
 SCENARIO = ('current_8deg', {'dives': 0, 'duration_s': 20000.0})
@@ -196,10 +197,11 @@ def test_missions_follow_from_seed_and_number_and_half_of_them_are_awkward():
     assert all(2 <= len(one.faults) <= 3 for one in missions)
 
 
-def test_a_small_share_of_the_search_finds_nothing():
+def test_a_small_share_of_the_search_finds_nothing(tmp_path):
     words = ['--only', 'random_faults', '--flights', '12', '--seed', '3', '--json']
-    done = CliRunner().invoke(app, words)
+    done = CliRunner().invoke(app, [*words, '--out', str(tmp_path / 'found')])
     counts = json.loads(done.stdout)
+    assert json.loads((tmp_path / 'found' / RESULT_FILE).read_text('utf-8')) == counts
     names = ('flights', 'lost', 'untold', 'late', 'not_finite', 'false_reactions')
     assert [counts[name] for name in names] == [12, 0, 0, 0, 0, 0], counts['experiments']
     assert counts['hours'] > 25.0
