@@ -140,8 +140,7 @@ if __name__ == '__main__':
         'experiments': (_fly_case, case),
     }
     with worker_pool(1) as pool:
-        tasks = {name: (fly, study) for name, study in studies.items()}
-        print(pool.results(tasks, lambda done: None))
+        print(pool.results(fly, studies, lambda done: None))
 """
 
 

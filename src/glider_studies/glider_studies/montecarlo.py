@@ -287,10 +287,9 @@ def fly_plants(
 
     Returns what `judge` says by plant and controller, and what `airframe` says by plant.
     """
-    plants = {plant: (_check_plant, scenario) for (plant, _), scenario in scenarios.items()}
-    airframes = pool.results(plants, lambda done: None)
-    flights = {key: (_fly_plant, scenario) for key, scenario in scenarios.items()}
-    return pool.results(flights, progress), airframes
+    plants = {plant: scenario for (plant, _), scenario in scenarios.items()}
+    airframes = pool.results(_check_plant, plants, lambda done: None)
+    return pool.results(_fly_plant, scenarios, progress), airframes
 
 
 # ---------------------------------------------------------------------------------- results

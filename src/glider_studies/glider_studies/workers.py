@@ -74,9 +74,9 @@ def _call(code: str, function: Callable, task: Any) -> Any:
     return function(task)
 
 
-def _keyed(task: tuple[Hashable, tuple[Callable, Any]]) -> tuple[Hashable, Any]:
+def _keyed(task: tuple[Callable, Hashable, Any]) -> tuple[Hashable, Any]:
     """Key of a task, and what its function returns."""
-    key, (function, argument) = task
+    function, key, argument = task
     return key, function(argument)
 
 
@@ -115,14 +115,14 @@ class Pool:
             yield from self._together(function, iter([task]), 1, on_wait)
 
     def results(
-        self, tasks: dict[Hashable, tuple[Callable, Any]], progress: Progress
+        self, function: Callable, tasks: dict[Hashable, Any], progress: Progress
     ) -> dict[Hashable, Any]:
-        """What each function returns for its argument, by the keys, in their order.
+        """What a function returns for each task, by its key, in the order of the keys.
 
         Raises WorkError if a task killed its workers, and as `outcomes`.
         """
         results = {}
-        for outcome in self.outcomes(_keyed, tasks.items()):
+        for outcome in self.outcomes(_keyed, ((function, *task) for task in tasks.items())):
             if outcome.died:
                 raise WorkError(WORKER_DIED)
             key, result = outcome.result

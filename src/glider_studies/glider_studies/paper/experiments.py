@@ -289,6 +289,11 @@ def _row(scores: dict[str, Any], failed: bool = False) -> dict[str, Any]:
     return {'finite': whole, **clean, **({'status': 'failed'} if failed else {})}
 
 
+def _work(task: tuple[Callable, Any]) -> Any:
+    function, argument = task
+    return function(argument)
+
+
 def _tasks(experiments: list[Experiment]) -> dict[Hashable, tuple[Callable, Any]]:
     """What is to be done; what two experiments share once, with its record if one is drawn."""
     cases: dict[str, Case] = {}
@@ -311,7 +316,7 @@ def fly(
     Returns rows by experiment and case; and the record of each case (None for what is not drawn),
     or what else is told of a study.
     """
-    flown = pool.results(_tasks(experiments), progress)
+    flown = pool.results(_work, _tasks(experiments), progress)
     found = []
     for one in experiments:
         if one.study:
