@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 
 import glider_bringup as glider
+from glider_base.frames import poses_from_wire
 from glider_base.settings import ConfigurationError
+from glider_base.signals import TICK_S
 from glider_bringup.commands.plan import plan
 from glider_bringup.engines.flight import fly
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.score import Scorer, scores_of
+from glider_mission.blocks import COLUMNS
+from glider_mission.routing import pilot as piloting
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
 
@@ -70,6 +74,29 @@ def test_a_planned_flight_has_its_route_as_orders_and_flies_so_to_the_same_bits(
     assert scores_of(kept, scorer)['arrival'] == run.score['arrival']
     one, other = (np.concatenate(rows.blocks) for rows in (first, again))
     assert one.tobytes() == other.tobytes()
+
+
+def test_what_a_pilot_notes_is_the_true_current_of_the_dive_segment_that_he_dates(monkeypatch):
+    """The mean of what was flown through from one surfacing to the next, there and then."""
+    noted, plain, rows = [], piloting.observed, Rows()
+
+    def observed(chart, seen, *errors):
+        noted[:] = seen
+        return plain(chart, seen, *errors)
+
+    monkeypatch.setattr(piloting, 'observed', observed)
+    fly(load_scenario('eddies_hard', {'dives': 5}), [rows])
+    log = np.concatenate(rows.blocks)
+    north, east, depth = poses_from_wire(log[:, COLUMNS['ground_truth/odom']])[:, :3].T
+    under = np.flatnonzero(np.diff(depth > 5.0, prepend=False, append=False))
+    segments = [slice(*ends) for ends in under.reshape(-1, 2) if np.ptp(ends) > 36000]
+    assert len(noted) == len(segments) - 2 == 3
+    for (t_s, *place, v_n, v_e), one in zip(noted, segments, strict=False):
+        assert one.start * TICK_S < t_s < one.stop * TICK_S
+        middle = (one.start + one.stop) // 2
+        assert np.hypot(north[middle] - place[0], east[middle] - place[1]) < 2000.0
+        true_e, true_n, _ = log[one, COLUMNS['current_velocity']].mean(axis=0)
+        assert np.hypot(v_n - true_n, v_e - true_e) < 0.02
 
 
 def test_a_route_that_is_planned_in_flight_is_not_recorded(tmp_path):

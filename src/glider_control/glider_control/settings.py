@@ -103,7 +103,9 @@ class ControlLawSettings(_LawChoice):
                 f'the vehicle has a {steers_by}, which nothing steers by (allowed: '
                 f'{", ".join(SURFACE_LAWS)}; {plugins.others(plugins.SURFACE_LAWS)})'
             )
-        return getattr(self, steers_by, None) or SURFACE_LAWS[steers_by]() if steers_by else None
+        if not steers_by:
+            return None
+        return getattr(self, steers_by, None) or SURFACE_LAWS[steers_by]()
 
     def idle(self, steers_by: str) -> set[str]:
         """What does not fly, with the gains that it has anyway: laws of others, surfaces."""

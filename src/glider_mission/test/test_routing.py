@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from glider_base.signals import TICK_S
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.routing import pilot as piloting
 from glider_mission.routing.forecast_chart import erroneous, forecast_of, observed, with_land
@@ -212,26 +211,6 @@ def test_a_pilot_plans_at_the_start_and_at_each_surfacing_once(hard):
     assert told == [5, 16]
     assert pilot.orders == [first, *(given[number] for number in told)]
     np.testing.assert_allclose(given[5].path.waypoints[0][:2], place)
-
-
-def test_the_current_that_is_told_is_of_the_dive_segment_before_the_last(hard, monkeypatch):
-    """Navigation takes a segment in when it dives again."""
-    corrected, plain = [], piloting.observed
-    monkeypatch.setattr(
-        piloting,
-        'observed',
-        lambda chart, seen, *of: corrected.append(seen) or plain(chart, seen, *of),
-    )
-    scenario, *_ = hard
-    pilot, start = Pilot(scenario), waypoints_of(scenario)[0]
-    pilot.order(0, None)
-    stages = [1, 1, 1, 5, 5, 5]
-    for k, stage in enumerate(2 * stages, 1):
-        place = start + (4000.0 if k <= len(stages) else 9000.0)
-        pilot.order(LOOK_TICKS * k, row_at(place, stage, (0.1, 0.02)))
-    assert [len(seen) for seen in corrected] == [0, 0, 1]
-    half_s = 0.5 * len(stages) * LOOK_TICKS * TICK_S
-    np.testing.assert_allclose(corrected[2][0], [half_s, *(start + 2000.0), 0.1, 0.02])
 
 
 def test_a_waypoint_that_was_passed_on_a_bend_under_way_is_not_gone_back_to(hard):

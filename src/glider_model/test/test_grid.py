@@ -444,9 +444,10 @@ def test_a_chart_of_the_bottom_whose_latitudes_are_in_no_order_is_no_chart(wrong
 def test_a_chart_is_land_where_it_has_no_number(tmp_path):
     data = chart(tmp_path / 'chart.nc', 'elevation', sign=-1.0, units='m').astype(float)
     data[0, :3] = [math.nan, math.inf, -math.inf]
+    data[0, 3:5] = [20.0, math.nan]  # within land, too
     path = written(data.to_dataset(), tmp_path / 'holes.nc')
     seen = contents(path).parts['bottom'].seen
-    assert np.all(seen.depth[0, :3] <= 0.0) and np.all(seen.depth[1:] >= 100.0)
+    assert np.all(seen.depth[0, :5] <= 0.0) and np.all(seen.depth[1:] >= 100.0)
 
 
 def test_a_path_over_land_is_refused(tmp_path):

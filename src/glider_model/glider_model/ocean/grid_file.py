@@ -611,7 +611,7 @@ def _read_bottom(layout: _Layout, chosen: dict[str, np.ndarray]) -> LoadedBottom
     axes = {axis: layout.axes[axis] for axis in chosen}
     depth = scale * _cut(layout.dataset[name], axes, chosen)
     if not np.isfinite(depth).all():
-        depth = np.where(np.isfinite(depth), depth, -_fill_land(depth[None].copy())[0])
+        depth = np.where(np.isfinite(depth), depth, -abs(_fill_land(depth[None].copy())[0]))
     depth = depth.astype(np.float32)
     return LoadedBottom(*(layout.values[axis][chosen[axis]] for axis in chosen), depth)
 
