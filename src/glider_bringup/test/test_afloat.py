@@ -1,12 +1,15 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""At the surface there is nothing to steer by: no vehicle is swung there, by either law."""
+"""At the surface there is nothing to steer by, nor to learn: no vehicle is swung there."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from glider_base.frames import poses_from_wire
 from glider_bringup.engines.flight import fly
+from glider_guidance.yo.stage import GLIDING_UP
 from glider_mission.blocks import COLUMNS
 from glider_mission.scenario import load_scenario
 
@@ -69,3 +72,21 @@ def test_an_offset_of_the_depth_sensor_keeps_no_vehicle_at_the_surface(name, off
     goes_down = np.diff((depth > 120.0).astype(int)) == 1
     assert np.count_nonzero(goes_down) >= 4  # it dives on
     assert depth.max() < 165.0
+
+
+@pytest.mark.parametrize('vehicle', ['seaglider', 'slocum_g2', 'zhang2021'])
+def test_a_climb_is_as_fast_as_it_is_asked_to_be_after_a_stay_at_the_surface(vehicle):
+    """In water like that of eddies_10d, which makes the pump work for it."""
+    changes = {'vehicle': vehicle, 'profile.depth_m': 180.0, 'dives': 4, 'duration_s': 20_000.0}
+    water = {'water.pycnocline_rise': 0.002, 'water.pycnocline_depth_m': 30.0}
+    rows = []
+    scenario = load_scenario('current_8deg', {**DIVES, **changes, **water})
+    fly(scenario, [SimpleNamespace(add=lambda log: rows.append(log[::10].copy()))])
+    log = np.concatenate(rows)
+    depth = poses_from_wire(log[:, COLUMNS['ground_truth/odom']])[:, 2]
+    climbs = np.flatnonzero(np.diff((log[:, COLUMNS['stage']].ravel() == GLIDING_UP).astype(int)))
+    for begin, end in climbs.reshape(-1, 2)[1:]:  # from the second on
+        steady = slice(begin + (end - begin) // 3, begin + 2 * (end - begin) // 3)
+        asked_mps = log[steady, COLUMNS['reference'].start + 9].mean()
+        risen_mps = -np.polyfit(np.arange(steady.stop - steady.start), depth[steady], 1)[0]
+        assert risen_mps == pytest.approx(asked_mps, rel=0.12)

@@ -17,7 +17,13 @@ from glider_guidance.orders import is_surfaced
 from glider_guidance.path.settings import WaypointPath
 from glider_mission.blocks import COLUMNS
 from glider_mission.routing.forecast_chart import forecast_of, observed, with_land
-from glider_mission.routing.plan import pace_of, route_through, sailed_s, waypoints_of
+from glider_mission.routing.plan import (
+    pace_of,
+    route_through,
+    sailed_s,
+    waypoints_of,
+    with_errors,
+)
 from glider_mission.scenario import Scenario
 
 #: The pilot looks so often (ticks).
@@ -26,9 +32,9 @@ LOOK_TICKS = 600
 _LISTEN_S = 180.0
 #: A waypoint is passed from this near on (m); from this near on to the last one nothing changes.
 _PASSED_M, _LAST_M = 2000.0, 8000.0
-#: A planned route has to be faster than straight legs by this share, and by this much more for an
-#: error of the forecast as large as the speed of the vehicle.
-LEAST_GAIN, GAIN_BY_ERROR = 0.03, 0.25
+#: A planned route has to be faster than straight legs by this share, in the middle of the errors
+#: that the forecast may have.
+LEAST_GAIN = 0.03
 #: Routes may take so long (s), whatever time the mission has.
 _HORIZON_S = 60.0 * 86_400.0
 #: Corners of a route are farther apart than this (m).
@@ -41,8 +47,14 @@ class Pilot:
     """Gives the orders of a mission whose route is planned; errors as `forecast_of`."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._scenario, self._speed = scenario, pace_of(scenario).speed
-        self._chart, self._land = forecast_of(scenario)
+        pace = pace_of(scenario)
+        self._scenario, self._speed = scenario, pace.speed
+        self._chart, self._land, self._error_mps = forecast_of(scenario, pace.stay)
+        self._dives = forecast_of(scenario).chart
+        self._errors = [
+            sea.current - self._chart.current
+            for sea in with_errors(self._chart, self._error_mps, scenario)
+        ]
         self._waypoints, self._next = waypoints_of(scenario), 1
         self._replans = scenario.guidance.replan == 'surfacing'
         self._listen_s = min(_LISTEN_S, 0.5 * scenario.profile.wait_s)
@@ -96,17 +108,18 @@ class Pilot:
 
     def _told(self, t_s: float, place: np.ndarray) -> Order | None:
         """Order to follow the best route from a place; None where it follows that already."""
-        told = self._scenario.forecast
         seen = np.array(self._seen).reshape(-1, 5)
-        chart = observed(self._chart, seen, told.error_mps, told.error_km)
+        error_km = self._scenario.forecast.error_km
+        chart = observed(self._chart, self._dives, seen, self._error_mps, error_km)
         left = np.vstack((place, self._waypoints[self._next :]))
         end_s = t_s + _HORIZON_S
         route = route_through(with_land(chart, self._land), left, t_s, self._speed, end_s)
+        seas = [chart._replace(current=chart.current + error) for error in self._errors]
         planned_s, straight_s = (
-            sailed_s(chart, corners, t_s, self._speed, end_s) for corners in (route.corners, left)
+            float(np.median([sailed_s(sea, way, t_s, self._speed, end_s) for sea in seas]))
+            for way in (route.corners, left)
         )
-        gain = LEAST_GAIN + GAIN_BY_ERROR * told.error_mps / self._speed
-        is_worth_it = route.arrives and not planned_s - t_s > (1.0 - gain) * (straight_s - t_s)
+        is_worth_it = planned_s - t_s < (1.0 - LEAST_GAIN) * (straight_s - t_s)
         if not is_worth_it and self._is_straight:
             return None
         self._is_straight = not is_worth_it

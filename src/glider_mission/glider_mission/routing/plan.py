@@ -3,7 +3,7 @@
 """What a mission will take: whether it gets there, when, by what route and with what energy."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,6 @@ from glider_mission.routing.forecast_chart import erroneous, forecast_of, with_l
 from glider_mission.routing.fronts import Chart, fronts, sail
 from glider_mission.scenario import Scenario
 from glider_model.ocean.density import immersed
-from glider_model.onboard.glide_polar import glide_horizontal_speed, glide_vertical_rate
 from glider_model.vehicle.file import load_vehicle
 
 #: A route is straightened where that moves it by less than this (m).
@@ -22,10 +21,7 @@ _STRAIGHT_M = 1000.0
 #: Errors of a forecast that are tried.
 MEMBERS = 12
 #: What is left of the speed of the polar for a vehicle that steers, by what eddies_10d flies (-).
-_HELD_SHARE = 0.93
-#: While all the pump has goes in or out, a vehicle stands for so much of the time: until it weighs
-#: nothing, and a third of what comes then, in which its speed grows as the root of the time.
-_STANDS_SHARE = 0.6
+_HELD_SHARE = 0.985
 #: Levels of a climb at which it is looked at.
 _LEVELS = 21
 
@@ -35,6 +31,7 @@ class Pace(NamedTuple):
 
     speed: float  #: through the water, horizontally, stays at the surface included (m/s)
     cycle_s: float  #: from one stay at the surface to the next (s)
+    stay: float  #: share of the time that it is at the surface (-)
     cycle_wh: float | None  #: that it takes; None where the battery is not known
 
 
@@ -80,43 +77,17 @@ class Plan(NamedTuple):
 
 
 def pace_of(scenario: Scenario) -> Pace:
-    """How the vehicle of a mission gets on: by its polar, up to the surface by all its pump."""
+    """How the vehicle of a mission gets on, by its polar."""
     params = scenario.guidance_settings().params()
     profile, every = params.profile, params.profile.surface_every
     dives = max(1, every)
     stay_s = (profile.wait_ticks + profile.prepare_ticks) * TICK_S if every else 0.0
     deep = profile.depth - (profile.top_depth if dives > 1 else 0.0)
-    glide_s = (2 * dives - 1) * deep / profile.glide_rate
-    way_m, rise_s = glide_s * params.profile_speed, deep / profile.glide_rate
-    rise_m, turns_s = rise_s * params.profile_speed, 2.0 * dives * profile.lead_s
-    if every:
-        rise_s, rise_m = _rise(scenario, params)
-        vehicle = load_vehicle(scenario.vehicle)
-        swing = profile.net_heaviness + vehicle.params().m_b_max
-        pump_s = swing / vehicle.slowest_pump_rate(profile.depth)
-        turns_s += 2.0 * (_STANDS_SHARE * pump_s - profile.lead_s)
-    way_m += rise_m
-    cycle_s = glide_s + rise_s + turns_s + stay_s
-    hotel_s = glide_s + rise_s, cycle_s - glide_s - rise_s
-    return Pace(_HELD_SHARE * way_m / cycle_s, cycle_s, _cycle_wh(scenario, params, *hotel_s))
-
-
-def _levels(depth: float) -> np.ndarray:
-    """Levels of a climb (m), from below."""
-    return np.linspace(depth, 0.0, _LEVELS)
-
-
-def _rise(scenario: Scenario, params: GuidanceParams) -> tuple[float, float]:
-    """Time (s) and way through the water (m) of a climb with all the pump has."""
-    body, water = load_vehicle(scenario.vehicle).params(), scenario.resolved_water().params()
-    profile, (time_s, way_m) = params.profile, (0.0, 0.0)
-    step = profile.depth / _LEVELS
-    for depth in _levels(profile.depth):
-        net = immersed(float(depth), -body.m_b_max, body, water).net
-        rate = -glide_vertical_rate(profile.climb_pitch, net, params.polar)
-        speed = glide_horizontal_speed(profile.climb_pitch, -rate, params.polar)
-        time_s, way_m = time_s + step / rate, way_m + speed * step / rate
-    return time_s, way_m
+    glide_s = 2.0 * dives * deep / profile.glide_rate
+    other_s = 2.0 * dives * profile.lead_s + stay_s
+    cycle_s = glide_s + other_s
+    speed = _HELD_SHARE * glide_s * params.profile_speed / cycle_s
+    return Pace(speed, cycle_s, stay_s / cycle_s, _cycle_wh(scenario, params, glide_s, other_s))
 
 
 def _cycle_wh(
@@ -141,13 +112,13 @@ def _cycle_wh(
         """Of as much pumped out there, and let in again (J/kg)."""
         return max(0.0, told.out + told.out_per_m * depth) + max(0.0, told.let_in)
 
-    turns, levels = max(1, profile.surface_every) - 1, _levels(profile.depth)
-    heavy = heaviness(profile.depth, profile.net_heaviness)
+    levels = np.linspace(profile.depth, 0.0, _LEVELS)
     rising = [heaviness(float(depth), -profile.climb_net_heaviness) for depth in levels]
-    pumped = turns * (heavy - rising[0]) * cost(profile.depth)
+    heavy = heaviness(profile.depth, profile.net_heaviness)
+    pumped = (heavy - rising[0]) * cost(profile.depth)
     for depth, before, after in zip(levels, rising, rising[1:], strict=False):
-        pumped += turns * max(0.0, before - after) * cost(float(depth))
-    pumped += (heavy + body.m_b_max) * cost(profile.depth)
+        pumped += max(0.0, before - after) * cost(float(depth))
+    pumped *= max(1, profile.surface_every)
     hotel = 0.5 * (told.dive + told.climb) * glide_s + told.surface * other_s
     return (pumped + hotel + told.call_start + told.call * told.call_s) / 3600.0
 
@@ -222,26 +193,32 @@ def _leads_over(chart: Chart, land: np.ndarray, route: np.ndarray) -> bool:
     return False
 
 
+def with_errors(chart: Chart, error_mps: float, scenario: Scenario) -> Iterator[Chart]:
+    """A chart with one after the other of `MEMBERS` errors; as it is if it has none."""
+    told = scenario.forecast
+    for member in range(MEMBERS if error_mps > 0.0 else 0):
+        yield erroneous(chart, error_mps, told.error_km, scenario.seed, member + 1)
+    if not error_mps:
+        yield chart
+
+
 def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None) -> Plan:
     """Plan a mission by its forecast; errors as `forecast_of`.
 
     ``progress`` gets how many of `MEMBERS` + 1 steps are done.
     """
-    chart, land = forecast_of(scenario)
     pace, end_s = pace_of(scenario), scenario.duration_s
+    chart, land, _ = forecast_of(scenario, pace.stay)
     if scenario.dives:
         cycles = scenario.dives / max(1, scenario.profile.surface_every_dives)
         end_s = min(end_s, cycles * pace.cycle_s)
     waypoints = waypoints_of(scenario)
     route = route_through(with_land(chart, land), waypoints, 0.0, pace.speed, end_s)
     progress(1)
-    told, arrivals = scenario.forecast, []
-    for member in range(MEMBERS if told.error_mps > 0.0 else 1):
-        sea = chart
-        if told.error_mps > 0.0:
-            sea = erroneous(chart, told.error_mps, told.error_km, scenario.seed, member + 1)
+    arrivals = []
+    for sea in with_errors(chart, scenario.forecast.error_mps, scenario):
         arrivals.append(sailed_s(sea, route.corners, 0.0, pace.speed, end_s))
-        progress(member + 2)
+        progress(len(arrivals) + 1)
     straight_s = sailed_s(chart, waypoints, 0.0, pace.speed, end_s)
     if _leads_over(chart, land, waypoints):
         straight_s = math.inf
