@@ -118,8 +118,8 @@ def _check(kernel: Any, kinds: tuple, what: tuple[str, ...]) -> None:
         In one sentence, with its name and file.
     """
     try:
-        cases = kernel.get_call_template(kinds, {})[0].cases
-        (returned,) = (case.return_type for case in cases if case.args == kinds)
+        call = types.Dispatcher(kernel).get_call_type(kernel.typingctx, kinds, {})
+        returned = call.return_type
         if isinstance(returned, types.Optional | types.NoneType):
             why = 'returns nothing where it ends without a return'
         elif isinstance(returned, types.BaseTuple) and len(returned) != len(what):

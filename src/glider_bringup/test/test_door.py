@@ -36,6 +36,7 @@ from glider_bringup import console
 from glider_bringup.cli import OF_THE_SCRIPT, app
 from glider_bringup.door.export import write_mat
 from glider_guidance.method import method_step as guidance_step
+from glider_model.ocean.field import field_velocity
 from glider_navigation.method import method_step as navigation_step
 
 #: Half of what is named north, east and down in the world of topics: x east, y north, z up.
@@ -619,27 +620,27 @@ def test_law_that_cannot_be_flown_is_told(law, choices, words):
 
 
 @pytest.mark.parametrize(
-    ('step', 'what'), [(guidance_step, 'Asked'), (navigation_step, 'Believed')]
+    ('call', 'what'),
+    [(guidance_step, 'Asked'), (navigation_step, 'Believed'), (field_velocity, 'to the north')],
 )
-def test_method_that_returns_nothing_somewhere_is_told(step, what):
+def test_method_that_returns_nothing_somewhere_is_told(call, what):
     class Params(NamedTuple):
         at: float
 
-    @step.body(Params)
+    @call.body(Params)
     @kernel
-    def sometimes(state, seen, params, dt):
+    def sometimes(first, second, params, dt=0.1):
         if dt > params.at:
-            return state, seen
+            return first, second
 
     @kernel
-    def tick(state, seen, params, dt):
-        state, asked = step(state, seen, params, dt)
-        return asked
+    def tick(params):
+        return call(0.0, 0.0, params)
 
     with pytest.raises(
         glider.ConfigurationError, match=rf'sometimes \(.*test_door.*nothing.*{what}'
     ):
-        tick(0.0, 0.0, Params(0.0), 0.1)
+        tick(Params(0.0))
 
 
 def test_depth_is_drawn_downward_and_nothing_else(data):
