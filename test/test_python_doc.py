@@ -40,6 +40,11 @@ def with_table(text: str) -> str:
     return MARKED.sub(lambda found: found[1] + '\n'.join(lines) + '\n' + found[3], text)
 
 
+def test_memory_of_a_run_is_that_of_its_rows():
+    """Float64 of every number, ten ticks in a second (MB/h)."""
+    assert f'{36000 * ROW * 8 / 1e6:.0f} MB for each simulated hour' in DOCUMENT.read_text()
+
+
 def code_cells(notebook: dict) -> list[dict]:
     return [cell for cell in notebook['cells'] if cell['cell_type'] == 'code']
 

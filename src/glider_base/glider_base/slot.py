@@ -16,19 +16,26 @@ arguments are not. Each combination of types compiles the loop again.
 
 import functools
 import inspect
+import re
 from collections.abc import Callable
 from typing import Any
 
+from numba.core import types
+from numba.core.errors import NumbaError
 from numba.extending import overload
 
 from glider_base.errors import ConfigurationError
 from glider_base.kernels.cache import BODIES, Body
 
+#: How the calls of slots are compiled.
+_INLINED = {'error_model': 'numpy', 'forceinline': True}
+
 
 def slot(stub: Callable) -> Callable:
     """Make a slot of a function that has a parameter ``params``.
 
-    A stub that is marked by `default` is the body for all types that have none. The slot has a
+    A stub that is marked by `default` is the body for all types that have none; by `returns` it
+    says what a body has to return. The slot has a
     decorator ``body(params_type)`` for a kernel with the same parameters. Called by
     uncompiled code, it calls that kernel.
     """
@@ -59,10 +66,13 @@ def slot(stub: Callable) -> Callable:
 
         return fill
 
-    @overload(call, jit_options={'error_model': 'numpy', 'forceinline': True}, strict=False)
-    def choose(*types):
-        kind = types[position]
+    @overload(call, jit_options=_INLINED, strict=False)
+    def choose(*kinds):
+        kind = kinds[position]
         found = find(getattr(kind, 'instance_class', type(kind)))
+        if hasattr(stub, 'returns'):
+            _check(found, kinds, stub.returns)
+            return lambda *values: found(*values)
         return getattr(found, 'py_func', found)
 
     call.body = body
@@ -73,3 +83,61 @@ def default(stub: Callable) -> Callable:
     """Let a stub be the body for all types that have none: written under ``@slot``."""
     stub.is_default = True
     return stub
+
+
+def returns(*what: str) -> Callable:
+    """Have a slot refuse bodies that return less or more than so much: written under ``@slot``."""
+
+    def mark(stub: Callable) -> Callable:
+        stub.returns = what
+        return stub
+
+    return mark
+
+
+def checked(kernel: Callable, *what: str) -> Callable:
+    """Call a kernel, which is refused as it is compiled if it returns less or more."""
+
+    def call(*values):
+        return kernel(*values)
+
+    @overload(call, jit_options=_INLINED, strict=False)
+    def choose(*kinds):
+        _check(kernel, kinds, what)
+        return lambda *values: kernel(*values)
+
+    return call
+
+
+def _check(kernel: Any, kinds: tuple, what: tuple[str, ...]) -> None:
+    """Refuse a kernel that is not compiled for arguments of these types, or returns other things.
+
+    Raises
+    ------
+    ConfigurationError
+        In one sentence, with its name and file.
+    """
+    try:
+        call = types.Dispatcher(kernel).get_call_type(kernel.typingctx, kinds, {})
+        returned = call.return_type
+        if isinstance(returned, types.Optional | types.NoneType):
+            why = 'returns nothing where it ends without a return'
+        elif isinstance(returned, types.BaseTuple) and len(returned) != len(what):
+            why = f'returns {len(returned)} values'
+        elif isinstance(returned, types.Number):
+            why = 'returns a number alone'
+        else:
+            return
+    except NumbaError as error:
+        why = f'cannot be compiled: {reason(error)}'
+    code = kernel.py_func.__code__
+    raise ConfigurationError(
+        f'{code.co_name} ({code.co_filename}, line {code.co_firstlineno}): {why} (allowed: on any '
+        f'way returns {len(what)}: {", ".join(what)}; numbers keep their type, 0.0 for a float)'
+    )
+
+
+def reason(error: NumbaError) -> str:
+    """The innermost of what numba says, in a line."""
+    text = re.sub(r'\x1b\[\d+m', '', str(error)).partition('During:')[0]
+    return re.split(r'pipeline \(step: [^)]*\)', text)[-1].strip().partition('\n')[0]

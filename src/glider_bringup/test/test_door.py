@@ -12,6 +12,7 @@ import sys
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import matplotlib
 import numba
@@ -29,11 +30,14 @@ from typer.testing import CliRunner
 
 import command_line
 import glider_bringup as glider
-from glider_base.kernel import compiling_told
+from glider_base.kernel import compiling_told, kernel
 from glider_base.settings import ConfigurationError
 from glider_bringup import console
 from glider_bringup.cli import OF_THE_SCRIPT, app
 from glider_bringup.door.export import write_mat
+from glider_guidance.method import method_step as guidance_step
+from glider_model.ocean.field import field_velocity
+from glider_navigation.method import method_step as navigation_step
 
 #: Half of what is named north, east and down in the world of topics: x east, y north, z up.
 ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -511,6 +515,15 @@ def three_moments(seen):
     return 0.0, 0.0, 0.0
 
 
+def moments_of_a_bank(seen):
+    if seen.measured.phi > 0.1:
+        return -1.0, 0.0
+
+
+def two_or_three(seen):
+    return (0.0, 0.0) if seen.m_b > 0.0 else (0.0, 0.0, 0.0)
+
+
 def test_law_of_a_program_is_flown_as_a_class_and_as_a_function(level_law, tmp_path):
     """They are one law: the same flight, each under its name."""
     changes = {'dives': 0, 'duration_s': 400.0}
@@ -576,7 +589,24 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
         (lambda state, seen: (0.0, 0.0), {}, ['one parameter']),
         (level, {'engine': 'nodes'}, ['nodes', 'direct']),
         (level, {'controller': 'pid'}, ['pid']),
-        (three_moments, {}, ['law three_moments', 'expected 2, got 3', 'roll and pitch']),
+        (three_moments, {}, ['three_moments (', 'test_door.py', 'returns 3', 'roll moment']),
+        (
+            moments_of_a_bank,
+            {},
+            ['moments_of_a_bank (', 'returns nothing', 'returns 2', 'pitch mo'],
+        ),
+        (
+            two_or_three,
+            {},
+            ['two_or_three (', 'test_door.py', 'unify', 'returns 2', 'roll moment'],
+        ),
+        (
+            run_cell(
+                CELL.replace('    return Turns(state', '    if pitch:\n        return Turns(state')
+            ),
+            {},
+            ['level_step (<ipython-input-1>', 'returns nothing', 'returns 3', 'state after'],
+        ),
         (run_cell(CELL.replace('count + 1', 'count + 0.5')), {}, ['law LevelLaw', 'Turns', '0.0']),
         (run_cell(CELL.replace('def initial', 'def first')), {}, ['LevelLaw', 'no initial_state']),
         (run_cell(CELL.partition('@law')[0]), {}, ['law_step: no body for params of type Level']),
@@ -587,6 +617,30 @@ def test_law_that_cannot_be_flown_is_told(law, choices, words):
         glider.fly('current_8deg', law=law, **choices)
     assert all(word in str(error.value) for word in words)
     assert len(str(error.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ('call', 'what'),
+    [(guidance_step, 'Asked'), (navigation_step, 'Believed'), (field_velocity, 'to the north')],
+)
+def test_method_that_returns_nothing_somewhere_is_told(call, what):
+    class Params(NamedTuple):
+        at: float
+
+    @call.body(Params)
+    @kernel
+    def sometimes(first, second, params, dt=0.1):
+        if dt > params.at:
+            return first, second
+
+    @kernel
+    def tick(params):
+        return call(0.0, 0.0, params)
+
+    with pytest.raises(
+        glider.ConfigurationError, match=rf'sometimes \(.*test_door.*nothing.*{what}'
+    ):
+        tick(Params(0.0))
 
 
 def test_depth_is_drawn_downward_and_nothing_else(data):

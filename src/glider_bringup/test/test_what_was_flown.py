@@ -183,6 +183,8 @@ def test_a_run_of_before_guidance_had_its_names_is_reported(tmp_path, new):
         ({'profile.depth_m': 50, 'profile.top_depth_m': 80}, 'not above the lower turn'),
         ({'profile.net_heaviness_kg': 1.01}, 'more than the pump of the vehicle makes'),
         ({'profile.climb_net_heaviness_kg': 1.01}, 'more than the pump of the vehicle makes'),
+        ({'initial.net_heaviness_kg': 1.01}, r'net_heaviness_kg = 1.01: .*allowed: -1 to 1 kg'),
+        ({'initial.net_heaviness_kg': -1.01}, r'net_heaviness_kg = -1.01: .*allowed: -1 to 1 kg'),
         ({'water': {'profile': [[0, 1025.0], [50, 1024.9], [90, 1026.0]]}}, 'turns over'),
         ({'seed': True}, 'no number'),
         ({'current.speed_kn': True}, 'no number'),

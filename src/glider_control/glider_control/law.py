@@ -13,7 +13,7 @@ from typing import NamedTuple
 from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings, number, positive
 from glider_base.signals import NOTHING_LEARNT, Reference
-from glider_base.slot import default, slot
+from glider_base.slot import default, returns, slot
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
 from glider_model.onboard.righting import rights_itself
@@ -100,6 +100,7 @@ class LawSettings(Settings):
 
 
 @slot
+@returns('state after the tick', 'roll moment (N m)', 'pitch moment (N m)')
 def law_step(state, seen, params, dt):
     """One tick of a control law, by the type of its params.
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numba
 
 from glider_base.errors import ConfigurationError
+from glider_base.slot import checked
 from glider_control.law import LawSettings, law_step
 
 
@@ -55,6 +56,7 @@ def _stateless(function: Callable) -> type[LawSettings]:
     """Settings without a field, of a law that is a function of what it sees."""
     # compiled for this session alone, as whoever calls it is: see KernelCache
     compiled = numba.njit(error_model='numpy', forceinline=True)(function)
+    moments = checked(compiled, 'roll moment (N m)', 'pitch moment (N m)')
 
     class Params(NamedTuple):
         nothing: int
@@ -69,7 +71,7 @@ def _stateless(function: Callable) -> type[LawSettings]:
     @law_step.body(Params)
     @numba.njit(error_model='numpy', forceinline=True)
     def step(state, seen, params, dt):
-        tau_p, tau_q = compiled(seen)
+        tau_p, tau_q = moments(seen)
         return state, float(tau_p), float(tau_q)
 
     Stateless.__name__ = function.__name__

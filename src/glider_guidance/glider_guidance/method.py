@@ -13,7 +13,7 @@ from pydantic import Field
 
 from glider_base.settings import Settings, number, positive
 from glider_base.signals import TrackingError, Water
-from glider_base.slot import slot
+from glider_base.slot import returns, slot
 from glider_model.onboard.learnt_steering import Steering
 from glider_model.vehicle.file import Vehicle
 
@@ -105,6 +105,7 @@ class Asked(NamedTuple):
 
 
 @slot
+@returns('state after the tick', 'Asked')
 def method_step(state, seen, params, dt):
     """One tick of a guidance method, by the type of its params.
 

@@ -598,13 +598,8 @@ def _check_glide(scenario: Scenario) -> None:
             "the path of the mission (allowed: guidance.replan = 'never')"
         )
     scenario.water.check_stable()
-    start_m, rated_m = scenario.initial.depth_m, load_vehicle(scenario.vehicle).rated_depth_m
-    if start_m > rated_m:
-        raise ConfigurationError(
-            f'initial.depth_m = {start_m:g}: deeper than the vehicle is rated for (allowed: <= '
-            f'{rated_m:g} m, its rated_depth)'
-        )
-    bottom_m = scenario.water.bottom_m
+    PlantSettings(vehicle=scenario.vehicle, initial=scenario.initial).check()
+    start_m, bottom_m = scenario.initial.depth_m, scenario.water.bottom_m
     if bottom_m and start_m > bottom_m and not scenario.bathymetry.file:
         raise ConfigurationError(
             f'initial.depth_m = {start_m:g}: below the bottom (allowed: <= {bottom_m:g} m, '

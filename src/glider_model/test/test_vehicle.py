@@ -183,6 +183,16 @@ def test_vehicle_by_path(edited):
             'component (allowed: >= 0)',
         ),
         (
+            'hydrodynamics.K_beta.value',
+            120.0,
+            'hydrodynamics.K_beta.value = 120.0: should be less than or equal to 0 (allowed: ',
+        ),
+        (
+            'volume',
+            {'value': 6.9, 'unit': 'l', 'source': 'tank, a digit lost'},
+            '(file): rigid_body, moving_mass, volume: neutral in water of 1e+04 kg/m^3 ',
+        ),
+        (
             'rigid_body.hull_inertia.value',
             [1.0, math.nan, 3.0],
             'rigid_body.hull_inertia.value.1 = nan: should be a finite number',

@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 from glider_base.frames import Origin
 from glider_base.settings import Settings
 from glider_base.signals import Covariance, Imu, Joints, Odometry, Vector
-from glider_base.slot import slot
+from glider_base.slot import returns, slot
 from glider_model.vehicle.file import Vehicle
 from glider_navigation.forecast import ForecastSettings
 
@@ -90,6 +90,7 @@ NONE = Covariance(0.0, 0.0, 0.0)
 
 
 @slot
+@returns('state after the tick', 'Believed')
 def method_step(state, heard, params, dt):
     """One tick of a navigation method, by the type of its params.
 

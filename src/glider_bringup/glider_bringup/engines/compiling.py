@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The loop of a law with a method that was never flown here is compiled, once; this is told."""
 
-import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -13,6 +12,7 @@ from numba.core.errors import NumbaError
 from glider_base.errors import ConfigurationError
 from glider_base.kernel import compiling_told
 from glider_base.signals import TICK_S
+from glider_base.slot import reason
 from glider_bringup.engines.direct import fly_held, hold
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.interrupts import interrupts_noted
@@ -42,15 +42,9 @@ def told(combination: Combination, tell: Tell) -> Iterator[None]:
             yield
     except NumbaError as error:
         raise ConfigurationError(
-            f'law {law} with method {method}: cannot be compiled: {_reason(error)} (allowed: roll '
+            f'law {law} with method {method}: cannot be compiled: {reason(error)} (allowed: roll '
             'and pitch moment of a function; numbers that keep their type, 0.0 for a float)'
         ) from None
-
-
-def _reason(error: NumbaError) -> str:
-    """The innermost of what numba says, in a line."""
-    text = re.sub(r'\x1b\[\d+m', '', str(error)).partition('During:')[0]
-    return re.split(r'pipeline \(step: [^)]*\)', text)[-1].strip().partition('\n')[0]
 
 
 def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:

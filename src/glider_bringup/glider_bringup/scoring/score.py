@@ -198,7 +198,7 @@ class Scorer:
         return sum(block.shape[1] for block in self._blocks)
 
     def _series(self, name: str) -> np.ndarray:
-        """One series over all blocks, float64[ticks]; not kept, for 30 h of all are 100 MB."""
+        """One series over all blocks, float64[ticks]; not kept, for 30 h of all are 140 MB."""
         column = _SERIES.index(name)
         return np.concatenate([np.empty(0), *(block[column] for block in self._blocks)])
 

@@ -14,7 +14,7 @@ from pydantic import Field
 from glider_base.frames import OriginSettings
 from glider_base.kernel import kernel
 from glider_base.settings import Settings
-from glider_base.slot import slot
+from glider_base.slot import returns, slot
 
 
 class Mission(Settings):
@@ -59,6 +59,7 @@ class NoField(NamedTuple):
 
 
 @slot
+@returns('to the north', 'to the east', 'down (m/s)')
 def field_velocity(position, t_s, params):
     """Velocity of the water at a place and time, by the type of the params.
 

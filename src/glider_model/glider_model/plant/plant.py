@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 
 from pydantic import Field
 
+from glider_base.errors import ConfigurationError
 from glider_base.frames import OriginSettings, quaternion_from_euler, rotate_to_body
 from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings, number
@@ -170,6 +171,21 @@ class PlantSettings(Settings):
     )
     faults: list[Fault] = FAULTS
 
+    def check(self) -> None:
+        """Refuse a start that is not one of the vehicle."""
+        vehicle = load_vehicle(self.vehicle)
+        if self.initial.depth_m > vehicle.rated_depth_m:
+            raise ConfigurationError(
+                f'initial.depth_m = {self.initial.depth_m:g}: deeper than the vehicle is rated '
+                f'for (allowed: <= {vehicle.rated_depth_m:g} m, its rated_depth)'
+            )
+        most = vehicle.params().m_b_max
+        if abs(weight := self.initial.net_heaviness_kg) > most:
+            raise ConfigurationError(
+                f'initial.net_heaviness_kg = {weight:g}: more than the pump of the vehicle makes '
+                f'(allowed: {-most:g} to {most:g} kg, its buoyancy_engine.range)'
+            )
+
     @property
     def topics(self) -> tuple[str, ...]:
         """Topics of the sensors that are fitted."""
@@ -210,15 +226,14 @@ class PlantSettings(Settings):
     def initial_state(self) -> PlantState:
         """State at tick 0."""
         start = self.initial
-        limit = load_vehicle(self.vehicle).buoyancy_engine.range.value
         q = quaternion_from_euler(
             0.0, math.radians(start.pitch_deg), math.radians(start.heading_deg)
         )
         motion = Motion(
             start.north_m, start.east_m, start.depth_m, *q, start.speed_mps, *(5 * (0.0,))
         )
-        m_b = min(limit, max(-limit, start.net_heaviness_kg))
-        return PlantState(motion, Joints(m_b, 0.0, 0.0, 0.0), faults=fault_state(self.faults))
+        joints = Joints(start.net_heaviness_kg, 0.0, 0.0, 0.0)
+        return PlantState(motion, joints, faults=fault_state(self.faults))
 
 
 @kernel

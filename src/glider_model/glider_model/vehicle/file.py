@@ -51,6 +51,8 @@ SLOWEST_GLIDE_MPS = 0.12
 DROP_MARGIN_SHARE = 0.2
 #: Share of its rate that a pump keeps at the rated depth at least (-).
 LEAST_PUMP_SHARE = 0.05
+#: Density of the lightest and the heaviest water that there is (kg/m^3).
+WATER = (950.0, 1100.0)
 #: Source of a number that a person changed for a run.
 _SET = '--set'
 
@@ -160,6 +162,17 @@ class Vehicle(_Steered):
                 f'buoyancy_engine.rate_per_m: {fall:g} 1/m '
                 f'(allowed: <= {most:.3g} 1/m, which leaves 5 % of the rate at its rated_depth)'
             )
+        return self
+
+    @pydantic.model_validator(mode='after')
+    def _floats_in_some_water(self):
+        if self.volume:
+            neutral = self.params().m / self.volume.value
+            if not WATER[0] <= neutral <= WATER[1]:
+                raise ValueError(
+                    f'rigid_body, moving_mass, volume: neutral in water of {neutral:.4g} kg/m^3 '
+                    f'(allowed: {WATER[0]:g} to {WATER[1]:g} kg/m^3)'
+                )
         return self
 
     @pydantic.model_validator(mode='after')

@@ -78,6 +78,7 @@ def _told(unit: str, also: Other | None) -> list[str]:
 
 Positive = {'gt': 0.0, 'le': 1e5}
 NotNegative = {'ge': 0.0, 'le': 1e5}
+NotPositive = {'ge': -1e5, 'le': 0.0}
 Signed = {'ge': -1e5, 'le': 1e5}
 
 

@@ -15,6 +15,7 @@ from glider_model.vehicle.quantity import (
     CC,
     CC_PER_S,
     NotNegative,
+    NotPositive,
     Positive,
     Signed,
     optional,
@@ -61,7 +62,7 @@ class HydrodynamicsSettings(Settings):
     K_D: required('kg/m/rad^2', 'drag over V^2 alpha^2', **NotNegative)
     K_L0: required('kg/m', 'lift over V^2 at no angle of attack', **Signed)
     K_L: required('kg/m/rad', 'lift over V^2 alpha', **Signed)
-    K_beta: required('kg/m/rad', 'side force over V^2 beta; < 0', **Signed)
+    K_beta: required('kg/m/rad', 'side force over V^2 beta', **NotPositive)
     K_MR: required('kg/rad', 'roll moment over V^2 beta; < 0 with dihedral', **Signed)
     K_p: required('kg s/rad', 'roll moment over V^2 p; < 0 damps', **Signed)
     K_M0: required('kg', 'pitch moment over V^2 at no angle of attack', **Signed)
@@ -136,8 +137,8 @@ class BuoyancyEngineSettings(Settings):
 class HullSettings(Settings):
     """Outer shape, used where the hull breaks the surface."""
 
-    length: required('m', 'of the hull', gt=0.1, le=20.0)
-    diameter: required('m', 'of the hull', gt=0.01, le=5.0)
+    length: required('m', 'of the hull; for who reads it, no equation has it', gt=0.1, le=20.0)
+    diameter: required('m', 'of the hull, by which it floats', gt=0.01, le=5.0)
 
 
 class SteeringSettings(Settings):
