@@ -17,7 +17,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
-from glider_base.errors import EXIT_USAGE, say_fatal
+from glider_base.errors import EXIT_USAGE, leave, say_fatal
 from glider_base.ros.lockstep.executor import make_executor
 from glider_base.ros.parameters import refuse_unknown
 from glider_base.settings import ConfigurationError
@@ -61,7 +61,7 @@ def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
         bad parameter, 3 for a peer that is missing, late or wrong.
     """
     os.environ.setdefault(_FASTDDS, str(_PROFILES))
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, leave):
         signal.signal(signal.SIGINT, _leave_to_rclpy)
     try:
         with tempfile.TemporaryDirectory() as scratch:
