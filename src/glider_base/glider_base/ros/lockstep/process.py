@@ -16,6 +16,7 @@ import rclpy
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions, get_current_signal_handlers_options
 
 from glider_base.errors import EXIT_USAGE, leave, say_fatal
 from glider_base.ros.lockstep.executor import make_executor
@@ -124,8 +125,11 @@ def _leave_to_rclpy(number, frame) -> None:
     """Let rclpy, which hears SIGINT too, end the node at its next turn, as it does for SIGTERM.
 
     A KeyboardInterrupt may come while numba makes the tuples that a step returns, and numba goes
-    on without them: a segmentation fault.
+    on without them: a segmentation fault. Before its `init` rclpy hears nothing.
     """
+    if get_current_signal_handlers_options() == SignalHandlerOptions.NO:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # another one would kill it at its end
+        sys.exit()
 
 
 def _say(stop: Stop) -> int:
