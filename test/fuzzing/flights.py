@@ -22,6 +22,7 @@ from glider_bringup.scoring.card import finite, fly_scored, scorecard
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.current_settings import MAX_SPEED_MPS
+from glider_model.plant.faults.settings import measured
 from glider_model.vehicle.file import load_vehicle, vehicle_names
 from glider_studies.random_faults import sample_faults
 
@@ -116,7 +117,8 @@ def draw_changes(seed: int, case: int) -> dict[str, Any]:
     if load_vehicle(changes['vehicle']).steers_by:
         changes |= STEERS
     elif draw.random() < BREAKS:
-        faults = sample_faults(int(draw.integers(2**31)), FAULTS, changes['duration_s'])
+        of = int(draw.integers(2**31)), FAULTS, changes['duration_s']
+        faults = sample_faults(*of, shows=measured(('imu', 'pressure', 'fix')))
         changes |= {**RECKONS, 'faults': faults}
     for name in draw.choice(sorted(fields), draw.integers(1, FIELDS + 1), replace=False):
         changes[str(name)] = _number(draw, fields[name])

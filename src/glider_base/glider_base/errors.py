@@ -5,7 +5,10 @@
 And how a process ends: its exit code, and the last words of a node that gives up.
 """
 
+import os
+import re
 import reprlib
+import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,6 +37,20 @@ EXIT_INTERRUPTED = 130
 
 #: What the last words of a node begin with, on standard error.
 FATAL = 'fatal: '
+#: Program of a node in a command line: its executable, or its module.
+_NODE = re.compile(r'\bglider_\w+(/|\.nodes\.)\w+$')
+
+
+def leave(number: int, frame: Any) -> None:
+    """Take SIGINT in a node that still imports, where an exception might be caught."""
+    os._exit(0)
+
+
+def leave_while_importing() -> None:
+    """Have SIGINT taken by `leave`, if this is a node: its imports take a second."""
+    is_node = any(_NODE.search(word) for word in sys.orig_argv[1:3])
+    if is_node and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, leave)
 
 
 class ConfigurationError(ValueError):

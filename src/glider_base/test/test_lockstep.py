@@ -361,6 +361,20 @@ def test_signal_does_not_break_off_what_a_node_does(number):
     assert done.stdout.startswith('acted to the end')
 
 
+def test_ctrl_c_before_rclpy_hears_it_ends_a_node():
+    """It was lost there: `ros2 launch` waited 5 s, and sent SIGTERM."""
+    program = (
+        'import signal, sys, tempfile\n'
+        'from glider_base.ros.lockstep.process import run_together\n'
+        'tempfile.TemporaryDirectory = lambda: signal.raise_signal(signal.SIGINT)\n'
+        'sys.exit(run_together([lambda: 1 / 0]))\n'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, timeout=TIMEOUT_S
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, '', '')
+
+
 def test_number_that_is_not_finite_stops_the_run(make_graph):
     graph = make_graph()
     guidance = graph.blocks[GUIDANCE]

@@ -210,3 +210,20 @@ def test_interrupt_while_loading():
         [sys.executable, '-c', program], capture_output=True, text=True, timeout=300, check=False
     )
     assert (found.returncode, found.stderr) == (130, '')
+
+
+@pytest.mark.parametrize('node', ['control_node', 'recorder_node', 'viewer_node', 'autopilot'])
+def test_interrupt_of_a_node_that_still_imports(node, tmp_path):
+    """Ctrl-C reaches all that `ros2 launch` has started: a node ends with 0, as in flight."""
+    program = 'import signal\ntry:\n    signal.raise_signal(signal.SIGINT)\nexcept:\n    pass\n'
+    (tmp_path / 'rclpy.py').write_text(program)
+    package = 'glider_control' if node == 'control_node' else 'glider_bringup'
+    found = subprocess.run(
+        [sys.executable, '-m', f'{package}.nodes.{node}'],
+        env={**os.environ, 'PYTHONPATH': f'{tmp_path}{os.pathsep}{os.environ["PYTHONPATH"]}'},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert (found.returncode, found.stdout, found.stderr) == (0, '', '')

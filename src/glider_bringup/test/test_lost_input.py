@@ -147,6 +147,6 @@ def test_frames_of_ned_are_refused_and_named(flight):
         return to_cdr(message)
 
     vehicle.change = in_ned
-    flight.until(lambda: vehicle.said("odom of navigation_node: header.frame_id is 'map_ned'"))
+    flight.until(lambda: vehicle.said("message refused: odom: header.frame_id is 'map_ned'"))
     flight.until(lambda: vehicle.said('missing or stale: odom'))
     flight.until(lambda: vehicle.commands[-1] == SAFE)

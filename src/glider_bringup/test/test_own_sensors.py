@@ -213,7 +213,7 @@ def test_receiver_without_a_fix_is_heard_in_peace(flight, number):
 def test_attitude_that_is_none_is_refused_and_named(flight):
     vehicle = flight.vehicle
     vehicle.quaternion = (0.0, 0.0, 0.0, 0.0)
-    flight.until(lambda: vehicle.said('message refused: imu of plant_node: orientation is'))
+    flight.until(lambda: vehicle.said('message refused: imu: orientation is'))
     flight.until(lambda: vehicle.said('missing or stale: imu'))
 
 

@@ -64,7 +64,7 @@ from glider_model.plant.faults.settings import (
     Fault,
     FaultSettings,
     Message,
-    check_actuators,
+    check_fitted,
 )
 from glider_model.plant.plant import SURFACE_S, InitialSettings, PlantSettings
 from glider_model.plant.sensors import SensorSettings
@@ -688,7 +688,8 @@ def _with_vehicle(scenario: Scenario, name: str, source: str) -> Scenario:
     with told_of(f'{source}: '):
         perturbed(vehicle.params(), scenario.perturb)
         scenario.control.steering(vehicle.steers_by)
-        check_actuators(scenario.faults, vehicle.steers_by)
+        gyro, topics = scenario.sensors.gyro, scenario.topics
+        check_fitted(scenario.faults, vehicle.steers_by, topics, gyro)
     return scenario.model_copy(update={'vehicle': name})
 
 

@@ -19,6 +19,7 @@ from glider_bringup.scoring.navigation import FOURTH
 from glider_bringup.scoring.scores import SCORES, studied
 from glider_mission.changes import overlap, run_command
 from glider_mission.scenario import Scenario, load_scenario
+from glider_model.plant.faults.settings import measured
 from glider_model.plant.sensors import SensorSettings
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import VehicleParams, load_vehicle
@@ -149,7 +150,8 @@ def _drawn(base: Scenario, seed: int, faults: int) -> dict[str, Any]:
     plant = sample_plant(seed, vehicle, base.navigation.jumps)
     if base.water.profile is not None or base.water.grid.file:  # the density is told
         plant = {**plant, 'water': {}}
-    drawn = sample_faults(seed, faults, base.duration_s)
+    shows = measured(base.topics, base.sensors.gyro)
+    drawn = sample_faults(seed, faults, base.duration_s, shows=shows)
     return {**plant, 'faults': drawn} if faults else plant
 
 

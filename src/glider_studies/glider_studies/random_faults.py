@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faults drawn at random, of what `random_faults.yaml` says."""
 
-from collections.abc import Iterable
+import itertools
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pydantic
 
 from glider_base.files import read_yaml
-from glider_model.plant.faults.settings import Fault, FaultSettings
+from glider_model.plant.faults.settings import SENSED, Fault, FaultSettings
 
 _FILE = read_yaml(Path(__file__).with_suffix('.yaml'))
 #: Fields of what is drawn, by kind.
@@ -24,15 +25,22 @@ _FAULT = pydantic.TypeAdapter(Fault)
 
 
 def sample_faults(
-    seed: int, count: int, duration_s: float, steered: bool = False, depth_m: float = 0.0
+    seed: int,
+    count: int,
+    duration_s: float,
+    steered: bool = False,
+    depth_m: float = 0.0,
+    shows: Collection[str] = tuple(SENSED),
 ) -> list[dict[str, Any]]:
     """Draw faults that begin within ``duration_s``: fields of a scenario, as one would type them.
 
     Where the vehicle is ``steered`` by a surface, that may break too. Some begin somewhere in its
-    dives to ``depth_m``; 0.0: by time alone.
+    dives to ``depth_m``; 0.0: by time alone. None is of something that no sensor ``shows``.
     """
     draw = np.random.Generator(np.random.PCG64([seed, _STREAM]))
-    return [_sample(draw, duration_s, steered, depth_m) for _ in range(count)]
+    drawn = (_sample(draw, duration_s, steered, depth_m) for _ in itertools.count())
+    fitted = (one for one in drawn if validated([one])[0].measures in ('', *shows))
+    return list(itertools.islice(fitted, count))
 
 
 def _draw(draw: np.random.Generator, of: Any, largest: float = 1.0) -> Any:

@@ -13,6 +13,7 @@ from glider_mission.recording.ros.recorded_run import Recording
 from glider_mission.recording.ros.told import read_told
 from glider_mission.recording.ros.verify.every_block import verify
 from glider_mission.scenario import Scenario, load_scenario
+from glider_model.plant.faults.settings import check_fitted
 from glider_model.vehicle.file import load_vehicle
 from glider_studies.montecarlo import make_scenarios, outcome
 from glider_studies.random_faults import DRAWN, sample_faults, validated
@@ -25,6 +26,7 @@ faults:
 - {kind: spike, sensor: heading, error: 20.0, share: 0.1, at_depth_m: 10.0, phase: dive, for_s: 60.0}
 - {kind: frozen, sensor: depth, at_s: 1000000.0}
 """  # noqa: E501
+SILENT = {'kind': 'message', 'topic': 'altitude', 'how': 'drop', 'share': 1.0}
 
 
 def fly(*words) -> dict:
@@ -75,6 +77,9 @@ def test_faults_survive_being_written(written, tmp_path):
             [{'kind': 'stuck', 'actuator': 'steering_surface'}],
             ('faults.0.actuator', 'steering_surface', 'roll_mass'),
         ),
+        ('faults.1.sensor', 'fix', ("faults.1.sensor = 'fix'", 'no fix', 'velocity')),
+        ('faults', [{'kind': 'gps_silent'}], ("faults.0.kind = 'gps_silent'", 'no fix', 'depth')),
+        ('faults', [SILENT], ("faults.0.topic = 'altitude'", 'measured_odom')),
     ],
 )
 def test_what_cannot_be_is_named(written, field, value, words):
@@ -82,6 +87,28 @@ def test_what_cannot_be_is_named(written, field, value, words):
         load_scenario(str(written), {field: value})
     assert all(word in str(caught.value) for word in words), caught.value
     assert not load_vehicle('zhang2021').steers_by
+
+
+@pytest.mark.parametrize(
+    ('sensor', 'changes'),
+    [
+        ('position', {}),
+        ('velocity', {'sensors.also_fitted': ['altitude']}),
+        ('rates', {'sensors.gyro': False}),
+    ],
+)
+def test_a_fault_of_what_a_reckoning_vehicle_does_not_measure_is_refused(sensor, changes):
+    faults = {'faults': [{'kind': 'biased', 'sensor': sensor, 'error': 1.0}]}
+    with pytest.raises(ConfigurationError, match=f"faults.0.sensor = '{sensor}': .*fix"):
+        load_scenario('slocum_shelf', changes | faults)
+    load_scenario('slocum_shelf', {'sensors.also_fitted': ['measured_odom']} | faults)
+
+
+def test_drawn_faults_are_of_what_a_vehicle_has():
+    for name in ('current_8deg', 'slocum_shelf'):
+        for scenario in make_scenarios(name, {}, ['adaptive'], 40, seed=1, faults=3).values():
+            assert len(scenario.faults) == 3
+            check_fitted(scenario.faults, '', scenario.topics, scenario.sensors.gyro)
 
 
 def test_a_run_tells_of_its_faults_and_verify_computes_them_again(written, tmp_path):

@@ -62,7 +62,7 @@ def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
                 'control.law': one.law,
                 'guidance.los.method': one.method,
                 'navigation.method': one.navigation,
-                'faults': [{'kind': 'gps_silent'}] if one.breaks else [],
+                'faults': [{'kind': 'no_contact'}] if one.breaks else [],
             }
             if one.steered:
                 vehicle = load_vehicle(one.steered)

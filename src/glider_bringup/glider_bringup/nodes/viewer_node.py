@@ -8,6 +8,7 @@ to 5 times real time, samples of a faster one.
 """
 
 import select
+import signal
 import struct
 import sys
 import time
@@ -147,6 +148,7 @@ class ViewerNode(Node):
 
 def main(args=None) -> int:
     """Run the node; returns its exit code."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     rclpy.init(args=args)
     try:
         node = ViewerNode()

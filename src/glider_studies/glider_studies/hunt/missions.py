@@ -11,6 +11,7 @@ import numpy as np
 
 from glider_base.settings import ConfigurationError
 from glider_mission.scenario import Scenario, load_scenario, scenario_names
+from glider_model.plant.faults.settings import measured
 from glider_model.vehicle.file import load_vehicle, steers_by, vehicle_names
 from glider_studies.montecarlo import ERRORS, SENSORS, sample_plant
 from glider_studies.random_faults import sample_faults
@@ -154,6 +155,7 @@ def draw_mission(seed: int, number: int) -> Mission:
         window_s,
         steered=bool(steers_by(scenario)),
         depth_m=depth,
+        shows=measured(scenario.topics, scenario.sensors.gyro),
     )
     return Mission(name, fields, faults, aging)
 

@@ -22,6 +22,8 @@ class Input:
 
     def __init__(self, topic: Topic, lockstep: bool, stand_in: str = '') -> None:
         self.topic = topic
+        #: in errors: free-running, any node may be in the place of its publisher
+        self.named = f'{topic.name} of {topic.publisher}' if lockstep else topic.name
         self.subscription = None
         self.stamp_ns = -1
         self.values: tuple[float, ...] = ()
@@ -34,14 +36,13 @@ class Input:
         self.used_ns = -1
 
     def accept(self, raw: bytes) -> None:
-        """Keep a message; a `MessageError` names topic and publisher if it cannot be used."""
+        """Keep a message; a `MessageError` names the topic if it cannot be used."""
         try:
             stamp_ns, values = self.topic.codec.decode(raw, check_frames=True)
             if self.topic.name == 'imu' and abs(math.hypot(*values[:4]) - 1.0) > NOT_UNIT:
                 raise MessageError(f'orientation is {values[:4]} (allowed: unit quaternions)')
         except MessageError as error:
-            said = f'{self.topic.name} of {self.topic.publisher}: {error}'
-            raise type(error)(said) from None
+            raise type(error)(f'{self.named}: {error}') from None
         self.stamp_ns, self.values = stamp_ns, values
 
     def accept_newest(self, raw: bytes, now_s: float, max_age_s: float) -> None:

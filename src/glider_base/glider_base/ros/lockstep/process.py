@@ -16,8 +16,9 @@ import rclpy
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions, get_current_signal_handlers_options
 
-from glider_base.errors import EXIT_USAGE, say_fatal
+from glider_base.errors import EXIT_USAGE, leave, say_fatal
 from glider_base.ros.lockstep.executor import make_executor
 from glider_base.ros.parameters import refuse_unknown
 from glider_base.settings import ConfigurationError
@@ -61,7 +62,7 @@ def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
         bad parameter, 3 for a peer that is missing, late or wrong.
     """
     os.environ.setdefault(_FASTDDS, str(_PROFILES))
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, leave):
         signal.signal(signal.SIGINT, _leave_to_rclpy)
     try:
         with tempfile.TemporaryDirectory() as scratch:
@@ -124,8 +125,11 @@ def _leave_to_rclpy(number, frame) -> None:
     """Let rclpy, which hears SIGINT too, end the node at its next turn, as it does for SIGTERM.
 
     A KeyboardInterrupt may come while numba makes the tuples that a step returns, and numba goes
-    on without them: a segmentation fault.
+    on without them: a segmentation fault. Before its `init` rclpy hears nothing.
     """
+    if get_current_signal_handlers_options() == SignalHandlerOptions.NO:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # another one would kill it at its end
+        sys.exit()
 
 
 def _say(stop: Stop) -> int:

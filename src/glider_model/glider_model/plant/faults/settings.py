@@ -3,7 +3,7 @@
 """Faults as a person writes them: one model for each kind, with what it does."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Union
 
 import numpy as np
@@ -11,9 +11,10 @@ import pydantic
 from pydantic import Field
 
 from glider_base.noise import random_stream
-from glider_base.ros.message_fault import MessageFault
+from glider_base.ros.message_fault import TICK_TOPICS, MessageFault
 from glider_base.settings import ConfigurationError, Settings, number, positive
 from glider_base.signals import TICK_S
+from glider_base.wiring import present
 from glider_model.plant.faults import kinds
 from glider_model.plant.faults.kinds import FaultParams, FaultState, NoFaults, NoFaultState
 
@@ -28,18 +29,28 @@ _STREAM_OFFSET = 2**33
 ACTUATORS = ('buoyancy_engine', 'pitch_mass', 'roll_mass', 'steering_surface')
 #: Phases of a dive, in the order of their numbers in `kinds`.
 PHASES = ('any', 'dive', 'turn', 'climb', 'surface')
-#: What a sensor shows: the first of its numbers in `kinds`, how many, and one of its unit in SI.
+_RAD = math.pi / 180.0
+#: Topics of which any tells attitude and rates.
+_TILTED = ('measured_odom', 'imu')
+#: What a sensor shows: the first of its numbers in `kinds`, how many, one of its unit in SI, and
+#: the topics of which any tells it.
 SENSED = {
-    'attitude': (0, 2, math.pi / 180.0),
-    'roll': (0, 1, math.pi / 180.0),
-    'pitch': (1, 1, math.pi / 180.0),
-    'heading': (2, 1, math.pi / 180.0),
-    'rates': (3, 3, math.pi / 180.0),
-    'depth': (6, 1, 1.0),
-    'position': (7, 2, 1.0),
-    'velocity': (9, 3, 1.0),
-    'fix': (12, 3, 1.0),
+    'attitude': (0, 2, _RAD, _TILTED),
+    'roll': (0, 1, _RAD, _TILTED),
+    'pitch': (1, 1, _RAD, _TILTED),
+    'heading': (2, 1, _RAD, _TILTED),
+    'rates': (3, 3, _RAD, _TILTED),
+    'depth': (6, 1, 1.0, ('measured_odom', 'pressure')),
+    'position': (7, 2, 1.0, ('measured_odom',)),
+    'velocity': (9, 3, 1.0, ('measured_odom',)),
+    'fix': (12, 3, 1.0, ('fix',)),
 }
+
+
+def measured(topics: Collection[str], gyro: bool = True) -> tuple[str, ...]:
+    """What of `SENSED` is measured where there are these topics, with a gyro or without."""
+    shown = (name for name, (*_, tell) in SENSED.items() if not set(tell).isdisjoint(topics))
+    return tuple(name for name in shown if gyro or name != 'rates')
 
 
 class FaultSettings(Settings):
@@ -58,6 +69,8 @@ class FaultSettings(Settings):
 
     #: The kind that it is to the kernels, if another one.
     acts_as: ClassVar[str] = ''
+    #: What of `SENSED` it is about, if of any.
+    measures: ClassVar[str] = ''
 
     @property
     def code(self) -> int:
@@ -214,6 +227,11 @@ class _SensorFault(FaultSettings):
     )
 
     @property
+    def measures(self) -> str:
+        """What is measured."""
+        return self.sensor
+
+    @property
     def target(self) -> tuple[int, int]:
         """Numbers of the sensor."""
         return SENSED[self.sensor][:2]
@@ -271,6 +289,7 @@ class Compass(FaultSettings):
     """The deviation of the compass jumps: an error that goes as the sine of the heading."""
 
     kind: Literal['compass']
+    measures: ClassVar[str] = 'heading'
     deviation_deg: float = number(..., (-90.0, 90.0), 'its largest error (deg)')
     phase_deg: float = number(0.0, (-180.0, 180.0), 'phase of the sine (deg)')
 
@@ -285,6 +304,7 @@ class GpsSilent(FaultSettings):
     """There is no fix."""
 
     kind: Literal['gps_silent']
+    measures: ClassVar[str] = 'fix'
 
 
 class Battery(FaultSettings):
@@ -333,19 +353,31 @@ Fault = Annotated[Union[tuple(_kinds(FaultSettings))], Field(discriminator='kind
 FAULTS = Field([], max_length=MAX_FAULTS, description='what breaks, and when')
 
 
-def check_actuators(faults: Sequence[FaultSettings], steers_by: str) -> None:
-    """Refuse a fault of a steering surface that the vehicle, which steers by that, does not have.
+def check_fitted(
+    faults: Sequence[FaultSettings], steers_by: str, topics: Collection[str], gyro: bool
+) -> None:
+    """Refuse a fault of what there is not: an actuator, something measured, a topic.
+
+    The vehicle steers by that surface, and of `SENSORS` and `BELIEFS` there are these ``topics``.
 
     Raises
     ------
     ConfigurationError
     """
+    has = {
+        'actuator': ACTUATORS if steers_by else ACTUATORS[:-1],
+        'measures': measured(topics, gyro),
+        'topic': present(TICK_TOPICS, topics),
+    }
     for i, fault in enumerate(faults):
-        if getattr(fault, 'actuator', '') == ACTUATORS[-1] and not steers_by:
-            raise ConfigurationError(
-                f'faults.{i}.actuator = {ACTUATORS[-1]!r}: the vehicle has none '
-                f'(allowed: {", ".join(ACTUATORS[:-1])})'
-            )
+        fields = type(fault).model_fields
+        for name, allowed in has.items():
+            if (value := getattr(fault, name, '')) and value not in allowed:
+                field = next(one for one in (name, 'sensor', 'kind') if one in fields)
+                raise ConfigurationError(
+                    f'faults.{i}.{field} = {getattr(fault, field)!r}: there is no {value} in this '
+                    f'mission (allowed: faults of {", ".join(allowed)})'
+                )
 
 
 def fault_params(faults: Sequence[FaultSettings], seed: int) -> NamedTuple:
