@@ -36,16 +36,14 @@ MEANING = {
 }
 
 
-def measure(progress: Callable[[str], None], checkout: Path | None = None) -> dict:
-    """Ratios of this checkout to another one; nothing without one.
+def measure(progress: Callable[[str], None], checkout: Path) -> dict:
+    """Ratios of this checkout to another one.
 
     Raises
     ------
     RuntimeError
         If a command fails in one of them.
     """
-    if checkout is None:
-        return {}
     ways = {
         'mission': lambda root: _flight_s(root, MISSION_S, '--engine', 'direct'),
         'nodes': lambda root: _flight_s(root, NODES_S),

@@ -41,7 +41,9 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 def bench(
     only: Annotated[
         list[repeatable(Section)] | None,
-        typer.Option(help='Section; can be repeated. Default: all of them.'),
+        typer.Option(
+            help='Section; can be repeated. Default: all of them (against: with --against only).'
+        ),
     ] = None,
     against: Annotated[
         Path | None,
@@ -63,7 +65,7 @@ def bench(
             f'{against} has no file glider (allowed: the folder of another checkout)',
             param_hint="'--against'",
         )
-    names = picked(only, Section)
+    names = [name for name in picked(only, Section) if only or against or name != 'against']
     if only and ('against' in names) != bool(against):
         raise typer.BadParameter(
             'neither without the other (allowed: --only against --against DIR)',

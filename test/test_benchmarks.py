@@ -96,6 +96,20 @@ def test_bench_of_the_command_line_sends_to_the_script(glider):
     assert './glider' in done.stderr
 
 
+@pytest.mark.parametrize('options', [[], ['--against', str(FOLDER.parent)]])
+def test_bench_without_another_checkout_has_no_section_against(monkeypatch, options):
+    """It was an empty table."""
+    monkeypatch.syspath_prepend(str(FOLDER))
+    import bench
+
+    for name in bench.SECTIONS:
+        monkeypatch.setattr(f'{name}.measure', lambda progress, **given: {})
+    done = CliRunner().invoke(bench.app, options)
+    assert done.exit_code == 0, done.output
+    titles = [line.strip() for line in done.stdout.splitlines() if line.strip() in bench.SECTIONS]
+    assert titles == list(bench.SECTIONS[: None if options else -1])
+
+
 @pytest.mark.parametrize(
     ('options', 'told'),
     [

@@ -135,6 +135,28 @@ def test_score_that_is_not_finite_is_a_failure():
     strict(json.dumps(card))
 
 
+def test_a_number_that_grew_without_limit_is_not_told_and_its_run_is_shown(
+    glider, driven, blown, tmp_path
+):
+    """It ended the run a tick before it was infinite: 6e33 m along the path, in one case."""
+    folder, page = tmp_path / 'run', tmp_path / 'report.html'
+    more = ['--set', f'vehicle={driven}', '--set', 'vehicle.hydrodynamics.K_p.value=19834.7']
+    more += ['--set', 'perturb.roll_bias_deg=5', '--duration', DURATION_S, '--out', folder]
+    done = glider('run', 'current_8deg', '--engine', 'direct', *more, '--json')
+    assert (done.returncode, 'no report' in done.stderr) == (1, False), done.stderr
+    card = strict(done.stdout)
+    assert (card['status'], card['distance_along_path_m']) == ('failed', None)
+    assert card['final_state']['velocity_mps'] == [None] * 3
+    for words in (
+        ('score', folder),
+        ('report', folder, '--out', page),
+        ('compare', folder, blown['direct'][1]),
+    ):
+        shown = glider(*words)
+        assert shown.returncode == 0, shown.stderr
+    assert '✕ Failed' in page.read_text()
+
+
 def test_extreme_flights_are_finite_or_refused():
     """A few of `./glider test --only fuzz --door flights`, by loops that other tests compile."""
     counter = Counter(lambda tried: None)

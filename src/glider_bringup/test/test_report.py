@@ -507,7 +507,7 @@ EVENT = {'t_s': 1.0, 'row': 'leak', 'reaction': 'surface', 'message': 'wet'}
     ('part', 'told'),
     [
         ({'arrival': {**ARRIVAL, 't_s': None}}, 'arrival: t_s: not known, though it arrived'),
-        ({'arrival': {**ARRIVAL, 'arrived': False, 'left_m': None}}, 'arrival.left_m = None'),
+        ({'arrival': {**ARRIVAL, 'arrived': False, 'left_m': 'far'}}, "arrival.left_m = 'far'"),
         ({'guard': {'events': [{**EVENT, 'row': []}]}}, 'guard.events.0.row = []'),
         ({'guard': {'events': [{**EVENT, 'reaction': {}}]}}, 'guard.events.0.reaction: should'),
     ],

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from glider_base.errors import ConfigurationError, shown
-from glider_bringup.scoring.card import finite, fly_scored
+from glider_bringup.scoring.card import STOPPED, finite, fly_scored
 from glider_bringup.scoring.navigation import FOURTH
 from glider_bringup.scoring.scores import SCORES, studied
 from glider_mission.changes import overlap, run_command
@@ -79,6 +79,8 @@ NAVIGATION = (
     'fixed',
     'innovation_squared',
 )
+#: Outcomes of flights that were not flown to their end: no percentile holds figures of them.
+CUT_SHORT = ('surfaced', 'lost', *STOPPED)
 RESULT_FILE = 'montecarlo.json'
 
 
@@ -246,7 +248,7 @@ def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
         'diverged': diverged,
         'outcome': outcome(scores, failed, diverged),
         **clean,
-        'navigation': {name: scores['navigation'][name] for name in NAVIGATION},
+        'navigation': finite({name: scores['navigation'][name] for name in NAVIGATION}),
     }
 
 
@@ -298,12 +300,12 @@ def fly_plants(
 
 
 def spread(numbers: list[float | None]) -> dict[str, float | None]:
-    """Median, 95th percentile and worst of some figures.
+    """Median, 95th percentile and worst of some figures; None of nothing.
 
     A percentile is the figure that this share of the plants does not exceed. None counts as the
     worst there is.
     """
-    ranked = sorted(math.inf if number is None else number for number in numbers)
+    ranked = sorted(math.inf if number is None else number for number in numbers) or [math.inf]
 
     def at(share: float) -> float | None:
         number = ranked[max(1, math.ceil(share * len(ranked))) - 1]
@@ -315,7 +317,7 @@ def spread(numbers: list[float | None]) -> dict[str, float | None]:
 def _rows(
     flights: dict[tuple[int, str], dict], airframes: dict[int, dict]
 ) -> list[dict[str, Any]]:
-    """What all plants came to, by controller."""
+    """What all plants came to, by controller: percentiles of those flown to their end."""
     weak = {
         'statically_unstable': sum(one['unstable'] for one in airframes.values()),
         'weak_steering': sum(one['weak_steering'] for one in airframes.values()),
@@ -323,13 +325,15 @@ def _rows(
     rows = []
     for controller in dict.fromkeys(controller for _, controller in flights):
         of = [flights[plant, controller] for plant in airframes]
+        whole = [flight for flight in of if flight['outcome'] not in CUT_SHORT]
         rows.append(
             {
                 'controller': controller,
                 'diverged': sum(flight['diverged'] for flight in of),
-                **{key: spread([flight[key] for flight in of]) for key, _ in studied()},
+                **{key: spread([flight[key] for flight in whole]) for key, _ in studied()},
                 **weak,
-                'navigation': pooled([flight['navigation'] for flight in of]),
+                'navigation': pooled([flight['navigation'] for flight in whole]),
+                'flown_to_end': len(whole),
                 'outcomes': dict(Counter(flight['outcome'] for flight in of)),
                 'worst_plant': max(airframes, key=lambda plant: _badness(of[plant])),
             }

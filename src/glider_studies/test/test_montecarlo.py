@@ -5,6 +5,7 @@
 import json
 import math
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -58,6 +59,9 @@ from glider_studies.montecarlo import (
 SHORT = {'profile.depth_m': 200.0, 'settle_s': 60.0, 'duration_s': 2400.0}
 OPTIONS = [f'--set={field}={value}' for field, value in SHORT.items()]
 LAWS = ['adaptive', 'backstepping', 'pid']
+#: What is told of the navigation of a flight, but for surfacings; statuses of five flights.
+FLOWN = dict.fromkeys(NAVIGATION) | {'fixed': 0, 'surfacing_cross_track_m': []}
+STATUSES = ('completed', 'infeasible', 'completed', 'lost', 'surfaced')
 #: Topics whose numbers are compared.
 RECORDED = [name for name in COLUMNS if name in TOPICS]
 SPREADS = (
@@ -205,12 +209,44 @@ def test_a_good_run_has_not_diverged():
         {'cross_track_m': {'max_steady': 900.0, 'max_all': 1000.1, 'max_run': 1000.1}},
         {'pitch_error_deg': {'rms_steady': math.nan}},
         {'final_state': {'position_ned_m': [1.0, math.inf, 3.0]}},
+        {
+            'status': 'lost',
+            'navigation': dict.fromkeys(NAVIGATION) | {'surfacing_error_m': [math.nan]},
+        },
     ],
 )
 def test_a_lost_run_has_diverged(change):
     judged = judge(scores(**change))
     assert judged['diverged']
     json.dumps(judged, allow_nan=False)
+
+
+def test_percentiles_are_of_flights_that_were_flown_to_their_end(capsys):
+    """A flight that failed in its first minute made them better."""
+    scored = [
+        scores(navigation=FLOWN | {'surfacings': i, 'surfacing_error_m': 4 * [10.0 * i]})
+        for i in range(1, 6)
+    ]
+    for card, m, status in zip(scored, (4.0, 9.0, 0.1, 0.2, 0.3), STATUSES, strict=True):
+        card['cross_track_m'] = dict.fromkeys(('max_steady', 'max_all', 'max_run'), m)
+        card['status'] = status
+    flights = {
+        (i, 'pid'): judge(card, 'failed' if i == 2 else 'completed')
+        for i, card in enumerate(scored)
+    }
+    frames = dict.fromkeys(range(5), {'unstable': 0, 'weak_steering': 0})
+    told = report('current_8deg', {}, 0, 0, flights, frames)
+    (row,) = told['rows']
+    assert row['max_all_m'] == {'p50': 4.0, 'p95': 9.0, 'worst': 9.0}
+    assert row['navigation']['surfacings'] == 1 + 2
+    assert row['navigation']['error_m'] == {'p50': 10.0, 'p95': 20.0, 'worst': 20.0}
+    counted = {'completed': 1, 'infeasible': 1, 'failed': 1, 'lost': 1, 'surfaced': 1}
+    assert (row['flown_to_end'], row['outcomes']) == (2, counted)
+    _print_study(told)
+    assert re.search(r'flown to their end +│ 2 ', capsys.readouterr().out)
+    lost = {(0, 'pid'): flights[3, 'pid']}
+    (row,) = report('current_8deg', {}, 0, 0, lost, {0: frames[0]})['rows']
+    assert row['max_all_m'] == {'p50': None, 'p95': None, 'worst': None}
 
 
 def test_result_is_one_json_object_of_the_promised_shape(study):

@@ -226,6 +226,7 @@ def test_nothing_of_a_map_is_cut_off(tmp_path, monkeypatch, speeds, angles, circ
         monkeypatch.setattr(sys, 'argv', ['glider', 'map', str(file), '--out', out])
         assert cli.main() == 0
     pixels = (255.0 * matplotlib.image.imread(tmp_path / 'map.png')[..., :3]).round().astype(int)
+    assert (pixels[:, [0, -1]] == 255).all()
     seen = np.array(
         [
             np.count_nonzero((pixels == list(bytes.fromhex(colour))).all(axis=-1))

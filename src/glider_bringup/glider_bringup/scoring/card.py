@@ -3,7 +3,6 @@
 """The scorecard as data, which is ``score.json``: made, written, read and checked."""
 
 import json
-import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,6 +20,8 @@ from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import load_vehicle
 
 STATUSES = ('completed', 'unfinished', 'surfaced', 'lost', 'infeasible', 'aborted', 'failed')
+#: A figure this large is of a number that grew without limit, whatever its unit: it is not known.
+LARGEST = 1e15
 #: Statuses of runs that were not flown to their end.
 STOPPED = ('aborted', 'failed')
 
@@ -33,7 +34,7 @@ def fly_scored(scenario: Scenario, takers: Iterable[Taker] = ()) -> tuple[Outcom
 
 
 def scorecard(scenario: Scenario, engine: str | None, flight: Outcome, scores: dict) -> dict:
-    """Contents of ``score.json``; a figure that is not finite is None there, and a failure."""
+    """Contents of ``score.json``; a figure that is not `finite` is None there, and a failure."""
     scores, wrong = dict(scores), list(_not_finite(scores))
     status, reason = became, why = scores.pop('status'), scores.pop('reason')
     if flight.status != 'completed':
@@ -64,12 +65,12 @@ def scorecard(scenario: Scenario, engine: str | None, flight: Outcome, scores: d
 
 
 def finite(value: Any) -> Any:
-    """The same without numbers that JSON does not have: they become None."""
+    """The same without numbers that JSON does not have, or beyond `LARGEST`: they become None."""
     if isinstance(value, dict):
         return {name: finite(inner) for name, inner in value.items()}
     if isinstance(value, list):
         return [finite(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return None if isinstance(value, float) and not abs(value) < LARGEST else value
 
 
 def _not_finite(scores: dict) -> Iterator[str]:
@@ -89,7 +90,7 @@ def write_score(folder: Path, card: dict) -> None:
 #: A number of a scorecard that is not known is None; north and east; in three dimensions.
 _Figure = float | None
 _Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
-_Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
+_Triple = Annotated[list[_Figure], Field(min_length=3, max_length=3)]
 _Count = Annotated[int, Field(ge=0)]
 
 
@@ -132,8 +133,8 @@ class _Arrival(_Part):
 
     arrived: bool
     t_s: _Figure
-    missed_m: float
-    left_m: float
+    missed_m: _Figure
+    left_m: _Figure
     eta_s: _Figure
     overrun_s: _Figure
     place_latlon_deg: _Pair | None
@@ -176,7 +177,7 @@ _State = _part(position_ned_m=_Triple, attitude_rpy_rad=_Triple, velocity_mps=_T
 _Card = _part(
     'wall_time_s real_time_factor',
     sim_time_s=Annotated[float, Field(ge=0.0)],
-    distance_along_path_m=float,
+    distance_along_path_m=_Figure,
     settle_s=(_Figure, None),
     end_of_path_m=(_Figure, None),
     scenario=str,

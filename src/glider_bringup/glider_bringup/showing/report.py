@@ -44,7 +44,7 @@ def _tiles(run: FlownRun) -> list[tuple[str, str, str]]:
     asked = _number(depth_m, 0, 'm')
     beyond = f'{_number(depth["overshoot"], 1, "m")} beyond {asked}'
     against = beyond if (depth['max'] or 0.0) > depth_m else f'of {asked}'
-    speed = f'{way_m / max(TICK_S, time_s):.2f} m/s on average'
+    speed = f'{way_m / max(TICK_S, time_s):.2f} m/s on average' if way_m is not None else ''
     (pitch, most_pitch), (heading, most_heading) = (
         [_number(card[of][name], digits, 'deg') for name in ('rms_steady', 'max_steady')]
         for of, digits in (('pitch_error_deg', 2), ('heading_fluctuation_deg', 3))

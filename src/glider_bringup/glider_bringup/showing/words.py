@@ -14,8 +14,10 @@ def span(seconds: float) -> str:
     return f'{hours} h {minutes} min' if minutes else f'{hours} h'
 
 
-def way(metres: float) -> str:
-    """Distance as a person says it."""
+def way(metres: float | None) -> str:
+    """Distance as a person says it; None is not known."""
+    if metres is None:
+        return '-'
     return f'{metres / 1e3:,.1f} km' if metres >= 2000.0 else f'{metres:,.0f} m'
 
 

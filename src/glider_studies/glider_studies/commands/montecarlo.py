@@ -62,7 +62,8 @@ def montecarlo(
     Each hydrodynamic coefficient differs by up to 30 %, added mass by 15 %, trim by 10 mm, roll at
     rest by 10 deg, ballast by 50 g; water is stratified. Control knows the file only. Where the
     vehicle reckons (navigation.method), its compass, pitch, depth and fixes are off too.
-    With --faults each plant breaks too, and what became of the flights is counted.
+    With --faults each plant breaks too. Percentiles are of the flights that were flown to their
+    end; those that surfaced for good, were lost or failed are counted.
     """
     from glider_mission.choices import combination_of
     from glider_mission.run_folder import make_result_folder
@@ -99,6 +100,7 @@ def _print_study(study: dict) -> None:
     rows = study['rows']
     told = [row['navigation'] for row in rows]
     lines = {
+        'flown to their end': [str(row['flown_to_end']) for row in rows],
         'diverged': [str(row['diverged']) for row in rows],
         **{label: [show(row[key]) for row in rows] for key, label in studied()},
     }

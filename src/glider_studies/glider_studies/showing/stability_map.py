@@ -265,6 +265,7 @@ def draw_map(stability: StabilityMap, file: Path) -> None:
     figure.legend(
         handles=_legend(stability), loc='outside lower center', ncols=2 if columns > 1 else 1
     )
+    figure.draw_without_rendering()  # labels of circles have no place before, and were cut off
     save_figure(figure, file, dpi=150)
 
 
