@@ -137,6 +137,17 @@ def test_lines_are_cut_where_they_cross_the_date_line(tmp_path):
         assert max(np.ptp([place[0] for place in part]) for part in (west, east)) < 0.02
     times = track['properties']['times']
     assert [len(part) for part in times] == [len(west), len(east)]
+    fastkml, gpxpy = pytest.importorskip('fastkml'), pytest.importorskip('gpxpy')
+    (document,) = fastkml.KML.parse(exported('kml')).features
+    for mark, line in zip(document.features, (route, track), strict=True):
+        for part, ours in zip(mark.geometry.geoms, line['geometry']['coordinates'], strict=True):
+            assert part.coords[0][:2] == pytest.approx(ours[0][:2], abs=1e-6)
+            assert part.coords[-1][:2] == pytest.approx(ours[-1][:2], abs=1e-6)
+    read = gpxpy.parse(exported('gpx').read_text())
+    for parts, line in ((read.routes, route), (read.tracks[0].segments, track)):
+        for part, ours in zip(parts, line['geometry']['coordinates'], strict=True):
+            found = [(point.longitude, point.latitude) for point in part.points]
+            assert found == pytest.approx(np.array([place[:2] for place in ours]), abs=1e-6)
     pytest.importorskip('h5netcdf')
     with xarray.open_dataset(exported('og1'), engine='h5netcdf') as read:
         assert read.geospatial_lon_min == pytest.approx(179.9999, abs=1e-5)
