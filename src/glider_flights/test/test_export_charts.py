@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 import glider_bringup as glider
 from glider_base.errors import ConfigurationError
 from glider_bringup.cli import app
+from glider_bringup.door import tracks
 from glider_bringup.door.tracks import write_mafiles
 from glider_bringup.showing.flown_run import read_run
 from glider_mission.scenario import load_scenario
@@ -116,6 +117,15 @@ def test_geojson_is_valid_and_where_the_vehicle_was(export, flown):
     )
     surfacings = [name for name in by_name if name.startswith('surfacing')]
     assert len(surfacings) == len(flown.score['navigation']['reports'])
+
+
+def test_a_track_of_few_points_is_at_the_last_of_them_when_the_run_ends(flown, monkeypatch):
+    monkeypatch.setattr(tracks, 'MOST_POINTS', 20)
+    for line in tracks.chart_of(read_run(flown.folder), 0.0).lines:
+        last_s = (np.datetime64(line.times[-1][:-1]) - np.datetime64(0, 's')) / np.timedelta64(
+            1, 's'
+        )
+        assert last_s == pytest.approx(flown.to_xarray().time.values[-1], abs=1.0)
 
 
 def test_lines_are_cut_where_they_cross_the_date_line(tmp_path):

@@ -18,6 +18,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_base.frames import OriginSettings, to_geodetic
+from glider_base.signals import TICK_S
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.web_page import FlownRun
 from glider_mission.disk import not_written, write_whole
@@ -110,7 +111,8 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
         columns = samples[f'{of}_north_m'], samples[f'{of}_east_m'], samples['track_depth_m']
         known = np.flatnonzero(np.isfinite(columns).all(axis=0))
         north, east, depth = (column[known] for column in columns)
-        times = [when(2.0 * traces.spacing_s * at) for at in known] if began_s is not None else []
+        seconds = np.minimum(2.0 * traces.spacing_s * known, (traces.ticks - 1) * TICK_S)
+        times = [when(t_s) for t_s in seconds] if began_s is not None else []
         lines.append(Line(name, places(north, east), [round(float(d), 2) for d in depth], times))
     surfacings = [
         Point(
