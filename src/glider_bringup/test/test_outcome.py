@@ -111,6 +111,22 @@ def test_a_vehicle_that_is_too_light_to_dive_has_not_completed_its_mission(tmp_p
     assert 'Nothing went wrong' not in page
 
 
+@pytest.mark.parametrize(
+    ('bottom_m', 'status'), [(8.0, 'unfinished'), (14.0, 'unfinished'), (35.0, 'completed')]
+)
+@pytest.mark.parametrize('at_end', ['stop', 'continue'])
+def test_a_mission_in_water_that_is_too_shallow_to_dive_is_unfinished(bottom_m, status, at_end):
+    """It is to end by its path or its time, and waits at the surface until then.
+
+    Over a shelf the bottom turns its dives, at 21 m of 200.
+    """
+    shallow = {'water.bottom_m': bottom_m, 'profile.clearance_m': 15.0}
+    changes = {**shallow, 'dives': 0, 'duration_s': 6000.0, 'path.at_end': at_end}
+    _, told = fly_scored(load_scenario('slocum_shelf', changes), [])
+    assert told['status'] == status
+    assert told['reason'].startswith('no dive flown' if status == 'unfinished' else '')
+
+
 @pytest.mark.parametrize('depth_m', [60.0, 100.0])
 def test_dives_count_wherever_the_upper_turn_is(depth_m):
     """A mission that has flown its dives is over once it is up, and is told so."""

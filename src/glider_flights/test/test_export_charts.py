@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 import glider_bringup as glider
 from glider_base.errors import ConfigurationError
 from glider_bringup.cli import app
+from glider_bringup.door import tracks
 from glider_bringup.door.tracks import write_mafiles
 from glider_bringup.showing.flown_run import read_run
 from glider_mission.scenario import load_scenario
@@ -118,6 +119,15 @@ def test_geojson_is_valid_and_where_the_vehicle_was(export, flown):
     assert len(surfacings) == len(flown.score['navigation']['reports'])
 
 
+def test_a_track_of_few_points_is_at_the_last_of_them_when_the_run_ends(flown, monkeypatch):
+    monkeypatch.setattr(tracks, 'MOST_POINTS', 20)
+    for line in tracks.chart_of(read_run(flown.folder), 0.0).lines:
+        last_s = (np.datetime64(line.times[-1][:-1]) - np.datetime64(0, 's')) / np.timedelta64(
+            1, 's'
+        )
+        assert last_s == pytest.approx(flown.to_xarray().time.values[-1], abs=1.0)
+
+
 def test_lines_are_cut_where_they_cross_the_date_line(tmp_path):
     """No line goes round the world, and the box is small."""
     path = {**CHANGES['path'], 'waypoints_latlon': [(36.0, 179.9999), (36.0, -179.99)]}
@@ -137,6 +147,17 @@ def test_lines_are_cut_where_they_cross_the_date_line(tmp_path):
         assert max(np.ptp([place[0] for place in part]) for part in (west, east)) < 0.02
     times = track['properties']['times']
     assert [len(part) for part in times] == [len(west), len(east)]
+    fastkml, gpxpy = pytest.importorskip('fastkml'), pytest.importorskip('gpxpy')
+    (document,) = fastkml.KML.parse(exported('kml')).features
+    for mark, line in zip(document.features, (route, track), strict=True):
+        for part, ours in zip(mark.geometry.geoms, line['geometry']['coordinates'], strict=True):
+            assert part.coords[0][:2] == pytest.approx(ours[0][:2], abs=1e-6)
+            assert part.coords[-1][:2] == pytest.approx(ours[-1][:2], abs=1e-6)
+    read = gpxpy.parse(exported('gpx').read_text())
+    for parts, line in ((read.routes, route), (read.tracks[0].segments, track)):
+        for part, ours in zip(parts, line['geometry']['coordinates'], strict=True):
+            found = [(point.longitude, point.latitude) for point in part.points]
+            assert found == pytest.approx(np.array([place[:2] for place in ours]), abs=1e-6)
     pytest.importorskip('h5netcdf')
     with xarray.open_dataset(exported('og1'), engine='h5netcdf') as read:
         assert read.geospatial_lon_min == pytest.approx(179.9999, abs=1e-5)

@@ -27,7 +27,8 @@ class Rules(NamedTuple):
     duration_s: float = math.inf  #: time that the mission has (s)
     origin: Origin | None = None  #: of its chart, if people read its places in degrees
     shallowest_m: float = math.inf  #: depth of dives by which they are counted, if less (m)
-    dives: int = 0  #: that it is to fly in its time; 0: nobody asks
+    dives: int = 0  #: that it is to fly in its time; 0: so many as there are
+    dives_at_all: bool = False  #: there is time for a dive, and it is to fly some
     top_m: float = 10.0  #: depth of the upper turn between dives (m)
 
     @property

@@ -392,15 +392,16 @@ class Scenario(Settings):
             self.duration_s,
             self.origin.params() if self.is_charted else None,
             self.shallowest_m,
-            self._due_dives(),
+            min(self.dives, fitting := self._fitting_dives()),
+            fitting > 0,
             self.profile.top_depth_m,
         )
 
-    def _due_dives(self) -> int:
-        """Dives that it is to fly, as far as there is ample time for them; 0: it is not asked."""
+    def _fitting_dives(self) -> int:
+        """Dives for which there is ample time; 0 where it may wait for all of it."""
         stay_s = self.profile.wait_s + self.profile.prepare_s
         fit = self.duration_s / (AMPLE * 2.0 * self._glide_s() + stay_s)
-        return 0 if self._holds else min(self.dives, int(fit))
+        return 0 if self._holds else int(fit)
 
     def _glide_s(self) -> float:
         """Time of a glide to the depth of the lower turn (s); infinite along a path in 3-D."""

@@ -2,15 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """What missions are told of the files that they fly in, and what their plans make of them."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 import xarray
 
+from glider_base.frames import to_geodetic
 from glider_base.settings import ConfigurationError
 from glider_mission.routing.forecast_chart import forecast_of
 from glider_mission.routing.fronts import current_on
+from glider_mission.routing.pilot import Pilot
 from glider_mission.routing.plan import plan
 from glider_mission.scenario import load_scenario
 from glider_model.ocean.fields.grid import grid_velocity
@@ -141,9 +144,42 @@ def test_a_planned_route_goes_round_land_that_straight_legs_do_not(kind, tmp_pat
     files = [sea(tmp_path / 'sea.nc', land=island if kind == 'current' else None)]
     if kind == 'bottom':
         files.append(bottom(tmp_path / 'bottom.nc'))
-    made = plan(mission(*files, **{'guidance.route': 'planned', 'duration_s': 4e5}))
+    planned = {'guidance.route': 'planned', 'duration_s': 4e5}
+    made = plan(mission(*files, **planned))
     assert made.reachable and math.isinf(made.straight_s)
     assert np.hypot(*np.diff(made.route.corners, axis=0).T).sum() > 1.05 * 18_000.0
+    flown = Pilot(mission(*files, **planned)).order(0, None).path
+    np.testing.assert_allclose(np.array(flown.waypoints)[:, :2], made.route.corners, atol=1e-6)
+
+
+SPIT = {'lat': slice(36.03, 36.25), 'lon': slice(121.99, 122.01)}
+
+
+@pytest.mark.parametrize('land', [SPIT, {'lat': slice(36.11, 36.14), 'lon': slice(121.9, 122.1)}])
+def test_a_planned_route_goes_round_land_between_the_points_of_its_chart(land, tmp_path):
+    """A spit 2 km wide across the way, and an island along it that is as narrow."""
+    file = bottom(tmp_path / 'bottom.nc', east=-1.0)
+    data = xarray.load_dataset(file['bathymetry.file'])
+    data.elevation.loc[land] = 20.0
+    data.to_netcdf(file['bathymetry.file'], engine='scipy')
+    ways = {'waypoints': [[36.125, 121.75], [36.128, 122.25]], 'guidance.route': 'planned'}
+    flown = mission(sea(tmp_path / 'sea.nc'), file, **ways, duration_s=1e6)
+    corners = np.array(Pilot(flown).order(0, None).path.waypoints)
+    origin = flown.origin.params()
+    for one, after in itertools.pairwise(corners[:, :2]):
+        at = [to_geodetic(*(one + s * (after - one)), origin) for s in np.linspace(0, 1, 2000)]
+        lat, lon = (xarray.DataArray(axis, dims='place') for axis in np.array(at).T)
+        assert (data.elevation.interp(lat=lat, lon=lon) < 0.0).all()
+
+
+def test_a_planned_route_that_no_way_leads_along_is_refused(tmp_path):
+    file = bottom(tmp_path / 'bottom.nc', east=-1.0)
+    data = xarray.load_dataset(file['bathymetry.file'])
+    data.elevation.loc[{'lon': slice(121.99, 122.01)}] = 20.0
+    data.to_netcdf(file['bathymetry.file'], engine='scipy')
+    wall = mission(sea(tmp_path / 'sea.nc'), file, **{'guidance.route': 'planned'})
+    with pytest.raises(ConfigurationError, match=r'guidance.route: no way round the land'):
+        Pilot(wall).order(0, None)
 
 
 def test_an_order_of_a_path_is_not_led_back_by_a_route_that_is_planned_anew(tmp_path):

@@ -18,6 +18,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_base.frames import OriginSettings, to_geodetic
+from glider_base.signals import TICK_S
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.web_page import FlownRun
 from glider_mission.disk import not_written, write_whole
@@ -58,7 +59,12 @@ class Chart(NamedTuple):
     @property
     def as_line(self) -> Line:
         """The route as a line over the chart."""
-        return Line('route', self.route, [0.0] * len(self.route), [])
+        return Line('route', self.route, [], [])
+
+    @property
+    def all_lines(self) -> list[Line]:
+        """The route, where there is one, and the tracks."""
+        return [self.as_line, *self.lines] if self.route else self.lines
 
 
 def start_of(scenario: Scenario, start: str | None) -> float | None:
@@ -105,7 +111,8 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
         columns = samples[f'{of}_north_m'], samples[f'{of}_east_m'], samples['track_depth_m']
         known = np.flatnonzero(np.isfinite(columns).all(axis=0))
         north, east, depth = (column[known] for column in columns)
-        times = [when(2.0 * traces.spacing_s * at) for at in known] if began_s is not None else []
+        seconds = np.minimum(2.0 * traces.spacing_s * known, (traces.ticks - 1) * TICK_S)
+        times = [when(t_s) for t_s in seconds] if began_s is not None else []
         lines.append(Line(name, places(north, east), [round(float(d), 2) for d in depth], times))
     surfacings = [
         Point(
@@ -123,73 +130,80 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
     )
 
 
-def _cut(places: list[list[float]], times: list[str]) -> tuple[list, list]:
-    """A line, longitude first, in parts on one side of the date line each; so are its times."""
-    parts, said = [places[:1]], [times[:1]]
-    for k, (one, after) in enumerate(itertools.pairwise(places), 1):
-        if abs(after[0] - one[0]) > 180.0:
-            edge = math.copysign(180.0, one[0])
-            share = (edge - one[0]) / ((after[0] + 2.0 * edge - one[0]) or 1.0)
-            rest = [a + share * (b - a) for a, b in zip(one[1:], after[1:], strict=True)]
-            parts[-1].append([edge, *rest])
-            parts.append([[-edge, *rest]])
-            said[-1] += times[k : k + 1]
-            said.append(times[k : k + 1])
+class _Row(NamedTuple):
+    """A point of a line: latitude, longitude (deg), depth (m) and time; None of what has none."""
+
+    latitude: float
+    longitude: float
+    depth_m: float | None
+    time: str | None
+
+
+def _parts(line: Line) -> list[list[_Row]]:
+    """A line in parts on one side of the date line each, as RFC 7946 has it (section 3.1.9)."""
+    columns = zip_longest(line.places, line.depths_m, line.times)
+    rows = [_Row(*place, depth, time) for place, depth, time in columns]
+    parts = [rows[:1]]
+    for one, after in itertools.pairwise(rows):
+        if abs(after.longitude - one.longitude) > 180.0:
+            edge = math.copysign(180.0, one.longitude)
+            way = after.longitude + 2.0 * edge - one.longitude
+            share = (edge - one.longitude) / (way or 1.0)
+            latitude = one.latitude + share * (after.latitude - one.latitude)
+            there = after._replace(latitude=latitude, longitude=edge)
+            if line.depths_m:
+                depth = one.depth_m + share * (after.depth_m - one.depth_m)
+                there = there._replace(depth_m=round(depth, 2))
+            parts[-1].append(there)
+            parts.append([there._replace(longitude=-edge)])
         parts[-1].append(after)
-        said[-1] += times[k : k + 1]
-    return parts, said
+    return parts
 
 
 def geojson(chart: Chart) -> bytes:
     """A FeatureCollection: lines of route and tracks, points of surfacings."""
 
-    def at(place: tuple[float, float], *depth: float) -> list[float]:
-        return [round(place[1], 7), round(place[0], 7), *(-d for d in depth)]
+    def at(latitude: float, longitude: float, depth: float | None = None) -> list[float]:
+        return [round(longitude, 7), round(latitude, 7), *([] if depth is None else [-depth])]
 
     def feature(kind: str, coordinates: list, **told: Any) -> dict[str, Any]:
         geometry = {'type': kind, 'coordinates': coordinates}
         return {'type': 'Feature', 'properties': told, 'geometry': geometry}
 
-    def way(name: str, places: list[list[float]], times: list[str]) -> dict[str, Any]:
-        parts, said = _cut(places, times)
-        kind, inside, when = ('LineString', parts[0], said[0])
-        if len(parts) > 1:
-            kind, inside, when = ('MultiLineString', parts, said)
-        return feature(kind, inside, name=name, **({'times': when} if times else {}))
-
     features = []
-    if chart.route:
-        features.append(way('route', [at(place) for place in chart.route], []))
-    for line in chart.lines:
-        pairs = zip(line.places, line.depths_m, strict=True)
-        features.append(way(line.name, [at(*pair) for pair in pairs], line.times))
+    for line in chart.all_lines:
+        parts = _parts(line)
+        inside, when = ([[at(*row[:3]) for row in part] for part in parts], [])
+        if line.times:
+            when = [[row.time for row in part] for part in parts]
+        kind = 'MultiLineString'
+        if len(parts) == 1:
+            kind, inside, when = 'LineString', inside[0], when and when[0]
+        told = {'name': line.name} | ({'times': when} if when else {})
+        features.append(feature(kind, inside, **told))
     for point in chart.surfacings:
         told = {'name': point.name} | ({'time': point.time} if point.time else {}) | point.told
-        features.append(feature('Point', at(point.place), **told))
+        features.append(feature('Point', at(*point.place), **told))
     return json.dumps({'type': 'FeatureCollection', 'features': features}).encode()
 
 
 def kml(chart: Chart) -> bytes:
     """A document with a placemark for each line and surfacing."""
 
-    def placemark(name: str, time: str, kind: str, places, depths_m) -> ElementTree.Element:
-        pairs = zip(places, depths_m, strict=True)
-        told = (f'{place[1]:.7f},{place[0]:.7f},{-depth:.2f}' for place, depth in pairs)
-        mode = 'absolute' if any(depths_m) else 'clampToGround'
-        shape = _element(
-            kind, _element('altitudeMode', mode), _element('coordinates', ' '.join(told))
-        )
-        stamp = [_element('TimeStamp', _element('when', time))] if time else []
-        return _element('Placemark', _element('name', name), *stamp, shape)
+    def shape(kind: str, rows: list[_Row], depths_m: list[float]) -> ElementTree.Element:
+        told = (f'{x:.7f},{y:.7f},{-(depth or 0.0):.2f}' for y, x, depth, _ in rows)
+        mode = _element('altitudeMode', 'absolute' if any(depths_m) else 'clampToGround')
+        return _element(kind, mode, _element('coordinates', ' '.join(told)))
 
-    marks = [
-        placemark(line.name, '', 'LineString', line.places, line.depths_m)
-        for line in [chart.as_line, *chart.lines]
-        if line.places
-    ]
-    marks += [
-        placemark(one.name, one.time, 'Point', [one.place], [0.0]) for one in chart.surfacings
-    ]
+    marks = []
+    for line in chart.all_lines:
+        parts = [shape('LineString', part, line.depths_m) for part in _parts(line)]
+        whole = parts[0] if len(parts) == 1 else _element('MultiGeometry', *parts)
+        marks.append(_element('Placemark', _element('name', line.name), whole))
+    for one in chart.surfacings:
+        stamp = [_element('TimeStamp', _element('when', one.time))] if one.time else []
+        place = shape('Point', [_Row(*one.place, None, None)], [])
+        marks.append(_element('Placemark', _element('name', one.name), *stamp, place))
     document = _element('Document', _element('name', chart.name), *marks)
     return _text(_element('kml', document, xmlns=KML))
 
@@ -197,19 +211,20 @@ def kml(chart: Chart) -> bytes:
 def gpx(chart: Chart) -> bytes:
     """Surfacings as waypoints, the waypoints as a route, the tracks as tracks."""
 
-    def at(tag: str, place, time: str = '', name: str = '', depth: float | None = None):
-        told = {'ele': '' if depth is None else f'{-depth:.2f}', 'time': time, 'name': name}
+    def at(tag: str, row: _Row, name: str = '') -> ElementTree.Element:
+        depth = '' if row.depth_m is None else f'{-row.depth_m:.2f}'
+        told = {'ele': depth, 'time': row.time, 'name': name}
         inside = [_element(key, text) for key, text in told.items() if text]
-        return _element(tag, *inside, lat=f'{place[0]:.7f}', lon=f'{place[1]:.7f}')
+        return _element(tag, *inside, lat=f'{row.latitude:.7f}', lon=f'{row.longitude:.7f}')
 
-    inside = [at('wpt', one.place, one.time, one.name) for one in chart.surfacings]
+    inside = [at('wpt', _Row(*one.place, None, one.time), one.name) for one in chart.surfacings]
     if chart.route:
-        route = (at('rtept', place) for place in chart.route)
-        inside.append(_element('rte', _element('name', chart.name), *route))
+        for part in _parts(chart.as_line):
+            route = (at('rtept', row) for row in part)
+            inside.append(_element('rte', _element('name', chart.name), *route))
     for line in chart.lines:
-        rows = zip_longest(line.places, line.times, line.depths_m, fillvalue='')
-        points = (at('trkpt', place, time, depth=depth) for place, time, depth in rows)
-        inside.append(_element('trk', _element('name', line.name), _element('trkseg', *points)))
+        parts = (_element('trkseg', *(at('trkpt', row) for row in part)) for part in _parts(line))
+        inside.append(_element('trk', _element('name', line.name), *parts))
     return _text(_element('gpx', *inside, version='1.1', creator='glider stack', xmlns=GPX))
 
 

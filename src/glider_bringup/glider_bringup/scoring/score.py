@@ -49,7 +49,7 @@ from glider_mission.blocks import COLUMNS
 from glider_mission.rules import Rules
 from glider_mission.scenario import Scenario
 from glider_model.ocean.bottom import NO_BOTTOM
-from glider_model.plant.plant import dive_depths
+from glider_model.plant.plant import DIVED_M, dive_depths
 from glider_model.plant.readings import make_readings, noise_of_readings
 from glider_model.vehicle.file import Vehicle, load_vehicle
 
@@ -236,8 +236,10 @@ class Scorer:
         held = ~(series('infeasible')[scored & flies] > 0.0)
         infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)
         missing = ''
-        if dives < rules.dives and time_s >= rules.duration_s:
+        if time_s >= rules.duration_s and dives < rules.dives:
             missing = f'dives flown, of those that there was time for: {dives} of {rules.dives}'
+        elif time_s >= rules.duration_s and rules.dives_at_all and not _dives_at_all(depth, rules):
+            missing = 'no dive flown, for which there was time'
         ended = outcome_of(depth, told, self._hull, infeasible, missing)
         pace_m = way_m if ended.status in (COMPLETED, INFEASIBLE) else None
         return {
@@ -399,6 +401,12 @@ def _count_dives(depth: np.ndarray, below_m: float, above_m: float) -> int:
     zone[depth < above_m] = -1
     zone = zone[zone != 0]
     return int(np.count_nonzero((zone[:-1] == 1) & (zone[1:] == -1)))
+
+
+def _dives_at_all(depth: np.ndarray, rules: Rules) -> bool:
+    """Whether it went down and came back, however little: over a shelf a bottom turns dives."""
+    deepest_m = float(np.max(depth, initial=0.0))
+    return deepest_m > DIVED_M and _count_dives(depth, *dive_depths(deepest_m, rules.top_m)) > 0
 
 
 def _along_m(row: np.ndarray, target: np.ndarray, course_rad: float) -> float:

@@ -11,15 +11,17 @@ import math
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_guidance.order import Order
 from glider_guidance.orders import is_surfaced
 from glider_guidance.path.settings import WaypointPath
 from glider_mission.blocks import COLUMNS
-from glider_mission.routing.forecast_chart import forecast_of, observed, with_land
+from glider_mission.routing.forecast_chart import forecast_of, observed
 from glider_mission.routing.plan import (
+    crossing,
     pace_of,
-    route_through,
+    route_round,
     sailed_s,
     waypoints_of,
     with_errors,
@@ -55,6 +57,7 @@ class Pilot:
             sea.current - self._chart.current
             for sea in with_errors(self._chart, self._error_mps, scenario)
         ]
+        self._bottom = scenario.bottom()
         self._waypoints, self._next = waypoints_of(scenario), 1
         self._replans = scenario.guidance.replan == 'surfacing'
         self._listen_s = min(_LISTEN_S, 0.5 * scenario.profile.wait_s)
@@ -113,14 +116,22 @@ class Pilot:
         chart = observed(self._chart, self._dives, seen, self._error_mps, error_km)
         left = np.vstack((place, self._waypoints[self._next :]))
         end_s = t_s + _HORIZON_S
-        route = route_through(with_land(chart, self._land), left, t_s, self._speed, end_s)
+        coast = chart, self._land, self._bottom
+        route = route_round(*coast, left, t_s, self._speed, end_s)
+        is_land = crossing(*coast, left) is not None
         seas = [chart._replace(current=chart.current + error) for error in self._errors]
         planned_s, straight_s = (
             float(np.median([sailed_s(sea, way, t_s, self._speed, end_s) for sea in seas]))
             for way in (route.corners, left)
         )
-        is_worth_it = planned_s - t_s < (1.0 - LEAST_GAIN) * (straight_s - t_s)
-        if not is_worth_it and self._is_straight:
+        is_faster = planned_s - t_s < (1.0 - LEAST_GAIN) * (straight_s - t_s)
+        is_worth_it = route.arrives and (is_land or is_faster)
+        if not is_worth_it and is_land and t_s == 0.0:
+            raise ConfigurationError(
+                'guidance.route: no way round the land between waypoints is found (allowed: '
+                'waypoints farther from land than 3 km, or straight legs beside it)'
+            )
+        if not is_worth_it and (is_land or self._is_straight):
             return None
         self._is_straight = not is_worth_it
         corners = route.corners if is_worth_it else left

@@ -13,11 +13,14 @@ from glider_guidance.guidance import GuidanceParams
 from glider_mission.routing.forecast_chart import erroneous, forecast_of, with_land
 from glider_mission.routing.fronts import Chart, fronts, sail
 from glider_mission.scenario import Scenario
+from glider_model.ocean.bottom import FlatBottom, least_height
 from glider_model.ocean.density import immersed
 from glider_model.vehicle.file import load_vehicle
 
 #: A route is straightened where that moves it by less than this (m).
 _STRAIGHT_M = 1000.0
+#: Whether a leg leads over land is looked at so often along it (m).
+_LOOK_M = 20.0
 #: Errors of a forecast that are tried.
 MEMBERS = 12
 #: What is left of the speed of the polar for a vehicle that steers, by what eddies_10d flies (-).
@@ -152,6 +155,49 @@ def route_through(
     return Route(np.array([*corners, *waypoints[done:]]), passed, [*found, *missing])
 
 
+def crossing(
+    chart: Chart, land: np.ndarray, bottom: NamedTuple, route: np.ndarray
+) -> tuple[int, int] | None:
+    """Point of a chart that is nearest to where straight legs lead over land; None: nowhere.
+
+    There is land by the bottom where that is charted, else by the nearest points, bool[n, m].
+    """
+    legs = zip(route, route[1:], strict=False)
+    places = [np.linspace(a, b, 2 + int(np.hypot(*(b - a)) / _LOOK_M)) for a, b in legs]
+    norths, easts = np.concatenate(places).T.copy()
+    step = chart.norths[1] - chart.norths[0]
+    rows, columns = (
+        np.rint((along - axis[0]) / step).astype(int).clip(0, len(axis) - 1)
+        for along, axis in zip((norths, easts), (chart.norths, chart.easts), strict=True)
+    )
+    is_over = land[rows, columns] & isinstance(bottom, FlatBottom)
+    least_m, where = least_height(norths, easts, np.zeros(len(norths)), bottom)
+    is_over[where] |= least_m <= 0.0
+    first = is_over.argmax()
+    return (int(rows[first]), int(columns[first])) if is_over[first] else None
+
+
+def route_round(
+    chart: Chart,
+    land: np.ndarray,
+    bottom: NamedTuple,
+    waypoints: np.ndarray,
+    t_s: float,
+    speed: float,
+    end_s: float,
+) -> Route:
+    """`route_through` that leads over no land, nor over what the bottom has of it between points.
+
+    Where it would, the nearest point of the chart becomes land, and the route is sought again.
+    """
+    while True:
+        route = route_through(with_land(chart, land), waypoints, t_s, speed, end_s)
+        point = crossing(chart, land, bottom, route.corners) if route.arrives else None
+        if point is None or land[point]:
+            return route
+        land[point] = True
+
+
 def straightened(points: np.ndarray) -> list[np.ndarray]:
     """Fewer corners, none farther than `_STRAIGHT_M` off (Douglas and Peucker 1973)."""
     first, last = points[0], points[-1]
@@ -180,19 +226,6 @@ def waypoints_of(scenario: Scenario) -> np.ndarray:
     return np.vstack((start, corners[1:] if is_there else corners))
 
 
-def _leads_over(chart: Chart, land: np.ndarray, route: np.ndarray) -> bool:
-    """Whether straight legs lead over land, by the nearest points of a chart, bool[n, m]."""
-    step = chart.norths[1] - chart.norths[0]
-    for a, b in zip(route, route[1:], strict=False):
-        share = np.linspace(0.0, 1.0, 2 + int(2.0 * np.hypot(*(b - a)) / step))[:, None]
-        places = ((1.0 - share) * a + share * b - (chart.norths[0], chart.easts[0])) / step
-        rows, columns = np.rint(places).astype(int).T
-        rows, columns = rows.clip(0, len(land) - 1), columns.clip(0, land.shape[1] - 1)
-        if land[rows, columns].any():
-            return True
-    return False
-
-
 def with_errors(chart: Chart, error_mps: float, scenario: Scenario) -> Iterator[Chart]:
     """A chart with one after the other of `MEMBERS` errors; as it is if it has none."""
     told = scenario.forecast
@@ -213,13 +246,14 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
         cycles = scenario.dives / max(1, scenario.profile.surface_every_dives)
         end_s = min(end_s, cycles * pace.cycle_s)
     waypoints = waypoints_of(scenario)
-    route = route_through(with_land(chart, land), waypoints, 0.0, pace.speed, end_s)
+    bottom = scenario.bottom()
+    route = route_round(chart, land, bottom, waypoints, 0.0, pace.speed, end_s)
     progress(1)
     arrivals = []
     for sea in with_errors(chart, scenario.forecast.error_mps, scenario):
         arrivals.append(sailed_s(sea, route.corners, 0.0, pace.speed, end_s))
         progress(len(arrivals) + 1)
     straight_s = sailed_s(chart, waypoints, 0.0, pace.speed, end_s)
-    if _leads_over(chart, land, waypoints):
+    if crossing(chart, land, bottom, waypoints):
         straight_s = math.inf
     return Plan(route, np.array(arrivals), straight_s, pace, chart, end_s)
