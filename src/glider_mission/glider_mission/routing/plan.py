@@ -118,7 +118,10 @@ def _cycle_wh(
     levels = np.linspace(profile.depth, 0.0, _LEVELS)
     rising = [heaviness(float(depth), -profile.climb_net_heaviness) for depth in levels]
     heavy = heaviness(profile.depth, profile.net_heaviness)
-    pumped = (heavy - rising[0]) * cost(profile.depth)
+    law = scenario.control.buoyancy  # it takes a part of what the water makes of it for drag
+    as_drag = law.drag_ki_kg_per_m / (law.ki_kg_per_m + law.drag_ki_kg_per_m or 1.0)
+    turns = heavy - rising[0] + 2.0 * as_drag * max(0.0, heavy - profile.net_heaviness)
+    pumped = turns * cost(profile.depth)
     for depth, before, after in zip(levels, rising, rising[1:], strict=False):
         pumped += max(0.0, before - after) * cost(float(depth))
     pumped *= max(1, profile.surface_every)
