@@ -529,6 +529,18 @@ def test_figure_needs_no_bag(tmp_path, call):
         assert (tmp_path / f'run.{suffix}').read_bytes().startswith(magic)
 
 
+@pytest.mark.parametrize(
+    ('scenario', 'moved'),
+    [('slocum_shelf', ['pitch mass', 'fin']), ('current_8deg', ['pitch mass', 'roll mass'])],
+)
+def test_figure_shows_the_actuators_of_the_vehicle(tmp_path, call, scenario, moved):
+    """That of a vehicle steered by its fin had a roll mass at rest, and no fin."""
+    folder = fly(tmp_path, of=scenario)
+    assert call('figure', folder, '--out', tmp_path / 'run.svg')[0] == 0
+    drawn = re.findall(r'<!-- (.*) / 100 (?:mm|deg) -->', (tmp_path / 'run.svg').read_text())
+    assert drawn == moved
+
+
 # ---------------------------------------------------------------------------------- several
 
 

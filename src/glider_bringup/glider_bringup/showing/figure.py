@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from glider_bringup.showing.panels import actuators_of
 from glider_bringup.showing.web_page import FlownRun
 from glider_mission.disk import save_figure
 
@@ -14,6 +15,9 @@ from glider_mission.disk import save_figure
 POINTS = 8192
 #: Arrows that show the current along the track.
 ARROWS = 12
+
+#: What is one of a curve of an actuator, by its unit.
+_WHOLE = {'kg': 1.0, 'mm': 100.0, 'deg': 100.0}
 
 BLUE, ORANGE, GREY, GREEN = '#1f6fb4', '#e07b1a', '#8a8a8a', '#2f8f4e'
 #: Panels by their place: title, axis, and curves with name, curve of the traces, colour, and how
@@ -51,15 +55,6 @@ _PANELS = {
             ('east, estimated', 'estimate_east_kn', GREY, 1.0),
         ],
     ),
-    'joints': (
-        'Actuators',
-        'share of 1 kg, 100 mm, 100 deg',
-        [
-            ('net buoyancy / 1 kg', 'buoyancy_engine_kg', BLUE, 1.0),
-            ('pitch mass / 100 mm', 'pitch_mass_mm', ORANGE, 100.0),
-            ('roll mass / 100 deg', 'roll_mass_deg', GREEN, 100.0),
-        ],
-    ),
 }
 
 
@@ -94,7 +89,12 @@ def draw_run(run: FlownRun, file: Path) -> None:
     traces = run.traces.thinned(POINTS)
     hours, reckons = traces.time_s() / 3600.0, traces.has('place_error_m')
     _draw_track(axes['track'], traces.samples)
-    for place, (name, label, curves) in _PANELS.items():
+    moved = []
+    for (one, _), colour in zip(actuators_of(run), (BLUE, ORANGE, GREEN, GREY), strict=False):
+        text = f'{one.title.lower()} / {_WHOLE[one.unit]:g} {one.unit}'
+        moved.append((text, one.position, colour, _WHOLE[one.unit]))
+    joints = 'Actuators', 'share of 1 kg, 100 mm, 100 deg', moved
+    for place, (name, label, curves) in {**_PANELS, 'joints': joints}.items():
         shown = [
             (text, traces.curves[curve] / one, colour)
             for text, curve, colour, one in curves

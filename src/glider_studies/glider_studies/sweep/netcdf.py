@@ -117,7 +117,7 @@ def make_dataset(plan: Plan, records: Iterable[dict[str, Any]]) -> xarray.Datase
         'flag_values': np.arange(len(STATUSES), dtype=np.int8),
         'flag_meanings': ' '.join(STATUSES),
     }
-    why = {'long_name': 'why the cell failed; empty if it did not'}
+    why = {'long_name': 'why the flight ended so; empty where the status says all'}
     dataset = xarray.Dataset(
         {
             'status': (dimensions, status.reshape(plan.shape), flags),
