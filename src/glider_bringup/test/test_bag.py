@@ -273,6 +273,29 @@ def test_event_from_before_the_beginning_of_time_is_of_the_first_tick(tmp_path):
     assert (message.log_time, message.data) == (0, b'\0\1\0\0')
 
 
+def test_what_was_commanded_before_the_vehicle_was_heard_is_of_its_first_tick():
+    """Without an input the guard stamps by the wall clock, a simulated vehicle from 0 on."""
+    written, second_ns = [], 10**9
+    order = TickSorter(['a', 'b'], second_ns, lambda *message: written.append(message))
+    for wall_s in (1_700_000_000, 1_700_000_001):
+        order.add('b', wall_s * second_ns, b'early')
+    order.add_event('path', 0, b'')
+    for tick in range(3):
+        for topic in ('a', 'b'):
+            order.add(topic, tick * second_ns, b'')
+        order.write_complete(lambda stamp_ns: False)
+    begin = [
+        ('a', 0, b''),
+        ('b', 0, b'early'),
+        ('b', 0, b'early'),
+        ('b', 0, b''),
+        ('path', 0, b''),
+    ]
+    later = [(topic, tick * second_ns, b'') for tick in (1, 2) for topic in ('a', 'b')]
+    assert written == begin + later
+    assert order.lost == 0
+
+
 def test_bag_is_as_long_as_its_run_whatever_stamps_events_have():
     """A path is stamped 0, and a stranger tells with a clock of its own."""
     written = []

@@ -6,6 +6,9 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable
 
+#: A stamp so far (ns) before the one that came last is by another clock.
+_OTHER_CLOCK_NS = 3600 * 10**9
+
 
 class TickSorter:
     """Holds messages back until their tick is complete, then hands them on in a fixed order.
@@ -31,12 +34,20 @@ class TickSorter:
         self.lost = 0  #: messages whose stamps were skipped
 
     def add(self, topic: str, stamp_ns: int, payload: bytes) -> None:
-        """Take a message of a per-tick topic."""
+        """Take a message of a per-tick topic.
+
+        What a free-running guard commanded before it heard of the vehicle may be stamped by
+        another clock: it is recorded with the first that is not.
+        """
         if not self._newest_ns:  # all topics begin with the same tick
             self._first_ns = stamp_ns
             self._newest_ns = dict.fromkeys(self._queues, stamp_ns - self._period_ns)
         due_ns = self._newest_ns[topic] + self._period_ns
         self.lost += max(0, (stamp_ns - due_ns) // self._period_ns)
+        if stamp_ns < self._newest_ns[topic] - _OTHER_CLOCK_NS:
+            before = self._queues[topic]
+            self._queues[topic] = deque((stamp_ns, early) for _, early in before)
+            self._first_ns = min(self._first_ns, stamp_ns)
         self._newest_ns[topic] = stamp_ns
         self._queues[topic].append((stamp_ns, payload))
 
