@@ -37,7 +37,7 @@ class Pace(NamedTuple):
     """How a vehicle gets on, by its glide polar and its profile."""
 
     speed: float  #: through the water, horizontally, stays at the surface included (m/s)
-    cycle_s: float  #: from one stay at the surface to the next (s)
+    cycle_s: float  #: from one stay at the surface to the next, or of a dive without one (s)
     cycle_wh: float | None  #: that it takes; None where the battery is not known
 
 
@@ -88,7 +88,7 @@ def pace_of(scenario: Scenario) -> Pace:
     profile, every = params.profile, params.profile.surface_every
     dives = max(1, every)
     stay_s = (profile.wait_ticks + profile.prepare_ticks) * TICK_S if every else 0.0
-    deep = profile.depth - (profile.top_depth if dives > 1 else 0.0)
+    deep = profile.depth - (profile.top_depth if every != 1 else 0.0)
     glide_s = (2 * dives - 1) * deep / profile.glide_rate
     way_m, rise_s = glide_s * params.profile_speed, deep / profile.glide_rate
     rise_m, turns_s = rise_s * params.profile_speed, 2.0 * dives * profile.lead_s
@@ -125,7 +125,7 @@ def _rise(scenario: Scenario, params: GuidanceParams) -> tuple[float, float]:
 def _cycle_wh(
     scenario: Scenario, params: GuidanceParams, glide_s: float, other_s: float
 ) -> float | None:
-    """Energy (Wh) from one stay at the surface to the next: pump, electronics and a call."""
+    """Energy (Wh) of `Pace.cycle_s`: pump, electronics and, at the surface, a call."""
     vehicle, profile = load_vehicle(scenario.vehicle), params.profile
     if vehicle.energy is None:
         return None
@@ -144,14 +144,18 @@ def _cycle_wh(
         """Of as much pumped out there, and let in again (J/kg)."""
         return max(0.0, told.out + told.out_per_m * depth) + max(0.0, told.let_in)
 
-    turns, levels = max(1, profile.surface_every) - 1, _levels(profile.depth)
+    every, levels = profile.surface_every, _levels(profile.depth)
+    turns = every - 1 if every else 1
     heavy = heaviness(profile.depth, profile.net_heaviness)
     rising = [heaviness(float(depth), -profile.climb_net_heaviness) for depth in levels]
     pumped = turns * (heavy - rising[0]) * cost(profile.depth)
     for depth, before, after in zip(levels, rising, rising[1:], strict=False):
         pumped += turns * max(0.0, before - after) * cost(float(depth))
+    under = 0.5 * (told.dive + told.climb)
+    if not every:  # it never comes up
+        return (pumped + under * (glide_s + other_s)) / 3600.0
     pumped += (heavy + body.m_b_max) * cost(profile.depth)
-    hotel = 0.5 * (told.dive + told.climb) * glide_s + told.surface * other_s
+    hotel = under * glide_s + told.surface * other_s
     return (pumped + hotel + told.call_start + told.call * told.call_s) / 3600.0
 
 
