@@ -156,7 +156,8 @@ def _cycle_wh(
         return (pumped + under * (glide_s + other_s)) / 3600.0
     pumped += (heavy + body.m_b_max) * cost(profile.depth)
     hotel = under * glide_s + told.surface * other_s
-    return (pumped + hotel + told.call_start + told.call * told.call_s) / 3600.0
+    call_s = min(told.call_s, (profile.wait_ticks + profile.prepare_ticks) * TICK_S)
+    return (pumped + hotel + told.call_start + told.call * call_s) / 3600.0
 
 
 def route_through(
