@@ -18,6 +18,7 @@ from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.score import Scorer, scores_of
 from glider_mission.blocks import COLUMNS
 from glider_mission.routing import pilot as piloting
+from glider_mission.routing.plan import plan as planned
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
 
@@ -56,6 +57,23 @@ def test_a_plan_ends_when_the_dives_of_its_mission_are_flown(capsys):
     flown = glider.fly('slocum_shelf').score
     assert (told['reachable'], told['dives'], flown['dives']) == (False, 4, 4)
     assert told['mission_h'] == pytest.approx(flown['sim_time_s'] / 3600.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ('every', 'depth_m', 'wait_s'),
+    [(0, 60.0, 600.0), (0, 200.0, 600.0), (1, 60.0, 0.0), (2, 200.0, 600.0)],
+)
+def test_a_plan_tells_time_and_energy_of_a_flight_that_surfaces_and_of_one_that_does_not(
+    every, depth_m, wait_s
+):
+    path = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 20_000.0, 'at_end': 'stop'}
+    yo = {'profile.depth_m': depth_m, 'profile.surface_every_dives': every}
+    yo['profile.wait_s'] = wait_s
+    known = {'navigation.method': 'known', 'dives': 0, 'duration_s': 2e5}
+    scenario = load_scenario('slocum_shelf', {'path': path, **yo, **known})
+    made, flown = planned(scenario), glider.fly(scenario).score
+    assert made.arrival_s(50.0) == pytest.approx(flown['arrival']['t_s'], rel=0.15)
+    assert made.wh == pytest.approx(flown['energy']['wh'], rel=0.15)
 
 
 def test_a_planned_flight_has_its_route_as_orders_and_flies_so_to_the_same_bits(tmp_path):

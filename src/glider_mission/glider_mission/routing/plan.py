@@ -33,7 +33,7 @@ class Pace(NamedTuple):
     """How a vehicle gets on, by its glide polar and its profile."""
 
     speed: float  #: through the water, horizontally, stays at the surface included (m/s)
-    cycle_s: float  #: from one stay at the surface to the next (s)
+    cycle_s: float  #: from one stay at the surface to the next, or of a dive without one (s)
     stay: float  #: share of the time that it is at the surface (-)
     cycle_wh: float | None  #: that it takes; None where the battery is not known
 
@@ -85,18 +85,17 @@ def pace_of(scenario: Scenario) -> Pace:
     profile, every = params.profile, params.profile.surface_every
     dives = max(1, every)
     stay_s = (profile.wait_ticks + profile.prepare_ticks) * TICK_S if every else 0.0
-    deep = profile.depth - (profile.top_depth if dives > 1 else 0.0)
+    deep = profile.depth - (profile.top_depth if every != 1 else 0.0)
     glide_s = 2.0 * dives * deep / profile.glide_rate
-    other_s = 2.0 * dives * profile.lead_s + stay_s
-    cycle_s = glide_s + other_s
+    cycle_s = glide_s + 2.0 * dives * profile.lead_s + stay_s
     speed = _HELD_SHARE * glide_s * params.profile_speed / cycle_s
-    return Pace(speed, cycle_s, stay_s / cycle_s, _cycle_wh(scenario, params, glide_s, other_s))
+    return Pace(speed, cycle_s, stay_s / cycle_s, _cycle_wh(scenario, params, cycle_s, stay_s))
 
 
 def _cycle_wh(
-    scenario: Scenario, params: GuidanceParams, glide_s: float, other_s: float
+    scenario: Scenario, params: GuidanceParams, cycle_s: float, stay_s: float
 ) -> float | None:
-    """Energy (Wh) from one stay at the surface to the next: pump, electronics and a call."""
+    """Energy (Wh) of `Pace.cycle_s`: pump, electronics and, at the surface, a call."""
     vehicle, profile = load_vehicle(scenario.vehicle), params.profile
     if vehicle.energy is None:
         return None
@@ -125,8 +124,9 @@ def _cycle_wh(
     for depth, before, after in zip(levels, rising, rising[1:], strict=False):
         pumped += max(0.0, before - after) * cost(float(depth))
     pumped *= max(1, profile.surface_every)
-    hotel = 0.5 * (told.dive + told.climb) * glide_s + told.surface * other_s
-    return (pumped + hotel + told.call_start + told.call * told.call_s) / 3600.0
+    hotel = 0.5 * (told.dive + told.climb) * (cycle_s - stay_s) + told.surface * stay_s
+    call = told.call_start + told.call * min(told.call_s, stay_s) if stay_s else 0.0
+    return (pumped + hotel + call) / 3600.0
 
 
 def route_through(
