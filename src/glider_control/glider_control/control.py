@@ -176,9 +176,9 @@ def control_step(state, odometry, joints, reference, params, dt):
         command, m_b = params.safe_command, params.safe_command.m_b
     elif taken.gate.seen:
         reference = taken.reference
-        m_b, trim = vertical_rate_law(state.trim, measured, reference, joints, params, dt)
-        if is_afloat and reference.v_d < 0.0:  # it is up: there is no rate to learn from
-            trim = state.trim
+        m_b, trim = vertical_rate_law(
+            state.trim, measured, reference, joints, is_afloat, params, dt
+        )
         stall_s = watch_stall(stall_s, measured, reference, joints.m_b, params, dt)
         if stall_s < 0.0:
             m_b, trim, reference = leave_stall(stall_s, m_b, trim, reference)

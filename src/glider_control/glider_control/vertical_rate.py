@@ -41,7 +41,7 @@ class Trim(NamedTuple):
 
 
 @kernel
-def vertical_rate_law(trim, measured, reference, joints, params, dt):
+def vertical_rate_law(trim, measured, reference, joints, is_afloat, params, dt):
     """Net heaviness (kg) for the reference's vertical rate, and the new integrals.
 
     The glide polar gives the weight of the steady glide. One integral corrects what ballast and
@@ -57,7 +57,8 @@ def vertical_rate_law(trim, measured, reference, joints, params, dt):
     wanted = glide + sign * max(least, drag)
     error = reference.v_d - measured.vertical_rate
     limit = params.allocation.m_b_max
-    if abs(joints.m_b - wanted - ballast) < PUMP_ARRIVED_KG:
+    is_up = is_afloat and reference.v_d < 0.0  # and has no rate to learn from
+    if abs(joints.m_b - wanted - ballast) < PUMP_ARRIVED_KG and not is_up:
         most = params.buoyancy_trim_max
         ballast = min(most, max(-most, ballast + dt * params.buoyancy_ki * error))
         learnt = drag + dt * params.drag_ki * error * sign

@@ -448,6 +448,8 @@ def test_a_hull_has_half_of_the_drag_in_its_file_at_least(down, learnt, counts):
     now = Measured(0.0, pitch, 0.0, 0.0, 0.0, 0.0, v_d)
     glide = glide_net_heaviness(pitch, v_d, params.polar)
     far = Joints(-0.9 * down, 0.0, 0.0, 0.0)  # nothing is learnt while the pump is on its way
-    m_b, trim = vertical_rate_law(Trim(0.0, learnt * abs(glide)), now, wanted, far, params, TICK_S)
+    m_b, trim = vertical_rate_law(
+        Trim(0.0, learnt * abs(glide)), now, wanted, far, False, params, TICK_S
+    )
     assert m_b == pytest.approx((1.0 + counts) * glide)
     assert trim.drag == learnt * abs(glide)
