@@ -170,8 +170,7 @@ def control_step(state, odometry, joints, reference, params, dt):
     is_afloat = depth < (SUBMERGED_M if state.is_afloat else AFLOAT_M)
 
     law, steering, trim, stall_s = state.law, state.steering, state.trim, state.stall_s
-    command, tau_p, tau_q = last, 0.0, 0.0
-    m_b = last.m_b
+    command, m_b, tau_p, tau_q = last, last.m_b, 0.0, 0.0
     if is_blind(taken, params.intake):
         command, m_b = params.safe_command, params.safe_command.m_b
     elif taken.gate.seen:
