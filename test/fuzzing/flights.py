@@ -41,6 +41,8 @@ RECKONS = {
 }
 #: The same for those with a steering surface.
 STEERS = {'control.law': 'adaptive', 'guidance.los.method': 'los_current'}
+#: What they measure.
+SHOWN = measured(('imu', 'pressure', 'fix'))
 #: Sections that the plant alone is told: half of the flights draw from these only.
 PLANT_SECTIONS = ('perturb', 'initial', 'water')
 #: What says which loop is compiled, beside whether there are faults; and a flight to compile it.
@@ -118,7 +120,7 @@ def draw_changes(seed: int, case: int) -> dict[str, Any]:
         changes |= STEERS
     elif draw.random() < BREAKS:
         of = int(draw.integers(2**31)), FAULTS, changes['duration_s']
-        faults = sample_faults(*of, shows=measured(('imu', 'pressure', 'fix')))
+        faults = sample_faults(*of, shows=SHOWN)
         changes |= {**RECKONS, 'faults': faults}
     for name in draw.choice(sorted(fields), draw.integers(1, FIELDS + 1), replace=False):
         changes[str(name)] = _number(draw, fields[name])
@@ -153,7 +155,7 @@ def fuzz(seed: int, count: int, counter: Counter) -> None:
         changes = draw_changes(seed, case)
         loop = {name: changes[name] for name in LOOP if name in changes}
         if 'faults' in changes:
-            loop['faults'] = sample_faults(0, FAULTS, 1.0)
+            loop['faults'] = sample_faults(0, FAULTS, 1.0, shows=SHOWN)
         if loop not in compiled:  # which is no case's fault
             compiled.append(loop)
             _fly({**FIRST, **loop})

@@ -182,7 +182,7 @@ def test_damaged_score_is_refused(flown, tmp_path, call, damage):
     ('field', 'value', 'told'),
     [
         ('sim_time_s', None, 'sim_time_s = None'),
-        ('distance_along_path_m', None, 'distance_along_path_m = None'),
+        ('distance_along_path_m', 'far', "distance_along_path_m = 'far'"),
         ('settle_s', 'x', "settle_s = 'x'"),
         ('end_of_path_m', 'x', "end_of_path_m = 'x'"),
         ('depth_m.max', None, 'depth_m: max, overshoot: some are known'),
