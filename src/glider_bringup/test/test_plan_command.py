@@ -98,9 +98,9 @@ def test_what_a_pilot_notes_is_the_true_current_of_the_dive_segment_that_he_date
     """The mean of what was flown through from one surfacing to the next, there and then."""
     noted, plain, rows = [], piloting.observed, Rows()
 
-    def observed(chart, dives, seen, *errors):
+    def observed(chart, seen, *errors):
         noted[:] = seen
-        return plain(chart, dives, seen, *errors)
+        return plain(chart, seen, *errors)
 
     monkeypatch.setattr(piloting, 'observed', observed)
     fly(load_scenario('eddies_hard', {'dives': 5}), [rows])

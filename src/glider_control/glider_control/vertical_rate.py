@@ -48,7 +48,8 @@ def vertical_rate_law(trim, measured, reference, joints, is_afloat, params, dt):
     density differ by, another, with the sign of the rate, what the drag does: a draggy vehicle
     has to be heavier in the dive and lighter in the climb, and has to know it as soon as it turns
     over. Both wait until the pump is where it is meant to be, and no longer: a vehicle that then
-    sinks, or climbs too slowly, needs them most.
+    sinks, or climbs too slowly, needs them most. At the surface there is no rate to learn from,
+    until it is asked to dive.
     """
     sign = 1.0 if reference.v_d > 0.0 else -1.0
     ballast, drag = trim.ballast, trim.drag
@@ -57,7 +58,7 @@ def vertical_rate_law(trim, measured, reference, joints, is_afloat, params, dt):
     wanted = glide + sign * max(least, drag)
     error = reference.v_d - measured.vertical_rate
     limit = params.allocation.m_b_max
-    is_up = is_afloat and reference.v_d < 0.0  # and has no rate to learn from
+    is_up = is_afloat and reference.v_d < 0.0
     if abs(joints.m_b - wanted - ballast) < PUMP_ARRIVED_KG and not is_up:
         most = params.buoyancy_trim_max
         ballast = min(most, max(-most, ballast + dt * params.buoyancy_ki * error))

@@ -200,7 +200,7 @@ def test_an_order_to_dive_deeper_meets_the_water_of_there(tmp_path):
 
 def test_a_late_forecast_is_as_late_as_it_is_told(tmp_path):
     flown = mission(sea(tmp_path / 'sea.nc', lambda t, z: 1e-3 * t), **{'forecast.late_h': 60.0})
-    chart = forecast_of(flown).chart
+    chart = forecast_of(flown, 0.0).chart
     found = [current_on(chart, 3600.0 * h, 0.0, 0.0)[1] for h in (0.0, 12.0, 24.0)]
     assert found == pytest.approx([-0.060, -0.048, -0.036], abs=1e-6)
 

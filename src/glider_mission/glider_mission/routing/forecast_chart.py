@@ -28,19 +28,19 @@ _ERROR_S, OBSERVED_STD = 4.0 * 86_400.0, 0.02
 
 
 @kernel
-def _depth_means(params, nothing, times, norths, easts, depths, weights, found):
-    """Fill ``found`` with means of the current over depths, by their weights."""
+def _depth_means(params, nothing, times, norths, easts, depths, found):
+    """Fill ``found`` with means of the current over depths."""
     for t in range(len(times)):
         for i in range(len(norths)):
             for j in range(len(easts)):
                 v_n, v_e = 0.0, 0.0
-                for k in range(len(depths)):
-                    place = (norths[i], easts[j], depths[k])
+                for depth in depths:
+                    place = (norths[i], easts[j], depth)
                     _, water = current_step_in_place(nothing, place, times[t], params, TICK_S)
-                    v_n += weights[k] * water.v_n
-                    v_e += weights[k] * water.v_e
-                found[t, i, j, 0] = v_n
-                found[t, i, j, 1] = v_e
+                    v_n += water.v_n
+                    v_e += water.v_e
+                found[t, i, j, 0] = v_n / len(depths)
+                found[t, i, j, 1] = v_e / len(depths)
 
 
 def _lattice(scenario: Scenario, params: CurrentParams) -> tuple[np.ndarray, np.ndarray]:
@@ -64,15 +64,20 @@ def _lattice(scenario: Scenario, params: CurrentParams) -> tuple[np.ndarray, np.
 class Forecast(NamedTuple):
     """What a route is planned by."""
 
-    chart: Chart
+    chart: Chart  #: of dives, as is observed
+    stays: np.ndarray  #: what stays at the surface add to it, float32[t, n, m, 2] (m/s)
     land: np.ndarray  #: where it is, bool[n, m]
     error_mps: float  #: that the current may have, rms of each part
 
+    def sailed(self, chart: Chart) -> Chart:
+        """What is sailed in, dives and stays, where that of dives is such a chart."""
+        return chart._replace(current=chart.current + self.stays)
 
-def forecast_of(scenario: Scenario, stay: float = 0.0) -> Forecast:
+
+def forecast_of(scenario: Scenario, stay: float) -> Forecast:
     """The forecast of a mission, as it is to be expected by its error.
 
-    The current is that of dives, and of the surface for the share ``stay`` of the time.
+    For the share ``stay`` of the time the vehicle is at the surface.
 
     Raises
     ------
@@ -95,11 +100,12 @@ def forecast_of(scenario: Scenario, stay: float = 0.0) -> Forecast:
         check_starts({'current.field.file': true.start_s, 'forecast.file': grid.start_s})
     norths, easts = _lattice(scenario, params)
     times = np.arange(0.0, scenario.duration_s + STEP_S, STEP_S)
-    depths = np.append(0.0, (np.arange(_LEVELS) + 0.5) * scenario.profile.depth_m / _LEVELS)
-    weights = np.append(stay, np.full(_LEVELS, (1.0 - stay) / _LEVELS))
-    means = np.empty((len(times), len(norths), len(easts), 2), dtype=np.float32)
+    depths = (np.arange(_LEVELS) + 0.5) * scenario.profile.depth_m / _LEVELS
+    means, at_top = np.empty((2, len(times), len(norths), len(easts), 2), dtype=np.float32)
     nothing = CurrentState(0, np.zeros(0))
-    _depth_means(params, nothing, times - late_s, norths, easts, depths, weights, means)
+    for levels, found in ((depths, means), (np.zeros(1), at_top)):
+        _depth_means(params, nothing, times - late_s, norths, easts, levels, found)
+    stays = stay * (at_top - means)
     chart = Chart(times, norths, easts, means)
     land = np.zeros(means.shape[1:3], dtype=bool)
     if isinstance(grid, GridSettings):
@@ -107,23 +113,24 @@ def forecast_of(scenario: Scenario, stay: float = 0.0) -> Forecast:
     if scenario.bathymetry.file:
         bottom = scenario.bottom()
         land |= np.array([[bottom_depth(n, e, bottom) <= 0.0 for e in easts] for n in norths])
-    if not told.error_mps:
-        return Forecast(chart, land, 0.0)
-    erring = erroneous(chart, told.error_mps, told.error_km, scenario.seed, 0)
-    return expected(erring, land, told.error_mps)
+    error_mps = told.error_mps
+    if error_mps > 0.0:
+        erring = erroneous(chart, error_mps, told.error_km, scenario.seed, 0)
+        chart, error_mps = expected(erring, error_mps)
+    return Forecast(chart, stays, land, error_mps)
 
 
-def expected(chart: Chart, land: np.ndarray, error_mps: float) -> Forecast:
-    """What is to be expected where a chart errs by so much: less than it shows.
+def expected(chart: Chart, error_mps: float) -> tuple[Chart, float]:
+    """What is to be expected where a chart errs by so much, and by how much that errs (m/s).
 
-    It is as far from its mean as eddies and errors together; eddies are what is left of its
-    variance (Wiener's filter, by the whole of the chart), and so is their error.
+    The chart is as far from its mean as eddies and errors together; eddies are what is left of
+    its variance (Wiener's filter, by the whole of the chart).
     """
     mean = chart.current.mean(axis=(0, 1, 2))
     away = chart.current - mean
     share = 1.0 - error_mps**2 / max(float(np.mean(away**2)), error_mps**2)
     current = (mean + share * away).astype(np.float32)
-    return Forecast(chart._replace(current=current), land, error_mps * math.sqrt(share))
+    return chart._replace(current=current), error_mps * math.sqrt(share)
 
 
 def erroneous(chart: Chart, error_mps: float, error_km: float, seed: int, member: int) -> Chart:
@@ -178,16 +185,12 @@ def _correct(current, times, norths, easts, seen, weights, length):
                 current[t, i, j, 1] += v_e
 
 
-def observed(
-    chart: Chart, dives: Chart, seen: np.ndarray, error_mps: float, error_km: float
-) -> Chart:
+def observed(chart: Chart, seen: np.ndarray, error_mps: float, error_km: float) -> Chart:
     """A chart corrected by what was observed: optimal interpolation (Gandin 1963).
 
     Parameters
     ----------
     chart : Chart
-    dives : Chart
-        Of the same forecast, that of dives alone: it is that which is observed.
     seen : float64[n, 5]
         Time (s), north, east (m), and the depth-averaged current there, north and east (m/s).
     error_mps, error_km : float
@@ -197,7 +200,7 @@ def observed(
     if not len(seen):
         return chart
     length, (times, norths, easts, _) = 1e3 * error_km, chart
-    told = np.array([current_on(dives, *one) for one in seen[:, :3]])
+    told = np.array([current_on(chart, *one) for one in seen[:, :3]])
     off = seen[:, 3:] - told
     error_mps = max(error_mps, math.sqrt(float(np.mean(off**2))))
 

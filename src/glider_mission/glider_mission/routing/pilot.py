@@ -51,11 +51,11 @@ class Pilot:
     def __init__(self, scenario: Scenario) -> None:
         pace = pace_of(scenario)
         self._scenario, self._speed = scenario, pace.speed
-        self._chart, self._land, self._error_mps = forecast_of(scenario, pace.stay)
-        self._dives = forecast_of(scenario).chart
+        self._forecast = forecast_of(scenario, pace.stay)
+        chart = self._forecast.chart
         self._errors = [
-            sea.current - self._chart.current
-            for sea in with_errors(self._chart, self._error_mps, scenario)
+            sea.current - chart.current
+            for sea in with_errors(chart, self._forecast.error_mps, scenario)
         ]
         self._bottom = scenario.bottom()
         self._waypoints, self._next = waypoints_of(scenario), 1
@@ -112,11 +112,11 @@ class Pilot:
     def _told(self, t_s: float, place: np.ndarray) -> Order | None:
         """Order to follow the best route from a place; None where it follows that already."""
         seen = np.array(self._seen).reshape(-1, 5)
-        error_km = self._scenario.forecast.error_km
-        chart = observed(self._chart, self._dives, seen, self._error_mps, error_km)
+        forecast, error_km = self._forecast, self._scenario.forecast.error_km
+        chart = forecast.sailed(observed(forecast.chart, seen, forecast.error_mps, error_km))
         left = np.vstack((place, self._waypoints[self._next :]))
         end_s = t_s + _HORIZON_S
-        coast = chart, self._land, self._bottom
+        coast = chart, forecast.land, self._bottom
         route = route_round(*coast, left, t_s, self._speed, end_s)
         is_land = crossing(*coast, left) is not None
         seas = [chart._replace(current=chart.current + error) for error in self._errors]

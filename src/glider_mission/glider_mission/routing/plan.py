@@ -244,7 +244,8 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
     ``progress`` gets how many of `MEMBERS` + 1 steps are done.
     """
     pace, end_s = pace_of(scenario), scenario.duration_s
-    chart, land, _ = forecast_of(scenario, pace.stay)
+    forecast = forecast_of(scenario, pace.stay)
+    chart, land = forecast.sailed(forecast.chart), forecast.land
     if scenario.dives:
         cycles = scenario.dives / max(1, scenario.profile.surface_every_dives)
         end_s = min(end_s, cycles * pace.cycle_s)
