@@ -34,7 +34,7 @@ class ForecastSettings(SumOfCurrents):
         0.1, 1.0, 'standard deviation of the forecast, of its north and of its east part (m/s)'
     )
     share_std: float = number(
-        0.5,
+        1.0,
         (0.0, 2.0),
         'how far the share of the forecast that there is in the sea may be off 1, at first (-); '
         '0.0: it is taken whole, whatever fixes tell',

@@ -22,7 +22,7 @@ SIZES, FIRST = (0.18, 0.18, 0.42, 0.42), 2000
 ERRORS, DURATION_S = (0.0, 0.05, 0.15), 120.0 * 3600.0
 PERSISTENCE = 'persistence'
 #: What is believed of a forecast: all of it, or the share that there is in the sea.
-WAYS = {'whole forecast': 0.0, 'its share': 0.5}
+WAYS = {'whole forecast': 0.0, 'its share': 1.0}
 CASES = [(PERSISTENCE, 0.0), *((way, error) for error in ERRORS for way in WAYS)]
 #: The first surfacings are not judged: all that is believed at first is the forecast.
 _SETTLED = 3
