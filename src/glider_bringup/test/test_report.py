@@ -427,6 +427,16 @@ def test_trouble_comes_before_notes_and_none_is_called_none(tmp_path):
     assert kinds[0] == 'problem' and not [text for _, text in bad if text in said]
 
 
+def test_a_gust_that_was_too_strong_is_not_contradicted(tmp_path):
+    def gust(log):
+        log[600:700, COLUMNS['infeasible']] = 1.0
+        return log
+
+    (_, fine), (_, note), *_ = findings(read_run(fly(tmp_path, gust)))
+    assert 'could not be held against the estimated current for 10 s' in note
+    assert fine == 'Nothing went wrong: the run is complete.'
+
+
 def test_verdict_of_a_flight_into_a_current_that_is_too_strong(tmp_path):
     fields = {'duration_s': 4000.0, 'current.speed_kn': 1.5, 'current.angle_deg': 90.0}
     folder = fly(tmp_path, settle_s=1000.0, **fields)
