@@ -29,6 +29,7 @@ from glider_bringup.showing.findings import LOST_M, findings, lost_since_s, verd
 from glider_bringup.showing.flown_run import keep_traces, read_run
 from glider_bringup.showing.report import report_page
 from glider_bringup.showing.words import span
+from glider_guard.rows import ROWS
 from glider_mission.blocks import COLUMNS
 from glider_mission.disk import write_whole
 from glider_mission.rules import Rules
@@ -425,6 +426,18 @@ def test_trouble_comes_before_notes_and_none_is_called_none(tmp_path):
     said = verdict(read_run(tmp_path / 'bad').card, 1800.0)
     assert said.startswith('Stopped after 5 min: stopped. At worst it was 200 m off its path.')
     assert kinds[0] == 'problem' and not [text for _, text in bad if text in said]
+
+
+def test_all_that_the_guard_told_is_on_the_page(tmp_path):
+    latching = [row for row in ROWS if row.latches][:7]
+    rows = [{'row': row.name, 'reaction': 'surface', 'message': row.says} for row in latching]
+    events = [{'t_s': 10.0 * i, **row} for i, row in enumerate(rows)]
+    guard = {'state': 'latched', 'reaction': 'surface', 'events': events}
+    text, data = report_of(altered(fly(tmp_path), 'ended', guard=guard))
+    assert not [row.says for row in latching if row.says not in text.text]
+    for panel in data['panels']:
+        drawn = {steps['label'] for steps in panel['steps']} & {row.says for row in latching}
+        assert len(drawn) in (0, len(latching)), panel['caption']
 
 
 def test_a_gust_that_was_too_strong_is_not_contradicted(tmp_path):
