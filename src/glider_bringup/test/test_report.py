@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from command_line import glider
 from glider_bringup import cli, console
@@ -25,6 +26,7 @@ from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.one_hertz import Rows
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import dives_of, make_tracer
+from glider_bringup.showing.figure import draw_run
 from glider_bringup.showing.findings import LOST_M, findings, lost_since_s, verdict
 from glider_bringup.showing.flown_run import keep_traces, read_run
 from glider_bringup.showing.report import report_page
@@ -562,6 +564,21 @@ def test_figure_shows_the_actuators_of_the_vehicle(tmp_path, call, scenario, mov
     assert call('figure', folder, '--out', tmp_path / 'run.svg')[0] == 0
     drawn = re.findall(r'<!-- (.*) / 100 (?:mm|deg) -->', (tmp_path / 'run.svg').read_text())
     assert drawn == moved
+
+
+@pytest.mark.filterwarnings('error')
+def test_figure_of_a_long_title_and_of_still_water(tmp_path, monkeypatch):
+    """All of the title is on the paper, and no current is drawn that is not there."""
+    drawn = []
+    keep = 'glider_bringup.showing.figure.save_figure'
+    monkeypatch.setattr(keep, lambda figure, *_, **__: drawn.append(figure))
+    draw_run(read_run(fly(tmp_path, of='helix', description='far ' * 60)), tmp_path / 'run.png')
+    (figure,) = drawn
+    FigureCanvasAgg(figure).draw()
+    across = figure._suptitle.get_window_extent()
+    assert 0.0 <= across.x0 < across.x1 <= figure.bbox.x1
+    labels = figure.axes[0].get_legend_handles_labels()[1]
+    assert labels == ['desired path', 'track', 'start']
 
 
 # ---------------------------------------------------------------------------------- several
