@@ -4,6 +4,7 @@
 
 import json
 import os
+import re
 import sys
 from functools import partial
 from pathlib import Path
@@ -17,6 +18,7 @@ import glider_flights.commands
 import glider_studies.commands
 from glider_base.settings import ConfigurationError
 from glider_bringup import cli, commands
+from glider_bringup.commands import export
 from glider_mission.scenario import scenario_names
 from glider_model.vehicle.file import vehicle_names, vehicle_path
 from glider_studies.sweep.plan import sweep_names
@@ -48,6 +50,12 @@ def refused(*arguments):
 def write(path, values):
     path.write_text(yaml.safe_dump(values), encoding='utf-8')
     return path
+
+
+def test_docs_have_each_kind_of_export():
+    text = (Path(__file__).parents[1] / 'docs' / 'commands.md').read_text()
+    kinds = '\\|'.join(re.findall(r'--to (\S+\|\w+)', text)).split('\\|')
+    assert sorted(kinds) == sorted(export.SUFFIXES)
 
 
 @pytest.mark.parametrize('options', [(), ('--engine', 'direct', '--bag')])

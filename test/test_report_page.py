@@ -117,6 +117,11 @@ STYLES = """(names) => [...document.querySelectorAll(names)].map((one) => {
 })"""
 
 
+#: What is written beside the curves over time.
+LABELS = """() => page.panels.filter(({ kind }) => kind === 'time').flatMap(({ id }) =>
+  [...document.querySelectorAll(`#${id} .ytick text`)].map((one) => one.textContent))"""
+
+
 @contextmanager
 def browser_at(executable):
     """Chromium, driven from here."""
@@ -393,6 +398,20 @@ def check_reckoned(page, reckoned_run, width):
         assert metre['east'] == pytest.approx(metre['north'], rel=0.01), 'circles are round'
     assert page.locator('.many').first.locator('tbody tr').count() == len(reports)
     assert page.evaluate(LEGEND_IS_APART, 'plan')
+
+
+def test_axes_of_a_steady_current_and_of_a_long_drift_can_be_read(browser, glider, tmp_path):
+    """Ended by the guard in the first dive of a current that no fix told of, then days adrift."""
+    told = ('--duration', 120_000, '--set', 'water.bottom_m=60', '--out', tmp_path / 'run')
+    done = glider('run', 'slocum_shelf', '--engine', 'direct', *told)
+    assert done.returncode == 3, done.stderr
+    page, said, _ = open_page(browser, tmp_path / 'run' / 'report.html')
+    labels = page.evaluate(LABELS)
+    assert '10,000' in labels, 'metres off the path'
+    assert max(map(len, labels)) <= 8, 'all of it can be seen'
+    assert not any('e' in label for label in labels)
+    assert said == []
+    page.close()
 
 
 def test_plan_follows_the_zoom(open_reckoned):

@@ -11,7 +11,8 @@ import xarray
 
 from glider_base.settings import ConfigurationError
 from glider_bringup.commands.ocean import ocean
-from glider_bringup.showing.ocean import in_words, mission_in
+from glider_bringup.showing.ocean import in_words, look, mission_in
+from glider_mission.scenario import SCENARIO_FOLDER
 from glider_model.ocean import grid_file
 
 #: A mission of a day in the sea of `sea_file`.
@@ -192,3 +193,14 @@ def test_it_tells_whether_a_mission_is_covered_and_draws_it(sea_file, tmp_path, 
     found = json.loads(capsys.readouterr().out)
     assert found['mission']['covered'] is False
     assert 'allowed: within 35.000 to 37.000' in found['mission']['reason']
+
+
+def test_a_chart_is_of_the_mean_over_the_depth():
+    """Of levels that lie far apart below: as xarray integrates it."""
+    file = SCENARIO_FOLDER / 'eddies_10d.nc'
+    (panel,) = mission_in(look(file)[0], 'eddies_10d').panels
+    sea = xarray.open_dataset(file).sel(time='2026-03-03', method='nearest')
+    mean = sea.integrate('depth') / (sea.depth[-1] - sea.depth[0])
+    mean = mean.sel(latitude=panel.latitudes, longitude=panel.longitudes, method='nearest')
+    speed = np.hypot(mean.uo, mean.vo).transpose('latitude', 'longitude')
+    assert panel.values == pytest.approx(speed.values, abs=1e-6)

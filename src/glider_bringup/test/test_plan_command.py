@@ -48,6 +48,7 @@ def test_a_plan_in_json_and_as_a_picture(tmp_path, capsys):
     np.testing.assert_allclose(told['route_latlon'][-1], [36.0, 121.7], atol=1e-6)
     assert len(told['waypoints_h']) == 5
     assert sorted(told['waypoints_h']) == told['waypoints_h']
+    assert told['waypoints_h'][-1] == told['arrival_h']['p50'], 'of the same route'
     assert matplotlib.image.imread(picture).std() > 0.05
 
 

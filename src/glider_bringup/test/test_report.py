@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from command_line import glider
 from glider_bringup import cli, console
@@ -25,10 +26,12 @@ from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.one_hertz import Rows
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import dives_of, make_tracer
+from glider_bringup.showing.figure import draw_run
 from glider_bringup.showing.findings import LOST_M, findings, lost_since_s, verdict
 from glider_bringup.showing.flown_run import keep_traces, read_run
 from glider_bringup.showing.report import report_page
 from glider_bringup.showing.words import span
+from glider_guard.rows import ROWS
 from glider_mission.blocks import COLUMNS
 from glider_mission.disk import write_whole
 from glider_mission.rules import Rules
@@ -427,6 +430,28 @@ def test_trouble_comes_before_notes_and_none_is_called_none(tmp_path):
     assert kinds[0] == 'problem' and not [text for _, text in bad if text in said]
 
 
+def test_all_that_the_guard_told_is_on_the_page(tmp_path):
+    latching = [row for row in ROWS if row.latches][:7]
+    rows = [{'row': row.name, 'reaction': 'surface', 'message': row.says} for row in latching]
+    events = [{'t_s': 10.0 * i, **row} for i, row in enumerate(rows)]
+    guard = {'state': 'latched', 'reaction': 'surface', 'events': events}
+    text, data = report_of(altered(fly(tmp_path), 'ended', guard=guard))
+    assert not [row.says for row in latching if row.says not in text.text]
+    for panel in data['panels']:
+        drawn = {steps['label'] for steps in panel['steps']} & {row.says for row in latching}
+        assert len(drawn) in (0, len(latching)), panel['caption']
+
+
+def test_a_gust_that_was_too_strong_is_not_contradicted(tmp_path):
+    def gust(log):
+        log[600:700, COLUMNS['infeasible']] = 1.0
+        return log
+
+    (_, fine), (_, note), *_ = findings(read_run(fly(tmp_path, gust)))
+    assert 'could not be held against the estimated current for 10 s' in note
+    assert fine == 'Nothing went wrong: the run is complete.'
+
+
 def test_verdict_of_a_flight_into_a_current_that_is_too_strong(tmp_path):
     fields = {'duration_s': 4000.0, 'current.speed_kn': 1.5, 'current.angle_deg': 90.0}
     folder = fly(tmp_path, settle_s=1000.0, **fields)
@@ -539,6 +564,21 @@ def test_figure_shows_the_actuators_of_the_vehicle(tmp_path, call, scenario, mov
     assert call('figure', folder, '--out', tmp_path / 'run.svg')[0] == 0
     drawn = re.findall(r'<!-- (.*) / 100 (?:mm|deg) -->', (tmp_path / 'run.svg').read_text())
     assert drawn == moved
+
+
+@pytest.mark.filterwarnings('error')
+def test_figure_of_a_long_title_and_of_still_water(tmp_path, monkeypatch):
+    """All of the title is on the paper, and no current is drawn that is not there."""
+    drawn = []
+    keep = 'glider_bringup.showing.figure.save_figure'
+    monkeypatch.setattr(keep, lambda figure, *_, **__: drawn.append(figure))
+    draw_run(read_run(fly(tmp_path, of='helix', description='far ' * 60)), tmp_path / 'run.png')
+    (figure,) = drawn
+    FigureCanvasAgg(figure).draw()
+    across = figure._suptitle.get_window_extent()
+    assert 0.0 <= across.x0 < across.x1 <= figure.bbox.x1
+    labels = figure.axes[0].get_legend_handles_labels()[1]
+    assert labels == ['desired path', 'track', 'start']
 
 
 # ---------------------------------------------------------------------------------- several

@@ -107,7 +107,7 @@ def draw_run(run: FlownRun, file: Path) -> None:
     if len(hours):
         axes['cross'].plot([], [], color=GREY, linestyle=':', label='inflection')
     axes['cross'].legend(loc='upper right', fontsize='small')
-    figure.suptitle(f'{run.scenario.name}: {run.scenario.described}')
+    figure.suptitle(f'{run.scenario.name}: {run.scenario.described}', wrap=True)
     save_figure(figure, file, dpi=100)
 
 
@@ -124,7 +124,8 @@ def _draw_track(axis, samples: dict[str, np.ndarray]) -> None:
     if len(east):
         axis.plot(east[0], north[0], 'o', color=BLUE, label='start')
         pick = np.linspace(0, len(east) - 1, ARROWS).astype(int)
-        water = (samples[f'water_{name}_kn'][pick] for name in ('east', 'north'))
-        axis.quiver(east[pick], north[pick], *water, color=GREY, width=0.004, label='current')
+        water = [samples[f'water_{name}_kn'][pick] for name in ('east', 'north')]
+        if np.any(np.nan_to_num(water)):
+            axis.quiver(east[pick], north[pick], *water, color=GREY, width=0.004, label='current')
     axis.set_aspect('equal', adjustable='datalim')
     dress(axis, 'Track', 'east (km)', 'north (km)')

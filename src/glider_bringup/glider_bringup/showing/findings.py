@@ -210,6 +210,7 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
             f'Track lost: more than {LOST_M:.0f} m off the path from {at(since_s)} to the end.'
         )
     ticks = traces.flagged['infeasible']
+    held = '' if ticks else ', the course could be held'
     if ticks:
         text = f'The course could not be held against the estimated current for {share(ticks)}, '
         text += f'first at {at(traces.first_s("infeasible"))}.'
@@ -223,7 +224,7 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
             )
     if not problems:
         messages = ', and no message was lost' if card['messages_recorded'] else ''
-        fine = f'Nothing went wrong: the run is complete, the course could be held{messages}.'
+        fine = f'Nothing went wrong: the run is complete{held}{messages}.'
         return [('fine', fine), *(('note', text) for text in notes)]
     said = verdict(card, run.rules.settle_s)
     listed = [*(('problem', text) for text in problems), *(('note', text) for text in notes)]

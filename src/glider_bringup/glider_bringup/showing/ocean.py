@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from glider_base.frames import on_chart
 from glider_base.settings import ConfigurationError
@@ -214,12 +215,11 @@ def _panels(name: str, seen: Loaded | LoadedBottom) -> list[Panel]:
     (time, *_), levels, *places = seen.axes
     at = f'at {levels[0]:g} m, {told_time(time)}'
     if name == 'currents':
-        share = np.gradient(levels) if len(levels) > 1 else np.ones(1)
-        mean = np.tensordot(share / share.sum(), seen.water[0], axes=1)
-        arrows = tuple(np.where(seen.land, np.nan, mean[..., k]) for k in (0, 1))
-        title = f'current {at}'
+        mean, title = seen.water[0, 0], f'current {at}'
         if len(levels) > 1:
+            mean = trapezoid(seen.water[0], levels, axis=0) / (levels[-1] - levels[0])
             title = f'mean current, {levels[0]:g} to {levels[-1]:g} m, {told_time(time)}'
+        arrows = tuple(np.where(seen.land, np.nan, mean[..., k]) for k in (0, 1))
         return [Panel(title, 'speed (m/s)', 'Blues', *places, np.hypot(*arrows), arrows)]
     water = np.where(seen.land, np.nan, np.moveaxis(seen.water[0, 0], -1, 0))
     return [

@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, Steps
-from glider_guard.rows import REACTIONS, ROWS
-from glider_guard.rows import SURFACE as AT_LEAST
 from glider_model.ocean.current_settings import KNOT_MPS
 
 
@@ -293,36 +291,6 @@ def _current_panels(run: FlownRun) -> list[Panel]:
     ]
 
 
-def _guard_panels(run: FlownRun) -> list[Panel]:
-    """What the guard reacted to for good; nothing of a run in which there was nothing."""
-    latching = {row.name for row in ROWS if row.latches}
-    first: dict[str, dict] = {}
-    for event in run.card.get('guard', {}).get('events', []):
-        if event.get('row') in latching and event.get('reaction') in REACTIONS:
-            first.setdefault(event['row'], event)
-    steps = tuple(
-        Steps(
-            event['message'],
-            role,
-            ((event['t_s'], run.card['sim_time_s'], REACTIONS.index(event['reaction'])),),
-        )
-        for event, role in zip(first.values(), _ROLES, strict=False)
-    )
-    levels = ', '.join(
-        f'{level} {name}' for level, name in enumerate(REACTIONS) if level >= AT_LEAST
-    )
-    return [
-        Panel(
-            'guard',
-            'Guard',
-            'What it reacted to, since when, and how gravely: the highest line is in force. Such '
-            'reactions stay until a person clears them at the surface.',
-            levels,
-            steps=steps,
-        )
-    ]
-
-
 def _learnt_panels(run: FlownRun) -> list[Panel]:
     """What the adaptive law has learnt; nothing of what stayed zero."""
     panels = []
@@ -347,7 +315,6 @@ def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
         'How it knew where it was': _navigation_panels(run),
         'How it flew': _flight_panels(run),
         'What the actuators did, and the battery': [*_actuator_panels(run), _BATTERY],
-        'What the guard did': _guard_panels(run),
         'The current': _current_panels(run),
         'What control learnt': _learnt_panels(run),
     }

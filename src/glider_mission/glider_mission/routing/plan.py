@@ -44,6 +44,7 @@ class Route(NamedTuple):
     corners: np.ndarray  #: float64[n, 2], north and east (m), the start among them
     passed_s: list[float]  #: arrival at each waypoint (s); those that are not reached are missing
     fronts: list[np.ndarray]  #: arrivals on the chart, float64[n, m], one for each waypoint
+    ends: list[int]  #: which corners are waypoints that are reached
 
     @property
     def arrives(self) -> bool:
@@ -137,7 +138,7 @@ def route_through(
     At a speed through the water (m/s), from a start to the end of the time (s); straight on from
     where it does not get on any more.
     """
-    corners, passed, found = [waypoints[0]], [], []
+    corners, passed, found, ends = [waypoints[0]], [], [], []
     columns = len(chart.easts)
     for place, goal in zip(waypoints, waypoints[1:], strict=False):
         arrivals, before, goal_s, last = fronts(
@@ -152,10 +153,11 @@ def route_through(
             point = before[point]
         corners += straightened(np.array([place, *points[::-1], goal]))[1:]
         passed.append(goal_s)
+        ends.append(len(corners) - 1)
         t_s = goal_s
     done = len(passed) + 1
     missing = [np.empty((0, 0))] * (len(waypoints) - 1 - len(found))
-    return Route(np.array([*corners, *waypoints[done:]]), passed, [*found, *missing])
+    return Route(np.array([*corners, *waypoints[done:]]), passed, [*found, *missing], ends)
 
 
 def crossing(

@@ -71,12 +71,12 @@ function pick(array, most, scale, begin = 0, end = array.length - 1) {
   return out;
 }
 
-/** Smallest and largest of some arrays; nothing of them may be finite. */
+/** Smallest and largest of some arrays, gaps left out; nothing of them may be finite. */
 function extent(arrays) {
   let low = Infinity;
   let high = -Infinity;
   for (const array of arrays) {
-    for (const value of array) {
+    for (const value of array.filter((one) => one !== null)) {
       if (value < low) low = value;
       if (value > high) high = value;
     }

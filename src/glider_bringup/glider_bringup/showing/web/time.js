@@ -33,6 +33,7 @@ const react = (element, traces, layout) => Plotly.react(
 const axis = (title, more) => ({
   title: { text: title, standoff: 6, font: { size: 12 } },
   exponentformat: 'e',
+  minexponent: 5, // below 0.00001 and from a million on: elsewhere digits are read at once
   gridcolor: values('--grid'),
   linecolor: values('--line'),
   zerolinecolor: values('--line'),
@@ -118,6 +119,7 @@ function drawTime(panel, element, from, to) {
   }));
   traces.push(...panel.steps.map(stepTrace));
   const reach = extent(traces.map((trace) => trace.y.map(Math.abs)))[1];
+  const [least, most] = extent(traces.map((trace) => trace.y));
   const [low, high] = extent(traces.map((trace) => trace.y.filter((value) => value > 0)));
   const decades = panel.log && low > 0 ? Math.max(1, Math.ceil(Math.log10(high / low) / 5)) : 1;
   const limits = panel.limits.filter((value) => reach > 0.5 * Math.abs(value)).map((value) => ({
@@ -144,6 +146,7 @@ function drawTime(panel, element, from, to) {
     yaxis: axis(panel.axis, {
       fixedrange: true, automargin: false, nticks: 6, type: panel.log ? 'log' : 'linear',
       autorange: panel.inverted ? 'reversed' : true,
+      rangemode: most - least < 1e-6 * reach ? 'tozero' : 'normal', // else it is of rounding
       ...(panel.log ? { dtick: decades, exponentformat: low < 1e-4 ? 'power' : 'none' } : {}),
     }),
     yaxis2: { overlaying: 'y', range: [0, 1], visible: false, fixedrange: true },
