@@ -114,6 +114,16 @@ def test_samples_that_repeat_by_nature_are_no_alarm(sensors):
     assert not flown.told.any()
 
 
+@pytest.mark.parametrize('name', ['current_8deg', 'slocum_shelf'])
+def test_who_floats_nose_up_shows_one_depth_and_keeps_its_weight(name):
+    """Sent up for good, with a depth in steps, and nobody hears it."""
+    fields = {'sensors.depth_resolution_m': 0.1, 'profile.depth_m': 100.0, 'dives': 0}
+    faults = [broken('no_contact'), broken('battery', 90.0, drop_v=8.0)]
+    flown = fly(name, 4000.0, faults, **fields)
+    assert np.bitwise_or.reduce(flown.told) == rows.BATTERY
+    assert flown.depth[-1] < AT_SURFACE_M
+
+
 @pytest.mark.parametrize(
     ('name', 'crush_m', 'faults'),
     [

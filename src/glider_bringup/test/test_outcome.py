@@ -127,6 +127,17 @@ def test_a_mission_in_water_that_is_too_shallow_to_dive_is_unfinished(bottom_m, 
     assert told['reason'].startswith('no dive flown' if status == 'unfinished' else '')
 
 
+@pytest.mark.parametrize('dives', [0, 4])
+def test_a_mission_that_drifts_before_the_end_of_its_path_is_unfinished(dives):
+    """Its depth shows 1.5 m at the surface, so it waits to come up, long before its time."""
+    path = {'kind': 'waypoints', 'waypoints': [[0, 0], [3000, 0]], 'at_end': 'stop'}
+    yo = {'profile.depth_m': 100.0, 'profile.surface_every_dives': 1, 'path': path}
+    changes = {**yo, 'dives': dives, 'sensors.depth_offset_m': 1.5}
+    _, told = fly_scored(load_scenario('current_8deg', changes), [])
+    assert (told['status'], told['dives']) == ('unfinished', 1)
+    assert told['reason'].startswith('afloat')
+
+
 @pytest.mark.parametrize('depth_m', [60.0, 100.0])
 def test_dives_count_wherever_the_upper_turn_is(depth_m):
     """A mission that has flown its dives is over once it is up, and is told so."""

@@ -122,6 +122,8 @@ def watch(
     is_one = abs(raw) < FARTHEST_M
     led = shown.led if shown.is_glide or not sees else 0.0
     same_s, led_m = state.same_s + dt, state.led_m + dt * led
+    if limits.is_rough and state.depth <= AFLOAT_M:  # nothing leads it up from there
+        led_m = max(0.0, led_m)
     if is_one and raw != state.raw:
         same_s, led_m = 0.0, 0.0
     if not is_one:

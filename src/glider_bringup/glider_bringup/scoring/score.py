@@ -235,11 +235,16 @@ class Scorer:
         way_m, time_s = self._along_path_m(), seconds(ticks)
         held = ~(series('infeasible')[scored & flies] > 0.0)
         infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)
-        missing = ''
-        if time_s >= rules.duration_s and dives < rules.dives:
+        arrival, missing = self._arrival(rules), ''
+        is_over = time_s >= rules.duration_s
+        if is_over and dives < rules.dives:
             missing = f'dives flown, of those that there was time for: {dives} of {rules.dives}'
-        elif time_s >= rules.duration_s and rules.dives_at_all and not _dives_at_all(depth, rules):
+        elif is_over and rules.dives_at_all and not _dives_at_all(depth, rules):
             missing = 'no dive flown, for which there was time'
+        elif not is_over and rules.dives_at_all and not 0 < rules.dives <= dives:
+            # who has arrived, or is to go on, may be done before
+            if arrival['arrival'] and not arrival['arrival']['arrived']:
+                missing = 'afloat for longer than it was to wait, before the end of its path'
         ended = outcome_of(depth, told, self._hull, infeasible, missing)
         pace_m = way_m if ended.status in (COMPLETED, INFEASIBLE) else None
         return {
@@ -249,7 +254,7 @@ class Scorer:
             'settle_s': rules.settle_s,
             'dives': dives,
             'distance_along_path_m': way_m,
-            **self._arrival(rules),
+            **arrival,
             'no_progress': {'events': self._stays[:EVENTS_KEPT]},
             'bottom': self._bottom.result() if self._bottom else None,
             **measured(flown),
