@@ -22,9 +22,10 @@ from typing import Any
 
 from numba.core import types
 from numba.core.errors import NumbaError
-from numba.extending import overload
+from numba.extending import is_jitted, overload
 
 from glider_base.errors import ConfigurationError
+from glider_base.kernel import kernel
 from glider_base.kernels.cache import BODIES, Body
 
 #: How the calls of slots are compiled.
@@ -57,12 +58,12 @@ def slot(stub: Callable) -> Callable:
         return find(type(values[position]))(*values)
 
     def body(params_type: type) -> Callable:
-        def fill(kernel):
+        def fill(function):
             if params_type in bodies:
                 raise TypeError(f'{stub.__name__}: {params_type.__name__} has a body already')
-            bodies[params_type] = kernel
-            BODIES.append(Body(stub.__module__, params_type.__module__, kernel.__module__))
-            return kernel
+            bodies[params_type] = function if is_jitted(function) else kernel(function)
+            BODIES.append(Body(stub.__module__, params_type.__module__, function.__module__))
+            return function
 
         return fill
 
@@ -70,7 +71,7 @@ def slot(stub: Callable) -> Callable:
     def choose(*kinds):
         kind = kinds[position]
         found = find(getattr(kind, 'instance_class', type(kind)))
-        if hasattr(stub, 'returns'):
+        if hasattr(stub, 'returns') and found is not stub:
             _check(found, kinds, stub.returns)
             return lambda *values: found(*values)
         return getattr(found, 'py_func', found)

@@ -492,6 +492,16 @@ def level_step(state, seen, params, dt):
     return Turns(state.count + 1), -20.0 * seen.measured.phi_dot, pitch
 """
 
+#: What tells of a law on `adaptation`, but for what there is to tell.
+LEARNT = """
+from glider_control.law import law_learnt
+
+
+@law_learnt.body(Level)
+def learnt(state, params):
+    return params.k, 0.0
+"""
+
 
 def run_cell(text):
     """The law of a cell of a notebook, from its settings to its step."""
@@ -561,7 +571,9 @@ def test_law_of_a_program_is_flown_as_a_class_and_as_a_function(level_law, tmp_p
 def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
     changes = {'dives': 0, 'duration_s': 400.0}
     before = glider.fly('current_8deg', changes, law=level_law)
-    other = run_cell(CELL.replace('-20.0 * seen.measured.phi_dot', '3.0'))
+    other = run_cell(  # a step is compiled, whether it is marked as a kernel or not
+        CELL.replace('-20.0 * seen.measured.phi_dot', '3.0').replace('@kernel\n', '')
+    )
     after = glider.fly('current_8deg', changes, law=other)
     assert before.score['controller'] == after.score['controller'] == 'LevelLaw'
     assert abs(before.to_xarray().odom_roll).max() < 0.01
@@ -610,6 +622,7 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
         (run_cell(CELL.replace('count + 1', 'count + 0.5')), {}, ['law LevelLaw', 'Turns', '0.0']),
         (run_cell(CELL.replace('def initial', 'def first')), {}, ['LevelLaw', 'no initial_state']),
         (run_cell(CELL.partition('@law')[0]), {}, ['law_step: no body for params of type Level']),
+        (run_cell(CELL + LEARNT), {}, ['learnt (<ipython-input-1>', 'returns 2', 'roll_bias_nm']),
     ],
 )
 def test_law_that_cannot_be_flown_is_told(law, choices, words):

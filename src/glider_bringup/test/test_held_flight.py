@@ -141,6 +141,19 @@ def test_a_state_of_another_law_or_navigation_is_refused():
         assert numbers(flight) == before and flight.tick == 10
 
 
+def test_a_state_is_flown_on_by_the_numbers_of_the_flight_and_the_orders_of_the_state():
+    flight = glider.Flight('current_8deg', {'profile.depth_m': 40.0})
+    flight.order(pitch_deg=20.0)
+    flight.step(2500)
+    deeper = glider.Flight('current_8deg', {'profile.depth_m': 80.0}).restore(flight.state)
+    deepest, steepest = 0.0, 0.0
+    while deeper.step(100).name == 'time' and deeper.now['odom_depth'] > 5.0:
+        deepest = max(deepest, deeper.now['ground_truth_odom_depth'])
+        steepest = min(steepest, math.degrees(deeper.now['odom_pitch']))
+    assert 78.0 < deepest < 84.0
+    assert -22.0 < steepest < -18.0
+
+
 class Failing(NamedTuple):
     at: int
 

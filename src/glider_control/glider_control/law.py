@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings, number, positive
-from glider_base.signals import NOTHING_LEARNT, Reference
+from glider_base.signals import NOTHING_LEARNT, Adaptation, Reference
 from glider_base.slot import default, returns, slot
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
@@ -124,6 +124,7 @@ def law_step(state, seen, params, dt):
 
 @slot
 @default
+@returns(*Adaptation._fields)
 def law_learnt(state, params):
     """What a law has learnt, for the topic ``adaptation``: nothing, if it does not say.
 

@@ -60,6 +60,13 @@ def test_straight_glide_of_seawing():
     assert trim.turn_radius_m is None
 
 
+def test_numbers_of_an_array_are_numbers():
+    numbers = np.array([0.25, -28.0], dtype=np.float32)
+    assert solve_trim(SEAWING, numbers[0], pitch_deg=numbers[1]) == solve_trim(
+        SEAWING, 0.25, pitch_deg=-28.0
+    )
+
+
 def test_seawing_turns_against_its_roll(spiral):
     assert spiral.turn_rate_radps * spiral.roll_deg < 0.0
 

@@ -153,7 +153,8 @@ class Flight:
         """Go on from a state, of this flight or of another one of the same scenario.
 
         One with another law, method or navigation is refused. Whether numbers of the scenario are
-        others is not known: the parameters are those of this flight.
+        others is not known: the parameters are those of this flight, changed by the orders that
+        the state has.
         """
         if not isinstance(state, FlightState):
             raise ConfigurationError(

@@ -36,7 +36,6 @@ from glider_guidance.orders import (
     ticks_alone,
     wait_for_surface,
 )
-from glider_guidance.settings import GuidanceSettings
 from glider_guidance.status import Status, status_of
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.disk import VANISHED, DiskError
@@ -87,8 +86,7 @@ class Kept(NamedTuple):
     no_progress: int  #: what guidance told of that then
     battery: Battery  #: what it said then
     own: tuple[Order, ...]  #: what it orders itself by that, to come
-    settings: GuidanceSettings  #: by the orders that hold
-    followed: tuple[Order, ...]  #: those that were given in flight, and held until now
+    followed: tuple[tuple[Order, bool], ...]  #: what held until now, and whether it was given
     waiting: tuple[Order, ...]  #: those to come
 
 
@@ -110,7 +108,7 @@ class Held:
         self._battery = Battery(*WHEN_SILENT['battery'])
         self._scenario, self._settings = scenario, scenario.guidance_settings()
         self._own: tuple[Order, ...] = ()
-        self._followed: tuple[Order, ...] = ()
+        self._followed: tuple[tuple[Order, bool], ...] = ()
         self._waiting = tuple(scenario.orders)
         fly_held(self._held, np.empty((0, ROW)), TICK_S)
 
@@ -123,7 +121,6 @@ class Held:
             no_progress=self._no_progress,
             battery=self._battery,
             own=self._own,
-            settings=self._settings,
             followed=self._followed,
             waiting=self._waiting,
         )
@@ -140,17 +137,17 @@ class Held:
         Raises
         ------
         ConfigurationError
-            If it is of a mission with another law, or other blocks.
+            If it is of a mission with another law, or other blocks, or its orders make no sense.
         """
         if typeof(kept.mission) != typeof(held_state(self._held)):
             raise ConfigurationError(
                 'state: of another flight (allowed: of the same scenario and the same law)'
             )
+        self._tell(kept.followed)
         set_held(self._held, kept.mission)
         self.tick, self._stage, self._waiting = kept.tick, kept.stage, kept.waiting
         self._no_progress, self._own = kept.no_progress, kept.own
         self._battery = kept.battery
-        self._tell(kept.settings, kept.followed)
 
     def order(self, order: Order) -> None:
         """Take an order in.
@@ -210,20 +207,23 @@ class Held:
             state = held_state(self._held)
             set_held(self._held, state._replace(guidance=guidance_abort(state.guidance)))
             return
+        given = not any(one is order for one in self._own)
         try:
-            settings = changed(self._settings, order)
+            self._tell((*self._followed, (order, given)))
         except ConfigurationError:  # it made sense before guidance ordered itself something
             return
-        # who ends the run knows what was ordered from outside, as over nodes
-        given = () if any(one is order for one in self._own) else (order,)
-        self._tell(settings, (*self._followed, *given))
 
-    def _tell(self, settings: GuidanceSettings, followed: tuple[Order, ...]) -> None:
-        """Fly on with other settings of guidance, by orders that were followed."""
-        if (settings, followed) == (self._settings, self._followed):
+    def _tell(self, followed: tuple[tuple[Order, bool], ...]) -> None:
+        """Fly on by orders that were followed."""
+        if followed == self._followed:
             return
+        settings = self._scenario.guidance_settings()
+        for order, _ in followed:
+            settings = changed(settings, order)
         self._settings, self._followed = settings, followed
-        ends = self._scenario.with_orders(followed).plant_settings().ends()
+        # who ends the run knows what was ordered from outside, as over nodes
+        outside = tuple(order for order, given in followed if given)
+        ends = self._scenario.with_orders(outside).plant_settings().ends()
         plant = self._params.plant._replace(**ends)
         set_held_params(self._held, self._params._replace(guidance=settings.params(), plant=plant))
 

@@ -92,7 +92,7 @@ def solve_trim(
     # its whole net weight is given: the hull that displaces it is of no account
     glide = _Glide(
         vehicle=vehicle._replace(volume=0.0),
-        net_heaviness=net_heaviness_kg,
+        net_heaviness=float(net_heaviness_kg),  # kernels take no float32
         theta=theta,
         x_p=pitch_mass_m,
         mu=mu,
