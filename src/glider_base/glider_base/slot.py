@@ -60,7 +60,10 @@ def slot(stub: Callable) -> Callable:
     def body(params_type: type) -> Callable:
         def fill(function):
             if params_type in bodies:
-                raise TypeError(f'{stub.__name__}: {params_type.__name__} has a body already')
+                raise TypeError(
+                    f'{stub.__name__}: {params_type.__name__} has a body already (in a notebook, '
+                    f'run the cell of {params_type.__name__} anew, too)'
+                )
             bodies[params_type] = function if is_jitted(function) else kernel(function)
             BODIES.append(Body(stub.__module__, params_type.__module__, function.__module__))
             return function
