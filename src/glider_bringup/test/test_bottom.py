@@ -12,33 +12,27 @@ from scipy.spatial.transform import Rotation
 import glider_bringup
 from glider_base.settings import ConfigurationError
 from glider_base.signals import Water
-from glider_mission.scenario import load_scenario
 from glider_model.ocean.bottom import aground
 from glider_model.plant.motion import Motion
 
 #: A shelf that a yo to 200 m does not fit over.
 SHELF = {'water.bottom_m': 120.0}
 SPEED = st.floats(-2.0, 2.0)
-PLANT = load_scenario('current_8deg').plant_settings()
 
 
-@given(*[SPEED] * 6, *[st.floats(-3.0, 3.0)] * 3, st.floats(90.0, 110.0), st.booleans())
-def test_a_vehicle_lies_where_it_touched_the_bottom(
-    u, v, w, north, east, down, a, b, c, depth, is_light
-):
-    """By rotations of SciPy: it does not move over ground but upward; who is light slides, too."""
+@given(*[SPEED] * 6, *[st.floats(-3.0, 3.0)] * 3, st.floats(90.0, 110.0))
+def test_a_vehicle_lies_where_it_touched_the_bottom(u, v, w, north, east, down, a, b, c, depth):
+    """By rotations of SciPy: it does not move over ground but upward."""
     turn = Rotation.from_euler('xyz', (a, b, c))
     x, y, z, scalar = turn.as_quat()
     before = Motion(1.0, 2.0, depth, scalar, x, y, z, u, v, w, 0.1, 0.2, 0.3)
-    m_b = -0.1 if is_light else 0.1
-    after = aground(before, Water(north, east, down), 100.0, m_b, PLANT.params())
+    after = aground(before, Water(north, east, down), 100.0)
     if depth <= 100.0:
         assert after == before
         return
     over_ground = turn.apply(after[7:10]) + (north, east, down)
-    goes = turn.apply((u, v, w)) + (north, east, down)
-    held = goes * (is_light, is_light, 1.0)
-    np.testing.assert_allclose(over_ground, np.minimum(held, (9.0, 9.0, 0.0)), atol=1e-9)
+    rose = min(0.0, (turn.apply((u, v, w)) + (north, east, down))[2])
+    np.testing.assert_allclose(over_ground, (0.0, 0.0, rose), atol=1e-9)
     assert after[:3] == (1.0, 2.0, 100.0)
     assert after[3:7] + after[10:] == before[3:7] + before[10:]
 
@@ -125,16 +119,6 @@ def test_a_vehicle_that_touches_comes_up_and_the_score_says_so():
     assert told['bottom']['touched']
     assert told['bottom']['least_height_m'] == 0.0
     assert 120.0 / 0.5 < told['bottom']['t_s'] < told['sim_time_s']
-
-
-def test_a_current_from_behind_does_not_hold_down_who_is_light():
-    """With its nose up: a pump that is stuck heavy in the dive, and a weight of 2 kg let go."""
-    stuck = {'kind': 'stuck', 'actuator': 'buoyancy_engine', 'at_s': 300.0}
-    sea = {'water.bottom_m': 99.0}
-    yo = {'vehicle': 'seawing', 'profile.depth_m': 100.0, 'duration_s': 5400.0, 'dives': 0}
-    told = glider_bringup.fly('current_8deg', {**sea, **yo, 'faults': [stuck]}).score
-    assert told['bottom']['touched']
-    assert told['status'] == 'surfaced', told['reason']
 
 
 def test_clearance_is_for_yos():

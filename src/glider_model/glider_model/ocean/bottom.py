@@ -18,7 +18,6 @@ from glider_base.frames import (
 )
 from glider_base.kernel import kernel, replace
 from glider_base.slot import slot
-from glider_model.ocean.density import immersed
 from glider_model.ocean.field import Mission, bracket
 from glider_model.ocean.fields.grid import Coast, GridFileSettings, mission_window, widened
 from glider_model.ocean.grid_file import LoadedBottom, load_bottom
@@ -121,19 +120,15 @@ def least_height(n, e, depth, params):
 
 
 @kernel
-def aground(motion, water, bottom, m_b, body):
+def aground(motion, water, bottom):
     """The motion of a vehicle, stopped by the bottom (m) if it would be below it.
 
-    It lies where it touched: the mud holds it against the current, and lets it go upward. One that
-    is light by its pump at ``m_b`` (kg) is not held: the current would press it down, nose up.
-    ``body`` has vehicle and density.
+    It lies where it touched: the mud holds it against the current, and lets it go upward.
     """
     x = motion
     if not x.p_d > bottom:
         return motion
-    north, east, down = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
-    if immersed(x.p_d, m_b, body.vehicle, body.density).net > 0.0:
-        north, east = -water.v_n, -water.v_e
+    _, _, down = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
     down = min(0.0, down + water.v_d) - water.v_d
-    u, v, w = rotate_to_body(x.q_w, x.q_x, x.q_y, x.q_z, north, east, down)
+    u, v, w = rotate_to_body(x.q_w, x.q_x, x.q_y, x.q_z, -water.v_n, -water.v_e, down)
     return replace(x, p_d=bottom, u=u, v=v, w=w)

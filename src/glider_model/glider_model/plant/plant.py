@@ -319,8 +319,7 @@ def plant_step(
     while error > LARGEST_ERROR_J and steps <= MOST_STEPS:
         motion, error = integrate(state.motion, start, end, water, water_rate, body, dt, steps)
         steps *= 2
-    bottom = bottom_depth(motion.p_n, motion.p_e, params.bottom)
-    motion = aground(motion, water, bottom, end.m_b, body)
+    motion = aground(motion, water, bottom_depth(motion.p_n, motion.p_e, params.bottom))
     deep = motion.p_d > params.dive_below or (state.deep and motion.p_d >= params.dive_above)
     dives = state.dives + 1 if state.deep and not deep else state.dives
     surface_ticks = state.surface_ticks + 1 if motion.p_d < SURFACE_M else 0
