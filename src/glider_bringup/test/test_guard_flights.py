@@ -189,6 +189,17 @@ def test_a_pump_with_little_left_that_turns_the_vehicle_is_enough():
     assert flown.depth[-1] < 750.0
 
 
+def test_a_rate_that_a_fast_current_and_a_pitch_feign_weighs_nothing():
+    """By 1.1 deg a position that is known rises by 0.05 m/s; 0.1 kg heavier than in its file."""
+    glide = {'profile.net_heaviness_kg': 0.098, 'profile.pitch_deg': 16.2}
+    glide |= {'profile.depth_m': 586.5, 'profile.top_depth_m': 5.0, 'vehicle': 'seaglider'}
+    sea = {'current.speed_mps': 2.5, 'current.direction_deg': 127.9}
+    off = {'sensors.pitch_offset_deg': 1.1, 'perturb.net_heaviness_kg': 0.1}
+    flown = fly('yaw_10deg', 24000.0, [], dives=0, **glide, **sea, **off)
+    assert not (flown.told & rows.SURFACES).any()
+    assert flown.depth[200000:].max() > 350.0
+
+
 def test_a_pump_that_still_turns_the_vehicle_spares_the_weight():
     """0.5 kg more at 950 m, of 0.6 kg that the pump has left."""
     flown = fly('current_8deg', 9000.0, [broken('mass', 950.0, mass_kg=0.5)])

@@ -160,7 +160,7 @@ def weigh(state: Weight, at: Glide, limits: WeightLimits, dt: float) -> tuple[We
     told, too, where at the end of it the pump could not take off what it weighs.
     """
     off, soon, least, line, growth = state.off, state.soon, state.least, state.line, state.growth
-    begun, line_s = state.begun, 0.0
+    begun, line_s, glides, shown = state.begun, 0.0, 0.0, 0.0
     steep = max(LEAST_PITCH, LEAST_SHARE * limits.polar.shallowest)
     glides_s = 0.0
     if at.under and abs(at.theta) > steep and abs(at.m_b - at.sent) <= limits.arrived:
@@ -188,7 +188,8 @@ def weigh(state: Weight, at: Glide, limits: WeightLimits, dt: float) -> tuple[We
     elif mean > LEAST_RATE:  # another dive: the climb after this one tells of it
         ended = NO_END
     if ended.depth > 0.0 and mean < -LEAST_RATE and glides_s > WEIGHED_AGAIN_S:
-        errs = ended.weight + ended.per_m * (at.depth - ended.depth) - soon
+        # by the rate that is less, as the line is
+        errs = ended.weight + ended.per_m * (at.depth - ended.depth) - (soon + shown - glides)
         ended, can = NO_END, limits.range + errs
     is_heavy = least > limits.most
     if line_s > LINE_S and mean > LEAST_RATE and at.target > at.depth > begun:
