@@ -200,6 +200,17 @@ def test_a_rate_that_a_fast_current_and_a_pitch_feign_weighs_nothing():
     assert flown.depth[200000:].max() > 350.0
 
 
+def test_who_glides_down_where_its_mass_should_hold_it_level_turns_its_nose_up():
+    """0.85 kg on a Seaglider for 45 min, of which its pump takes half: it went to 1,484 m."""
+    mass = {'kind': 'mass', 'mass_kg': 0.849, 'at_s': 12235.8, 'phase': 'dive', 'for_s': 2682.0}
+    glide = {'profile.net_heaviness_kg': 0.123, 'profile.pitch_deg': 23.1, **RECKONED}
+    glide |= {'profile.depth_m': 548.0, 'profile.top_depth_m': 5.0, 'vehicle': 'seaglider'}
+    glide['profile.surface_every_dives'] = 2
+    flown = fly('yaw_10deg', 18000.0, [mass], dives=0, **glide)
+    assert flown.depth.max() < 700.0
+    assert flown.depth[-1] < AT_SURFACE_M
+
+
 def test_a_pump_that_still_turns_the_vehicle_spares_the_weight():
     """0.5 kg more at 950 m, of 0.6 kg that the pump has left."""
     flown = fly('current_8deg', 9000.0, [broken('mass', 950.0, mass_kg=0.5)])

@@ -17,9 +17,10 @@ from glider_model.onboard.moving_mass import MovingMass, first_moments, mass_pla
 
 #: A vehicle that rises faster than this (m/s) turns its nose up; one that sinks faster lies level.
 RISES_MPS = 0.05
-#: One that rises nose up more slowly than this (m/s), for so long (s), is held level for
-#: as long: it may lie in a stall that it rises out of. One that hangs, level, where its pump makes
-#: it light, turns its nose up for as long: the water may sink.
+#: One that rises nose up more slowly than this (m/s), for so long (s), is held level for as long:
+#: it may lie in a stall that it rises out of. One that does not rise, level, with its pump out,
+#: turns its nose up for as long: the water may sink, or it may be too heavy, and glide down where
+#: its mass should hold it level. What makes it sink faster by `RISES_MPS` is given up.
 SLOW_MPS, SLOW_S = 0.03, 300.0
 #: Its vertical rate is averaged over this time (s): a turn throws it up for a moment.
 AVERAGE_S = 20.0
@@ -47,6 +48,7 @@ class Ascent(NamedTuple):
     #: for which it has risen too slowly so; less than 0: the other way is tried for as long
     slow_s: float
     moment: float  #: first moment that nobody knows of (kg m)
+    before: float  #: the rate as the other way began to be tried (m/s, + down)
 
 
 class Rise(NamedTuple):
@@ -63,7 +65,7 @@ class Rise(NamedTuple):
     is_there: bool = False  #: where it was sent, or it goes no farther
 
 
-INITIAL_ASCENT = Ascent(0.0, 0.0, False, 0.0, 0.0)
+INITIAL_ASCENT = Ascent(0.0, 0.0, False, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -92,17 +94,20 @@ def come_up(state: Ascent, at: Rise, limits: AscentLimits, dt: float) -> tuple[A
     # what a way of lying does is seen once the mass is there: one may take an hour to its stop
     seen_s = dt if at.is_there else 0.0
     slow_s = min(0.0, state.slow_s + seen_s) if state.slow_s < 0.0 else 0.0
-    hangs = is_done and m_b < 0.0 and average <= RISES_MPS
+    hangs, before = is_done and m_b < 0.0, state.before
     if slow_s < 0.0:
-        turned = state.turned and not (sees and average > RISES_MPS)
+        turned = state.turned
+        if sees and average > before + RISES_MPS:
+            turned, slow_s, before = not turned, -SLOW_S, average
     elif at.moves and at.under and (turned or hangs):
         slower = seen_s if average > -SLOW_MPS else -dt  # a rate that errs is now this, now that
         slow_s = max(0.0, state.slow_s + slower)
         if slow_s >= SLOW_S:
-            turned, slow_s = not turned, -SLOW_S
+            turned, slow_s, before = not turned, -SLOW_S, average
     moment = state.moment
     if at.is_new and not state.turned:
         moment = _off_balance(moment, at, limits.mass, dt)
     safe = limits.safe
     x_p = safe.x_p if turned else mass_place(-moment, m_b, -safe.x_p, limits.mass)
-    return Ascent(waits_s, average, turned, slow_s, moment), Joints(safe.m_b, x_p, 0.0, 0.0)
+    state = Ascent(waits_s, average, turned, slow_s, moment, before)
+    return state, Joints(safe.m_b, x_p, 0.0, 0.0)
