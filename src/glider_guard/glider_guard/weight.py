@@ -188,7 +188,7 @@ def weigh(state: Weight, at: Glide, limits: WeightLimits, dt: float) -> tuple[We
     elif mean > LEAST_RATE:  # another dive: the climb after this one tells of it
         ended = NO_END
     if ended.depth > 0.0 and mean < -LEAST_RATE and glides_s > WEIGHED_AGAIN_S:
-        # by the rate that is less, as the line is
+        # by the rate that is less, as the line is, which makes ``shown`` of ``glides``
         errs = ended.weight + ended.per_m * (at.depth - ended.depth) - (soon + shown - glides)
         ended, can = NO_END, limits.range + errs
     is_heavy = least > limits.most

@@ -12,6 +12,7 @@ from glider_bringup.scoring.card import fly_scored
 from glider_mission.choices import combination_of
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.eddying_sea import EddyingSea, write_sea
+from glider_navigation.forecast import ForecastSettings
 from glider_studies.paper.experiments import Experiment, Study, make_study
 from glider_studies.paper.judges import Check
 
@@ -22,7 +23,7 @@ SIZES, FIRST = (0.18, 0.18, 0.42, 0.42), 2000
 ERRORS, DURATION_S = (0.0, 0.05, 0.15), 120.0 * 3600.0
 PERSISTENCE = 'persistence'
 #: What is believed of a forecast: all of it, or the share that there is in the sea.
-WAYS = {'whole forecast': 0.0, 'its share': 1.0}
+WAYS = {'whole forecast': 0.0, 'its share': ForecastSettings().share_std}
 CASES = [(PERSISTENCE, 0.0), *((way, error) for error in ERRORS for way in WAYS)]
 #: The first surfacings are not judged: all that is believed at first is the forecast.
 _SETTLED = 3

@@ -56,19 +56,15 @@ def _hours(seconds: float) -> float | None:
 
 def _told(made: Any, scenario: Scenario) -> dict[str, Any]:
     """What a plan says, for machines."""
-    from glider_mission.routing.plan import sailed_s
-
     origin = scenario.origin.params()
     corners = [to_geodetic(*map(float, corner), origin) for corner in made.route.corners]
     time_s = made.arrival_s(50.0)
-    ways = [made.route.corners[: end + 1] for end in made.route.ends]
-    passed = [sailed_s(made.chart, way, 0.0, made.pace.speed, made.end_s) for way in ways]
     return {
         'scenario': scenario.name,
         'changed': scenario.changed,
         'reachable': made.reachable,
         'arrival_h': {f'p{p}': _hours(made.arrival_s(float(p))) for p in (10, 50, 90)},
-        'waypoints_h': [_hours(one) for one in passed],
+        'waypoints_h': [_hours(one) for one in made.waypoints_s],
         'straight_h': _hours(made.straight_s),
         'mission_h': made.end_s / 3600.0,
         'dives': scenario.dives if made.end_s < scenario.duration_s else None,

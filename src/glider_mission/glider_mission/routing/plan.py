@@ -42,7 +42,7 @@ class Route(NamedTuple):
     """A route through waypoints, and when it is at each of them."""
 
     corners: np.ndarray  #: float64[n, 2], north and east (m), the start among them
-    passed_s: list[float]  #: arrival at each waypoint (s); those that are not reached are missing
+    passed_s: list[float]  #: when a front is at each waypoint (s); those not reached are missing
     fronts: list[np.ndarray]  #: arrivals on the chart, float64[n, m], one for each waypoint
     ends: list[int]  #: which corners are waypoints that are reached
 
@@ -70,6 +70,12 @@ class Plan(NamedTuple):
     def arrival_s(self, percent: float) -> float:
         """Arrival (s) that so many of the errors that were tried keep; infinite: not in time."""
         return float(np.sort(self.arrivals_s)[round(percent / 100.0 * (len(self.arrivals_s) - 1))])
+
+    @property
+    def waypoints_s(self) -> list[float]:
+        """Arrivals (s) at the waypoints that are reached, along the route, by the forecast."""
+        ways = [self.route.corners[: end + 1] for end in self.route.ends]
+        return [sailed_s(self.chart, way, 0.0, self.pace.speed, self.end_s) for way in ways]
 
     @property
     def wh(self) -> float | None:
