@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which files are those of a flight, and the libraries that read them."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable
 from datetime import datetime, timezone
@@ -51,6 +52,16 @@ def gsw():
     with installed('gsw, which knows sea water'):
         import gsw
     return gsw
+
+
+def declination_at(latitude_deg: float, longitude_deg: float, time_s: float) -> tuple[float, str]:
+    """Magnetic declination (rad, + east) by IGRF at a time (s since 1970), and how to say it."""
+    with installed('ppigrf, which knows the magnetic field'):
+        import ppigrf
+    day = datetime.fromtimestamp(time_s, timezone.utc).replace(tzinfo=None)
+    east, north, _ = ppigrf.igrf(longitude_deg, latitude_deg, 0.0, day)
+    declination = math.atan2(east.item(), north.item())
+    return declination, f'{math.degrees(declination):.1f} deg east there by IGRF'
 
 
 def read_each(

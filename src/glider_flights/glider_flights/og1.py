@@ -8,17 +8,16 @@ the file of the vehicle. ``HEADING`` is magnetic in the vocabulary of OG1.
 """
 
 import math
-from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from glider_base.errors import installed
 from glider_base.files import parse_yaml
 from glider_base.settings import validate
 from glider_flights.folders import (
     Progress,
+    declination_at,
     files_in,
     gsw,
     of_one_flight,
@@ -175,11 +174,6 @@ def _declination(known: dict[str, np.ndarray], fixes: np.ndarray) -> tuple[float
     told = usual(known.get('declination_rad', ()))
     if math.isfinite(told):
         return told, ''
-    latitude, longitude = fixes[0, 1:] if len(fixes) else _middle(known)
-    day = datetime.fromtimestamp(usual(known['time']), timezone.utc).replace(tzinfo=None)
-    with installed('ppigrf, which knows the magnetic field'):
-        import ppigrf
-    east, north, _ = ppigrf.igrf(longitude, latitude, 0.0, day)
-    declination = math.atan2(east.item(), north.item())
-    turned = f'{math.degrees(declination):.1f} deg east'
-    return declination, f'HEADING is magnetic, {turned} there by IGRF'
+    place = fixes[0, 1:] if len(fixes) else _middle(known)
+    declination, told = declination_at(*place, usual(known['time']))
+    return declination, f'HEADING is magnetic, {told}'

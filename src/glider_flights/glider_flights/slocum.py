@@ -18,13 +18,13 @@ from glider_base.errors import ConfigurationError, installed
 from glider_flights.folders import (
     LATEST_S,
     Progress,
+    declination_at,
     files_in,
     gsw,
     of_one_flight,
 )
 from glider_flights.netcdf import names_of
 from glider_flights.record import (
-    DIVE_DEPTH_M,
     LONGEST_GAP_S,
     NOT_KNOWN,
     Cut,
@@ -87,8 +87,6 @@ POLAR = Polar(
     area_m2=0.1,
     shallowest_rad=math.radians(11.3),
 )
-#: Longer steps of a reckoned place are its corrections (m/s).
-FASTEST_STEP_MPS = 2.0
 #: The vehicle's own current is of the same dive if the time it reckoned for is, up to this share.
 SAME_TIME = 0.2
 #: The current of a segment is told until so long after the next dive has begun (s).
@@ -128,14 +126,12 @@ def read_slocum(
             f'{place}: no value of {", ".join(missing)} in its {len(files)} files '
             f'*{files[0].suffix} (needed: {", ".join(NEEDED)})'
         )
+    origin, fixes = _fixes(sensors)
     declined = usual(sensors['m_gps_mag_var'][1])
     if math.isnan(declined):
-        declined = _turned(sensors)
-        told = f'{-math.degrees(declined):.0f} deg east is how m_lat, m_lon turn from m_heading'
-        if math.isnan(declined):
-            told, declined = 'magnetic north is taken for true north', 0.0
-        notes.append(f'm_gps_mag_var is not recorded: {told}')
-    origin, fixes = _fixes(sensors)
+        declination, told = declination_at(*origin, usual(sensors['m_gps_lat'][0]))
+        declined = -declination
+        notes.append(f'm_gps_mag_var is not recorded: magnetic north is {told}')
     cuts, left_out = cut(fixes, _samples(sensors, declined))
     ends = [*(one.before.time_s[-1] for one in cuts), math.inf][1:]
     segments = [
@@ -402,38 +398,6 @@ def _fixes(sensors: Sensors) -> tuple[np.ndarray, Fixes]:
     if not len(time_s):
         return np.zeros(2), Fixes(time_s, np.empty((0, 2)))
     return degrees[0], Fixes(time_s, local_metres(degrees[0], *degrees.T))
-
-
-def _turned(sensors: Sensors) -> float:
-    """What ``m_gps_mag_var`` was (rad), from the steps by which the vehicle reckoned; NaN if none.
-
-    Turned into local mission coordinates and less the vehicle's own current, they lie along its
-    heading.
-    """
-    time_s, degrees = _places(sensors, 'm_lat', 'm_lon')
-    deep = at_times(time_s, *sensors['m_depth']) > DIVE_DEPTH_M
-    if len(time_s) < 2:
-        return math.nan
-    steps = np.diff(local_metres(degrees[0], *degrees.T), axis=0) / np.diff(time_s)[:, None]
-    under = deep[1:] & deep[:-1] & (np.hypot(*steps.T) < FASTEST_STEP_MPS)
-    if not under.any():
-        return math.nan
-    north, east = steps[under].T
-    middle_s = 0.5 * (time_s[1:] + time_s[:-1])[under]
-    heading = angles_at_times(middle_s, *sensors['m_heading'])
-    x, y = (
-        np.nan_to_num(_before(middle_s, *sensors[name])) for name in ('m_water_vx', 'm_water_vy')
-    )
-    turns = np.radians(np.arange(-60.0, 60.0, 0.5))[:, None]
-    ahead = north * np.cos(turns) - east * np.sin(turns) - y
-    abeam = north * np.sin(turns) + east * np.cos(turns) - x
-    beside = np.abs(abeam * np.cos(heading) - ahead * np.sin(heading))
-    return float(turns[np.nanmedian(beside, axis=1).argmin(), 0])
-
-
-def _before(time_s: np.ndarray, own_s: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """The last of values with times of their own before other times, NaN before the first."""
-    return np.append(values, math.nan)[np.searchsorted(own_s, time_s) - 1]
 
 
 def _samples(sensors: Sensors, declined: float) -> Samples:
