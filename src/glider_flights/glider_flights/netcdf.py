@@ -91,7 +91,7 @@ def read(
                         scale = math.copysign((scales or {}).get(unit, scale), scale)
                         values = scale * values.astype(float)
                     found[key] = values
-    except (OSError, ValueError, TypeError, KeyError, RuntimeError, ImportError) as error:
+    except Exception as error:  # noqa: BLE001 - of a damaged file the libraries say anything
         raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
     return found
 

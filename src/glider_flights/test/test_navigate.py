@@ -643,6 +643,16 @@ def test_each_bad_file_in_og1_costs_what_it_holds_and_is_named(tmp_path):
         assert any(f'unit_{number}.nc' in note for note in flight.notes), number
 
 
+@pytest.mark.parametrize('name', ['p1230001.nc', 'unit_1.nc'])
+def test_a_file_in_netcdf_3_is_refused_wherever_in_its_header_it_is_cut(tmp_path, name):
+    write_dive(tmp_path / name, 0, 2)
+    whole = (tmp_path / name).read_bytes()
+    for length in range(1, 1500, 13):
+        (tmp_path / name).write_bytes(whole[:length])
+        with pytest.raises(ConfigurationError, match=name):
+            read_flight(tmp_path, None, quiet)
+
+
 def test_missing_numbers_in_a_dive_do_not_spread(tmp_path):
     samples, _ = made_up(1)
     pitch = np.degrees(samples[10:1510, 2])
