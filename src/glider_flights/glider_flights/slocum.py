@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_base.errors import ConfigurationError, installed
+from glider_base.kernel import kernel
 from glider_flights.folders import (
     LATEST_S,
     Progress,
@@ -56,7 +57,9 @@ CACHES_ABOVE = 2
 #: A file with its header has no fewer bytes.
 SMALLEST_FILE = 100
 #: Where its first cycle is after the header, and what a cycle and, often, the end begin with.
-FIRST_CYCLE, CYCLE_TAG, LAST_TAG = 16, b'd', b'X'
+FIRST_CYCLE, CYCLE_TAG, LAST_TAG = 16, ord('d'), b'X'
+#: State of a sensor that has a new value in a cycle.
+UPDATED = 2
 #: Name of a file on board: vehicle, year, day of the year, mission of the day, segment.
 WRITTEN = re.compile(r'(.+)-(\d+)-(\d+)-(\d+)-(\d+)')
 #: What a glider can have been told by its sensors (m, rad): other values are damage.
@@ -256,7 +259,7 @@ def read_sensors(
     found, notes = of_one_flight(files[0].parent, found, left_out)
     cut = [file.name for file in found if file.is_cut]
     if cut:
-        notes.append(f'read as far as it goes: {", ".join(cut)}: cut short')
+        notes.append(f'read as far as it goes: {", ".join(cut)}: cut short or damaged')
     for name in names:
         lack = [file.name for file in found if name not in file.sensors]
         if 0 < len(lack) < len(found):
@@ -327,16 +330,29 @@ def _read_file(path: Path, scratch: Path, names: Names) -> DbdFile:
 
 def _is_cut(content: bytes, dbd) -> bool:
     """Whether a file, opened, ends within a cycle or is damaged before its end."""
-    if content.endswith(LAST_TAG):
-        return False
-    sizes, at = np.array(dbd.byteSizes), dbd.fp_binary_start + FIRST_CYCLE
-    while at < len(content) and content[at : at + 1] == CYCLE_TAG:
-        states = np.frombuffer(content[at + 1 : at + 1 + dbd.n_state_bytes], np.uint8)
-        updated = np.unpackbits(states).reshape(-1, 2)[: len(sizes)] == (1, 0)
-        if len(updated) < len(sizes):
-            return True
-        at += 1 + dbd.n_state_bytes + int(sizes[updated.all(axis=1)].sum())
-    return at != len(content)
+    begin, sizes = dbd.fp_binary_start + FIRST_CYCLE, np.array(dbd.byteSizes)
+    bytes_ = np.frombuffer(content, np.uint8)
+    at = _end_of_cycles(bytes_, begin, sizes, dbd.n_state_bytes)
+    return at > len(content) or content[at : at + 1] not in (b'', LAST_TAG)
+
+
+@kernel
+def _end_of_cycles(content, at, sizes, n_state_bytes):
+    """Where the cycles of a file end that begin at ``at``: past its end if it ends in one.
+
+    Two bits a sensor, of its number of bytes in ``sizes``, say whether a cycle has its value.
+    """
+    if 4 * n_state_bytes < len(sizes):
+        return len(content) + 1
+    while at < len(content) and content[at] == CYCLE_TAG:
+        states = content[at + 1 : at + 1 + n_state_bytes]
+        at += 1 + n_state_bytes
+        if at > len(content):
+            return at
+        for i in range(len(sizes)):
+            if states[i // 4] >> (6 - 2 * (i % 4)) & 3 == UPDATED:
+                at += sizes[i]
+    return at
 
 
 def _decompress(path: Path, plain: Path) -> bool:

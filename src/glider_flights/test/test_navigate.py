@@ -285,6 +285,17 @@ def test_a_damaged_file_is_left_out_and_named(tmp_path, write_dbd):
     assert flight.notes[0].startswith('left out: 00020000.dbd: cannot be read')
 
 
+def test_a_file_that_is_damaged_before_its_end_is_named(tmp_path, write_dbd):
+    pytest.importorskip('dbdreader')
+    file = tmp_path / '00010000.dbd'
+    write_dbd(file, sensors(3), True)
+    content = file.read_bytes()
+    assert not read_flight(tmp_path, None, quiet).notes
+    middle = len(content) // 2
+    file.write_bytes(content[:middle] + bytes(500) + content[middle + 500 :])
+    assert any(file.name in note for note in read_flight(tmp_path, None, quiet).notes)
+
+
 def part(table: dict, begin_s: float, end_s: float, later_s: float = 0.0) -> dict:
     """What sensors told in a time, with dates that are so much later."""
     chosen = {}
