@@ -6,9 +6,10 @@ A Kalman filter, the same for both axes: the place goes on with the drift, and t
 tides and wind do. Where the vehicle came up is kept beside the two: the first fixes tell it, and
 what comes hours later does not. Fixes count once in `FIX_EVERY_S`: the error of one is that of the
 next. A fix where the vehicle can hardly be is set aside; another one beside it, later, says that
-the vehicle is there after all, and what was believed of the place is forgotten.
+the vehicle was there after all: what was believed of the place is forgotten, and both count.
 """
 
+import math
 from typing import NamedTuple
 
 from glider_base.kernel import kernel, replace
@@ -27,11 +28,10 @@ DRIFT_WANDERS = 3e-7
 #: The drift by the fixes up to so long after the surfacing is that of the surfacing (s).
 EARLY_S = 900.0
 #: Farther from where the vehicle is believed to be than so many standard deviations, and than so
-#: far (m), a fix is set aside.
-FARTHEST_STD, FARTHEST_M = 6.0, 100.0
-#: Another one this much later (s), and no farther from it than this (m) and what the vehicle may
-#: have drifted since (m/s), confirms it.
-CONFIRMED_S, CONFIRMED_M, CONFIRMED_MPS = 10.0, 100.0, 1.5
+#: far (m) and what it may have drifted otherwise since the last fix (m/s), a fix is set aside.
+FARTHEST_STD, FARTHEST_M, FASTEST_MPS = 6.0, 100.0, 1.5
+#: Another one this much later (s), and no farther from it than that, confirms it.
+CONFIRMED_S = 10.0
 
 
 #: There is no fix that was set aside.
@@ -169,21 +169,23 @@ def _set_aside(stay, fix):
 
 
 @kernel
-def _begin_at(stay, fix):
-    """The same stay, of whose place nothing is known but this fix."""
-    t, drift, vv = stay.t_s, stay.drift, LOST_DRIFT_STD * LOST_DRIFT_STD
-    variance = max(LEAST_VARIANCE, fix.variance)
+def _begin_aside(stay, variance):
+    """The same stay, of whose place nothing is known but the fix that was set aside."""
+    t, fix, drift, vv = stay.aside_s, stay.aside, stay.drift, LOST_DRIFT_STD * LOST_DRIFT_STD
+    variance = max(LEAST_VARIANCE, variance)
     back = variance + t * t * (vv + DRIFT_WANDERS * t / 3.0)
-    return replace(
+    then = replace(
         stay,
-        came_up=Vector(fix.p_n - t * drift.n, fix.p_e - t * drift.e),
-        place=Vector(fix.p_n, fix.p_e),
+        t_s=t,
+        came_up=Vector(fix.n - t * drift.n, fix.e - t * drift.e),
+        place=fix,
         known=Known(cc=back, cp=variance, cv=-t * vv, pp=variance, pv=0.0, vv=vv),
         early=Early(drift, vv, t),
         fixes=stay.fixes + 1,
         fixed_s=t,
         aside_s=NO_FIX_ASIDE,
     )
+    return wait(then, stay.t_s - t)
 
 
 @kernel
@@ -191,13 +193,15 @@ def hear_fix(stay, fix):
     """Take in a fix that counts, if the vehicle can be there, or if another one has said so."""
     here = stay.place
     variance = stay.known.pp + max(LEAST_VARIANCE, fix.variance)
-    farthest2 = max(FARTHEST_M * FARTHEST_M, FARTHEST_STD * FARTHEST_STD * variance)
-    if _distance2(fix, here.n, here.e) <= farthest2:
+    drifted = FASTEST_MPS * (stay.t_s - stay.fixed_s) if stay.fixes > 0 else 0.0
+    farthest = max(FARTHEST_M + drifted, FARTHEST_STD * math.sqrt(variance))
+    if _distance2(fix, here.n, here.e) <= farthest * farthest:
         return take_fix(stay, fix)
-    near = CONFIRMED_M + CONFIRMED_MPS * (stay.t_s - stay.aside_s)
+    near = FARTHEST_M + FASTEST_MPS * (stay.t_s - stay.aside_s)
     beside = _distance2(fix, stay.aside.n, stay.aside.e) <= near * near
     if stay.aside_s == NO_FIX_ASIDE or not beside:
         return _set_aside(stay, fix)
-    if stay.t_s - stay.aside_s >= CONFIRMED_S:
-        return _begin_at(stay, fix)
-    return stay
+    if stay.t_s - stay.aside_s < CONFIRMED_S:
+        return stay
+    anew = _begin_aside(stay, fix.variance)
+    return take_fix(anew, fix) if counts(anew, fix) else anew

@@ -13,7 +13,7 @@ from glider_base.signals import Vector
 from glider_navigation.method import Fix
 from glider_navigation.surface_stay import (
     LOST_DRIFT_STD,
-    _begin_at,
+    _begin_aside,
     begin,
     counts,
     drifted_variance,
@@ -135,12 +135,25 @@ def test_who_begins_anew_at_a_fix_knows_of_its_surfacing_what_it_may_have_drifte
     stay = begin(Vector(0.0, 0.0), 100.0**2, Vector(0.2, 0.0))
     for _ in range(600):
         stay = wait(stay, 1.0)
-    anew = _begin_at(stay, Fix(True, 1000.0, 50.0, 25.0))
+    stay = stay._replace(aside=Vector(1000.0, 50.0), aside_s=600.0)
+    anew = _begin_aside(stay, 25.0)
     assert tuple(anew.place) == (1000.0, 50.0)
     assert tuple(anew.came_up) == pytest.approx((880.0, 50.0))
     assert anew.known.pp == 25.0
     drifted = (600.0 * LOST_DRIFT_STD) ** 2 + WANDERS * 600.0**3 / 3.0
     assert anew.known.cc == pytest.approx(25.0 + drifted)
+
+
+@pytest.mark.parametrize('came_up_m', [0.0, 2000.0])
+def test_two_fixes_tell_a_strong_drift_wherever_it_came_up(came_up_m):
+    """As of sg167 in 1 m/s: it dives after the second, and is to know where it came up."""
+    stay = begin(Vector(0.0, 0.0), 60.0**2, Vector(0.0, 0.0))
+    for wait_s in (160.0, 540.0):
+        stay = wait(stay, wait_s)
+        stay = hear_fix(stay, Fix(True, came_up_m + stay.t_s, -0.2 * stay.t_s, 25.0))
+    assert tuple(stay.drift) == pytest.approx((1.0, -0.2), abs=0.03)
+    assert tuple(stay.place) == pytest.approx((came_up_m + 700.0, -140.0), abs=5.0)
+    assert tuple(stay.came_up) == pytest.approx((came_up_m, 0.0), abs=15.0)
 
 
 @pytest.mark.parametrize('minutes', [3.0, 10.0])
@@ -166,7 +179,7 @@ def test_a_fix_far_off_is_confirmed_by_one_near_it_and_a_while_later(later_s, as
     assert stay.fixes == 0
     stay = hear_fix(wait(stay, later_s), Fix(True, 5e4, aside_m, 25.0))
     assert stay.fixes == believed
-    assert (tuple(stay.place) == (5e4, aside_m)) == believed
+    assert (tuple(stay.place) == (5e4, 0.0)) == believed
 
 
 def test_the_drift_early_in_a_stay_is_that_of_its_first_quarter_of_an_hour_or_first_fix():
