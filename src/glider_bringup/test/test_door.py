@@ -9,6 +9,7 @@ import json
 import pickle
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
@@ -35,6 +36,7 @@ from glider_base.settings import ConfigurationError
 from glider_bringup import console
 from glider_bringup.cli import OF_THE_SCRIPT, app
 from glider_bringup.door.export import write_mat
+from glider_bringup.door.run import chosen_scenario
 from glider_guidance.method import method_step as guidance_step
 from glider_model.ocean.field import field_velocity
 from glider_navigation.method import method_step as navigation_step
@@ -566,6 +568,17 @@ def test_law_of_a_program_is_flown_as_a_class_and_as_a_function(level_law, tmp_p
     line = command_line.glider('verify', one.folder)
     assert line.returncode == 2
     assert 'LevelLaw' in line.stderr and 'Traceback' not in line.stderr
+
+
+def test_threads_each_fly_the_law_that_they_were_given():
+    laws = [run_cell(CELL) for _ in range(8)]
+    with ThreadPoolExecutor(len(laws)) as threads:
+        chosen = list(
+            threads.map(
+                lambda law: chosen_scenario('helix', {}, None, law, None, None, None), laws
+            )
+        )
+    assert [type(one.control.chosen) for one in chosen] == laws
 
 
 def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):

@@ -16,6 +16,7 @@ from glider_base.kernel import kernel
 from glider_bringup.engines.direct import NotFiniteError
 from glider_control.law import LawSettings, law_step
 from glider_guard.rows import LATCHED
+from glider_guidance.settings import GuidanceSettings
 
 WATERS = {
     'rough_water': {},
@@ -152,6 +153,19 @@ def test_a_state_is_flown_on_by_the_numbers_of_the_flight_and_the_orders_of_the_
         steepest = min(steepest, math.degrees(deeper.now['odom_pitch']))
     assert 78.0 < deepest < 84.0
     assert -22.0 < steepest < -18.0
+
+
+def test_an_order_costs_as_much_after_many_as_after_none(monkeypatch):
+    checked = []
+    check = GuidanceSettings.check
+    monkeypatch.setattr(GuidanceSettings, 'check', lambda told: checked.append(1) or check(told))
+    flight, counts = glider.Flight('current_8deg', {'profile.depth_m': 60.0}), []
+    for i in range(8):
+        before = len(checked)
+        flight.order(depth_m=30.0 + i)
+        flight.step()
+        counts.append(len(checked) - before)
+    assert len(set(counts[2:])) == 1, counts
 
 
 class Failing(NamedTuple):

@@ -147,7 +147,7 @@ def charted(values: dict[str, Any]) -> dict[str, Any]:
             start = from_geodetic(*points[0], OriginSettings.model_validate(origin).params())
         except ValueError:  # refused later
             return values
-        initial = {'depth_m': 0.1, **initial, 'north_m': start[0], 'east_m': start[1]}
+        initial = {**initial, 'north_m': start[0], 'east_m': start[1]}
         values = {**values, 'initial': initial}
     return values
 

@@ -139,9 +139,7 @@ class Scenario(Settings):
         'time left out of the score (s); by default 7200 in long runs, else 1800, a dive to '
         'depth_m or half of the run, whichever is shortest',
     )
-    initial: InitialSettings = Field(
-        InitialSettings(depth_m=0.1), description='state at the start'
-    )
+    initial: InitialSettings = Field(InitialSettings(), description='state at the start')
     water: WaterSettings = Field(
         WaterSettings(), description='density of the water, its bottom, and wind'
     )

@@ -478,6 +478,16 @@ def test_navigation_is_told_of_vehicle_launch_and_sensors():
     assert (told.imu_period_s, told.gyro, told.origin.latitude_deg) == (4.0, False, -10.0)
 
 
+@pytest.mark.parametrize('part', sorted({*Scenario.model_fields} - {'changed', 'current'}))
+def test_a_field_that_is_set_to_what_it_is_changes_no_other(part):
+    plain = load_scenario('current_8deg')
+    section = plain.model_dump(mode='json')[part]
+    for name, value in section.items() if isinstance(section, dict) else ():
+        if value is not None:
+            same = load_scenario('current_8deg', {f'{part}.{name}': value})
+            assert getattr(same, part) == getattr(plain, part)
+
+
 def test_fields_that_are_given_stay_as_they_are():
     """A field inside a section that is given too changes the scenario, not what was given."""
     fields = {'sensors': {}, 'sensors.gps_std_m': 7.0}

@@ -188,6 +188,11 @@ def test_vehicle_by_path(edited):
             'hydrodynamics.K_beta.value = 120.0: should be less than or equal to 0 (allowed: ',
         ),
         (
+            'hydrodynamics.K_D0.value',
+            0.0,
+            'hydrodynamics: K_D0 = 0: nothing brakes it (allowed: > 0 kg/m, or ',
+        ),
+        (
             'volume',
             {'value': 6.9, 'unit': 'l', 'source': 'tank, a digit lost'},
             '(file): rigid_body, moving_mass, volume: neutral in water of 1e+04 kg/m^3 ',

@@ -222,10 +222,11 @@ class Flight:
         ----------
         path : mapping or PathSettings, optional
             Another path, as in a scenario; it is entered at its nearest point.
-        depth_m, pitch_deg : float, optional
-            Another depth of the lower turn, from this dive on, another pitch of the glides (deg).
+        depth_m, pitch_deg, wait_s : float, optional
+            Another depth of the lower turn, from this dive on, another pitch of the glides (deg),
+            another wait on the surface between dives (s).
         when : str
-            Of these three: ``'once'``, or ``'surfacing'``: when the vehicle is at the surface.
+            Of these four: ``'once'``, or ``'surfacing'``: when the vehicle is at the surface.
         hold, resume, abort : bool
             Come up and wait at the surface, dive on, or come up for good.
 

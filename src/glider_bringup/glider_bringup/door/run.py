@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,6 +51,9 @@ from glider_mission.scenario import (
 
 if TYPE_CHECKING:
     import xarray
+
+#: A law is known by its name until its scenario is made: not by that of another thread.
+_CHOOSING = Lock()
 
 
 @dataclass(frozen=True)
@@ -153,12 +157,13 @@ def chosen_scenario(
     if law is not None and controller is not None:
         raise ConfigurationError(f'--controller {controller}: not with a law of your own')
     own = own_law(law) if law is not None else None
-    if own:
-        controller = know_law(own)
-    fields = chosen_fields(fields, controller, guidance, seed, duration)
-    if not isinstance(scenario, Scenario):
-        return load_scenario(str(scenario), fields)
-    return changed_scenario(scenario, fields, own) if fields else scenario
+    with _CHOOSING:
+        if own:
+            controller = know_law(own)
+        fields = chosen_fields(fields, controller, guidance, seed, duration)
+        if not isinstance(scenario, Scenario):
+            return load_scenario(str(scenario), fields)
+        return changed_scenario(scenario, fields, own) if fields else scenario
 
 
 # long: most of it says what its parameters are.

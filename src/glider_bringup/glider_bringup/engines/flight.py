@@ -217,8 +217,10 @@ class Held:
         """Fly on by orders that were followed."""
         if followed == self._followed:
             return
-        settings = self._scenario.guidance_settings()
-        for order, _ in followed:
+        settings, known = self._settings, len(self._followed)
+        if followed[:known] != self._followed:  # of a state of before, or of another flight
+            settings, known = self._scenario.guidance_settings(), 0
+        for order, _ in followed[known:]:
             settings = changed(settings, order)
         self._settings, self._followed = settings, followed
         # who ends the run knows what was ordered from outside, as over nodes

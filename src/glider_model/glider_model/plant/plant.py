@@ -123,7 +123,7 @@ class InitialSettings(Settings):
 
     north_m: float = number(0.0, (-1e7, 1e7), 'start position, north (m)')
     east_m: float = number(0.0, (-1e7, 1e7), 'start position, east (m)')
-    depth_m: float = number(0.0, (0.0, 12000.0), 'start depth (m)')
+    depth_m: float = number(0.1, (0.0, 12000.0), 'start depth (m)')
     heading_deg: float = number(0.0, (-360.0, 360.0), 'start heading (deg)')
     pitch_deg: float = number(0.0, (-80.0, 80.0), 'start pitch (deg, + nose up)')
     speed_mps: float = number(0.0, (0.0, 3.0), 'start speed through water (m/s)')

@@ -87,7 +87,7 @@ def with_coefficients(values):
     try:
         found = SETS[name].model_validate(values[name]).coefficients()
     except ValueError:  # what is wrong with the set is told by its own fields
-        found = dict.fromkeys(LIFT_AND_DRAG, 0.0)
+        found = dict.fromkeys(LIFT_AND_DRAG, 1.0)
     return values | {
         field: {'value': found[field], 'unit': unit, 'source': f'follows from {name}'}
         for field, unit in LIFT_AND_DRAG.items()

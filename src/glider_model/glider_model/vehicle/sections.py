@@ -95,6 +95,14 @@ class HydrodynamicsSettings(Settings):
     def _as_others_write_it(cls, values):
         return with_coefficients(values)
 
+    @pydantic.model_validator(mode='after')
+    def _has_drag(self):
+        if not (self.K_D0.value or self.linear_damping.value[0]):
+            raise ValueError(
+                'K_D0 = 0: nothing brakes it (allowed: > 0 kg/m, or linear_damping along x)'
+            )
+        return self
+
 
 class MovingMassSettings(Settings):
     """Mass that slides along x for pitch and turns about x for roll."""
