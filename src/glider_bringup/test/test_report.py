@@ -568,7 +568,7 @@ def test_figure_shows_the_actuators_of_the_vehicle(tmp_path, call, scenario, mov
 
 @pytest.mark.filterwarnings('error')
 def test_figure_of_a_long_title_and_of_still_water(tmp_path, monkeypatch):
-    """All of the title is on the paper, and no current is drawn that is not there."""
+    """All of the title is on the paper, no legend over a curve, no current that is not there."""
     drawn = []
     keep = 'glider_bringup.showing.figure.save_figure'
     monkeypatch.setattr(keep, lambda figure, *_, **__: drawn.append(figure))
@@ -579,6 +579,8 @@ def test_figure_of_a_long_title_and_of_still_water(tmp_path, monkeypatch):
     assert 0.0 <= across.x0 < across.x1 <= figure.bbox.x1
     labels = figure.axes[0].get_legend_handles_labels()[1]
     assert labels == ['desired path', 'track', 'start']
+    for axis in filter(lambda axis: axis.get_legend(), figure.axes):
+        assert axis.get_legend().get_window_extent().y0 >= axis.bbox.y1 - 1.0
 
 
 # ---------------------------------------------------------------------------------- several
