@@ -630,8 +630,13 @@ def test_comparison_names_what_only_one_scenario_has(tmp_path, call):
     one = fly(tmp_path, name='one')
     path = {'kind': 'waypoints', 'waypoints': [[0, 0], [500, 0]]}
     two = fly(tmp_path, name='two', path=path, vehicle='zhang2021_table1')
-    rows = json.loads(call('compare', one, two, '--json')[1])['differences']
+    page = tmp_path / 'both.html'
+    rows = json.loads(call('compare', one, two, '--json', '--out', page)[1])['differences']
+    shown = read_page(page)[0].text
     found = {row['field']: row['values'] for row in rows}
+    by_end = {name.rpartition('.')[2]: name for name in found}
+    assert by_end['value'] in shown
+    assert by_end['source'] not in shown, 'nor a hundred other sentences'
     assert found['path.kind'] == ['straight', 'waypoints']
     assert found['path.length_m'] == [25000.0, None]
     assert found['vehicle.name'] == ['zhang2021', 'zhang2021_table1']

@@ -80,9 +80,11 @@ def differences(runs: list[FlownRun]) -> list[dict[str, Any]]:
 
 
 def difference_rows(found: list[dict[str, Any]]) -> list[list[str]]:
-    """Lines of differences: field, then the text of each value."""
+    """Lines of differences: field, then the text of each value, of vehicles without its source."""
     return [
-        [one['field'], *(_said(one['field'], value) for value in one['values'])] for one in found
+        [name, *(_said(name, value) for value in one['values'])]
+        for one in found
+        if not (name := one['field']).endswith(('.unit', '.source'))
     ]
 
 
