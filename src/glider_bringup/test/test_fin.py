@@ -12,6 +12,7 @@ from glider_bringup.door.run import fly, open_run
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.one_hertz import SECOND, Record, Rows
+from glider_bringup.showing.compare import score_rows
 from glider_mission.blocks import COLUMNS
 from glider_mission.run_folder import make_run_folder
 
@@ -96,7 +97,8 @@ def test_a_run_is_read_back_as_it_was_flown(tmp_path):
     scenario = load_scenario('current_8deg', fields)
     folder = make_run_folder(scenario, tmp_path / 'run')
     fly_recorded(scenario, folder)
-    flown, read = fly(scenario).to_xarray(), open_run(folder).to_xarray()
+    run = fly(scenario)
+    flown, read = run.to_xarray(), open_run(folder).to_xarray()
     for name in ('joint_states_fin', 'command_fin', 'joint_states_roll_mass'):
         np.testing.assert_array_equal(read[name], flown[name])
     assert np.abs(read['command_fin']).max() > 0.05
@@ -104,6 +106,9 @@ def test_a_run_is_read_back_as_it_was_flown(tmp_path):
     others = fly('current_8deg', duration=1.0)
     assert 'command_fin' not in others.to_xarray()
     assert 'fin_deg' not in others.score['actuator_travel']
+    way = f'{run.score["actuator_travel"]["fin_deg"]:,.0f} deg'
+    compared = dict(score_rows([run.score, others.score]))['fin travel']
+    assert [cell.text for cell in compared] == [way, '-']
     assert 'fin' not in yaml.safe_load(others.scenario.to_yaml())['control']
 
 

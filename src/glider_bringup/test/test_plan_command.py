@@ -52,6 +52,20 @@ def test_a_plan_in_json_and_as_a_picture(tmp_path, capsys):
     assert matplotlib.image.imread(picture).std() > 0.05
 
 
+@pytest.mark.parametrize(('speed_kn', 'label'), [(0.3, 'planned route'), (4.0, 'does not arrive')])
+def test_the_picture_of_a_plan_shows_its_mission_and_whether_it_arrives(
+    speed_kn, label, tmp_path, monkeypatch
+):
+    drawn = []
+    keep = 'glider_bringup.showing.ocean.save_figure'
+    monkeypatch.setattr(keep, lambda figure, *_: drawn.append(figure))
+    plan('survey', [f'current.speed_kn={speed_kn}'], out=tmp_path / 'plan.png', as_json=True)
+    axis = drawn[0].axes[0]
+    path, _, route = axis.lines
+    assert np.diff(axis.get_ylim())[0] < 15.0 * np.ptp(path.get_ydata()), 'no dot on a chart'
+    assert route.get_label().startswith(label)
+
+
 def test_a_plan_ends_when_the_dives_of_its_mission_are_flown(capsys):
     plan('slocum_shelf', as_json=True)
     told = json.loads(capsys.readouterr().out)

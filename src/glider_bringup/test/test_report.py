@@ -568,7 +568,7 @@ def test_figure_shows_the_actuators_of_the_vehicle(tmp_path, call, scenario, mov
 
 @pytest.mark.filterwarnings('error')
 def test_figure_of_a_long_title_and_of_still_water(tmp_path, monkeypatch):
-    """All of the title is on the paper, and no current is drawn that is not there."""
+    """All of the title is on the paper, no legend over a curve, no current that is not there."""
     drawn = []
     keep = 'glider_bringup.showing.figure.save_figure'
     monkeypatch.setattr(keep, lambda figure, *_, **__: drawn.append(figure))
@@ -579,6 +579,8 @@ def test_figure_of_a_long_title_and_of_still_water(tmp_path, monkeypatch):
     assert 0.0 <= across.x0 < across.x1 <= figure.bbox.x1
     labels = figure.axes[0].get_legend_handles_labels()[1]
     assert labels == ['desired path', 'track', 'start']
+    for axis in filter(lambda axis: axis.get_legend(), figure.axes):
+        assert axis.get_legend().get_window_extent().y0 >= axis.bbox.y1 - 1.0
 
 
 # ---------------------------------------------------------------------------------- several
@@ -628,8 +630,13 @@ def test_comparison_names_what_only_one_scenario_has(tmp_path, call):
     one = fly(tmp_path, name='one')
     path = {'kind': 'waypoints', 'waypoints': [[0, 0], [500, 0]]}
     two = fly(tmp_path, name='two', path=path, vehicle='zhang2021_table1')
-    rows = json.loads(call('compare', one, two, '--json')[1])['differences']
+    page = tmp_path / 'both.html'
+    rows = json.loads(call('compare', one, two, '--json', '--out', page)[1])['differences']
+    shown = read_page(page)[0].text
     found = {row['field']: row['values'] for row in rows}
+    by_end = {name.rpartition('.')[2]: name for name in found}
+    assert by_end['value'] in shown
+    assert by_end['source'] not in shown, 'nor a hundred other sentences'
     assert found['path.kind'] == ['straight', 'waypoints']
     assert found['path.length_m'] == [25000.0, None]
     assert found['vehicle.name'] == ['zhang2021', 'zhang2021_table1']

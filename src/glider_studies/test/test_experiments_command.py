@@ -144,6 +144,20 @@ def test_a_flight_that_is_cut_short_is_a_verdict_and_a_table(capsys):
     assert 'leg on course 180 deg' in shown
 
 
+@pytest.mark.parametrize('law', ['pid', 'backstepping'])
+def test_what_is_better_than_the_adaptive_law_is_marked_and_the_mark_is_told(law, capsys):
+    """In a narrow terminal, too, no name is cut."""
+    from glider_studies.paper import tables
+
+    rows = [made_up(), made_up(guidance='los_zhang2021'), made_up(law, path_error_m__e2_max=0.1)]
+    one = Experiment('', 'current_8deg', '', '', '', [], judge_limits({}, 'adaptive'))
+    tables.show(report([one], [rows]), Console(width=80))
+    shown = capsys.readouterr().out
+    assert '0.10*' in shown
+    assert '\n* better than the adaptive law\n' in shown
+    assert '…' not in shown
+
+
 def test_command_of_a_row_flies_the_same_scenario(planned):
     cases = [case for one in planned.values() for case in one.cases]
     for case in cases[::7]:

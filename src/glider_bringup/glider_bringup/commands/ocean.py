@@ -34,15 +34,18 @@ def ocean(
         ),
     ] = None,
     rms: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help='rms of what --make makes, at the top (m/s).')
+        float,
+        typer.Option(
+            min=0.0, max=1.0, help='rms of each part of what --make makes, at the top (m/s).'
+        ),
     ] = 0.18,
     error: Annotated[
         float,
         typer.Option(
             min=0.0,
             max=1.0,
-            help='It makes a forecast of that sea instead, whose depth-averaged current is off '
-            'by this rms (m/s).',
+            help='It makes a forecast of that sea instead: each part of its depth-averaged '
+            'current, north and east, is off by this rms (m/s).',
         ),
     ] = 0.0,
     as_json: Json = False,

@@ -150,6 +150,19 @@ SCORES = [
 # fmt: on
 
 
+def told_in(cards: list[dict[str, Any]]) -> list[Score]:
+    """Scores of some cards, with the travel of their steering surfaces, which have any name."""
+    keys = [score.key for score in SCORES]
+    names = sorted({name for card in cards for name in card['actuator_travel']})
+    more = [
+        Score(f'{name.removesuffix("_deg")} travel', key, 'deg', 0, True)
+        for name in names
+        if (key := f'actuator_travel.{name}') not in keys
+    ]
+    at = keys.index('actuator_travel.roll_mass_deg') + 1
+    return SCORES[:at] + more + SCORES[at:]
+
+
 def measured(flown: Flown, only: str = '') -> dict[str, Any]:
     """The part of ``score.json`` that is made from a flight: figures in their groups, or one."""
     found: dict[str, Any] = {}

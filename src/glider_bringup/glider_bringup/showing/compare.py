@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from glider_base.settings import ConfigurationError
 from glider_bringup.scoring.card import STOPPED
-from glider_bringup.scoring.scores import SCORES, Score, reckoned
+from glider_bringup.scoring.scores import Score, reckoned, told_in
 from glider_bringup.showing.panels import ACTUATORS, FLOWN, SPACE, SURFACE, flown_panel
 from glider_bringup.showing.scorecard import engine_text, event_texts, flown_text, show
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page
@@ -80,9 +80,11 @@ def differences(runs: list[FlownRun]) -> list[dict[str, Any]]:
 
 
 def difference_rows(found: list[dict[str, Any]]) -> list[list[str]]:
-    """Lines of differences: field, then the text of each value."""
+    """Lines of differences: field, then the text of each value, of vehicles without its source."""
     return [
-        [one['field'], *(_said(one['field'], value) for value in one['values'])] for one in found
+        [name, *(_said(name, value) for value in one['values'])]
+        for one in found
+        if not (name := one['field']).endswith(('.unit', '.source'))
     ]
 
 
@@ -172,7 +174,7 @@ def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
         rows.append(told('guard', lambda card: '; '.join(event_texts(card, 'guard')) or 'nothing'))
     return rows + [
         (score.label, _cells(score, cards))
-        for score in SCORES
+        for score in told_in(cards)
         if any(score.in_card(card) is not None for card in cards)
     ]
 

@@ -65,19 +65,23 @@ def new_figure(width: float, height: float) -> Any:
     return Figure(figsize=(width, height), layout='constrained')
 
 
-def dress(axis, title: str, x: str, y: str, legend: str = 'upper right', **more) -> None:
-    """Title, labels, grid and the place of a legend, empty without one."""
-    axis.set(title=title, xlabel=x, ylabel=y)
+def dress(
+    axis, title: str, x: str, y: str, legend: bool = True, above: bool = False, **more
+) -> None:
+    """Title, labels, grid and above the curves a legend, beside the title or, ``above``, below."""
+    axis.set_title(title, loc='left', pad=30.0 if above else None)
+    axis.set(xlabel=x, ylabel=y)
     axis.grid(alpha=0.3)
     if legend:
-        axis.legend(loc=legend, fontsize='small', **more)
+        place = {'loc': 'lower right', 'bbox_to_anchor': (1.0, 1.0), 'borderaxespad': 0.0}
+        axis.legend(fontsize='small', ncols=2, frameon=False, **place, **more)
 
 
 def draw_curves(axis, x, title: str, labels: tuple[str, str], curves, width: float = 1.2) -> None:
     """Curves, each with name, values and colour, with a legend if there are several."""
     for name, values, colour in curves:
         axis.plot(x, values, color=colour, linewidth=width, label=name)
-    dress(axis, title, *labels, legend='upper right' if len(curves) > 1 else '')
+    dress(axis, title, *labels, legend=len(curves) > 1)
 
 
 def draw_run(run: FlownRun, file: Path) -> None:
@@ -89,6 +93,10 @@ def draw_run(run: FlownRun, file: Path) -> None:
     traces = run.traces.thinned(POINTS)
     hours, reckons = traces.time_s() / 3600.0, traces.has('place_error_m')
     _draw_track(axes['track'], traces.samples)
+    for turn_s in traces.inflections_s():
+        axes['cross'].axvline(turn_s / 3600.0, color=GREY, linewidth=0.8, linestyle=':')
+    if len(hours):
+        axes['cross'].plot([], [], color=GREY, linestyle=':', label='inflection')
     moved = []
     for (one, _), colour in zip(actuators_of(run), (BLUE, ORANGE, GREEN, GREY), strict=False):
         text = f'{one.title.lower()} / {_WHOLE[one.unit]:g} {one.unit}'
@@ -102,11 +110,6 @@ def draw_run(run: FlownRun, file: Path) -> None:
         ]
         draw_curves(axes[place], hours, name, ('time (h)', label), shown)
     axes['depth'].invert_yaxis()
-    for turn_s in traces.inflections_s():
-        axes['cross'].axvline(turn_s / 3600.0, color=GREY, linewidth=0.8, linestyle=':')
-    if len(hours):
-        axes['cross'].plot([], [], color=GREY, linestyle=':', label='inflection')
-    axes['cross'].legend(loc='upper right', fontsize='small')
     figure.suptitle(f'{run.scenario.name}: {run.scenario.described}', wrap=True)
     save_figure(figure, file, dpi=100)
 

@@ -106,7 +106,7 @@ def navigation_notes(told: dict[str, Any], learns: bool) -> list[str]:
     """
     off = [abs(value) for value in told['surfacing_cross_track_m']]
     if not off:
-        return ['It never came up, so its estimated position was never put to the proof.']
+        return ['It came up from no dive, so its estimated position was never put to the proof.']
     notes = [_came_up(off, learns)]
     error = told['error_m']
     worst = small(error['worst'])

@@ -267,22 +267,30 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
         If the image cannot be written.
     """
     chart, origin = made.chart, scenario.origin.params()
-    latitudes, longitudes = on_chart(chart.norths, chart.easts, origin)
-    north, east = np.moveaxis(chart.current[0], -1, 0)
+    ways = np.concatenate([scenario.path.points(200)[:, :2], made.route.corners])
+    first, last = ways.min(axis=0), ways.max(axis=0)
+    around = 1.5 * max(*(last - first), 2.0 * (chart.norths[1] - chart.norths[0]))
+    n, e = (
+        np.flatnonzero(np.abs(axis - middle) <= around)
+        for axis, middle in zip(chart[1:3], 0.5 * (first + last), strict=True)
+    )
+    latitudes, longitudes = on_chart(chart.norths[n], chart.easts[e], origin)
+    north, east = np.moveaxis(chart.current[0][np.ix_(n, e)], -1, 0)
     label = 'depth-averaged current at the start (m/s)'
     speed = np.hypot(north, east)
     panel = Panel('', label, 'Blues', latitudes, longitudes, speed, (north, east))
     axis = _draw_panel(new_figure(8.0, 6.5), (1, 1, 1), panel)
     axis.set_title(f'{scenario.name}: fronts every 12 h of each leg')
     axis.set_aspect(1.0 / math.cos(math.radians(origin.latitude)))
-    for arrivals in made.route.fronts:
-        reached = np.ma.masked_invalid(arrivals / 3600.0)
+    for arrivals in filter(np.size, made.route.fronts):  # empty of a leg that is not begun
+        reached = np.ma.masked_invalid(arrivals[np.ix_(n, e)] / 3600.0)
         if reached.count():
             levels = np.arange(0.0, float(reached.max()) + 12.0, 12.0)
             axis.contour(longitudes, latitudes, reached, levels, colors='#666666', linewidths=0.5)
     _draw_path(axis, scenario)
     latitude, longitude = on_chart(*made.route.corners.T, origin)
-    axis.plot(longitude, latitude, color=GREEN, label='planned route')
+    label = 'planned route' if made.reachable else 'does not arrive in its time'
+    axis.plot(longitude, latitude, color=GREEN, label=label)
     axis.legend(loc='upper right', fontsize='small')
     save_figure(axis.figure, file, 150)
 

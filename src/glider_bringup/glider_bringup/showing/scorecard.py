@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from glider_bringup.console import output
-from glider_bringup.scoring.scores import SCORES, Score, reckoned
+from glider_bringup.scoring.scores import SCORES, Score, reckoned, told_in
 from glider_bringup.showing.words import span, way
 from glider_mission.changes import told_fields
 from glider_mission.chart import place_told
@@ -151,12 +151,9 @@ def _energy_rows(card: dict) -> list[tuple[str, str]]:
 
 
 def _travel_rows(card: dict) -> list[tuple[str, str]]:
-    """Line of the ways of the actuators; a steering surface may have any name."""
-    travel = card['actuator_travel']
-    known = [one for one in SCORES if one.group == 'actuator_travel']
-    texts = [f'{one.label.removesuffix(" travel")} {_text(card, one)}' for one in known]
-    others = sorted(set(travel) - {one.key.rpartition('.')[2] for one in known})
-    texts += [f'{name.removesuffix("_deg")} {show(travel[name], "deg", 0)}' for name in others]
+    """Line of the ways of the actuators."""
+    ways = [one for one in told_in([card]) if one.group == 'actuator_travel']
+    texts = [f'{one.label.removesuffix(" travel")} {_text(card, one)}' for one in ways]
     return [('actuator travel', ', '.join(texts))]
 
 

@@ -67,7 +67,7 @@ def _scatter(axis, result: Validation) -> None:
     axis.plot(recorded, simulated, '.', color=BLUE, markersize=1.0, rasterized=True)
     span = [float(np.nanmin(recorded)), float(np.nanmax(recorded))]
     axis.plot(span, span, color=GREY, linewidth=0.8)
-    dress(axis, 'Vertical rate, all', 'recorded (cm/s)', 'simulated (cm/s)', legend='')
+    dress(axis, 'Vertical rate, all', 'recorded (cm/s)', 'simulated (cm/s)', legend=False)
 
 
 def _depths(axis, result: Validation) -> None:

@@ -20,7 +20,7 @@ from glider_studies.paper.judges import figure_of
 
 #: Failed checks that are listed; of more only the number is told.
 LISTED = 12
-#: Marks a figure in which the tuned PID is better than the adaptive law.
+#: Marks a figure in which another law is better than the adaptive law.
 BETTER = '*'
 #: Largest steady cross-track error (m).
 STEADY = 'cross_track_m.max_steady'
@@ -39,7 +39,7 @@ def _table(names: list[str], figures: list[str]) -> Table:
     """Empty table with columns of text and columns of figures."""
     table = Table()
     for name in names:
-        table.add_column(name)
+        table.add_column(name, overflow='fold')
     for name in figures:
         table.add_column(name, justify='right')
     return table
@@ -180,9 +180,10 @@ def show(result: dict[str, Any], output: Console) -> None:
         if 'counts' in one:
             _show_search(one, output)
         else:
-            output.print(_TABLES.get(said.get('table'), _by_flight)(one['rows'], said))
-        if one['pid_better'] and said.get('table') != 'survey':
-            output.print(f'{BETTER} the tuned PID is better than the adaptive law')
+            table = _TABLES.get(said.get('table'), _by_flight)(one['rows'], said)
+            output.print(table)
+            if any(BETTER in cell for column in table.columns for cell in column.cells):
+                output.print(f'{BETTER} better than the adaptive law')
         for line in _steering(one['rows']):
             output.print(line)
         if 'remark' in said:

@@ -115,11 +115,11 @@ def _draw_current(figure, drawing: Drawing, flights: Flights, rows: list[dict]) 
             part = _shown(guidance, hours)
             _plot(axis, controller, hours[part], error[part], _STYLES[controller])
     track.axvline(0.0, color=GREY, linewidth=0.8, linestyle=':', label='desired path')
-    track.margins(y=0.15)
-    dress(track, 'Track, adaptive (scales differ)', 'east of the path (m)', 'north (km)')
+    title = 'Track, adaptive (scales differ)'
+    dress(track, title, 'east of the path (m)', 'north (km)', above=True)
     dress(axes['ours'], f'Cross-track error, {_CRAB}', 'time (h)', 'off the path (m)')
     title = f'Cross-track error, {_PAPER}: part of a dive'
-    dress(axes['paper'], title, 'time (h)', 'off the path (m)')
+    dress(axes['paper'], title, 'time (h)', 'off the path (m)', above=True)
     figure.suptitle(
         f'After figure {drawing.number} of the paper: 1.0 kn at {angle} deg off the path\n'
         'The peaks are the start and the turns of the dives'
@@ -151,7 +151,7 @@ def _draw_pitch(figure, drawing: Drawing, flights: Flights, rows: list[dict]) ->
         _plot(pitch, controller, hours, record.pitch[part])
         _plot(error, controller, hours, (record.pitch - record.pitch_ref)[part])
         _plot(mass, controller, hours, 1e3 * record.joints[part, 1])
-    dress(pitch, 'Trim angle (pitch), positive nose up', '', 'pitch (deg)', 'center right')
+    dress(pitch, 'Trim angle (pitch), positive nose up', '', 'pitch (deg)')
     dress(error, 'Pitch less desired pitch', '', 'error (deg)')
     dress(mass, 'Pitch mass, positive forward', 'time (h)', 'position (mm)')
     figure.suptitle(
@@ -187,7 +187,7 @@ def _draw_yaw(figure, drawing: Drawing, flights: Flights, rows: list[dict]) -> N
     ours.set_ylim(min(np.min(steady), 8.0) - 1.0, max(np.max(steady), 12.0) + 4.0)
     y = 'heading\n(deg from north)'
     dress(ours, f'Heading, {_CRAB}', 'time (h)', y)
-    dress(across, f'Cross-track error, {_CRAB}', 'time (h)', 'off the path (m)', legend='')
+    dress(across, f'Cross-track error, {_CRAB}', 'time (h)', 'off the path (m)', legend=False)
     dress(paper, f'Heading, {_PAPER}: part of a dive', 'time (h)', y)
     figure.suptitle(
         f'After figure {drawing.number} of the paper '
@@ -224,7 +224,7 @@ def _draw_envelope(figure, drawing: Drawing, flights: Flights, rows: list[dict])
     axis.set_ylim(0.0, 1.75)
     axis.set_xlim(-5.0, 185.0)
     figure.colorbar(dots, label='largest cross-track error with turns (m)')
-    dress(axis, '', 'angle of the current off the path (deg)', 'current (kn)', legend='')
+    dress(axis, '', 'angle of the current off the path (deg)', 'current (kn)', legend=False)
     figure.legend(loc='outside lower center', ncols=4)
     figure.suptitle(
         'After figure 12 of the paper: where the adaptive law holds the course\n'
