@@ -92,8 +92,8 @@ def pace_of(scenario: Scenario) -> Pace:
     profile, every = params.profile, params.profile.surface_every
     dives = max(1, every)
     stay_s = (profile.wait_ticks + profile.prepare_ticks) * TICK_S if every else 0.0
-    deep = profile.depth - (profile.top_depth if every != 1 else 0.0)
-    glide_s = 2.0 * dives * deep / profile.glide_rate
+    turns = dives - (every > 0)  # that are not at the surface
+    glide_s = 2.0 * (dives * profile.depth - turns * profile.top_depth) / profile.glide_rate
     cycle_s = glide_s + 2.0 * dives * profile.lead_s + stay_s
     speed = _HELD_SHARE * glide_s * params.profile_speed / cycle_s
     return Pace(speed, cycle_s, stay_s / cycle_s, _cycle_wh(scenario, params, cycle_s, stay_s))
