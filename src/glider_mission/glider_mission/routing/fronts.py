@@ -23,8 +23,8 @@ REACH = 5
 #: Slowest way made good that counts (m/s), and the longest piece of a line in one current (m).
 _SLOWEST, _PIECE_M = 0.02, 2500.0
 #: A vehicle on its way looks for what to do so often (s), aims so far ahead on its route (m), and
-#: is at a waypoint from this near on (m); nearer on a leg that is shorter than twice that, but not
-#: nearer than the last of these (m).
+#: from this near on heads for a waypoint (m). One that it cannot head for is passed from there on;
+#: from nearer on a leg that is shorter than twice that, but not nearer than the last of these (m).
 _LOOK_S, _AHEAD_M, NEAR_M, _NEAREST_M = 600.0, 3000.0, 1500.0, 20.0
 
 #: Lines from a point to those around it, int64[n, 2] in steps to the north and to the east.
@@ -207,12 +207,14 @@ def sail(chart, t_s, route, speed, end_s):
         along = (north - route[leg, 0]) * d_n + (east - route[leg, 1]) * d_e
         off = math.hypot(goal_n - north, goal_e - east)
         near = min(NEAR_M, max(_NEAREST_M, NEAR_M * (0.5 * length / NEAR_M) ** 2))
-        if leg == len(route) - 2:
-            if off <= NEAR_M:
-                there_s = line_arrival(chart, t_s, north, east, goal_n, goal_e, speed)
-                if there_s < math.inf:
-                    return there_s if there_s <= end_s else math.inf
-        elif off <= near or along >= length:
+        is_last, there_s = leg == len(route) - 2, math.inf
+        if off <= NEAR_M:
+            there_s = line_arrival(chart, t_s, north, east, goal_n, goal_e, speed)
+        if there_s < math.inf:
+            if is_last:
+                return there_s if there_s <= end_s else math.inf
+            t_s, north, east = there_s, goal_n, goal_e
+        if not is_last and (there_s < math.inf or off <= near or along >= length):
             leg += 1
             continue
         ahead = min(length, max(0.0, along) + _AHEAD_M)

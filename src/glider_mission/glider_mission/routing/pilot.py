@@ -19,6 +19,7 @@ from glider_guidance.path.settings import WaypointPath
 from glider_mission.blocks import COLUMNS
 from glider_mission.routing.forecast_chart import forecast_of, observed
 from glider_mission.routing.plan import (
+    as_dived,
     crossing,
     pace_of,
     route_round,
@@ -49,6 +50,7 @@ class Pilot:
     """Gives the orders of a mission whose route is planned; errors as `forecast_of`."""
 
     def __init__(self, scenario: Scenario) -> None:
+        scenario = as_dived(scenario)
         pace = pace_of(scenario)
         self._scenario, self._speed = scenario, pace.speed
         self._forecast = forecast_of(scenario, pace.stay)

@@ -13,7 +13,7 @@ from glider_guidance.guidance import GuidanceParams
 from glider_mission.routing.forecast_chart import erroneous, forecast_of, with_land
 from glider_mission.routing.fronts import Chart, fronts, sail
 from glider_mission.scenario import Scenario
-from glider_model.ocean.bottom import FlatBottom, least_height
+from glider_model.ocean.bottom import FlatBottom, bottom_depth, least_height
 from glider_model.ocean.density import immersed
 from glider_model.vehicle.file import load_vehicle
 
@@ -21,6 +21,8 @@ from glider_model.vehicle.file import load_vehicle
 _STRAIGHT_M = 1000.0
 #: Whether a leg leads over land is looked at so often along it (m).
 _LOOK_M = 20.0
+#: How deep it is there is looked at so often (m).
+_DIVE_M = 200.0
 #: Errors of a forecast that are tried.
 MEMBERS = 12
 #: What is left of the speed of the polar for a vehicle that steers, by what eddies_10d flies (-).
@@ -92,8 +94,8 @@ def pace_of(scenario: Scenario) -> Pace:
     profile, every = params.profile, params.profile.surface_every
     dives = max(1, every)
     stay_s = (profile.wait_ticks + profile.prepare_ticks) * TICK_S if every else 0.0
-    deep = profile.depth - (profile.top_depth if every != 1 else 0.0)
-    glide_s = 2.0 * dives * deep / profile.glide_rate
+    turns = dives - (every > 0)  # that are not at the surface
+    glide_s = 2.0 * (dives * profile.depth - turns * profile.top_depth) / profile.glide_rate
     cycle_s = glide_s + 2.0 * dives * profile.lead_s + stay_s
     speed = _HELD_SHARE * glide_s * params.profile_speed / cycle_s
     return Pace(speed, cycle_s, stay_s / cycle_s, _cycle_wh(scenario, params, cycle_s, stay_s))
@@ -166,6 +168,30 @@ def route_through(
     return Route(np.array([*corners, *waypoints[done:]]), passed, [*found, *missing], ends)
 
 
+def places_along(route: np.ndarray, step_m: float) -> np.ndarray:
+    """North and east (m), float64[n, 2], of places on straight legs, so far apart at most."""
+    legs = zip(route, route[1:], strict=False)
+    return np.concatenate(
+        [np.linspace(a, b, 2 + int(np.hypot(*(b - a)) / step_m)) for a, b in legs]
+    )
+
+
+def as_dived(scenario: Scenario) -> Scenario:
+    """A mission with dives as deep as its altimeter lets them be, where straight legs can dive.
+
+    It is the harmonic mean, by which as many dives are flown as over the bottom as it is.
+    """
+    profile, bottom = scenario.profile, scenario.bottom()
+    places = places_along(waypoints_of(scenario), _DIVE_M) if profile.clearance_m else []
+    deepest = np.array([bottom_depth(*place, bottom) - profile.clearance_m for place in places])
+    deepest = deepest[deepest > profile.top_depth_m]
+    if not len(deepest):
+        return scenario
+    depth_m = float(1.0 / np.mean(1.0 / np.minimum(deepest, profile.depth_m)))
+    profile = profile.model_copy(update={'depth_m': depth_m})
+    return scenario.model_copy(update={'profile': profile})
+
+
 def crossing(
     chart: Chart, land: np.ndarray, bottom: NamedTuple, route: np.ndarray
 ) -> tuple[int, int] | None:
@@ -173,9 +199,7 @@ def crossing(
 
     There is land by the bottom where that is charted, else by the nearest points, bool[n, m].
     """
-    legs = zip(route, route[1:], strict=False)
-    places = [np.linspace(a, b, 2 + int(np.hypot(*(b - a)) / _LOOK_M)) for a, b in legs]
-    norths, easts = np.concatenate(places).T.copy()
+    norths, easts = places_along(route, _LOOK_M).T.copy()
     step = chart.norths[1] - chart.norths[0]
     rows, columns = (
         np.rint((along - axis[0]) / step).astype(int).clip(0, len(axis) - 1)
@@ -251,6 +275,7 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
 
     ``progress`` gets how many of `MEMBERS` + 1 steps are done.
     """
+    scenario = as_dived(scenario)
     pace, end_s = pace_of(scenario), scenario.duration_s
     forecast = forecast_of(scenario, pace.stay)
     chart, land = forecast.sailed(forecast.chart), forecast.land
