@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A flight in one's own hands: the bits of a flight at once, however it is cut up or carried."""
 
+import copy
 import math
 import pickle
 import subprocess
@@ -153,6 +154,12 @@ def test_a_state_is_flown_on_by_the_numbers_of_the_flight_and_the_orders_of_the_
         steepest = min(steepest, math.degrees(deeper.now['odom_pitch']))
     assert 78.0 < deepest < 84.0
     assert -22.0 < steepest < -18.0
+
+
+@pytest.mark.parametrize('way', [pickle.dumps, copy.copy, copy.deepcopy])
+def test_who_copies_a_flight_is_told_to_keep_its_state(way):
+    with pytest.raises(TypeError, match='keep its state, and restore that'):
+        way(glider.Flight('current_8deg'))
 
 
 def test_an_order_costs_as_much_after_many_as_after_none(monkeypatch):

@@ -149,6 +149,12 @@ class Flight:
         """All that the flight is at this moment, to be kept, pickled and restored."""
         return FlightState(self._held.keep(), self._past)
 
+    def __reduce__(self):
+        raise TypeError(
+            'a Flight lies in compiled memory and is not copied: keep its state, and restore that '
+            'in another Flight of the same scenario'
+        )
+
     def restore(self, state: FlightState) -> 'Flight':
         """Go on from a state, of this flight or of another one of the same scenario.
 
