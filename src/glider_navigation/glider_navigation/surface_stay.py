@@ -134,7 +134,9 @@ def take_fix(stay, fix):
     off_n, off_e = fix.p_n - stay.place.n, fix.p_e - stay.place.e
     drift = Vector(stay.drift.n + k_v * off_n, stay.drift.e + k_v * off_e)
     vv, early = k.vv - k_v * k.pv, stay.early
-    if stay.t_s <= EARLY_S or stay.fixes == 0:
+    if stay.fixes == 0:  # one fix tells where it is, not how it drifts
+        early = Early(drift, LOST_DRIFT_STD * LOST_DRIFT_STD, stay.t_s)
+    elif stay.t_s <= EARLY_S:
         early = Early(drift, vv, stay.t_s)
     return replace(
         stay,

@@ -188,6 +188,7 @@ def test_the_drift_early_in_a_stay_is_that_of_its_first_quarter_of_an_hour_or_fi
     assert (soon.early.drift, soon.early.t_s) == (soon.drift, 890.0)
     late = stay_with(stay, [(1200.0, 300.0, -20.0, 25.0)])
     assert (late.early.drift, late.early.t_s) == (late.drift, 1200.0)
+    assert soon.early.variance < DRIFT_STD**2 < late.early.variance, 'one fix tells no drift'
     for one in soon, late:
         later = stay_with(one, [(600.0, 900.0, 90.0, 25.0)])
         assert later.early == one.early
