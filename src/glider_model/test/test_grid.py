@@ -446,8 +446,8 @@ def test_a_chart_is_land_where_it_has_no_number(tmp_path):
     data[0, :3] = [math.nan, math.inf, -math.inf]
     data[0, 3:5] = [20.0, math.nan]  # within land, too
     path = written(data.to_dataset(), tmp_path / 'holes.nc')
-    seen = contents(path).parts['bottom'].seen
-    assert np.all(seen.depth[0, :5] <= 0.0) and np.all(seen.depth[1:] >= 100.0)
+    depth = contents(path).parts['bottom'].seen.water[0, 0, ..., 0]
+    assert np.all(depth[0, :5] <= 0.0) and np.all(depth[1:] >= 100.0)
 
 
 def test_a_path_over_land_is_refused(tmp_path):

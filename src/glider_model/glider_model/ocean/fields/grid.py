@@ -25,8 +25,8 @@ from glider_base.settings import Settings, beside
 from glider_model.ocean.field import FieldSettings, Mission, bracket, field_velocity
 from glider_model.ocean.grid_file import GRIDS, Loaded, Window, fingerprint, load
 
-#: Water around the path that is read too, as far as the file has it (m).
-MARGIN_M = 150_000.0
+#: Water, or bottom, around the path that is read too, as far as the file has it (m).
+MARGINS_M = {'currents': 150_000.0, 'water': 150_000.0, 'bottom': 50_000.0}
 #: A place is not beyond a file by what it was rounded (deg).
 EDGE_DEG = 1e-9
 
@@ -172,11 +172,11 @@ class GridSettings(GridFileSettings, FieldSettings):
         )
 
 
-@functools.lru_cache(maxsize=4)
+@functools.lru_cache(maxsize=8)
 def _loaded(file: str, stamp: tuple[int, int], mission: Mission, of: str) -> tuple[Loaded, float]:
     """What a mission needs of a version of a file, and its start (s since 1970)."""
     needed = mission_window(mission)
-    window = widened(needed, MARGIN_M)
+    window = widened(needed, MARGINS_M[of])
     begin_s, lasts_s = window.begin - mission.earlier_s, window.lasts + mission.earlier_s
     window = window._replace(begin=begin_s, lasts=lasts_s)
     loaded = load(Path(file), window, needed, GRIDS[of])
