@@ -119,6 +119,19 @@ class GridFileSettings(Settings):
             if is_land(*at):
                 raise ConfigurationError(f'{told} land (allowed: water)')
 
+    def grid_params(self) -> 'GridParams':
+        """What was read of the file, for kernels.
+
+        Raises
+        ------
+        ConfigurationError
+            Naming the file, and what of it or of the mission is at fault.
+        """
+        loaded, begin = self.loaded()
+        self.check_places(self.mission.places, 'on the path')
+        (times, *others), origin = loaded.axes, self.mission.origin.params()
+        return GridParams(times - begin, *others, loaded.water, origin)
+
     def known(self) -> 'GridFileSettings':
         """Copy with the fingerprint of its file.
 
@@ -152,24 +165,8 @@ class GridSettings(GridFileSettings, FieldSettings):
         return loaded.land[np.ix_(*nearest)]
 
     def params(self) -> 'GridParams':
-        """Kernel parameters.
-
-        Raises
-        ------
-        ConfigurationError
-            Naming the file, and what of it or of the mission is at fault.
-        """
-        loaded, begin = self.loaded()
-        self.check_places(self.mission.places, 'on the path')
-        axes = loaded.axes
-        return GridParams(
-            times=axes.times - begin,
-            depths=axes.depths,
-            latitudes=axes.latitudes,
-            longitudes=axes.longitudes,
-            water=loaded.water,
-            origin=self.mission.origin.params(),
-        )
+        """Kernel parameters; errors as of `grid_params`."""
+        return self.grid_params()
 
 
 @functools.lru_cache(maxsize=8)
@@ -226,13 +223,13 @@ class GridParams(NamedTuple):
     depths: np.ndarray  #: float64[z] (m)
     latitudes: np.ndarray  #: float64[y] (deg)
     longitudes: np.ndarray  #: float64[x] (deg), around the origin
-    water: np.ndarray  #: float32[t, z, y, x, 2], to the north and to the east (m/s)
+    water: np.ndarray  #: float32[t, z, y, x, 2]; a current to the north and to the east (m/s)
     origin: Origin
 
 
 @kernel
 def interpolate(t_s, depth, latitude, longitude, params):
-    """Velocity of a grid to the north and to the east (m/s), linear between its points."""
+    """Both numbers of a grid, such as a velocity north and east (m/s), linear between points."""
     t, t_next, f_t = bracket(t_s, params.times)
     z, z_next, f_z = bracket(depth, params.depths)
     y, y_next, f_y = bracket(latitude, params.latitudes)
