@@ -194,7 +194,10 @@ def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
         laws = fields.pop('laws', one.get('laws', ['adaptive', 'pid']))
         if 'plant' in fields:
             seed = fields.pop('plant')
-            fields |= _plant(seed, load_scenario(scenario, fields))
+            vehicle = load_vehicle(load_scenario(scenario, fields).vehicle).params()
+            plant = sample_plant(seed, vehicle)
+            water = {f'water.{name}': value for name, value in plant.pop('water').items()}
+            fields |= {**plant, **water}
         if 'fault' in fields:
             fields['faults'] = [fields.pop('fault')]
         name = one['named'].format(*names) if 'named' in one else ', '.join(names)
@@ -207,26 +210,18 @@ def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
     return cases
 
 
-def _plant(seed: int, scenario: Scenario) -> dict[str, Any]:
-    """Fields of a plant of Monte Carlo."""
-    plant = sample_plant(seed, load_vehicle(scenario.vehicle).params())
-    water = {f'water.{name}': value for name, value in plant.pop('water').items()}
-    return {**plant, **water}
-
-
 def _changed(case: Case) -> dict[str, Any]:
-    """What is wrong with the vehicle of a case, and how it steers if that is."""
+    """What is wrong with the vehicle of a case, and how it steers if that is.
+
+    That is its turn rate over sin(roll) over that of its file, in dive and climb.
+    """
     facts = {'changes': case.changes}
     if 'perturb.K_MY' in case.changes:
-        facts['steering'] = steering_share(load_scenario(case.scenario, case.changes))
+        scenario = load_scenario(case.scenario, case.changes)
+        vehicle = load_vehicle(scenario.vehicle).params()
+        frame = airframe(vehicle, perturbed(vehicle, scenario.perturb))
+        facts['steering'] = {name: frame[f'steering_{name}'] for name in ('dive', 'climb')}
     return facts
-
-
-def steering_share(scenario: Scenario) -> dict[str, float]:
-    """Turn rate over sin(roll) of the plant over that of its file, in dive and climb."""
-    vehicle = load_vehicle(scenario.vehicle).params()
-    frame = airframe(vehicle, perturbed(vehicle, scenario.perturb))
-    return {'dive': frame['steering_dive'], 'climb': frame['steering_climb']}
 
 
 def _in_current(case: Case, speed: float) -> dict[str, Any]:
