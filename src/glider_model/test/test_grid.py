@@ -295,7 +295,7 @@ def test_what_is_in_a_file(tmp_path):
     found = contents(path)
     assert list(found.parts) == ['currents'] and not found.refused
     currents = found.parts['currents']
-    assert [one.name for one in currents.variables] == ['water_v', 'water_u']
+    assert [one['name'] for one in currents.variables] == ['water_v', 'water_u']
     np.testing.assert_allclose(currents.axes['depth'], DEPTHS)
     assert currents.axes['time'][0] == TIMES[0].astype('M8[s]').astype(float)
 

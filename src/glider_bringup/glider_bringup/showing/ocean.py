@@ -86,7 +86,7 @@ def _uppermost(seen: Loaded) -> Loaded:
 
 def _told(name: str, part: Part) -> dict[str, Any]:
     """What a part of a file is, how far it goes, and the range of its numbers."""
-    variables = [{**one._asdict(), 'low': None, 'high': None} for one in part.variables]
+    variables = [{**one, 'low': None, 'high': None} for one in part.variables]
     told = {'variables': variables, **_extent(part.axes), 'seen': None, 'land_share': None}
     if name == 'currents':
         told['speed_mps'] = None

@@ -559,20 +559,12 @@ def _fill_land(levels: np.ndarray) -> np.ndarray:
     return levels
 
 
-class Variable(NamedTuple):
-    """A variable that can be used."""
-
-    name: str
-    what: str
-    standard_name: str  #: what it is taken for, in CF
-    units: str  #: as the file says
-    unit: str  #: what is made of them
-
-
 class Part(NamedTuple):
     """What of a file can be used for one purpose."""
 
-    variables: tuple[Variable, ...]
+    #: of each variable its name, what it is, the standard_name it is taken for in CF, units as the
+    #: file says, and the unit that is made of them
+    variables: list[dict[str, str]]
     axes: dict[str, np.ndarray]  #: each increasing; a bottom has neither time nor depth
     #: in the middle of its time: all levels, or the uppermost if all are too large to be read;
     #: None if that is, too
@@ -626,10 +618,13 @@ def _part(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> Part:
             there = axes._replace(times=axes.times[time], depths=axes.depths[:levels])
             seen = _read(layout, some, there)
             break
-    variables = tuple(
-        Variable(name, one.what, standard, str(dataset[name].attrs.get('units', '')), one.unit)
+    variables = [
+        {
+            **{'name': name, 'what': one.what, 'standard_name': standard},
+            **{'units': str(dataset[name].attrs.get('units', '')), 'unit': one.unit},
+        }
         for name, standard, one in zip(layout.variables, layout.standards, wanted, strict=True)
-    )
+    ]
     told = dict(zip(_AXES, axes, strict=True))
     return Part(variables, {axis: told[axis] for axis in _allowed(wanted)}, seen)
 
