@@ -17,7 +17,8 @@ from glider_base.frames import (
 from glider_base.kernel import kernel, replace
 from glider_base.slot import slot
 from glider_model.ocean.field import bracket
-from glider_model.ocean.fields.grid import Coast, GridFileSettings
+from glider_model.ocean.fields.grid import GridFileSettings
+from glider_model.ocean.grid_file import Loaded
 
 
 class FlatBottom(NamedTuple):
@@ -68,19 +69,14 @@ class BathymetrySettings(GridFileSettings):
 
     of: ClassVar[str] = 'bottom'
 
-    def coast(self) -> Coast:
-        """What is read of the file, and where on it there is land."""
-        chart = self._charted()
+    def is_land(self, loaded: Loaded, place: tuple[float, float]) -> bool:
+        """Whether there is land at a place (deg), between the points too."""
+        chart = self._charted(loaded)
+        return bottom_depth(*from_geodetic(*place, chart.origin), chart) <= 0.0
 
-        def is_land(latitude: float, longitude: float) -> bool:
-            place = from_geodetic(latitude, longitude, chart.origin)
-            return bottom_depth(*place, chart) <= 0.0
-
-        return Coast(chart.latitudes, chart.longitudes, is_land)
-
-    def _charted(self) -> ChartedBottom:
-        (axes, water, *_), _ = self.loaded()
-        return ChartedBottom(*axes[2:], water[0, 0, ..., 0], self.mission.origin.params())
+    def _charted(self, loaded: Loaded) -> ChartedBottom:
+        depth, origin = loaded.water[0, 0, ..., 0], self.mission.origin.params()
+        return ChartedBottom(*loaded.axes[2:], depth, origin)
 
     def params(self) -> ChartedBottom:
         """Kernel parameters.
@@ -91,7 +87,7 @@ class BathymetrySettings(GridFileSettings):
             Naming the file, and what of it or of the mission is at fault.
         """
         self.check_places(self.mission.places, 'on the path')
-        return self._charted()
+        return self._charted(self.loaded()[0])
 
 
 @kernel

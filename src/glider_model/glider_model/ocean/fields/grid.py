@@ -10,7 +10,7 @@ is carried out of it finds the water of its edge.
 import functools
 import math
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import ClassVar, Literal, NamedTuple
 
@@ -29,14 +29,6 @@ from glider_model.ocean.grid_file import GRIDS, Loaded, Window, fingerprint, loa
 MARGINS_M = {'currents': 150_000.0, 'water': 150_000.0, 'bottom': 50_000.0}
 #: A place is not beyond a file by what it was rounded (deg).
 EDGE_DEG = 1e-9
-
-
-class Coast(NamedTuple):
-    """What is read of a file, and where on it there is land."""
-
-    latitudes: np.ndarray  #: (deg), increasing
-    longitudes: np.ndarray
-    is_land: Callable[[float, float], bool]  #: at a latitude and longitude (deg)
 
 
 class GridFileSettings(Settings):
@@ -87,15 +79,10 @@ class GridFileSettings(Settings):
         loaded, start_s = self.loaded()
         return start_s if len(loaded.axes.times) > 1 else None
 
-    def coast(self) -> Coast:
-        """What is read of the file, and where there is land, by the nearest point of its grid."""
-        (*_, latitudes, longitudes), _, _, land = self.loaded()[0]
-
-        def is_land(latitude: float, longitude: float) -> bool:
-            row = np.abs(latitudes - latitude).argmin()
-            return bool(land[row, np.abs(longitudes - longitude).argmin()])
-
-        return Coast(latitudes, longitudes, is_land)
+    def is_land(self, loaded: Loaded, place: tuple[float, float]) -> bool:
+        """Whether there is land at a place (deg) of what is read: at the nearest of its points."""
+        axes = zip(loaded.axes[2:], place, strict=True)
+        return bool(loaded.land[tuple(np.abs(axis - one).argmin() for axis, one in axes)])
 
     def check_places(self, places: Iterable[tuple[float, float]], what: str) -> None:
         """Refuse places (deg) that are on land, or beyond what is read around the path.
@@ -105,7 +92,8 @@ class GridFileSettings(Settings):
         ConfigurationError
             Naming the file, the place, and ``what`` it is: such as 'on the path'.
         """
-        latitudes, longitudes, is_land = self.coast()
+        loaded, _ = self.loaded()
+        latitudes, longitudes = loaded.axes[2:]
         for place in places:
             at = _beside(place, self.mission.origin.longitude_deg)
             told = f'file {self.file}: {place[0]:.4f}, {place[1]:.4f} {what} is'
@@ -116,7 +104,7 @@ class GridFileSettings(Settings):
                     f'{latitudes[-1]:.3f}, {longitudes[0]:.3f} to {longitudes[-1]:.3f}, around '
                     'the path as far as it has water)'
                 )
-            if is_land(*at):
+            if self.is_land(loaded, at):
                 raise ConfigurationError(f'{told} land (allowed: water)')
 
     def grid_params(self) -> 'GridParams':
