@@ -156,10 +156,7 @@ class _Layout(NamedTuple):
 def _opened(path: Path) -> Iterator['xarray.Dataset']:
     """Dataset of a file, of which nothing is read yet.
 
-    Raises
-    ------
-    ConfigurationError
-        Naming the file; also of what is found wrong in it.
+    A ConfigurationError names the file, also of what is found wrong in it.
     """
     import xarray
 
@@ -260,10 +257,7 @@ def _flat(dataset: 'xarray.Dataset') -> str:
 def _find_axes(dataset: 'xarray.Dataset', name: str, allowed: tuple[str, ...]) -> dict[str, str]:
     """Dimension of a variable by axis.
 
-    Raises
-    ------
-    ValueError
-        Naming the dimension that is none, and what grid it seems to be.
+    A ValueError names the dimension that is none, and what grid it seems to be.
     """
     found: dict[str, str] = {}
     for dimension in map(str, dataset[name].dims):
@@ -287,20 +281,17 @@ def _find_axes(dataset: 'xarray.Dataset', name: str, allowed: tuple[str, ...]) -
 
 def _times(variable: 'xarray.Variable') -> np.ndarray:
     """Times of an axis (s since 1970, UTC)."""
-    import xarray
+    from xarray.coding.times import decode_cf_datetime
 
+    units, calendar = variable.attrs.get('units'), variable.attrs.get('calendar')
     try:
-        told = {name: text for name, text in variable.attrs.items() if name != 'bounds'}
-        bare = xarray.Dataset(coords={'time': ('time', variable.values, told)})
-        decoded = xarray.decode_cf(bare)
-        values = decoded['time'].values
+        values = decode_cf_datetime(variable.values, str(units), calendar)
     except (ValueError, ImportError, OverflowError):  # of other calendars, by a library for them
         values = np.empty(0)
     if values.dtype.kind != 'M':
-        calendar = variable.attrs.get('calendar', 'none')
         raise ValueError(
-            f'time: units = {variable.attrs.get("units")!r}, calendar = {calendar!r}: no times of '
-            "this world (allowed: such as 'hours since 1950-01-01', of the standard calendar)"
+            f'time: units = {units!r}, calendar = {calendar or "none"!r}: no times of this world '
+            "(allowed: such as 'hours since 1950-01-01', of the standard calendar)"
         )
     return values.astype('datetime64[ns]').astype(np.int64) / 1e9
 
@@ -321,10 +312,7 @@ def _allowed(wanted: tuple[Wanted, ...]) -> tuple[str, ...]:
 def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
     """Where what is wanted of a dataset and its axes are.
 
-    Raises
-    ------
-    ValueError
-        Naming what is missing, or is no regular grid.
+    A ValueError names what is missing, or is no regular grid.
     """
     found = [_variable(dataset, one) for one in reversed(wanted)][::-1]
     names, standards = zip(*found, strict=True)
@@ -448,12 +436,7 @@ def _refuse_uncovered(axes: Axes, window: Window) -> None:
     """Refuse a grid that does not cover a window in place or time.
 
     A grid with one time is a steady one. Above its first level and below its last one it has the
-    water of these.
-
-    Raises
-    ------
-    ValueError
-        Naming the axis, and what there is.
+    water of these. A ValueError names the axis, and what there is.
     """
     if len(axes.times) > 1 and not math.isnan(window.begin):
         first, last = axes.times[0], axes.times[-1]
