@@ -25,7 +25,6 @@ from glider_flights.folders import (
 from glider_flights.netcdf import names_of
 from glider_flights.record import (
     DIVE_DEPTH_M,
-    LONGEST_GAP_S,
     NOT_KNOWN,
     Cut,
     Fixes,
@@ -33,14 +32,13 @@ from glider_flights.record import (
     Instruments,
     OnBoard,
     Polar,
-    Samples,
     Segment,
     angles_at_times,
-    at_surface,
     at_times,
     cut,
     instruments,
     local_metres,
+    samples_of,
     usual,
 )
 
@@ -136,7 +134,8 @@ def read_slocum(
             told, declined = 'magnetic north is taken for true north', 0.0
         notes.append(f'm_gps_mag_var is not recorded: {told}')
     origin, fixes = _fixes(sensors)
-    cuts, left_out = cut(fixes, _samples(sensors, declined))
+    told = (sensors[name] for name in ('m_pitch', 'm_heading'))
+    cuts, left_out = cut(fixes, samples_of(*sensors['m_depth'], *told, -declined))
     ends = [*(one.before.time_s[-1] for one in cuts), math.inf][1:]
     segments = [
         Segment(
@@ -434,14 +433,6 @@ def _turned(sensors: Sensors) -> float:
 def _before(time_s: np.ndarray, own_s: np.ndarray, values: np.ndarray) -> np.ndarray:
     """The last of values with times of their own before other times, NaN before the first."""
     return np.append(values, math.nan)[np.searchsorted(own_s, time_s) - 1]
-
-
-def _samples(sensors: Sensors, declined: float) -> Samples:
-    time_s, depth_m = sensors['m_depth']
-    gap = LONGEST_GAP_S, at_surface(time_s, depth_m)
-    heading = angles_at_times(time_s, *sensors['m_heading'], *gap) - declined
-    pitch = at_times(time_s, *sensors['m_pitch'], *gap)
-    return Samples(time_s, depth_m, pitch, heading, np.full(len(time_s), math.nan))
 
 
 def _on_board(
