@@ -12,7 +12,7 @@ from glider_bringup.scoring.card import fly_scored
 from glider_guard.witness import AFLOAT_M
 from glider_mission.choices import combination_of
 from glider_mission.scenario import load_scenario
-from glider_studies.paper.experiments import Experiment, Study, make_study
+from glider_studies.paper.experiments import Experiment, make_study
 from glider_studies.paper.judges import Check
 
 NAME = 'bottoms'
@@ -104,4 +104,4 @@ def experiment(seed: int) -> Experiment:
     first = FIRST + COUNT * seed
     tasks = {(one, way): (one, way) for one in range(first, first + COUNT) for way in WAYS}
     loops = {combination_of(load_scenario('slocum_shelf'))}
-    return make_study(NAME, seed, judge, Study(fly_one, tasks, loops, rows))
+    return make_study(NAME, seed, judge, fly_one, tasks, loops, rows)
