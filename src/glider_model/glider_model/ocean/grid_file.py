@@ -356,11 +356,6 @@ def _chosen(values: np.ndarray, low: float, high: float) -> np.ndarray:
     return order[max(0, first - 1) : last + 1]
 
 
-def _unwrapped(longitudes: np.ndarray, middle: float) -> np.ndarray:
-    """The same meridians, as near to the middle as they can be (deg)."""
-    return middle + (longitudes - middle + 180.0) % 360.0 - 180.0
-
-
 def _runs(indices: np.ndarray) -> list[slice]:
     """Indices as slices of steps of 1 or -1: files are read in slices."""
     found = []
@@ -416,7 +411,8 @@ def _select(layout: _Layout, window: Window | None) -> tuple[dict[str, np.ndarra
     middle = 0.5 * (longitudes.min() + longitudes.max())
     if window is not None:
         middle = 0.5 * (window.west + window.east)
-    values['longitude'] = _unwrapped(longitudes, middle)
+    # the same meridians, as near to the middle as they can be
+    values['longitude'] = middle + (longitudes - middle + 180.0) % 360.0 - 180.0
     if window is None:
         chosen = {axis: np.argsort(values[axis], kind='stable') for axis in _AXES}
     else:
