@@ -60,7 +60,7 @@ FLOORS = {
         ('random_faults', 'workers'),
         ('montecarlo', 'sweep'),
         ('paper',),
-        ('bounds', 'hunt', 'routes', 'forecasts', 'bottoms', 'showing', 'at_work'),
+        ('bounds', 'hunt', 'routes', 'forecasts', 'bottoms', 'showing'),
         ('door', 'commands'),
     ),
 }

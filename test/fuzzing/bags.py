@@ -170,7 +170,7 @@ def _recover(folder: Path) -> Answer:
         copy = Path(shutil.copytree(folder, Path(scratch) / folder.name))
         found = recover(copy)
         card, is_told = _score(copy)
-        return (found.counts, card), is_told or bool(found.rebuilt)
+        return (found['topics'], card), is_told or bool(found['rebuilt'])
 
 
 COMMANDS: dict[str, Callable[[Path], Answer]] = {

@@ -109,7 +109,7 @@ def test_recovered_file_is_what_the_recorder_would_have_left(short_run, tmp_path
     for length in (*places, len(whole) - 1):
         file_of(folder).write_bytes(whole[:length])
         (folder / 'metadata.yaml').unlink()
-        assert recover(folder).rebuilt == (file_of(folder).name, 'metadata.yaml')
+        assert recover(folder)['rebuilt'] == [file_of(folder).name, 'metadata.yaml']
         assert file_of(folder).read_bytes() == whole
         assert (folder / 'metadata.yaml').read_bytes() == metadata
 
@@ -130,7 +130,7 @@ def test_metadata_alone_is_made_anew(short_run, tmp_path, text):
     (folder / 'metadata.yaml').unlink()
     if text is not None:
         (folder / 'metadata.yaml').write_text(text)
-    assert recover(folder).rebuilt == ('metadata.yaml',)
+    assert recover(folder)['rebuilt'] == ['metadata.yaml']
     for name in ('metadata.yaml', file_of(folder).name):
         assert (folder / name).read_bytes() == (short_run / name).read_bytes()
 
@@ -212,5 +212,5 @@ def test_power_that_goes_while_it_recovers_costs_nothing(cut_run, short_run, mon
         with pytest.raises(KeyboardInterrupt):
             recover(folder)
     assert file_of(folder).read_bytes() == before
-    assert recover(folder).counts['/glider/odom'] == 1200
+    assert recover(folder)['topics']['/glider/odom'] == 1200
     assert Bag(folder).end_ns == 1199 * TICK_NS

@@ -86,7 +86,6 @@ def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
 
 #: Less than this is no pumping of a Seaglider: oil let in, or the valve (cc, A).
 PUMPED_CC, PUMPING_A = 2.0, 0.05
-_METRES_PER_CM = 0.01
 #: Its moving masses: field of the vehicle file.
 MASSES = {'pitch': 'pitch_mass', 'roll': 'roll_mass'}
 
@@ -138,7 +137,7 @@ class _Dive(NamedTuple):
 def _pumpings(path: Path) -> _Dive:
     """Read a dive."""
     moves = names_of('moves')
-    of_masses = {one: {one: 1.0} for name in MASSES for one in _variables_of(name)}
+    of_masses = {f'{name}_{key}': of for name in MASSES for key, of in names_of(name).items()}
     found = read(path, moves | of_masses)
     refuse_missing(path, found, moves, 'for the energy of a Seaglider')
     rows = {key: len(found[key]) for key in moves if key != 'cc_per_count'}
@@ -157,22 +156,15 @@ def _pumpings(path: Path) -> _Dive:
     )
 
 
-def _variables_of(name: str) -> list[str]:
-    """Variables of a moving mass, all of which a file may lack; the last: a count in cm or deg."""
-    parts = ('ad_start', 'ad', 'i', 'volts', 'secs')
-    return [*(f'gc_{name}_{part}' for part in parts), f'log_{name.upper()}_CNV']
-
-
 def _moved(found: dict[str, np.ndarray], name: str) -> np.ndarray:
     """Energy (J) and way (m, deg) of one moving mass in a dive, shape (2,); zeros if not told."""
-    told = [found.get(one, ()) for one in _variables_of(name)]
+    told = [found.get(f'{name}_{key}', ()) for key in names_of(name)]
     if not all(map(len, told)):
         return np.zeros(2)
     before, after, amps, volts, seconds, per_count = told
-    scale = abs(per_count[0]) * (_METRES_PER_CM if name == 'pitch' else 1.0)
     energy = amps * volts * np.abs(seconds)
     ran = (seconds != 0.0) & (before > 0.0) & np.isfinite(energy * after)
-    return np.array([energy[ran].sum(), scale * np.abs(after - before)[ran].sum()])
+    return np.array([energy[ran].sum(), abs(per_count[0]) * np.abs(after - before)[ran].sum()])
 
 
 # ---- a Slocum

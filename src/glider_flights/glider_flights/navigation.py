@@ -10,7 +10,7 @@ second run, which believes in no current.
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,17 +52,20 @@ TICKS = 36_000
 SHORTEST_DRIFT_S = 60.0
 
 
-class Reckoned(NamedTuple):
+class Row(NamedTuple):
     """What navigation makes of a segment; places and ways of shape (2,): north, east."""
 
+    segment: Segment
     #: When it dived and when it came up (s since 1970), and where, by the fixes of its stays (m).
     dived_s: float
     surfaced_s: float
     dived_m: np.ndarray
     surfaced_m: np.ndarray
     way_m: np.ndarray  #: way through the water between the two (m)
-    believed_m: np.ndarray  #: where it believed to come up, from where it dived (m)
     told_mps: np.ndarray  #: current that it told afterwards (m/s)
+    #: Distance from where it surfaced to where it was forecast (m), by name; NaN for the first.
+    missed_m: dict[str, float]
+    over: str  #: what the vehicle's own current is a mean over, see `Flight`
 
     @property
     def seconds(self) -> float:
@@ -73,6 +76,15 @@ class Reckoned(NamedTuple):
     def dac_mps(self) -> np.ndarray:
         """Depth-averaged current, of shape (2,): north, east (m/s)."""
         return (self.surfaced_m - self.dived_m - self.way_m) / self.seconds
+
+    @property
+    def comparable_mps(self) -> np.ndarray:
+        """Our current over what the vehicle's own is a mean, of shape (2,): north, east (m/s)."""
+        if self.over != 'between fixes':
+            return self.dac_mps
+        before, after = self.segment.before, self.segment.after
+        moved_m = after.place_m[0] - before.place_m[-1]
+        return (moved_m - self.way_m) / (after.time_s[0] - before.time_s[-1])
 
 
 def check(method: str) -> None:
@@ -87,19 +99,6 @@ def check(method: str) -> None:
         )
 
 
-def reckon(
-    flight: Flight, run: Sequence[Segment], method: str, progress: Callable[[], None]
-) -> list[Reckoned]:
-    """Navigate segments that follow each other."""
-    still = list(_navigated(flight, run, method, 'none', progress))
-    led = list(_navigated(flight, run, method, 'persistence', progress))
-    told = [one.told_mps for one in led[1:]]
-    return [
-        _reckoned(segment, one, other.way_m, current)
-        for segment, one, other, current in zip(run, still, led, told, strict=False)
-    ]
-
-
 class _Under(NamedTuple):
     """What came out of the ticks from a dive until the next one."""
 
@@ -107,13 +106,6 @@ class _Under(NamedTuple):
     surfaced_s: float
     way_m: np.ndarray
     told_mps: np.ndarray  #: at the end: the current of the segment before
-
-
-def _reckoned(segment: Segment, under: _Under, led_m, told_mps) -> Reckoned:
-    dived_s, dived_m = _at_surface(segment.before, -1, under.dived_s)
-    surfaced_s, surfaced_m = _at_surface(segment.after, 0, under.surfaced_s)
-    believed_m = dived_m + led_m
-    return Reckoned(dived_s, surfaced_s, dived_m, surfaced_m, under.way_m, believed_m, told_mps)
 
 
 def _at_surface(stay: Fixes, nearest: int, time_s: float) -> tuple[float, np.ndarray]:
@@ -276,25 +268,6 @@ FAR_OFF_MPS = 0.02
 FORECASTS = ('none', 'persistence', 'ours')
 
 
-class Row(NamedTuple):
-    """What came out for a segment."""
-
-    segment: Segment
-    reckoned: Reckoned
-    #: Our current over what the vehicle's own is a mean, shape (2,): north, east (m/s).
-    comparable_mps: np.ndarray
-    #: Distance from where it surfaced to where it was forecast (m), by name; NaN for the first.
-    missed_m: dict[str, float]
-
-
-def comparable_current(flight: Flight, segment: Segment, reckoned: Reckoned) -> np.ndarray:
-    """Our current (m/s) over what the vehicle's own is a mean, shape (2,): north, east."""
-    if flight.on_board_over != 'between fixes':
-        return reckoned.dac_mps
-    moved_m = segment.after.place_m[0] - segment.before.place_m[-1]
-    return (moved_m - reckoned.way_m) / (segment.after.time_s[0] - segment.before.time_s[-1])
-
-
 def navigate(flight: Flight, progress: Progress, method: str = METHOD) -> list[Row]:
     """Navigate all segments, in the order of time, each by what was known before it.
 
@@ -306,38 +279,46 @@ def navigate(flight: Flight, progress: Progress, method: str = METHOD) -> list[R
     check(method)
     rows: list[Row] = []
     done = itertools.count(1)
+
+    def one_more() -> None:
+        progress(next(done), 2 * len(flight.segments))
+
     # Between others there is a dive that is not known.
     for run in runs(
         flight.segments, lambda last, one: one.before.time_s[-1] == last.after.time_s[-1]
     ):
-        found = reckon(flight, run, method, lambda: progress(next(done), 2 * len(flight.segments)))
-        last = None
-        for segment, reckoned in zip(run, found, strict=True):
-            comparable = comparable_current(flight, segment, reckoned)
-            missed = _missed(segment, reckoned, last)
-            rows.append(Row(segment, reckoned, comparable, missed))
-            last = reckoned
+        still, led = (
+            list(_navigated(flight, run, method, current, one_more))
+            for current in ('none', 'persistence')
+        )
+        last_mps = None
+        for segment, under, one, after in zip(run, still, led, led[1:], strict=False):
+            told = one.way_m, after.told_mps, last_mps
+            rows.append(_row(segment, under, *told, flight.on_board_over))
+            last_mps = after.told_mps
     return rows
 
 
-def _missed(segment: Segment, reckoned: Reckoned, last: Reckoned | None) -> dict[str, float]:
-    """How far off it surfaced (m), by forecasts that know of the dive before, if there is one."""
-    missed = dict.fromkeys(FORECASTS, math.nan)
-    if last is not None:
-        for name, current in (('none', np.zeros(2)), ('persistence', last.told_mps)):
-            missed[name] = float(np.hypot(*(reckoned.dac_mps - current))) * reckoned.seconds
-        missed['ours'] = float(np.hypot(*(reckoned.surfaced_m - reckoned.believed_m)))
-    believed = segment.on_board.surfaced_m
-    missed['on_board'] = float(np.hypot(*(reckoned.surfaced_m - believed)))
-    return missed
+def _row(segment: Segment, under: _Under, led_m, told_mps, last_mps, over: str) -> Row:
+    """What came out; forecasts know what the dive before told of the current, if there is one."""
+    dived_s, dived_m = _at_surface(segment.before, -1, under.dived_s)
+    surfaced_s, surfaced_m = _at_surface(segment.after, 0, under.surfaced_s)
+    dive, missed = (dived_s, surfaced_s, dived_m, surfaced_m), dict.fromkeys(FORECASTS, math.nan)
+    row = Row(segment, *dive, under.way_m, told_mps, missed, over)
+    if last_mps is not None:
+        for name, current in (('none', np.zeros(2)), ('persistence', last_mps)):
+            missed[name] = float(np.hypot(*(row.dac_mps - current))) * row.seconds
+        missed['ours'] = float(np.hypot(*(surfaced_m - (dived_m + led_m))))
+    missed['on_board'] = float(np.hypot(*(surfaced_m - segment.on_board.surfaced_m)))
+    return row
 
 
 def summary(flight: Flight, rows: list[Row], method: str = METHOD) -> dict[str, Any]:
     """Figures of a flight, as `--json` prints them."""
     dac = [np.hypot(*(row.comparable_mps - row.segment.on_board.dac_mps)) for row in rows]
-    told = [np.hypot(*(row.reckoned.told_mps - row.reckoned.dac_mps)) for row in rows]
+    told = [np.hypot(*(row.told_mps - row.dac_mps)) for row in rows]
     way = [_way_off(row) for row in rows]
-    through_water = [np.hypot(*row.reckoned.way_m) for row in rows]
+    through_water = [np.hypot(*row.way_m) for row in rows]
     ratio = [
         own / np.hypot(*row.segment.on_board.way_m)
         for own, row in zip(through_water, rows, strict=True)
@@ -352,8 +333,8 @@ def summary(flight: Flight, rows: list[Row], method: str = METHOD) -> dict[str, 
         'first_file': flight.files[0],
         'last_file': flight.files[-1],
         'segments': len(rows),
-        'duration_s': round(rows[-1].reckoned.surfaced_s - rows[0].reckoned.dived_s, 1),
-        'under_water_s': round(sum(row.reckoned.seconds for row in rows), 1),
+        'duration_s': round(rows[-1].surfaced_s - rows[0].dived_s, 1),
+        'under_water_s': round(sum(row.seconds for row in rows), 1),
         'through_water_m': round(float(np.nansum(through_water)), 1),
         'on_board_current_is_mean': flight.on_board_over,
         'dac_difference_mps': _spread(dac, 4),
@@ -370,7 +351,7 @@ def _why_far_off(rows: list[Row], dac: list[float]) -> list[str]:
     off = _spread(dac, 4)['median']
     if off is None or off <= FAR_OFF_MPS:
         return []
-    seconds = float(np.median([row.reckoned.seconds for row in rows]))
+    seconds = float(np.median([row.seconds for row in rows]))
     apart_s = float(np.median([np.median(np.diff(row.segment.samples.time_s)) for row in rows]))
     way_m = _spread([_way_off(row) for row in rows], 1)['median']
     by_way = (
@@ -388,7 +369,7 @@ def _why_far_off(rows: list[Row], dac: list[float]) -> list[str]:
 
 def _way_off(row: Row) -> float:
     """How far our way through the water is off that on board (m)."""
-    return float(np.hypot(*(row.reckoned.way_m - row.segment.on_board.way_m)))
+    return float(np.hypot(*(row.way_m - row.segment.on_board.way_m)))
 
 
 def _spread(values: list[float], digits: int) -> dict[str, Any]:

@@ -32,11 +32,10 @@ from glider_flights.record import (
     OnBoard,
     Polar,
     Samples,
-    angles_at_times,
-    at_surface,
     at_times,
     instruments,
     put_together,
+    samples_of,
     usual,
 )
 from glider_flights.seaglider import DIVE_FILE, polar_of
@@ -123,17 +122,11 @@ def _read(path: Path) -> LogFile:
         notes.append(f'{path.name}: no variable {" or ".join(wanted["heading_rad"])}')
     if not len(fixes):
         notes.append(f'{path.name}: no fix in LATITUDE_GPS, LONGITUDE_GPS')
-    nothing = np.full(count, math.nan)
     own_s = known['time']
     depth_m = at_times(own_s, own_s, known['depth_m'], LONGEST_GAP_S)
-    gap = LONGEST_GAP_S, at_surface(own_s, depth_m)
-    samples = Samples(
-        own_s,
-        depth_m,
-        at_times(own_s, own_s, known['pitch_rad'], *gap),
-        angles_at_times(own_s, own_s, known.get('heading_rad', nothing), *gap),
-        known.get('buoyancy_kg', nothing),
-    )
+    pitch = own_s, known['pitch_rad']
+    heading = own_s, known.get('heading_rad', np.full(count, math.nan))
+    samples = samples_of(own_s, depth_m, pitch, heading, 0.0, known.get('buoyancy_kg'))
     own_polar = _own_polar(path)
     of_base = own_polar is None and 'seaglider' in model.lower()
     return LogFile(

@@ -169,11 +169,6 @@ def usual(values: Sequence[float]) -> float:
     return float(np.median(values)) if len(values) else math.nan
 
 
-def at_surface(time_s: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
-    """Those of some times at which it was at the surface, where it may record no attitude."""
-    return time_s[depth_m <= SURFACE_DEPTH_M]
-
-
 def local_metres(origin_deg: np.ndarray, latitude_deg, longitude_deg) -> np.ndarray:
     """North and east (m, last axis) of an origin (latitude, longitude in degrees)."""
     latitude_deg, longitude_deg = np.asarray(latitude_deg), np.asarray(longitude_deg)
@@ -219,6 +214,21 @@ def angles_at_times(
         at_times(time_s, own_s, part(angles), gap_s, idle_s) for part in (np.sin, np.cos)
     )
     return np.arctan2(east, north)
+
+
+def samples_of(
+    time_s: np.ndarray, depth_m: np.ndarray, pitch, heading, turn=0.0, buoyancy_kg=None
+) -> Samples:
+    """Samples at some times, of pitch and heading (rad), pairs of times of their own and values.
+
+    Both are NaN in a gap; at the surface they need not be recorded. The heading is turned by so
+    much (rad).
+    """
+    gap = LONGEST_GAP_S, time_s[depth_m <= SURFACE_DEPTH_M]
+    heading_rad = angles_at_times(time_s, *heading, *gap) + turn
+    if buoyancy_kg is None:
+        buoyancy_kg = np.full(len(time_s), math.nan)
+    return Samples(time_s, depth_m, at_times(time_s, *pitch, *gap), heading_rad, buoyancy_kg)
 
 
 def vertical_rate(time_s: np.ndarray, depth_m: np.ndarray, over_s: float = 15.0) -> np.ndarray:

@@ -16,18 +16,16 @@ from glider_base.errors import ConfigurationError
 from glider_flights.folders import Progress, files_in, of_one_flight, read_each
 from glider_flights.netcdf import SUFFIXES, fixes_of, names_of, read, refuse_missing
 from glider_flights.record import (
-    LONGEST_GAP_S,
     Flight,
     Instruments,
     LogFile,
     OnBoard,
     Polar,
     Samples,
-    angles_at_times,
-    at_surface,
     at_times,
     instruments,
     put_together,
+    samples_of,
     usual,
 )
 
@@ -123,11 +121,8 @@ def _samples(found: dict[str, np.ndarray], declination: float) -> Samples:
         buoyancy = at_times(time_s, own_s, weighed)
         known = at_times(time_s, own_s, np.isfinite(weighed).astype(float))
         buoyancy[known < 0.5] = math.nan
-    depth_m = found['depth_m']
-    gap = LONGEST_GAP_S, at_surface(time_s, depth_m)
-    heading = angles_at_times(time_s, time_s, found['heading_rad'], *gap) + declination
-    pitch = at_times(time_s, time_s, found['pitch_rad'], *gap)
-    return Samples(time_s, depth_m, pitch, heading, buoyancy)
+    pitch, heading = ((time_s, found[name]) for name in ('pitch_rad', 'heading_rad'))
+    return samples_of(time_s, found['depth_m'], pitch, heading, declination, buoyancy)
 
 
 def _instruments(found: dict[str, np.ndarray], samples: Samples) -> Instruments:

@@ -26,7 +26,6 @@ from glider_flights.folders import (
 )
 from glider_flights.netcdf import names_of
 from glider_flights.record import (
-    LONGEST_GAP_S,
     NOT_KNOWN,
     Cut,
     Fixes,
@@ -34,14 +33,13 @@ from glider_flights.record import (
     Instruments,
     OnBoard,
     Polar,
-    Samples,
     Segment,
     angles_at_times,
-    at_surface,
     at_times,
     cut,
     instruments,
     local_metres,
+    samples_of,
     usual,
 )
 
@@ -135,7 +133,8 @@ def read_slocum(
         declination, told = declination_at(*origin, usual(sensors['m_gps_lat'][0]))
         declined = -declination
         notes.append(f'm_gps_mag_var is not recorded: magnetic north is {told}')
-    cuts, left_out = cut(fixes, _samples(sensors, declined))
+    told = (sensors[name] for name in ('m_pitch', 'm_heading'))
+    cuts, left_out = cut(fixes, samples_of(*sensors['m_depth'], *told, -declined))
     ends = [*(one.before.time_s[-1] for one in cuts), math.inf][1:]
     segments = [
         Segment(
@@ -414,14 +413,6 @@ def _fixes(sensors: Sensors) -> tuple[np.ndarray, Fixes]:
     if not len(time_s):
         return np.zeros(2), Fixes(time_s, np.empty((0, 2)))
     return degrees[0], Fixes(time_s, local_metres(degrees[0], *degrees.T))
-
-
-def _samples(sensors: Sensors, declined: float) -> Samples:
-    time_s, depth_m = sensors['m_depth']
-    gap = LONGEST_GAP_S, at_surface(time_s, depth_m)
-    heading = angles_at_times(time_s, *sensors['m_heading'], *gap) - declined
-    pitch = at_times(time_s, *sensors['m_pitch'], *gap)
-    return Samples(time_s, depth_m, pitch, heading, np.full(len(time_s), math.nan))
 
 
 def _on_board(

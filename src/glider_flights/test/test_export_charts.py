@@ -122,7 +122,7 @@ def test_geojson_is_valid_and_where_the_vehicle_was(export, flown):
 def test_a_track_of_few_points_is_at_the_last_of_them_when_the_run_ends(flown, monkeypatch):
     monkeypatch.setattr(tracks, 'MOST_POINTS', 20)
     for line in tracks.chart_of(read_run(flown.folder), 0.0).lines:
-        last_s = (np.datetime64(line.times[-1][:-1]) - np.datetime64(0, 's')) / np.timedelta64(
+        last_s = (np.datetime64(line.rows[-1].time[:-1]) - np.datetime64(0, 's')) / np.timedelta64(
             1, 's'
         )
         assert last_s == pytest.approx(flown.to_xarray().time.values[-1], abs=1.0)

@@ -164,8 +164,8 @@ def test_a_slocum_finds_the_current_it_drifted_with(tmp_path, cached, write_dbd)
     report = summary(flight, rows)
     assert (report['vehicle'], report['segments']) == ('slocum', 4)
     for row in rows:
-        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
-        assert row.reckoned.seconds == pytest.approx(2.0 * LEG_S, abs=40.0)
+        assert row.dac_mps == pytest.approx(CURRENT, abs=0.005)
+        assert row.seconds == pytest.approx(2.0 * LEG_S, abs=40.0)
     # The current of the vehicle is 2 cm/s off, in its magnetic coordinates.
     assert report['dac_difference_mps']['median'] == pytest.approx(0.02, abs=0.003)
     assert report['dac_difference_mps']['segments'] == 4
@@ -183,7 +183,7 @@ def test_a_sent_file_is_turned_by_the_field_of_the_earth(tmp_path, write_dbd):
     flight = read_flight(tmp_path, None, quiet)
     assert any('by IGRF' in note for note in flight.notes)
     for row in navigated(flight):
-        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.02)
+        assert row.dac_mps == pytest.approx(CURRENT, abs=0.02)
 
 
 def test_attitude_that_is_not_recorded_at_the_surface_takes_no_depth_from_it(tmp_path, write_dbd):
@@ -197,7 +197,7 @@ def test_attitude_that_is_not_recorded_at_the_surface_takes_no_depth_from_it(tmp
     write_dbd(tmp_path / '00010000.dbd', table, True)
     rows = navigated(read_flight(tmp_path, None, quiet))
     for row in rows[1:-1]:
-        assert row.reckoned.seconds == pytest.approx(2.0 * LEG_S, abs=40.0)
+        assert row.seconds == pytest.approx(2.0 * LEG_S, abs=40.0)
 
 
 def test_a_fix_far_off_and_one_under_water_are_left_out(tmp_path, write_dbd):
@@ -212,7 +212,7 @@ def test_a_fix_far_off_and_one_under_water_are_left_out(tmp_path, write_dbd):
     rows = navigated(read_flight(tmp_path, None, quiet))
     assert len(rows) == 2
     for row in rows:
-        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.003)
+        assert row.dac_mps == pytest.approx(CURRENT, abs=0.003)
 
 
 def test_a_current_of_another_time_is_not_compared(tmp_path, write_dbd):
@@ -337,7 +337,7 @@ def test_each_bad_file_of_a_slocum_costs_what_it_holds_and_is_named(tmp_path, wr
     flight = read_flight(tmp_path, None, quiet)
     assert flight.segments
     for row in navigated(flight):
-        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
+        assert row.dac_mps == pytest.approx(CURRENT, abs=0.005)
     whole = {number for number in range(dives) if number not in bad}
     # A dive ends with the fixes in the file after it.
     kept = {int(segment.name[:4]) for segment in flight.segments}
@@ -416,9 +416,9 @@ def test_a_seaglider_finds_the_current_of_each_dive(tmp_path):
     flight = read_flight(tmp_path, None, quiet)
     rows = navigated(flight)
     for row in rows[:-1]:
-        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
+        assert row.dac_mps == pytest.approx(CURRENT, abs=0.005)
     # After the last dive a single fix says nothing of the drift: it counts as under water.
-    assert rows[-1].reckoned.seconds == pytest.approx(2.0 * LEG_S + 120.0, abs=40.0)
+    assert rows[-1].seconds == pytest.approx(2.0 * LEG_S + 120.0, abs=40.0)
     # From fix to fix the drift at the surface counts too: 180 s of 6180.
     mean = (2.0 * LEG_S * CURRENT + 180.0 * SURFACE) / (2.0 * LEG_S + 180.0)
     assert rows[1].comparable_mps == pytest.approx(mean, abs=0.004)
@@ -449,7 +449,7 @@ def test_buoyancy_is_taken_where_it_is_recorded(tmp_path):
     )
     flight = read_flight(tmp_path / 'p1230001.nc', None, quiet)
     (row,) = navigated(flight)
-    assert np.hypot(*row.reckoned.way_m) == pytest.approx(2.0 * LEG_S * speed, rel=0.02)
+    assert np.hypot(*row.way_m) == pytest.approx(2.0 * LEG_S * speed, rel=0.02)
 
 
 def test_a_missing_dive_is_not_bridged(tmp_path):
@@ -509,7 +509,7 @@ def test_each_bad_dive_of_a_seaglider_costs_what_it_holds_and_is_named(tmp_path)
     kept = {1, 2, 4, 7, 9, 11}
     assert [segment.name for segment in flight.segments] == [f'p123{n:04d}.nc' for n in kept]
     for row in navigated(flight)[:-1]:
-        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.02)
+        assert row.dac_mps == pytest.approx(CURRENT, abs=0.02)
     for name in (*(f'p123{n:04d}.nc' for n in (3, 5, 6, 8, 10)), 'p4560012.nc', '00010000.dbd'):
         assert any(name in note for note in flight.notes), name
 
@@ -549,7 +549,7 @@ def test_a_flight_in_og1_is_navigated(tmp_path):
     rows = navigated(flight)
     assert len(rows) == 4
     for row in rows:
-        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
+        assert row.dac_mps == pytest.approx(CURRENT, abs=0.005)
     assert summary(flight, rows)['dac_difference_mps']['median'] == pytest.approx(0.02, abs=0.003)
 
 
@@ -596,7 +596,7 @@ def test_a_flight_in_og1_is_the_same_however_it_is_told(change, tmp_path):
     rows = navigated(read_flight(tmp_path, None, quiet))
     assert len(rows) == 4
     for row in rows:
-        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.005)
+        assert row.dac_mps == pytest.approx(CURRENT, abs=0.005)
 
 
 @pytest.mark.parametrize('names', [['DEPTH'], ['PITCH', 'HEADING']])
@@ -628,7 +628,7 @@ def test_magnetic_heading_of_og1_is_turned_by_the_field_of_the_earth(tmp_path):
     flight = read_flight(tmp_path, None, quiet)
     assert any('by IGRF' in note for note in flight.notes)
     for row in navigated(flight):
-        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.02)
+        assert row.dac_mps == pytest.approx(CURRENT, abs=0.02)
 
 
 def test_each_bad_file_in_og1_costs_what_it_holds_and_is_named(tmp_path):
@@ -649,7 +649,7 @@ def test_each_bad_file_in_og1_costs_what_it_holds_and_is_named(tmp_path):
     flight = read_flight(tmp_path, None, quiet)
     assert [segment.name for segment in flight.segments] == [f'unit_{n}.nc' for n in (0, 2, 4)]
     for row in navigated(flight):
-        assert row.reckoned.dac_mps == pytest.approx(CURRENT, abs=0.01)
+        assert row.dac_mps == pytest.approx(CURRENT, abs=0.01)
     for number in (1, 3, 5, 6, 7):
         assert any(f'unit_{number}.nc' in note for note in flight.notes), number
 
@@ -670,7 +670,7 @@ def test_missing_numbers_in_a_dive_do_not_spread(tmp_path):
     pitch[::3] = np.nan
     write_dive(tmp_path / 'p1230001.nc', 0, 1, eng_pitchAng=('sg_data_point', pitch))
     (row,) = navigated(read_flight(tmp_path, None, quiet))
-    assert np.isfinite(row.reckoned.dac_mps).all()
+    assert np.isfinite(row.dac_mps).all()
 
 
 # ---------------------------------------------------------------------- forecasts and the command

@@ -295,7 +295,7 @@ def test_what_is_in_a_file(tmp_path):
     found = contents(path)
     assert list(found.parts) == ['currents'] and not found.refused
     currents = found.parts['currents']
-    assert [one.name for one in currents.variables] == ['water_v', 'water_u']
+    assert [one['name'] for one in currents.variables] == ['water_v', 'water_u']
     np.testing.assert_allclose(currents.axes['depth'], DEPTHS)
     assert currents.axes['time'][0] == TIMES[0].astype('M8[s]').astype(float)
 
@@ -446,8 +446,8 @@ def test_a_chart_is_land_where_it_has_no_number(tmp_path):
     data[0, :3] = [math.nan, math.inf, -math.inf]
     data[0, 3:5] = [20.0, math.nan]  # within land, too
     path = written(data.to_dataset(), tmp_path / 'holes.nc')
-    seen = contents(path).parts['bottom'].seen
-    assert np.all(seen.depth[0, :5] <= 0.0) and np.all(seen.depth[1:] >= 100.0)
+    depth = contents(path).parts['bottom'].seen.water[0, 0, ..., 0]
+    assert np.all(depth[0, :5] <= 0.0) and np.all(depth[1:] >= 100.0)
 
 
 def test_a_path_over_land_is_refused(tmp_path):
@@ -523,7 +523,7 @@ def test_density_is_that_of_gsw_at_the_points_of_the_grid(layout, gsw, tmp_path)
         make = gsw.CT_from_pt if 'potential' in standard else gsw.CT_from_t
         more = () if 'potential' in standard else (pressure,)
         conservative = make(absolute, at[temperature].item(), *more)
-        n, e = from_geodetic(latitude, longitude, params.origin)
+        n, e = from_geodetic(latitude, longitude, params.grid.origin)
         rise, warm = water_there(DEPTHS[z], params._replace(n=n, e=e, t_s=t * 86400.0))
         density = SEA_WATER_DENSITY * (1.0 + rise)
         assert density == pytest.approx(gsw.rho(absolute, conservative, pressure), abs=1e-3)
@@ -546,8 +546,10 @@ def test_a_vehicle_is_neutral_where_it_was_ballasted_and_lighter_in_denser_water
     told = WaterSettings(grid={'file': str(written(hydrography(), tmp_path / 'sea.nc'))})
     water = told.model_copy(update={'grid': told.grid.resolved(mission(*PLACES))})
     plant = PlantSettings(water=water).params()
-    there = around(plant, *from_geodetic(*PLACES[1], plant.density.origin), 0.0, plant.density)
-    here = around(plant, *from_geodetic(*PLACES[0], plant.density.origin), 0.0, plant.density)
+    there = around(
+        plant, *from_geodetic(*PLACES[1], plant.density.grid.origin), 0.0, plant.density
+    )
+    here = around(plant, *from_geodetic(*PLACES[0], plant.density.grid.origin), 0.0, plant.density)
     net = [immersed(0.0, 0.0, one.vehicle, one.density).net for one in (here, there)]
     assert net[0] == pytest.approx(0.0, abs=1e-9)
     rises = [water_there(0.0, one.density)[0] for one in (here, there)]

@@ -11,8 +11,8 @@ import numpy as np
 from glider_bringup.scoring.card import fly_scored
 from glider_guard.witness import AFLOAT_M
 from glider_mission.choices import combination_of
-from glider_mission.scenario import Scenario, load_scenario
-from glider_studies.paper.experiments import Experiment, Study, make_study
+from glider_mission.scenario import load_scenario
+from glider_studies.paper.experiments import Experiment, make_study
 from glider_studies.paper.judges import Check
 
 NAME = 'bottoms'
@@ -50,19 +50,14 @@ def write_bottom(seed: int, path: Path) -> None:
     data.to_netcdf(path, engine='scipy')
 
 
-def scenario_over(chart: Path, way: str) -> Scenario:
-    """The mission over a chart, in one of `WAYS`."""
-    changes = {'dives': DIVES, 'bathymetry.file': str(chart), **WAYS[way]}
-    return load_scenario('slocum_shelf', changes)
-
-
 def fly_one(task: tuple[int, str]) -> dict[str, Any]:
     """Fly over a bottom by its seed, in a worker."""
     seed, way = task
     with TemporaryDirectory() as folder:
         chart = Path(folder) / 'bottom.nc'
         write_bottom(seed, chart)
-        _, scores = fly_scored(scenario_over(chart, way))
+        changes = {'dives': DIVES, 'bathymetry.file': str(chart), **WAYS[way]}
+        _, scores = fly_scored(load_scenario('slocum_shelf', changes))
     bottom, place = scores['bottom'], scores['final_state']['position_ned_m']
     return {
         'touched': bottom['touched'],
@@ -109,4 +104,4 @@ def experiment(seed: int) -> Experiment:
     first = FIRST + COUNT * seed
     tasks = {(one, way): (one, way) for one in range(first, first + COUNT) for way in WAYS}
     loops = {combination_of(load_scenario('slocum_shelf'))}
-    return make_study(NAME, seed, judge, Study(fly_one, tasks, loops, rows))
+    return make_study(NAME, seed, judge, fly_one, tasks, loops, rows)

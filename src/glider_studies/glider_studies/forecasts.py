@@ -13,7 +13,7 @@ from glider_mission.choices import combination_of
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.eddying_sea import EddyingSea, write_sea
 from glider_navigation.forecast import ForecastSettings
-from glider_studies.paper.experiments import Experiment, Study, make_study
+from glider_studies.paper.experiments import Experiment, make_study
 from glider_studies.paper.judges import Check
 
 NAME = 'forecasts'
@@ -83,4 +83,4 @@ def experiment(seed: int) -> Experiment:
     seas = enumerate(SIZES, FIRST + len(SIZES) * seed)
     tasks = {(sea, *case): (sea, rms, *case) for sea, rms in seas for case in CASES}
     loops = {combination_of(load_scenario('eddies_10d', {'orders': []}))}
-    return make_study(NAME, seed, judge, Study(fly_one, tasks, loops, rows))
+    return make_study(NAME, seed, judge, fly_one, tasks, loops, rows)

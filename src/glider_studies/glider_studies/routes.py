@@ -14,7 +14,7 @@ from glider_mission.choices import combination_of
 from glider_mission.routing.plan import plan
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.eddying_sea import EddyingSea, write_sea
-from glider_studies.paper.experiments import Experiment, Study, make_study
+from glider_studies.paper.experiments import Experiment, make_study
 from glider_studies.paper.judges import Check
 
 NAME = 'routes'
@@ -101,4 +101,4 @@ def experiment(seed: int) -> Experiment:
 
     tasks = {(sea, way): (sea, rms_mps, way) for sea, rms_mps in seas.items() for way in WAYS}
     loops = {combination_of(load_scenario('eddies_10d', {'orders': []}))}
-    return make_study(NAME, seed, judge, Study(cross_one, tasks, loops, rows))
+    return make_study(NAME, seed, judge, cross_one, tasks, loops, rows)

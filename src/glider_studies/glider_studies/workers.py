@@ -20,12 +20,14 @@ from socket import gethostname
 from typing import Any, NamedTuple
 
 import dask
+import typer
 from distributed import Client, Future, LocalCluster, TimeoutError, wait
 from distributed.client import ClosedClientError
 from distributed.scheduler import KilledWorker
 
+from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED, ConfigurationError
 from glider_base.kernel import source_digest
-from glider_base.settings import ConfigurationError
+from glider_bringup.console import compiling, counter, messages
 from glider_bringup.engines.compiling import Tell, compile_loops
 from glider_bringup.engines.interrupts import interrupts_noted
 from glider_mission.choices import Combination
@@ -250,3 +252,35 @@ def _connect(scheduler: str | LocalCluster) -> Client:
             f'--scheduler {scheduler}: no Dask scheduler answers there ({error}) '
             f'(allowed: the address that dask scheduler prints, such as tcp://127.0.0.1:8786)'
         ) from None
+
+
+@contextmanager
+def workers_at_work(
+    workers: int | None,
+    scheduler: str | None,
+    combinations: Iterable[Combination],
+    flights: int,
+    advice: Callable[[], str] = lambda: '',
+):
+    """Workers of a command; yields their pool, and the update of a bar of flights.
+
+    They fly laws with methods, ``combinations``. What ends their work early is told, with what
+    ``advice`` adds, and is the exit code.
+    """
+    if workers and scheduler:
+        raise ConfigurationError(
+            f'--workers {workers}: not with --scheduler, whose cluster has workers of its own'
+        )
+    try:
+        with (
+            worker_pool(workers, scheduler, combinations, compiling) as pool,
+            counter('flying', flights) as update,
+        ):
+            yield pool, update
+        return
+    except KeyboardInterrupt:
+        reason, code = 'stopped by SIGINT', EXIT_INTERRUPTED
+    except WorkError as error:
+        reason, code = str(error), EXIT_FAILED
+    messages.print(reason + advice(), style='red', soft_wrap=True)
+    raise typer.Exit(code)

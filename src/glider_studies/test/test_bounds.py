@@ -220,7 +220,7 @@ def test_starts_in_the_region_come_home_within_their_bound(vehicle, phase):
     of_glide = steering_loop(glide)
     inside = region(of_glide, lambda reach: slope(glide, reach), ((1.0, 0.3),))
     flown = fly_starts(glide, inside, 3, 7, lambda: None)
-    assert flown.home == flown.starts
-    assert 0.05 < flown.of_bound <= 1.0
+    assert flown['home'] == flown['starts']
+    assert 0.05 < flown['of_bound'] <= 1.0
     jumps = fly_jumps(glide, gain(of_glide, 1), 1, 7, lambda: None)
-    assert 0.05 < jumps.of_bound <= 1.0
+    assert 0.05 < jumps['of_bound'] <= 1.0

@@ -9,7 +9,6 @@ import itertools
 import json
 import math
 from datetime import datetime, timedelta, timezone
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -30,13 +29,20 @@ MOST_POINTS = 4000
 KML, GPX = 'http://www.opengis.net/kml/2.2', 'http://www.topografix.com/GPX/1/1'
 
 
+class Row(NamedTuple):
+    """A place of a line, and when it was there."""
+
+    latitude: float  #: (deg)
+    longitude: float
+    depth_m: float | None = None  #: None of what has none
+    time: str = ''  #: UTC as ISO 8601; empty where nobody knows when it was
+
+
 class Line(NamedTuple):
     """A way over the chart."""
 
     name: str
-    places: list[tuple[float, float]]  #: latitude, longitude (deg)
-    depths_m: list[float]
-    times: list[str]  #: UTC as ISO 8601; empty where nobody knows when it was
+    rows: list[Row]
 
 
 class Point(NamedTuple):
@@ -59,7 +65,7 @@ class Chart(NamedTuple):
     @property
     def as_line(self) -> Line:
         """The route as a line over the chart."""
-        return Line('route', self.route, [], [])
+        return Line('route', [Row(*place) for place in self.route])
 
     @property
     def all_lines(self) -> list[Line]:
@@ -112,8 +118,8 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
         known = np.flatnonzero(np.isfinite(columns).all(axis=0))
         north, east, depth = (column[known] for column in columns)
         seconds = np.minimum(2.0 * traces.spacing_s * known, (traces.ticks - 1) * TICK_S)
-        times = [when(t_s) for t_s in seconds] if began_s is not None else []
-        lines.append(Line(name, places(north, east), [round(float(d), 2) for d in depth], times))
+        rows = zip(places(north, east), depth.tolist(), map(when, seconds), strict=True)
+        lines.append(Line(name, [Row(*one, round(m, 2), time) for one, m, time in rows]))
     surfacings = [
         Point(
             f'surfacing {number}',
@@ -126,32 +132,21 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
     waypoints = None if flown.is_rerouted else getattr(scenario.path, 'waypoints', None)
     norths, easts = np.array([point[:2] for point in waypoints or flown.path_points()]).T
     return Chart(
-        scenario.name, places(norths, easts), [line for line in lines if line.places], surfacings
+        scenario.name, places(norths, easts), [line for line in lines if line.rows], surfacings
     )
 
 
-class _Row(NamedTuple):
-    """A point of a line: latitude, longitude (deg), depth (m) and time; None of what has none."""
-
-    latitude: float
-    longitude: float
-    depth_m: float | None
-    time: str | None
-
-
-def _parts(line: Line) -> list[list[_Row]]:
+def _parts(line: Line) -> list[list[Row]]:
     """A line in parts on one side of the date line each, as RFC 7946 has it (section 3.1.9)."""
-    columns = zip_longest(line.places, line.depths_m, line.times)
-    rows = [_Row(*place, depth, time) for place, depth, time in columns]
-    parts = [rows[:1]]
-    for one, after in itertools.pairwise(rows):
+    parts = [line.rows[:1]]
+    for one, after in itertools.pairwise(line.rows):
         if abs(after.longitude - one.longitude) > 180.0:
             edge = math.copysign(180.0, one.longitude)
             way = after.longitude + 2.0 * edge - one.longitude
             share = (edge - one.longitude) / (way or 1.0)
             latitude = one.latitude + share * (after.latitude - one.latitude)
             there = after._replace(latitude=latitude, longitude=edge)
-            if line.depths_m:
+            if one.depth_m is not None:
                 depth = one.depth_m + share * (after.depth_m - one.depth_m)
                 there = there._replace(depth_m=round(depth, 2))
             parts[-1].append(there)
@@ -173,9 +168,8 @@ def geojson(chart: Chart) -> bytes:
     features = []
     for line in chart.all_lines:
         parts = _parts(line)
-        inside, when = ([[at(*row[:3]) for row in part] for part in parts], [])
-        if line.times:
-            when = [[row.time for row in part] for part in parts]
+        inside = [[at(*row[:3]) for row in part] for part in parts]
+        when = [[row.time for row in part] for part in parts] if line.rows[0].time else []
         kind = 'MultiLineString'
         if len(parts) == 1:
             kind, inside, when = 'LineString', inside[0], when and when[0]
@@ -190,19 +184,20 @@ def geojson(chart: Chart) -> bytes:
 def kml(chart: Chart) -> bytes:
     """A document with a placemark for each line and surfacing."""
 
-    def shape(kind: str, rows: list[_Row], depths_m: list[float]) -> ElementTree.Element:
+    def shape(kind: str, rows: list[Row], is_deep: bool = False) -> ElementTree.Element:
         told = (f'{x:.7f},{y:.7f},{-(depth or 0.0):.2f}' for y, x, depth, _ in rows)
-        mode = _element('altitudeMode', 'absolute' if any(depths_m) else 'clampToGround')
+        mode = _element('altitudeMode', 'absolute' if is_deep else 'clampToGround')
         return _element(kind, mode, _element('coordinates', ' '.join(told)))
 
     marks = []
     for line in chart.all_lines:
-        parts = [shape('LineString', part, line.depths_m) for part in _parts(line)]
+        is_deep = any(row.depth_m for row in line.rows)
+        parts = [shape('LineString', part, is_deep) for part in _parts(line)]
         whole = parts[0] if len(parts) == 1 else _element('MultiGeometry', *parts)
         marks.append(_element('Placemark', _element('name', line.name), whole))
     for one in chart.surfacings:
         stamp = [_element('TimeStamp', _element('when', one.time))] if one.time else []
-        place = shape('Point', [_Row(*one.place, None, None)], [])
+        place = shape('Point', [Row(*one.place)])
         marks.append(_element('Placemark', _element('name', one.name), *stamp, place))
     document = _element('Document', _element('name', chart.name), *marks)
     return _text(_element('kml', document, xmlns=KML))
@@ -211,13 +206,13 @@ def kml(chart: Chart) -> bytes:
 def gpx(chart: Chart) -> bytes:
     """Surfacings as waypoints, the waypoints as a route, the tracks as tracks."""
 
-    def at(tag: str, row: _Row, name: str = '') -> ElementTree.Element:
+    def at(tag: str, row: Row, name: str = '') -> ElementTree.Element:
         depth = '' if row.depth_m is None else f'{-row.depth_m:.2f}'
         told = {'ele': depth, 'time': row.time, 'name': name}
         inside = [_element(key, text) for key, text in told.items() if text]
         return _element(tag, *inside, lat=f'{row.latitude:.7f}', lon=f'{row.longitude:.7f}')
 
-    inside = [at('wpt', _Row(*one.place, None, one.time), one.name) for one in chart.surfacings]
+    inside = [at('wpt', Row(*one.place, None, one.time), one.name) for one in chart.surfacings]
     if chart.route:
         for part in _parts(chart.as_line):
             route = (at('rtept', row) for row in part)

@@ -128,24 +128,10 @@ _Fault = _part('t_s end_s', kind=str, message=str, when=str)
 _Energy = _part('wh wh_per_dive endurance_days range_km', by=_part('pump hotel masses calls'))
 
 
-class _Arrival(_Part):
-    """What became of a mission that ends with its path."""
-
-    arrived: bool
-    t_s: _Figure
-    missed_m: _Figure
-    left_m: _Figure
-    eta_s: _Figure
-    overrun_s: _Figure
-    place_latlon_deg: _Pair | None
-
-    @model_validator(mode='after')
-    def _has_a_time(self):
-        if self.arrived and self.t_s is None:
-            raise ValueError('t_s: not known, though it arrived')
-        return self
-
-
+#: What became of a mission that ends with its path.
+_Arrival = _part(
+    't_s missed_m left_m eta_s overrun_s', arrived=bool, place_latlon_deg=_Pair | None
+)
 _Bottom = _part('t_s least_height_m', touched=bool)
 _Surfacing = _part(
     t_s=float,
@@ -228,6 +214,8 @@ def read_score(run: Path) -> dict:
     else:  # only a run without a tick has no final state
         unknown = read.final_state is None or read.depth_m.max is None
         wrong = 'final_state, depth_m.max: not known' if read.ticks and unknown else ''
+        if read.arrival and read.arrival.arrived and read.arrival.t_s is None:
+            wrong = 'arrival: t_s: not known, though it arrived'
     if wrong:
         raise ConfigurationError(f'{path}: not a scorecard of this program: {wrong}')
     return card

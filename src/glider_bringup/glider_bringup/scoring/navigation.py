@@ -4,7 +4,6 @@
 
 import itertools
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,67 +15,12 @@ from glider_navigation.phase import DIVES_M, SURFACES_M
 _ODOM, _FIX = (COLUMNS[name].start for name in ('odom', 'fix'))
 _CURRENT, _BELIEVED = (COLUMNS[name].start for name in ('current_velocity', 'believed_current'))
 _E2 = COLUMNS['tracking_error'].start + 1
-#: Covariance of east and north in an odometry: xx, xy, yy.
-_COVARIANCE = (_ODOM + 13, _ODOM + 14, _ODOM + 16)
+#: North and east in an odometry, and their covariance: of north, of both, of east.
+_PLACE, _COVARIANCE = [_ODOM + 1, _ODOM], [_ODOM + 16, _ODOM + 14, _ODOM + 13]
 #: The current has been met by this surfacing: figures of what comes later begin with it.
 FOURTH = 3
 #: A 95 % ellipse: its radius squared over the variance, of two numbers (chi squared).
 ELLIPSE_95 = 5.991
-
-
-class Surfacing(NamedTuple):
-    """What was known when the vehicle came up. Pairs are east, north."""
-
-    tick: int
-    true: tuple[float, float]  #: place (m)
-    believed: tuple[float, float]
-    covariance: tuple[float, float, float]  #: of east, east and north, north (m^2)
-    cross_track_m: float  #: true one
-    believed_cross_track_m: float
-    true_current: tuple[float, float]  #: mean of the way under water (m/s)
-    way_rms_m: float  #: of the true cross-track error in it
-    dive_tick: int  #: at which it had dived
-    fix: tuple[float, float] | None = None  #: first one (m)
-    learnt_current: tuple[float, float] | None = None  #: believed of the way after the fixes (m/s)
-
-    @property
-    def error_m(self) -> float:
-        """Distance between the true and the estimated position (m)."""
-        return math.dist(self.true, self.believed)
-
-    def off_squared(self, place: tuple[float, float], variance: float = 0.0) -> float | None:
-        """Squared distance of a place from the believed one, over its variance; None of none."""
-        xx, xy, yy = self.covariance
-        xx, yy = xx + variance, yy + variance
-        determinant = xx * yy - xy * xy
-        if not determinant > 0.0:
-            return None
-        d_e, d_n = place[0] - self.believed[0], place[1] - self.believed[1]
-        return (yy * d_e * d_e - 2.0 * xy * d_e * d_n + xx * d_n * d_n) / determinant
-
-    @property
-    def is_inside(self) -> bool | None:
-        """Whether the true place is inside the 95 % ellipse; None if there is none."""
-        off = self.off_squared(self.true)
-        return None if off is None else off <= ELLIPSE_95
-
-    def report(self) -> dict:
-        """What ``score.json`` tells of it; pairs are north, east, as everywhere there."""
-        xx, xy, yy = self.covariance
-        return {
-            't_s': seconds(self.tick),
-            'dive_t_s': seconds(self.dive_tick),
-            'true_ned_m': _north_east(self.true),
-            'believed_ned_m': _north_east(self.believed),
-            'covariance_m2': [yy, xy, xx],
-            'fix_ned_m': _north_east(self.fix),
-            'cross_track_m': self.cross_track_m,
-            'believed_cross_track_m': self.believed_cross_track_m,
-            'error_m': self.error_m,
-            'inside_95': self.is_inside,
-            'dac_true_mps': _north_east(self.true_current),
-            'dac_believed_mps': _north_east(self.learnt_current),
-        }
 
 
 class NavigationScorer:
@@ -96,9 +40,11 @@ class NavigationScorer:
         #: of the way under water: sum of the current, of squared cross-track errors, and ticks
         self._current, self._squares, self._deep_ticks = np.zeros(2), 0.0, 0
         self._dive_tick, self._waits_for_fix, self._was_fixed = 0, False, False
-        self.surfacings: list[Surfacing] = []
-        self.innovations: list[float] = []  #: squared, over their variance
-        self.dac_errors: list[tuple[float, float]] = []  #: of east and north (m/s)
+        self._mean_current = np.zeros(2)  #: of the last whole way, east and north (m/s)
+        self._ways: list[float] = []  #: rms of the true cross-track error of each (m)
+        self._surfacings: list[dict] = []  #: what ``score.json`` tells of each
+        self._innovations: list[float] = []  #: squared, over their variance
+        self._dac_errors: list[float] = []  #: (m/s)
 
     def add(self, log: np.ndarray, true: np.ndarray) -> None:
         """Take in rows as they are and with true motion, float64[n, ROW] each."""
@@ -124,30 +70,34 @@ class NavigationScorer:
         self._is_deep = not self._is_deep
         if self._is_deep:
             self._dive_tick = tick
-            self._was_fixed = bool(self.surfacings) and not self._waits_for_fix
+            self._was_fixed = bool(self._surfacings) and not self._waits_for_fix
             self._current, self._squares, self._deep_ticks = np.zeros(2), 0.0, 0
             self._waits_for_fix = False
             return
         believed = row[_BELIEVED : _BELIEVED + 2]
         if self._was_fixed and np.all(np.isfinite(believed)):  # what the way before told
-            e, n = map(float, believed)
-            before = self.surfacings[-1] = self.surfacings[-1]._replace(learnt_current=(e, n))
-            true_e, true_n = before.true_current
-            self.dac_errors.append((e - true_e, n - true_n))
+            self._surfacings[-1]['dac_believed_mps'] = _north_east(believed)
+            self._dac_errors.append(math.dist(believed, self._mean_current))
         ticks = max(1, self._deep_ticks)
-        mean = self._current / ticks
-        self.surfacings.append(
-            Surfacing(
-                tick=tick,
-                true=(float(true[_ODOM]), float(true[_ODOM + 1])),
-                believed=(float(row[_ODOM]), float(row[_ODOM + 1])),
-                covariance=tuple(float(row[i]) for i in _COVARIANCE),
-                cross_track_m=float(true[_E2]),
-                believed_cross_track_m=float(row[_E2]),
-                true_current=(float(mean[0]), float(mean[1])),
-                way_rms_m=math.sqrt(self._squares / ticks),
-                dive_tick=self._dive_tick,
-            )
+        self._mean_current = self._current / ticks
+        self._ways.append(math.sqrt(self._squares / ticks))
+        place, (believed_place, covariance) = true[_PLACE].tolist(), _believed(row)
+        off = _off_squared(place, believed_place, covariance)
+        self._surfacings.append(
+            {
+                't_s': seconds(tick),
+                'dive_t_s': seconds(self._dive_tick),
+                'true_ned_m': place,
+                'believed_ned_m': believed_place,
+                'covariance_m2': covariance,
+                'fix_ned_m': None,
+                'cross_track_m': float(true[_E2]),
+                'believed_cross_track_m': float(row[_E2]),
+                'error_m': math.dist(place, believed_place),
+                'inside_95': None if off is None else off <= ELLIPSE_95,
+                'dac_true_mps': _north_east(self._mean_current),
+                'dac_believed_mps': None,
+            }
         )
         self._waits_for_fix = True
 
@@ -158,29 +108,24 @@ class NavigationScorer:
             return
         self._waits_for_fix = False
         at = max(0, int(found[0]) - 1)  # what was believed before it
-        _, latitude, longitude, variance, _ = rows[found[0], _FIX : _FIX + 5]
-        north, east = from_geodetic(latitude, longitude, self._origin)
-        row = rows[at]
-        last = self.surfacings[-1] = self.surfacings[-1]._replace(fix=(east, north))
-        before = last._replace(
-            believed=(float(row[_ODOM]), float(row[_ODOM + 1])),
-            covariance=tuple(float(row[i]) for i in _COVARIANCE),
-        )
-        off = before.off_squared((east, north), float(variance))
+        _, latitude, longitude, variance, _ = rows[found[0], _FIX : _FIX + 5].tolist()
+        fix = [*from_geodetic(latitude, longitude, self._origin)]
+        self._surfacings[-1]['fix_ned_m'] = fix if all(map(math.isfinite, fix)) else None
+        off = _off_squared(fix, *_believed(rows[at]), variance)
         if off is not None:
-            self.innovations.append(off)
+            self._innovations.append(off)
 
     def result(self, method: str, believed_cross_track: dict) -> dict:
         """The part ``navigation`` of ``score.json``; a figure without data is None."""
-        errors, beside, ways = (
-            np.array([getattr(one, name) for one in self.surfacings])
-            for name in ('error_m', 'cross_track_m', 'way_rms_m')
+        told = self._surfacings
+        errors, beside = (
+            np.array([one[name] for one in told]) for name in ('error_m', 'cross_track_m')
         )
-        within = [one.is_inside for one in self.surfacings if one.is_inside is not None]
-        dac = np.array([math.hypot(*error) for error in self.dac_errors])
+        within = [one['inside_95'] for one in told if one['inside_95'] is not None]
+        ways, dac = np.array(self._ways), np.array(self._dac_errors)
         return {
             'method': method,
-            'surfacings': len(self.surfacings),
+            'surfacings': len(told),
             'error_m': {
                 'p50': _percentile(errors, 50),
                 'p95': _percentile(errors, 95),
@@ -188,7 +133,7 @@ class NavigationScorer:
             },
             'surfacing_cross_track_m': beside.tolist(),
             'surfacing_error_m': errors.tolist(),
-            'surfacing_t_s': [seconds(one.tick) for one in self.surfacings],
+            'surfacing_t_s': [one['t_s'] for one in told],
             'under_water_rms_m': ways.tolist(),
             'from_fourth': {
                 'surfacing_cross_track_m': largest(beside[FOURTH:]),
@@ -196,10 +141,10 @@ class NavigationScorer:
             },
             'dac_error_mps': {'rms': rms(dac), 'worst': largest(dac)},
             'believed_cross_track_m': believed_cross_track,
-            'ellipse_95_share': float(np.mean(within)) if within else None,
-            'fixed': len(self.innovations),
-            'innovation_squared': float(np.mean(self.innovations)) if self.innovations else None,
-            'reports': [one.report() for one in self.surfacings] if self._reckons else [],
+            'ellipse_95_share': _mean(within),
+            'fixed': len(self._innovations),
+            'innovation_squared': _mean(self._innovations),
+            'reports': told if self._reckons else [],
         }
 
 
@@ -207,6 +152,28 @@ def _percentile(values: np.ndarray, share: float) -> float | None:
     return float(np.percentile(values, share)) if len(values) else None
 
 
-def _north_east(pair: tuple[float, float] | None) -> list[float] | None:
+def _mean(values: list) -> float | None:
+    return float(np.mean(values)) if values else None
+
+
+def _north_east(pair: np.ndarray) -> list[float] | None:
     """An east and a north the other way round; None of what is not known."""
-    return None if pair is None or not all(map(math.isfinite, pair)) else [pair[1], pair[0]]
+    return pair[::-1].tolist() if np.all(np.isfinite(pair)) else None
+
+
+def _believed(row: np.ndarray) -> tuple[list[float], list[float]]:
+    """Believed place (m), and its covariance (m^2): north, north and east, east."""
+    return row[_PLACE].tolist(), row[_COVARIANCE].tolist()
+
+
+def _off_squared(
+    place: list[float], believed: list[float], covariance: list[float], variance: float = 0.0
+) -> float | None:
+    """Squared distance of a place from the believed one, over its variance; None of none."""
+    nn, ne, ee = covariance
+    nn, ee = nn + variance, ee + variance
+    determinant = ee * nn - ne * ne
+    if not determinant > 0.0:
+        return None
+    d_n, d_e = place[0] - believed[0], place[1] - believed[1]
+    return (nn * d_e * d_e - 2.0 * ne * d_e * d_n + ee * d_n * d_n) / determinant

@@ -34,13 +34,6 @@ SAME_M = 0.01
 TRIES_S, CLIMBS_M = 600.0, 5.0
 
 
-class Outcome(NamedTuple):
-    """What became of a vehicle."""
-
-    status: str
-    reason: str  #: in words; empty where there is nothing to say
-
-
 def as_told(bits: np.ndarray) -> np.ndarray:
     """Bits of guard or control as they are told, which is once a second at most, int64[ticks].
 
@@ -63,8 +56,8 @@ def outcome_of(
     hull: tuple[float, float],
     infeasible: bool,
     missing: str,
-) -> Outcome:
-    """What became of a vehicle.
+) -> tuple[str, str]:
+    """What became of a vehicle: its status, and the reason, empty where there is nothing to say.
 
     Parameters
     ----------
@@ -80,21 +73,21 @@ def outcome_of(
         What of its mission it has not flown in its time; empty: nothing.
     """
     if not len(depth):
-        return Outcome(COMPLETED, '')
+        return COMPLETED, ''
     rated_m, crush_m = hull
     deepest_m, end_m = float(np.max(depth)), float(depth[-1])
     if deepest_m > crush_m:
-        return Outcome(LOST, _beyond(depth, crush_m, 'its hull bears'))
+        return LOST, _beyond(depth, crush_m, 'its hull bears')
     is_ended = ends_mission(told[-1:])[0]
     reasons = [_ended(told) if is_ended else missing]
     if (is_ended or missing) and end_m > AFLOAT_M:
         reasons.append(f'{end_m:,.0f} m deep at the end')
         if is_ended and _nothing_is_left(depth, told):
-            return Outcome(LOST, f'{"; ".join(reasons)}, and nothing left to try')
+            return LOST, f'{"; ".join(reasons)}, and nothing left to try'
     if deepest_m > rated_m + LIMITS.margin_m(rated_m):
         reasons.append(_beyond(depth, rated_m, 'it is rated for'))
     status = INFEASIBLE if infeasible else UNFINISHED if missing else COMPLETED
-    return Outcome(SURFACED if is_ended else status, '; '.join(filter(None, reasons)))
+    return SURFACED if is_ended else status, '; '.join(filter(None, reasons))
 
 
 def _beyond(depth: np.ndarray, limit_m: float, what: str) -> str:

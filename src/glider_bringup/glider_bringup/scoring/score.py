@@ -245,10 +245,11 @@ class Scorer:
             # who has arrived, or is to go on, may be done before
             if arrival['arrival'] and not arrival['arrival']['arrived']:
                 missing = 'afloat for longer than it was to wait, before the end of its path'
-        ended = outcome_of(depth, told, self._hull, infeasible, missing)
-        pace_m = way_m if ended.status in (COMPLETED, INFEASIBLE) else None
+        status, reason = outcome_of(depth, told, self._hull, infeasible, missing)
+        pace_m = way_m if status in (COMPLETED, INFEASIBLE) else None
         return {
-            **ended._asdict(),
+            'status': status,
+            'reason': reason,
             'ticks': ticks,
             'sim_time_s': time_s,
             'settle_s': rules.settle_s,

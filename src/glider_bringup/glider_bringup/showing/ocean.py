@@ -19,7 +19,7 @@ from glider_mission.routing.plan import Plan
 from glider_mission.scenario import Scenario, check_ways, load_scenario, told_of
 from glider_model.ocean.bottom import BathymetrySettings
 from glider_model.ocean.fields.grid import GridSettings
-from glider_model.ocean.grid_file import GRIDS, Loaded, LoadedBottom, Part, contents, told_time
+from glider_model.ocean.grid_file import GRIDS, Loaded, Part, contents, told_time
 from glider_model.ocean.water import ModelWaterSettings
 
 #: Arrows along either side of a chart.
@@ -68,7 +68,7 @@ def look(file: Path) -> tuple[dict[str, Any], Sea]:
     told = {
         'file': str(file),
         'source': found.source,
-        **dict.fromkeys((*GRIDS, 'bottom')),
+        **dict.fromkeys(GRIDS),
         **{name: _told(name, part) for name, part in found.parts.items()},
         'refused': found.refused,
         'mission': None,
@@ -78,28 +78,23 @@ def look(file: Path) -> tuple[dict[str, Any], Sea]:
     return told, Sea(file.name, panels, None)
 
 
-def _uppermost(seen: Loaded | LoadedBottom) -> Loaded | LoadedBottom:
+def _uppermost(seen: Loaded) -> Loaded:
     """The same with one level."""
-    if isinstance(seen, LoadedBottom):
-        return seen
     axes = seen.axes._replace(depths=seen.axes.depths[:1])
     return seen._replace(axes=axes, water=seen.water[:, :1])
 
 
 def _told(name: str, part: Part) -> dict[str, Any]:
     """What a part of a file is, how far it goes, and the range of its numbers."""
-    variables = [{**one._asdict(), 'low': None, 'high': None} for one in part.variables]
+    variables = [{**one, 'low': None, 'high': None} for one in part.variables]
     told = {'variables': variables, **_extent(part.axes), 'seen': None, 'land_share': None}
     if name == 'currents':
         told['speed_mps'] = None
     if part.seen is None:  # too large to look at as a whole
         return told
-    if isinstance(part.seen, LoadedBottom):
-        land = part.seen.depth <= 0.0
-        numbers = [part.seen.depth[~land]]
-    else:
-        axes, land = part.seen.axes, part.seen.land
-        numbers = list(np.moveaxis(part.seen.water[0][:, ~land], -1, 0))
+    axes, water, _, land = part.seen
+    numbers = list(np.moveaxis(water[0][:, ~land], -1, 0))
+    if 'time' in part.axes:
         depth = {'first': axes.depths[0], 'last': axes.depths[-1]}
         told['seen'] = {'time': told_time(axes.times[0]), 'depth_m': depth}
     told['land_share'] = float(land.mean())
@@ -132,7 +127,7 @@ def _extent(axes: dict[str, np.ndarray]) -> dict[str, Any]:
 def in_words(told: dict[str, Any]) -> list[tuple[str, str]]:
     """Name and text of each line of what is in a file."""
     rows, before = [('source', told['source'] or '-')], []
-    for name in (*GRIDS, 'bottom'):
+    for name in GRIDS:
         part = told[name]
         if not part:
             continue
@@ -150,7 +145,7 @@ def in_words(told: dict[str, Any]) -> list[tuple[str, str]]:
         before = where
     rows += [(name, f'cannot be used: {reason}') for name, reason in told['refused'].items()]
     if told['mission']:
-        used = ', '.join(name for name in (*GRIDS, 'bottom') if told[name])
+        used = ', '.join(name for name in GRIDS if told[name])
         covered = f'is covered by {used}' if told['mission']['covered'] else 'is not covered'
         rows.append(('mission', f'{told["mission"]["scenario"]} {covered}'))
     return rows
@@ -192,27 +187,23 @@ def mission_in(told: dict[str, Any], name: str) -> Sea:
     scenario = load_scenario(name, _NO_FILES)
     mission, panels = scenario.mission(), []
     with told_of('', ValueError):
-        for part, kind in (('currents', GridSettings), ('water', ModelWaterSettings)):
-            if told[part]:
+        for kind in (GridSettings, ModelWaterSettings, BathymetrySettings):
+            if told[part := kind.of]:
                 grid = kind(file=str(file)).resolved(mission)
-                check_ways(scenario, grid, not told['bottom'])
+                check_ways(scenario, grid, part == 'bottom' or not told['bottom'])
                 loaded, begin = grid.loaded()
                 step = np.searchsorted(loaded.axes.times, begin, side='right') - 1
                 axes = loaded.axes._replace(times=loaded.axes.times[step:])
                 panels += _panels(part, loaded._replace(axes=axes, water=loaded.water[step:]))
-        if told['bottom']:
-            chart = BathymetrySettings(file=str(file)).resolved(mission)
-            check_ways(scenario, chart, True)
-            panels += _panels('bottom', LoadedBottom(*chart.params()[:3]))
     return Sea(f'{file.name} at the start of {scenario.name}', panels, scenario)
 
 
-def _panels(name: str, seen: Loaded | LoadedBottom) -> list[Panel]:
+def _panels(name: str, seen: Loaded) -> list[Panel]:
     """Charts of the mean current over the levels, of the uppermost water, or of the bottom."""
-    if isinstance(seen, LoadedBottom):
-        depth = np.where(seen.depth > 0.0, seen.depth, np.nan)
-        return [Panel('bottom', 'depth of the bottom (m)', 'Blues', *seen[:2], depth)]
     (time, *_), levels, *places = seen.axes
+    if name == 'bottom':
+        depth = np.where(seen.land, np.nan, seen.water[0, 0, ..., 0])
+        return [Panel('bottom', 'depth of the bottom (m)', 'Blues', *places, depth)]
     at = f'at {levels[0]:g} m, {told_time(time)}'
     if name == 'currents':
         mean, title = seen.water[0, 0], f'current {at}'

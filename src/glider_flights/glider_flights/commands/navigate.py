@@ -61,8 +61,7 @@ def navigate(
 
 def _segments_table(flight, rows) -> Table:
     begin, end = (
-        datetime.fromtimestamp(one, timezone.utc)
-        for one in (rows[0].reckoned.dived_s, rows[-1].reckoned.surfaced_s)
+        datetime.fromtimestamp(one, timezone.utc) for one in (rows[0].dived_s, rows[-1].surfaced_s)
     )
     title = (
         f'{flight.kind.capitalize()}, {len(flight.files)} files, {begin:%Y-%m-%d %H:%M} to '
@@ -78,9 +77,9 @@ def _segments_table(flight, rows) -> Table:
         own, other = row.comparable_mps, row.segment.on_board.dac_mps
         table.add_row(
             _short(row.segment.name),
-            f'{row.reckoned.seconds / 3600.0:.1f}',
+            f'{row.seconds / 3600.0:.1f}',
             f'{row.segment.samples.depth_m.max():.0f}',
-            f'{np.hypot(*row.reckoned.way_m):.0f}',
+            f'{np.hypot(*row.way_m):.0f}',
             _current(own),
             _current(other),
             _number(float(np.hypot(*(own - other))), 1, 100.0),

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from glider_base.errors import ConfigurationError, installed
-from glider_flights.navigation import comparable_current, navigate
+from glider_flights.navigation import navigate
 from glider_flights.record import Flight, Segment, at_times, vertical_rate
 from glider_flights.validation.flying import RATE_S, Model, Simulated, Track
 
@@ -152,11 +152,10 @@ def _closure(flight: Flight, pairs) -> dict[str, Any]:
     """Our depth-averaged current, by the plant's way through the water, less that on board."""
     off = []
     for row in navigate(flight, lambda *_: None):
-        segment = row.segment
-        way, seconds = _way(segment, pairs)
-        if seconds > WHOLE * row.reckoned.seconds:
-            own = comparable_current(flight, segment, row.reckoned._replace(way_m=way))
-            off.append(float(np.hypot(*(own - segment.on_board.dac_mps))))
+        way, seconds = _way(row.segment, pairs)
+        if seconds > WHOLE * row.seconds:
+            own = row._replace(way_m=way).comparable_mps
+            off.append(float(np.hypot(*(own - row.segment.on_board.dac_mps))))
     off = np.array(off, float)
     return {
         'median': figure(off, 100.0, np.median),

@@ -10,7 +10,7 @@ ours is then, byte by byte, what its recorder would have left had it been stoppe
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO, Any
 
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Header, Metadata
@@ -37,19 +37,15 @@ _LOOSE_BYTES = 1 << 20
 Progress = Callable[[int, int], None]
 
 
-class Recovered(NamedTuple):
-    """What is in a bag that is whole now."""
-
-    rebuilt: tuple[str, ...]  #: names of the files that were made anew; none if all were whole
-    dropped_bytes: int  #: of what was no whole chunk
-    dropped: tuple[str, ...]  #: the same in words
-    counts: dict[str, int]  #: messages by topic
-    start_ns: int  #: log time of the first message; 0 without one
-    end_ns: int  #: and of the last
-
-
-def recover(path: Path, progress: Progress = lambda done, total: None) -> Recovered:
+def recover(path: Path, progress: Progress = lambda done, total: None) -> dict[str, Any]:
     """Make a run, a bag or a single MCAP file whole. What is whole is left as it is.
+
+    Returns
+    -------
+    dict
+        rebuilt (names of the files that were made anew; none if all were whole), start_s and end_s
+        (log times of the first and the last message; 0 without one), messages, topics (messages
+        by topic), dropped_bytes (of what was no whole chunk), dropped (the same in words).
 
     Raises
     ------
@@ -70,14 +66,16 @@ def recover(path: Path, progress: Progress = lambda done, total: None) -> Recove
         write_metadata(path, metadata_text(summaries))
         rebuilt.append(METADATA_FILE)
     bag = Bag(path)  # which tests all checksums
-    return Recovered(
-        rebuilt=tuple(rebuilt),
-        dropped_bytes=sum(size for size, _ in dropped),
-        dropped=tuple(what for _, what in dropped),
-        counts=dict(topic_counts(summaries.values())),
-        start_ns=bag.start_ns,
-        end_ns=bag.end_ns,
-    )
+    counts = topic_counts(summaries.values())
+    return {
+        'rebuilt': rebuilt,
+        'start_s': bag.start_ns / 1e9,
+        'end_s': bag.end_ns / 1e9,
+        'messages': counts.total(),
+        'topics': dict(counts),
+        'dropped_bytes': sum(size for size, _ in dropped),
+        'dropped': [what for _, what in dropped],
+    }
 
 
 def _files(path: Path) -> tuple[list[Path], bool]:

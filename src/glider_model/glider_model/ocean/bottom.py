@@ -2,10 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bottom of the sea: how deep it is at a place, and a vehicle that touches it."""
 
-import functools
 import math
-from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -18,12 +16,9 @@ from glider_base.frames import (
 )
 from glider_base.kernel import kernel, replace
 from glider_base.slot import slot
-from glider_model.ocean.field import Mission, bracket
-from glider_model.ocean.fields.grid import Coast, GridFileSettings, mission_window, widened
-from glider_model.ocean.grid_file import LoadedBottom, load_bottom
-
-#: Chart around the path that is read too, as far as the file has it (m).
-MARGIN_M = 50_000.0
+from glider_model.ocean.field import bracket
+from glider_model.ocean.fields.grid import GridFileSettings
+from glider_model.ocean.grid_file import Loaded
 
 
 class FlatBottom(NamedTuple):
@@ -72,19 +67,16 @@ def _charted_depth(n, e, params):
 class BathymetrySettings(GridFileSettings):
     """A chart of the bottom, from a file as GEBCO writes it."""
 
-    def coast(self) -> Coast:
-        """What is read of the file, and where on it there is land."""
-        chart = self._charted()
+    of: ClassVar[str] = 'bottom'
 
-        def is_land(latitude: float, longitude: float) -> bool:
-            place = from_geodetic(latitude, longitude, chart.origin)
-            return bottom_depth(*place, chart) <= 0.0
+    def is_land(self, loaded: Loaded, place: tuple[float, float]) -> bool:
+        """Whether there is land at a place (deg), between the points too."""
+        chart = self._charted(loaded)
+        return bottom_depth(*from_geodetic(*place, chart.origin), chart) <= 0.0
 
-        return Coast(chart.latitudes, chart.longitudes, is_land)
-
-    def _charted(self) -> ChartedBottom:
-        loaded = _loaded(self.file, self.stamp, self.mission)
-        return ChartedBottom(*loaded, self.mission.origin.params())
+    def _charted(self, loaded: Loaded) -> ChartedBottom:
+        depth, origin = loaded.water[0, 0, ..., 0], self.mission.origin.params()
+        return ChartedBottom(*loaded.axes[2:], depth, origin)
 
     def params(self) -> ChartedBottom:
         """Kernel parameters.
@@ -95,14 +87,7 @@ class BathymetrySettings(GridFileSettings):
             Naming the file, and what of it or of the mission is at fault.
         """
         self.check_places(self.mission.places, 'on the path')
-        return self._charted()
-
-
-@functools.lru_cache(maxsize=4)
-def _loaded(file: str, stamp: tuple[int, int], mission: Mission) -> LoadedBottom:
-    """What a mission needs of a version of a chart."""
-    needed = mission_window(mission)
-    return load_bottom(Path(file), widened(needed, MARGIN_M), needed)
+        return self._charted(self.loaded()[0])
 
 
 @kernel

@@ -10,7 +10,7 @@ by step. What is no such grid is refused by name. Charts of the bottom have no t
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime, timezone
 from pathlib import Path
@@ -40,11 +40,11 @@ _AXES = ('time', 'depth', 'latitude', 'longitude')
 
 
 class Wanted(NamedTuple):
-    """A quantity of the water, and how a file tells it."""
+    """A quantity of the sea, and how a file tells it."""
 
     what: str
     names: dict[str, str]  #: what CF calls a variable of a name that says nothing of that
-    units: dict[str, float]  #: what makes m/s, degC or psu of them
+    units: dict[str, float]  #: what makes m/s, degC, psu or m of them
     unit: str  #: which of these
     least: float  #: beyond these it is none of the sea
     most: float
@@ -71,8 +71,27 @@ TEMPERATURE_AND_SALINITY = (
         *(_PSU, 'psu', 0.0, 60.0),
     ),
 )
+#: What CF calls a bottom that is a height, and some of what it calls one that is a depth.
+_HEIGHTS = (
+    'height_above_mean_sea_level',
+    'height_above_reference_ellipsoid',
+    'surface_altitude',
+)
+_BELOW = ('sea_floor_depth_below_mean_sea_level', 'sea_floor_depth_below_sea_surface')
+#: As GEBCO and CMEMS (``deptho``) write it: without time and depth.
+BOTTOM = (
+    Wanted(
+        'depth of the bottom',
+        {
+            **dict.fromkeys(('elevation', 'z'), _HEIGHTS[0]),
+            **{'deptho': 'sea_floor_depth_below_geoid', 'bathymetry': 'sea_floor_depth'},
+            **{name: name for name in (*_HEIGHTS, *_BELOW)},
+        },
+        *(_LENGTHS, 'm', -math.inf, math.inf),
+    ),
+)
 #: What a grid is for, and what is read of it; a file may have several.
-GRIDS = {'currents': VELOCITIES, 'water': TEMPERATURE_AND_SALINITY}
+GRIDS = {'currents': VELOCITIES, 'water': TEMPERATURE_AND_SALINITY, 'bottom': BOTTOM}
 #: What of a grid no regular axes have, by names of dimensions or coordinates: what it is called.
 _OTHER_GRIDS = {
     's_rho': 'levels that follow the bottom, as ROMS and CROCO have',
@@ -114,9 +133,11 @@ class Axes(NamedTuple):
 class Loaded(NamedTuple):
     """A window of a grid."""
 
-    axes: Axes
-    water: np.ndarray  #: float32[time, depth, latitude, longitude, 2], what was wanted
-    standards: tuple[str, ...]  #: what CF calls the two of them
+    axes: Axes  #: a bottom has one time and one depth
+    #: float32[time, depth, latitude, longitude, n], what was wanted; a bottom's is above 0 but
+    #: for land
+    water: np.ndarray
+    standards: tuple[str, ...]  #: what CF calls each of them
     land: np.ndarray  #: bool[latitude, longitude], of the uppermost level
 
 
@@ -124,21 +145,18 @@ class _Layout(NamedTuple):
     """Where in a dataset what is wanted and its axes are."""
 
     dataset: 'xarray.Dataset'
-    variables: list[str]
+    variables: tuple[str, ...]
     standards: tuple[str, ...]  #: what CF calls them
-    scales: list[float]  #: that make m/s, degC or psu of them
+    scales: list[float]  #: that make m/s, degC, psu or m of them
     axes: dict[str, str]  #: dimension by axis; depth may be missing
-    values: dict[str, np.ndarray]  #: of each axis, as in the file
+    values: dict[str, np.ndarray]  #: of each axis, as in the file; one 0 where it is missing
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator['xarray.Dataset']:
     """Dataset of a file, of which nothing is read yet.
 
-    Raises
-    ------
-    ConfigurationError
-        Naming the file; also of what is found wrong in it.
+    A ConfigurationError names the file, also of what is found wrong in it.
     """
     import xarray
 
@@ -196,7 +214,7 @@ def _candidates(dataset: 'xarray.Dataset', wanted: Wanted) -> dict[str, str]:
     """What CF calls each variable that may be what is wanted."""
     named, known = _named(dataset), wanted.names
     found = {name: told for name, told in named.items() if told in known.values()}
-    return found or {name: known[name] for name in known if name in named}
+    return found or {name: known[name.lower()] for name in named if name.lower() in known}
 
 
 def _variable(dataset: 'xarray.Dataset', wanted: Wanted) -> tuple[str, str]:
@@ -236,15 +254,10 @@ def _flat(dataset: 'xarray.Dataset') -> str:
     return ''
 
 
-def _find_axes(
-    dataset: 'xarray.Dataset', name: str, allowed: tuple[str, ...] = _AXES
-) -> dict[str, str]:
+def _find_axes(dataset: 'xarray.Dataset', name: str, allowed: tuple[str, ...]) -> dict[str, str]:
     """Dimension of a variable by axis.
 
-    Raises
-    ------
-    ValueError
-        Naming the dimension that is none, and what grid it seems to be.
+    A ValueError names the dimension that is none, and what grid it seems to be.
     """
     found: dict[str, str] = {}
     for dimension in map(str, dataset[name].dims):
@@ -268,63 +281,62 @@ def _find_axes(
 
 def _times(variable: 'xarray.Variable') -> np.ndarray:
     """Times of an axis (s since 1970, UTC)."""
-    import xarray
+    from xarray.coding.times import decode_cf_datetime
 
+    units, calendar = variable.attrs.get('units'), variable.attrs.get('calendar')
     try:
-        told = {name: text for name, text in variable.attrs.items() if name != 'bounds'}
-        bare = xarray.Dataset(coords={'time': ('time', variable.values, told)})
-        decoded = xarray.decode_cf(bare)
-        values = decoded['time'].values
+        values = decode_cf_datetime(variable.values, str(units), calendar)
     except (ValueError, ImportError, OverflowError):  # of other calendars, by a library for them
         values = np.empty(0)
     if values.dtype.kind != 'M':
-        calendar = variable.attrs.get('calendar', 'none')
         raise ValueError(
-            f'time: units = {variable.attrs.get("units")!r}, calendar = {calendar!r}: no times of '
-            "this world (allowed: such as 'hours since 1950-01-01', of the standard calendar)"
+            f'time: units = {units!r}, calendar = {calendar or "none"!r}: no times of this world '
+            "(allowed: such as 'hours since 1950-01-01', of the standard calendar)"
         )
     return values.astype('datetime64[ns]').astype(np.int64) / 1e9
 
 
-def _scale(name: str, told: dict, units: dict[str, float], default: str = '') -> float:
+def _scale(name: str, told: dict, units: dict[str, float]) -> float:
     """What the numbers of a variable are multiplied by, as its attributes tell."""
-    unit = str(told.get('units', default)).strip()
+    unit = str(told.get('units', 'm' if units is _LENGTHS else '')).strip()
     if unit not in units:
         raise ValueError(f'{name}: units = {unit!r} (allowed: {", ".join(units)})')
     return units[unit]
 
 
+def _allowed(wanted: tuple[Wanted, ...]) -> tuple[str, ...]:
+    """Axes that what is wanted may have."""
+    return _AXES[2:] if wanted is BOTTOM else _AXES
+
+
 def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
     """Where what is wanted of a dataset and its axes are.
 
-    Raises
-    ------
-    ValueError
-        Naming what is missing, or is no regular grid.
+    A ValueError names what is missing, or is no regular grid.
     """
     found = [_variable(dataset, one) for one in reversed(wanted)][::-1]
-    names = [name for name, _ in found]
-    axes = _find_axes(dataset, names[-1])
-    if _find_axes(dataset, names[0]) != axes:
+    names, standards = zip(*found, strict=True)
+    allowed = _allowed(wanted)
+    axes = _find_axes(dataset, names[-1], allowed)
+    if _find_axes(dataset, names[0], allowed) != axes:
         both = ' and '.join(str(dataset[name].dims) for name in names)
         raise ValueError(f'{" and ".join(names)}: on different axes, {both}, as a '
                          'staggered grid has them (allowed: both at the same places)')  # fmt: skip
     scales = [
-        _scale(name, dataset[name].attrs, one.units)
-        for one, name in zip(wanted, names, strict=True)
+        (-1.0 if standard in _HEIGHTS else 1.0) * _scale(name, dataset[name].attrs, one.units)
+        for one, (name, standard) in zip(wanted, found, strict=True)
     ]
-    values = {}
+    values = {axis: np.zeros(1) for axis in _AXES[:2]}
     for axis, dimension in axes.items():
         one = dataset.variables[dimension]
         values[axis] = _times(one) if axis == 'time' else np.array(one.values, dtype=float)
         if axis == 'depth':
-            scale = _scale(dimension, one.attrs, _LENGTHS, 'm')
+            scale = _scale(dimension, one.attrs, _LENGTHS)
             is_up = one.attrs.get('positive') == 'up' or is_height(values[axis])
             values[axis] *= scale * (-1.0 if is_up else 1.0)
             if len(one) and values[axis].max() < 0.0:
                 raise ValueError(f'{dimension}: positive up, and no level below the surface')
         _refuse_no_axis(dimension, values[axis])
-    standards = tuple(standard for _, standard in found)
     return _Layout(dataset, names, standards, scales, axes, values)
 
 
@@ -342,11 +354,6 @@ def _chosen(values: np.ndarray, low: float, high: float) -> np.ndarray:
     first, last = np.searchsorted(values[order], (low, high), side='left')
     last += last < len(order) and values[order][last] == high
     return order[max(0, first - 1) : last + 1]
-
-
-def _unwrapped(longitudes: np.ndarray, middle: float) -> np.ndarray:
-    """The same meridians, as near to the middle as they can be (deg)."""
-    return middle + (longitudes - middle + 180.0) % 360.0 - 180.0
 
 
 def _runs(indices: np.ndarray) -> list[slice]:
@@ -386,28 +393,26 @@ def load(
         chosen, axes, whole = _select(layout, window)
         if needed is not None:
             _refuse_uncovered(whole, needed)
-        _refuse_large(_bytes(8, chosen))
-        return _read(layout, chosen, axes, wanted)
+        size = _bytes(layout, chosen)
+        if size > MAX_BYTES:
+            raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
+        return _read(layout, chosen, axes, () if wanted is BOTTOM else wanted)
 
 
-def _bytes(each: int, chosen: dict[str, np.ndarray]) -> int:
-    """Bytes of a window, of so many at every point."""
-    return each * math.prod(map(len, chosen.values()))
-
-
-def _refuse_large(size: int) -> None:
-    if size > MAX_BYTES:
-        raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
+def _bytes(layout: _Layout, chosen: dict[str, np.ndarray]) -> int:
+    """Bytes of a window."""
+    return 4 * len(layout.variables) * math.prod(map(len, chosen.values()))
 
 
 def _select(layout: _Layout, window: Window | None) -> tuple[dict[str, np.ndarray], Axes, Axes]:
     """Indices that a window needs, by axis, the axes that they make, and those of all."""
-    values = {'depth': np.zeros(1), **layout.values}
+    values = dict(layout.values)
     longitudes = values['longitude']
     middle = 0.5 * (longitudes.min() + longitudes.max())
     if window is not None:
         middle = 0.5 * (window.west + window.east)
-    values['longitude'] = _unwrapped(longitudes, middle)
+    # the same meridians, as near to the middle as they can be
+    values['longitude'] = middle + (longitudes - middle + 180.0) % 360.0 - 180.0
     if window is None:
         chosen = {axis: np.argsort(values[axis], kind='stable') for axis in _AXES}
     else:
@@ -419,9 +424,6 @@ def _select(layout: _Layout, window: Window | None) -> tuple[dict[str, np.ndarra
             'longitude': (window.west, window.east),
         }
         chosen = {axis: _chosen(values[axis], *limits[axis]) for axis in _AXES}
-        empty = next((axis for axis in _AXES if not len(chosen[axis])), None)
-        if empty:
-            raise ValueError(f'nothing of it is near the {empty} of the mission')
     axes = Axes(*(values[axis][chosen[axis]] for axis in _AXES))
     return chosen, axes, Axes(*(np.sort(values[axis]) for axis in _AXES))
 
@@ -430,12 +432,7 @@ def _refuse_uncovered(axes: Axes, window: Window) -> None:
     """Refuse a grid that does not cover a window in place or time.
 
     A grid with one time is a steady one. Above its first level and below its last one it has the
-    water of these.
-
-    Raises
-    ------
-    ValueError
-        Naming the axis, and what there is.
+    water of these. A ValueError names the axis, and what there is.
     """
     if len(axes.times) > 1 and not math.isnan(window.begin):
         first, last = axes.times[0], axes.times[-1]
@@ -478,23 +475,29 @@ def _read(
 ) -> Loaded:
     """Numbers of a window, with the nearest water in place of land and bottom.
 
-    A step without any, and numbers that are none of what is ``wanted``, are refused.
+    A step without any, and numbers that are none of what is ``wanted``, are refused. A bottom
+    without a number is as far above the sea as the nearest of it is from its surface.
     """
     shape = tuple(len(one) for one in axes)
-    water = np.empty((*shape, 2), dtype=np.float32)
-    present = [axis for axis in _AXES[1:] if axis in layout.axes]
-    land = np.zeros(shape[2:], dtype=bool)
+    water = np.empty((*shape, len(layout.variables)), dtype=np.float32)
+    present = {axis: layout.axes[axis] for axis in _AXES if axis in layout.axes}
+    is_bottom, land = 'time' not in present, np.zeros(shape[2:], dtype=bool)
     for step, index in enumerate(chosen['time']):
+        now = {**chosen, 'time': np.array([index])}
         for component, name in enumerate(layout.variables):
-            part = layout.dataset[name].isel({layout.axes['time']: int(index)})
-            read = _cut(part, {axis: layout.axes[axis] for axis in present}, chosen)
-            read = layout.scales[component] * read.reshape(shape[1:])
+            read = _cut(layout.dataset[name], present, now).reshape(shape[1:])
+            read = layout.scales[component] * read
             if wanted:
                 what = f'{name} at {told_time(axes.times[step])}'
                 _refuse_no_water(what, read, wanted[component])
+            dry = ~np.isfinite(read)
+            filled = _fill_land(read)
+            if is_bottom:
+                filled = np.where(dry, -abs(filled), filled)
+                dry = filled <= 0.0
             if step == 0:
-                land |= ~np.isfinite(read[0])
-            water[step, ..., component] = _fill_land(read)
+                land |= dry[0]
+            water[step, ..., component] = filled
     return Loaded(axes, water, layout.standards, land)
 
 
@@ -535,127 +538,16 @@ def _fill_land(levels: np.ndarray) -> np.ndarray:
     return levels
 
 
-#: Whether a bottom is a height, by its standard name, else by its name.
-_BOTTOMS = {
-    'height_above_mean_sea_level': True,
-    'height_above_reference_ellipsoid': True,
-    'surface_altitude': True,
-    'sea_floor_depth_below_geoid': False,
-    'sea_floor_depth_below_mean_sea_level': False,
-    'sea_floor_depth_below_sea_surface': False,
-    'sea_floor_depth': False,
-}
-_BOTTOM_NAMES = {'elevation': True, 'z': True, 'deptho': False, 'bathymetry': False}
-
-
-class LoadedBottom(NamedTuple):
-    """A window of a chart of the bottom."""
-
-    latitudes: np.ndarray  #: (deg), increasing
-    longitudes: np.ndarray  #: (deg), increasing, those nearest to the middle of the window
-    depth: np.ndarray  #: float32[latitude, longitude] (m); not above 0: land
-
-
-def load_bottom(path: Path, window: Window, needed: Window) -> LoadedBottom:
-    """Read a window of a chart of the bottom, as GEBCO and CMEMS (``deptho``) write them.
-
-    Parameters
-    ----------
-    path : Path
-    window : Window
-        That is read, as far as the file has it.
-    needed : Window
-        That the file has to cover.
-
-    Raises
-    ------
-    ValueError
-        Naming the file, and what is missing in it or what of the mission it does not cover.
-    """
-    with _opened(path) as dataset:
-        layout = _bottom_layout(dataset, 0.5 * (window.west + window.east))
-        values = layout.values
-        whole = Axes(np.zeros(1), np.zeros(1), *(np.sort(values[axis]) for axis in _AXES[2:]))
-        _refuse_uncovered(whole, needed)
-        chosen = {
-            'latitude': _chosen(values['latitude'], window.south, window.north),
-            'longitude': _chosen(values['longitude'], window.west, window.east),
-        }
-        return _read_bottom(layout, chosen)
-
-
-def _bottom_layout(dataset: 'xarray.Dataset', middle: float | None = None) -> _Layout:
-    """Where the depth of the bottom and its axes are, by the middle of a window (deg).
-
-    Raises
-    ------
-    ValueError
-        Naming what is missing, or is no regular grid.
-    """
-    name, standard, scale = _bottom(dataset)
-    axes = _find_axes(dataset, name, _AXES[2:])
-    values = {axis: np.array(dataset.variables[one].values, float) for axis, one in axes.items()}
-    for axis, dimension in axes.items():
-        _refuse_no_axis(dimension, values[axis])
-    longitudes = values['longitude']
-    if middle is None:
-        middle = 0.5 * (longitudes.min() + longitudes.max())
-    values['longitude'] = _unwrapped(longitudes, middle)
-    return _Layout(dataset, [name], (standard,), [scale], axes, values)
-
-
-def _read_bottom(layout: _Layout, chosen: dict[str, np.ndarray]) -> LoadedBottom:
-    """Depths of a window."""
-    _refuse_large(_bytes(4, chosen))
-    (name,), (scale,) = layout.variables, layout.scales
-    axes = {axis: layout.axes[axis] for axis in chosen}
-    depth = scale * _cut(layout.dataset[name], axes, chosen)
-    if not np.isfinite(depth).all():
-        depth = np.where(np.isfinite(depth), depth, -abs(_fill_land(depth[None].copy())[0]))
-    depth = depth.astype(np.float32)
-    return LoadedBottom(*(layout.values[axis][chosen[axis]] for axis in chosen), depth)
-
-
-def _bottoms(dataset: 'xarray.Dataset') -> dict[str, tuple[str, bool]]:
-    """What each variable is that may be the bottom, and whether it is a height."""
-    named = _named(dataset)
-    found = {name: (one, _BOTTOMS[one]) for name, one in named.items() if one in _BOTTOMS}
-    known = {name: name.lower() for name in named if name.lower() in _BOTTOM_NAMES}
-    return found or {name: (one, _BOTTOM_NAMES[one]) for name, one in known.items()}
-
-
-def _bottom(dataset: 'xarray.Dataset') -> tuple[str, str, float]:
-    """Name of the variable of the bottom, what it is, and what makes a depth in m of it."""
-    found = _bottoms(dataset)
-    if len(found) != 1:
-        raise ValueError(
-            f'{len(found)} variables of the depth of the bottom (allowed: one of standard_name '
-            f'{", ".join(_BOTTOMS)}, or called {", ".join(_BOTTOM_NAMES)}; it has '
-            f'{_listed(dataset)})'
-        )
-    ((name, (standard, is_height)),) = found.items()
-    scale = _scale(name, dataset[name].attrs, _LENGTHS, 'm')
-    return name, standard, -scale if is_height else scale
-
-
-class Variable(NamedTuple):
-    """A variable that can be used."""
-
-    name: str
-    what: str
-    standard_name: str  #: what it is taken for, in CF
-    units: str  #: as the file says
-    unit: str  #: what is made of them
-
-
 class Part(NamedTuple):
     """What of a file can be used for one purpose."""
 
-    variables: tuple[Variable, ...]
+    #: of each variable its name, what it is, the standard_name it is taken for in CF, units as the
+    #: file says, and the unit that is made of them
+    variables: list[dict[str, str]]
     axes: dict[str, np.ndarray]  #: each increasing; a bottom has neither time nor depth
     #: in the middle of its time: all levels, or the uppermost if all are too large to be read;
     #: None if that is, too
-    seen: Loaded | LoadedBottom | None
+    seen: Loaded | None
 
 
 class Contents(NamedTuple):
@@ -679,12 +571,13 @@ def contents(path: Path) -> Contents:
         found = Contents(str(source), {}, {})
         for name, wanted in GRIDS.items():
             if any(_candidates(dataset, one) for one in wanted):
-                _add_part(found, name, _water_part, dataset, wanted)
-        if _bottoms(dataset):
-            _add_part(found, 'bottom', _bottom_part, dataset)
+                try:
+                    found.parts[name] = _part(dataset, wanted)
+                except ValueError as error:
+                    found.refused[name] = str(error)
         if found.parts:
             return found
-        names = [*(name for one in sum(GRIDS.values(), ()) for name in one.names), *_BOTTOM_NAMES]
+        names = (name for one in sum(GRIDS.values(), ()) for name in one.names)
         nothing = (
             'no currents, no temperature and salinity, and no bottom (allowed: variables of such '
             f'standard_name, or called {", ".join(names)}; it has {_listed(dataset)})'
@@ -692,47 +585,27 @@ def contents(path: Path) -> Contents:
         raise ValueError('; '.join(found.refused.values()) or nothing)
 
 
-def _add_part(found: Contents, name: str, make: Callable[..., Part], *args) -> None:
-    """Add a part to contents, or why it cannot be used."""
-    try:
-        found.parts[name] = make(*args)
-    except ValueError as error:
-        found.refused[name] = str(error)
-
-
-def _water_part(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> Part:
-    """Water of a dataset; errors as `_layout`."""
+def _part(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> Part:
+    """What of a dataset can be used for one purpose; errors as `_layout`."""
     layout = _layout(dataset, wanted)
     chosen, axes, _ = _select(layout, None)
     time = slice(len(axes.times) // 2, len(axes.times) // 2 + 1)
     seen = None
     for levels in (len(axes.depths), 1):
         some = {**chosen, 'time': chosen['time'][time], 'depth': chosen['depth'][:levels]}
-        if _bytes(8, some) <= MAX_BYTES:
+        if _bytes(layout, some) <= MAX_BYTES:
             there = axes._replace(times=axes.times[time], depths=axes.depths[:levels])
             seen = _read(layout, some, there)
             break
-    told = [(one.what, one.unit) for one in wanted]
-    return Part(_variables(layout, told), dict(zip(_AXES, axes, strict=True)), seen)
-
-
-def _bottom_part(dataset: 'xarray.Dataset') -> Part:
-    """Bottom of a dataset; errors as `_bottom_layout`."""
-    layout = _bottom_layout(dataset)
-    chosen = {axis: np.argsort(layout.values[axis], kind='stable') for axis in _AXES[2:]}
-    axes = {axis: layout.values[axis][chosen[axis]] for axis in chosen}
-    seen = _read_bottom(layout, chosen) if _bytes(4, chosen) <= MAX_BYTES else None
-    return Part(_variables(layout, [('depth of the bottom', 'm')]), axes, seen)
-
-
-def _variables(layout: _Layout, told: list[tuple[str, str]]) -> tuple[Variable, ...]:
-    """Variables of a layout, of which it is told what they are, and the unit made of theirs."""
-    return tuple(
-        Variable(name, what, standard, str(layout.dataset[name].attrs.get('units', '')), unit)
-        for name, standard, (what, unit) in zip(
-            layout.variables, layout.standards, told, strict=True
-        )
-    )
+    variables = [
+        {
+            **{'name': name, 'what': one.what, 'standard_name': standard},
+            **{'units': str(dataset[name].attrs.get('units', '')), 'unit': one.unit},
+        }
+        for name, standard, one in zip(layout.variables, layout.standards, wanted, strict=True)
+    ]
+    told = dict(zip(_AXES, axes, strict=True))
+    return Part(variables, {axis: told[axis] for axis in _allowed(wanted)}, seen)
 
 
 def told_time(seconds: float) -> str:

@@ -21,7 +21,7 @@ import pydantic
 from pydantic import Field
 
 from glider_base.errors import ConfigurationError
-from glider_base.frames import Origin, from_geodetic, on_chart
+from glider_base.frames import from_geodetic, on_chart
 from glider_base.kernel import kernel, replace
 from glider_base.settings import number
 from glider_base.signals import SEA_WATER_DENSITY, Vector, Water
@@ -36,7 +36,7 @@ from glider_model.ocean.density import (
     displacing,
     immersed,
 )
-from glider_model.ocean.fields.grid import GridFileSettings, interpolate
+from glider_model.ocean.fields.grid import GridFileSettings, GridParams, interpolate
 from glider_model.ocean.grid_file import POTENTIAL
 
 #: The drift of wind is whole above the first depth, and there is none below the second (m).
@@ -47,15 +47,9 @@ INVERSION_KGPM3 = 0.03
 
 
 class ModelWaterParams(NamedTuple):
-    """Water of a model as the kernels see it, at a place and time; its axes increase."""
+    """Water of a model as the kernels see it, at a place and time."""
 
-    times: np.ndarray  #: float64[t] (s since the start)
-    depths: np.ndarray  #: float64[z] (m)
-    latitudes: np.ndarray  #: float64[y] (deg)
-    longitudes: np.ndarray  #: float64[x] (deg), around the origin
-    #: float32[t, z, y, x, 2]: rho / rho_0 - 1, of `SEA_WATER_DENSITY`, and temperature (degC)
-    water: np.ndarray
-    origin: Origin
+    grid: GridParams  #: of rho / rho_0 - 1, of `SEA_WATER_DENSITY`, and temperature (degC)
     surface: float  #: the first at the surface where and when the mission begins
     hull_compression: float  #: of a vehicle whose file has no volume (1/Pa)
     n: float  #: where the vehicle is (m)
@@ -76,26 +70,12 @@ class ModelWaterSettings(GridFileSettings):
         ValueError
             Naming the file, and what of it or of the mission is at fault.
         """
-        (axes, *_), begin = self.loaded()
-        self.check_places(self.mission.places, 'on the path')
-        water = _density(self, self.stamp)
-        origin = self.mission.origin.params()
-        n, e = (
-            from_geodetic(*self.mission.places[0], origin) if self.mission.places else (0.0, 0.0)
-        )
-        made = ModelWaterParams(
-            times=axes.times - begin,
-            depths=axes.depths,
-            latitudes=axes.latitudes,
-            longitudes=axes.longitudes,
-            water=water,
-            origin=origin,
-            surface=0.0,
-            hull_compression=hull_compression_per_m / SPECIFIC_WEIGHT,
-            n=n,
-            e=e,
-            t_s=0.0,
-        )
+        grid = self.grid_params()._replace(water=_density(self, self.stamp))
+        n, e = 0.0, 0.0
+        if self.mission.places:
+            n, e = from_geodetic(*self.mission.places[0], grid.origin)
+        compression = hull_compression_per_m / SPECIFIC_WEIGHT
+        made = ModelWaterParams(grid, 0.0, compression, n, e, t_s=0.0)
         return made._replace(surface=water_there(0.0, made)[0])
 
 
@@ -115,8 +95,8 @@ def _density(settings: ModelWaterSettings, stamp: tuple[int, int]) -> np.ndarray
 @kernel
 def water_there(depth, params):
     """Density over `SEA_WATER_DENSITY`, less 1, and temperature (degC) at a depth (m)."""
-    latitude, longitude = on_chart(params.n, params.e, params.origin)
-    return interpolate(params.t_s, depth, latitude, longitude, params)
+    latitude, longitude = on_chart(params.n, params.e, params.grid.origin)
+    return interpolate(params.t_s, depth, latitude, longitude, params.grid)
 
 
 @immersed.body(ModelWaterParams)

@@ -38,6 +38,8 @@ from glider_studies.bounds.steering_loop import (
 TRIED = ((1.0, 0.3), (1.0, 0.6), (1.5, 0.6), (2.0, 0.6))
 #: Condition of P, in states over their sizes, at which the search for a region begins.
 _WORST_CONDITION = 1e6
+#: Typical heading error (rad), by which the states are scaled.
+_ANGLE = 0.1
 #: Largest heading error of a region (rad): sin(psi) / psi.
 _LARGEST_HEADING = 0.6
 #: Rates alpha (1/s) over the rate of the line of sight at which gains are looked for.
@@ -101,16 +103,9 @@ def _symmetric(n: int) -> np.ndarray:
 
 def _scales(loop: SteeringLoop) -> np.ndarray:
     """Typical size of each state."""
-    angle = 0.1
-    sizes = {
-        'e': angle / loop.line_of_sight,
-        'psi': angle,
-        'psi_s': angle,
-        "psi_s'": angle * loop.bandwidth,
-        'u': angle * loop.bandwidth / abs(loop.b),
-        "u'": angle * loop.bandwidth / abs(loop.b) * 0.1,
-    }
-    return np.array([sizes[name] for name in names(loop)])
+    u = loop.bandwidth / abs(loop.b)
+    sizes = (1.0 / loop.line_of_sight, 1.0, 1.0, loop.bandwidth, u, 0.1 * u)
+    return _ANGLE * np.array(sizes[: len(names(loop))])
 
 
 def _scaled(one: Tick, scale: np.ndarray) -> Tick:
@@ -147,7 +142,8 @@ def gain(loop: SteeringLoop, column: int, ratios=BOX) -> Gain | None:
     vertices = box(loop, ratios=ratios)
     scale = _scales(loop)
     ticks = [tick(loop, one) for one in vertices]
-    size = _input_size(loop, column)
+    # an input that moves the vehicle as far as the sizes of its states say
+    size = _ANGLE * (loop.bandwidth, loop.speed, loop.bandwidth / abs(loop.b))[column]
     best = None
     for share in _RATES:
         rate = share * loop.line_of_sight * loop.speed
@@ -191,14 +187,6 @@ def reached(loop: SteeringLoop, ratios=BOX) -> np.ndarray:
             x = step @ x
         most = np.maximum(most, total)
     return most
-
-
-def _input_size(loop: SteeringLoop, column: int) -> float:
-    """An input that moves the vehicle as far as the sizes of its states say."""
-    angle = 0.1
-    return (angle * loop.bandwidth, angle * loop.speed, angle * loop.bandwidth / abs(loop.b))[
-        column
-    ]
 
 
 def _common(loop: SteeringLoop, ticks: list[Tick], basis: np.ndarray, rate: float):

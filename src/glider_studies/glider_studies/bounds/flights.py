@@ -9,7 +9,6 @@ the water: its velocity across the path jumps to and fro, and what guidance esti
 
 import math
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -35,23 +34,6 @@ JUMPS_SHARE = 0.1
 _ASIDE = COLUMNS['tracking_error'].start + 1
 _WATER = COLUMNS['current_velocity'].start
 _ESTIMATE = COLUMNS['current_estimate'].start
-
-
-class Starts(NamedTuple):
-    """What became of starts inside the region."""
-
-    starts: int
-    home: int
-    of_bound: float  #: largest |e| of a flight over what its start allows (-)
-    largest_m: float  #: largest |e|
-
-
-class Jumps(NamedTuple):
-    """What an error of the current did."""
-
-    flights: int
-    gain: float  #: largest |e| over the largest error of its flight (m per m/s)
-    of_bound: float  #: that over the certified gain (-)
 
 
 def _course_of(glide: Glide) -> tuple[float, float, float]:
@@ -86,8 +68,12 @@ def _ticks(glide: Glide) -> int:
 
 def fly_starts(
     glide: Glide, region: Region, starts: int, seed: int, done: Callable[[], None]
-) -> Starts:
-    """Fly from starts that are drawn; start i of a seed is the same whatever their number."""
+) -> dict[str, float]:
+    """Fly from starts that are drawn; start i of a seed is the same whatever their number.
+
+    Returns how many ``starts``, and of these came ``home``; ``of_bound``, the largest |e| of a
+    flight over what its start allows (-); ``largest_m``, the largest |e|.
+    """
     widest = math.sqrt(np.linalg.inv(region.p)[0, 0])
     home, of_bound, largest = 0, 0.0, 0.0
     for i in range(starts):
@@ -99,13 +85,17 @@ def fly_starts(
         of_bound = max(of_bound, float(flown.max()) / allowed)
         largest = max(largest, float(flown.max()))
         done()
-    return Starts(starts, home, of_bound, largest)
+    return {'starts': starts, 'home': home, 'of_bound': of_bound, 'largest_m': largest}
 
 
 def fly_jumps(
     glide: Glide, gain: Gain, flights: int, seed: int, done: Callable[[], None]
-) -> Jumps:
-    """Fly on the path in water that jumps; the error of the estimate is measured."""
+) -> dict[str, float]:
+    """Fly on the path in water that jumps; the error of the estimate is measured.
+
+    Returns how many ``flights``; ``gain``, the largest |e| over the largest error of its flight
+    (m per m/s); ``of_bound``, that over the certified gain (-).
+    """
     north, east, heading = _course_of(glide)
     waters = [_water(glide, heading, sign * JUMP_MPS) for sign in (1.0, -1.0)]
     across = -math.cos(heading), math.sin(heading)
@@ -120,7 +110,7 @@ def fly_jumps(
         largest = float(np.abs(error @ across).max())
         worst = max(worst, float(np.abs(log[:, _ASIDE]).max()) / largest)
         done()
-    return Jumps(flights, worst, worst / gain.gain)
+    return {'flights': flights, 'gain': worst, 'of_bound': worst / gain.gain}
 
 
 def _water(glide: Glide, heading: float, speed: float):

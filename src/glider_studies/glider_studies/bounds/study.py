@@ -78,9 +78,9 @@ def _phase(glide: Glide, starts: int, seed: int, done: Callable[[], None]) -> di
         'jumps': None,
     }
     if starts and found:
-        told['starts'] = fly_starts(glide, found, starts, seed, done)._asdict()
+        told['starts'] = fly_starts(glide, found, starts, seed, done)
     if starts and gains['current']:
-        told['jumps'] = fly_jumps(glide, gains['current'], _jumps(starts), seed, done)._asdict()
+        told['jumps'] = fly_jumps(glide, gains['current'], _jumps(starts), seed, done)
     told['failed'] = _failed(told)
     return told
 

@@ -3,6 +3,7 @@
 """``./glider bounds``: what is certified of the steering of a vehicle, beside simulations."""
 
 import json
+from collections.abc import Callable
 from functools import partial
 from typing import Annotated, Any
 
@@ -66,7 +67,7 @@ def bounds(
 def _print(found: dict[str, Any]) -> None:
     """Print bounds for a person."""
     phases = found['phases'].values()
-    rows = [[label, *(show(phase) for phase in phases)] for label, show in _ROWS]
+    rows = [[label, *(_text(form, phase) for phase in phases)] for label, form in _ROWS]
     low, high = found['box']
     print_table(
         f'{found["vehicle"]}: b / b_hat and k / k_hat between {low} and {high}',
@@ -80,85 +81,59 @@ def _print(found: dict[str, Any]) -> None:
         output.print('all of it holds')
 
 
-def _of(group: str, key: str, form: str = '{:,.3g}', factor: float = 1.0):
-    """Text of a number of a phase; a dash where there is none."""
-
-    def show(phase: dict[str, Any]) -> str:
-        value = (phase[group] or {}).get(key)
-        return '-' if value is None else form.format(factor * value)
-
-    return show
-
-
-def _gain(name: str, key: str = 'm_per_unit'):
-    def show(phase: dict[str, Any]) -> str:
-        one = phase['gains'][name]
-        return f'{one[key]:,.3g}' if one else 'none found'
-
-    return show
+def _text(form: str | Callable[[dict], str], phase: dict[str, Any]) -> str:
+    """Text of a row in a phase; a dash where there is none of its numbers."""
+    try:
+        return form(phase) if callable(form) else form.format_map(phase)
+    except TypeError:  # of None
+        return 'none found' if '{gains' in form else '-'
 
 
 def _ratio(phase: dict[str, Any]) -> str:
-    loop = phase['loop']
-    if loop['b_of_trim_radps'] is None:
-        return '-'
-    return f'{loop["b_of_trim_radps"] / loop["b_radps"]:.2f}'
+    return f'{phase["loop"]["b_of_trim_radps"] / phase["loop"]["b_radps"]:.2f}'
 
 
 def _yaw(phase: dict[str, Any]) -> str:
     loop = phase['loop']
-    if not loop['k']:
-        return '-'
-    return f'{loop["k"]:.3f}, {"adverse" if loop["is_adverse"] else "proverse"}'
+    return (
+        f'{loop["k"]:.3f}, {"adverse" if loop["is_adverse"] else "proverse"}' if loop['k'] else '-'
+    )
 
 
-def _home(phase: dict[str, Any]) -> str:
-    starts = phase['starts']
-    return f'{starts["home"]} of {starts["starts"]}' if starts else '-'
+def _filters(phase: dict[str, Any]) -> str:
+    loop = phase['loop']
+    times_s = 1.0 / loop['bandwidth_radps'], loop['heading_filter_s'], loop['roll_filter_s']
+    return ', '.join(f'{one:.0f}' for one in times_s if one)
 
 
 _ROWS = (
-    (
-        'speed, horizontal speed (m/s)',
-        lambda x: f'{x["loop"]["speed_mps"]:.3f}, {x["loop"]["horizontal_mps"]:.3f}',
-    ),
-    ('b, learnt (rad/s)', _of('loop', 'b_radps', '{:.4f}')),
+    ('speed, horizontal speed (m/s)', '{loop[speed_mps]:.3f}, {loop[horizontal_mps]:.3f}'),
+    ('b, learnt (rad/s)', '{loop[b_radps]:.4f}'),
     ('b by ./glider trim over that', _ratio),
     ('k', _yaw),
-    ('n, speed exponent', _of('loop', 'speed_exponent', '{:.2f}')),
-    ('|z| = |b / k| (rad/s)', _of('loop', 'zero_radps')),
-    ('heading bandwidth a (rad/s)', _of('loop', 'bandwidth_radps')),
-    ('lookahead T (s)', _of('loop', 'lookahead_s', '{:.0f}')),
-    (
-        '1 / a, heading and roll filter (s)',
-        lambda x: ', '.join(
-            f'{one:.0f}'
-            for one in (
-                1.0 / x['loop']['bandwidth_radps'],
-                x['loop']['heading_filter_s'],
-                x['loop']['roll_filter_s'],
-            )
-            if one
-        ),
-    ),
-    ('slowest of the box (s)', _of('loop', 'slowest_s', '{:.0f}')),
-    ('max |S| over the box', _of('loop', 'sensitivity', '{:.2f}')),
-    ('|z| T_leg', _of('loop', 'zero_times_leg', '{:,.0f}')),
-    ('certified: m per m/s of current error', _gain('current')),
-    ('  no less is true than', _gain('current', 'at_least')),
-    ('  up to (m/s)', _gain('current', 'holds_to')),
-    ('certified: m per rad/s of turn rate', _gain('turn rate')),
-    ('  no less is true than', _gain('turn rate', 'at_least')),
-    ('  up to (rad/s)', _gain('turn rate', 'holds_to')),
-    ('certified: m per rad of roll or fin', _gain('roll')),
-    ('  no less is true than', _gain('roll', 'at_least')),
-    ('  up to (rad)', _gain('roll', 'holds_to')),
-    ('region: cross-track (m)', _of('region', 'aside_m', '{:.1f}')),
-    ('region: heading (deg)', _of('region', 'turned_deg', '{:.1f}')),
-    ('  no further than (m)', _of('region', 'widest_m', '{:.1f}')),
-    ('simulated: came home', _home),
-    ('simulated: largest error (m)', _of('starts', 'largest_m', '{:.1f}')),
-    ('  over its bound', _of('starts', 'of_bound', '{:.2f}')),
-    ('simulated: m per m/s of current error', _of('jumps', 'gain')),
-    ('  over its bound', _of('jumps', 'of_bound', '{:.2f}')),
+    ('n, speed exponent', '{loop[speed_exponent]:.2f}'),
+    ('|z| = |b / k| (rad/s)', '{loop[zero_radps]:,.3g}'),
+    ('heading bandwidth a (rad/s)', '{loop[bandwidth_radps]:,.3g}'),
+    ('lookahead T (s)', '{loop[lookahead_s]:.0f}'),
+    ('1 / a, heading and roll filter (s)', _filters),
+    ('slowest of the box (s)', '{loop[slowest_s]:.0f}'),
+    ('max |S| over the box', '{loop[sensitivity]:.2f}'),
+    ('|z| T_leg', '{loop[zero_times_leg]:,.0f}'),
+    ('certified: m per m/s of current error', '{gains[current][m_per_unit]:,.3g}'),
+    ('  no less is true than', '{gains[current][at_least]:,.3g}'),
+    ('  up to (m/s)', '{gains[current][holds_to]:,.3g}'),
+    ('certified: m per rad/s of turn rate', '{gains[turn rate][m_per_unit]:,.3g}'),
+    ('  no less is true than', '{gains[turn rate][at_least]:,.3g}'),
+    ('  up to (rad/s)', '{gains[turn rate][holds_to]:,.3g}'),
+    ('certified: m per rad of roll or fin', '{gains[roll][m_per_unit]:,.3g}'),
+    ('  no less is true than', '{gains[roll][at_least]:,.3g}'),
+    ('  up to (rad)', '{gains[roll][holds_to]:,.3g}'),
+    ('region: cross-track (m)', '{region[aside_m]:.1f}'),
+    ('region: heading (deg)', '{region[turned_deg]:.1f}'),
+    ('  no further than (m)', '{region[widest_m]:.1f}'),
+    ('simulated: came home', '{starts[home]} of {starts[starts]}'),
+    ('simulated: largest error (m)', '{starts[largest_m]:.1f}'),
+    ('  over its bound', '{starts[of_bound]:.2f}'),
+    ('simulated: m per m/s of current error', '{jumps[gain]:,.3g}'),
+    ('  over its bound', '{jumps[of_bound]:.2f}'),
 )

@@ -19,7 +19,7 @@ from glider_bringup.console import (
     repeatable,
 )
 from glider_mission.disk import write_whole
-from glider_studies.at_work import workers_at_work
+from glider_studies.workers import workers_at_work
 
 app = typer.Typer()
 GROUPS = (

@@ -26,7 +26,7 @@ from glider_bringup.console import (
 )
 from glider_mission.disk import write_whole
 from glider_mission.scenario import DEFAULT_SCENARIO
-from glider_studies.at_work import workers_at_work
+from glider_studies.workers import workers_at_work
 
 app = typer.Typer()
 

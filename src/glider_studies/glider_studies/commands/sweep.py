@@ -21,7 +21,7 @@ from glider_bringup.console import (
     output,
     print_table,
 )
-from glider_studies.at_work import workers_at_work
+from glider_studies.workers import workers_at_work
 
 app = typer.Typer()
 #: So many of the cells that failed are told one by one.

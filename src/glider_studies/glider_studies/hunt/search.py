@@ -13,7 +13,7 @@ from glider_mission.choices import Combination, combination_of
 from glider_mission.scenario import Scenario
 from glider_studies.hunt.missions import Mission, draw_mission
 from glider_studies.hunt.oracle import Truth, Verdict, judge, unfounded
-from glider_studies.paper.experiments import Experiment, Study, make_study
+from glider_studies.paper.experiments import Experiment, make_study
 from glider_studies.paper.judges import Check
 
 NAME = 'random_faults'
@@ -115,5 +115,5 @@ def experiment(seed: int, flights: int) -> Experiment:
         return told, {'flights': flights, **_wrong(told), 'hours': hours}
 
     places = {number: (seed, number) for number in range(flights)}
-    study = Study(_fly_mission, places, combinations(seed, flights), rows)
-    return make_study(NAME, seed, judge_search, study)
+    loops = combinations(seed, flights)
+    return make_study(NAME, seed, judge_search, _fly_mission, places, loops, rows)

@@ -9,7 +9,7 @@ anything worse turns a verdict to ``failed``.
 
 import json
 import math
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Collection, Hashable, Iterator
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -90,18 +90,8 @@ class Case(NamedTuple):
         return json.dumps([*self[1:5], self.measures, self.told])
 
 
-class Study(NamedTuple):
-    """Flights that are no cases of the file."""
-
-    fly: Callable[[Any], Any]  #: what a worker does with a task
-    tasks: dict[Hashable, Any]
-    loops: set[Combination]  #: what they need
-    #: Rows, and what else is told of all flights, of what came of each task.
-    rows: Callable[[dict[Hashable, Any]], tuple[list[dict], dict[str, Any]]]
-
-
 class Experiment(NamedTuple):
-    """Flights, and what is asked of them."""
+    """Flights, and what is asked of them: cases of the file, or a study of tasks."""
 
     group: str
     name: str
@@ -110,7 +100,11 @@ class Experiment(NamedTuple):
     paper: str  #: the paper's figure
     cases: list[Case]
     judge: Callable[[list[dict]], list[Check]]
-    study: Study | None = None
+    fly: Callable[[Any], Any] | None = None  #: what a worker does with a task
+    tasks: dict[Hashable, Any] = {}
+    loops: Collection[Combination] = ()  #: what they need
+    #: Rows, and what else is told of all flights, of what came of each task.
+    rows: Callable[[dict[Hashable, Any]], tuple[list[dict], dict[str, Any]]] | None = None
 
 
 # ---------------------------------------------------------------------------------- the file
@@ -132,10 +126,10 @@ def described(name: str) -> dict[str, Any]:
     return next((group[name] for group in groups if name in group), {})
 
 
-def make_study(name: str, seed: int, judge: Callable, study: Study) -> Experiment:
-    """Experiment of a study that the file describes."""
+def make_study(name: str, seed: int, judge: Callable, *study: Any) -> Experiment:
+    """Experiment of a study that the file describes: what fly, tasks, loops and rows are of it."""
     title = f'{described(name)["title"]}, seed {seed}'
-    return Experiment(name, name, '', title, '-', [], judge, study)
+    return Experiment(name, name, '', title, '-', [], judge, *study)
 
 
 def make_experiments(groups: list[str]) -> list[Experiment]:
@@ -194,7 +188,10 @@ def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
         laws = fields.pop('laws', one.get('laws', ['adaptive', 'pid']))
         if 'plant' in fields:
             seed = fields.pop('plant')
-            fields |= _plant(seed, load_scenario(scenario, fields))
+            vehicle = load_vehicle(load_scenario(scenario, fields).vehicle).params()
+            plant = sample_plant(seed, vehicle)
+            water = {f'water.{name}': value for name, value in plant.pop('water').items()}
+            fields |= {**plant, **water}
         if 'fault' in fields:
             fields['faults'] = [fields.pop('fault')]
         name = one['named'].format(*names) if 'named' in one else ', '.join(names)
@@ -207,26 +204,18 @@ def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
     return cases
 
 
-def _plant(seed: int, scenario: Scenario) -> dict[str, Any]:
-    """Fields of a plant of Monte Carlo."""
-    plant = sample_plant(seed, load_vehicle(scenario.vehicle).params())
-    water = {f'water.{name}': value for name, value in plant.pop('water').items()}
-    return {**plant, **water}
-
-
 def _changed(case: Case) -> dict[str, Any]:
-    """What is wrong with the vehicle of a case, and how it steers if that is."""
+    """What is wrong with the vehicle of a case, and how it steers if that is.
+
+    That is its turn rate over sin(roll) over that of its file, in dive and climb.
+    """
     facts = {'changes': case.changes}
     if 'perturb.K_MY' in case.changes:
-        facts['steering'] = steering_share(load_scenario(case.scenario, case.changes))
+        scenario = load_scenario(case.scenario, case.changes)
+        vehicle = load_vehicle(scenario.vehicle).params()
+        frame = airframe(vehicle, perturbed(vehicle, scenario.perturb))
+        facts['steering'] = {name: frame[f'steering_{name}'] for name in ('dive', 'climb')}
     return facts
-
-
-def steering_share(scenario: Scenario) -> dict[str, float]:
-    """Turn rate over sin(roll) of the plant over that of its file, in dive and climb."""
-    vehicle = load_vehicle(scenario.vehicle).params()
-    frame = airframe(vehicle, perturbed(vehicle, scenario.perturb))
-    return {'dive': frame['steering_dive'], 'climb': frame['steering_climb']}
 
 
 def _in_current(case: Case, speed: float) -> dict[str, Any]:
@@ -301,10 +290,7 @@ def _tasks(experiments: list[Experiment]) -> dict[Hashable, tuple[Callable, Any]
         if case.drawn or case.key() not in cases:
             cases[case.key()] = case
     return {key: (_fly_case, case) for key, case in cases.items()} | {
-        (one.name, key): (one.study.fly, task)
-        for one in experiments
-        if one.study
-        for key, task in one.study.tasks.items()
+        (one.name, key): (one.fly, task) for one in experiments for key, task in one.tasks.items()
     }
 
 
@@ -319,8 +305,8 @@ def fly(
     flown = pool.results(_work, _tasks(experiments), progress)
     found = []
     for one in experiments:
-        if one.study:
-            found.append(one.study.rows({key: flown[one.name, key] for key in one.study.tasks}))
+        if one.tasks:
+            found.append(one.rows({key: flown[one.name, key] for key in one.tasks}))
             continue
         results = [flown[case.key()] for case in one.cases]
         rows = [
@@ -342,7 +328,7 @@ def combinations(experiments: list[Experiment]) -> Iterator[Combination]:
     """What `fly` needs loops for."""
     for one in experiments:
         yield from (combination_of(case.load()) for case in one.cases)
-        yield from one.study.loops if one.study else ()
+        yield from one.loops
 
 
 def count_flights(experiments: list[Experiment]) -> int:

@@ -54,7 +54,7 @@ def draw(
     flights = {
         (one.name, case.case, case.controller, case.guidance): record
         for one, kept in zip(experiments, records, strict=True)
-        if not one.study
+        if one.cases
         for case, record in zip(one.cases, kept, strict=True)
         if record is not None
     }

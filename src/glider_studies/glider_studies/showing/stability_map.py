@@ -213,19 +213,12 @@ LEAST_DEG = 60.0
 _ARC, _SIZE = 181, 4.2
 
 # Okabe and Ito's colours, which differ for every kind of colour vision, and in grey.
-_COLOURS = {
-    STABLE: '#56b4e9',
-    CRITICAL: '#f0e442',
-    LOST: '#d55e00',
-    INFEASIBLE: '#c8c8c8',
-    FAILED: '#ffffff',
-}
-_MEANING = {
-    STABLE: 'stable: {0.text} <= {0.stable_m:g} m',
-    CRITICAL: 'critical: <= {0.critical_m:g} m',
-    LOST: 'lost: more, or none measured',
-    INFEASIBLE: 'reported infeasible by the run',
-    FAILED: 'failed: not flown to the end',
+_LOOKS = {
+    STABLE: ('#56b4e9', 'stable: {0.text} <= {0.stable_m:g} m'),
+    CRITICAL: ('#f0e442', 'critical: <= {0.critical_m:g} m'),
+    LOST: ('#d55e00', 'lost: more, or none measured'),
+    INFEASIBLE: ('#c8c8c8', 'reported infeasible by the run'),
+    FAILED: ('#ffffff', 'failed: not flown to the end'),
 }
 
 
@@ -293,7 +286,7 @@ def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray, glide: float
         np.radians(along),
         speed,
         np.repeat(classes, fine, axis=1),
-        cmap=ListedColormap([_COLOURS[name] for name in CLASSES]),
+        cmap=ListedColormap([_LOOKS[name][0] for name in CLASSES]),
         vmin=-0.5,
         vmax=len(CLASSES) - 0.5,
         rasterized=True,
@@ -327,8 +320,9 @@ def _legend(stability: StabilityMap) -> list:
     failed = np.any(stability.classes == CLASSES.index(FAILED))
     handles = []
     for name in CLASSES if failed else CLASSES[:-1]:
-        text, look = _MEANING[name].format(stability.measure), {'edgecolor': 'black'}
-        handles.append(Patch(facecolor=_COLOURS[name], linewidth=0.5, label=text, **look))
+        colour, text = _LOOKS[name]
+        look = {'facecolor': colour, 'edgecolor': 'black', 'linewidth': 0.5}
+        handles.append(Patch(label=text.format(stability.measure), **look))
     glides = dict.fromkeys(f'{one:.2f}' for one in stability.horizontal_kn)
     limits = {
         '-': f'cross current = speed of the glide U_h = {", ".join(glides)} kn',

@@ -31,18 +31,8 @@ def recover(
 
     with counter('reading', None) as update:
         done = work.recover(run, update)
-    found = {
-        'run': str(run),
-        'state': 'recovered' if done.rebuilt else 'whole',
-        'rebuilt': done.rebuilt,
-        **_ticks(run),
-        'start_s': done.start_ns / 1e9,
-        'end_s': done.end_ns / 1e9,
-        'messages': sum(done.counts.values()),
-        'topics': done.counts,
-        'dropped_bytes': done.dropped_bytes,
-        'dropped': done.dropped,
-    }
+    state = 'recovered' if done['rebuilt'] else 'whole'
+    found = {'run': str(run), 'state': state, **done, **_ticks(run)}
     if as_json:
         print(json.dumps(found))
     else:
@@ -94,7 +84,7 @@ def _print(found: dict[str, Any]) -> None:
 
 
 def _missing(found: dict[str, Any]) -> list[str]:
-    missing = list(found['dropped'])
+    missing = [*found['dropped']]
     if missing:
         missing[-1] += f'; {found["dropped_bytes"]:,} bytes in all'
     missing += [f'{count:,} messages of {name}' for name, count in found['lacking'].items()]

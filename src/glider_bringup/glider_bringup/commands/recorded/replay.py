@@ -75,7 +75,7 @@ def replay(
         while loop:
             played = player.run(update)
     if as_json:
-        print(json.dumps({'run': str(run), 'recorded_s': span_s, **played._asdict()}))
+        print(json.dumps({'run': str(run), 'recorded_s': span_s, **played}))
     else:
-        count = sum(played.counts.values())
-        output.print(f'{count:,} messages, {span_s:,.1f} s in {played.wall_s:,.1f} s')
+        count = sum(played['counts'].values())
+        output.print(f'{count:,} messages, {span_s:,.1f} s in {played["wall_s"]:,.1f} s')

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import rclpy
@@ -57,13 +57,6 @@ class Plan(NamedTuple):
         """Which messages of a batch are published."""
         inside = (batch.log_ns >= self.start_ns) & (batch.log_ns <= self.end_ns)
         return inside & np.isin(batch.topic, list(self.names))
-
-
-class Played(NamedTuple):
-    """What was replayed."""
-
-    counts: dict[str, int]  #: messages by topic
-    wall_s: float
 
 
 # ---------------------------------------------------------------------- what to replay
@@ -343,8 +336,8 @@ class Replay:
                 say(f'waiting for {count} subscribers of {", ".join(missing)}')
             time.sleep(0.02)
 
-    def run(self, progress: Progress) -> Played:
-        """Publish everything once."""
+    def run(self, progress: Progress) -> dict[str, Any]:
+        """Publish everything once; returns the ``counts`` of messages by topic, and ``wall_s``."""
         began_s = time.monotonic()
         self._clock_ns = -TICK_NS
         span_s = (self._plan.end_ns - self._plan.start_ns) / 1e9
@@ -367,7 +360,7 @@ class Replay:
         _wait_for_acks(self._count.publisher)
         progress(span_s)
         counts = {output.name: output.count for output in self._outputs.values()}
-        return Played(counts, time.monotonic() - began_s)
+        return {'counts': counts, 'wall_s': time.monotonic() - began_s}
 
     def _sleep_until(self, due_s: float, passed_s: float, progress: Progress) -> None:
         while (left_s := due_s - time.monotonic()) > 0.0:

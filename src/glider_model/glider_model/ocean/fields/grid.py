@@ -10,7 +10,7 @@ is carried out of it finds the water of its edge.
 import functools
 import math
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import ClassVar, Literal, NamedTuple
 
@@ -25,18 +25,10 @@ from glider_base.settings import Settings, beside
 from glider_model.ocean.field import FieldSettings, Mission, bracket, field_velocity
 from glider_model.ocean.grid_file import GRIDS, Loaded, Window, fingerprint, load
 
-#: Water around the path that is read too, as far as the file has it (m).
-MARGIN_M = 150_000.0
+#: Water, or bottom, around the path that is read too, as far as the file has it (m).
+MARGINS_M = {'currents': 150_000.0, 'water': 150_000.0, 'bottom': 50_000.0}
 #: A place is not beyond a file by what it was rounded (deg).
 EDGE_DEG = 1e-9
-
-
-class Coast(NamedTuple):
-    """What is read of a file, and where on it there is land."""
-
-    latitudes: np.ndarray  #: (deg), increasing
-    longitudes: np.ndarray
-    is_land: Callable[[float, float], bool]  #: at a latitude and longitude (deg)
 
 
 class GridFileSettings(Settings):
@@ -87,15 +79,10 @@ class GridFileSettings(Settings):
         loaded, start_s = self.loaded()
         return start_s if len(loaded.axes.times) > 1 else None
 
-    def coast(self) -> Coast:
-        """What is read of the file, and where there is land, by the nearest point of its grid."""
-        (*_, latitudes, longitudes), _, _, land = self.loaded()[0]
-
-        def is_land(latitude: float, longitude: float) -> bool:
-            row = np.abs(latitudes - latitude).argmin()
-            return bool(land[row, np.abs(longitudes - longitude).argmin()])
-
-        return Coast(latitudes, longitudes, is_land)
+    def is_land(self, loaded: Loaded, place: tuple[float, float]) -> bool:
+        """Whether there is land at a place (deg) of what is read: at the nearest of its points."""
+        axes = zip(loaded.axes[2:], place, strict=True)
+        return bool(loaded.land[tuple(np.abs(axis - one).argmin() for axis, one in axes)])
 
     def check_places(self, places: Iterable[tuple[float, float]], what: str) -> None:
         """Refuse places (deg) that are on land, or beyond what is read around the path.
@@ -105,7 +92,8 @@ class GridFileSettings(Settings):
         ConfigurationError
             Naming the file, the place, and ``what`` it is: such as 'on the path'.
         """
-        latitudes, longitudes, is_land = self.coast()
+        loaded, _ = self.loaded()
+        latitudes, longitudes = loaded.axes[2:]
         for place in places:
             at = _beside(place, self.mission.origin.longitude_deg)
             told = f'file {self.file}: {place[0]:.4f}, {place[1]:.4f} {what} is'
@@ -116,8 +104,21 @@ class GridFileSettings(Settings):
                     f'{latitudes[-1]:.3f}, {longitudes[0]:.3f} to {longitudes[-1]:.3f}, around '
                     'the path as far as it has water)'
                 )
-            if is_land(*at):
+            if self.is_land(loaded, at):
                 raise ConfigurationError(f'{told} land (allowed: water)')
+
+    def grid_params(self) -> 'GridParams':
+        """What was read of the file, for kernels.
+
+        Raises
+        ------
+        ConfigurationError
+            Naming the file, and what of it or of the mission is at fault.
+        """
+        loaded, begin = self.loaded()
+        self.check_places(self.mission.places, 'on the path')
+        (times, *others), origin = loaded.axes, self.mission.origin.params()
+        return GridParams(times - begin, *others, loaded.water, origin)
 
     def known(self) -> 'GridFileSettings':
         """Copy with the fingerprint of its file.
@@ -152,31 +153,15 @@ class GridSettings(GridFileSettings, FieldSettings):
         return loaded.land[np.ix_(*nearest)]
 
     def params(self) -> 'GridParams':
-        """Kernel parameters.
-
-        Raises
-        ------
-        ConfigurationError
-            Naming the file, and what of it or of the mission is at fault.
-        """
-        loaded, begin = self.loaded()
-        self.check_places(self.mission.places, 'on the path')
-        axes = loaded.axes
-        return GridParams(
-            times=axes.times - begin,
-            depths=axes.depths,
-            latitudes=axes.latitudes,
-            longitudes=axes.longitudes,
-            water=loaded.water,
-            origin=self.mission.origin.params(),
-        )
+        """Kernel parameters; errors as of `grid_params`."""
+        return self.grid_params()
 
 
-@functools.lru_cache(maxsize=4)
+@functools.lru_cache(maxsize=8)
 def _loaded(file: str, stamp: tuple[int, int], mission: Mission, of: str) -> tuple[Loaded, float]:
     """What a mission needs of a version of a file, and its start (s since 1970)."""
     needed = mission_window(mission)
-    window = widened(needed, MARGIN_M)
+    window = widened(needed, MARGINS_M[of])
     begin_s, lasts_s = window.begin - mission.earlier_s, window.lasts + mission.earlier_s
     window = window._replace(begin=begin_s, lasts=lasts_s)
     loaded = load(Path(file), window, needed, GRIDS[of])
@@ -226,13 +211,13 @@ class GridParams(NamedTuple):
     depths: np.ndarray  #: float64[z] (m)
     latitudes: np.ndarray  #: float64[y] (deg)
     longitudes: np.ndarray  #: float64[x] (deg), around the origin
-    water: np.ndarray  #: float32[t, z, y, x, 2], to the north and to the east (m/s)
+    water: np.ndarray  #: float32[t, z, y, x, 2]; a current to the north and to the east (m/s)
     origin: Origin
 
 
 @kernel
 def interpolate(t_s, depth, latitude, longitude, params):
-    """Velocity of a grid to the north and to the east (m/s), linear between its points."""
+    """Both numbers of a grid, such as a velocity north and east (m/s), linear between points."""
     t, t_next, f_t = bracket(t_s, params.times)
     z, z_next, f_z = bracket(depth, params.depths)
     y, y_next, f_y = bracket(latitude, params.latitudes)
