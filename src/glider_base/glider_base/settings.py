@@ -252,8 +252,8 @@ def _mistake(item: dict, model: type[pydantic.BaseModel]) -> Mistake:
         message = 'unknown' if 'tag' in context else 'missing'
     given = '' if isinstance(value, dict) else f' = {shown(value)}'
     allowed = _allowed(item, holders, field)
-    where = '.'.join(clipped(part) for part in path) or '(file)'
-    text = f'{where}{given}: {message}' + (f' ({allowed})' if allowed else '')
+    where = ('.'.join(clipped(part) for part in path) + given).removeprefix(' = ')
+    text = ': '.join(filter(None, [where, message])) + (f' ({allowed})' if allowed else '')
     return tuple(path), text
 
 

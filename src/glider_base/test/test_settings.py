@@ -111,7 +111,7 @@ def message(values) -> str:
         ({'pets': [{}]}, 'a.yaml: pets.0.kind: missing'),
         (
             [],
-            'a.yaml: (file) = []: expected a mapping of fields '
+            'a.yaml: []: expected a mapping of fields '
             '(allowed fields: inner, rate, mode, path, pets, maybe)',
         ),
     ],

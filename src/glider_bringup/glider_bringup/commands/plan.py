@@ -87,7 +87,7 @@ def _rows(told: dict[str, Any]) -> list[tuple[str, str]]:
         bands += f' (p10 {when(arrival["p10"])}, p90 {when(arrival["p90"])})'
     its_time = span(3600.0 * told['mission_h'])
     if told['dives']:
-        its_time = f'its {told["dives"]} dives, {its_time}'
+        its_time = f'its {told["dives"]} dive{"s" * (told["dives"] != 1)}, {its_time}'
     reach = 'yes' if told['reachable'] else f'not in {its_time}'
     rows = [
         ('reachable', reach),

@@ -44,9 +44,10 @@ def _navigation_rows(card: dict) -> list[tuple[str, str]]:
     off, believed = told['surfacing_cross_track_m'], told['believed_cross_track_m']
     within, surfacings = told['ellipse_95_share'], told['surfacings']
     rms, worst = (None if dac[name] is None else dac[name] / KNOT_MPS for name in ('rms', 'worst'))
+    times = f'{surfacings} surfacing' + 's' * (surfacings != 1)
     inside = '-' if within is None else f'{round(within * surfacings)} of {surfacings} true places'
     return [
-        ('navigation', f'{told["method"]}, {surfacings} surfacings, {told["fixed"]} with a fix'),
+        ('navigation', f'{told["method"]}, {times}, {told["fixed"]} with a fix'),
         ('surfacing position error', f'off by {show(error["p50"], "m", 1)} (p50), '
          f'{show(error["p95"], "m", 1)} (p95), {show(error["worst"], "m", 1)} (worst)'),
         ('cross-track, surfacing', f'max {show(max(map(abs, off), default=None), "m", 1)}, last '
