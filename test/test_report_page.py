@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reports and comparisons in a real browser: drawn, linked, offline, and with the score's numbers.
 
-Needs Chromium, on Debian and Ubuntu the package ``chromium``. ``python test/test_report_page.py``
-flies the default scenario and writes docs/images/report.png anew.
+Needs Chromium, on Debian and Ubuntu the package ``chromium``.
 """
 
 import json
@@ -11,17 +10,12 @@ import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
-import tempfile
 import time
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import sync_playwright
 
-PICTURE = Path(__file__).resolve().parents[1] / 'docs' / 'images' / 'report.png'
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome-stable', 'google-chrome')
 #: 3-D views are drawn without a graphics card.
 OPTIONS = ['--no-sandbox', '--enable-unsafe-swiftshader']
@@ -549,24 +543,3 @@ def test_comparison(browser, glider, default_run, pid_run, tmp_path):
     assert ranges[0][0] > 0.0
     assert (said, len(asked)) == ([], 1)
     page.close()
-
-
-# ---------------------------------------------------------------------------------- picture
-
-
-def write_picture():
-    """Fly the default scenario and draw the head of its report into `PICTURE`."""
-    with tempfile.TemporaryDirectory() as folder:
-        run = Path(folder) / 'run'
-        command = [sys.executable, '-m', 'glider_bringup.cli', 'run', '--engine', 'direct']
-        subprocess.run([*command, '--out', run], check=True)
-        with browser_at(browser_executable()) as browser:
-            page, _, _ = open_page(
-                browser, run / 'report.html', viewport={'width': 1180, 'height': 1900}
-            )
-            page.screenshot(path=PICTURE)
-    print(f'written: {PICTURE}')
-
-
-if __name__ == '__main__':
-    write_picture()
