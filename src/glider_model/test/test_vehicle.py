@@ -195,7 +195,7 @@ def test_vehicle_by_path(edited):
         (
             'volume',
             {'value': 6.9, 'unit': 'l', 'source': 'tank, a digit lost'},
-            '(file): rigid_body, moving_mass, volume: neutral in water of 1e+04 kg/m^3 ',
+            'rigid_body, moving_mass, volume: neutral in water of 1e+04 kg/m^3 ',
         ),
         (
             'rigid_body.hull_inertia.value',
