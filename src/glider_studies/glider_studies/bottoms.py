@@ -104,4 +104,4 @@ def experiment(seed: int) -> Experiment:
     first = FIRST + COUNT * seed
     tasks = {(one, way): (one, way) for one in range(first, first + COUNT) for way in WAYS}
     loops = {combination_of(load_scenario('slocum_shelf'))}
-    return make_study(NAME, seed, judge, fly_one, tasks, loops, rows)
+    return make_study(NAME, seed, judge=judge, fly=fly_one, tasks=tasks, loops=loops, rows=rows)

@@ -83,4 +83,4 @@ def experiment(seed: int) -> Experiment:
     seas = enumerate(SIZES, FIRST + len(SIZES) * seed)
     tasks = {(sea, *case): (sea, rms, *case) for sea, rms in seas for case in CASES}
     loops = {combination_of(load_scenario('eddies_10d', {'orders': []}))}
-    return make_study(NAME, seed, judge, fly_one, tasks, loops, rows)
+    return make_study(NAME, seed, judge=judge, fly=fly_one, tasks=tasks, loops=loops, rows=rows)

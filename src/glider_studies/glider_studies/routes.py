@@ -101,4 +101,4 @@ def experiment(seed: int) -> Experiment:
 
     tasks = {(sea, way): (sea, rms_mps, way) for sea, rms_mps in seas.items() for way in WAYS}
     loops = {combination_of(load_scenario('eddies_10d', {'orders': []}))}
-    return make_study(NAME, seed, judge, cross_one, tasks, loops, rows)
+    return make_study(NAME, seed, judge=judge, fly=cross_one, tasks=tasks, loops=loops, rows=rows)

@@ -74,8 +74,14 @@ class ModelWaterSettings(GridFileSettings):
         n, e = 0.0, 0.0
         if self.mission.places:
             n, e = from_geodetic(*self.mission.places[0], grid.origin)
-        compression = hull_compression_per_m / SPECIFIC_WEIGHT
-        made = ModelWaterParams(grid, 0.0, compression, n, e, t_s=0.0)
+        made = ModelWaterParams(
+            grid=grid,
+            surface=0.0,
+            hull_compression=hull_compression_per_m / SPECIFIC_WEIGHT,
+            n=n,
+            e=e,
+            t_s=0.0,
+        )
         return made._replace(surface=water_there(0.0, made)[0])
 
 

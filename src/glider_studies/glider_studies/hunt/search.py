@@ -116,4 +116,6 @@ def experiment(seed: int, flights: int) -> Experiment:
 
     places = {number: (seed, number) for number in range(flights)}
     loops = combinations(seed, flights)
-    return make_study(NAME, seed, judge_search, _fly_mission, places, loops, rows)
+    return make_study(
+        NAME, seed, judge=judge_search, fly=_fly_mission, tasks=places, loops=loops, rows=rows
+    )

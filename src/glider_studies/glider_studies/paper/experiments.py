@@ -126,10 +126,10 @@ def described(name: str) -> dict[str, Any]:
     return next((group[name] for group in groups if name in group), {})
 
 
-def make_study(name: str, seed: int, judge: Callable, *study: Any) -> Experiment:
-    """Experiment of a study that the file describes: what fly, tasks, loops and rows are of it."""
+def make_study(name: str, seed: int, **study: Any) -> Experiment:
+    """Experiment of a study that the file describes; it has judge, fly, tasks, loops and rows."""
     title = f'{described(name)["title"]}, seed {seed}'
-    return Experiment(name, name, '', title, '-', [], judge, *study)
+    return Experiment(name, name, '', title, '-', [], **study)
 
 
 def make_experiments(groups: list[str]) -> list[Experiment]:
