@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import signal
+import struct
 import time
 from collections import Counter
 from pathlib import Path
@@ -116,7 +117,7 @@ def flying_together(start_glider, tmp_path) -> Flying:
 def messages_on_disk(file: Path) -> dict[str, list[int]]:
     """Stamps by topic in a recording, read chunk by chunk as far as it goes."""
     topics, stamps = {}, {}
-    with file.open('rb') as stream, contextlib.suppress(McapError, EOFError):
+    with file.open('rb') as stream, contextlib.suppress(McapError, EOFError, struct.error):
         for record in StreamReader(stream, validate_crcs=True).records:
             if isinstance(record, Channel):
                 topics[record.id] = record.topic
