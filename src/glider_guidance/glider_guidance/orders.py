@@ -23,10 +23,7 @@ from glider_guidance.yo.stage import AT_END_OF_PATH, SURFACE_PREPARATION, WAITIN
 def changed(settings: GuidanceSettings, order: Order) -> GuidanceSettings:
     """What guidance is told when an order holds.
 
-    Raises
-    ------
-    ConfigurationError
-        Naming the order, and why it makes no sense.
+    A ConfigurationError names the order, and why it makes no sense.
     """
     follows = settings.profile.mode == 'path'
     for name in ('depth_m', 'pitch_deg', 'wait_s', 'hold'):
@@ -127,13 +124,8 @@ def check_orders(
 ) -> None:
     """Refuse orders of a mission that make no sense one after the other.
 
-    ``settings`` are those before the first of them, ``name`` is what one is called by its
-    number.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming the order.
+    ``settings`` are those before the first of them, ``name`` is what one is called by its number.
+    A ConfigurationError names the order.
     """
     is_aborted = False
     for i, order in sorted(enumerate(orders), key=lambda one: one[1].tick):

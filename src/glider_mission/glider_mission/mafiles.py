@@ -208,10 +208,7 @@ def _words(only: _Only) -> str:
 def read_goto_list(file: Path) -> list[tuple[float, float]]:
     """Latitude and longitude (deg) of the waypoints of a list.
 
-    Raises
-    ------
-    ValueError
-        Naming file, line, value and what is allowed.
+    A ValueError names file, line, value and what is allowed.
     """
     read = _read(file, ['goto_list'])
     _check(read, ['num_waypoints'])

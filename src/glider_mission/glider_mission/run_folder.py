@@ -22,10 +22,7 @@ TRACES_FILE, REPORT_FILE = 'traces.npz', 'report.html'
 def make_run_folder(scenario: Scenario, out: Path | None) -> Path:
     """Folder of a new run, with its scenario and vehicle in it as they are flown.
 
-    Raises
-    ------
-    ConfigurationError
-        If the folder cannot be made, or already holds something.
+    Raises ConfigurationError if the folder cannot be made, or already holds something.
     """
     stamp = datetime.now().strftime('%Y%m%d-%H%M%S')
     folder = out or Path('runs') / f'{stamp}-{scenario.name}'
@@ -55,10 +52,7 @@ def write_scenario(scenario: Scenario, folder: Path) -> None:
 def make_result_folder(folder: Path, result: str) -> None:
     """Folder for a study whose result is the file ``result``.
 
-    Raises
-    ------
-    ConfigurationError
-        If it cannot be made, or already holds a result.
+    Raises ConfigurationError if it cannot be made, or already holds a result.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

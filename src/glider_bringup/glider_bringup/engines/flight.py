@@ -134,10 +134,8 @@ class Held:
     def restore(self, kept: Kept) -> None:
         """Go on from there.
 
-        Raises
-        ------
-        ConfigurationError
-            If it is of a mission with another law, or other blocks, or its orders make no sense.
+        Raises ConfigurationError if it is of a mission with another law, or other blocks, or its
+        orders make no sense.
         """
         if typeof(kept.mission) != typeof(held_state(self._held)):
             raise ConfigurationError(
@@ -152,10 +150,7 @@ class Held:
     def order(self, order: Order) -> None:
         """Take an order in.
 
-        Raises
-        ------
-        ConfigurationError
-            If it makes no sense, now or with those to come.
+        Raises ConfigurationError if it makes no sense, now or with those to come.
         """
         if held_state(self._held).guidance.profile.aborted:
             raise ConfigurationError('the mission is aborted (allowed: nothing more)')

@@ -151,12 +151,8 @@ class LaunchPlan(NamedTuple):
 def check_names(words: Iterable[str]) -> None:
     """Refuse ``name:=value`` words of a command line whose name is not that of an argument.
 
-    The launch system would take them without a word.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming it, and those that there are.
+    The launch system would take them without a word. A ConfigurationError names it, and those that
+    there are.
     """
     names = [argument.name for argument in ARGUMENTS]
     for word in words:

@@ -125,10 +125,7 @@ class Traces:
     def save(self, file: Path) -> None:
         """Write everything into a NumPy archive, whole or not at all.
 
-        Raises
-        ------
-        ConfigurationError
-            If it cannot be written.
+        Raises ConfigurationError if it cannot be written.
         """
         with whole_file(file) as stream:
             np.savez_compressed(
@@ -146,10 +143,7 @@ class Traces:
 def load_traces(file: Path) -> Traces:
     """Read what `Traces.save` wrote.
 
-    Raises
-    ------
-    ConfigurationError
-        If the file cannot be read, or is of another version of this program.
+    Raises ConfigurationError if the file cannot be read, or is of another version of this program.
     """
     try:
         with np.load(file) as archive:

@@ -33,10 +33,7 @@ _COLOURS = 8
 def labels(folders: list[Path]) -> list[str]:
     """Short names of runs: those of their folders, or the whole paths if two have one name.
 
-    Raises
-    ------
-    ConfigurationError
-        If a run is given twice.
+    Raises ConfigurationError if a run is given twice.
     """
     whole = [folder.resolve() for folder in folders]
     for i, folder in enumerate(whole):
