@@ -71,15 +71,8 @@ def reaction(
 ) -> Order | None:
     """What guidance orders itself as it begins to tell of no progress, if anything.
 
-    Parameters
-    ----------
-    settings : GuidanceSettings
-    no_progress : int
-        Number of the waypoint that comes no nearer.
-    odom : sequence of float
-        Numbers of the topic.
-    tick : int
-        From which the order holds.
+    ``no_progress`` is the number of the waypoint that comes no nearer, ``odom`` are the numbers of
+    the topic, from ``tick`` on the order holds.
     """
     at_s = round(tick * TICK_S, 1)
     if settings.no_progress == 'hold' and not settings.hold:

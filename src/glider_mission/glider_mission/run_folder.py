@@ -76,23 +76,11 @@ class FlownScenario(NamedTuple):
 def find_scenario(
     run: Path, folder: Path, attachments: Mapping[str, bytes], scratch: Path
 ) -> FlownScenario | None:
-    """Scenario of a run: the file in a folder or else the one attached to its bag; or none.
+    """Scenario of a run: the file in ``folder`` or else the one attached to its bag; or none.
 
-    Parameters
-    ----------
-    run : Path
-        As the person called it.
-    folder : Path
-        Where a file counts.
-    attachments : mapping
-        Of the bag.
-    scratch : Path
-        Folder for attached files. It has to stay as long as the scenario is used.
-
-    Raises
-    ------
-    ConfigurationError
-        If it is not valid, or not what the bag says was flown.
+    ``run`` is what the person called it. Attached files go to ``scratch``, which has to stay as
+    long as the scenario is used. Raises ConfigurationError if it is not valid, or not what the bag
+    says was flown.
     """
     file = folder / SCENARIO_FILE
     if file.is_file():

@@ -93,10 +93,7 @@ class Kept(NamedTuple):
 class Held:
     """A mission between two ticks, where compiled code finds it, and the orders that it follows.
 
-    Parameters
-    ----------
-    mission : tuple, optional
-        State and parameters to fly with, if they are not `mission_of` the scenario.
+    ``mission`` is flown instead of `mission_of` the scenario.
     """
 
     def __init__(
@@ -282,19 +279,9 @@ def fly(
     """Fly with the direct engine; Ctrl-C ends it as aborted with what was flown.
 
     A number that is not finite ends it as failed, with what was flown before. So does a recording
-    that is gone; a disk that takes no more ends it as aborted.
-
-    Parameters
-    ----------
-    takers : iterable of Taker
-        Each is given every row, in this order.
-    mission : tuple, optional
-        State and parameters to fly with, if they are not `mission_of` the scenario.
-
-    Raises
-    ------
-    ConfigurationError
-        If messages are to go wrong, for there are none.
+    that is gone; a disk that takes no more ends it as aborted. Each taker is given every row, in
+    their order. ``mission`` is flown instead of `mission_of` the scenario. Raises
+    ConfigurationError if messages are to go wrong, for there are none.
     """
     refuse_message_faults(scenario)
     takers = tuple(takers)

@@ -218,14 +218,8 @@ def _largest(values: np.ndarray) -> float:
 class Tracer:
     """Takes log blocks as they come and keeps `Traces` of them.
 
-    What was measured, or believed, is kept beside the truth where it is another.
-
-    Parameters
-    ----------
-    vehicle : VehicleParams
-        Whose actuators have limits.
-    reckons : bool
-        Whether the vehicle has to reckon its place: how far off it is is kept, too.
+    What was measured, or believed, is kept beside the truth where it is another. The actuators of
+    ``vehicle`` have limits. If it ``reckons`` its place, how far off that is is kept, too.
     """
 
     topics = TRACED
