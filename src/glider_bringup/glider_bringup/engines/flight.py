@@ -63,7 +63,8 @@ class Outcome(NamedTuple):
 class Taker(Protocol):
     """What follows a flight: a score, traces, a bag.
 
-    One that has a method ``order`` is given the orders that come in flight, before their rows.
+    One that has a method ``order`` is given the orders that come in flight, before their rows;
+    one that has a method ``follow`` the ticks from which orders hold, with these, in their order.
     """
 
     def add(self, log: np.ndarray) -> None:
@@ -93,11 +94,15 @@ class Kept(NamedTuple):
 class Held:
     """A mission between two ticks, where compiled code finds it, and the orders that it follows.
 
-    ``mission`` is flown instead of `mission_of` the scenario.
+    ``mission`` is flown instead of `mission_of` the scenario; the takers that ``follow`` orders
+    are told of them.
     """
 
     def __init__(
-        self, scenario: Scenario, mission: tuple[MissionState, MissionParams] | None = None
+        self,
+        scenario: Scenario,
+        mission: tuple[MissionState, MissionParams] | None = None,
+        takers: Iterable[Taker] = (),
     ) -> None:
         state, self._params = mission or mission_of(scenario)
         self._held = hold(state, self._params)
@@ -107,6 +112,7 @@ class Held:
         self._own: tuple[Order, ...] = ()
         self._followed: tuple[tuple[Order, bool], ...] = ()
         self._waiting = tuple(scenario.orders)
+        self._followers = [taker for taker in takers if hasattr(taker, 'follow')]
         fly_held(self._held, np.empty((0, ROW)), TICK_S)
 
     def keep(self) -> Kept:
@@ -159,7 +165,10 @@ class Held:
         """Fill a log, float64[n, ROW]; rows filled, and whether the mission has ended."""
         filled, is_over = 0, False
         while filled < len(log) and not is_over:
-            for order in due((*self._waiting, *self._own), self.tick, self._stage):
+            orders = due((*self._waiting, *self._own), self.tick, self._stage)
+            for follower in self._followers if orders else ():
+                follower.follow(self.tick, orders)
+            for order in orders:
                 self._follow(order)
             self._own = ()
             ticks = int(min(len(log) - filled, ticks_alone(self._waiting, self.tick)))
@@ -291,7 +300,7 @@ def fly(
         pilot = Pilot(scenario) if scenario.guidance.route == 'planned' else None
         start = time.perf_counter()
         try:
-            held = Held(scenario, (state, params))
+            held = Held(scenario, (state, params), takers)
             for log in blocks_of(_piloted(held, pilot, takers) if pilot else held.fly):
                 for taker in takers:
                     taker.add(log)
