@@ -37,13 +37,7 @@ MEANING = {
 
 
 def measure(progress: Callable[[str], None], checkout: Path) -> dict:
-    """Ratios of this checkout to another one.
-
-    Raises
-    ------
-    RuntimeError
-        If a command fails in one of them.
-    """
+    """Ratios of this checkout to another one; a RuntimeError if a command fails in one of them."""
     ways = {
         'mission': lambda root: _flight_s(root, MISSION_S, '--engine', 'direct'),
         'nodes': lambda root: _flight_s(root, NODES_S),

@@ -44,13 +44,7 @@ MEANING = {
 
 
 def measure(progress: Callable[[str], None]) -> dict:
-    """Figures of the direct engine.
-
-    Raises
-    ------
-    RuntimeError
-        If the floor does not compute the same bits.
-    """
+    """Figures of the direct engine; a RuntimeError if the floor does not compute the same bits."""
     progress('compiling all kernels')
     with TemporaryDirectory() as empty:
         compilation = {'compile_s': _warm_up_s(empty), 'load_s': _warm_up_s(empty)}

@@ -177,10 +177,7 @@ class Floor:
 def compare(engine: np.ndarray, in_c: np.ndarray) -> int:
     """Number of ticks of two motions, float64[ticks, 13], which have the same bits.
 
-    Raises
-    ------
-    RuntimeError
-        If they have not, naming the first difference.
+    Raises RuntimeError if they have not, naming the first difference.
     """
     differs = np.argwhere(engine.view(np.uint64) != in_c.view(np.uint64))
     if len(differs):

@@ -40,10 +40,8 @@ Location = tuple[str, ...]
 def read_bytes(path: Path) -> bytes:
     """Content of a regular file of at most `MAX_BYTES`.
 
-    Raises
-    ------
-    ConfigurationError
-        If there is no such file, it is no regular one, cannot be read, or is larger.
+    Raises ConfigurationError if there is no such file, it is no regular one, cannot be read, or is
+    larger.
     """
     try:
         # devices and pipes are not opened at all; should one come in between, nothing waits for it

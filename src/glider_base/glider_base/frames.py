@@ -164,10 +164,7 @@ def imu_from_wire(wire):
 def poses_from_wire(wire):
     """Poses of many messages, float64[n, >= 7] laid out as by ``odometry_to_wire``.
 
-    Returns
-    -------
-    float64[n, 6]
-        North, east, depth (m), roll, pitch, heading (rad).
+    They are float64[n, 6]: north, east, depth (m), roll, pitch, heading (rad).
     """
     poses = np.empty((wire.shape[0], 6))
     for i in range(wire.shape[0]):

@@ -154,10 +154,7 @@ def refuse_unusable(
 ) -> None:
     """Refuse what is no usable subclass of ``base``, or not by a name; see `classes`.
 
-    Raises
-    ------
-    ValueError, TypeError
-        Which say why, as part of a sentence.
+    A ValueError or TypeError says why, as part of a sentence.
     """
     if not name.isidentifier():
         raise ValueError('its name is no identifier (allowed: letters, digits and _)')

@@ -27,10 +27,7 @@ class Settings(pydantic.BaseModel):
     def check(self) -> None:
         """Refuse what no field shows by itself, such as a depth that a vehicle is not rated for.
 
-        Raises
-        ------
-        ConfigurationError
-            Naming field, value and allowed range.
+        A ConfigurationError names field, value and allowed range.
         """
 
 
@@ -186,12 +183,8 @@ def find_field(model: type[Settings], name: str) -> pydantic.fields.FieldInfo | 
 def holder_of(values: dict[str, Any], name: str) -> dict[str, Any]:
     """Mapping in nested values that holds a field, given by its dotted name; made if need be.
 
-    A member of a list goes by its number, from 0 on: ``faults.0.at_s``.
-
-    Raises
-    ------
-    ConfigurationError
-        If something on the way is not a mapping, or a list has no such member.
+    A member of a list goes by its number, from 0 on: ``faults.0.at_s``. Raises ConfigurationError
+    if something on the way is not a mapping, or a list has no such member.
     """
     inside: Any = values
     for parent in name.split('.')[:-1]:
@@ -331,10 +324,8 @@ def _stems(folder: Path) -> tuple[str, ...]:
 def find_file(what: str, name: str, folder: Path) -> Path:
     """File of a scenario, vehicle or the like, given by name or by path.
 
-    Raises
-    ------
-    ConfigurationError
-        If neither ``folder`` has a file of that name nor there is such a file.
+    Raises ConfigurationError if neither ``folder`` has a file of that name nor there is such a
+    file.
     """
     path, names = Path(name), file_names(folder)
     if name in names:

@@ -116,10 +116,7 @@ def checked(kernel: Callable, *what: str) -> Callable:
 def _check(kernel: Any, kinds: tuple, what: tuple[str, ...]) -> None:
     """Refuse a kernel that is not compiled for arguments of these types, or returns other things.
 
-    Raises
-    ------
-    ConfigurationError
-        In one sentence, with its name and file.
+    A ConfigurationError says so in one sentence, with its name and file.
     """
     try:
         call = types.Dispatcher(kernel).get_call_type(kernel.typingctx, kinds, {})

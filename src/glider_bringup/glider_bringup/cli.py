@@ -137,9 +137,7 @@ for _name, (_text, _example) in OF_THE_SCRIPT.items():
 def check_words(words: list[str]) -> None:
     """Refuse words of a command line that could not be shown as they are.
 
-    Raises
-    ------
-    ConfigurationError
+    Raises ConfigurationError.
     """
     for number, word in enumerate(words, 1):
         if len(word) > MAX_WORD:

@@ -139,23 +139,10 @@ def rest_afloat(m_b, params):
 
 @kernel
 def control_step(state, odometry, joints, reference, params, dt):
-    """One tick of control.
+    """One tick of control, of ``dt`` s.
 
-    Parameters
-    ----------
-    state : ControlState
-    odometry : Odometry
-        Measured pose and velocity over ground; what the gate refuses is not acted on.
-    joints : Joints
-        Where the actuators are.
-    reference : Reference
-    params : ControlParams
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    ControlState, ControlOutput
+    What the gate refuses of the odometry, pose and velocity over ground, is not acted on;
+    ``joints`` is where the actuators are. Returns `ControlState` and `ControlOutput`.
     """
     first = state.tick == 0
     taken = take_in(state.intake, odometry, joints, reference, params.intake, dt)

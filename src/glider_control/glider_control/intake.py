@@ -75,10 +75,8 @@ def _is_finite(reference):
 def take_in(state, odometry, joints, reference, params, dt):
     """Take in what a tick brings; what cannot be is refused, and the last good ones serve.
 
-    Returns
-    -------
-    IntakeState
-        With odometry (``gate.odometry``), ``joints`` and ``reference`` that can be worked with.
+    With odometry (``gate.odometry``), ``joints`` and ``reference`` of the `IntakeState` that it
+    returns one can work.
     """
     gate = gate_step(state.gate, odometry, params.gate, dt)
     joints_s, reference_s, refused_s = 0.0, 0.0, state.refused_s + dt

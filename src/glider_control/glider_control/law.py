@@ -54,13 +54,8 @@ def bank_carefully(m_b, params):
     """Params of a law, with less bank where a net heaviness m_b (kg) hardly lets the roll stop.
 
     What does not right itself is stopped by the roll mass alone, which takes long to the other
-    side and holds a small roll only. Rolled as far and as fast as else, it rolls over.
-
-    Parameters
-    ----------
-    m_b : float
-    params : NamedTuple
-        With ``roll_limit``, ``roll_filter`` and ``righting``.
+    side and holds a small roll only. Rolled as far and as fast as else, it rolls over. The params
+    have ``roll_limit``, ``roll_filter`` and ``righting``.
     """
     if rights_itself(m_b, LEAST_RIGHTING, params.righting):
         return params

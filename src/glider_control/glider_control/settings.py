@@ -93,10 +93,7 @@ class ControlLawSettings(_LawChoice):
     def steering(self, steers_by: str) -> SurfaceLawSettings | None:
         """Gains of steering by a surface of this name; None without a name.
 
-        Raises
-        ------
-        ConfigurationError
-            If nothing steers by such a surface.
+        Raises ConfigurationError if nothing steers by such a surface.
         """
         if steers_by and steers_by not in SURFACE_LAWS:
             raise ConfigurationError(
@@ -167,9 +164,7 @@ class ControlSettings(ControlLawSettings):
 def check_law(name: str, law: type) -> None:
     """Refuse a law that this program alone brings, if it cannot be called by this name.
 
-    Raises
-    ------
-    ConfigurationError
+    Raises ConfigurationError.
     """
     try:
         plugins.refuse_unusable(name, law, LawSettings, {*TAKEN, *LAWS, *SURFACE_LAWS})

@@ -44,12 +44,8 @@ def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
     """Energy of a flight as predicted and as recorded, as `--json` prints it.
 
     Fitted on the first half of another flight, it is all of this one that is predicted; else its
-    second half by its first.
-
-    Raises
-    ------
-    ConfigurationError
-        If the two are not of one kind, or there is too little to be fitted.
+    second half by its first. Raises ConfigurationError if the two are not of one kind, or there is
+    too little to be fitted.
     """
     source = fitted or uses
     if source.kind != uses.kind:

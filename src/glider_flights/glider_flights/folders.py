@@ -27,10 +27,8 @@ File = TypeVar('File')
 def files_in(place: Path, wanted: Callable[[Path], bool]) -> list[Path]:
     """The wanted files: the place itself, those in it, or those in the one folder below it.
 
-    Raises
-    ------
-    ConfigurationError
-        If several folders below it have some: they may be of several flights.
+    Raises ConfigurationError if several folders below it have some: they may be of several
+    flights.
     """
     if place.is_file():
         return [place] if wanted(place) else []

@@ -271,10 +271,7 @@ FORECASTS = ('none', 'persistence', 'ours')
 def navigate(flight: Flight, progress: Progress, method: str = METHOD) -> list[Row]:
     """Navigate all segments, in the order of time, each by what was known before it.
 
-    Raises
-    ------
-    ConfigurationError
-        If there is no such method, or it reads what was not recorded.
+    Raises ConfigurationError if there is no such method, or it reads what was not recorded.
     """
     check(method)
     rows: list[Row] = []

@@ -242,12 +242,7 @@ def read_sensors(
     Returns sensors by name, of which one that was never recorded has no times; the files that were
     read; when each begins (s since 1970) with its name; what is to be said of them. A file without
     a sensor that is needed is left out, as is one that cannot be read, or is not of the flight of
-    the others.
-
-    Raises
-    ------
-    ConfigurationError
-        If that leaves none.
+    the others. Raises ConfigurationError if that leaves none.
     """
     found, left_out = _read_files(files, cache, progress, names)
     found.sort(key=lambda file: file.written)

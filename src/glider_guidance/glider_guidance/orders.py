@@ -23,10 +23,7 @@ from glider_guidance.yo.stage import AT_END_OF_PATH, SURFACE_PREPARATION, WAITIN
 def changed(settings: GuidanceSettings, order: Order) -> GuidanceSettings:
     """What guidance is told when an order holds.
 
-    Raises
-    ------
-    ConfigurationError
-        Naming the order, and why it makes no sense.
+    A ConfigurationError names the order, and why it makes no sense.
     """
     follows = settings.profile.mode == 'path'
     for name in ('depth_m', 'pitch_deg', 'wait_s', 'hold'):
@@ -74,15 +71,8 @@ def reaction(
 ) -> Order | None:
     """What guidance orders itself as it begins to tell of no progress, if anything.
 
-    Parameters
-    ----------
-    settings : GuidanceSettings
-    no_progress : int
-        Number of the waypoint that comes no nearer.
-    odom : sequence of float
-        Numbers of the topic.
-    tick : int
-        From which the order holds.
+    ``no_progress`` is the number of the waypoint that comes no nearer, ``odom`` are the numbers of
+    the topic, from ``tick`` on the order holds.
     """
     at_s = round(tick * TICK_S, 1)
     if settings.no_progress == 'hold' and not settings.hold:
@@ -127,13 +117,8 @@ def check_orders(
 ) -> None:
     """Refuse orders of a mission that make no sense one after the other.
 
-    ``settings`` are those before the first of them, ``name`` is what one is called by its
-    number.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming the order.
+    ``settings`` are those before the first of them, ``name`` is what one is called by its number.
+    A ConfigurationError names the order.
     """
     is_aborted = False
     for i, order in sorted(enumerate(orders), key=lambda one: one[1].tick):

@@ -100,10 +100,7 @@ def told_fields(changed: dict[str, str]) -> str:
 def parse_assignment(text: str) -> tuple[str, Any]:
     """Field and value of a ``path.to.field=value`` option; the value is read as YAML.
 
-    Raises
-    ------
-    ConfigurationError
-        If the text has not this form.
+    Raises ConfigurationError if the text has not this form.
     """
     field, sign, value = text.partition('=')
     field = field.strip()

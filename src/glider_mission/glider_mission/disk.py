@@ -49,12 +49,8 @@ def whole_file(file: Path) -> Iterator[IO[bytes]]:
     """Open a file that is to hold all of what is written, or what it held before.
 
     It is written under another name in the same folder, synced to disk and then renamed. What is
-    no file on a disk (a pipe, a terminal) is written to as it is.
-
-    Raises
-    ------
-    ConfigurationError
-        If it cannot be written; a `DiskError` if the disk is to blame.
+    no file on a disk (a pipe, a terminal) is written to as it is. Raises ConfigurationError if it
+    cannot be written; a `DiskError` if the disk is to blame.
     """
     try:
         if file.exists() and not file.is_file():

@@ -208,10 +208,7 @@ def _words(only: _Only) -> str:
 def read_goto_list(file: Path) -> list[tuple[float, float]]:
     """Latitude and longitude (deg) of the waypoints of a list.
 
-    Raises
-    ------
-    ValueError
-        Naming file, line, value and what is allowed.
+    A ValueError names file, line, value and what is allowed.
     """
     read = _read(file, ['goto_list'])
     _check(read, ['num_waypoints'])
@@ -354,15 +351,9 @@ def with_mafiles(profile: Any) -> Any:
 def mafiles(
     name: str, places: Sequence[tuple[float, float]], profile: ProfileSettings
 ) -> dict[str, str]:
-    """Files of a mission, by their names.
+    """Files of a mission of this name, by their names.
 
-    Parameters
-    ----------
-    name : str
-        What it is called.
-    places : list of (float, float)
-        Waypoints, latitude and longitude (deg), written to 2 mm. They are gone to once.
-    profile : ProfileSettings
+    The waypoints, latitude and longitude (deg), are written to 2 mm. They are gone to once.
     """
     waypoints = [f'{_minutes(longitude)} {_minutes(latitude)}' for latitude, longitude in places]
     list_only = [

@@ -22,10 +22,7 @@ TRACES_FILE, REPORT_FILE = 'traces.npz', 'report.html'
 def make_run_folder(scenario: Scenario, out: Path | None) -> Path:
     """Folder of a new run, with its scenario and vehicle in it as they are flown.
 
-    Raises
-    ------
-    ConfigurationError
-        If the folder cannot be made, or already holds something.
+    Raises ConfigurationError if the folder cannot be made, or already holds something.
     """
     stamp = datetime.now().strftime('%Y%m%d-%H%M%S')
     folder = out or Path('runs') / f'{stamp}-{scenario.name}'
@@ -55,10 +52,7 @@ def write_scenario(scenario: Scenario, folder: Path) -> None:
 def make_result_folder(folder: Path, result: str) -> None:
     """Folder for a study whose result is the file ``result``.
 
-    Raises
-    ------
-    ConfigurationError
-        If it cannot be made, or already holds a result.
+    Raises ConfigurationError if it cannot be made, or already holds a result.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -82,23 +76,11 @@ class FlownScenario(NamedTuple):
 def find_scenario(
     run: Path, folder: Path, attachments: Mapping[str, bytes], scratch: Path
 ) -> FlownScenario | None:
-    """Scenario of a run: the file in a folder or else the one attached to its bag; or none.
+    """Scenario of a run: the file in ``folder`` or else the one attached to its bag; or none.
 
-    Parameters
-    ----------
-    run : Path
-        As the person called it.
-    folder : Path
-        Where a file counts.
-    attachments : mapping
-        Of the bag.
-    scratch : Path
-        Folder for attached files. It has to stay as long as the scenario is used.
-
-    Raises
-    ------
-    ConfigurationError
-        If it is not valid, or not what the bag says was flown.
+    ``run`` is what the person called it. Attached files go to ``scratch``, which has to stay as
+    long as the scenario is used. Raises ConfigurationError if it is not valid, or not what the bag
+    says was flown.
     """
     file = folder / SCENARIO_FILE
     if file.is_file():

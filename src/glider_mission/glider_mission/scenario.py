@@ -446,12 +446,8 @@ _WITH_LAW: dict[str, type[Scenario]] = {}
 def know_law(law: type[LawSettings]) -> str:
     """Let scenarios of this program fly a law that is not registered; returns its name.
 
-    A later class of the same name takes the place of an earlier one.
-
-    Raises
-    ------
-    ConfigurationError
-        If it cannot be called by its name, or one of its fields has no default.
+    A later class of the same name takes the place of an earlier one. Raises ConfigurationError if
+    it cannot be called by its name, or one of its fields has no default.
     """
     name = law.__name__
     check_law(name, law)

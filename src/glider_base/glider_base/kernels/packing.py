@@ -26,10 +26,7 @@ FENCED = 32
 def packed(values: tuple) -> tuple[types.Type, tuple[np.ndarray, ...], tuple]:
     """What `pour` makes a tuple of again: its type, its numbers, and what is none.
 
-    Parameters
-    ----------
-    values : tuple
-        Of tuples, numbers and arrays, in any depth.
+    In it are tuples, numbers and arrays, in any depth.
     """
     if numba.config.DISABLE_JIT:
         return values, (), ()

@@ -172,12 +172,8 @@ def declare_settings(
     """Declare the parameters of ``model`` on ``node`` and return the values they were given.
 
     ``on_change`` is called with the new settings after a tunable parameter was set at run time. A
-    set that the model refuses as a whole is rejected and changes nothing.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming the parameter, its value and the allowed range.
+    set that the model refuses as a whole is rejected and changes nothing. A ConfigurationError
+    names the parameter, its value and the allowed range.
     """
     leaves = list(_leaves(model, None))
     for leaf in leaves:

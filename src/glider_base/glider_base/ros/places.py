@@ -48,10 +48,7 @@ def given_domain() -> int | None:
 def domain_id() -> Iterator[int]:
     """ROS domain of a run: $ROS_DOMAIN_ID, or one that no other run on this machine uses.
 
-    Raises
-    ------
-    ConfigurationError
-        If all of them are taken, or $ROS_DOMAIN_ID is none.
+    Raises ConfigurationError if all of them are taken, or $ROS_DOMAIN_ID is none.
     """
     domain, lock = given_domain(), None
     if domain is not None:  # others may have been given it too, but nobody shall draw it

@@ -148,10 +148,7 @@ def _checked(
 ) -> tuple[float, str | None]:
     """Speed (0.0: max) and absolute namespace of a flight, if its engine knows what is asked.
 
-    Raises
-    ------
-    ConfigurationError
-        Naming the option, and what is allowed.
+    A ConfigurationError names the option, and what is allowed.
     """
     rate = 0.0 if speed == 'max' else number('--speed', speed, 'max', 0.01, 1e6)
     if rate and engine == 'direct':

@@ -58,12 +58,8 @@ def write_mat(dataset: xarray.Dataset, file: Path, progress: Progress) -> None:
     """Write a MAT-file of version 5 with the structs data, units, long_names, flags and about.
 
     The fields of the first three are called alike; ``flags`` says what the numbers of a state or
-    mask mean, ``about`` what was flown.
-
-    Raises
-    ------
-    ConfigurationError
-        If there are more numbers than such a file may have in a struct.
+    mask mean, ``about`` what was flown. Raises ConfigurationError if there are more numbers than
+    such a file may have in a struct.
     """
     if dataset.nbytes >= MAT_BYTES:
         raise ConfigurationError(

@@ -89,11 +89,8 @@ def write_og1(
 ) -> None:
     """Write a run with a bag as a flight in OG1.0.
 
-    Raises
-    ------
-    ConfigurationError
-        If it has no bag, or no tick in it, if nobody knows when it was, or the file cannot be
-        written.
+    Raises ConfigurationError if it has no bag, or no tick in it, if nobody knows when it was, or
+    the file cannot be written.
     """
     with installed('h5netcdf, which writes NetCDF 4'):
         import h5netcdf  # xarray writes NetCDF 4 through it

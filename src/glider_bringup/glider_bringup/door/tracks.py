@@ -76,10 +76,7 @@ class Chart(NamedTuple):
 def start_of(scenario: Scenario, start: str | None) -> float | None:
     """When a run started (s since 1970): as its scenario says, or else as told; None if unknown.
 
-    Raises
-    ------
-    ConfigurationError
-        If both say it, or it is no time.
+    Raises ConfigurationError if both say it, or it is no time.
     """
     told = scenario.origin.time
     if start is not None:
@@ -244,11 +241,8 @@ CHARTS = {'geojson': geojson, 'kml': kml, 'gpx': gpx}
 def write_mafiles(flown: FlownRun, folder: Path) -> None:
     """Write the mission of a run into a folder, as files of a Slocum's.
 
-    Raises
-    ------
-    ConfigurationError
-        If its path has no waypoints or it follows a path in three dimensions, or the files cannot
-        be written.
+    Raises ConfigurationError if its path has no waypoints or it follows a path in three
+    dimensions, or the files cannot be written.
     """
     scenario = flown.scenario
     path, profile, origin = scenario.path, scenario.profile, scenario.origin.params()

@@ -50,10 +50,7 @@ def told(combination: Combination, tell: Tell) -> Iterator[None]:
 def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
     """Have loops compiled that are not in the cache, before many processes need them at once.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        After the loop that was being compiled.
+    Raises KeyboardInterrupt after the loop that was being compiled.
     """
     nothing = np.empty((0, ROW))
     with interrupts_noted() as interrupts:

@@ -190,25 +190,10 @@ def set_held_params(held: HeldMission, params: MissionParams) -> None:
 def fly(
     state: MissionState, params: MissionParams, log: np.ndarray, dt: float
 ) -> tuple[MissionState, int, bool]:
-    """Fly until the log is full or the mission ends.
+    """Fly until the log, float64[n, ROW], is full or the mission ends, in ticks of ``dt`` s.
 
-    Parameters
-    ----------
-    state, params
-        The mission; neither is changed.
-    log : float64[n, ROW]
-        One row is filled for each tick.
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    MissionState
-        State after the last tick that was filled in.
-    int
-        Number of rows filled.
-    bool
-        Whether the mission has ended.
+    Returns the state after the last row that was filled in, the number of rows, and whether the
+    mission has ended. Neither state nor params are changed.
     """
     held = hold(state, params)
     rows, finished = fly_held(held, log, dt)
@@ -235,15 +220,8 @@ def fault_of(row: np.ndarray, tick: int) -> str:
 def blocks_of(advance: Callable[[np.ndarray], tuple[int, bool]]) -> Iterator[np.ndarray]:
     """Fly block by block; ``advance`` fills rows of a log, and says how many, and if it is over.
 
-    Yields
-    ------
-    float64[n, ROW]
-        Log rows, n <= BLOCK_TICKS. The array is used again for the next block.
-
-    Raises
-    ------
-    NotFiniteError
-        After the last tick of which every number is finite.
+    Yields float64[n, ROW], n <= BLOCK_TICKS, which is used again for the next block. Raises
+    NotFiniteError after the last tick of which every number is finite.
     """
     log = np.empty((BLOCK_TICKS, ROW))
     finished, ticks = False, 0

@@ -63,7 +63,8 @@ class Outcome(NamedTuple):
 class Taker(Protocol):
     """What follows a flight: a score, traces, a bag.
 
-    One that has a method ``order`` is given the orders that come in flight, before their rows.
+    One that has a method ``order`` is given the orders that come in flight, before their rows;
+    one that has a method ``follow`` the ticks from which orders hold, with these, in their order.
     """
 
     def add(self, log: np.ndarray) -> None:
@@ -93,14 +94,15 @@ class Kept(NamedTuple):
 class Held:
     """A mission between two ticks, where compiled code finds it, and the orders that it follows.
 
-    Parameters
-    ----------
-    mission : tuple, optional
-        State and parameters to fly with, if they are not `mission_of` the scenario.
+    ``mission`` is flown instead of `mission_of` the scenario; the takers that ``follow`` orders
+    are told of them.
     """
 
     def __init__(
-        self, scenario: Scenario, mission: tuple[MissionState, MissionParams] | None = None
+        self,
+        scenario: Scenario,
+        mission: tuple[MissionState, MissionParams] | None = None,
+        takers: Iterable[Taker] = (),
     ) -> None:
         state, self._params = mission or mission_of(scenario)
         self._held = hold(state, self._params)
@@ -110,6 +112,7 @@ class Held:
         self._own: tuple[Order, ...] = ()
         self._followed: tuple[tuple[Order, bool], ...] = ()
         self._waiting = tuple(scenario.orders)
+        self._followers = [taker for taker in takers if hasattr(taker, 'follow')]
         fly_held(self._held, np.empty((0, ROW)), TICK_S)
 
     def keep(self) -> Kept:
@@ -134,10 +137,8 @@ class Held:
     def restore(self, kept: Kept) -> None:
         """Go on from there.
 
-        Raises
-        ------
-        ConfigurationError
-            If it is of a mission with another law, or other blocks, or its orders make no sense.
+        Raises ConfigurationError if it is of a mission with another law, or other blocks, or its
+        orders make no sense.
         """
         if typeof(kept.mission) != typeof(held_state(self._held)):
             raise ConfigurationError(
@@ -152,10 +153,7 @@ class Held:
     def order(self, order: Order) -> None:
         """Take an order in.
 
-        Raises
-        ------
-        ConfigurationError
-            If it makes no sense, now or with those to come.
+        Raises ConfigurationError if it makes no sense, now or with those to come.
         """
         if held_state(self._held).guidance.profile.aborted:
             raise ConfigurationError('the mission is aborted (allowed: nothing more)')
@@ -167,7 +165,10 @@ class Held:
         """Fill a log, float64[n, ROW]; rows filled, and whether the mission has ended."""
         filled, is_over = 0, False
         while filled < len(log) and not is_over:
-            for order in due((*self._waiting, *self._own), self.tick, self._stage):
+            orders = due((*self._waiting, *self._own), self.tick, self._stage)
+            for follower in self._followers if orders else ():
+                follower.follow(self.tick, orders)
+            for order in orders:
                 self._follow(order)
             self._own = ()
             ticks = int(min(len(log) - filled, ticks_alone(self._waiting, self.tick)))
@@ -287,19 +288,9 @@ def fly(
     """Fly with the direct engine; Ctrl-C ends it as aborted with what was flown.
 
     A number that is not finite ends it as failed, with what was flown before. So does a recording
-    that is gone; a disk that takes no more ends it as aborted.
-
-    Parameters
-    ----------
-    takers : iterable of Taker
-        Each is given every row, in this order.
-    mission : tuple, optional
-        State and parameters to fly with, if they are not `mission_of` the scenario.
-
-    Raises
-    ------
-    ConfigurationError
-        If messages are to go wrong, for there are none.
+    that is gone; a disk that takes no more ends it as aborted. Each taker is given every row, in
+    their order. ``mission`` is flown instead of `mission_of` the scenario. Raises
+    ConfigurationError if messages are to go wrong, for there are none.
     """
     refuse_message_faults(scenario)
     takers = tuple(takers)
@@ -309,7 +300,7 @@ def fly(
         pilot = Pilot(scenario) if scenario.guidance.route == 'planned' else None
         start = time.perf_counter()
         try:
-            held = Held(scenario, (state, params))
+            held = Held(scenario, (state, params), takers)
             for log in blocks_of(_piloted(held, pilot, takers) if pilot else held.fly):
                 for taker in takers:
                     taker.add(log)

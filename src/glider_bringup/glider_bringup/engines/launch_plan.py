@@ -151,12 +151,8 @@ class LaunchPlan(NamedTuple):
 def check_names(words: Iterable[str]) -> None:
     """Refuse ``name:=value`` words of a command line whose name is not that of an argument.
 
-    The launch system would take them without a word.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming it, and those that there are.
+    The launch system would take them without a word. A ConfigurationError names it, and those that
+    there are.
     """
     names = [argument.name for argument in ARGUMENTS]
     for word in words:
@@ -168,18 +164,10 @@ def check_names(words: Iterable[str]) -> None:
 def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     """Check the arguments, and write the parameter file that all nodes are handed.
 
-    Parameters
-    ----------
-    arguments : dict of str
-        Text by name of the argument; what is not given takes its default.
-    log_folder : Path
-        Where the parameter file goes if there is no recording, in a folder called like the
-        namespace. With one it lies in its folder, beside scenario and vehicle.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming the argument, or the file and field, its value and what is allowed.
+    ``arguments`` are texts by name; what is not given takes its default. The file goes beside
+    scenario and vehicle of the recording; without one to ``log_folder``, in a folder called like
+    the namespace. A ConfigurationError names the argument, or the file and field, its value and
+    what is allowed.
     """
     text = {argument.name: argument.default for argument in ARGUMENTS} | arguments
     for argument in ARGUMENTS:

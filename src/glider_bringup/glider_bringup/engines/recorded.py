@@ -75,20 +75,10 @@ def fly_nodes(
 ) -> Outcome:
     """Fly over nodes and topics; what takers are given is read back from the bag.
 
-    Parameters
-    ----------
-    speed : float
-        In times real time; 0.0 is as fast as possible.
-    namespace : str, optional
-        Nodes in a namespace of their own have their clock in it.
-    on_log : callable
-        Gets each line that a node prints.
-    on_read : callable
-        Gets the ticks that have been read back.
-    sync : str
-        When the bag is synced to disk.
-    layout : str
-        Which nodes share a process; see `Layout`.
+    ``speed`` is in times real time, 0.0 as fast as possible. Nodes in a namespace of their own
+    have their clock in it. ``on_log`` gets each line that a node prints, ``on_read`` the ticks
+    that have been read back; ``sync`` says when the bag is synced to disk, ``layout`` which nodes
+    share a process.
     """
     refuse_planned_route(scenario)
     attachments = (folder / SCENARIO_FILE, folder / VEHICLE_FILE)

@@ -27,12 +27,8 @@ def score_again(run: Path, progress: Reading = lambda ticks, total: None) -> dic
     How the run ended is what its `SCORE_FILE` says, or the bag where there is none: a recording
     made by the launch file, or the MCAP file alone. A run of which ticks are missing in its bag is
     not completed, whatever is said: its status is ``aborted``, and the reason names what is
-    missing. Reports, figures and comparisons keep to that.
-
-    Raises
-    ------
-    ConfigurationError
-        If it holds no run, its bag is damaged, or not one tick is in it.
+    missing. Reports, figures and comparisons keep to that. Raises ConfigurationError if it holds
+    no run, its bag is damaged, or not one tick is in it.
     """
     old = read_score(run)
     if not has_bag(run):

@@ -26,12 +26,8 @@ ELLIPSE_95 = 5.991
 class NavigationScorer:
     """Takes in log rows, and tells of every surfacing.
 
-    Parameters
-    ----------
-    origin : Origin
-        To which fixes are relative.
-    reckons : bool
-        Whether the vehicle has to reckon its place between fixes.
+    Fixes are relative to ``origin``; ``reckons``: the vehicle has to reckon its place between
+    them.
     """
 
     def __init__(self, origin: Origin, reckons: bool = False) -> None:

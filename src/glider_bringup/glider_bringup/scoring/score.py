@@ -373,14 +373,8 @@ def windows(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Masks of the steady and of all scored samples.
 
-    Parameters
-    ----------
-    depth : float64[n]
-        From the start of the run on (m).
-    descending : bool[n]
-        Whether the desired vertical rate points down.
-    step_s : float
-        Time between two samples (s).
+    ``depth`` (m) and ``descending``, whether the desired vertical rate points down, are of samples
+    ``step_s`` s apart, from the start of the run on.
     """
     scored = np.arange(len(depth)) * step_s > rules.settle_s
     steady = scored & (depth > rules.steady_depth_m)

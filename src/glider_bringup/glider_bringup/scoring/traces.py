@@ -125,10 +125,7 @@ class Traces:
     def save(self, file: Path) -> None:
         """Write everything into a NumPy archive, whole or not at all.
 
-        Raises
-        ------
-        ConfigurationError
-            If it cannot be written.
+        Raises ConfigurationError if it cannot be written.
         """
         with whole_file(file) as stream:
             np.savez_compressed(
@@ -146,10 +143,7 @@ class Traces:
 def load_traces(file: Path) -> Traces:
     """Read what `Traces.save` wrote.
 
-    Raises
-    ------
-    ConfigurationError
-        If the file cannot be read, or is of another version of this program.
+    Raises ConfigurationError if the file cannot be read, or is of another version of this program.
     """
     try:
         with np.load(file) as archive:
@@ -224,14 +218,8 @@ def _largest(values: np.ndarray) -> float:
 class Tracer:
     """Takes log blocks as they come and keeps `Traces` of them.
 
-    What was measured, or believed, is kept beside the truth where it is another.
-
-    Parameters
-    ----------
-    vehicle : VehicleParams
-        Whose actuators have limits.
-    reckons : bool
-        Whether the vehicle has to reckon its place: how far off it is is kept, too.
+    What was measured, or believed, is kept beside the truth where it is another. The actuators of
+    ``vehicle`` have limits. If it ``reckons`` its place, how far off that is is kept, too.
     """
 
     topics = TRACED

@@ -45,17 +45,10 @@ class TrueMotion:
         self._course = 0.0
 
     def of(self, log: np.ndarray) -> np.ndarray:
-        """Log rows with true odometry and cross-track error.
+        """Log rows, float64[n, ROW], with true odometry and cross-track error.
 
-        Parameters
-        ----------
-        log : float64[n, ROW]
-            The next rows; not changed.
-
-        Returns
-        -------
-        float64[n, ROW]
-            ``log`` itself if the odometry is the truth.
+        ``log`` are the next rows; they are not changed, and given back if the odometry is the
+        truth.
         """
         if not len(log) or np.isnan(log[0, _TRUTH.start]):
             return log

@@ -33,10 +33,7 @@ _COLOURS = 8
 def labels(folders: list[Path]) -> list[str]:
     """Short names of runs: those of their folders, or the whole paths if two have one name.
 
-    Raises
-    ------
-    ConfigurationError
-        If a run is given twice.
+    Raises ConfigurationError if a run is given twice.
     """
     whole = [folder.resolve() for folder in folders]
     for i, folder in enumerate(whole):
@@ -58,11 +55,8 @@ def _fields(values: Any, name: str = '') -> Iterator[tuple[str, Any]]:
 def differences(runs: list[FlownRun]) -> list[dict[str, Any]]:
     """Fields in which the scenarios of runs, or their vehicles, are not all the same.
 
-    Returns
-    -------
-    list of dict
-        ``field``, its dotted name, and ``values``, one of each run; None where there is no
-        such field.
+    Each has a ``field``, its dotted name, and ``values``, one of each run; None where there is no
+    such field.
     """
     flat = []
     for run in runs:

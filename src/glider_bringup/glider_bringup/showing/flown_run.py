@@ -30,12 +30,9 @@ def read_run(
 ) -> FlownRun:
     """A run folder or MCAP file as pages show it: as it was kept in flight, else from its bag.
 
-    Where it has a scorecard and is not to be ``traced``, its bag is not read.
-
-    Raises
-    ------
-    ConfigurationError
-        If it holds no run, its bag is damaged, or there is nothing that could be drawn.
+    Where it has a scorecard and is not to be ``traced``, its bag is not read. Raises
+    ConfigurationError if it holds no run, its bag is damaged, or there is nothing that could be
+    drawn.
     """
     card, kept = read_score(run), run / TRACES_FILE
     bag = Bag(run) if has_bag(run) else None
@@ -91,10 +88,7 @@ def flown_run(
 def keep_traces(scenario: Scenario, folder: Path, card: dict, tracer: Tracer) -> FlownRun:
     """Keep what was traced of a flight in its run folder.
 
-    Raises
-    ------
-    ConfigurationError
-        If it cannot be written.
+    Raises ConfigurationError if it cannot be written.
     """
     traces = tracer.result()
     traces.save(folder / TRACES_FILE)

@@ -56,10 +56,7 @@ class Sea(NamedTuple):
 def look(file: Path) -> tuple[dict[str, Any], Sea]:
     """What is in a file, and its uppermost water in the middle of its time, if that is not huge.
 
-    Raises
-    ------
-    ConfigurationError
-        Naming the file, and why nothing of it can be used.
+    A ConfigurationError names the file, and why nothing of it can be used.
     """
     try:
         found = contents(file)
@@ -178,10 +175,7 @@ def _where(part: dict[str, Any]) -> list[tuple[str, str]]:
 def mission_in(told: dict[str, Any], name: str) -> Sea:
     """What a mission meets at its start, if it flies in the water and over the bottom of a file.
 
-    Raises
-    ------
-    ConfigurationError
-        If the file does not cover it, and why.
+    Raises ConfigurationError if the file does not cover it, and why.
     """
     file = Path(told['file']).resolve()
     scenario = load_scenario(name, _NO_FILES)
@@ -225,10 +219,7 @@ def _panels(name: str, seen: Loaded) -> list[Panel]:
 def draw_sea(sea: Sea, file: Path) -> None:
     """Draw charts of a sea, and the path of a mission.
 
-    Raises
-    ------
-    ConfigurationError
-        If the image cannot be written, or all there is is too large.
+    Raises ConfigurationError if the image cannot be written, or all there is is too large.
     """
     if not sea.panels:
         raise ConfigurationError(
@@ -252,10 +243,7 @@ def draw_sea(sea: Sea, file: Path) -> None:
 def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
     """Draw a plan: the current at the start, fronts of each leg every 12 h, route and path.
 
-    Raises
-    ------
-    ConfigurationError
-        If the image cannot be written.
+    Raises ConfigurationError if the image cannot be written.
     """
     chart, origin = made.chart, scenario.origin.params()
     ways = np.concatenate([scenario.path.points(200)[:, :2], made.route.corners])

@@ -38,13 +38,7 @@ class Track(NamedTuple):
 
 
 def tracks(flight: Flight) -> list[Track]:
-    """Stretches under water of a flight.
-
-    Raises
-    ------
-    ConfigurationError
-        If there is none.
-    """
+    """Stretches under water of a flight; a ConfigurationError if there is none."""
     whole = in_order(flight.instruments, 3)  # time, depth and pitch
     under = whole.depth_m > SURFACE_DEPTH_M
     usual_s = float(np.median(np.diff(whole.time_s[under]))) if under.sum() > 1 else 0.0
@@ -168,10 +162,7 @@ class Simulated(NamedTuple):
 def model_of(name: str, flight: Flight) -> Model:
     """A vehicle with the constants of the body that the files of a flight name.
 
-    Raises
-    ------
-    ConfigurationError
-        If its volume is not known.
+    Raises ConfigurationError if its volume is not known.
     """
     vehicle, body = load_vehicle(name).params(), flight.body or {}
     if body.keys() >= {'mass_kg', 'volume_m3'}:  # one alone would be that of another vehicle

@@ -201,10 +201,7 @@ OF_HALF = (
 def flights_in(folder: Path) -> list[Path]:
     """The folder and those in it that hold files of a flight themselves, in order.
 
-    Raises
-    ------
-    ConfigurationError
-        If there is none.
+    Raises ConfigurationError if there is none.
     """
     if not folder.is_dir():
         raise ConfigurationError(f'--all {folder}: there is no such folder')

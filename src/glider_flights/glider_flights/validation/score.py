@@ -45,16 +45,9 @@ class Adcp(NamedTuple):
 
 
 def score(flight: Flight, pairs: list[Pair], model: Model, speed: np.ndarray) -> dict[str, Any]:
-    """Figures of a flight.
+    """Figures of a flight, as ``model``, which knows the true pitch, flew it.
 
-    Parameters
-    ----------
-    flight : Flight
-    pairs : list of Pair
-    model : Model
-        What was flown: it knows the true pitch.
-    speed : ndarray, shape (n,)
-        Simulated speed less that by an ADCP (m/s); none without one.
+    ``speed``, float64[n], is the simulated one less that by an ADCP (m/s); none without one.
     """
     rate = rate_off(pairs)
     pitch = np.concatenate(

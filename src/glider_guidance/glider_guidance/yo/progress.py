@@ -23,16 +23,8 @@ class Progress(NamedTuple):
 def watch_progress(progress, tick, s, stage, profile):
     """The progress after a tick; it counts as the vehicle comes up.
 
-    Parameters
-    ----------
-    progress : Progress
-    tick : int
-    s : float
-        Parameter of the virtual target (m). It never goes back along a path.
-    stage : int
-        The one before.
-    profile : ProfileState
-        After the tick.
+    ``s`` (m) is the parameter of the virtual target, which never goes back along a path; ``stage``
+    is the one before the tick, ``profile`` the `ProfileState` after it.
     """
     if profile.stage != WAITING_ON_SURFACE or stage == profile.stage or profile.aborted:
         return progress

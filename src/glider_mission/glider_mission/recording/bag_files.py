@@ -21,10 +21,8 @@ ROSBAG2 = 'rosbag2'
 def bag_files(path: Path) -> list[Path]:
     """MCAP files of a bag, in the order in which they were written.
 
-    Raises
-    ------
-    ConfigurationError
-        If there is none, or one of those that metadata.yaml lists is missing.
+    Raises ConfigurationError if there is none, or one of those that metadata.yaml lists is
+    missing.
     """
     if path.is_file():
         return [path]

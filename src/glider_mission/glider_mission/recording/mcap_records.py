@@ -163,11 +163,8 @@ def find_defined(
 ) -> Places:
     """Records of a chunk, of which ``define`` gets the definitions.
 
-    Raises
-    ------
-    ValueError
-        If a record is longer than what is left, or a message is of no channel that is ``known``
-        by then; one of `UNREADABLE` about a definition.
+    Raises ValueError if a record is longer than what is left, or a message is of no channel that
+    is ``known`` by then; one of `UNREADABLE` about a definition.
     """
     found = find(content)
     for at in map(int, found.others):

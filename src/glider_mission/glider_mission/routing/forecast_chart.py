@@ -77,12 +77,8 @@ class Forecast(NamedTuple):
 def forecast_of(scenario: Scenario, stay: float) -> Forecast:
     """The forecast of a mission, as it is to be expected by its error.
 
-    For the share ``stay`` of the time the vehicle is at the surface.
-
-    Raises
-    ------
-    ConfigurationError
-        If the file of the forecast cannot be read, or does not cover the mission.
+    For the share ``stay`` of the time the vehicle is at the surface. Raises ConfigurationError if
+    the file of the forecast cannot be read, or does not cover the mission.
     """
     told, current = scenario.forecast, scenario.current
     if told.file:

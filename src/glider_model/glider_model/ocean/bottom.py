@@ -81,10 +81,7 @@ class BathymetrySettings(GridFileSettings):
     def params(self) -> ChartedBottom:
         """Kernel parameters.
 
-        Raises
-        ------
-        ValueError
-            Naming the file, and what of it or of the mission is at fault.
+        A ValueError names the file, and what of it or of the mission is at fault.
         """
         self.check_places(self.mission.places, 'on the path')
         return self._charted(self.loaded()[0])

@@ -86,10 +86,7 @@ def cast_params(rows: list[list[float]], hull_compression_per_m: float) -> CastP
 def check_cast(rows: list[list[float]], names, source: str) -> None:
     """Refuse rows that cannot be interpolated, or are no water; ``names`` are their numbers.
 
-    Raises
-    ------
-    ValueError
-        Naming the source, the row and the column at fault.
+    A ValueError names the source, the row and the column at fault.
     """
     names, columns = list(names), ('depth_m', 'density_kgpm3', 'temperature_degC')
     check_rows(rows, names, source, columns, alike=True)
@@ -106,10 +103,7 @@ def check_cast(rows: list[list[float]], names, source: str) -> None:
 def read_cast(path: Path) -> list[list[float]]:
     """Read and check a cast: rows of depth (m), density (kg/m^3) and, if it says so, degC.
 
-    Raises
-    ------
-    ValueError
-        Naming the file and what of it is at fault.
+    A ValueError names the file and what of it is at fault.
     """
     source = f'file {path}'
     if path.suffix == '.nc':
@@ -144,10 +138,7 @@ def density_of(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Density (kg/m^3) and temperature (degC) in place, by TEOS-10 with reference salinity.
 
-    Raises
-    ------
-    ValueError
-        Naming the source, if there is no library for it.
+    A ValueError names the source, if there is no library for it.
     """
     with installed(f'{source}: gsw, which makes density of temperature and salinity'):
         import gsw

@@ -183,10 +183,7 @@ def _opened(path: Path) -> Iterator['xarray.Dataset']:
 def fingerprint(path: Path) -> str:
     """Whether a file is the same one, by its size and its ends: 16 hexadecimal digits.
 
-    Raises
-    ------
-    ConfigurationError
-        If it cannot be read.
+    Raises ConfigurationError if it cannot be read.
     """
     try:
         with open(path, 'rb') as file:
@@ -559,13 +556,7 @@ class Contents(NamedTuple):
 
 
 def contents(path: Path) -> Contents:
-    """What is in a file.
-
-    Raises
-    ------
-    ValueError
-        Naming the file, if nothing of it can be used, and why.
-    """
+    """What is in a file; a ValueError names the file, if nothing of it can be used, and why."""
     with _opened(path) as dataset:
         source = dataset.attrs.get('source') or dataset.attrs.get('title') or ''
         found = Contents(str(source), {}, {})

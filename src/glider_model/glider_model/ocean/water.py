@@ -65,10 +65,7 @@ class ModelWaterSettings(GridFileSettings):
     def params(self, hull_compression_per_m: float) -> ModelWaterParams:
         """Kernel parameters.
 
-        Raises
-        ------
-        ValueError
-            Naming the file, and what of it or of the mission is at fault.
+        A ValueError names the file, and what of it or of the mission is at fault.
         """
         grid = self.grid_params()._replace(water=_density(self, self.stamp))
         n, e = 0.0, 0.0
@@ -188,9 +185,7 @@ class WaterSettings(DensitySettings):
     def check_stable(self) -> None:
         """Refuse measured water that is lighter at depth than above by more than is measured.
 
-        Raises
-        ------
-        ConfigurationError
+        Raises ConfigurationError.
         """
         heaviest = (0.0, 0.0)
         for depth, density, *_ in self.profile or ():

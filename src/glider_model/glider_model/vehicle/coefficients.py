@@ -16,8 +16,6 @@ LIFT_AND_DRAG = {
     'K_L': 'kg/m/rad',
     'speed_exponent': '-',
 }
-#: What of them a file need not say.
-OPTIONAL = ('speed_exponent',)
 
 
 class MerckelbachSettings(Settings):

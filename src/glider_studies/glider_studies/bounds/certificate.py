@@ -241,15 +241,8 @@ def _propose_gain(loop, ticks, column, rate) -> np.ndarray | None:
 def region(loop: SteeringLoop, slope, tried=TRIED, ratios=BOX) -> Region | None:
     """Largest region that is found; None: there is none.
 
-    Parameters
-    ----------
-    loop : SteeringLoop
-    slope : callable
-        Least gain of the line of sight, of its slope on the path, up to a reach (m).
-    tried : tuple of (float, float)
-        As `TRIED`.
-    ratios : (float, float)
-        Least and largest b / b_hat, and k / k_hat.
+    ``slope`` gives the least gain of the line of sight, of its slope on the path, up to a reach
+    (m). ``tried`` is like `TRIED`, ``ratios`` are the least and largest b / b_hat, and k / k_hat.
     """
     best = None
     for times, part in tried:

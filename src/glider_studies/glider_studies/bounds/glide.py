@@ -168,10 +168,7 @@ def _seen(state: MissionState, params: MissionParams) -> Seen:
 def steering_loop(glide: Glide) -> SteeringLoop:
     """The loop of a glide, with the gains that law and method have in it.
 
-    Raises
-    ------
-    ConfigurationError
-        If the law does not steer there.
+    Raises ConfigurationError if the law does not steer there.
     """
     state, params = glide.state, glide.params
     law, seen = params.control.law, _seen(state, params)

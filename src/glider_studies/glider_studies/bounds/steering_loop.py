@@ -147,12 +147,8 @@ def _filtered(value, rate, command, gain, params):
 def box(loop: SteeringLoop, least: dict[str, float] | None = None, ratios=BOX) -> list[Gains]:
     """Vertices of the box of gains.
 
-    Parameters
-    ----------
-    least : dict, optional
-        Least value of gains of `Gains`, which else are 1.
-    ratios : (float, float)
-        Least and largest b / b_hat, and k / k_hat.
+    The least value of a gain of `Gains` is 1 if ``least`` does not say it; ``ratios`` are the
+    least and largest b / b_hat, and k / k_hat.
     """
     edges = {'b': ratios, **({'k': ratios} if loop.k else {})}
     edges |= {name: (low, 1.0) for name, low in (least or {}).items() if low < 1.0}

@@ -29,10 +29,7 @@ def bounds(
 ) -> dict[str, Any]:
     """Certificates of both phases of a vehicle, and ``starts`` flights from each region.
 
-    Returns
-    -------
-    dict
-        ``vehicle``, ``box``, ``starts``, ``seed``, ``holds`` and ``phases``, by their names.
+    They are ``vehicle``, ``box``, ``starts``, ``seed``, ``holds`` and ``phases``, by their names.
     """
     flown = 0
 

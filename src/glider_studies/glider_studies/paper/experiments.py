@@ -228,10 +228,7 @@ def _in_current(case: Case, speed: float) -> dict[str, Any]:
 def expectation(speed: float, current_mps: float, angle_deg: float) -> dict[str, Any]:
     """What physics allows in a current so fast and at such an angle off the path.
 
-    Parameters
-    ----------
-    speed : float
-        Horizontal speed through the water U_h (m/s).
+    ``speed`` is the horizontal one through the water U_h (m/s).
     """
     angle = math.radians(angle_deg)
     across = abs(current_mps * math.sin(angle))

@@ -71,10 +71,7 @@ class StabilityMap(NamedTuple):
 def load_map(file: Path, by: str = 'steady') -> StabilityMap:
     """Map of the result of a sweep, by one of `MEASURES`.
 
-    Raises
-    ------
-    ConfigurationError
-        If the file cannot be read, or its dimensions are others.
+    Raises ConfigurationError if the file cannot be read, or its dimensions are others.
     """
     try:
         data = read_dataset(file)
@@ -233,10 +230,7 @@ def _edges(values: np.ndarray, alone: float) -> np.ndarray:
 def draw_map(stability: StabilityMap, file: Path) -> None:
     """Draw a map into an image file; the suffix says which kind (png, svg, pdf).
 
-    Raises
-    ------
-    ConfigurationError
-        If the file cannot be written.
+    Raises ConfigurationError if the file cannot be written.
     """
     count = len(stability.panels)
     columns = min(3, count)

@@ -196,13 +196,9 @@ class Codec:
     def decode(self, raw: bytes, check_frames: bool = False) -> tuple[int, tuple[float, ...]]:
         """Stamp (ns) and numbers of a serialized message.
 
-        Raises
-        ------
-        MessageError
-            If it is no message of this type, a joint is missing, or, where frames are checked, it
-            names others than the template.
-        NotFiniteFieldError
-            If a number is NaN or infinite.
+        Raises MessageError if it is no message of this type, a joint is missing, or, where frames
+        are checked, it names others than the template; NotFiniteFieldError if a number is NaN or
+        infinite.
         """
         if len(raw) != self.size or int.from_bytes(raw, 'little') & self._kept != self._constant:
             return self._decode_foreign(raw, check_frames)

@@ -3,8 +3,6 @@
 """Log rows of the direct engine to the bag that the nodes would have left."""
 
 from collections.abc import Iterable
-from itertools import groupby, pairwise
-from operator import itemgetter
 
 import numpy as np
 
@@ -20,7 +18,7 @@ from glider_base.signals import TICK_NS
 from glider_base.wiring import GUIDANCE, present
 from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message, refused
 from glider_guidance.order import Order
-from glider_guidance.orders import begins, changed, first_ticks, reaction
+from glider_guidance.orders import changed
 from glider_guidance.settings import GuidanceSettings
 from glider_mission.blocks import BLOCKS, COLUMNS
 from glider_mission.recording.ros.rosbag2 import BagWriter
@@ -32,9 +30,9 @@ _PER_TICK = [topic.name for topic in TOPICS.values() if topic.per_tick]
 class LogWriter:
     """Writes the log rows of a direct run as the messages that the nodes would have published.
 
-    The settings are what guidance is told before the first tick, and its orders; ``topics`` are
-    those that not every run has and this one does; ``steers_by`` names the vehicle's steering
-    surface, and is empty without.
+    The settings are what guidance is told before the first tick; ``topics`` are those that not
+    every run has and this one does; ``steers_by`` names the vehicle's steering surface, and is
+    empty without.
     """
 
     def __init__(
@@ -48,20 +46,19 @@ class LogWriter:
         self._topics = [topic_of(name, steers_by) for name in present(_PER_TICK, topics)]
         self._tick = 0
         self._tellings = [Telling(block) for block in BLOCKS if block.say]
-        self._settings, self._waiting, self._stage = settings, [*settings.orders], -1
-        self._no_progress = 0.0  #: what guidance told of that last
+        self._settings = settings
+        self._orders: list[tuple[int, list[Order]]] = []  #: to be written, by tick
         self._tell_path(0)
+
+    def follow(self, tick: int, orders: list[Order]) -> None:
+        """Note the orders that hold from a tick on, whose row is still to come."""
+        self._orders.append((tick, orders))
 
     def add(self, log: np.ndarray) -> None:
         """Add a block of rows, float64[n, ROW]."""
         stamps = (np.arange(len(log)) + self._tick) * TICK_NS
-        no_progress = log[:, COLUMNS['no_progress']]
-        parts = [0, *(begins(no_progress, self._no_progress) + 1).tolist(), len(log)]
-        self._no_progress = no_progress[-1]
-        for first, last in pairwise(parts):
-            self._tell_orders(stamps[first:last], log[first:last])
-            if last in parts[1:-1]:
-                self._react(int(stamps[last - 1]) // TICK_NS + 1, log[last - 1])
+        while self._orders and self._orders[0][0] < self._tick + len(log):
+            self._tell_orders(*self._orders.pop(0))
         self._tell(stamps, log)
         payloads = {}
         for topic in self._topics:
@@ -86,28 +83,11 @@ class LogWriter:
         points = self._settings.path.points(PATH_POINTS)
         self._bag.write('path', stamp_ns, to_cdr(path_message(points, stamp_ns)))
 
-    def _react(self, tick: int, row: np.ndarray) -> None:
-        """Note what guidance orders itself, from a tick on, by what it told in the row before."""
-        no_progress = int(row[COLUMNS['no_progress']])
-        order = reaction(self._settings, no_progress, row[COLUMNS['odom']], tick)
-        self._waiting += [order] if order else []
-
-    def _tell_orders(self, stamps: np.ndarray, log: np.ndarray) -> None:
-        """Write the orders that hold from one of the ticks on, as the guidance node tells them."""
-        if not (self._waiting and len(log)):
-            return
-        stages = np.concatenate([[self._stage], log[:, COLUMNS['stage']]]).astype(np.int64)
-        self._stage = int(stages[-1])
-        found = first_ticks(self._waiting, int(stamps[0]) // TICK_NS, stages[:-1])
-        for row, group in groupby(found, key=itemgetter(0)):
-            self._follow(int(stamps[row]), [order for _, order in group])
-
-    def _follow(self, stamp_ns: int, orders: list[Order]) -> None:
+    def _tell_orders(self, tick: int, orders: list[Order]) -> None:
         """Write the orders that hold from a tick on: one event of a kind, and one path."""
+        stamp_ns = tick * TICK_NS
         path, told = self._settings.path, {}
         for order in orders:
-            rest = [one for one in self._waiting if one is not order]
-            self._waiting = [] if order.abort else rest
             before, message = self._settings, ABORT if order.abort else PARAMETERS_SET
             try:
                 self._settings = changed(before, order)

@@ -97,12 +97,8 @@ class Recording:
 
     The namespace of the nodes may be left out if there is only one. ``progress`` is called now and
     then with the share that is read, 0 to 1. ``steers_by`` names the vehicle's steering surface,
-    and is empty without.
-
-    Raises
-    ------
-    ConfigurationError
-        If the bag holds no topic of ours or those of several namespaces, or is damaged.
+    and is empty without. Raises ConfigurationError if the bag holds no topic of ours or those of
+    several namespaces, or is damaged.
     """
 
     def __init__(

@@ -69,22 +69,11 @@ def plan_replay(
     duration_s: float | None,
     namespace: str | None,
 ) -> Plan:
-    """Check what is asked for.
+    """Check what is asked for: part of a recording, from its beginning (s).
 
-    Parameters
-    ----------
-    bag : Bag
-    topics : list of str
-        Recorded names, or names in the namespace of the nodes; empty: all of them.
-    start_s, duration_s : float
-        Part of the recording, from its beginning (s).
-    namespace : str, optional
-        Namespace to publish the topics of the nodes in, instead of the recorded one.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming the option, and what is recorded; also if nothing is to be published.
+    ``topics`` are recorded names, or names in the namespace of the nodes; empty: all of them. The
+    topics of the nodes go to ``namespace``, if it is given, instead of the recorded one. A
+    ConfigurationError names the option, and what is recorded; also if nothing is to be published.
     """
     try:
         recorded = choose_namespace(bag, None)

@@ -36,22 +36,11 @@ class Told(NamedTuple):
 
 
 def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
-    """Settings of the blocks of a recorded run.
+    """Settings of the blocks of a recorded run, whose bag was found at ``path``.
 
-    Parameters
-    ----------
-    bag : Bag
-    path : Path
-        Its folder or file. A scenario.yaml that lies there counts, else the one attached.
-    file : Path, optional
-        Scenario or parameter file that counts instead.
-    scratch : Path
-        Folder for attached files. It has to stay as long as the settings are used.
-
-    Raises
-    ------
-    ConfigurationError
-        If there are none, or they cannot be used.
+    A scenario.yaml that lies there counts, else the one attached; instead of both a scenario or
+    parameter ``file``. Attached files go to ``scratch``, which has to stay as long as the settings
+    are used. Raises ConfigurationError if there are none, or they cannot be used.
     """
     folder = path if path.is_dir() else path.parent
     parameters = folder / PARAMETERS_FILE

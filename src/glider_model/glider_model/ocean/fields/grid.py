@@ -56,10 +56,7 @@ class GridFileSettings(Settings):
     def stamp(self) -> tuple[int, int]:
         """What tells another version of its file: time of the last change (ns), and size.
 
-        Raises
-        ------
-        ConfigurationError
-            If the file is not the one that was flown.
+        Raises ConfigurationError if the file is not the one that was flown.
         """
         if self.fingerprint:
             self.known()
@@ -87,10 +84,7 @@ class GridFileSettings(Settings):
     def check_places(self, places: Iterable[tuple[float, float]], what: str) -> None:
         """Refuse places (deg) that are on land, or beyond what is read around the path.
 
-        Raises
-        ------
-        ConfigurationError
-            Naming the file, the place, and ``what`` it is: such as 'on the path'.
+        A ConfigurationError names the file, the place, and ``what`` it is: such as 'on the path'.
         """
         loaded, _ = self.loaded()
         latitudes, longitudes = loaded.axes[2:]
@@ -110,10 +104,7 @@ class GridFileSettings(Settings):
     def grid_params(self) -> 'GridParams':
         """What was read of the file, for kernels.
 
-        Raises
-        ------
-        ConfigurationError
-            Naming the file, and what of it or of the mission is at fault.
+        A ConfigurationError names the file, and what of it or of the mission is at fault.
         """
         loaded, begin = self.loaded()
         self.check_places(self.mission.places, 'on the path')
@@ -123,10 +114,7 @@ class GridFileSettings(Settings):
     def known(self) -> 'GridFileSettings':
         """Copy with the fingerprint of its file.
 
-        Raises
-        ------
-        ConfigurationError
-            If there is no such file, or it is another one.
+        Raises ConfigurationError if there is no such file, or it is another one.
         """
         found = fingerprint(Path(self.file))
         if self.fingerprint not in ('', found):

@@ -359,10 +359,7 @@ def check_fitted(
     """Refuse a fault of what there is not: an actuator, something measured, a topic.
 
     The vehicle steers by that surface, and of `SENSORS` and `BELIEFS` there are these ``topics``.
-
-    Raises
-    ------
-    ConfigurationError
+    Raises ConfigurationError.
     """
     has = {
         'actuator': ACTUATORS if steers_by else ACTUATORS[:-1],
