@@ -187,6 +187,16 @@ def test_vehicle_by_path(edited):
             120.0,
             'hydrodynamics.K_beta.value = 120.0: should be less than or equal to 0 (allowed: ',
         ),
+        (  # a Slocum with it was 696 m off its path, and completed
+            'hydrodynamics.K_q.value',
+            200.0,
+            'hydrodynamics.K_q.value = 200.0: should be less than or equal to 0 (allowed: ',
+        ),
+        (
+            'hydrodynamics.K_r.value',
+            111.0,
+            'hydrodynamics.K_r.value = 111.0: should be less than or equal to 0 (allowed: ',
+        ),
         (
             'hydrodynamics.K_D0.value',
             0.0,
