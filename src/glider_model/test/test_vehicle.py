@@ -202,6 +202,11 @@ def test_vehicle_by_path(edited):
             0.0,
             'hydrodynamics: K_D0 = 0: nothing brakes it (allowed: > 0 kg/m, or ',
         ),
+        (  # z is down
+            'rigid_body.hull_center_of_mass.value',
+            [0.0, 0.0, -0.02],
+            'rigid_body, moving_mass: top-heavy, its centre of mass is at z = -',
+        ),
         (
             'volume',
             {'value': 6.9, 'unit': 'l', 'source': 'tank, a digit lost'},

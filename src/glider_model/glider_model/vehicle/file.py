@@ -176,6 +176,17 @@ class Vehicle(_Steered):
         return self
 
     @pydantic.model_validator(mode='after')
+    def _hangs_upright(self):
+        x = self.params()
+        low = (x.s_z + x.m_p * x.R_p) / x.m
+        if low <= 0.0:
+            raise ValueError(
+                f'rigid_body, moving_mass: top-heavy, its centre of mass is at z = {low:.3g} m '
+                '(allowed: > 0 m, below the centre of buoyancy)'
+            )
+        return self
+
+    @pydantic.model_validator(mode='after')
     def _mass_is_positive(self):
         fault = mass_fault(self.params())
         if fault:
