@@ -207,6 +207,11 @@ def test_vehicle_by_path(edited):
             [0.0, 0.0, -0.02],
             'rigid_body, moving_mass: top-heavy, its centre of mass is at z = -',
         ),
+        (  # nothing took note of it
+            'compressibility',
+            {'value': 5e-10, 'unit': '1/Pa', 'source': 'Merckelbach et al. 2019'},
+            'compressibility: of no volume (allowed: beside volume)',
+        ),
         (
             'volume',
             {'value': 6.9, 'unit': 'l', 'source': 'tank, a digit lost'},

@@ -165,6 +165,13 @@ class Vehicle(_Steered):
         return self
 
     @pydantic.model_validator(mode='after')
+    def _has_what_shrinks(self):
+        for name in ('compressibility', 'thermal_expansion'):
+            if _value(getattr(self, name)) and not self.volume:
+                raise ValueError(f'{name}: of no volume (allowed: beside volume)')
+        return self
+
+    @pydantic.model_validator(mode='after')
     def _floats_in_some_water(self):
         if self.volume:
             neutral = self.params().m / self.volume.value
