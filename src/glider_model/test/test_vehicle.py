@@ -187,10 +187,30 @@ def test_vehicle_by_path(edited):
             120.0,
             'hydrodynamics.K_beta.value = 120.0: should be less than or equal to 0 (allowed: ',
         ),
+        (  # a Slocum with it was 696 m off its path, and completed
+            'hydrodynamics.K_q.value',
+            200.0,
+            'hydrodynamics.K_q.value = 200.0: should be less than or equal to 0 (allowed: ',
+        ),
+        (
+            'hydrodynamics.K_r.value',
+            111.0,
+            'hydrodynamics.K_r.value = 111.0: should be less than or equal to 0 (allowed: ',
+        ),
         (
             'hydrodynamics.K_D0.value',
             0.0,
             'hydrodynamics: K_D0 = 0: nothing brakes it (allowed: > 0 kg/m, or ',
+        ),
+        (  # z is down
+            'rigid_body.hull_center_of_mass.value',
+            [0.0, 0.0, -0.02],
+            'rigid_body, moving_mass: top-heavy, its centre of mass is at z = -',
+        ),
+        (  # nothing took note of it
+            'compressibility',
+            {'value': 5e-10, 'unit': '1/Pa', 'source': 'Merckelbach et al. 2019'},
+            'compressibility: of no volume (allowed: beside volume)',
         ),
         (
             'volume',

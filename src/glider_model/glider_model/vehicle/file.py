@@ -165,6 +165,13 @@ class Vehicle(_Steered):
         return self
 
     @pydantic.model_validator(mode='after')
+    def _has_what_shrinks(self):
+        for name in ('compressibility', 'thermal_expansion'):
+            if _value(getattr(self, name)) and not self.volume:
+                raise ValueError(f'{name}: of no volume (allowed: beside volume)')
+        return self
+
+    @pydantic.model_validator(mode='after')
     def _floats_in_some_water(self):
         if self.volume:
             neutral = self.params().m / self.volume.value
@@ -173,6 +180,17 @@ class Vehicle(_Steered):
                     f'rigid_body, moving_mass, volume: neutral in water of {neutral:.4g} kg/m^3 '
                     f'(allowed: {WATER[0]:g} to {WATER[1]:g} kg/m^3)'
                 )
+        return self
+
+    @pydantic.model_validator(mode='after')
+    def _hangs_upright(self):
+        x = self.params()
+        low = (x.s_z + x.m_p * x.R_p) / x.m
+        if low <= 0.0:
+            raise ValueError(
+                f'rigid_body, moving_mass: top-heavy, its centre of mass is at z = {low:.3g} m '
+                '(allowed: > 0 m, below the centre of buoyancy)'
+            )
         return self
 
     @pydantic.model_validator(mode='after')

@@ -71,14 +71,14 @@ class HydrodynamicsSettings(Settings):
         'pitch moment over V^2 alpha, without a_33 - a_11 of the added mass; the sum is < 0',
         **Signed,
     )
-    K_q: required('kg s/rad', 'pitch moment over V^2 q; < 0 damps', **Signed)
+    K_q: required('kg s/rad', 'pitch moment over V^2 q; < 0 damps', **NotPositive)
     K_MY: required(
         'kg/rad',
         'yaw moment over V^2 beta, without a_22 - a_11 of the added mass; less that it is the '
         'weathercock, > 0',
         **Signed,
     )
-    K_r: required('kg s/rad', 'yaw moment over V^2 r; < 0 damps', **Signed)
+    K_r: required('kg s/rad', 'yaw moment over V^2 r; < 0 damps', **NotPositive)
     speed_exponent: optional(
         '-',
         'K_D0 is that at 1 m/s and goes with this power of the speed; 0 without',
