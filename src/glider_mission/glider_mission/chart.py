@@ -84,14 +84,17 @@ def stretch(latitude: float, origin: Origin) -> float:
     return origin.east / there.east - 1.0
 
 
-def in_metres(path: Any, settings: OriginSettings) -> Any:
+def in_metres(path: Any, settings: OriginSettings | None) -> Any:
     """A path as a person wrote it, with waypoints in metres if it has them in degrees.
 
+    Without an origin, where the one that was told is refused, it is their middle.
     A ValueError names a waypoint that is none, or at which the chart is too far off.
     """
     if not isinstance(path, dict) or path.get('waypoints_latlon') is None:
         return path
-    origin, made, found = settings.params(), [], places(path['waypoints_latlon'])
+    found = places(path['waypoints_latlon'])
+    settings = settings or OriginSettings(**_middle(found))
+    origin, made = settings.params(), []
     if isinstance(path['waypoints_latlon'], str):
         path = {**path, 'waypoints_latlon': found}
     for number, place in enumerate(found):

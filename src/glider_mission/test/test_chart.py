@@ -24,6 +24,8 @@ RING = [
     ['36°N', 121.7],
 ]
 
+FIJI = [[-17.0, 179.9], [-17.1, -179.9]]
+
 
 def mission(**values):
     """Scenario of a path through waypoints in degrees."""
@@ -128,6 +130,8 @@ def test_orders_may_be_in_degrees():
          'other places than waypoints_latlon'),
         ({'origin': {'time': 'yesterday'}}, r"origin.time = 'yesterday': not a time \(allowed: "),
         ({'origin': {'time': '0001-01-01T00:00+09:00'}}, r'not a time \(allowed: '),
+        ({'origin': {'time': 'now'}, 'path': {'kind': 'waypoints', 'waypoints_latlon': FIJI}},
+         r'^[^\n]*origin.time = .now.: not a time[^\n]*$'),
         ({'path': {'kind': 'waypoints', 'waypoints_latlon': [[10, 0], [10, 0]]}},
          r'are 0.000 m apart \(allowed: >= 1.0 m\)'),
     ],
