@@ -25,7 +25,8 @@ _SAID = {'origin': {'latitude_deg', 'longitude_deg'}, 'initial': {'north_m', 'ea
 #: Letters of each axis, + first, and its range (deg). A flat chart has no poles.
 _AXES = {'latitude': ('NS', -85.0, 85.0), 'longitude': ('EW', -180.0, 360.0)}
 _TEXT = re.compile(
-    r"""([NSEW])?\s*([-+]?\d+(?:\.\d*)?)\s*(?:°|deg)?\s*(?:(\d+(?:\.\d*)?)\s*['′]?)?\s*([NSEW])?""",
+    r"""([NSEW])?\s*([-+]?\d{1,3}(?!\d)(?:\.\d*)?)\s*(?:°|deg)?\s*"""
+    r"""(?:(\d+(?:\.\d*)?)\s*['′]?)?\s*([NSEW])?""",
     re.IGNORECASE,
 )
 

@@ -51,7 +51,11 @@ def test_degrees_and_minutes_are_read_as_they_are_written(latitude, longitude):
 
 
 @pytest.mark.parametrize(
-    'bad', ['', 'here', '36 60 N', '36.5 30 N', '-36 N', 'N 36 S', '36 E', '86', True, None, 90.0]
+    'bad',
+    [
+        *('', 'here', '36 60 N', '36.5 30 N', '-36 N', 'N 36 S', '36 E', '86', True, None, 90.0),
+        *('0012.3 S', '-0012.3', 'S0012.34', '1234.5S'),  # degrees and minutes as one number
+    ],
 )
 def test_what_is_no_latitude_is_refused(bad):
     with pytest.raises(ValueError, match=r'latitude = .*allowed: -85 to 85 deg'):
