@@ -4,7 +4,8 @@
 
 A text is read event by event: how deep and how large it is, is known before anything is built.
 Scalars are YAML 1.1 as PyYAML reads it, with two exceptions: ``1e-3`` is a number, and dates are
-text. Tags, directives for tags, and repeated keys are refused; names of fields are text.
+text. Numbers of base 8 and 60, tags, directives for tags, and repeated keys are refused; names of
+fields are text.
 """
 
 import json
@@ -33,6 +34,8 @@ MAX_DIGITS = 100
 # Text has line ends and tabs, but no other control characters and no halves of characters.
 _CONTROL = re.compile('[\0-\b\v\f\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]')
 _TAG_DIRECTIVE = re.compile('^%TAG', re.MULTILINE)
+# A course of 045 is 37 in YAML 1.1, and 1:30 is 90.
+_OTHER_BASE = re.compile('[-+]?0[0_]*[1-7][0-7_]+|.*:.*')
 
 Location = tuple[str, ...]
 
@@ -125,6 +128,8 @@ def _scalar(event: yaml.ScalarEvent) -> Any:
         return text
     if len(text) > MAX_DIGITS:
         raise _RefusedError(line, f'a number of {len(text)} characters (allowed: <= {MAX_DIGITS})')
+    if _OTHER_BASE.fullmatch(text):
+        raise _RefusedError(line, f'{text}: of base 8 or 60 (allowed: such as 45 and 45.5)')
     try:
         return getattr(_CONSTRUCTOR, f'construct_yaml_{kind}')(yaml.ScalarNode(tag, text))
     except ValueError:

@@ -71,6 +71,17 @@ def test_it_tells_what_is_in_a_file(sea_file, capsys):
     assert (found['water'], found['bottom'], found['mission']) == (None, None, None)
 
 
+def test_a_sea_across_the_date_line_is_no_sea_round_the_earth(sea_file, tmp_path, capsys):
+    path = tmp_path / 'across.nc'
+    with xarray.open_dataset(sea_file, decode_times=False) as sea:
+        east = (sea['longitude'] + 58.05 + 180.0) % 360.0 - 180.0
+        sea.assign_coords(longitude=east).sortby('longitude').to_netcdf(path, engine='scipy')
+    found = told(capsys, path)
+    ends = found['currents']['longitude_deg']
+    assert ends == {'first': pytest.approx(179.05), 'last': pytest.approx(181.05), 'count': 21}
+    assert '35.00000 N, 179.05000 E to 37.00000 N, 178.95000 W' in dict(in_words(found))['places']
+
+
 def test_of_what_is_too_large_there_are_no_numbers_or_those_of_its_surface(
     sea_file, tmp_path, monkeypatch, capsys
 ):

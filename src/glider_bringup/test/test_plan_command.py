@@ -59,8 +59,14 @@ def test_the_picture_of_a_plan_shows_its_mission_and_whether_it_arrives(
     drawn = []
     keep = 'glider_bringup.showing.ocean.save_figure'
     monkeypatch.setattr(keep, lambda figure, *_: drawn.append(figure))
-    plan('survey', [f'current.speed_kn={speed_kn}'], out=tmp_path / 'plan.png', as_json=True)
+    changes = [f'current.speed_kn={speed_kn}', 'origin.longitude_deg=180']
+    plan('survey', changes, out=tmp_path / 'plan.png', as_json=True)
     axis = drawn[0].axes[0]
+    ticks = {
+        float(text) for text in axis.xaxis.get_major_formatter().format_ticks(axis.get_xticks())
+    }
+    assert min(ticks) < -179.0 and max(ticks) > 179.0, 'across the date line'
+    assert all(-180.0 <= one <= 180.0 for one in ticks)
     path, _, route = axis.lines
     assert np.diff(axis.get_ylim())[0] < 15.0 * np.ptp(path.get_ydata()), 'no dot on a chart'
     assert route.get_label().startswith(label)

@@ -82,6 +82,8 @@ def test_og1_has_what_its_manual_wants(og1):
                 assert vocabulary.startswith('http://vocab.nerc.ac.uk/collection/OG1/current/')
                 assert vocabulary.endswith('/'), name
         assert read['TIME'].values[0] == np.datetime64('2026-03-01T06:00')
+        steps_s = np.diff(read['TIME'].values) / np.timedelta64(1, 's')
+        assert set(steps_s) == {1.0}  # as docs/sea.md says
         assert read['LATITUDE'].values[0] == pytest.approx(WAYPOINTS[0][0], abs=1e-4)
         assert read['LONGITUDE'].values[0] == pytest.approx(WAYPOINTS[0][1], abs=1e-4)
         phase, depth = read['PHASE'].values, read['DEPTH'].values

@@ -25,7 +25,8 @@ _SAID = {'origin': {'latitude_deg', 'longitude_deg'}, 'initial': {'north_m', 'ea
 #: Letters of each axis, + first, and its range (deg). A flat chart has no poles.
 _AXES = {'latitude': ('NS', -85.0, 85.0), 'longitude': ('EW', -180.0, 360.0)}
 _TEXT = re.compile(
-    r"""([NSEW])?\s*([-+]?\d+(?:\.\d*)?)\s*(?:°|deg)?\s*(?:(\d+(?:\.\d*)?)\s*['′]?)?\s*([NSEW])?""",
+    r"""([NSEW])?\s*([-+]?\d{1,3}(?!\d)(?:\.\d*)?)\s*(?:°|deg)?\s*"""
+    r"""(?:(\d+(?:\.\d*)?)\s*['′]?)?\s*([NSEW])?""",
     re.IGNORECASE,
 )
 
@@ -84,14 +85,17 @@ def stretch(latitude: float, origin: Origin) -> float:
     return origin.east / there.east - 1.0
 
 
-def in_metres(path: Any, settings: OriginSettings) -> Any:
+def in_metres(path: Any, settings: OriginSettings | None) -> Any:
     """A path as a person wrote it, with waypoints in metres if it has them in degrees.
 
+    Without an origin, where the one that was told is refused, it is their middle.
     A ValueError names a waypoint that is none, or at which the chart is too far off.
     """
     if not isinstance(path, dict) or path.get('waypoints_latlon') is None:
         return path
-    origin, made, found = settings.params(), [], places(path['waypoints_latlon'])
+    found = places(path['waypoints_latlon'])
+    settings = settings or OriginSettings(**_middle(found))
+    origin, made = settings.params(), []
     if isinstance(path['waypoints_latlon'], str):
         path = {**path, 'waypoints_latlon': found}
     for number, place in enumerate(found):

@@ -184,7 +184,7 @@ class Scenario(Settings):
     @pydantic.field_validator('path', mode='before')
     @classmethod
     def _path_in_metres(cls, path: Any, info: pydantic.ValidationInfo) -> Any:
-        return in_metres(path, info.data.get('origin', OriginSettings()))
+        return in_metres(path, info.data.get('origin'))
 
     @pydantic.field_validator('profile', mode='before')
     @classmethod
@@ -196,7 +196,7 @@ class Scenario(Settings):
     def _orders_in_metres(cls, orders: Any, info: pydantic.ValidationInfo) -> Any:
         if not isinstance(orders, list):
             return orders
-        origin = info.data.get('origin', OriginSettings())
+        origin = info.data.get('origin')
         return [
             {**one, 'path': in_metres(one.get('path'), origin)} if isinstance(one, dict) else one
             for one in orders

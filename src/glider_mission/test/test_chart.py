@@ -24,6 +24,8 @@ RING = [
     ['36°N', 121.7],
 ]
 
+FIJI = [[-17.0, 179.9], [-17.1, -179.9]]
+
 
 def mission(**values):
     """Scenario of a path through waypoints in degrees."""
@@ -49,7 +51,11 @@ def test_degrees_and_minutes_are_read_as_they_are_written(latitude, longitude):
 
 
 @pytest.mark.parametrize(
-    'bad', ['', 'here', '36 60 N', '36.5 30 N', '-36 N', 'N 36 S', '36 E', '86', True, None, 90.0]
+    'bad',
+    [
+        *('', 'here', '36 60 N', '36.5 30 N', '-36 N', 'N 36 S', '36 E', '86', True, None, 90.0),
+        *('0012.3 S', '-0012.3', 'S0012.34', '1234.5S'),  # degrees and minutes as one number
+    ],
 )
 def test_what_is_no_latitude_is_refused(bad):
     with pytest.raises(ValueError, match=r'latitude = .*allowed: -85 to 85 deg'):
@@ -128,6 +134,8 @@ def test_orders_may_be_in_degrees():
          'other places than waypoints_latlon'),
         ({'origin': {'time': 'yesterday'}}, r"origin.time = 'yesterday': not a time \(allowed: "),
         ({'origin': {'time': '0001-01-01T00:00+09:00'}}, r'not a time \(allowed: '),
+        ({'origin': {'time': 'now'}, 'path': {'kind': 'waypoints', 'waypoints_latlon': FIJI}},
+         r'^[^\n]*origin.time = .now.: not a time[^\n]*$'),
         ({'path': {'kind': 'waypoints', 'waypoints_latlon': [[10, 0], [10, 0]]}},
          r'are 0.000 m apart \(allowed: >= 1.0 m\)'),
     ],

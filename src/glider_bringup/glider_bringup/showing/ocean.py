@@ -277,6 +277,7 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
 def _draw_panel(figure: Any, place: tuple[int, int, int], panel: Panel) -> Any:
     """Axis of a figure with colours, and with arrows of a current."""
     axis = figure.add_subplot(*place, xlabel='longitude (deg)', ylabel='latitude (deg)')
+    axis.xaxis.set_major_formatter(lambda degree, _: f'{(degree + 180.0) % 360.0 - 180.0:.8g}')
     latitudes, longitudes = panel.latitudes, panel.longitudes
     drawn = axis.pcolormesh(longitudes, latitudes, panel.values, cmap=panel.colours)
     figure.colorbar(drawn, label=panel.label)

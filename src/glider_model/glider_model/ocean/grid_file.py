@@ -406,6 +406,9 @@ def _select(layout: _Layout, window: Window | None) -> tuple[dict[str, np.ndarra
     values = dict(layout.values)
     longitudes = values['longitude']
     middle = 0.5 * (longitudes.min() + longitudes.max())
+    first, last = _hole(np.sort(longitudes))
+    if last - first > 360.0 - np.ptp(longitudes):  # of a sea across the date line
+        middle = 0.5 * (first + last) + 180.0
     if window is not None:
         middle = 0.5 * (window.west + window.east)
     # the same meridians, as near to the middle as they can be
