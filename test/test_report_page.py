@@ -271,6 +271,7 @@ def test_report_of_the_default_run(open_report, default_run):
     page = open_report
     panels = page.evaluate(DRAWN)
     check_drawn(panels)
+    assert max(map(len, page.evaluate(LABELS))) <= 8, 'no digits over the title of an axis'
     assert {panel['id'] for panel in panels} == {
         *('track', 'space', 'depth', 'cross_track', 'pitch', 'heading', 'roll'),
         *('buoyancy_engine', 'pitch_mass', 'roll_mass', 'battery'),

@@ -295,14 +295,19 @@ def test_end_of_the_path_is_told_from_where_the_vehicle_came_up():
             lambda way_m: (200.0 - abs(300.0 * way_m - 200.0), 0.0 * way_m),
             100.0,
         ),
-        # two turns of three, from the south round by the west
-        (
-            HelixPath(kind='helix', radius_m=50.0, turns=3.0, course_deg=270.0, slope_deg=0.0),
-            lambda way_m: (
-                -50.0 * np.cos(4.0 * math.pi * way_m),
-                -50.0 * np.sin(4.0 * math.pi * way_m),
-            ),
-            100.0 * math.pi,
+        # two turns of three, from the south round by the west, level and steep: as on a chart
+        *(
+            (
+                HelixPath(
+                    kind='helix', radius_m=50.0, turns=3.0, course_deg=270.0, slope_deg=slope_deg
+                ),
+                lambda way_m: (
+                    -50.0 * np.cos(4.0 * math.pi * way_m),
+                    -50.0 * np.sin(4.0 * math.pi * way_m),
+                ),
+                100.0 * math.pi,
+            )
+            for slope_deg in (0.0, 60.0)
         ),
     ],
 )
@@ -311,7 +316,7 @@ def test_way_that_is_left_of_a_path_that_comes_by_again(path, where, left_m):
     north, east = where(t / t[-1])
     log = make_log(t, target_n=north, target_e=east)
     told = score(log, path=path.params(), ends=True)['arrival']
-    length_m = path.params().knots[-1]
+    length_m = path.params().ways[-1]
     assert told['left_m'] == pytest.approx(left_m, abs=0.1)
     assert told['eta_s'] == pytest.approx(100.0 * length_m / (length_m - left_m), rel=1e-3)
 

@@ -121,6 +121,14 @@ def test_geojson_is_valid_and_where_the_vehicle_was(export, flown):
     assert len(surfacings) == len(flown.score['navigation']['reports'])
 
 
+def test_a_straight_path_is_a_route_from_its_start_to_its_end(tmp_path):
+    run = glider.fly('slocum_shelf', duration=60.0, out=tmp_path / 'run', bag=True)
+    north_m = 111_132.9 - 559.8 * np.cos(np.radians(2.0 * 36.09))  # a degree, WGS84
+    (start, end) = tracks.chart_of(read_run(run.folder), None).route
+    assert start == pytest.approx((36.0, 122.0), abs=1e-6)
+    assert end == pytest.approx((36.0 + 20_000.0 / north_m, 122.0), abs=1e-4)
+
+
 def test_a_track_of_few_points_is_at_the_last_of_them_when_the_run_ends(flown, monkeypatch):
     monkeypatch.setattr(tracks, 'MOST_POINTS', 20)
     for line in tracks.chart_of(read_run(flown.folder), 0.0).lines:

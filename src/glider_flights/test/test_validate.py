@@ -4,6 +4,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -160,6 +161,12 @@ def test_the_plant_glides_as_a_model_solved_apart_once_weight_and_drag_are_found
     drag = load_vehicle('slocum_g2').params().K_D0
     assert found['fitted']['Cd0'] == pytest.approx(ROUGHER * drag, rel=0.02)
     assert found['u_adcp_rmse_cmps'] is None
+
+
+def test_what_is_fitted_is_printed_with_its_unit(file):
+    words = ['validate', file, '--vehicle', 'slocum_g2', '--fit', 'Cd0,mass']
+    done = CliRunner().invoke(app, words, catch_exceptions=False)
+    assert re.search(r'Cd0 [0-9.]+ kg/m, mass [-0-9.]+ kg ', ' '.join(done.stdout.split()))
 
 
 def test_without_a_fit_it_is_off_by_what_the_flight_weighs_more(file):

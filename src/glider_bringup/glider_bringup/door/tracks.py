@@ -127,7 +127,10 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
         for number, report in enumerate((reckoned(flown.card) or {}).get('reports', []), 1)
     ]
     waypoints = None if flown.is_rerouted else getattr(scenario.path, 'waypoints', None)
-    norths, easts = np.array([point[:2] for point in waypoints or flown.path_points()]).T
+    points = waypoints or flown.path_points()
+    if scenario.path.kind == 'straight' and not flown.is_rerouted:
+        points = [points[0], points[-1]]  # a plotter takes a hundred points or so
+    norths, easts = np.array([point[:2] for point in points]).T
     return Chart(
         scenario.name, places(norths, easts), [line for line in lines if line.rows], surfacings
     )

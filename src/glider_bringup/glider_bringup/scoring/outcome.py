@@ -121,9 +121,10 @@ def arrival_of(
     Returns
     -------
     dict
-        arrived, t_s, missed_m (distance from the last point), left_m (way along the path), eta_s
-        (when it arrives, or would at its pace so far), overrun_s (by what that is beyond the time
-        of the mission), place_latlon_deg (if there is a chart). What nobody knows is None.
+        arrived, t_s, missed_m (distance from the last point), left_m (horizontal way along the
+        path), eta_s (when it arrives, or would at its pace so far), overrun_s (by what that is
+        beyond the time of the mission), place_latlon_deg (if there is a chart). What nobody knows
+        is None.
     """
     if rules.path is None or not rules.ends:
         return None
@@ -132,9 +133,10 @@ def arrival_of(
     left_m, eta_s = 0.0, t_s
     if not has_arrived:
         began_m, come_m = _come_from_to(targets, rules.path)
-        left_m, made_m = length - come_m, come_m - began_m
+        ways, made_m = rules.path.ways, come_m - began_m
+        left_m = float(ways[-1] - np.interp(come_m, rules.path.knots, ways))
         pace_s = (t_s - seconds(since)) / made_m if made_m >= LEAST_SHARE * length else None
-        eta_s = None if pace_s is None else t_s + left_m * pace_s
+        eta_s = None if pace_s is None else t_s + (length - come_m) * pace_s
     return {
         'arrived': has_arrived,
         't_s': t_s if has_arrived else None,

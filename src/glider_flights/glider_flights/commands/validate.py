@@ -127,6 +127,8 @@ def validate(
 
 
 def _print(report: dict) -> None:
+    from glider_flights.validation.fit import CONSTANTS
+
     title = (
         f'{report["vehicle"]} along {report["files"]} files of a {report["kind"]}, '
         f'{report["imposed"]} imposed'
@@ -154,7 +156,9 @@ def _print(report: dict) -> None:
         'both with nothing fitted (cm/s)': f'{unfitted["w_rmse_cmps"]}, '
         f'{_or_dash(unfitted["peer_w_rmse_cmps"])}',
         'fitted on': report['fit_on'],
-        'fitted': ', '.join(f'{name} {value:g}' for name, value in report['fitted'].items()),
+        'fitted': ', '.join(
+            f'{name} {value:g} {CONSTANTS[name].unit}' for name, value in report['fitted'].items()
+        ),
     }
     texts = ('-' if value in (None, '') else str(value) for value in rows.values())
     print_table(title, (), zip(rows, texts, strict=True))

@@ -147,6 +147,7 @@ function drawTime(panel, element, from, to) {
       fixedrange: true, automargin: false, nticks: 6, type: panel.log ? 'log' : 'linear',
       autorange: panel.inverted ? 'reversed' : true,
       rangemode: most - least < 1e-6 * reach ? 'tozero' : 'normal', // else it is of rounding
+      minexponent: most - least < 3e-5 ? 4 : 5, // or digits run over the title
       ...(panel.log ? { dtick: decades, exponentformat: low < 1e-4 ? 'power' : 'none' } : {}),
     }),
     yaxis2: { overlaying: 'y', range: [0, 1], visible: false, fixedrange: true },
