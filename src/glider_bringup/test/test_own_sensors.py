@@ -3,6 +3,7 @@
 """Navigation, free-running, with sensors at their own pace, or with none that can be believed."""
 
 import math
+import re
 import time
 
 import pytest
@@ -197,6 +198,18 @@ def test_fix_counts_at_the_surface_and_is_forgotten_when_it_is_old(flight):
     vehicle.fix = None
     flight.until(lambda: heard[-1][-1] == (-1.0, 0.0, 0.0, 0.0, 0.0))
     assert not vehicle.misses('fix')
+
+
+@pytest.mark.parametrize(('degrees', 'far'), [((122.0, 36.0), '9,5'), ((0.0, 0.0), '1[01],')])
+def test_fix_of_another_sea_is_refused_and_named(flight, degrees, far):
+    """Swapped, or with an origin that nobody has set."""
+    vehicle = flight.vehicle
+    vehicle.fix = a_fix(0.0)
+    vehicle.fix.latitude, vehicle.fix.longitude = degrees
+    flight.until(lambda: vehicle.said('km from the origin, 36, 122'))
+    assert any(re.search(f'message refused: fix: .*: {far}.* km from', x) for x in vehicle.told)
+    flight.go_on(20)
+    assert abs(vehicle.north_m()) < 20.0
 
 
 @pytest.mark.parametrize('number', [0.0, math.nan])
