@@ -12,6 +12,8 @@ from glider_base.signals import TICK_NS
 
 #: The norm of a quaternion that is further from 1 is that of no attitude (-).
 NOT_UNIT = 0.1
+#: A battery that says that it has more of its capacity (-) counts in percent.
+MOST_CHARGED = 1.5
 
 #: A topic whose messages are refused is told of at most so often (s of wall time).
 _REFUSED_EVERY_S = 1.0
@@ -22,7 +24,12 @@ def _check_attitude(values: tuple[float, ...]) -> None:
         raise MessageError(f'orientation is {values[:4]} (allowed: unit quaternions)')
 
 
-_CHECKS = {'imu': _check_attitude}
+def _check_battery(values: tuple[float, ...]) -> None:
+    if values[4] > MOST_CHARGED:
+        raise MessageError(f'percentage is {values[4]:g} (allowed: 0 to 1)')
+
+
+_CHECKS = {'imu': _check_attitude, 'battery': _check_battery}
 
 
 class Input:
