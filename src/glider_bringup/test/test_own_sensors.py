@@ -17,6 +17,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure, Imu, JointState, NavSatFix
 
 from glider_base.frames import OriginSettings
+from glider_base.ros.lockstep import step_node
 from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.lockstep.step_node import OLD_AFTER
 from glider_base.ros.wire import qos
@@ -221,6 +222,18 @@ def test_receiver_without_a_fix_is_heard_in_peace(flight, number):
     assert not vehicle.said('refused')
     assert not vehicle.misses('fix')
     assert abs(vehicle.north_m()) < 20.0
+
+
+def test_who_waits_for_a_clock_that_nobody_publishes_says_so_once(context, monkeypatch):
+    monkeypatch.setattr(step_node, '_STANDS_S', 0.5, raising=False)
+    flight = Flight(context, use_sim_time=True)
+    try:
+        flight.until(lambda: flight.vehicle.said('use_sim_time, and no /clock'))
+        flight.wait(2.0)
+        assert sum('/clock' in told for told in flight.vehicle.told) == 1
+        assert not flight.vehicle.odom
+    finally:
+        flight.close()
 
 
 def test_attitude_that_is_none_is_refused_and_named(flight):
