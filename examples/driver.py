@@ -40,7 +40,7 @@ class Vehicle(Protocol):
         """Latitude, longitude (deg), and standard deviation north and east (m)."""
 
     def actuators(self) -> list[float]:
-        """Positions of the actuators in the order of JOINTS."""
+        """Positions of the actuators in the order of the parameter ``joints``."""
 
     def move(self, targets: dict[str, float]) -> None:
         """Move actuators towards their targets."""
@@ -49,13 +49,15 @@ class Vehicle(Protocol):
 class Driver(Node):
     """Publishes joint_states and odom at 10 Hz, and obeys command.
 
-    With its parameter ``navigates`` false, imu, pressure and fix take the place of odom.
+    With its parameter ``navigates`` false, imu, pressure and fix take the place of odom. A vehicle
+    with a steering surface has it as the last of its ``joints``, such as fin.
     """
 
     def __init__(self, vehicle: Vehicle, name: str = 'driver', **kwargs) -> None:
         super().__init__(name, **kwargs)
         self.vehicle = vehicle
         self.navigates = self.declare_parameter('navigates', True).value
+        self.joints = self.declare_parameter('joints', JOINTS).value
         kinds = {'joint_states': JointState, 'odom': Odometry}
         if not self.navigates:
             kinds = {'joint_states': JointState}
@@ -70,7 +72,7 @@ class Driver(Node):
     def read(self) -> dict:
         """What there is to say of the vehicle, as messages by topic."""
         stamp = Time(nanoseconds=self.vehicle.time_ns()).to_msg()
-        joints = JointState(header=Header(stamp=stamp), name=JOINTS)
+        joints = JointState(header=Header(stamp=stamp), name=self.joints)
         joints.position = self.vehicle.actuators()
         header = Header(stamp=stamp, frame_id='base_link')
         measured = self.odometry(stamp) if self.navigates else self.samples(header)
@@ -108,6 +110,7 @@ class Driver(Node):
             fix.status.status = NavSatStatus.STATUS_FIX
             fix.latitude, fix.longitude, std_m = place
             fix.position_covariance[0] = fix.position_covariance[4] = std_m**2
+            fix.position_covariance_type = NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN
         return taken
 
     def publish(self, messages: dict) -> None:

@@ -186,6 +186,7 @@ MISTAKES = [
     (['trim', 'zhang2021', '--net-heaviness-kg', '9', '--pitch-deg', '-30'], ['9', '1 kg']),
     (['trim', 'zhang2021', '--net-heaviness-kg', '0.4'], ['pitch']),
     (['score', '.'], ['not a run folder']),
+    (['autopilot', 'helix', '--ros-args', '-r', '__ns:=/a'], ['__ns:=/a', '--namespace']),
 ]
 
 

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import rclpy
@@ -18,11 +19,15 @@ from diagnostic_msgs.msg import DiagnosticArray
 from mcap.reader import make_reader
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
-from sensor_msgs.msg import JointState
+from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState, NavSatFix
 
 from glider_base.ros.lockstep import health
 from glider_base.ros.places import domain_id
 from glider_base.ros.wire import qos
+from glider_base.ros.wire.topics import topic_of
+from glider_base.wiring import JOINTS
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import (
     AUTOPILOT,
@@ -207,3 +212,26 @@ def test_recording_goes_on(flight):
     gaps_s = [after - before for before, after in zip(stamps_s[:-1], stamps_s[1:], strict=True)]
     assert AWAY_S < max(gaps_s) < ended_s - killed_s
     assert stamps_s[-1] - stamps_s[gaps_s.index(max(gaps_s)) + 1] > 1.0
+
+
+def test_what_the_example_says_is_taken_from_a_vehicle_with_a_fin(context, monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    from driver import Driver
+
+    vehicle = SimpleNamespace(
+        time_ns=lambda: 7,
+        attitude=lambda: None,
+        pressure=lambda: 2e5,
+        fix=lambda: (36.0, 9.0, 4.0),
+        actuators=lambda: [0.1, 0.2, 0.3, 0.4],
+    )
+    told = {'navigates': False, 'joints': [*JOINTS, 'fin']}
+    overrides = [Parameter(name, value=value) for name, value in told.items()]
+    node = Driver(vehicle, context=context, parameter_overrides=overrides)
+    said = node.read()
+    node.destroy_node()
+    codec = topic_of('joint_states', 'fin').codec
+    assert codec.decode(serialize_message(said['joint_states'])) == (7, (0.1, 0.2, 0.3, 0.4))
+    codec = topic_of('fix').codec
+    assert codec.decode(serialize_message(said['fix'])) == (7, (0.0, 36.0, 9.0, 16.0, 16.0))
+    assert said['fix'].position_covariance_type == NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN

@@ -162,10 +162,10 @@ class Wired(NamedTuple):
 #: What a vehicle may be able to measure. Each way to navigate reads some of it, and of this alone
 #: there are messages in a run; where a table has a column for each topic, the others are zero.
 SENSORS = ('measured_odom', 'imu', 'pressure', 'fix', 'altitude')
-#: Those of them of which a vehicle has samples now and then, and not in every tick.
-SAMPLED = ('imu', 'pressure', 'fix', 'altitude', 'battery')
+#: What a vehicle has samples of as often as its `imu_period_s` says, and not in every tick.
+SAMPLED = ('imu', 'pressure', 'fix', 'battery')
 #: Age (s) from which on a topic is silent that need not be told often.
-SLOW_S = {'battery': 600.0, 'health': 10.0}
+SLOW_S = {'battery': 600.0, 'health': 10.0, 'altitude': 5.0}
 #: What stands for a topic that may be silent for as long as it likes: under water there is no fix,
 #: far above the bottom no echo. A vehicle need not say how it is, either: less than nothing is not
 #: measured.

@@ -23,6 +23,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from glider_base.ros.hearing.gids import GID
+from glider_base.ros.hearing.inputs import Input
 from glider_base.ros.lockstep import clock, health, peers, step_node
 from glider_base.ros.lockstep.clock import MAX_TICKS_AHEAD, ClockNode
 from glider_base.ros.lockstep.executor import Gate, make_executor
@@ -631,6 +632,14 @@ def test_other_frames_are_refused_and_named(make_graph, context, field, frame):
     message.header.frame_id, message.child_frame_id = 'map', 'one/base_link'
     item.accept(to_cdr(message))
     assert item.values == 17 * (0.5,)
+
+
+def test_a_battery_that_counts_in_percent_is_refused_and_named():
+    item = Input(TOPICS['battery'], lockstep=False)
+    with pytest.raises(MessageError, match='battery: percentage is 5 '):
+        item.accept(item.topic.codec.encode(0, (15.0, -1.0, 1.0, 20.0, 5.0)))
+    item.accept(item.topic.codec.encode(0, (15.0, -1.0, 20.5, 20.0, 1.025)))
+    assert item.values[0] == 15.0
 
 
 def test_parameter_that_there_is_not_is_refused_by_its_name(make_graph, context):

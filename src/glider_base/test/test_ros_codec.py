@@ -162,6 +162,16 @@ def test_fields_in_arrays_lie_where_the_message_has_them():
     assert TOPICS['odom'].codec.decode(serialize_message(other))[1] == tuple(range(17))
 
 
+def test_an_imu_that_says_it_has_no_orientation_is_refused():
+    """That of a message that nobody has filled in is level, and heads east."""
+    imu = message_of('imu', 1.0, *(7 * (0.0,)))
+    imu.orientation_covariance[0] = -1.0
+    with pytest.raises(MessageError, match=r'orientation_covariance\[0\] is -1'):
+        TOPICS['imu'].codec.decode(serialize_message(imu))
+    imu.orientation_covariance[0] = 1e-4
+    assert TOPICS['imu'].codec.decode(serialize_message(imu))[1][0] == 1.0
+
+
 def test_fields_are_set_by_their_paths():
     fix = NavSatFix()
     set_field(fix, 'status.service', 3)

@@ -2,16 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bottom of the sea: turned above by guidance, left by the guard, or touched and told."""
 
+import math
+
 import numpy as np
 import pytest
 import xarray
 from hypothesis import given
 from hypothesis import strategies as st
+from rclpy.parameter import Parameter
 from scipy.spatial.transform import Rotation
 
 import glider_bringup
+from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
-from glider_base.signals import Water
+from glider_base.signals import TICK_NS, TICK_S, Water
+from glider_base.wiring import NO_ECHO, at_rest
+from glider_guard.nodes.guard_node import GuardNode
+from glider_guidance.nodes.guidance_node import GuidanceNode
 from glider_model.ocean.bottom import aground
 from glider_model.plant.motion import Motion
 
@@ -124,3 +131,34 @@ def test_a_vehicle_that_touches_comes_up_and_the_score_says_so():
 def test_clearance_is_for_yos():
     with pytest.raises(ConfigurationError, match=r'profile.clearance_m = 10: not along a path'):
         glider_bringup.fly('helix', {'profile.clearance_m': 10.0, 'profile.mode': 'path'})
+
+
+@pytest.mark.parametrize('kind', [GuidanceNode, GuardNode])
+@pytest.mark.parametrize('no_echo', [NO_ECHO, math.inf, math.nan])
+def test_an_altimeter_that_pings_every_four_seconds_is_heard_in_between(
+    context, monkeypatch, kind, no_echo
+):
+    """A bottom is believed that is heard for seconds on end, and no longer than it is heard."""
+    told, heard = {'lockstep': False, 'altitude': True}, []
+    overrides = [Parameter(name, value=value) for name, value in told.items()]
+    node, now_s = kind(context=context, parameter_overrides=overrides), 0.0
+    try:
+        place = [item.topic.name for item in node.inputs].index('altitude')
+        monkeypatch.setattr(node, 'now_s', lambda: now_s)
+        monkeypatch.setattr(node, 'step', lambda _, *values: heard.append(values[place][0]))
+        monkeypatch.setattr(node, 'is_of_owner', lambda *_: True)
+        for tick in range(100):
+            now_s = tick * TICK_S
+            for item in node.inputs:
+                numbers = at_rest(item.topic.name)
+                if item.topic.name == 'altitude':
+                    if tick % 40:
+                        continue
+                    numbers = (15.0 if tick < 80 else no_echo,)
+                codec = TOPICS[item.topic.name].codec
+                node._on_newest(item, codec.encode(tick * TICK_NS, numbers[: codec.width]), {})
+            node._on_cycle()
+        assert heard == [15.0] * 80 + [NO_ECHO] * 20
+    finally:
+        node.close()
+        node.destroy_node()

@@ -3,6 +3,7 @@
 """Navigation, free-running, with sensors at their own pace, or with none that can be believed."""
 
 import math
+import re
 import time
 
 import pytest
@@ -16,6 +17,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure, Imu, JointState, NavSatFix
 
 from glider_base.frames import OriginSettings
+from glider_base.ros.lockstep import step_node
 from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.lockstep.step_node import OLD_AFTER
 from glider_base.ros.wire import qos
@@ -199,6 +201,18 @@ def test_fix_counts_at_the_surface_and_is_forgotten_when_it_is_old(flight):
     assert not vehicle.misses('fix')
 
 
+@pytest.mark.parametrize(('degrees', 'far'), [((122.0, 36.0), '9,5'), ((0.0, 0.0), '1[01],')])
+def test_fix_of_another_sea_is_refused_and_named(flight, degrees, far):
+    """Swapped, or with an origin that nobody has set."""
+    vehicle = flight.vehicle
+    vehicle.fix = a_fix(0.0)
+    vehicle.fix.latitude, vehicle.fix.longitude = degrees
+    flight.until(lambda: vehicle.said('km from the origin, 36, 122'))
+    assert any(re.search(f'message refused: fix: .*: {far}.* km from', x) for x in vehicle.told)
+    flight.go_on(20)
+    assert abs(vehicle.north_m()) < 20.0
+
+
 @pytest.mark.parametrize('number', [0.0, math.nan])
 def test_receiver_without_a_fix_is_heard_in_peace(flight, number):
     vehicle = flight.vehicle
@@ -208,6 +222,18 @@ def test_receiver_without_a_fix_is_heard_in_peace(flight, number):
     assert not vehicle.said('refused')
     assert not vehicle.misses('fix')
     assert abs(vehicle.north_m()) < 20.0
+
+
+def test_who_waits_for_a_clock_that_nobody_publishes_says_so_once(context, monkeypatch):
+    monkeypatch.setattr(step_node, '_STANDS_S', 0.5, raising=False)
+    flight = Flight(context, use_sim_time=True)
+    try:
+        flight.until(lambda: flight.vehicle.said('use_sim_time, and no /clock'))
+        flight.wait(2.0)
+        assert sum('/clock' in told for told in flight.vehicle.told) == 1
+        assert not flight.vehicle.odom
+    finally:
+        flight.close()
 
 
 def test_attitude_that_is_none_is_refused_and_named(flight):

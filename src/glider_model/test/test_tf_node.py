@@ -13,6 +13,7 @@ from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 
 from glider_base.ros.wire import qos
 from glider_base.settings import ConfigurationError
@@ -104,6 +105,18 @@ def test_newest_odometry_is_published_once_each(context, published):
     stamps = [transform.header.stamp.sec for transform in transforms]
     assert stamps == sorted(set(stamps))
     assert (stamps[-1], last.child_frame_id) == (39, 'one/base_link')
+    node.destroy_node()
+
+
+def test_odometry_that_has_lost_its_attitude_is_no_transform(context, published):
+    node = TfNode(context=context)
+    for tick, attitude in enumerate((math.cos(ANGLE), 0.0, math.cos(ANGLE))):
+        message = odometry(tick)
+        q = message.pose.pose.orientation
+        q.w, q.y = attitude, attitude and math.sin(ANGLE)
+        node.keep(serialize_message(message))
+        node.on_timer()
+    assert [told.transforms[0].header.stamp.sec for told in published] == [0, 2]
     node.destroy_node()
 
 

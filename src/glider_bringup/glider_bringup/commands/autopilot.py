@@ -60,6 +60,9 @@ def autopilot(
     for word in called.args[:1]:
         if word != '--ros-args':
             raise ConfigurationError(f'{word}: unknown (allowed: --ros-args and what follows it)')
+    for word in called.args:
+        if '__ns:=' in word:  # rcl goes by the first one that it is given
+            raise ConfigurationError(f'{word}: not here (allowed: --namespace)')
     flown = load_scenario(scenario, chosen_fields(changed_fields(changes), controller))
     reckons = 'measured_odom' not in flown.navigation.topics if navigation is None else navigation
     parts = [name for name in PARTS if name != 'navigation' or reckons]

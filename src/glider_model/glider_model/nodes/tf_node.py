@@ -81,11 +81,11 @@ class TfNode(Node):
         while (raw := take(self.subscription)) is not None:
             self.keep(raw)
         if self.newest:
-            transform = transform_of(
-                deserialize_message(self.newest, Odometry), self.settings.frame_prefix
-            )
-            self.newest = b''
-            self.publisher.publish(self.message_type(transforms=[transform]))
+            odometry, self.newest = deserialize_message(self.newest, Odometry), b''
+            q = odometry.pose.pose.orientation
+            if q.w or q.x or q.y or q.z:  # else it has no attitude, and tf2 complains of each
+                transform = transform_of(odometry, self.settings.frame_prefix)
+                self.publisher.publish(self.message_type(transforms=[transform]))
 
     def close(self) -> None:
         """Nothing to complete."""

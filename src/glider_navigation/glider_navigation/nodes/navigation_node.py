@@ -4,9 +4,14 @@
 
 import sys
 
+from glider_base.frames import from_geodetic
 from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.process import entry
+from glider_base.ros.wire.codec import MessageError
 from glider_navigation.block import NAVIGATION
+
+#: Farther north or east of the origin, twice as far as a path may lead, there is no fix (km).
+FIX_MAX_KM = 2000.0
 
 
 class NavigationNode(BlockNode):
@@ -14,7 +19,21 @@ class NavigationNode(BlockNode):
 
     def __init__(self, **kwargs) -> None:
         super().__init__(NAVIGATION, **kwargs)
+        for item in self.inputs:
+            if item.topic.name == 'fix' and not self.ticks.lockstep:
+                item.check = self.check_fix
         self.start_up()
+
+    def check_fix(self, values: tuple[float, ...]) -> None:
+        """Refuse a fix by another origin, or whose latitude and longitude are swapped."""
+        origin = self.settings.origin.params()
+        far_km = max(map(abs, from_geodetic(*values[1:3], origin))) / 1e3
+        if values[0] >= 0.0 and far_km > FIX_MAX_KM:
+            raise MessageError(
+                f'latitude {values[1]:g}, longitude {values[2]:g}: {far_km:,.0f} km from the '
+                f'origin, {origin.latitude:g}, {origin.longitude:g} '
+                f'(allowed: <= {FIX_MAX_KM:,.0f} km)'
+            )
 
     @property
     def sample_period_s(self) -> float:

@@ -12,9 +12,24 @@ from glider_base.signals import TICK_NS
 
 #: The norm of a quaternion that is further from 1 is that of no attitude (-).
 NOT_UNIT = 0.1
+#: A battery that says that it has more of its capacity (-) counts in percent.
+MOST_CHARGED = 1.5
 
 #: A topic whose messages are refused is told of at most so often (s of wall time).
 _REFUSED_EVERY_S = 1.0
+
+
+def _check_attitude(values: tuple[float, ...]) -> None:
+    if abs(math.hypot(*values[:4]) - 1.0) > NOT_UNIT:
+        raise MessageError(f'orientation is {values[:4]} (allowed: unit quaternions)')
+
+
+def _check_battery(values: tuple[float, ...]) -> None:
+    if values[4] > MOST_CHARGED:
+        raise MessageError(f'percentage is {values[4]:g} (allowed: 0 to 1)')
+
+
+_CHECKS = {'imu': _check_attitude, 'battery': _check_battery}
 
 
 class Input:
@@ -34,13 +49,14 @@ class Input:
         self.lost = 0  #: messages that lack between those that came
         self.late = 0  #: cycles that had to do with the input of the one before
         self.used_ns = -1
+        #: raises a `MessageError` if numbers cannot be what was measured
+        self.check = _CHECKS.get(topic.name, lambda values: None)
 
     def accept(self, raw: bytes) -> None:
         """Keep a message; a `MessageError` names the topic if it cannot be used."""
         try:
             stamp_ns, values = self.topic.codec.decode(raw, check_frames=True)
-            if self.topic.name == 'imu' and abs(math.hypot(*values[:4]) - 1.0) > NOT_UNIT:
-                raise MessageError(f'orientation is {values[:4]} (allowed: unit quaternions)')
+            self.check(values)
         except MessageError as error:
             raise type(error)(f'{self.named}: {error}') from None
         self.stamp_ns, self.values = stamp_ns, values

@@ -36,6 +36,7 @@ from glider_base.ros.wire.codec import MessageError, NotFiniteFieldError, to_cdr
 from glider_base.ros.wire.topics import TOPICS, Topic, topic_of
 from glider_base.settings import Settings, number
 from glider_base.signals import TICK_NS, not_finite
+from glider_base.wiring import WHEN_SILENT
 
 #: A node looks for its peers this often (s), and after a while in so small a share of its wait.
 _STARTUP_PERIOD_S, _STARTUP_SHARE = 0.03, 0.02
@@ -449,7 +450,9 @@ class TickNode(Node):
         try:
             item.accept_newest(raw, self.now_s(), self.ticks.input_max_age_s)
         except NotFiniteFieldError as error:
-            if item.topic.name not in ('fix', 'altitude'):  # without a fix or an echo
+            if item.topic.name in ('fix', 'altitude'):  # without a fix or an echo
+                item.values = WHEN_SILENT[item.topic.name]
+            else:
                 self.refuse(item, partial(str, error))
         except MessageError as error:
             self.refuse(item, partial(str, error))

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A node with a step per tick, in lockstep or at 10 Hz on the newest inputs."""
 
+import math
+import time
+
 from glider_base.ros.hearing.inputs import Input
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.node import TickNode
@@ -11,6 +14,8 @@ from glider_base.wiring import SAMPLED, SLOW_S, WHEN_SILENT
 #: Samples of attitude and pressure are old after so many periods: two in a row may be missed.
 OLD_AFTER = 3.0
 _COUNTED = ('lost', 'late')
+#: With use_sim_time: nobody acts, and that is told, when the time has stood still for so long (s).
+_STANDS_S = 5.0
 _TELL_EVERY_S = 10.0
 #: So far (in ticks) the steps may be ahead of the stamps before one is left out.
 _AHEAD = 0.25
@@ -58,6 +63,7 @@ class StepNode(TickNode):
         self.passed = 1  #: ticks that have passed since the last step, this one included
         self._cycle_s: float | None = None
         self._passing = Passing(self.ticks.input_max_age_s)
+        self._stood = (0.0, time.monotonic())  #: time of the cycles, and since when it is that (s)
         self._told = (0, 0, 0)
         self._tell_s = -float('inf')
 
@@ -74,6 +80,17 @@ class StepNode(TickNode):
     def pause(self) -> None:
         """Act no more, until `begin`."""
         self.destroy_timer(self._timer)
+
+    def watch(self) -> None:
+        """Tell also that free-running cycles cease, for the time of /clock stands still."""
+        super().watch()
+        now_s = self.now_s()
+        if now_s != self._stood[0]:
+            self._stood = now_s, time.monotonic()
+        elif not self.ticks.lockstep and time.monotonic() - self._stood[1] > _STANDS_S:
+            said = 'use_sim_time, and no /clock: nothing is done until it comes'
+            self.event(self._newest_ns(), health.ERROR, said)
+            self._stood = now_s, math.inf  # once
 
     @property
     def sample_period_s(self) -> float:

@@ -250,6 +250,8 @@ class Codec:
             frame = operator.attrgetter(path)(message)
             if frame.rpartition('/')[2] != name:  # a prefix, as of a vehicle, is not our business
                 raise MessageError(f'{path} is {frame[:80]!r} (allowed: {name!r})')
+        if getattr(message, 'orientation_covariance', (0.0,))[0] == -1.0:
+            raise MessageError('orientation_covariance[0] is -1: it has no orientation')
         values = tuple(float(_get(message, path)) for path in self.fields)
         return self._stamp_of(message), self._measured(values) + self._absent
 
