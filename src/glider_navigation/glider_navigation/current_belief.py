@@ -9,8 +9,9 @@ q (T / 3 + G + T' / 3). How much it wanders, q, is learnt from how far the means
 so that what is told of the errors holds (innovation-based adaptive estimation, Mehra 1970); as it
 is learnt from a few ways, w, the variance that is told is 1 + 1 / w times as large. With the tide
 left out this is persistence: the last mean holds for the next way. In a long stay at the surface
-the drift tells how the current changes. Where there is a forecast, all of this is about the
-difference between the sea and the forecast.
+the drift changes with the tide, as the current does, and with the wind, as it does not: which
+share of that change is found in the current is learnt. Where there is a forecast, all of this is
+about the difference between the sea and the forecast.
 """
 
 import math
@@ -19,6 +20,7 @@ from typing import NamedTuple
 from glider_base.kernel import kernel, replace
 from glider_base.signals import Vector
 from glider_model.ocean.current_settings import MAX_SPEED_MPS
+from glider_navigation.forecast import Trust, weigh
 
 #: Principal lunar tide M2 (rad/s).
 TIDE = 2.0 * math.pi / (12.4206012 * 3600.0)
@@ -32,9 +34,11 @@ FIRST_CHANGE, FIRST_WEIGHT, MOST_WEIGHT = 0.05, 1.0, 4.0
 LEAST_STD = 0.0007
 #: No current is faster, in whatever scenario (m/s).
 FASTEST = MAX_SPEED_MPS
-#: From so long a stay at the surface on (s) the change of the drift tells that of the current: the
-#: drift changes by this much more variance, by wind and shear.
-LONG_STAY_S, SURFACE_MORE = 1800.0, 0.1
+#: From so long a stay at the surface on (s) a tide changes the current by more than what the wind,
+#: and the errors of fixes, change the drift by.
+LONG_STAY_S = 7200.0
+#: What share of that change is the current's, at first, and how far it may be off (-).
+FOLLOWS, FOLLOWS_STD = 1.0, 1.0
 FIRST_Q = 3.0 * FIRST_CHANGE * FIRST_CHANGE / (2.0 * 5400.0)
 
 
@@ -72,7 +76,8 @@ class CurrentBelief(NamedTuple):
     glide: Vector = _STILL  #: mean velocity through the water in the last way taken in (m/s)
     way_s: float = 0.0  #: its time; 0.0: none yet
     over: Regressors = Regressors(1.0, 0.0, 0.0)  #: of it
-    carried: Vector = _STILL  #: change of the current since, by the drift at the surface (m/s)
+    follows: Trust = Trust(FOLLOWS, FOLLOWS_STD * FOLLOWS_STD)  #: the drift, in a long stay
+    drifted: Vector = _STILL  #: that change since, as far as fixes tell it (m/s)
     gap_s: float = 0.0  #: time since then for which nothing tells how the current has changed
 
 
@@ -83,9 +88,16 @@ def initial_belief(tide: bool, mean_std: float = MEAN_STD) -> CurrentBelief:
 
 
 @kernel
+def _carried(belief, share):
+    """Mean (m/s) after the stays since, of whose drift a share was the current's."""
+    mean, drifted = belief.mean, belief.drifted
+    return Vector(mean.n + share * drifted.n, mean.e + share * drifted.e)
+
+
+@kernel
 def current_at(belief, t_s):
     """Current (m/s) that is believed for a time since the start (s)."""
-    mean = Vector(belief.mean.n + belief.carried.n, belief.mean.e + belief.carried.e)
+    mean = _carried(belief, belief.follows.share)
     if belief.p.aa <= 0.0:
         return mean
     c, s = math.cos(TIDE * t_s), math.sin(TIDE * t_s)
@@ -160,6 +172,11 @@ def take_in(belief, off, h, way_s, glide, variance, bias):
     grown = replace(p, mm=p.mm + wander + bias)
     m, a, b = _loaded(grown, h)
     s = h.one * m + h.cos * a + h.sin * b + variance
+    drifted = belief.drifted
+    untold = belief.q * (1.0 + 1.0 / belief.weight) * belief.gap_s
+    follows = weigh(belief.follows, off, drifted, s - untold)
+    more = follows.share - belief.follows.share
+    off = Vector(off.n - more * drifted.n, off.e - more * drifted.e)
     k_m, k_a, k_b = m / s, a / s, b / s
     q, weight = belief.q, belief.weight
     if belief.way_s > 0.0:
@@ -167,12 +184,9 @@ def take_in(belief, off, h, way_s, glide, variance, bias):
         seen = (0.5 * (off.n * off.n + off.e * off.e) - known) / _apart_s(belief, way_s)
         q = max(0.0, (weight * q + max(0.0, seen)) / (weight + 1.0))
         weight = min(MOST_WEIGHT, weight + 1.0)
-    mean = Vector(
-        belief.mean.n + belief.carried.n + k_m * off.n,
-        belief.mean.e + belief.carried.e + k_m * off.e,
-    )
+    mean = _carried(belief, follows.share)
     return CurrentBelief(
-        mean=_bounded(mean),
+        mean=_bounded(Vector(mean.n + k_m * off.n, mean.e + k_m * off.e)),
         cos=Vector(belief.cos.n + k_a * off.n, belief.cos.e + k_a * off.e),
         sin=Vector(belief.sin.n + k_b * off.n, belief.sin.e + k_b * off.e),
         p=Uncertainty(
@@ -188,7 +202,8 @@ def take_in(belief, off, h, way_s, glide, variance, bias):
         glide=glide,
         way_s=way_s,
         over=h,
-        carried=Vector(0.0, 0.0),
+        follows=follows,
+        drifted=Vector(0.0, 0.0),
         gap_s=0.0,
     )
 
@@ -203,6 +218,7 @@ def carry(belief, change, stay_s, variance):
     share = 0.0
     if stay_s >= LONG_STAY_S:
         wander = belief.q * stay_s
-        share = wander / ((1.0 + SURFACE_MORE) * wander + variance)
-    n, e = belief.carried.n + share * change.n, belief.carried.e + share * change.e
-    return replace(belief, carried=Vector(n, e), gap_s=belief.gap_s + (1.0 - share) * stay_s)
+        share = wander / (wander + variance)
+    n, e = belief.drifted.n + share * change.n, belief.drifted.e + share * change.e
+    known = min(1.0, share * belief.follows.share)
+    return replace(belief, drifted=Vector(n, e), gap_s=belief.gap_s + (1.0 - known) * stay_s)

@@ -3,10 +3,11 @@
 """A stay at the surface: where the vehicle came up, where it is, and how it drifts, by its fixes.
 
 A Kalman filter, the same for both axes: the place goes on with the drift, and the drift wanders as
-tides and wind do. Where the vehicle came up is kept beside the two: the first fixes tell it, and
-what comes hours later does not. Fixes count once in `FIX_EVERY_S`: the error of one is that of the
-next. A fix where the vehicle can hardly be is set aside; another one beside it, later, says that
-the vehicle was there after all: what was believed of the place is forgotten, and both count.
+tides and wind do. Where the vehicle came up, and how it drifted there, is kept beside the two (a
+fixed-point smoother): the first fixes tell it, and what comes hours later does not. Fixes count
+once in `FIX_EVERY_S`: the error of one is that of the next. A fix where the vehicle can hardly be
+is set aside; another one beside it, later, says that the vehicle was there after all: what was
+believed of the place is forgotten, and both count.
 """
 
 import math
@@ -25,8 +26,8 @@ DRIFT_STD = 0.15
 LOST_DRIFT_STD = 1.5
 #: Growth of the variance of the drift (m^2/s^3): by 0.03 m/s in an hour.
 DRIFT_WANDERS = 3e-7
-#: The drift by the fixes up to so long after the surfacing is that of the surfacing (s).
-EARLY_S = 900.0
+#: Where less than this share of what is known of its change is by fixes, they tell nothing.
+LEAST_BY_FIXES = 1e-6
 #: Farther from where the vehicle is believed to be than so many standard deviations, and than so
 #: far (m) and what it may have drifted otherwise since the last fix (m/s), a fix is set aside.
 FARTHEST_STD, FARTHEST_M, FASTEST_MPS = 6.0, 100.0, 1.5
@@ -39,22 +40,17 @@ NO_FIX_ASIDE = -1.0
 
 
 class Known(NamedTuple):
-    """Covariance of where it came up (c), place now (p) and drift (v) (m^2, m^2/s, m^2/s^2)."""
+    """Covariance of where it came up (c), drift there (d), place (p) and drift (v) now (m, s)."""
 
     cc: float
     cp: float
     cv: float
+    dd: float
+    dp: float
+    dv: float
     pp: float
     pv: float
     vv: float
-
-
-class Early(NamedTuple):
-    """The drift soon after the surfacing."""
-
-    drift: Vector  #: (m/s)
-    variance: float  #: (m^2/s^2)
-    t_s: float  #: time of the stay for which that holds
 
 
 class Stay(NamedTuple):
@@ -63,9 +59,9 @@ class Stay(NamedTuple):
     t_s: float  #: since the vehicle came up, or since the start
     came_up: Vector  #: where that was (m)
     place: Vector  #: where it is now (m)
-    drift: Vector  #: (m/s)
+    first_drift: Vector  #: as it came up (m/s)
+    drift: Vector  #: now (m/s)
     known: Known
-    early: Early
     fixes: int
     fixed_s: float  #: time of the last fix that counted
     aside: Vector  #: a fix that was set aside (m)
@@ -73,23 +69,16 @@ class Stay(NamedTuple):
 
 
 _STILL = Vector(0.0, 0.0)
-_NOWHERE = Stay(
-    0.0, _STILL, _STILL, _STILL, Known(*(6 * (0.0,))), Early(_STILL, 0.0, 0.0), 0, 0.0, _STILL
-)
+_NOWHERE = Stay(0.0, _STILL, _STILL, _STILL, _STILL, Known(*(9 * (0.0,))), 0, 0.0, _STILL)
 
 
 @kernel
 def begin(place, variance, drift):
     """Come up at a place (m) that is known with a variance (m^2)."""
     vv = DRIFT_STD * DRIFT_STD
-    known = Known(cc=variance, cp=variance, cv=0.0, pp=variance, pv=0.0, vv=vv)
+    known = replace(_NOWHERE.known, cc=variance, cp=variance, pp=variance, dd=vv, dv=vv, vv=vv)
     return replace(
-        _NOWHERE,
-        came_up=place,
-        place=place,
-        drift=drift,
-        known=known,
-        early=Early(drift, vv, 0.0),
+        _NOWHERE, came_up=place, place=place, first_drift=drift, drift=drift, known=known
     )
 
 
@@ -105,6 +94,21 @@ def drifted_variance(stay):
 
 
 @kernel
+def change_of_drift(stay):
+    """Drift now less that as it came up (m/s), by the fixes alone, and its variance (m^2/s^2).
+
+    The filter believes that the drift changes little, and that is taken out of what it says.
+    """
+    before = DRIFT_WANDERS * stay.t_s
+    variance = stay.known.vv - 2.0 * stay.known.dv + stay.known.dd
+    by_fixes = 1.0 - variance / before if before > 0.0 else 0.0
+    if by_fixes < LEAST_BY_FIXES:
+        return Vector(0.0, 0.0), math.inf
+    n, e = stay.drift.n - stay.first_drift.n, stay.drift.e - stay.first_drift.e
+    return Vector(n / by_fixes, e / by_fixes), variance / by_fixes
+
+
+@kernel
 def counts(stay, fix):
     """Whether a fix counts."""
     return fix.is_fix and (stay.fixes == 0 or stay.t_s - stay.fixed_s >= FIX_EVERY_S)
@@ -117,6 +121,7 @@ def wait(stay, dt):
     known = replace(
         k,
         cp=k.cp + dt * k.cv,
+        dp=k.dp + dt * k.dv,
         pp=k.pp + dt * (2.0 * k.pv + dt * (k.vv + DRIFT_WANDERS * dt / 3.0)),
         pv=k.pv + dt * (k.vv + 0.5 * DRIFT_WANDERS * dt),
         vv=k.vv + DRIFT_WANDERS * dt,
@@ -130,28 +135,26 @@ def take_fix(stay, fix):
     """Take in a fix."""
     k = stay.known
     s = k.pp + max(LEAST_VARIANCE, fix.variance)
-    k_c, k_p, k_v = k.cp / s, k.pp / s, k.pv / s
+    k_c, k_d, k_p, k_v = k.cp / s, k.dp / s, k.pp / s, k.pv / s
     off_n, off_e = fix.p_n - stay.place.n, fix.p_e - stay.place.e
-    drift = Vector(stay.drift.n + k_v * off_n, stay.drift.e + k_v * off_e)
-    vv, early = k.vv - k_v * k.pv, stay.early
-    if stay.fixes == 0:  # one fix tells where it is, not how it drifts
-        early = Early(drift, LOST_DRIFT_STD * LOST_DRIFT_STD, stay.t_s)
-    elif stay.t_s <= EARLY_S:
-        early = Early(drift, vv, stay.t_s)
+    first = stay.first_drift
     return replace(
         stay,
         came_up=Vector(stay.came_up.n + k_c * off_n, stay.came_up.e + k_c * off_e),
         place=Vector(stay.place.n + k_p * off_n, stay.place.e + k_p * off_e),
-        drift=drift,
+        first_drift=Vector(first.n + k_d * off_n, first.e + k_d * off_e),
+        drift=Vector(stay.drift.n + k_v * off_n, stay.drift.e + k_v * off_e),
         known=Known(
             cc=k.cc - k_c * k.cp,
             cp=k.cp - k_c * k.pp,
             cv=k.cv - k_c * k.pv,
+            dd=k.dd - k_d * k.dp,
+            dp=k.dp - k_d * k.pp,
+            dv=k.dv - k_d * k.pv,
             pp=k.pp - k_p * k.pp,
             pv=k.pv - k_p * k.pv,
-            vv=vv,
+            vv=k.vv - k_v * k.pv,
         ),
-        early=early,
         fixes=stay.fixes + 1,
         fixed_s=stay.t_s,
         aside_s=NO_FIX_ASIDE,
@@ -181,8 +184,18 @@ def _begin_aside(stay, variance):
         t_s=t,
         came_up=Vector(fix.n - t * drift.n, fix.e - t * drift.e),
         place=fix,
-        known=Known(cc=back, cp=variance, cv=-t * vv, pp=variance, pv=0.0, vv=vv),
-        early=Early(drift, vv, t),
+        first_drift=drift,
+        known=Known(
+            cc=back,
+            cp=variance,
+            cv=-t * vv,
+            dd=vv + DRIFT_WANDERS * t,
+            dp=0.0,
+            dv=vv,
+            pp=variance,
+            pv=0.0,
+            vv=vv,
+        ),
         fixes=stay.fixes + 1,
         fixed_s=t,
         aside_s=NO_FIX_ASIDE,

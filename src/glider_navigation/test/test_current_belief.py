@@ -18,6 +18,7 @@ from glider_navigation.current_belief import (
     take_in,
     wandered,
 )
+from glider_navigation.forecast import Trust
 
 #: Principal lunar tide (rad/s), what is known before the first way, and what never is (m/s).
 M2 = 2.0 * math.pi / (12.4206012 * 3600.0)
@@ -224,15 +225,33 @@ def test_no_current_is_believed_that_no_sea_has():
 def test_a_long_stay_carries_the_current_on_and_a_short_one_does_not():
     """By the change of the drift, as far as that is the current's; the rest of it is unknown."""
     belief = take_mean(initial_belief(False), [0.10, -0.05], 5400.0)
-    short = carry(belief, Vector(0.1, 0.2), 600.0, 1e-4)
+    belief = belief._replace(follows=Trust(0.8, 0.01))
+    short = carry(belief, Vector(0.1, 0.2), 3600.0, 1e-4)
     assert tuple(current_at(short, 0.0)) == tuple(belief.mean)
-    assert short.gap_s == 600.0
+    assert short.gap_s == 3600.0
     long = carry(belief, Vector(0.1, 0.2), 21600.0, 1e-4)
     moved = np.array(current_at(long, 0.0)) - belief.mean
-    share = belief.q * 21600.0 / (1.1 * belief.q * 21600.0 + 1e-4)
+    share = 0.8 * belief.q * 21600.0 / (belief.q * 21600.0 + 1e-4)
     assert moved == pytest.approx(share * np.array([0.1, 0.2]))
     assert tuple(last_mean(long)) == pytest.approx(tuple(belief.mean))
     told = [wandered(one, 5400.0) for one in (belief, short, long)]
-    untold = [600.0, (1.0 - share) * 21600.0]
+    untold = [3600.0, (1.0 - share) * 21600.0]
     grown = 2.0 * belief.q * np.array(untold)
     assert np.array(told[1:]) - told[0] == pytest.approx(grown, rel=1e-6)
+
+
+@pytest.mark.parametrize('of_current', [0.0, 1.0], ids=['the wind', 'the current'])
+def test_it_is_learnt_whether_the_drift_changes_with_the_current(of_current):
+    """Ten stays of 2 h, after each of which the drift has changed by 0.1 m/s rms on each axis."""
+    rng = np.random.default_rng(6)
+    belief, now = initial_belief(False), np.array([0.1, -0.05])
+    off = []
+    for _ in range(10):
+        carried = np.array(current_at(belief, 0.0)) - belief.mean
+        belief = take_mean(belief, now - carried, 5400.0)
+        change = rng.normal(0.0, 0.1, 2)
+        belief = carry(belief, Vector(*change.tolist()), 7200.0, 1e-5)
+        now = now + of_current * change
+        off.append(math.hypot(*(np.array(current_at(belief, 0.0)) - now)))
+    assert belief.follows.share == pytest.approx(of_current, abs=0.1)
+    assert np.median(off[5:]) < 0.015

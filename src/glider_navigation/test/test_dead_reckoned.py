@@ -19,7 +19,6 @@ from glider_navigation.forecast import Trust, weigh
 from glider_navigation.intake import is_refusing, take_in
 from glider_navigation.method import Fix, Heard, method_step
 from glider_navigation.methods.dead_reckoned import (
-    Drift,
     Way,
     _dive,
     _unforeseen,
@@ -438,7 +437,6 @@ def test_covariance_of_a_place_is_that_of_its_errors_drawn_by_lot(tide):
     way = Way(
         begun=still,
         variance=900.0,
-        drift=Drift(still, 1.0),
         through=through,
         believed=still,
         forecast=forecast,

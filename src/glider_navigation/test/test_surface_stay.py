@@ -15,6 +15,7 @@ from glider_navigation.surface_stay import (
     LOST_DRIFT_STD,
     _begin_aside,
     begin,
+    change_of_drift,
     counts,
     drifted_variance,
     hear_fix,
@@ -36,7 +37,7 @@ fixes = st.lists(
 
 
 def regression(place, drift, variance, times, seen, variances):
-    """Posterior mean and covariance of [p(0), p(t), v(t)] at the last of the times.
+    """Posterior mean and covariance of [p(0), v(0), p(t), v(t)] at the last of the times.
 
     The place is p(0) + v(0) t + the integral of a random walk, all that jointly Gaussian: the
     covariance of that integral at s and t >= s is q (s^2 t / 2 - s^3 / 6), and that of the walk at
@@ -47,13 +48,15 @@ def regression(place, drift, variance, times, seen, variances):
     places = variance + DRIFT_STD**2 * s * t + WANDERS * (s**2 * t / 2.0 - s**3 / 6.0)
     with_v = DRIFT_STD**2 * at + WANDERS * at**2 / 2.0
     v = DRIFT_STD**2 + WANDERS * at[-1]
-    everything = np.block([[places, with_v[:, None]], [with_v[None, :], np.array([[v]])]])
-    mean = np.concatenate([place + drift * at, [drift]])
-    H = np.eye(len(mean))[1:-1]
+    both = np.array([[DRIFT_STD**2, DRIFT_STD**2], [DRIFT_STD**2, v]])
+    with_both = np.stack([DRIFT_STD**2 * at, with_v])
+    everything = np.block([[places, with_both.T], [with_both, both]])
+    mean = np.concatenate([place + drift * at, [drift, drift]])
+    H = np.eye(len(mean))[1:-2]
     gain = everything @ H.T @ np.linalg.inv(H @ everything @ H.T + np.diag(variances))
     mean = mean + gain @ (seen - H @ mean)
     covariance = everything - gain @ H @ everything
-    wanted = [0, -2, -1]
+    wanted = [0, -2, -3, -1]
     return mean[wanted], covariance[np.ix_(wanted, wanted)]
 
 
@@ -75,10 +78,17 @@ def test_fixes_are_taken_in_as_by_regression(place, variance, drift, fixes):
     times = np.cumsum(after)
     for axis, start, at_first, seen in (('n', drift, place[0], n), ('e', -drift, place[1], e)):
         mean, covariance = regression(at_first, start, variance, times, seen, variances)
-        there = [getattr(vector, axis) for vector in (stay.came_up, stay.place, stay.drift)]
+        vectors = stay.came_up, stay.first_drift, stay.place, stay.drift
+        there = [getattr(vector, axis) for vector in vectors]
         assert there == pytest.approx(mean, rel=1e-5, abs=1e-4)
         scale = np.sqrt(np.diag(covariance))
-        known = np.array(stay.known)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+        k, unused = stay.known, covariance[0, 1]
+        known = [
+            [k.cc, unused, k.cp, k.cv],
+            [unused, k.dd, k.dp, k.dv],
+            [k.cp, k.dp, k.pp, k.pv],
+            [k.cv, k.dv, k.pv, k.vv],
+        ]
         assert known / np.outer(scale, scale) == pytest.approx(
             covariance / np.outer(scale, scale), abs=1e-5
         )
@@ -182,14 +192,25 @@ def test_a_fix_far_off_is_confirmed_by_one_near_it_and_a_while_later(later_s, as
     assert (tuple(stay.place) == (5e4, 0.0)) == believed
 
 
-def test_the_drift_early_in_a_stay_is_that_of_its_first_quarter_of_an_hour_or_first_fix():
-    stay = begin(Vector(0.0, 0.0), 25.0, Vector(0.1, 0.0))
-    soon = stay_with(stay, [(300.0, 60.0, 5.0, 25.0), (590.0, 200.0, 9.0, 25.0)])
-    assert (soon.early.drift, soon.early.t_s) == (soon.drift, 890.0)
-    late = stay_with(stay, [(1200.0, 300.0, -20.0, 25.0)])
-    assert (late.early.drift, late.early.t_s) == (late.drift, 1200.0)
-    assert soon.early.variance < DRIFT_STD**2 < late.early.variance, 'one fix tells no drift'
-    for one in soon, late:
-        later = stay_with(one, [(600.0, 900.0, 90.0, 25.0)])
-        assert later.early == one.early
-        assert later.drift != one.drift
+@pytest.mark.parametrize(
+    ('waits_s', 'most_std'),
+    [([60.1, 60.1, 1800.0, 60.1], 0.2), (120 * [60.1], 0.05)],
+    ids=['first and last minutes', 'each minute'],
+)
+def test_the_change_of_the_drift_is_as_well_known_as_it_says(waits_s, most_std):
+    """It goes from 0.1 to 0.3 m/s, and the filter believes that it hardly changes."""
+    ends = np.cumsum(waits_s)
+    rng, changes = np.random.default_rng(3), []
+    for _ in range(200):
+        seen = 0.1 * ends + 0.1 * ends**2 / ends[-1] + rng.normal(0.0, 5.0, len(ends))
+        stay = begin(Vector(0.0, 0.0), 25.0, Vector(0.1, 0.0))
+        fixes = zip(waits_s, seen, np.zeros(len(ends)), np.full(len(ends), 25.0), strict=True)
+        change, variance = change_of_drift(stay_with(stay, fixes))
+        changes.append(change.n)
+    assert np.mean(changes) == pytest.approx(0.2, abs=0.03)
+    assert 0.5 * np.std(changes) < math.sqrt(variance) < most_std
+
+
+def test_without_a_fix_nothing_tells_how_the_drift_has_changed():
+    stay = wait(begin(Vector(0.0, 0.0), 25.0, Vector(0.1, 0.0)), 3600.0)
+    assert change_of_drift(stay) == (Vector(0.0, 0.0), math.inf)

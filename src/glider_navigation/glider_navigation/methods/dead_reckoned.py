@@ -43,8 +43,6 @@ from glider_navigation.surface_stay import Stay
 
 #: Shorter than this (s) a way under water tells no current.
 SHORTEST_WAY_S = 120.0
-#: Drifts are known alike where the variance of one is at most so many times that of the other.
-KNOWN_ALIKE = 4.0
 
 
 class DeadReckonedSettings(NavigationMethodSettings):
@@ -80,7 +78,7 @@ class DeadReckonedSettings(NavigationMethodSettings):
     def initial_state(self, start: Start) -> 'DeadReckonedState':
         """At the surface, where the vehicle was put into the water."""
         place = Vector(start.p_n, start.p_e)
-        way = Way(place, self.start_std_m**2, Drift(_STILL, math.inf))
+        way = Way(place, self.start_std_m**2)
         stay = surface_stay.launched(place, self.start_std_m**2)
         current, trust = belief.initial_belief(start.current == 'tidal'), Trust(1.0, 0.0)
         if start.current == 'forecast':
@@ -102,13 +100,6 @@ class DeadReckonedParams(NamedTuple):
     is_weighed: bool  #: speed comes from pitch and buoyancy
 
 
-class Drift(NamedTuple):
-    """How the vehicle drifted at the surface."""
-
-    velocity: Vector  #: (m/s)
-    variance: float  #: (m^2/s^2)
-
-
 _STILL = Vector(0.0, 0.0)
 
 
@@ -117,7 +108,6 @@ class Way(NamedTuple):
 
     begun: Vector  #: where that was (m)
     variance: float  #: (m^2)
-    drift: Drift  #: there
     through: Vector = _STILL  #: way through the water, and by drift where nothing fixed it (m)
     believed: Vector = _STILL  #: way by the current that was believed (m)
     forecast: Vector = _STILL  #: way by the current that was forecast (m)
@@ -126,7 +116,7 @@ class Way(NamedTuple):
     sin_s: float = 0.0
 
 
-_NO_WAY = Way(_STILL, 0.0, Drift(_STILL, 0.0))
+_NO_WAY = Way(_STILL, 0.0)
 
 
 class DeadReckonedState(NamedTuple):
@@ -214,8 +204,7 @@ def _learn(current, trust, column, way, stay, params):
 def _dive(way, stay):
     """The way that begins with a dive: a new one, if the stay had a fix."""
     if stay.fixes > 0:
-        drift = Drift(stay.drift, stay.known.vv)
-        return replace(_NO_WAY, begun=stay.place, variance=stay.known.pp, drift=drift)
+        return replace(_NO_WAY, begun=stay.place, variance=stay.known.pp)
     drifted = Vector(
         way.through.n + stay.place.n - stay.came_up.n,
         way.through.e + stay.place.e - stay.came_up.e,
@@ -259,22 +248,17 @@ def _unforeseen(drift, place, t_s, current, trust, params):
 
 
 @kernel
-def _carry(current, trust, way, stay, t_s, params):
-    """What is believed of the current as a stay ends, by how the drift has changed since the way.
-
-    The drift of the way is that at both of its ends, where that at the first is as well known.
-    """
+def _carry(current, trust, stay, t_s, params):
+    """What is believed of the current as a stay ends, by how the drift has changed in it."""
     if current.way_s <= 0.0:
         return current
-    early, up_s = stay.early, t_s - stay.t_s
-    now = _unforeseen(stay.drift, stay.place, t_s, current, trust, params)
-    then = _unforeseen(early.drift, stay.came_up, up_s + early.t_s, current, trust, params)
-    if way.drift.variance <= KNOWN_ALIKE * early.variance:
-        drift, begun_s = way.drift.velocity, up_s - way.t_s
-        first = _unforeseen(drift, way.begun, begun_s, current, trust, params)
-        then = Vector(0.5 * (then.n + first.n), 0.5 * (then.e + first.e))
+    first = stay.first_drift
+    more, variance = surface_stay.change_of_drift(stay)
+    last = Vector(first.n + more.n, first.e + more.e)
+    then = _unforeseen(first, stay.came_up, t_s - stay.t_s, current, trust, params)
+    now = _unforeseen(last, stay.place, t_s, current, trust, params)
     change = Vector(now.n - then.n, now.e - then.e)
-    return belief.carry(current, change, stay.t_s, stay.known.vv + early.variance)
+    return belief.carry(current, change, stay.t_s, variance)
 
 
 @kernel
@@ -303,7 +287,7 @@ def _change_over(state, under, t_s, params):
             current, trust = _learn(current, trust, column, way, stay, params)
             if way.t_s >= SHORTEST_WAY_S:
                 column = Vector(way.forecast.n / way.t_s, way.forecast.e / way.t_s)
-            current = _carry(current, trust, way, stay, t_s, params)
+            current = _carry(current, trust, stay, t_s, params)
         way = _dive(way, stay)
     elif state.under and not under:
         covariance = place_covariance(way, current, trust, column, params)
