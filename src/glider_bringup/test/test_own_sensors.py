@@ -225,7 +225,7 @@ def test_receiver_without_a_fix_is_heard_in_peace(flight, number):
 
 
 def test_who_waits_for_a_clock_that_nobody_publishes_says_so_once(context, monkeypatch):
-    monkeypatch.setattr(step_node, '_STANDS_S', 0.5, raising=False)
+    monkeypatch.setattr(step_node, '_STANDS_S', 0.5)
     flight = Flight(context, use_sim_time=True)
     try:
         flight.until(lambda: flight.vehicle.said('use_sim_time, and no /clock'))
