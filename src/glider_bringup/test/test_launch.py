@@ -137,7 +137,7 @@ def test_vehicle_of_ones_own_has_guidance_control_and_guard_alone(tmp_path):
 )
 def test_navigation_of_a_vehicle_can_be_left_out(tmp_path, navigation, method, nodes):
     scenario = tmp_path / 'mine.yaml'
-    scenario.write_text(f'navigation: {{method: {method}}}\n')
+    scenario.write_text(f'navigation: {{method: {method}}}\nprofile: {{clearance_m: 15}}\n')
     arguments = {
         **{'simulate': 'false', 'lockstep': 'false'},
         **{'scenario': str(scenario), 'navigation': navigation},
@@ -147,6 +147,8 @@ def test_navigation_of_a_vehicle_can_be_left_out(tmp_path, navigation, method, n
     assert [node.executable for node in plan.nodes] == aboard
     has_pressure = bool(nodes) and method == 'dead_reckoned'
     assert parameters(plan)['/glider/guard_node']['pressure'] == has_pressure
+    for node in 'guidance_node', 'guard_node':
+        assert parameters(plan)[f'/glider/{node}']['altitude'], 'it keeps clear of the bottom'
     (autopilot,) = plan_launch({**arguments, 'autopilot': 'true'}, tmp_path).nodes
     assert autopilot.executable == 'autopilot'
     assert autopilot.words == (() if nodes else ('guidance', 'control', 'guard'))

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace
-from glider_base.ros.wire.topics import CURRENT, GUARD, GUIDANCE, NAVIGATION
+from glider_base.ros.wire.topics import CURRENT, GUARD, NAVIGATION
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
@@ -203,9 +203,8 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     # a vehicle whose place is measured knows it, and publishes odom itself
     knows_place = not simulate and 'measured_odom' in scenario.navigation.topics
     with_navigation = _TRUTH.get(text['navigation'], not knows_place)
-    if not with_navigation:  # nor is there any sensor of its own
-        parameters[GUARD] |= {'pressure': False, 'altitude': False}
-        parameters[GUIDANCE] |= {'altitude': False}
+    if not with_navigation:  # nor are there the sensors that it would read
+        parameters[GUARD] |= {'pressure': False}
     nodes = _nodes(
         simulate,
         with_navigation,
