@@ -34,8 +34,8 @@ FIRST_CHANGE, FIRST_WEIGHT, MOST_WEIGHT = 0.05, 1.0, 4.0
 LEAST_STD = 0.0007
 #: No current is faster, in whatever scenario (m/s).
 FASTEST = MAX_SPEED_MPS
-#: From so long a stay at the surface on (s) a tide changes the current by more than what the wind,
-#: and the errors of fixes, change the drift by.
+#: From so long a stay at the surface on (s) the change of the drift counts: in shorter ones of two
+#: recorded flights, modena and sg033, the current was forecast better without it.
 LONG_STAY_S = 7200.0
 #: What share of that change is the current's, at first, and how far it may be off (-).
 FOLLOWS, FOLLOWS_STD = 1.0, 1.0
@@ -124,12 +124,17 @@ def _apart_s(belief, way_s):
 
 
 @kernel
+def _grown(belief, time_s):
+    """Variance (m^2/s^2) by which the mean comes to differ in a time (s)."""
+    return belief.q * time_s * (1.0 + 1.0 / belief.weight)
+
+
+@kernel
 def wandered(belief, way_s):
     """Variance (m^2/s^2) by which the mean over a way differs from that of the way before."""
     if belief.way_s <= 0.0:
         return 0.0
-    apart_s = _apart_s(belief, way_s)
-    return belief.q * apart_s * (1.0 + 1.0 / belief.weight) + LEAST_STD * LEAST_STD
+    return _grown(belief, _apart_s(belief, way_s)) + LEAST_STD * LEAST_STD
 
 
 @kernel
@@ -173,8 +178,7 @@ def take_in(belief, off, h, way_s, glide, variance, bias):
     m, a, b = _loaded(grown, h)
     s = h.one * m + h.cos * a + h.sin * b + variance
     drifted = belief.drifted
-    untold = belief.q * (1.0 + 1.0 / belief.weight) * belief.gap_s
-    follows = weigh(belief.follows, off, drifted, s - untold)
+    follows = weigh(belief.follows, off, drifted, s - _grown(belief, belief.gap_s))
     more = follows.share - belief.follows.share
     off = Vector(off.n - more * drifted.n, off.e - more * drifted.e)
     k_m, k_a, k_b = m / s, a / s, b / s
