@@ -263,4 +263,4 @@ def test_a_new_file_is_a_new_command_after_the_others(tmp_path, monkeypatch):
 @pytest.mark.parametrize('name', cli.OF_THE_SCRIPT)
 def test_what_the_script_does_is_refused_here(name):
     with pytest.raises(ConfigurationError, match=f'^{name}: run it through the ./glider script'):
-        cli.app([name], standalone_mode=False)
+        cli.app([name, '--only', 'fuzz', '-c', '1'], standalone_mode=False)

@@ -130,8 +130,11 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={'help_option_names': ['-h', '--help']},
 )
+_ANY_WORDS = {'ignore_unknown_options': True, 'allow_extra_args': True}
 for _name, (_text, _example) in OF_THE_SCRIPT.items():
-    app.command(_name, help=_text, epilog=f'Example: ./glider {_example}')(_refuse)
+    app.command(
+        _name, help=_text, epilog=f'Example: ./glider {_example}', context_settings=_ANY_WORDS
+    )(_refuse)
 
 
 def check_words(words: list[str]) -> None:
