@@ -83,9 +83,17 @@ def fly(context, node, others=(), ticks=40, every_s=0.01) -> None:
     plant.destroy_node()
 
 
-@pytest.mark.parametrize(('prefix', 'child'), [('', 'base_link'), ('one/', 'one/base_link')])
-def test_transform_is_the_pose_of_the_odometry(prefix, child):
+@pytest.mark.parametrize(
+    ('prefix', 'said', 'child'),
+    [
+        ('', 'base_link', 'base_link'),
+        ('one/', 'base_link', 'one/base_link'),
+        ('one/', 'one/base_link', 'one/base_link'),  # of a driver that has put it there itself
+    ],
+)
+def test_transform_is_the_pose_of_the_odometry(prefix, said, child):
     source = odometry(7)
+    source.child_frame_id = said
     transform = transform_of(source, prefix)
     assert isinstance(transform, TransformStamped)
     assert (transform.header.frame_id, transform.child_frame_id) == ('map', child)

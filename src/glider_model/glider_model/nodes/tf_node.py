@@ -40,7 +40,7 @@ class TfSettings(Settings):
 def transform_of(odometry: Odometry, frame_prefix: str) -> TransformStamped:
     """Transform of the vehicle in the world, stamped as the odometry is."""
     transform = TransformStamped(header=odometry.header)
-    transform.child_frame_id = frame_prefix + odometry.child_frame_id
+    transform.child_frame_id = frame_prefix + odometry.child_frame_id.removeprefix(frame_prefix)
     position, translation = odometry.pose.pose.position, transform.transform.translation
     translation.x, translation.y, translation.z = position.x, position.y, position.z
     transform.transform.rotation = odometry.pose.pose.orientation
