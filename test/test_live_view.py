@@ -99,7 +99,7 @@ def plain(value):
     if names:
         return {n: plain(getattr(value, n)) for n in names if n[0] != '_' and not n.isupper()}
     if isinstance(value, str | bytes | bool | int | float):
-        return value
+        return value if value == value else 'NaN'
     return [plain(one) for one in value]
 
 

@@ -6,6 +6,7 @@ From it follow the table of topics, who waits for whom in lockstep, the columns 
 modules that are started, and what a recorded run is checked by.
 """
 
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -114,7 +115,10 @@ PORTS = {
         'sensor_msgs/msg/BatteryState',
         Battery._fields,
         BASE_LINK,
-        constants=(('power_supply_status', DISCHARGES), ('present', True)),
+        constants=(
+            *(('temperature', math.nan), ('design_capacity', math.nan)),  # nobody measures them
+            *(('power_supply_status', DISCHARGES), ('present', True)),
+        ),
     ),
     'joint_states': _joints(),
     'current_velocity': Port('geometry_msgs/msg/TwistStamped', _TWIST, MAP),

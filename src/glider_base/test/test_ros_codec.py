@@ -236,6 +236,23 @@ def test_what_is_not_measured_of_a_vehicle_does_not_hide_what_is(name, numbers, 
         codec.decode(codec.encode(7, (math.inf, *numbers[1:])))
 
 
+def test_a_battery_says_nan_where_it_measures_nothing_and_old_bags_are_read():
+    """As its message wants it; before, 0 and less than nothing were said."""
+    codec, numbers = TOPICS['battery'].codec, (15.0, 0.0, -1.0, -1.0, -1.0)
+    told = message_of('battery', *numbers)
+    unmeasured = ('temperature', 'charge', 'capacity', 'design_capacity', 'percentage')
+    assert all(math.isnan(getattr(told, name)) for name in unmeasured)
+    (many,) = codec.encode_many([0], np.array([numbers]))
+    assert many.tobytes() == codec.encode(0, numbers)
+    told.temperature = told.design_capacity = 0.0
+    told.charge = told.capacity = told.percentage = -1.0
+    raw = to_cdr(told)
+    rows = np.frombuffer(raw + bytes(-len(raw) % 4), np.uint8)[None]
+    _, values, own = codec.decode_many(rows)
+    assert own.all()
+    assert (tuple(values[0]), codec.decode(raw)[1]) == (numbers, numbers)
+
+
 def test_a_stamp_of_more_nanoseconds_than_a_second_has_is_none():
     message = deserialize_message(ODOM.encode(0, 13 * (0.0,)), Odometry)
     message.header.stamp.sec, message.header.stamp.nanosec = 2**31 - 1, 2**32 - 1

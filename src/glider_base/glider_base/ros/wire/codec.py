@@ -124,7 +124,8 @@ class Codec:
         Numbers of the tuple, if it has more than there are fields: those after them are 0.0, and
         not in the message.
     unmeasured : sequence of float, optional
-        What stands for each number that is NaN, if NaN says that it is not measured.
+        What stands for each number that is NaN, if NaN says that it is not measured. What is less
+        than nothing is sent as NaN.
     """
 
     def __init__(
@@ -144,6 +145,11 @@ class Codec:
         split = [_split(template, path) for path in self.fields]
         names = [name if i is None else f'{name}[{i}]' for name, i in split]
         self._lay_out(raw, [places[one] for one in (f'{stamp}.sec', f'{stamp}.nanosec', *names)])
+        #: as the constant rest was in older bags, which have 0 where it is NaN now
+        self._before = self._template.copy()
+        for place in places.values():
+            if place.code == 'f' and math.isnan(struct.unpack_from('<f', raw, place.start)[0]):
+                self._before[place.start : place.end] = 0
 
     def _lay_out(self, raw: bytes, places: list[Place]) -> None:
         """Note where stamp and numbers lie, and keep the constant rest, which is 0 there."""
@@ -176,6 +182,9 @@ class Codec:
         if self._has_integers:
             kinds = zip(self._codes, values, strict=False)
             values = [value if code in 'df' else int(value) for code, value in kinds]
+        if self._unmeasured:
+            pairs = zip(values, self._unmeasured, strict=False)
+            values = [math.nan if one == other < 0.0 else one for one, other in pairs]
         numbers = (*divmod(stamp_ns, _SECOND_NS), *values)
         packed = int.from_bytes(self._struct.pack(*self._in_memory(numbers)), 'little')
         return (packed | self._constant).to_bytes(self.size, 'little')
@@ -188,7 +197,12 @@ class Codec:
         stamps_ns = np.asarray(stamps_ns, np.int64)
         out = np.tile(self._template, (len(stamps_ns), 1))
         rows = out.view(self._rows)[:, 0]
-        columns = (*np.divmod(stamps_ns, _SECOND_NS), *np.asarray(values, np.float64).T)
+        values = np.asarray(values, np.float64)
+        if self._unmeasured:
+            other = np.array(self._unmeasured)
+            values = values[:, : len(other)]
+            values = np.where((values == other) & (other < 0.0), np.nan, values)
+        columns = (*np.divmod(stamps_ns, _SECOND_NS), *values.T)
         for name, column in zip(self._columns, columns, strict=False):
             rows[name] = column
         return out
@@ -216,10 +230,11 @@ class Codec:
         values : float64[n, m]
             NaN and infinities included.
         own : bool[n]
-            Whether all other bytes are those that `encode_many` writes: then, and only then,
-            stamp and numbers are the whole message. Else they may be anything.
+            Whether all other bytes are those that `encode_many` writes, or once wrote: then, and
+            only then, stamp and numbers are the whole message. Else they may be anything.
         """
-        own = np.all(rows & self._mask == self._template, axis=1)
+        rest = rows & self._mask
+        own = np.all(rest == self._template, axis=1) | np.all(rest == self._before, axis=1)
         table = np.ascontiguousarray(rows).view(self._rows)[:, 0]
         sec, nanosec = (table[name].astype(np.int64) for name in self._columns[:2])
         values = np.zeros((len(rows), self.width))
