@@ -102,7 +102,10 @@ PORTS = {
             'position_covariance[4]',
         ),
         BASE_LINK,
-        constants=(('status.service', 1), ('position_covariance_type', 2)),
+        constants=(
+            *(('status.service', 1), ('position_covariance_type', 2)),
+            ('altitude', math.nan),  # nobody measures it
+        ),
     ),
     'altitude': Port(
         'sensor_msgs/msg/Range',

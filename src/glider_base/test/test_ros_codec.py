@@ -129,14 +129,19 @@ def test_bytes_are_whole_words_and_are_read_without_their_padding_too(topic):
 def test_a_fix_carries_an_integer_beside_its_numbers(status, place):
     fix = message_of('fix', float(status), *place)
     assert (fix.status.status, fix.status.service, fix.position_covariance_type) == (status, 1, 2)
-    assert (fix.latitude, fix.longitude, fix.altitude) == (*place[:2], 0.0)
+    assert (fix.latitude, fix.longitude) == place[:2]
+    assert math.isnan(fix.altitude)
     expected = np.zeros(9)
     expected[[0, 4]] = place[2:]
     assert np.array_equal(fix.position_covariance, expected)
     codec = TOPICS['fix'].codec
     numbers = (float(status), *place)
     fix.header.frame_id = 'gps_antenna'
-    for raw in (codec.encode(0, numbers), serialize_message(fix)):
+    before = message_of('fix', *numbers)
+    before.altitude = 0.0
+    older = to_cdr(before) + bytes(3)
+    assert codec.decode_many(np.frombuffer(older, np.uint8)[None])[2].all()
+    for raw in (codec.encode(0, numbers), serialize_message(fix), older):
         decoded = codec.decode(raw)[1]
         assert bits(decoded) == bits(numbers)
         assert {type(number) for number in decoded} == {float}

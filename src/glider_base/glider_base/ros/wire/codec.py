@@ -148,7 +148,8 @@ class Codec:
         #: as the constant rest was in older bags, which have 0 where it is NaN now
         self._before = self._template.copy()
         for place in places.values():
-            if place.code == 'f' and math.isnan(struct.unpack_from('<f', raw, place.start)[0]):
+            (number,) = struct.unpack_from(f'<{place.code}', raw, place.start)
+            if place.code in 'df' and math.isnan(number):
                 self._before[place.start : place.end] = 0
 
     def _lay_out(self, raw: bytes, places: list[Place]) -> None:
