@@ -575,6 +575,15 @@ def test_two_of_one_name_are_told_apart_by_gid(listening, context):
     assert said == f'/glider/reference is published by /glider/guidance_node ({shown}) too'
 
 
+def test_one_that_publishes_alone_is_told_whose_the_topic_is(listening):
+    add, is_believed, item = listening
+    lone = add('my_guidance')
+    assert not is_believed(lone, 9.0, 0.5)
+    (info,) = lone.node.get_publishers_info_by_topic('reference')
+    said = peers.stranger(lone.node, item.topic, bytes(info.endpoint_gid))
+    assert said == f'/glider/reference is published by /glider/my_guidance and not by {GUIDANCE}'
+
+
 @pytest.mark.parametrize('is_first', [True, False])
 def test_silence_of_the_first_is_no_chance_for_a_stranger(listening, is_first):
     """Neither for one that came before it, nor for one that comes in its silence."""

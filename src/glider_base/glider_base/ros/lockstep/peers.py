@@ -42,9 +42,9 @@ def others(node: Node, topic: Topic) -> list[str]:
     return names
 
 
-def published_by(node: Node, topic: Topic, name: str) -> str:
+def published_by(node: Node, topic: Topic, name: str, how: str = 'too') -> str:
     """That somebody publishes a topic who should not, in words."""
-    return f'{node.resolve_topic_name(topic.name)} is published by {name or _NOBODY} too'
+    return f'{node.resolve_topic_name(topic.name)} is published by {name or _NOBODY} {how}'
 
 
 def rivals(node: Node, topics: Iterable[Topic]) -> list[str]:
@@ -59,7 +59,8 @@ def stranger(node: Node, topic: Topic, gid: bytes) -> str:
     name = names.get(gid) or _NOBODY
     if list(names.values()).count(name) != 1:
         name += f' ({shown(gid)})'
-    return published_by(node, topic, name)
+    how = 'too' if {*names} - {gid} else f'and not by {topic.publisher}'
+    return published_by(node, topic, name, how)
 
 
 def missing_readers(node: Node, topic: Topic, publisher, readers: list[str]) -> list[str]:
