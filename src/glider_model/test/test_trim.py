@@ -56,7 +56,7 @@ def test_straight_glide_of_seawing():
     assert trim.speed_mps == pytest.approx(0.4729, abs=2e-4)
     assert trim.alpha_deg == pytest.approx(1.457, abs=5e-3)
     assert trim.pitch_deg == pytest.approx(-32.973, abs=2e-2)
-    assert trim.turn_rate_radps == 0.0
+    assert trim.turn_rate_radps == trim.beta_deg == trim.roll_deg == 0.0
     assert trim.turn_radius_m is None
 
 

@@ -158,7 +158,7 @@ def _told(z: np.ndarray, solved: bool, glide: _Glide) -> Trim:
     speed = math.sqrt(u * u + v * v + w * w)
     north, east, down = rotate_to_ned(*quaternion_from_euler(phi, theta, 0.0), u, v, w)
     horizontal = math.hypot(north, east)
-    turning = abs(rate) > 1e-9
+    v, phi, rate = (0.0 if abs(number) < 1e-9 else number for number in (v, phi, rate))
     return Trim(
         speed_mps=speed,
         alpha_deg=math.degrees(math.atan2(w, u)),
@@ -168,8 +168,8 @@ def _told(z: np.ndarray, solved: bool, glide: _Glide) -> Trim:
         glide_deg=-math.degrees(math.atan2(down, horizontal)),
         horizontal_mps=horizontal,
         vertical_mps=down,
-        turn_rate_radps=rate if turning else 0.0,
-        turn_radius_m=horizontal / abs(rate) if turning else None,
+        turn_rate_radps=rate,
+        turn_radius_m=horizontal / abs(rate) if rate else None,
         pitch_mass_m=x_p,
         net_heaviness_kg=glide.net_heaviness,
         roll_mass_deg=math.degrees(glide.mu),
