@@ -123,12 +123,16 @@ def _check(kernel: Any, kinds: tuple, what: tuple[str, ...]) -> None:
         returned = call.return_type
         if isinstance(returned, types.Optional | types.NoneType):
             why = 'returns nothing where it ends without a return'
-        elif isinstance(returned, types.BaseTuple) and len(returned) != len(what):
+        elif not isinstance(returned, types.BaseTuple):
+            why = f'returns {returned} alone'
+        elif len(returned) != len(what):
             why = f'returns {len(returned)} values'
-        elif isinstance(returned, types.Number):
-            why = 'returns a number alone'
         else:
-            return
+            usable = types.Number, types.Boolean, types.BaseTuple, types.Array
+            odd = [one for one in zip(returned, what, strict=True) if not isinstance(one[0], usable)]
+            if not odd:
+                return
+            why = f'returns {odd[0][0]} as {odd[0][1]}'
     except NumbaError as error:
         why = f'cannot be compiled: {reason(error)}'
     code = kernel.py_func.__code__

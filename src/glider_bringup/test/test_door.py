@@ -527,6 +527,14 @@ def three_moments(seen):
     return 0.0, 0.0, 0.0
 
 
+def moments_in_words(seen):
+    return 0.0, 'none'
+
+
+def moment_in_a_word(seen):
+    return 'none'
+
+
 def moments_of_a_bank(seen):
     if seen.measured.phi > 0.1:
         return -1.0, 0.0
@@ -615,6 +623,12 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
         (level, {'engine': 'nodes'}, ['nodes', 'direct']),
         (level, {'controller': 'pid'}, ['pid']),
         (three_moments, {}, ['three_moments (', 'test_door.py', 'returns 3', 'roll moment']),
+        (
+            moments_in_words,
+            {},
+            ['moments_in_words (', 'test_door.py', 'str', 'as pitch moment', 'returns 2'],
+        ),
+        (moment_in_a_word, {}, ['moment_in_a_word (', 'str', 'alone', 'roll moment']),
         (
             moments_of_a_bank,
             {},
