@@ -452,6 +452,14 @@ def test_a_gust_that_was_too_strong_is_not_contradicted(tmp_path):
     assert fine == 'Nothing went wrong: the run is complete.'
 
 
+@pytest.mark.parametrize(
+    ('settle_s', 'ended'), [(0.0, 'at its first tick'), (600.0, 'the settling time of 10 min')]
+)
+def test_verdict_of_a_flight_too_short_for_a_score(tmp_path, settle_s, ended):
+    folder = fly(tmp_path, duration_s=0.1, settle_s=settle_s)
+    assert f'{ended}, so errors have no score.' in verdict(read_run(folder).card, settle_s)
+
+
 def test_verdict_of_a_flight_into_a_current_that_is_too_strong(tmp_path):
     fields = {'duration_s': 4000.0, 'current.speed_kn': 1.5, 'current.angle_deg': 90.0}
     folder = fly(tmp_path, settle_s=1000.0, **fields)

@@ -82,7 +82,8 @@ def _steady(card: dict[str, Any], settle_s: float) -> str:
         return f'In steady glide it stayed within {within} of the path (rms {rms}).'
     if track['max_all'] is not None:
         return f'After settling it was at most {small(track["max_all"])} off the path.'
-    return f'It ended within the settling time of {span(settle_s)}, so errors have no score.'
+    at = f'within the settling time of {span(settle_s)}' if settle_s else 'at its first tick'
+    return f'It ended {at}, so errors have no score.'
 
 
 def lost_since_s(traces: Traces) -> float | None:
