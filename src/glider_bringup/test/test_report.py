@@ -719,6 +719,14 @@ def test_comparison_of_a_long_and_a_short_run_marks_nothing(tmp_path, call, wide
     assert rows['cross-track, after settling, max'] == ['4.00 m', '3.00 m (-1.00)']
 
 
+def test_comparison_names_a_run_that_has_no_steady_score(tmp_path, call):
+    one = fly(tmp_path, name='one')
+    steady = {'cross_track_m__max_steady': 3.0, 'cross_track_m__rms_steady': 2.0}
+    two = altered(one, 'two', **steady)
+    assert call('compare', one, two, '--out', tmp_path / 'page.html')[0] == 0
+    assert 'in steady glide: two 3.00 m, one none.' in read_page(tmp_path / 'page.html')[0].text
+
+
 def test_comparison_of_equal_runs_says_so(tmp_path, call, wide):
     one = fly(tmp_path, name='one')
     again = altered(one, 'again', wall_time_s=9.0, engine='nodes')

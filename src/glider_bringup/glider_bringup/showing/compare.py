@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs side by side: their scores, what their scenarios differ in, and one page over the other."""
 
+import math
 from collections.abc import Iterator
 from itertools import compress
-from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -204,25 +204,22 @@ def _headline(runs: list[FlownRun]) -> str:
     """How far off the path each was, in a sentence."""
     if are_equal([run.card for run in runs]):
         return EQUAL
-    errors, whole = (
-        [
-            (run.label, run.card['cross_track_m'][name])
-            for run in runs
-            if run.card['cross_track_m'].get(name) is not None
-        ]
+    steady, whole = (
+        [(run.label, run.card['cross_track_m'].get(name)) for run in runs]
         for name in ('max_steady', 'max_run')
     )
-    if not errors:
+    if all(error is None for _, error in steady):
         return f'{len(runs)} runs; none has flown long enough for a score in steady glide.'
     return (
-        f'Largest cross-track error in steady glide: {_ranked(errors)}. In the whole run: '
+        f'Largest cross-track error in steady glide: {_ranked(steady)}. In the whole run: '
         f'{_ranked(whole)}.'
     )
 
 
-def _ranked(errors: list[tuple[str, float]]) -> str:
-    """Runs by their errors, the smallest first."""
-    return ', '.join(f'{name} {small(error)}' for name, error in sorted(errors, key=itemgetter(1)))
+def _ranked(errors: list[tuple[str, float | None]]) -> str:
+    """Runs by their errors, the smallest first, and last those that have none."""
+    ranked = sorted(errors, key=lambda one: math.inf if one[1] is None else one[1])
+    return ', '.join(f'{name} {"none" if m is None else small(m)}' for name, m in ranked)
 
 
 def _panels(runs: list[FlownRun]) -> dict[str, list[Panel]]:
