@@ -129,10 +129,10 @@ def _check(kernel: Any, kinds: tuple, what: tuple[str, ...]) -> None:
             why = f'returns {len(returned)} values'
         else:
             usable = types.Number, types.Boolean, types.BaseTuple, types.Array
-            odd = [one for one in zip(returned, what, strict=True) if not isinstance(one[0], usable)]
-            if not odd:
+            odd = (i for i, kind in enumerate(returned) if not isinstance(kind, usable))
+            if (i := next(odd, None)) is None:
                 return
-            why = f'returns {odd[0][0]} as {odd[0][1]}'
+            why = f'returns {returned[i]} as {what[i]}'
     except NumbaError as error:
         why = f'cannot be compiled: {reason(error)}'
     code = kernel.py_func.__code__
