@@ -167,6 +167,7 @@ def test_airframe_that_cannot_be_flown_is_flagged(vehicle, change, flag):
 
 def test_percentiles_are_figures_that_so_many_plants_do_not_exceed():
     assert spread(list(range(1, 101))) == {'p50': 50, 'p95': 95, 'worst': 100}
+    assert spread(list(range(1, 21)))['p95'] == 19
     assert spread([3.0, 1.0]) == {'p50': 1.0, 'p95': 3.0, 'worst': 3.0}
     assert spread([1.0, None]) == {'p50': 1.0, 'p95': None, 'worst': None}
 
@@ -243,7 +244,9 @@ def test_percentiles_are_of_flights_that_were_flown_to_their_end(capsys):
     counted = {'completed': 1, 'infeasible': 1, 'failed': 1, 'lost': 1, 'surfaced': 1}
     assert (row['flown_to_end'], row['outcomes']) == (2, counted)
     _print_study(told)
-    assert re.search(r'flown to their end +│ 2 ', capsys.readouterr().out)
+    printed = capsys.readouterr().out
+    assert re.search(r'flown to their end +│ 2 ', printed)
+    assert 'p95 of less than 20 flights is the worst' in printed
     lost = {(0, 'pid'): flights[3, 'pid']}
     (row,) = report('current_8deg', {}, 0, 0, lost, {0: frames[0]})['rows']
     assert row['max_all_m'] == {'p50': None, 'p95': None, 'worst': None}

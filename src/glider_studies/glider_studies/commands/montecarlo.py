@@ -29,6 +29,8 @@ from glider_mission.scenario import DEFAULT_SCENARIO
 from glider_studies.workers import workers_at_work
 
 app = typer.Typer()
+#: No figure but the worst is not exceeded by 95 % of fewer flights than these.
+FEW = 20
 
 
 @app.command(epilog='Example: ./glider montecarlo current_12deg --plants 200 --seed 1000')
@@ -63,7 +65,8 @@ def montecarlo(
     rest by 10 deg, ballast by 50 g; water is stratified. Control knows the file only. Where the
     vehicle reckons (navigation.method), its compass, pitch, depth and fixes are off too.
     With --faults each plant breaks too. Percentiles are of the flights that were flown to their
-    end; those that surfaced for good, were lost or failed are counted.
+    end; those that surfaced for good, were lost or failed are counted. Of less than 20 flights
+    p95 is the worst.
     """
     from glider_mission.choices import combination_of
     from glider_mission.run_folder import make_result_folder
@@ -124,6 +127,8 @@ def _print_study(study: dict) -> None:
         ['p50 / p95 / worst', *(row['controller'] for row in rows)],
         [[name, *texts] for name, texts in lines.items()],
     )
+    if min(row['flown_to_end'] for row in rows) < FEW:
+        output.print(f'p95 of less than {FEW} flights is the worst of them')
     for row in rows:
         worst = study['flown'][row['worst_plant']]['commands'][row['controller']]
         output.print(f'worst of {row["controller"]}:', worst, soft_wrap=True)
