@@ -11,6 +11,7 @@ import pytest
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_model.onboard.command_filter import FilterParams
+from glider_model.vehicle.file import vehicle_path
 from glider_studies.bounds import lmi
 from glider_studies.bounds.certificate import dissipates, gain, gain_verified, reached, region
 from glider_studies.bounds.flights import fly_jumps, fly_starts
@@ -25,6 +26,7 @@ from glider_studies.bounds.steering_loop import (
     sensitivity,
     tick,
 )
+from glider_studies.bounds.study import bounds
 
 B, K = 0.0276, -0.303
 
@@ -206,6 +208,16 @@ def test_a_certificate_is_refuted_where_it_does_not_hold(loop, current):
 
 def test_sensitivity_grows_with_the_gains(loop):
     assert 1.0 <= sensitivity(loop) < sensitivity(made(faster=5.0))
+
+
+def test_a_loop_that_is_unstable_has_no_slowest_time_and_no_sensitivity(tmp_path):
+    """A vehicle with a tenth of its steering in the dive."""
+    text, weak = vehicle_path('zhang2021').read_text(), tmp_path / 'weak.yaml'
+    text = text.replace('K_MR: {value: -20', 'K_MR: {value: -18')
+    weak.write_text(text.replace('K_MY: {value: 158.4', 'K_MY: {value: 104'))
+    dive = bounds(str(weak), 0, 0)['phases']['dive']
+    assert dive['loop']['slowest_s'] is dive['loop']['sensitivity'] is None
+    assert 'the loop is unstable somewhere in the box' in dive['failed']
 
 
 def test_a_vehicle_that_is_none_is_told_in_a_line():

@@ -199,8 +199,8 @@ def steering_loop(glide: Glide) -> SteeringLoop:
     )
     if not loop.bandwidth > 0.0:
         raise ConfigurationError(
-            f'{glide.scenario.vehicle}: the law does not steer it in a glide of '
-            f'{glide.speed:.2f} m/s'
+            f'{glide.scenario.vehicle}: the law does not steer it by its turn in a '
+            f'{"dive" if glide.descends else "climb"} of {glide.speed:.2f} m/s'
         )
     return loop
 

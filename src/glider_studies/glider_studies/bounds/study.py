@@ -89,7 +89,9 @@ def _failed(told: dict[str, Any]) -> list[str]:
     ]
     if not told['region']:
         failed.append('no certificate of a region')
-    if told['loop']['sensitivity'] >= SENSITIVITY_MAX:
+    if told['loop']['sensitivity'] is None:
+        failed.append('the loop is unstable somewhere in the box')
+    elif told['loop']['sensitivity'] >= SENSITIVITY_MAX:
         failed.append(f'max |S| is not below {SENSITIVITY_MAX}')
     starts, jumps = told['starts'], told['jumps']
     if starts and starts['home'] < starts['starts']:
@@ -106,6 +108,7 @@ def _of_loop(glide: Glide, loop: SteeringLoop) -> dict[str, float | None]:
     rate, exponent = _turn(glide, loop)
     zero = abs(loop.zero) if math.isfinite(loop.zero) else None
     slowest = max(np.linalg.eigvals(tick(loop, one).f).real.max() for one in box(loop))
+    stable = slowest < 0.0
     return {
         'speed_mps': glide.speed,
         'horizontal_mps': loop.speed,
@@ -120,8 +123,8 @@ def _of_loop(glide: Glide, loop: SteeringLoop) -> dict[str, float | None]:
         'heading_filter_s': 2.0 / loop.heading_filter.frequency,
         'roll_filter_s': loop.roll_filter and 2.0 / loop.roll_filter.frequency,
         'limit_deg': loop.limit * _DEG,
-        'slowest_s': -1.0 / slowest,
-        'sensitivity': max(sensitivity(loop, one) for one in box(loop)),
+        'slowest_s': -1.0 / slowest if stable else None,
+        'sensitivity': max(sensitivity(loop, one) for one in box(loop)) if stable else None,
         'leg_s': loop.leg_s,
         'zero_times_leg': zero and zero * loop.leg_s,
     }

@@ -86,7 +86,7 @@ def _text(form: str | Callable[[dict], str], phase: dict[str, Any]) -> str:
     try:
         return form(phase) if callable(form) else form.format_map(phase)
     except TypeError:  # of None
-        return 'none found' if '{gains' in form else '-'
+        return 'none found' if 'm_per_unit' in form else '-'
 
 
 def _ratio(phase: dict[str, Any]) -> str:
