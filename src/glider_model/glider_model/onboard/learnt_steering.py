@@ -219,7 +219,8 @@ def heading_gains(slope, k, params):
 
     For e = e2 / U, e' = psi* + k u, psi*' = b u with b the ``slope``, the u that minimises the
     integral of e^2 + tau^2 e'^2 + (u / rho)^2 is b u = -beta e - (alpha - beta k / b) psi*. With
-    psi_s = -e / T, b u = w psi_s' + a (psi_s - psi*) is that u exactly.
+    psi_s = -e / T, b u = w psi_s' + a (psi_s - psi*) is that u exactly, or nearly for proverse
+    yaw (docs/theory.md, 3).
     """
     rho, t2 = params.roll_per_s, params.approach_s**2
     b, kick = abs(slope), max(abs(k), SMALLEST_KICK)
