@@ -103,6 +103,24 @@ def test_a_plan_tells_time_and_energy_of_a_flight_that_surfaces_and_of_one_that_
     assert made.wh == pytest.approx(flown['energy']['wh'], rel=0.15)
 
 
+@pytest.mark.parametrize(
+    ('fields', 'note'),
+    [
+        (['water.bottom_m=150'], 'dives to 200 m touch a bottom at 150 m'),
+        (['water.bottom_m=15', 'profile.clearance_m=10'], 'no dives where the bottom is 15 m'),
+        (['orders=[{at_s: 900, depth_m: 50}]'], '1 order of the mission not counted'),
+        (['water.bottom_m=150', 'profile.clearance_m=10'], None),
+        (['water.bottom_m=250'], None),
+    ],
+)
+def test_a_plan_tells_of_a_bottom_that_its_dives_touch_and_what_it_does_not_count(
+    fields, note, capsys
+):
+    plan('survey', fields, as_json=True)
+    told = json.loads(capsys.readouterr().out)['notes']
+    assert len(told) == bool(note) and all(one.startswith(note) for one in told)
+
+
 def test_a_planned_flight_has_its_route_as_orders_and_flies_so_to_the_same_bits(tmp_path):
     scenario, first, again = load_scenario('eddies_hard', SHORT), Rows(), Rows()
     flight = fly(scenario, [first])

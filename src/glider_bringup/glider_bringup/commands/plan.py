@@ -7,13 +7,15 @@ import math
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 from glider_base.frames import to_geodetic
 from glider_bringup.console import Changes, Json, Named, changed_fields, counter, print_table
-from glider_bringup.showing.words import span
+from glider_bringup.showing.words import count, span
 from glider_mission.chart import place_told
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
+from glider_model.ocean.bottom import least_height
 
 app = typer.Typer()
 
@@ -71,8 +73,24 @@ def _told(made: Any, scenario: Scenario) -> dict[str, Any]:
         'wh': made.wh,
         'surfacings': math.ceil(time_s / made.pace.cycle_s) if math.isfinite(time_s) else None,
         'speed_mps': made.pace.speed,
+        'notes': _notes(made, scenario),
         'route_latlon': [list(one) for one in corners],
     }
+
+
+def _notes(made: Any, scenario: Scenario) -> list[str]:
+    """What a plan does not count, and what of its dives the bottom does not let be."""
+    from glider_mission.routing.plan import LOOK_M, places_along
+
+    orders, profile = len(scenario.orders), scenario.profile
+    notes = [f'{count(orders, "order")} of the mission not counted'] if orders else []
+    n, e = places_along(made.route.corners, LOOK_M).T.copy()
+    bottom_m, _ = least_height(n, e, np.zeros(len(n)), scenario.bottom())
+    if bottom_m <= profile.depth_m and not profile.clearance_m:
+        notes.append(f'dives to {profile.depth_m:,.0f} m touch a bottom at {bottom_m:,.0f} m')
+    if profile.clearance_m and bottom_m <= profile.clearance_m + profile.top_depth_m:
+        notes.append(f'no dives where the bottom is {bottom_m:,.0f} m deep, for its clearance')
+    return notes
 
 
 def _rows(told: dict[str, Any]) -> list[tuple[str, str]]:
@@ -97,6 +115,7 @@ def _rows(told: dict[str, Any]) -> list[tuple[str, str]]:
         ('surfacings', '-' if told['surfacings'] is None else str(told['surfacings'])),
         ('through the water', f'{told["speed_mps"]:.3f} m/s, surface intervals included'),
     ]
+    rows += [('note', note) for note in told['notes']]
     rows += [
         (f'corner {number}' if number else 'start', place_told(*place))
         for number, place in enumerate(told['route_latlon'])

@@ -20,7 +20,7 @@ from glider_model.vehicle.file import load_vehicle
 #: A route is straightened where that moves it by less than this (m).
 _STRAIGHT_M = 1000.0
 #: Whether a leg leads over land is looked at so often along it (m).
-_LOOK_M = 20.0
+LOOK_M = 20.0
 #: How deep it is there is looked at so often (m).
 _DIVE_M = 200.0
 #: Errors of a forecast that are tried.
@@ -199,7 +199,7 @@ def crossing(
 
     There is land by the bottom where that is charted, else by the nearest points, bool[n, m].
     """
-    norths, easts = places_along(route, _LOOK_M).T.copy()
+    norths, easts = places_along(route, LOOK_M).T.copy()
     step = chart.norths[1] - chart.norths[0]
     rows, columns = (
         np.rint((along - axis[0]) / step).astype(int).clip(0, len(axis) - 1)
