@@ -177,7 +177,11 @@ class _Builder:
             self._count_more(count - 1, line)
             return deepcopy(value)
         if isinstance(event, yaml.ScalarEvent):
-            value = _scalar(event)
+            try:
+                value = _scalar(event)
+            except _RefusedError as error:
+                said = [*filter(None, ['.'.join(where)]), error.what]
+                raise _RefusedError(line, ': '.join(said)) from None
         elif len(where) >= MAX_DEPTH:
             raise _RefusedError(line, f'nested more than {MAX_DEPTH} deep')
         elif isinstance(event, yaml.SequenceStartEvent):
