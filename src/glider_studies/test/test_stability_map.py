@@ -241,6 +241,18 @@ def test_nothing_of_a_map_is_cut_off(tmp_path, monkeypatch, speeds, angles, circ
     assert f'<!-- {held:.1%} of the feasible -->' in drawing
 
 
+@pytest.mark.parametrize(('vehicle', 'points'), [('zhang2021', 3), ('seawing', 0)])
+def test_points_of_the_paper_are_on_maps_of_its_vehicle_alone(
+    vehicle, points, tmp_path, monkeypatch
+):
+    dimensions = over([0.5, 1.0], [0.0, 30.0])
+    dimensions['who'] = {'kind': 'values', 'field': 'vehicle', 'values': [vehicle]}
+    file, image = write(tmp_path, [1.0], dimensions=dimensions), tmp_path / 'map.svg'
+    monkeypatch.setattr(sys, 'argv', ['glider', 'map', str(file), '--out', str(image)])
+    assert cli.main() == 0
+    assert image.read_text().count('<!-- the paper: ') == points
+
+
 def test_map_of_currents_that_nobody_can_hold(tmp_path, monkeypatch, capsys):
     file = write(tmp_path, [None], dimensions=over([1.5, 1.6], [80.0, 90.0]))
     arguments = ['glider', 'map', str(file), '--out', str(tmp_path / 'map.svg')]

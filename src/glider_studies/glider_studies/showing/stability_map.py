@@ -256,6 +256,11 @@ def draw_map(stability: StabilityMap, file: Path) -> None:
     save_figure(figure, file, dpi=150)
 
 
+def _paper_points(stability: StabilityMap) -> tuple[tuple[float, str, str], ...]:
+    """`PAPER_POINTS` on a map of the vehicle that they are of."""
+    return PAPER_POINTS if 'zhang2021' in stability.vehicle else ()
+
+
 def _title(name: str, share: dict[str, Any]) -> str:
     """Name of a panel, and how much of it is stable."""
     held = share['stable_of_feasible']
@@ -290,7 +295,7 @@ def _draw_panel(axis, stability: StabilityMap, classes: np.ndarray, glide: float
         axis.plot(side * off, glide / np.sin(off), color='black', linewidth=2.0)
     behind = np.linspace(0.5 * np.pi, 1.5 * np.pi, _ARC)
     axis.plot(behind, np.full(_ARC, glide), '--', color='black', linewidth=2.0)
-    for degrees, _, marker in PAPER_POINTS:
+    for degrees, _, marker in _paper_points(stability):
         look = {'color': 'white', 'markeredgecolor': 'black', 'markersize': 6.5}
         axis.plot(math.radians(degrees), PAPER_KN, marker, **look)
     arrow = {'arrowstyle': '-|>', 'linewidth': 2.0, 'color': 'black'}
@@ -326,7 +331,7 @@ def _legend(stability: StabilityMap) -> list:
         look = {'color': 'black', 'linewidth': 2.0, 'linestyle': style}
         handles.append(Line2D([], [], label=f'limit: {what}', **look))
     white = {'color': 'none', 'markerfacecolor': 'white', 'markeredgecolor': 'black'}
-    for degrees, what, marker in PAPER_POINTS:
+    for degrees, what, marker in _paper_points(stability):
         text = f'the paper: {PAPER_KN:.1f} kn at {degrees:.0f} deg, {what}'
         handles.append(Line2D([], [], marker=marker, label=text, **white))
     return handles
