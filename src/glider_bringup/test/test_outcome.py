@@ -127,6 +127,25 @@ def test_a_mission_in_water_that_is_too_shallow_to_dive_is_unfinished(bottom_m, 
     assert told['reason'].startswith('no dive flown' if status == 'unfinished' else '')
 
 
+@pytest.mark.parametrize(
+    ('fields', 'status'),
+    [
+        ({'sensors.depth_offset_m': 1.5}, 'unfinished'),
+        ({}, 'completed'),
+        ({'profile.wait_s': 18000.0}, 'completed'),
+        ({'orders': [{'at_s': 3600.0, 'wait_s': 18000.0}]}, 'completed'),
+        ({'orders': [{'at_s': 3600.0, 'hold': True}]}, 'completed'),
+    ],
+)
+def test_a_mission_that_ceased_to_dive_is_unfinished(fields, status):
+    """It has no number of dives and is to go on; its depth shows 1.5 m, so it waits to come up."""
+    yo = {'profile.depth_m': 100.0, 'profile.surface_every_dives': 1, 'dives': 0}
+    changes = {**yo, 'duration_s': 21600.0, **fields}
+    _, told = fly_scored(load_scenario('current_8deg', changes), [])
+    assert (told['status'], told['dives'] > 0) == (status, True)
+    assert told['reason'].startswith('no dive flown' if status == 'unfinished' else '')
+
+
 @pytest.mark.parametrize('dives', [0, 4])
 def test_a_mission_that_drifts_before_the_end_of_its_path_is_unfinished(dives):
     """Its depth shows 1.5 m at the surface, so it waits to come up, long before its time."""

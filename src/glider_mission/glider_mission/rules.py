@@ -28,8 +28,13 @@ class Rules(NamedTuple):
     origin: Origin | None = None  #: of its chart, if people read its places in degrees
     shallowest_m: float = math.inf  #: depth of dives by which they are counted, if less (m)
     dives: int = 0  #: that it is to fly in its time; 0: so many as there are
-    dives_at_all: bool = False  #: there is time for a dive, and it is to fly some
+    dive_s: float = math.inf  #: time that is ample for a stay and a dive, if it is to fly some (s)
     top_m: float = 10.0  #: depth of the upper turn between dives (m)
+
+    @property
+    def dives_at_all(self) -> bool:
+        """Whether there is time for a dive, and it is to fly some."""
+        return self.dive_s < self.duration_s
 
     @property
     def margin_s(self) -> float:

@@ -267,10 +267,7 @@ class Scenario(Settings):
         paths = [self.path, *(one.path for one in self.orders if one.path)]
         if self._holds or all(path.at_end == 'continue' for path in paths):
             return 0.0
-        if not self.profile.surface_every_dives:
-            return SURFACE_S
-        longest_s = max([self.profile.wait_s, *(one.wait_s or 0.0 for one in self.orders)])
-        return longest_s + self.profile.prepare_s + SURFACE_S
+        return SURFACE_S + (self._stay_s() if self.profile.surface_every_dives else 0.0)
 
     def current_settings(self) -> CurrentSettings:
         """What the current node is told: directions absolute, the scenario's seed."""
@@ -390,16 +387,19 @@ class Scenario(Settings):
             self.duration_s,
             self.origin.params() if self.is_charted else None,
             self.shallowest_m,
-            min(self.dives, fitting := self._fitting_dives()),
-            fitting > 0,
+            min(self.dives, int(self.duration_s / (dive_s := self._dive_s()))),
+            dive_s,
             self.profile.top_depth_m,
         )
 
-    def _fitting_dives(self) -> int:
-        """Dives for which there is ample time; 0 where it may wait for all of it."""
-        stay_s = self.profile.wait_s + self.profile.prepare_s
-        fit = self.duration_s / (AMPLE * 2.0 * self._glide_s() + stay_s)
-        return 0 if self._holds else int(fit)
+    def _dive_s(self) -> float:
+        """Time (s) that is ample for a stay and a dive; infinite where it may wait for good."""
+        return math.inf if self._holds else AMPLE * 2.0 * self._glide_s() + self._stay_s()
+
+    def _stay_s(self) -> float:
+        """Time (s) of the longest stay at the surface."""
+        waits_s = (one.wait_s or 0.0 for one in self.orders)
+        return max([self.profile.wait_s, *waits_s]) + self.profile.prepare_s
 
     def _glide_s(self) -> float:
         """Time of a glide to the depth of the lower turn (s); infinite along a path in 3-D."""

@@ -241,6 +241,8 @@ class Scorer:
             missing = f'dives flown, of those that there was time for: {dives} of {rules.dives}'
         elif is_over and rules.dives_at_all and not _dives_at_all(depth, rules):
             missing = 'no dive flown, for which there was time'
+        elif is_over and rules.dives_at_all and not self._end and _idles(depth, rules):
+            missing = f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
         elif not is_over and rules.dives_at_all and not 0 < rules.dives <= dives:
             # who has arrived, or is to go on, may be done before
             if arrival['arrival'] and not arrival['arrival']['arrived']:
@@ -407,6 +409,11 @@ def _dives_at_all(depth: np.ndarray, rules: Rules) -> bool:
     """Whether it went down and came back, however little: over a shelf a bottom turns dives."""
     deepest_m = float(np.max(depth, initial=0.0))
     return deepest_m > DIVED_M and _count_dives(depth, *dive_depths(deepest_m, rules.top_m)) > 0
+
+
+def _idles(depth: np.ndarray, rules: Rules) -> bool:
+    """Whether it has been at the surface at last for as long as a stay and a dive take."""
+    return bool(np.max(depth[-math.ceil(rules.dive_s / TICK_S) :], initial=0.0) <= DIVED_M)
 
 
 def _along_m(row: np.ndarray, target: np.ndarray, course_rad: float) -> float:
