@@ -146,6 +146,17 @@ def test_a_mission_that_ceased_to_dive_is_unfinished(fields, status):
     assert told['reason'].startswith('no dive flown' if status == 'unfinished' else '')
 
 
+def test_way_that_is_left_counts_that_the_vehicle_was_carried_back():
+    path = {'kind': 'waypoints', 'waypoints': [[0, 0], [20000, 0]], 'at_end': 'stop'}
+    back = {'current.angle_deg': 180.0, 'orders': [{'at_s': 3600.0, 'hold': True}]}
+    changes = {**back, 'path': path, 'dives': 0, 'duration_s': 14400.0, 'profile.depth_m': 100.0}
+    _, told = fly_scored(load_scenario('current_8deg', changes), [])
+    assert told['distance_along_path_m'] < -1000.0
+    left_m = 20000.0 - told['final_state']['position_ned_m'][0]
+    assert told['arrival']['left_m'] == pytest.approx(left_m, abs=1.0)
+    assert told['arrival']['eta_s'] is None
+
+
 @pytest.mark.parametrize('dives', [0, 4])
 def test_a_mission_that_drifts_before_the_end_of_its_path_is_unfinished(dives):
     """Its depth shows 1.5 m at the surface, so it waits to come up, long before its time."""

@@ -265,7 +265,7 @@ def test_every_yo_to_the_target_is_a_dive_however_shallow(target_m):
 def test_end_of_the_path_is_told_from_where_the_vehicle_came_up():
     """By the first tick of the stage; what it drifts after that does not count."""
     t = ticks(100.0)
-    log = make_log(t, north=np.where(t < 60.0, 3.0 + 0.0 * t, t), east=4.0, depth=0.5)
+    log = make_log(t, north=np.where(t < 60.0, 3.0, -100.0), east=4.0, depth=0.5)
     path = WaypointPath(kind='waypoints', waypoints=[(-400.0, 0.0), (0.0, 0.0)]).params()
     log[:, COLUMNS['reference'].start + 1] = np.linspace(-400.0, -100.0, len(log))  # to the north
     told = score(log, path=path, ends=True, duration_s=70.0)
@@ -314,7 +314,7 @@ def test_end_of_the_path_is_told_from_where_the_vehicle_came_up():
 def test_way_that_is_left_of_a_path_that_comes_by_again(path, where, left_m):
     t = ticks(100.0)
     north, east = where(t / t[-1])
-    log = make_log(t, target_n=north, target_e=east)
+    log = make_log(t, north=north, east=east, target_n=north, target_e=east)
     told = score(log, path=path.params(), ends=True)['arrival']
     length_m = path.params().ways[-1]
     assert told['left_m'] == pytest.approx(left_m, abs=0.1)

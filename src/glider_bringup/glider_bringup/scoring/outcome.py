@@ -100,6 +100,7 @@ def _beyond(depth: np.ndarray, limit_m: float, what: str) -> str:
 def arrival_of(
     place: tuple[float, float],
     targets: np.ndarray,
+    behind_m: float,
     tick: int,
     since: int,
     has_arrived: bool,
@@ -113,6 +114,8 @@ def arrival_of(
         True one at the arrival, else at the end of the run, north and east (m).
     targets : float64[ticks, 2]
         The points of the path that guidance had come to, north and east (m), since it follows it.
+    behind_m : float
+        How far it is behind the last of them, along the path: it may have been carried back.
     tick : int
         Of the arrival, else ticks of the run.
     since : int
@@ -133,10 +136,10 @@ def arrival_of(
     left_m, eta_s = 0.0, t_s
     if not has_arrived:
         began_m, come_m = _come_from_to(targets, rules.path)
-        ways, made_m = rules.path.ways, come_m - began_m
-        left_m = float(ways[-1] - np.interp(come_m, rules.path.knots, ways))
+        ways, made_m = rules.path.ways, come_m - behind_m - began_m
+        left_m = float(max(0.0, ways[-1] - np.interp(come_m, rules.path.knots, ways) + behind_m))
         pace_s = (t_s - seconds(since)) / made_m if made_m >= LEAST_SHARE * length else None
-        eta_s = None if pace_s is None else t_s + (length - come_m) * pace_s
+        eta_s = None if pace_s is None else t_s + (length - come_m + behind_m) * pace_s
     return {
         'arrived': has_arrived,
         't_s': t_s if has_arrived else None,

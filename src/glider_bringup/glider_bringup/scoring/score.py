@@ -310,10 +310,13 @@ class Scorer:
         for path in (order.path for order in self._followed if order.path):
             rules = rules._replace(path=path.params(), ends=path.at_end == 'stop')
         tick, row = self._end or (self.ticks, self._last)
-        odometry = _odometry_of(row)
+        odometry, targets = _odometry_of(row), self._targets()[self._path_since :]
+        course = self._reroutes[-1][-1] if self._reroutes else None
+        course = self._course_rad if course is None else course
         arrival = arrival_of(
             place=(odometry.p_n, odometry.p_e),
-            targets=self._targets()[self._path_since :],
+            targets=targets,
+            behind_m=_along_m(row, targets[::-1], course + math.pi),
             tick=tick,
             since=self._path_since,
             has_arrived=self._end is not None,
