@@ -3,6 +3,7 @@
 """Scenarios: one validated YAML file that says everything about a mission."""
 
 import math
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from copy import deepcopy
@@ -484,6 +485,11 @@ class ScenarioSource(NamedTuple):
     values: dict[str, Any]
 
 
+def name_after(path: Path) -> str:
+    """Name of what a file holds, if it says none: that of the file, in letters that names have."""
+    return re.sub(r'^[.-]|[^\w.-]', '_', path.stem, flags=re.ASCII)[:100]
+
+
 def read_scenario(name: str = DEFAULT_SCENARIO) -> ScenarioSource:
     """Read the file of a scenario given by name or by path; `make_scenario` validates it.
 
@@ -491,7 +497,7 @@ def read_scenario(name: str = DEFAULT_SCENARIO) -> ScenarioSource:
     """
     path = scenario_path(name)
     values = from_folder(read_yaml(path), path.parent)
-    values.setdefault('name', path.stem)
+    values.setdefault('name', name_after(path))
     return ScenarioSource(path, values)
 
 

@@ -111,8 +111,17 @@ def test_numbers_survive_being_written_to_the_last_bit(depth_m, net, angle_deg, 
     assert again == scenario
 
 
-def test_name_of_a_file_is_that_of_its_scenario_unless_it_says_otherwise(tmp_path):
-    assert load_scenario(write(tmp_path, {'dives': 2}, 'my_mission.yaml')).name == 'my_mission'
+@pytest.mark.parametrize(
+    ('file', 'name'),
+    [
+        ('my_mission.yaml', 'my_mission'),
+        ('Süd, Teil 2.yaml', 'S_d__Teil_2'),
+        ('-x.yaml', '_x'),
+        (120 * 'x' + '.yaml', 100 * 'x'),
+    ],
+)
+def test_name_of_a_file_is_that_of_its_scenario_unless_it_says_otherwise(file, name, tmp_path):
+    assert load_scenario(write(tmp_path, {'dives': 2}, file)).name == name
 
 
 UNKNOWN = [

@@ -36,6 +36,7 @@ from glider_mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
     make_scenario,
+    name_after,
     read_scenario,
     scenario_names,
 )
@@ -377,7 +378,7 @@ def sweep_names() -> list[str]:
 
 
 def _validate(path: Path, values: dict[str, Any] | None = None) -> Sweep:
-    told = {'name': path.stem} | (read_yaml(path) if values is None else values)
+    told = {'name': name_after(path)} | (read_yaml(path) if values is None else values)
     lines = {'line_of': partial(yaml_line, path)} if values is None else {}
     return validate(Sweep, told, str(path), **lines)
 
