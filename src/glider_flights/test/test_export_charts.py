@@ -225,6 +225,20 @@ def test_what_no_slocum_flies_is_not_written(flown, tmp_path, changes, named):
     assert not (tmp_path / 'mafiles').exists()
 
 
+def test_netcdf_of_a_run_with_a_date_has_times_by_cf(export):
+    file = export('netcdf')
+    with xarray.open_dataset(file, decode_times=False) as read:
+        about = dict(read.time.attrs)
+        units = about.pop('units')
+    assert units == 'seconds since 2026-03-01T06:00:00Z'
+    assert about == {
+        'long_name': 'simulated time of the tick',
+        **{'standard_name': 'time', 'axis': 'T', 'calendar': 'standard'},
+    }
+    with xarray.open_dataset(file) as read:
+        assert read.time.values[6000] == np.datetime64('2026-03-01T06:10')
+
+
 def test_a_run_of_no_date_is_refused_unless_it_is_told(tmp_path):
     run = glider.fly('slocum_shelf', duration=30.0, out=tmp_path / 'run', bag=True)
 
@@ -237,7 +251,8 @@ def test_a_run_of_no_date_is_refused_unless_it_is_told(tmp_path):
     pytest.importorskip('h5netcdf')
     assert 'origin.time' in told('--to', 'og1')
     assert 'allowed: as 2026-03-01' in told('--to', 'og1', '--start', 'noon')
-    assert 'not of mat' in told('--to', 'mat', '--start', '2026-03-01')
+    for kind in ('csv', 'mat', 'slocum'):
+        assert f'not of {kind}' in told('--to', kind, '--start', '2026-03-01')
     full = told('--to', 'og1', '--start', '2026-03-01', '--out', '/dev/full')
     assert full == '/dev/full: cannot be written: No space left on device'
     words = ['export', str(run.folder), '--to', 'og1', '--start', '2026-03-01T06:00']

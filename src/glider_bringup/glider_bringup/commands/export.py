@@ -50,7 +50,7 @@ def export(
         typer.Option(
             metavar='TIME',
             help='When it started (UTC, as 2026-03-01T06:00), of a run without origin.time; for '
-            'og1, geojson, kml and gpx.',
+            'netcdf, og1, geojson, kml and gpx.',
         ),
     ] = None,
     as_json: Json = False,
@@ -60,6 +60,11 @@ def export(
     netcdf, csv and mat have every number of its bag, with names and units: world NED, body FRD, SI
     and radians, whatever the topics carry; docs/python.md has the names.
     """
+    if start is not None and to in ('csv', 'mat', 'slocum'):
+        raise ConfigurationError(
+            f'--start {start}: not of {to}, which has no dates (allowed: netcdf, og1, geojson, '
+            'kml, gpx)'
+        )
     file = out or beside(run, f'run{SUFFIXES[to]}')
     if to == 'og1':
         from glider_bringup.door.og1 import write_og1
@@ -86,13 +91,11 @@ def export(
 def _write_all(run: Path, kind: str, file: Path, start: str | None) -> None:
     from glider_bringup.door.export import WRITERS, dataset_of
     from glider_bringup.door.run import open_run
+    from glider_bringup.door.tracks import start_of
 
-    if start is not None:
-        raise ConfigurationError(
-            f'--start {start}: not of {kind}, which has seconds since the start (allowed: og1, '
-            'geojson, kml, gpx)'
-        )
     with messages.status('reading the bag'):
-        dataset = dataset_of(open_run(run))
+        flown = open_run(run)
+        began_s = start_of(flown.scenario, start) if kind == 'netcdf' else None
+        dataset = dataset_of(flown, began_s)
     with counter('writing', dataset.sizes['time']) as update:
         WRITERS[kind](dataset, file, update)

@@ -4,6 +4,7 @@
 
 import json
 from collections.abc import Callable
+from datetime import datetime, timezone
 from pathlib import Path
 
 import xarray
@@ -25,9 +26,19 @@ MAT_BYTES = 2**31
 Progress = Callable[[int], None]
 
 
-def dataset_of(run: Run) -> xarray.Dataset:
-    """Dataset of a run, with its score, scenario and vehicle as they stand in a run folder."""
-    return run.to_xarray().assign_attrs(
+def dataset_of(run: Run, began_s: float | None = None) -> xarray.Dataset:
+    """Dataset of a run, with its score, scenario and vehicle as they stand in a run folder.
+
+    Its time is one by CF where it is known when the run started (s since 1970).
+    """
+    dataset = run.to_xarray()
+    if began_s is not None:
+        began = datetime.fromtimestamp(began_s, timezone.utc).replace(tzinfo=None)
+        dataset.time.attrs |= {
+            'units': f'seconds since {began.isoformat()}Z',
+            **{'calendar': 'standard', 'standard_name': 'time', 'axis': 'T'},
+        }
+    return dataset.assign_attrs(
         score_json=json.dumps(run.score),
         scenario_yaml=run.scenario.to_yaml(vehicle=VEHICLE_FILE),
         vehicle_yaml=vehicle_file(run.scenario.vehicle).decode(),
