@@ -71,11 +71,12 @@ def test_it_tells_what_is_in_a_file(sea_file, capsys):
     assert (found['water'], found['bottom'], found['mission']) == (None, None, None)
 
 
-def test_a_sea_across_the_date_line_is_no_sea_round_the_earth(sea_file, tmp_path, capsys):
+@pytest.mark.parametrize('by', [['longitude'], []])
+def test_a_sea_across_the_date_line_is_no_sea_round_the_earth(by, sea_file, tmp_path, capsys):
     path = tmp_path / 'across.nc'
     with xarray.open_dataset(sea_file, decode_times=False) as sea:
         east = (sea['longitude'] + 58.05 + 180.0) % 360.0 - 180.0
-        sea.assign_coords(longitude=east).sortby('longitude').to_netcdf(path, engine='scipy')
+        sea.assign_coords(longitude=east).sortby(by).to_netcdf(path, engine='scipy')
     found = told(capsys, path)
     ends = found['currents']['longitude_deg']
     assert ends == {'first': pytest.approx(179.05), 'last': pytest.approx(181.05), 'count': 21}

@@ -333,16 +333,18 @@ def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
             values[axis] *= scale * (-1.0 if is_up else 1.0)
             if len(one) and values[axis].max() < 0.0:
                 raise ValueError(f'{dimension}: positive up, and no level below the surface')
-        _refuse_no_axis(dimension, values[axis])
+        if not _is_axis(values[axis]) and not (
+            axis == 'longitude' and _is_axis(np.unwrap(values[axis], period=360.0))
+        ):
+            raise ValueError(f'{dimension}: neither increases nor decreases all along')
     return _Layout(dataset, names, standards, scales, axes, values)
 
 
-def _refuse_no_axis(dimension: str, values: np.ndarray) -> None:
-    """Refuse numbers that are not in order, or none."""
+def _is_axis(values: np.ndarray) -> bool:
+    """Whether there are numbers, and they are in order."""
     steps = np.diff(values)
-    is_axis = np.isfinite(values).all() and (np.all(steps > 0) or np.all(steps < 0))
-    if not len(values) or not is_axis:
-        raise ValueError(f'{dimension}: neither increases nor decreases all along')
+    in_order = np.isfinite(values).all() and (np.all(steps > 0) or np.all(steps < 0))
+    return len(values) > 0 and in_order
 
 
 def _chosen(values: np.ndarray, low: float, high: float) -> np.ndarray:
