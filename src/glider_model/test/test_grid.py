@@ -383,15 +383,16 @@ def chart(path, name, seed=0, sign=1.0, **attributes):
 
 
 @pytest.mark.parametrize(
-    ('name', 'sign', 'standard'),
+    ('name', 'sign', 'told'),
     [
-        ('elevation', -1.0, 'height_above_mean_sea_level'),
-        ('deptho', 1.0, 'sea_floor_depth_below_geoid'),
-        ('z', -1.0, None),
+        ('elevation', -1.0, {'standard_name': 'height_above_mean_sea_level'}),
+        ('deptho', 1.0, {'standard_name': 'sea_floor_depth_below_geoid'}),
+        ('z', -1.0, {}),
+        ('z', 1.0, {'positive': 'down'}),
+        ('bathymetry', -1.0, {'positive': 'up'}),
     ],
 )
-def test_the_bottom_is_what_xarray_makes_of_a_chart(name, sign, standard, tmp_path):
-    told = {'standard_name': standard} if standard else {}
+def test_the_bottom_is_what_xarray_makes_of_a_chart(name, sign, told, tmp_path):
     data = chart(tmp_path / 'chart.nc', name, sign=sign, units='m', **told)
     flown = mission((35.5, 121.5), (36.5, 122.5))
     settings = BathymetrySettings(file=str(tmp_path / 'chart.nc')).resolved(flown)

@@ -319,10 +319,11 @@ def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
         both = ' and '.join(str(dataset[name].dims) for name in names)
         raise ValueError(f'{" and ".join(names)}: on different axes, {both}, as a '
                          'staggered grid has them (allowed: both at the same places)')  # fmt: skip
-    scales = [
-        (-1.0 if standard in _HEIGHTS else 1.0) * _scale(name, dataset[name].attrs, one.units)
-        for one, (name, standard) in zip(wanted, found, strict=True)
-    ]
+    scales = []
+    for one, (name, standard) in zip(wanted, found, strict=True):
+        told = dataset[name].attrs
+        points = told.get('positive', 'up' if standard in _HEIGHTS else 'down')
+        scales.append(_scale(name, told, one.units) * (-1.0 if points == 'up' else 1.0))
     values = {axis: np.zeros(1) for axis in _AXES[:2]}
     for axis, dimension in axes.items():
         one = dataset.variables[dimension]
