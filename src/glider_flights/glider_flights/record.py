@@ -136,6 +136,11 @@ class Flight(NamedTuple):
     #: Over what the vehicle's own current is a mean; a base station counts the drift, too.
     on_board_over: str = 'under water'
 
+    @property
+    def told(self) -> str:
+        """Its files, as an error names them."""
+        return ' to '.join(dict.fromkeys((self.files[0], self.files[-1])))
+
 
 Item = TypeVar('Item')
 SamplesOrInstruments = TypeVar('SamplesOrInstruments', Samples, Instruments)

@@ -72,7 +72,8 @@ def _read_dive(path: Path) -> LogFile:
                 f'{path}: {" or ".join(wanted[key])} has {len(found[key])} values '
                 f'(allowed: as many as time, {count})'
             )
-    refuse_missing(path, found, {key: wanted[key] for key in NEEDED}, 'of a dive of a Seaglider')
+    why = 'of a dive of a Seaglider; a flight in OG1 has TIME, and PITCH or LATITUDE_GPS'
+    refuse_missing(path, found, {key: wanted[key] for key in NEEDED}, why)
     quality = found.get('fix_quality', ())
     if len(quality) == len(found['fix_time']):
         found['fix_time'] = np.where(np.isin(quality.astype('U8'), BAD), np.nan, found['fix_time'])

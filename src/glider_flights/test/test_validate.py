@@ -348,7 +348,8 @@ def test_what_cannot_be_flown_is_told(file, dive, tmp_path):
     assert 'no constant mas (allowed: none' in told(file, *slocum, '--fit', 'mas')
     assert 'its file has no volume' in told(file, '--vehicle', 'zhang2021')
     assert 'no such folder or file' in told(str(tmp_path / 'lost'), *slocum)
-    assert 'mass_x_m was not recorded' in told(file, *slocum, '--impose', 'actuators')
+    lacks = 'p1230001.nc: mass_x_m was not recorded (needed for --impose actuators'
+    assert lacks in told(file, *slocum, '--impose', 'actuators')
     wrong = tmp_path / 'wrong.npy'
     np.save(wrong, np.zeros(5))
     assert 'has shape (5,)' in told(file, *slocum, '--adcp', str(wrong))

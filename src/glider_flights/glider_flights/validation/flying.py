@@ -54,8 +54,8 @@ def tracks(flight: Flight) -> list[Track]:
             found.append(_track(own, flight.origin_deg))
     if not any(track.counts.any() for track in found):
         raise ConfigurationError(
-            f'{flight.files[0]} to {flight.files[-1]}: no stretch under water of {SHORTEST_S:g} s '
-            f'and {SHALLOWEST_M:g} m with depth and pitch (needed: one)'
+            f'{flight.told}: no stretch under water of {SHORTEST_S:g} s and {SHALLOWEST_M:g} m '
+            'with depth and pitch (needed: one)'
         )
     return found
 
@@ -174,12 +174,13 @@ def model_of(name: str, flight: Flight) -> Model:
     return Model(vehicle)
 
 
-def check(found: list[Track], impose: Imposed) -> None:
-    """Refuse a flight that lacks what is to be imposed; raises ConfigurationError."""
+def check(flight: Flight, found: list[Track], impose: Imposed) -> None:
+    """Refuse a flight whose stretches lack what is to be imposed; raises ConfigurationError."""
     for name in NEEDED[impose]:
         if all(np.isnan(getattr(track.instruments, name)).all() for track in found):
             raise ConfigurationError(
-                f'--impose {impose}: {name} was not recorded (needed: {", ".join(NEEDED[impose])})'
+                f'{flight.told}: {name} was not recorded (needed for --impose {impose}: '
+                f'{", ".join(NEEDED[impose])})'
             )
 
 

@@ -62,7 +62,7 @@ def validate(
     other, or to another flight. With ``none`` nothing is fitted. Raises ConfigurationError.
     """
     found = tracks(flight)
-    check(found, impose)
+    check(flight, found, impose)
     foreign = adcp is not None and all(np.isnan(measured(one, adcp)).all() for one in found)
     adcp = None if foreign else adcp
     names = chosen('none' if fit_on == 'none' else fit, flight.kind, impose, adcp is not None)
@@ -70,7 +70,7 @@ def validate(
     learnt_on, begun, tried = found, start, found
     if isinstance(fit_on, Flight):
         learnt_on, begun = tracks(fit_on), model_of(vehicle, fit_on)
-        check(learnt_on, impose)
+        check(fit_on, learnt_on, impose)
     elif fit_on in ('first', 'second'):
         learnt_on, tried = _halves(found, flight)[:: 1 if fit_on == 'first' else -1]
     told = learnt_on if adcp is not None and set(BY_ADCP) & set(names) else []
@@ -130,8 +130,8 @@ def _halves(found: list[Track], flight: Flight) -> tuple[list[Track], list[Track
     for part in parts:
         if len(part) < FEWEST:
             raise ConfigurationError(
-                f'{flight.files[0]} to {flight.files[-1]}: too few dives, stretches under water: '
-                f'{len(found)} (needed: {FEWEST} in each half)'
+                f'{flight.told}: too few dives, stretches under water: {len(found)} (needed: '
+                f'{FEWEST} in each half)'
             )
     return parts
 
