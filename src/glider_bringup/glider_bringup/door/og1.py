@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run as the OceanGliders community exchanges flights: NetCDF 4 in the format OG1.0.
 
-What the vehicle measured and believed, as a glider brings it home; nothing of the truth. The
+What the vehicle measured and estimated, as a glider brings it home; nothing of the truth. The
 simulated compass knows no declination: magnetic north is true north. Format:
 https://oceangliderscommunity.github.io/OG-format-user-manual/OG_Format.html
 """
@@ -45,7 +45,7 @@ _NORTH = {'units': 'degrees_north', 'standard_name': 'latitude'}
 _EAST = {'units': 'degrees_east', 'standard_name': 'longitude'}
 _DOWN = {'units': 'm', 'positive': 'down', 'axis': 'Z'}
 _WAY = {'coordinates': 'TIME LATITUDE LONGITUDE DEPTH'}
-_CURRENT = 'depth-averaged current of the dive, as the vehicle believed it'
+_CURRENT = 'depth-averaged current of the dive, as the vehicle estimated it'
 
 
 def _of(concept: str, long_name: str, **more: Any) -> dict[str, Any]:
@@ -62,8 +62,8 @@ def _along(concept: str, long_name: str, units: str, standard_name: str = '') ->
 #: Variables over the measurements, and what they are.
 VARIABLES = {
     'TIME': _of('TIME', 'time of measurement', standard_name='time', axis='T', **_SECONDS),
-    'LATITUDE': _of('LAT', 'latitude that the vehicle believed to be at', **_NORTH),
-    'LONGITUDE': _of('LON', 'longitude that the vehicle believed to be at', **_EAST),
+    'LATITUDE': _of('LAT', 'estimated latitude of the vehicle', **_NORTH),
+    'LONGITUDE': _of('LON', 'estimated longitude of the vehicle', **_EAST),
     'DEPTH': _of('DEPTH', 'depth by the pressure sensor', standard_name='depth', **_DOWN),
     'TIME_GPS': _of('TIME', 'time of each GPS location', **_SECONDS),
     'LATITUDE_GPS': _of('LAT_GPS', 'latitude of each GPS location', **_NORTH),

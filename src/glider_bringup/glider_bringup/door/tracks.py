@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run on other people's charts: GeoJSON (RFC 7946), KML 2.2 and GPX 1.1.
 
-Where the vehicle was and where it believed to be, its waypoints, and where it came up.
+Where the vehicle was and its estimated positions, its waypoints, and where it came up.
 """
 
 import itertools
@@ -110,7 +110,7 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
 
     traces = flown.traces.thinned(MOST_POINTS)
     samples, lines = traces.samples, []
-    for name, of in (('track', 'track'), ('believed track', 'believed')):
+    for name, of in (('track', 'track'), ('estimated track', 'believed')):
         columns = samples[f'{of}_north_m'], samples[f'{of}_east_m'], samples['track_depth_m']
         known = np.flatnonzero(np.isfinite(columns).all(axis=0))
         north, east, depth = (column[known] for column in columns)
