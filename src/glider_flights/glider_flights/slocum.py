@@ -52,8 +52,8 @@ CACHE_FOLDERS = ('cache', 'cac', '.dinkumcache', 'dinkumcache')
 CACHES = '.cac'
 #: So many folders above a flight may hold the folder of its caches.
 CACHES_ABOVE = 2
-#: A file with its header has no fewer bytes.
-SMALLEST_FILE = 100
+#: How many lines the header of a file has, among its first bytes.
+HEADER_LINES, HEADER_BYTES = re.compile(rb'^num_ascii_tags:\s*(\d+)', re.MULTILINE), 4096
 #: Where its first cycle is after the header, and what a cycle and, often, the end begin with.
 FIRST_CYCLE, CYCLE_TAG, LAST_TAG = 16, ord('d'), b'X'
 #: State of a sensor that has a new value in a cycle.
@@ -282,14 +282,12 @@ def _read_files(
         _gather_caches(files[0].parent, cache, Path(scratch))
         for number, path in enumerate(files):
             progress(number, len(files))
-            if path.stat().st_size < SMALLEST_FILE:
-                left_out[path.name] = 'it has no whole header'
-                continue
             try:
                 found.append(_read_file(path, Path(scratch), names))
             except Exception as error:  # noqa: BLE001 - of a damaged file dbdreader says anything
                 lacking = getattr(getattr(error, 'data', None), 'missing_cache_files', None)
-                kind = '' if isinstance(error, DbdError) else f'{type(error).__name__}: '
+                known = isinstance(error, (DbdError, ConfigurationError))
+                kind = '' if known else f'{type(error).__name__}: '
                 left_out[path.name] = f'cannot be read: {kind}{error}'
                 if lacking:
                     left_out[path.name] = (
@@ -309,6 +307,11 @@ def _read_file(path: Path, scratch: Path, names: Names) -> DbdFile:
         # dbdreader takes the whole process down with a compressed file that is damaged.
         plain = scratch / 'plain.dbd'
         is_cut = _decompress(path, plain)
+    content = plain.read_bytes()
+    # Of a header without its last line dbdreader reads for ever.
+    lines = HEADER_LINES.search(content, 0, HEADER_BYTES)
+    if not lines or not content.count(b'\n', 0, lines.end()) < int(lines[1]) < HEADER_BYTES:
+        raise ConfigurationError('it has no whole header')
     dbd = DBD(str(plain), str(scratch))
     known = [name for name in names if dbd.has_parameter(name)]
     read = dbd.get(*known) if len(known) > 1 else [dbd.get(*known)] if known else []
@@ -318,7 +321,7 @@ def _read_file(path: Path, scratch: Path, names: Names) -> DbdFile:
         written[1] if written else '',
         tuple(map(int, written.groups()[1:])) if written else (),
         {name: _plausible(name, *pair) for name, pair in zip(known, read, strict=True)},
-        is_cut or _is_cut(plain.read_bytes(), dbd),
+        is_cut or _is_cut(content, dbd),
     )
 
 

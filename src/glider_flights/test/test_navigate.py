@@ -276,13 +276,27 @@ def test_a_slocum_without_one_whole_dive_says_so(tmp_path, write_dbd, surfaced, 
     assert why in told(str(tmp_path))
 
 
-def test_a_damaged_file_is_left_out_and_named(tmp_path, write_dbd):
+@pytest.mark.parametrize(
+    'damage',
+    [
+        lambda content: b'\0' * 1000,
+        lambda content: content[:50],
+        lambda content: content.replace(b'num_ascii_tags', b'num_ascii\0tags'),
+        lambda content: content.replace(b'tags:    14', b'tags:    2'),
+        lambda content: content.replace(b'tags:    14', b'tags:    14141414'),
+    ],
+)
+@pytest.mark.parametrize('suffix', ['.dbd', '.dcd'])
+def test_a_damaged_file_is_left_out_and_named(damage, suffix, tmp_path, write_dbd):
     pytest.importorskip('dbdreader')
-    write_dbd(tmp_path / '00010000.dbd', sensors(2), True)
-    (tmp_path / '00020000.dbd').write_bytes(b'\0' * 1000)
+    file = tmp_path / '00010000.dbd'
+    write_dbd(file, sensors(2), True)
+    wrong = damage(file.read_bytes())
+    bad = tmp_path / f'00020000{suffix}'
+    bad.write_bytes(wrong if suffix == '.dbd' else packed(wrong))
     flight = read_flight(tmp_path, None, quiet)
     assert len(flight.segments) == 2
-    assert flight.notes[0].startswith('left out: 00020000.dbd: cannot be read')
+    assert flight.notes[0].startswith(f'left out: {bad.name}: cannot be read')
 
 
 def test_a_file_that_is_damaged_before_its_end_is_named(tmp_path, write_dbd):
