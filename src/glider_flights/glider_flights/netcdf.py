@@ -23,6 +23,12 @@ _UNITS = {
 _TEXTS = ('model', 'vehicle', 'fix_quality')
 #: So large are values that are missing, where a file does not say which they are.
 FILLS = 1e20
+#: What a glider can have been told by its sensors (m, rad, dbar): other values are damage, or
+#: stand for none where a file does not say which does.
+PLAUSIBLE = {
+    **dict.fromkeys(('depth_m', 'pressure'), (-50.0, 7000.0)),
+    **{'pitch_rad': (-1.6, 1.6), 'roll_rad': (-3.2, 3.2), 'heading_rad': (-6.3, 6.3)},
+}
 _SINCE_1970 = re.compile(
     r'seconds\s+since\s+1970-0?1-0?1([T ]0?0:0?0(:0?0(\.0*)?)?)?\s*(Z|UTC|\+00:?00)?'
 )
@@ -90,6 +96,8 @@ def read(
                         scale = -names[name] if is_up else names[name]
                         scale = math.copysign((scales or {}).get(unit, scale), scale)
                         values = scale * values.astype(float)
+                        lowest, highest = PLAUSIBLE.get(key, (-math.inf, math.inf))
+                        values[(values < lowest) | (values > highest)] = math.nan
                     found[key] = values
     except Exception as error:  # noqa: BLE001 - of a damaged file the libraries say anything
         raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None

@@ -24,7 +24,7 @@ from glider_flights.folders import (
     gsw,
     of_one_flight,
 )
-from glider_flights.netcdf import names_of
+from glider_flights.netcdf import PLAUSIBLE, names_of
 from glider_flights.record import (
     NOT_KNOWN,
     Cut,
@@ -60,10 +60,10 @@ FIRST_CYCLE, CYCLE_TAG, LAST_TAG = 16, ord('d'), b'X'
 UPDATED = 2
 #: Name of a file on board: vehicle, year, day of the year, mission of the day, segment.
 WRITTEN = re.compile(r'(.+)-(\d+)-(\d+)-(\d+)-(\d+)')
-#: What a glider can have been told by its sensors (m, rad): other values are damage.
-PLAUSIBLE = {'m_depth': (-50.0, 7000.0), 'm_pitch': (-1.6, 1.6), 'm_heading': (-6.3, 6.3)}
 #: Times in one file are no further apart than this (s).
 LONGEST_FILE_S = 20 * 86_400.0
+#: Our names of what is not believed whatever it says.
+OURS = {'m_depth': 'depth_m', 'm_pitch': 'pitch_rad', 'm_heading': 'heading_rad'}
 #: Without these nothing can be reckoned.
 NEEDED = ('m_depth', 'm_pitch', 'm_heading', 'm_gps_lat', 'm_gps_lon')
 WANTED = (
@@ -369,7 +369,7 @@ def _decompress(path: Path, plain: Path) -> bool:
 def _plausible(name: str, time_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Values of one sensor that a glider can have, with their times."""
     good = np.isfinite(values) & (time_s > 0.0) & (time_s < LATEST_S)
-    lowest, highest = PLAUSIBLE.get(name, (-math.inf, math.inf))
+    lowest, highest = PLAUSIBLE.get(OURS.get(name), (-math.inf, math.inf))
     good &= (values >= lowest) & (values <= highest)
     if good.any():
         good &= np.abs(time_s - np.median(time_s[good])) < LONGEST_FILE_S

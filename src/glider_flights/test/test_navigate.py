@@ -593,9 +593,17 @@ def from_noon(data):
     return data.assign(times)
 
 
+def with_fills(data):
+    """Some have no number, and the file does not say which stands for none."""
+    names, dived = ('DEPTH', 'PITCH', 'HEADING'), data.DEPTH > 50.0
+    lost = dived & (np.arange(data.sizes['N_MEASUREMENTS']) % 5 == 0)
+    return data.assign({name: data[name].where(~lost, -9999.9) for name in names})
+
+
 @pytest.mark.parametrize(
     'change',
     [
+        with_fills,
         lambda data: data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS % 360.0),
         lambda data: data.assign(DEPTH=(-data.DEPTH).assign_attrs(units='m', positive='up')),
         lambda data: data.assign(DEPTH=(100.0 * data.DEPTH).assign_attrs(units='cm')),
