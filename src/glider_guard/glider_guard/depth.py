@@ -18,8 +18,9 @@ RISES_MPS = 0.02
 SUNK_M = 3.0
 #: The depth by which it sinks, or stays where it is, is averaged over this time (s).
 MEAN_S = 10.0
-#: A depth that changes by no more than this rests (m).
-AT_REST_M = 1.0
+#: A depth that changes by no more than this (m), or than this share of the way down by pump and
+#: pitch, rests.
+AT_REST_M, AT_REST_SHARE = 1.0, 0.25
 #: For longer than this (s) the depth lags behind the vertical rate before it is told.
 LAG_S = 10.0
 #: The past of the lag fades with this time (s).
@@ -192,7 +193,8 @@ def sound(state: Depths, at: Sounding, limits: DepthLimits, dt: float) -> Depths
         top, bottom = near, near
     is_counted = at.surfaces and at.is_pumped and not at.is_out
     least = min(before, mean) if is_counted else mean
-    is_gone = not under or abs(depth - state.rest) > AT_REST_M
+    at_rest_m = max(AT_REST_M, AT_REST_SHARE * state.led_m)
+    is_gone = not under or abs(depth - state.rest) > at_rest_m
     rest, led_m = (depth, 0.0) if is_gone else (state.rest, state.led_m + dt * at.led)
     waits_up = at.surfaces and not at.is_afloat
     up_from = state.up_from if waits_up and state.up_s > 0.0 else depth

@@ -92,8 +92,8 @@ class GuardLimitSettings(Settings):
     led_m: float = number(
         60.0,
         (5.0, 1000.0),
-        'way that pump and pitch lead while the depth rests within a metre (m), as in a stall '
-        'that control ends',
+        'way that pump and pitch lead while the depth rests within a metre, or a quarter of a '
+        'way down (m), as in a stall that control ends',
     )
     jump_m: float = number(
         5.0, (1.0, 1000.0), 'under water a depth that jumps by more, and stays there, is wrong (m)'

@@ -304,15 +304,17 @@ def test_the_same_sample_is_none(pressure):
         assert told_now & rows.FROZEN == told
 
 
-def test_heavy_and_nose_down_it_does_not_stay_at_one_depth():
-    """A sensor that shows 100 m and a little noise; level, the same is no alarm."""
+@pytest.mark.parametrize('share', [0.0, 0.05, 0.15])
+def test_heavy_and_nose_down_it_does_not_stay_at_one_depth(share):
+    """A sensor that shows 100 m, or a part of the way, and noise; level, the same is no alarm."""
     for pitch_deg, told in ((-25.0, rows.FROZEN), (0.0, 0)):
         vehicle = Vehicle()
         vehicle.go(1.0)
         vehicle.pitch_deg = pitch_deg
-        for second in range(300):
-            vehicle.depth = 100.0 + 0.1 * (second % 3)
-            now = vehicle.go(1.0, rate=0.0)
+        rate = share * glide_vertical_rate(math.radians(-25.0), 0.4, vehicle.params.weight.polar)
+        for second in range(500):
+            vehicle.depth = 100.0 + rate * second + 0.1 * (second % 3)
+            now = vehicle.go(1.0, rate=rate)
         assert now & rows.FROZEN == told
 
 
