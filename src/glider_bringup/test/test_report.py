@@ -460,6 +460,11 @@ def test_verdict_of_a_flight_too_short_for_a_score(tmp_path, settle_s, ended):
     assert f'{ended}, so errors have no score.' in verdict(read_run(folder).card, settle_s)
 
 
+def test_a_vehicle_that_went_far_deeper_than_it_was_to_has_gone_wrong(tmp_path):
+    deep = altered(fly(tmp_path), 'deep', depth_m__overshoot=584.0)
+    assert ('problem', 'It went 584 m deeper than it was to.') in findings(read_run(deep))
+
+
 def test_verdict_of_a_flight_into_a_current_that_is_too_strong(tmp_path):
     fields = {'duration_s': 4000.0, 'current.speed_kn': 1.5, 'current.angle_deg': 90.0}
     folder = fly(tmp_path, settle_s=1000.0, **fields)

@@ -165,6 +165,9 @@ def _how_bad(card: dict[str, Any], traces: Traces) -> list[str]:
     worst = max(card['cross_track_m'].get('max_run') or 0.0, place)
     if worst > LOST_M:
         problems.append(_worst(card))
+    deeper_m = card['depth_m']['overshoot'] or 0.0
+    if deeper_m > LOST_M:
+        problems.append(f'It went {small(deeper_m)} deeper than it was to.')
     roll_deg = traces.largest('roll_deg')
     if roll_deg > ROLLED_DEG:
         problems.append(f'It rolled by {roll_deg:.0f} deg.')
