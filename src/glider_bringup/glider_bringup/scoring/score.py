@@ -235,18 +235,9 @@ class Scorer:
         way_m, time_s = self._along_path_m(), seconds(ticks)
         held = ~(series('infeasible')[scored & flies] > 0.0)
         infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)
-        arrival, missing = self._arrival(rules), ''
-        is_over = time_s >= rules.duration_s
-        if is_over and dives < rules.dives:
-            missing = f'dives flown, of those that there was time for: {dives} of {rules.dives}'
-        elif is_over and rules.dives_at_all and not _dives_at_all(depth, rules):
-            missing = 'no dive flown, for which there was time'
-        elif is_over and rules.dives_at_all and not self._end and _idles(depth, rules):
-            missing = f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
-        elif not is_over and rules.dives_at_all and not 0 < rules.dives <= dives:
-            # who has arrived, or is to go on, may be done before
-            if arrival['arrival'] and not arrival['arrival']['arrived']:
-                missing = 'afloat for longer than it was to wait, before the end of its path'
+        arrival = self._arrival(rules)
+        ended = self._end is not None
+        missing = _missing(depth, dives, time_s, ended, arrival['arrival'], rules)
         status, reason = outcome_of(depth, told, self._hull, infeasible, missing)
         pace_m = way_m if status in (COMPLETED, INFEASIBLE) else None
         return {
@@ -406,6 +397,25 @@ def _count_dives(depth: np.ndarray, below_m: float, above_m: float) -> int:
     zone[depth < above_m] = -1
     zone = zone[zone != 0]
     return int(np.count_nonzero((zone[:-1] == 1) & (zone[1:] == -1)))
+
+
+def _missing(
+    depth: np.ndarray, dives: int, time_s: float, ended: bool, arrival: dict | None, rules: Rules
+) -> str:
+    """What of its mission was not flown, in words; empty if nothing."""
+    if time_s < rules.duration_s:
+        # who has arrived, or is to go on, may be done before
+        drifts = arrival and not arrival['arrived'] and not 0 < rules.dives <= dives
+        if rules.dives_at_all and drifts:
+            return 'afloat for longer than it was to wait, before the end of its path'
+        return ''
+    if dives < rules.dives:
+        return f'dives flown, of those that there was time for: {dives} of {rules.dives}'
+    if rules.dives_at_all and not _dives_at_all(depth, rules):
+        return 'no dive flown, for which there was time'
+    if rules.dives_at_all and not ended and _idles(depth, rules):
+        return f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
+    return ''
 
 
 def _dives_at_all(depth: np.ndarray, rules: Rules) -> bool:
