@@ -388,6 +388,14 @@ def test_a_stall_that_control_ends_is_no_frozen_depth():
     assert not flown.told.any()
 
 
+def test_a_turn_after_a_climb_that_growth_slowed_is_no_frozen_depth():
+    """The climb showed its drag as weight, by which it would sink before its slow pump has it."""
+    steep = {'profile.pitch_deg': 45.0, 'profile.net_heaviness_kg': 0.95, 'dives': 0}
+    changes = {**RECKONED, **steep, 'profile.top_depth_m': 5.0, 'profile.surface_every_dives': 2}
+    growth = broken('fouling', drag=1.6, over_s=7000.0)
+    assert not fly('current_12deg', 14000.0, [growth], **changes).told.any()
+
+
 def test_a_turn_with_the_whole_pump_that_ends_in_a_stall_is_flown():
     """It slid tail first below the surface, and hung there until its depth was disbelieved."""
     steep = {'profile.depth_m': 200.0, 'profile.pitch_deg': 45.0, 'profile.top_depth_m': 5.0}

@@ -107,6 +107,7 @@ class Sounding(NamedTuple):
     stop: float  #: way that it sinks on if it is stopped now (m)
     drop_way: float  #: the same if its weight is let go where the pump does not do (m)
     led: float  #: vertical rate by pump and pitch, where they make a glide (m/s, + down)
+    sure: float  #: share of that which is left if what climbs showed as weight is drag
     altitude: float  #: height over the bottom (m); 0.0: no echo
     is_sent_up: bool  #: the last command makes it lighter than its file says it is, or than it is
     ascends: bool  #: and than both where it is asked up, or as light as can be
@@ -193,7 +194,7 @@ def sound(state: Depths, at: Sounding, limits: DepthLimits, dt: float) -> Depths
         top, bottom = near, near
     is_counted = at.surfaces and at.is_pumped and not at.is_out
     least = min(before, mean) if is_counted else mean
-    at_rest_m = max(AT_REST_M, AT_REST_SHARE * state.led_m)
+    at_rest_m = max(AT_REST_M, AT_REST_SHARE * at.sure * state.led_m)
     is_gone = not under or abs(depth - state.rest) > at_rest_m
     rest, led_m = (depth, 0.0) if is_gone else (state.rest, state.led_m + dt * at.led)
     waits_up = at.surfaces and not at.is_afloat

@@ -35,6 +35,7 @@ from glider_guard.weight import (
     led_rate,
     sinking_weight,
     sinks_on_m,
+    sure_share,
     turning_m,
     weigh,
 )
@@ -244,6 +245,7 @@ def _sounding(state, taken, before, heard, shown, witness, last, told, params):
         stop=turning_m(rate, sinks, params.weight),
         drop_way=sinks_on_m(rate, sinks, m_b, is_pumped, params.weight),
         led=led,
+        sure=sure_share(state.weight, m_b, params.weight),
         altitude=heard.altitude,
         is_sent_up=last.m_b < max(0.0, neutral),
         ascends=ascends,

@@ -143,6 +143,18 @@ def led_rate(state, theta, m_b, limits):
 
 
 @kernel
+def sure_share(state, m_b, limits):
+    """Share of the rate down by `led_rate` that is left if what climbs showed as weight is drag.
+
+    Growth on the hull slows a climb as weight does. It does not hasten the dive that follows.
+    """
+    known = m_b + limits.ballast
+    if state.off <= 0.0 or known + state.off <= 0.0:
+        return 1.0
+    return math.sqrt(max(0.0, known) / (known + state.off))
+
+
+@kernel
 def _least_squares(line, growth, more, since_s, dt):
     """Value (kg) and slope (kg/s) of the line through all since some time (s), to ``more``."""
     n = min(since_s, NEWER_S) / dt
