@@ -105,9 +105,10 @@ def test_a_pressure_that_freezes_before_the_dive_is_no_reason_to_dive(changes):
         {'imu_period_s': 10.0, 'imu_missed_share': 0.3},
         {'depth_resolution_m': 1.0},
         {'imu_period_s': 4.0, 'depth_resolution_m': 0.5, **NOISE},
+        {'position_std_m': 4.0},
     ],
 )
-def test_samples_that_repeat_by_nature_are_no_alarm(sensors):
+def test_samples_that_repeat_or_scatter_by_nature_are_no_alarm(sensors):
     """Nor is a yo of 20 m at .02 kg: the depth hardly moves."""
     slow = {'profile.depth_m': 20.0, 'profile.net_heaviness_kg': 0.02, 'dives': 0}
     flown = fly('rough_water', 10000.0, sensors=sensors, **RECKONED, **slow)

@@ -27,6 +27,8 @@ from glider_model.vehicle.file import load_vehicle
 STALL_MEAN_S, STALL_SAMPLES = 3.0, 2.0
 #: What is as improbable as this does not happen.
 RARE = 1e-9
+#: No two samples differ by so many standard deviations of the noise of the depth for long.
+JUMP_STDS = 5.0
 #: Share of a battery of which all is usable that is as good as nothing (-).
 EMPTY = 1e-6
 
@@ -142,6 +144,7 @@ class GuardSettings(GuardLimitSettings):
     depth_resolution_m: float = number(
         0.0, (0.0, 10.0), 'steps in which depth is measured (m); 0: none'
     )
+    position_std_m: float = number(0.0, (0.0, 1000.0), 'noise of the depth (m)')
     lost_after_s: float = number(
         10.0,
         (0.1, 3600.0),
@@ -210,7 +213,9 @@ class GuardSettings(GuardLimitSettings):
                 same_s=self.still_s + self._gap_s,
                 is_rough=self.depth_resolution_m > 0.0,
                 led_m=self.lag_m + 3.0 * self.depth_resolution_m,
-                jump_m=self.jump_m + 2.0 * self.depth_resolution_m,
+                jump_m=self.jump_m
+                + 2.0 * self.depth_resolution_m
+                + JUMP_STDS * self.position_std_m,
                 hold_s=gate.hold_s + self._gap_s,
                 settled_s=4.0 * self.imu_period_s,
                 offset_m=self.offset_max_m,

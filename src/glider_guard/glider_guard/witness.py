@@ -26,8 +26,6 @@ HEARD_S = 1.0
 OUT_S, ZERO_S = 5.0, 30.0
 #: A smaller offset is left (m): waves, and an antenna that is out before the hull is.
 LEAST_OFFSET_M = 3.0
-#: So far from its average (m) what is shown there twice running is another offset.
-ANEW_M = 5.0
 #: Time constant of the vertical rate that forecasts go by (s).
 RATE_S = 10.0
 #: No glider sinks or rises faster (m/s).
@@ -96,10 +94,10 @@ def _offset(zero):
 
 
 @kernel
-def _averaged(zero, shown, before, dt):
+def _averaged(zero, shown, before, jump_m, dt):
     """What is shown at the surface (m), averaged; anew where two samples (m) agree about it."""
-    is_far = abs(shown - zero) > ANEW_M and abs(before - zero) > ANEW_M
-    if is_far and 0.0 < abs(shown - before) < ANEW_M:
+    is_far = abs(shown - zero) > jump_m and abs(before - zero) > jump_m
+    if is_far and 0.0 < abs(shown - before) < jump_m:
         return shown
     return zero + dt / ZERO_S * (shown - zero)
 
@@ -140,8 +138,8 @@ def watch(
     out_s = state.out_s + dt if is_out else 0.0
     own_zero, odom_zero = state.own_zero, state.odom_zero
     if out_s > OUT_S + limits.settled_s:
-        own_zero = _averaged(own_zero, own, state.own, dt)
-        odom_zero = _averaged(odom_zero, shown.odom, shown.odom_before, dt)
+        own_zero = _averaged(own_zero, own, state.own, limits.jump_m, dt)
+        odom_zero = _averaged(odom_zero, shown.odom, shown.odom_before, limits.jump_m, dt)
     # two samples that agree show it higher above the water than any offset does: nobody flies
     is_above = far_s == 0.0 and raw != state.raw and max(own, state.own) < -limits.offset_m
     if is_above or max(abs(own_zero), abs(odom_zero)) > limits.offset_m:

@@ -336,12 +336,19 @@ def test_the_depth_is_checked_at_the_surface(shown_m, told):
 
 
 @pytest.mark.parametrize(
-    ('jump_m', 'resolution_m', 'told'),
-    [(-20.0, 0.0, True), (8.0, 0.0, True), (4.0, 0.0, False), (8.0, 5.0, False)],
+    ('jump_m', 'sensor', 'told'),
+    [
+        (-20.0, {}, True),
+        (8.0, {}, True),
+        (4.0, {}, False),
+        (8.0, {'depth_resolution_m': 5.0}, False),
+        (8.0, {'position_std_m': 1.0}, False),
+        (18.0, {'position_std_m': 1.0}, True),
+    ],
 )
-def test_a_depth_that_jumps_under_water_is_wrong(jump_m, resolution_m, told):
-    """By more than it is measured in steps of, and whatever the gate lets through."""
-    vehicle = Vehicle(pressure=True, depth_resolution_m=resolution_m)
+def test_a_depth_that_jumps_under_water_is_wrong(jump_m, sensor, told):
+    """By more than its steps, or its noise, and whatever the gate lets through."""
+    vehicle = Vehicle(pressure=True, **sensor)
     vehicle.go(10.0)
     vehicle.depth += jump_m
     assert bool(vehicle.go(10.0) & rows.DEPTH_WRONG) == told
