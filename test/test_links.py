@@ -28,3 +28,14 @@ def test_every_decision_is_in_their_list():
     listed = (folder / 'README.md').read_text()
     missing = [one.name for one in folder.glob('0*.md') if f']({one.name})' not in listed]
     assert not missing
+
+
+DESCRIBE_TODAY = [one for one in DOCUMENTS if one.name != 'CHANGELOG.md']
+
+
+@pytest.mark.parametrize('document', DESCRIBE_TODAY, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_that_are_named_are_there(document):
+    """Those in a folder, such as `engines/janitor.py`."""
+    named = re.findall(r'`((?!share/)(?:\w+/)+\w+\.(?:py|xml))`', document.read_text())
+    folders = [ROOT, *ROOT.glob('src/**/'), *ROOT.glob('examples/**/')]
+    assert [one for one in named if not any((folder / one).exists() for folder in folders)] == []
