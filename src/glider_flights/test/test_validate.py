@@ -266,23 +266,32 @@ def test_the_plant_finds_its_pitch_by_the_actuators(dive, tmp_path):
     assert report(*words, 'mass,Cd0,trim')['pitch_rmse_deg'] < found['pitch_rmse_deg']
 
 
-def test_a_flight_in_og1_gives_the_same_figures(file, dive, tmp_path):
-    count = len(dive['time'])
-    data = {
-        'TIME': START_S + dive['time'],
-        'LATITUDE': np.full(count, LATITUDE),
-        'LONGITUDE': np.full(count, LONGITUDE),
-        'DEPTH': dive['depth'],
-        'PITCH': np.degrees(dive['pitch']),
-        'ROLL': np.degrees(dive['roll']),
-        'HEADING': np.degrees(dive['heading']),
-        'VBD_CC': 1e6 * dive['pumped'],
-        'TEMP': temperature(dive['depth']),
-        'PSAL': np.full(count, SALINITY),
-        'GLIDER_VERT_VELO_MODEL': 100.0 * dive['rising'] + 2.0,
-    }
+def og1(dives, **constants) -> xarray.Dataset:
+    """Dives two hours apart as OG1 has them, without fixes."""
+    parts = [
+        {
+            'TIME': START_S + 7200.0 * number + dive['time'],
+            'LATITUDE': np.full(len(dive['time']), LATITUDE),
+            'LONGITUDE': np.full(len(dive['time']), LONGITUDE),
+            'DEPTH': dive['depth'],
+            'PITCH': np.degrees(dive['pitch']),
+            'ROLL': np.degrees(dive['roll']),
+            'HEADING': np.degrees(dive['heading']),
+            'VBD_CC': 1e6 * dive['pumped'],
+            'TEMP': temperature(dive['depth']),
+            'PSAL': np.full(len(dive['time']), SALINITY),
+            'GLIDER_VERT_VELO_MODEL': 100.0 * dive['rising'] + 2.0,
+        }
+        for number, dive in enumerate(dives)
+    ]
+    data = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     dataset = xarray.Dataset({name: ('N_MEASUREMENTS', values) for name, values in data.items()})
     dataset['TIME'].attrs['units'] = 'seconds since 1970-01-01T00:00:00Z'
+    return dataset.assign(constants)
+
+
+def test_a_flight_in_og1_gives_the_same_figures(file, dive, tmp_path):
+    dataset = og1([dive])
     dataset.to_netcdf(tmp_path / 'sg123_delayed.nc', engine='scipy')
     words = ('--vehicle', 'slocum_g2', '--fit', 'mass,Cd0')
     one, other = report(file, *words), report(str(tmp_path), *words)
@@ -348,8 +357,13 @@ def test_what_cannot_be_flown_is_told(file, dive, tmp_path):
     assert 'no constant mas (allowed: none' in told(file, *slocum, '--fit', 'mas')
     assert 'its file has no volume' in told(file, '--vehicle', 'zhang2021')
     assert 'no such folder or file' in told(str(tmp_path / 'lost'), *slocum)
-    lacks = 'p1230001.nc: mass_x_m was not recorded (needed for --impose actuators'
+    lacks = 'p1230001.nc: no value of eng_pitchCtl or pitchCtl (needed for --impose actuators)'
     assert lacks in told(file, *slocum, '--impose', 'actuators')
+    in_og1 = tmp_path / 'og1.nc'
+    og1([dive]).drop_vars('VBD_CC').to_netcdf(in_og1, engine='scipy')
+    lacks = 'og1.nc: no value of VBD_CC or BALLAST_PUMPED or OIL_VOLUME (needed for --impose pitch'
+    assert lacks in told(str(in_og1), *slocum)
+    in_og1.unlink()
     wrong = tmp_path / 'wrong.npy'
     np.save(wrong, np.zeros(5))
     assert 'has shape (5,)' in told(file, *slocum, '--adcp', str(wrong))

@@ -10,6 +10,7 @@ import numpy as np
 from glider_base.errors import ConfigurationError
 from glider_base.signals import SEA_WATER_DENSITY, TICK_S
 from glider_flights.folders import gsw
+from glider_flights.netcdf import names_of
 from glider_flights.record import SURFACE_DEPTH_M, Flight, Instruments, in_order, vertical_rate
 from glider_flights.validation.imposed import STEP_S, Forcing, fly_free, fly_held
 from glider_model.vehicle.file import VehicleParams, load_vehicle
@@ -178,9 +179,9 @@ def check(flight: Flight, found: list[Track], impose: Imposed) -> None:
     """Refuse a flight whose stretches lack what is to be imposed; raises ConfigurationError."""
     for name in NEEDED[impose]:
         if all(np.isnan(getattr(track.instruments, name)).all() for track in found):
+            names = ' or '.join(names_of(flight.kind)[name])
             raise ConfigurationError(
-                f'{flight.told}: {name} was not recorded (needed for --impose {impose}: '
-                f'{", ".join(NEEDED[impose])})'
+                f'{flight.told}: no value of {names} (needed for --impose {impose})'
             )
 
 
