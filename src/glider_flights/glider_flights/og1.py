@@ -141,6 +141,7 @@ def _read(path: Path) -> LogFile:
         on_board=partial(_on_board, known),
         of_base_station=of_base,
         notes=notes,
+        model=model,
     )
 
 

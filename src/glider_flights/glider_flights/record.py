@@ -135,6 +135,7 @@ class Flight(NamedTuple):
     body: dict[str, float] | None = None
     #: Over what the vehicle's own current is a mean; a base station counts the drift, too.
     on_board_over: str = 'under water'
+    model: str = ''  #: what a file in OG1 calls the vehicle; '' if it does not say
 
     @property
     def told(self) -> str:
@@ -269,6 +270,7 @@ class LogFile(NamedTuple):
     dive: int = 0  #: number of the one dive that it holds; 0 if it does not say
     #: Constants of the body that it names, see `glider_flights.record.Flight`.
     body: dict[str, float] = {}
+    model: str = ''  #: see `glider_flights.record.Flight`
 
     @property
     def time_s(self) -> np.ndarray:
@@ -300,6 +302,7 @@ def put_together(kind: str, files: list[LogFile], notes: list[str]) -> Flight:
         instruments=joined(_of_one_zero(file, body) for file in files),
         body=body,
         on_board_over='between fixes' if files[0].of_base_station else 'under water',
+        model=next((file.model for file in files if file.model), ''),
     )
 
 

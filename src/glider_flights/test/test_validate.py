@@ -442,3 +442,14 @@ def test_one_table_of_all_flights_of_a_folder(dive, tmp_path):
     assert 'FLIGHT is missing' in told(*slocum)
     assert '--vehicle is missing' in told(str(tmp_path / 'long'))
     assert 'no such folder' in told('--all', str(tmp_path / 'lost'))
+
+
+def test_the_table_takes_the_vehicle_that_a_file_in_og1_tells_of(dive, tmp_path):
+    for name, model in (('gliders', 'Teledyne Slocum G3 glider'), ('other', 'SeaExplorer')):
+        (tmp_path / name).mkdir()
+        og1([dive] * 4, PLATFORM_MODEL=model).to_netcdf(tmp_path / name / '1.nc', engine='scipy')
+    table = report('--all', str(tmp_path), '--fit', 'none')
+    assert [one['vehicle'] for one in table['flights']] == ['slocum_g2']
+    assert 'PLATFORM_MODEL is SeaExplorer (allowed without --vehicle' in table['left_out']['other']
+    table = report('--all', str(tmp_path), '--fit', 'none', '--vehicle', 'seaglider')
+    assert [one['vehicle'] for one in table['flights']] == ['seaglider'] * 2

@@ -32,7 +32,7 @@ def validate(
         str | None,
         typer.Option(
             help='Vehicle by name or path of its YAML file. With --all by default slocum_g2 or '
-            'seaglider, by the kind of the flight.'
+            'seaglider, by the kind of the flight; of one in OG1 by its PLATFORM_MODEL.'
         ),
     ] = None,
     impose: Annotated[

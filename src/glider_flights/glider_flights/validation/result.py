@@ -187,8 +187,8 @@ def find_adcp(place: Path, file: Path | None) -> Adcp | None:
 
 # ---- all flights of a folder
 
-#: The vehicle file that stands for a kind of vehicle, unless another one is named.
-VEHICLES = {'slocum': 'slocum_g2', 'seaglider': 'seaglider', 'og1': 'seaglider'}
+#: The vehicle file that stands for a kind of files, or of vehicle, unless another one is named.
+VEHICLES = {'slocum': 'slocum_g2', 'seaglider': 'seaglider'}
 #: Both ways.
 HALVES = ('first', 'second')
 #: What is told of each.
@@ -235,10 +235,21 @@ def validate_all(
     return {'folder': str(folder), 'flights': rows, 'left_out': left_out}
 
 
+def _vehicle_of(flight: Flight) -> str:
+    told = f'{flight.kind} {flight.model}'.lower()
+    found = next((VEHICLES[kind] for kind in VEHICLES if kind in told), None)
+    if found is None:
+        raise ConfigurationError(
+            f'{flight.told}: PLATFORM_MODEL is {flight.model or "missing"} (allowed without '
+            f'--vehicle: a model with {" or ".join(VEHICLES)} in its name)'
+        )
+    return found
+
+
 def _row(place: Path, vehicle: str | None, fit: str | None, cache: Path | None) -> dict[str, Any]:
     """Figures of one flight."""
     flight = read_whole(place, cache, lambda *_: None)
-    chosen, adcp = vehicle or VEHICLES[flight.kind], find_adcp(place, None)
+    chosen, adcp = vehicle or _vehicle_of(flight), find_adcp(place, None)
     halves = {
         half: validate(flight, chosen, 'pitch', fit, adcp, lambda *_: None, half).report
         for half in HALVES
