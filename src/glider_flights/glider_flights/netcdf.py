@@ -4,7 +4,8 @@
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
 
@@ -29,6 +30,12 @@ PLAUSIBLE = {
     **dict.fromkeys(('depth_m', 'pressure'), (-50.0, 7000.0)),
     **{'pitch_rad': (-1.6, 1.6), 'roll_rad': (-3.2, 3.2), 'heading_rad': (-6.3, 6.3)},
 }
+#: Units of these, the rest are angles, as an error names them, and as files spell the usual one.
+_USUAL = {
+    'depth_m': ('m, cm', r'(m|met(er|re)s?)?'),
+    'pressure': ('dbar, bar, kPa, hPa, mbar, Pa', r'(d(eci)?bars?|db)?'),
+    'pitch_rad': ('degrees, rad', r'(deg.*|°.*)?'),
+}
 _SINCE_1970 = re.compile(
     r'seconds\s+since\s+1970-0?1-0?1([T ]0?0:0?0(:0?0(\.0*)?)?)?\s*(Z|UTC|\+00:?00)?'
 )
@@ -50,8 +57,22 @@ def names_of(kind: str) -> Names:
     return found
 
 
-def datasets(path: Path) -> list:
-    """The datasets of all groups of a file, of NetCDF 3 or 4."""
+@contextmanager
+def opened(path: Path) -> Iterator[list]:
+    """The datasets of all groups of a file, of NetCDF 3 or 4.
+
+    Raises ConfigurationError, also if one turns out to be damaged while it is read.
+    """
+    try:
+        with ExitStack() as stack:
+            yield [stack.enter_context(dataset) for dataset in _datasets(path)]
+    except ConfigurationError:
+        raise
+    except Exception as error:  # noqa: BLE001 - of a damaged file the libraries say anything
+        raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
+
+
+def _datasets(path: Path) -> list:
     import xarray
 
     with path.open('rb') as file:
@@ -74,34 +95,41 @@ def read(
     """Variables of a file as flat arrays in our units, by our names.
 
     Times, in s since 1970, are those of which ours ends with ``time``. ``spelt`` makes a wanted
-    name of one in the file, ``scales`` says what values in some units are multiplied by instead.
+    name of one in the file, ``scales`` says what values in some units are multiplied by instead;
+    with it a depth, pressure or angle in a unit that is not known is refused.
     Raises ConfigurationError.
     """
     found: dict[str, np.ndarray] = {}
-    try:
-        for dataset in datasets(path):
-            with dataset:
-                by_name = {spelt(str(name)): name for name in dataset.variables}
-                for key, names in wanted.items():
-                    name = next((name for name in names if name in by_name), None)
-                    if name is None or key in found:
-                        continue
-                    variable = dataset[by_name[name]]
-                    unit = str(variable.attrs.get('units', ''))
-                    values = np.atleast_1d(variable.values).ravel()
-                    if key.endswith('time'):
-                        values = _seconds(values.astype(float), unit)
-                    elif key not in _TEXTS:
-                        is_up = key == 'depth_m' and variable.attrs.get('positive') == 'up'
-                        scale = -names[name] if is_up else names[name]
-                        scale = math.copysign((scales or {}).get(unit, scale), scale)
-                        values = scale * values.astype(float)
-                        lowest, highest = PLAUSIBLE.get(key, (-math.inf, math.inf))
-                        values[(values < lowest) | (values > highest)] = math.nan
-                    found[key] = values
-    except Exception as error:  # noqa: BLE001 - of a damaged file the libraries say anything
-        raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
+    with opened(path) as groups:
+        for dataset in groups:
+            by_name = {spelt(str(name)): name for name in dataset.variables}
+            for key, names in wanted.items():
+                name = next((name for name in names if name in by_name), None)
+                if name is None or key in found:
+                    continue
+                variable = dataset[by_name[name]]
+                unit = str(variable.attrs.get('units', ''))
+                values = np.atleast_1d(variable.values).ravel()
+                if key.endswith('time'):
+                    values = _seconds(values.astype(float), unit)
+                elif key not in _TEXTS:
+                    is_up = key == 'depth_m' and variable.attrs.get('positive') == 'up'
+                    scale = -names[name] if is_up else names[name]
+                    scale = math.copysign((scales or {}).get(unit, scale), scale)
+                    lowest, highest = PLAUSIBLE.get(key, (-math.inf, math.inf))
+                    if scales and key in PLAUSIBLE and unit not in scales:
+                        _refuse_unit(f'{path}: {name}', unit, key)
+                    values = scale * values.astype(float)
+                    values[(values < lowest) | (values > highest)] = math.nan
+                found[key] = values
     return found
+
+
+def _refuse_unit(name: str, unit: str, key: str) -> None:
+    """Refuse what is in none of the spellings of the unit in `variables.yaml`, if in any."""
+    usual, spelt = _USUAL.get(key, _USUAL['pitch_rad'])
+    if not re.fullmatch(spelt, unit.strip(), re.IGNORECASE):
+        raise ConfigurationError(f'{name} is in {unit!r} (allowed: {usual})')
 
 
 def refuse_missing(path: Path, found: dict, needed: Names, why: str) -> None:

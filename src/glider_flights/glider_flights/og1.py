@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError
 from glider_base.files import parse_yaml
 from glider_base.settings import validate
 from glider_flights.folders import (
@@ -24,7 +25,7 @@ from glider_flights.folders import (
     read_each,
 )
 from glider_flights.navigation import DENSITY
-from glider_flights.netcdf import SUFFIXES, datasets, fixes_of, names_of, read, refuse_missing
+from glider_flights.netcdf import SUFFIXES, fixes_of, names_of, opened, read, refuse_missing
 from glider_flights.record import (
     LONGEST_GAP_S,
     Flight,
@@ -64,8 +65,9 @@ def og1_files(place: Path) -> list[Path]:
 
 def _is_one(path: Path) -> bool:
     try:
-        names = {name.upper() for part in datasets(path) for name in part.variables}
-    except Exception:  # noqa: BLE001 - of a damaged file the libraries say anything
+        with opened(path) as groups:
+            names = {str(name).upper() for part in groups for name in part.variables}
+    except ConfigurationError:
         return False
     told = {'PITCH', 'GLIDER_PITCH', 'LATITUDE_GPS'} & names
     return 'TIME' in names and bool(told) and 'LOG_GPS_LAT' not in names
@@ -147,7 +149,8 @@ def _read(path: Path) -> LogFile:
 
 def _own_polar(path: Path) -> Polar | None:
     """Lift and drag of the file of a vehicle, as `glider_flights.record.Polar` has them."""
-    text = datasets(path)[0].attrs.get('vehicle_yaml')
+    with opened(path) as groups:
+        text = groups[0].attrs.get('vehicle_yaml')
     if text is None:
         return None
     values = parse_yaml(text, f'{path}: vehicle_yaml')

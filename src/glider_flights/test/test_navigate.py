@@ -621,6 +621,15 @@ def test_a_flight_in_og1_is_the_same_however_it_is_told(change, tmp_path):
         assert row.dac_mps == pytest.approx(CURRENT, abs=0.005)
 
 
+@pytest.mark.parametrize(('name', 'unit'), [('DEPTH', 'km'), ('DEPTH', 'dm'), ('PITCH', 'gon')])
+def test_a_unit_that_is_not_known_is_refused_by_name(name, unit, tmp_path):
+    data = og1(2)
+    data[name].attrs['units'] = unit
+    data.to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
+    with pytest.raises(ConfigurationError, match=rf"unit_1.nc: {name} is in '{unit}' \(allowed"):
+        read_flight(tmp_path, None, quiet)
+
+
 @pytest.mark.parametrize('names', [['DEPTH'], ['PITCH', 'HEADING']])
 def test_no_line_is_drawn_over_what_is_missing_for_most_of_a_dive(names, tmp_path):
     data = og1(2)
