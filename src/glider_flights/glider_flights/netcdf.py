@@ -24,17 +24,18 @@ _UNITS = {
 _TEXTS = ('model', 'vehicle', 'fix_quality')
 #: So large are values that are missing, where a file does not say which they are.
 FILLS = 1e20
-#: What a glider can have been told by its sensors (m, rad, dbar): other values are damage, or
-#: stand for none where a file does not say which does.
+#: What a glider, or its base station, can have been told (m, rad, dbar, m/s): other values are
+#: damage, or stand for none where a file does not say which does.
 PLAUSIBLE = {
     **dict.fromkeys(('depth_m', 'pressure'), (-50.0, 7000.0)),
     **{'pitch_rad': (-1.6, 1.6), 'roll_rad': (-3.2, 3.2), 'heading_rad': (-6.3, 6.3)},
+    **{'declination_rad': (-3.2, 3.2), 'dac_north': (-5.0, 5.0), 'dac_east': (-5.0, 5.0)},
 }
-#: Units of these, the rest are angles, as an error names them, and as files spell the usual one.
+#: Units of some, as an error names them, and as files spell the usual one.
 _USUAL = {
     'depth_m': ('m, cm', r'(m|met(er|re)s?)?'),
     'pressure': ('dbar, bar, kPa, hPa, mbar, Pa', r'(d(eci)?bars?|db)?'),
-    'pitch_rad': ('degrees, rad', r'(deg.*|°.*)?'),
+    **dict.fromkeys(('pitch_rad', 'roll_rad', 'heading_rad'), ('degrees, rad', r'(deg.*|°.*)?')),
 }
 _SINCE_1970 = re.compile(
     r'seconds\s+since\s+1970-0?1-0?1([T ]0?0:0?0(:0?0(\.0*)?)?)?\s*(Z|UTC|\+00:?00)?'
@@ -117,7 +118,7 @@ def read(
                     scale = -names[name] if is_up else names[name]
                     scale = math.copysign((scales or {}).get(unit, scale), scale)
                     lowest, highest = PLAUSIBLE.get(key, (-math.inf, math.inf))
-                    if scales and key in PLAUSIBLE and unit not in scales:
+                    if scales and key in _USUAL and unit not in scales:
                         _refuse_unit(f'{path}: {name}', unit, key)
                     values = scale * values.astype(float)
                     values[(values < lowest) | (values > highest)] = math.nan
@@ -127,7 +128,7 @@ def read(
 
 def _refuse_unit(name: str, unit: str, key: str) -> None:
     """Refuse what is in none of the spellings of the unit in `variables.yaml`, if in any."""
-    usual, spelt = _USUAL.get(key, _USUAL['pitch_rad'])
+    usual, spelt = _USUAL[key]
     if not re.fullmatch(spelt, unit.strip(), re.IGNORECASE):
         raise ConfigurationError(f'{name} is in {unit!r} (allowed: {usual})')
 

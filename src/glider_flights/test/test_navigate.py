@@ -567,6 +567,14 @@ def test_a_flight_in_og1_is_navigated(tmp_path):
     assert summary(flight, rows)['dac_difference_mps']['median'] == pytest.approx(0.02, abs=0.003)
 
 
+def test_a_current_on_board_that_is_a_fill_is_none(tmp_path):
+    data = og1(3)
+    data['DAVG_CURR_NORTH'] = (0.0 * data.DAVG_CURR_NORTH - 9999.9).fillna(-9999.9)
+    data.to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
+    flight = read_flight(tmp_path, None, quiet)
+    assert summary(flight, navigated(flight))['dac_difference_mps']['segments'] == 0
+
+
 def in_bar(data):
     gsw = pytest.importorskip('gsw')
     pressure = gsw.p_from_z(-data.DEPTH, ORIGIN[0]) / 10.0
@@ -597,7 +605,8 @@ def with_fills(data):
     """Some have no number, and the file does not say which stands for none."""
     names, dived = ('DEPTH', 'PITCH', 'HEADING'), data.DEPTH > 50.0
     lost = dived & (np.arange(data.sizes['N_MEASUREMENTS']) % 5 == 0)
-    return data.assign({name: data[name].where(~lost, -9999.9) for name in names})
+    told = data.assign({name: data[name].where(~lost, -9999.9) for name in names})
+    return told.assign(MAGNETIC_VARIATION=('n', [0.0, 9.96921e36, 9.96921e36]))
 
 
 @pytest.mark.parametrize(
