@@ -148,8 +148,9 @@ def fixes_of(found: dict[str, np.ndarray]) -> np.ndarray:
     times = found.get('fix_time', found.get('time', none))
     if not len(latitude) == len(longitude) == len(times):
         return np.empty((0, 3))
-    # CF has longitudes to 360 degrees, too
-    longitude = np.where((longitude > 180.0) & (longitude <= 360.0), longitude - 360.0, longitude)
+    # CF has longitudes to 360 degrees, too, and a track over the date line may go on to -181
+    turns = np.where(np.abs(longitude) <= 360.0, np.round(longitude / 360.0), 0.0)
+    longitude = longitude - 360.0 * turns
     table = np.stack([times, latitude, longitude], axis=-1)
     good = np.isfinite(table).all(axis=-1) & (np.abs(table[:, 1:]) <= (90.0, 180.0)).all(axis=-1)
     return table[good][np.unique(table[good, 0], return_index=True)[1]]

@@ -601,6 +601,11 @@ def from_noon(data):
     return data.assign(times)
 
 
+def across_the_date_line(data):
+    """Westward, and on to -180.01."""
+    return data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS - data.LONGITUDE_GPS.min() - 180.01)
+
+
 def with_fills(data):
     """Some have no number, and the file does not say which stands for none."""
     names, dived = ('DEPTH', 'PITCH', 'HEADING'), data.DEPTH > 50.0
@@ -614,6 +619,8 @@ def with_fills(data):
     [
         with_fills,
         lambda data: data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS % 360.0),
+        lambda data: data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS % 360.0 - 360.0),
+        across_the_date_line,
         lambda data: data.assign(DEPTH=(-data.DEPTH).assign_attrs(units='m', positive='up')),
         lambda data: data.assign(DEPTH=(100.0 * data.DEPTH).assign_attrs(units='cm')),
         without_pressure,
