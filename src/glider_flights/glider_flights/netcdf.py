@@ -111,8 +111,10 @@ def read(
                 variable = dataset[by_name[name]]
                 unit = str(variable.attrs.get('units', ''))
                 values = np.atleast_1d(variable.values).ravel()
+                if key not in _TEXTS:
+                    values = _numbers(f'{path}: {name}', values)
                 if key.endswith('time'):
-                    values = _seconds(values.astype(float), unit)
+                    values = _seconds(f'{path}: {name}', values, unit)
                 elif key not in _TEXTS:
                     is_up = key == 'depth_m' and variable.attrs.get('positive') == 'up'
                     scale = -names[name] if is_up else names[name]
@@ -120,10 +122,17 @@ def read(
                     lowest, highest = PLAUSIBLE.get(key, (-math.inf, math.inf))
                     if scales and key in _USUAL and unit not in scales:
                         _refuse_unit(f'{path}: {name}', unit, key)
-                    values = scale * values.astype(float)
+                    values = scale * values
                     values[(values < lowest) | (values > highest)] = math.nan
                 found[key] = values
     return found
+
+
+def _numbers(name: str, values: np.ndarray) -> np.ndarray:
+    try:
+        return values.astype(float)
+    except (TypeError, ValueError) as error:
+        raise ConfigurationError(f'{name} has what is no number: {error}') from None
 
 
 def _refuse_unit(name: str, unit: str, key: str) -> None:
@@ -156,7 +165,7 @@ def fixes_of(found: dict[str, np.ndarray]) -> np.ndarray:
     return table[good][np.unique(table[good, 0], return_index=True)[1]]
 
 
-def _seconds(values: np.ndarray, units: str) -> np.ndarray:
+def _seconds(name: str, values: np.ndarray, units: str) -> np.ndarray:
     """Times as s since 1970, whatever their unit."""
     import xarray
 
@@ -164,6 +173,11 @@ def _seconds(values: np.ndarray, units: str) -> np.ndarray:
     if _SINCE_1970.fullmatch(units):
         return values
     values = np.where(np.abs(values) < FILLS, values, math.nan)
-    decoded = xarray.coding.times.decode_cf_datetime(values, units)
+    try:
+        decoded = xarray.coding.times.decode_cf_datetime(values, units)
+    except (ImportError, ValueError):  # xarray tries cftime, which may not be there
+        raise ConfigurationError(
+            f'{name} holds no times in {units!r} (allowed: such as seconds since 1970-01-01)'
+        ) from None
     decoded = np.asarray(decoded, 'datetime64[ns]')
     return np.where(np.isnat(decoded), math.nan, decoded.astype(np.int64) * 1e-9)

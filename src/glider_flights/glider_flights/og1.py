@@ -115,7 +115,7 @@ def _read(path: Path) -> LogFile:
         told = known.get('depth_m', by_pressure)
         known['depth_m'] = np.where(np.isfinite(by_pressure), by_pressure, told)
     needed = {key: wanted[key] for key in ('time', 'depth_m', 'pitch_rad')}
-    refuse_missing(path, known, needed, 'of a flight in OG1 or CF')
+    refuse_missing(path, known, needed, 'along the time, of a flight in OG1 or CF')
     if 'heading_rad' in known:
         declination, note = _declination(known, fixes)
         known['heading_rad'] = known['heading_rad'] + declination
@@ -153,7 +153,7 @@ def _own_polar(path: Path) -> Polar | None:
         text = groups[0].attrs.get('vehicle_yaml')
     if text is None:
         return None
-    values = parse_yaml(text, f'{path}: vehicle_yaml')
+    values = parse_yaml(str(text), f'{path}: vehicle_yaml')
     own = make_polar(validate(Vehicle, values, f'{path}: vehicle_yaml').params())
     per_pressure = 2.0 / DENSITY  # V^2 of a dynamic pressure
     return Polar(

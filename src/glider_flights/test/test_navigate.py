@@ -646,6 +646,33 @@ def test_a_unit_that_is_not_known_is_refused_by_name(name, unit, tmp_path):
         read_flight(tmp_path, None, quiet)
 
 
+@pytest.mark.parametrize(
+    ('name', 'values', 'unit', 'why'),
+    [
+        ('DEPTH', 'deep', 'm', "has what is no number: could not convert string to float: 'deep'"),
+        (
+            'TIME',
+            5.0,
+            'bananas',
+            "holds no times in 'bananas' (allowed: such as seconds since 1970-01-01)",
+        ),
+        (
+            'TIME',
+            1e5,
+            'days since 2020-45-01',
+            "holds no times in 'days since 2020-45-01' (allowed",
+        ),
+        ('PITCH', 20.0, '', 'or GLIDER_PITCH (needed along the time, of a flight in OG1 or CF)'),
+    ],
+)
+def test_what_is_no_number_or_no_time_is_named(name, values, unit, why, tmp_path):
+    data = og1(2)
+    dims = () if name == 'PITCH' else data[name].dims
+    data[name] = (dims, np.full(data[name].shape if dims else (), values), {'units': unit})
+    data.to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
+    assert f'{name} {why}' in told(str(tmp_path))
+
+
 @pytest.mark.parametrize('names', [['DEPTH'], ['PITCH', 'HEADING']])
 def test_no_line_is_drawn_over_what_is_missing_for_most_of_a_dive(names, tmp_path):
     data = og1(2)
