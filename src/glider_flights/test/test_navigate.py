@@ -619,7 +619,6 @@ def with_fills(data):
     [
         with_fills,
         lambda data: data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS % 360.0),
-        lambda data: data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS % 360.0 - 360.0),
         across_the_date_line,
         lambda data: data.assign(DEPTH=(-data.DEPTH).assign_attrs(units='m', positive='up')),
         lambda data: data.assign(DEPTH=(100.0 * data.DEPTH).assign_attrs(units='cm')),
