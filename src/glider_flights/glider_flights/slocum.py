@@ -126,6 +126,7 @@ def read_slocum(
         raise ConfigurationError(
             f'{place}: no value of {", ".join(missing)} in its {len(files)} files '
             f'*{files[0].suffix} (needed: {", ".join(NEEDED)})'
+            + ''.join(f'; {note}' for note in notes)
         )
     origin, fixes = _fixes(sensors)
     declined = usual(sensors['m_gps_mag_var'][1])

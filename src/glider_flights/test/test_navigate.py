@@ -259,6 +259,9 @@ def test_what_a_slocum_lacks_is_told(tmp_path, write_dbd):
     del table['m_pitch']
     write_dbd(file, table, False)
     assert 'no value of m_pitch' in told(str(tmp_path))
+    file.write_bytes(file.read_bytes()[:-500])
+    assert 'no value of m_pitch' in told(str(tmp_path))
+    assert '; read as far as it goes: 00010000.dbd: cut short' in told(str(tmp_path))
     file.write_bytes(b'dbd_label: DBD')
     assert 'no file could be read' in told(str(tmp_path))
 
