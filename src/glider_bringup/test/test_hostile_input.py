@@ -69,7 +69,10 @@ def test_set(refused, text, word):
     ('text', 'word'),
     [
         (BOMB, 'mission.yaml:6: not valid YAML: more than 200,000 values'),
-        ('seed: 1\ndives: ' + '9' * 5000, 'mission.yaml:2: not valid YAML: dives: a number of 5000'),
+        (
+            'seed: 1\ndives: ' + '9' * 5000,
+            'mission.yaml:2: not valid YAML: dives: a number of 5000',
+        ),
         (
             'seed: 1\n\nwater: {depth: 5}\n',
             'mission.yaml:3 with dives=0, duration_s=0.5: water.depth = 5: unknown',

@@ -109,30 +109,38 @@ def read(
                 if name is None or key in found:
                     continue
                 variable = dataset[by_name[name]]
-                unit = str(variable.attrs.get('units', ''))
                 values = np.atleast_1d(variable.values).ravel()
                 if key not in _TEXTS:
-                    values = _numbers(f'{path}: {name}', values)
-                if key.endswith('time'):
-                    values = _seconds(f'{path}: {name}', values, unit)
-                elif key not in _TEXTS:
-                    is_up = key == 'depth_m' and variable.attrs.get('positive') == 'up'
-                    scale = -names[name] if is_up else names[name]
-                    scale = math.copysign((scales or {}).get(unit, scale), scale)
-                    lowest, highest = PLAUSIBLE.get(key, (-math.inf, math.inf))
-                    if scales and key in _USUAL and unit not in scales:
-                        _refuse_unit(f'{path}: {name}', unit, key)
-                    values = scale * values
-                    values[(values < lowest) | (values > highest)] = math.nan
+                    told = variable.attrs
+                    values = _in_ours(f'{path}: {name}', key, values, told, names[name], scales)
                 found[key] = values
     return found
 
 
-def _numbers(name: str, values: np.ndarray) -> np.ndarray:
+def _in_ours(
+    name: str,
+    key: str,
+    values: np.ndarray,
+    told: dict,
+    scale: float,
+    scales: dict[str, float] | None,
+) -> np.ndarray:
+    """Values of a variable in our units, by its attributes; NaN for what cannot be."""
+    unit = str(told.get('units', ''))
     try:
-        return values.astype(float)
+        values = values.astype(float)
     except (TypeError, ValueError) as error:
         raise ConfigurationError(f'{name} has what is no number: {error}') from None
+    if key.endswith('time'):
+        return _seconds(name, values, unit)
+    if scales and key in _USUAL and unit not in scales:
+        _refuse_unit(name, unit, key)
+    if key == 'depth_m' and told.get('positive') == 'up':
+        scale = -scale
+    values = values * math.copysign((scales or {}).get(unit, scale), scale)
+    lowest, highest = PLAUSIBLE.get(key, (-math.inf, math.inf))
+    values[(values < lowest) | (values > highest)] = math.nan
+    return values
 
 
 def _refuse_unit(name: str, unit: str, key: str) -> None:

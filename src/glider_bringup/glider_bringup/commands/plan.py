@@ -7,7 +7,6 @@ import math
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from glider_base.frames import to_geodetic
@@ -15,7 +14,6 @@ from glider_bringup.console import Changes, Json, Named, changed_fields, counter
 from glider_bringup.showing.words import count, span
 from glider_mission.chart import place_told
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
-from glider_model.ocean.bottom import least_height
 
 app = typer.Typer()
 
@@ -80,12 +78,11 @@ def _told(made: Any, scenario: Scenario) -> dict[str, Any]:
 
 def _notes(made: Any, scenario: Scenario) -> list[str]:
     """What a plan does not count, and what of its dives the bottom does not let be."""
-    from glider_mission.routing.plan import LOOK_M, places_along
+    from glider_mission.routing.plan import bottom_under
 
     orders, profile = len(scenario.orders), scenario.profile
     notes = [f'{count(orders, "order")} of the mission not counted'] if orders else []
-    n, e = places_along(made.route.corners, LOOK_M).T.copy()
-    bottom_m, _ = least_height(n, e, np.zeros(len(n)), scenario.bottom())
+    bottom_m = bottom_under(made.route.corners, scenario.bottom())
     if bottom_m <= profile.depth_m and not profile.clearance_m:
         notes.append(f'dives to {profile.depth_m:,.0f} m touch a bottom at {bottom_m:,.0f} m')
     if profile.clearance_m and bottom_m <= profile.clearance_m + profile.top_depth_m:

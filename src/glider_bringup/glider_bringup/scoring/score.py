@@ -302,12 +302,11 @@ class Scorer:
             rules = rules._replace(path=path.params(), ends=path.at_end == 'stop')
         tick, row = self._end or (self.ticks, self._last)
         odometry, targets = _odometry_of(row), self._targets()[self._path_since :]
-        course = self._reroutes[-1][-1] if self._reroutes else None
-        course = self._course_rad if course is None else course
+        courses = [self._course_rad, *(led for *_, led in self._reroutes if led is not None)]
         arrival = arrival_of(
             place=(odometry.p_n, odometry.p_e),
             targets=targets,
-            behind_m=_along_m(row, targets[::-1], course + math.pi),
+            behind_m=_along_m(row, targets[::-1], courses[-1] + math.pi),
             tick=tick,
             since=self._path_since,
             has_arrived=self._end is not None,

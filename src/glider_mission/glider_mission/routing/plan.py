@@ -20,7 +20,7 @@ from glider_model.vehicle.file import load_vehicle
 #: A route is straightened where that moves it by less than this (m).
 _STRAIGHT_M = 1000.0
 #: Whether a leg leads over land is looked at so often along it (m).
-LOOK_M = 20.0
+_LOOK_M = 20.0
 #: How deep it is there is looked at so often (m).
 _DIVE_M = 200.0
 #: Errors of a forecast that are tried.
@@ -176,6 +176,12 @@ def places_along(route: np.ndarray, step_m: float) -> np.ndarray:
     )
 
 
+def bottom_under(route: np.ndarray, bottom: NamedTuple) -> float:
+    """Least depth of the bottom (m) under straight legs."""
+    norths, easts = places_along(route, _LOOK_M).T.copy()
+    return least_height(norths, easts, np.zeros(len(norths)), bottom)[0]
+
+
 def as_dived(scenario: Scenario) -> Scenario:
     """A mission with dives as deep as its altimeter lets them be, where straight legs can dive.
 
@@ -199,7 +205,7 @@ def crossing(
 
     There is land by the bottom where that is charted, else by the nearest points, bool[n, m].
     """
-    norths, easts = places_along(route, LOOK_M).T.copy()
+    norths, easts = places_along(route, _LOOK_M).T.copy()
     step = chart.norths[1] - chart.norths[0]
     rows, columns = (
         np.rint((along - axis[0]) / step).astype(int).clip(0, len(axis) - 1)
