@@ -3,7 +3,8 @@
 """A driver that is killed in flight and is back within seconds: flown on, told, recorded.
 
 Driver, autopilot and recorder are processes of their own. What the middleware knows of the dead
-driver stays listed for longer than the guard would wait.
+driver stays listed for longer than the guard would wait. What it publishes is reliable at first,
+and once it is back with best effort.
 """
 
 import json
@@ -46,8 +47,16 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 import rclpy
 from driver import Driver, JOINTS
+from rclpy.qos import qos_profile_sensor_data
 
-START_S, PLACES = float(sys.argv[2]), Path(sys.argv[3])
+START_S, PLACES, QOS = float(sys.argv[2]), Path(sys.argv[3]), sys.argv[4]
+
+
+class OurDriver(Driver):
+    def create_publisher(self, kind, topic, qos, **more):
+        if QOS == 'best_effort' and topic in ('odom', 'joint_states'):
+            qos = qos_profile_sensor_data
+        return super().create_publisher(kind, topic, qos, **more)
 
 
 class Glider:
@@ -71,7 +80,7 @@ class Glider:
 
 
 rclpy.init(args=sys.argv)
-driver = Driver(Glider())
+driver = OurDriver(Glider())
 driver.start()
 rclpy.spin(driver)
 """
@@ -134,7 +143,7 @@ def flight(tmp_path_factory):
     python, option, module, *ros = commands[AUTOPILOT]
     aboard = [python, option, module, 'guidance', 'control', 'guard', *ros]
     driver = [sys.executable, script, EXAMPLES, str(time.time()), places]
-    driver += ['--ros-args', '-r', '__ns:=/glider']
+    space = ['--ros-args', '-r', '__ns:=/glider']
     context, processes = Context(), []
     with domain_id() as domain:
         environment = node_environment(domain)
@@ -157,13 +166,13 @@ def flight(tmp_path_factory):
                 recorder = start(commands[RECORDER], stdout=stream)
             nodes = {'guidance_node', 'control_node', 'guard_node', RECORDER}
             heard.until(lambda: heard.ready >= nodes)
-            first = start(driver)
+            first = start([*driver, 'reliable', *space])
             heard.until(lambda: heard.commands and heard.commands[-1][1] > 0.2 and recorded_s())
             heard.listen(2.0)
             first.kill()
             killed_s = time.monotonic()
             heard.listen(AWAY_S)
-            start(driver)
+            start([*driver, 'best_effort', *space])
             back_s, back_at_s = time.monotonic(), time.time()
             heard.until(lambda: len(heard.takers()) == 3)
             heard.until(lambda: recorded_s() > back_at_s)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
 from glider_base.errors import EXIT_FAILED
@@ -109,12 +110,28 @@ class RecorderNode(TickNode):
     def add_input(self, name: str) -> Input:
         """Subscribe without waiting for messages: `drain` takes them all."""
         item = Input(TOPICS[name], self.ticks.lockstep, topics.REPLAY)
-        profile = None if self.ticks.lockstep else qos.EVERYTHING
+        self.subscribe(item)
+        self.inputs.append(item)
+        return item
+
+    def subscribe(self, item: Input, profile: QoSProfile | None = None) -> None:
+        """Ask for the messages of an input, by the profile of its topic or another one."""
         item.subscription = self._subscription(
             item.topic, lambda raw, info: self.keep(item, raw, info), profile=profile
         )
-        self.inputs.append(item)
-        return item
+
+    def hear_best_effort(self, item: Input) -> None:
+        """Take what comes of a topic that somebody publishes with best effort.
+
+        By its own profile a topic is sent again until it is here, however late that is.
+        """
+        offers = (info.qos_profile for info in self.get_publishers_info_by_topic(item.topic.name))
+        reliable = ReliabilityPolicy.RELIABLE
+        if item.subscription.qos_profile.reliability == reliable and any(
+            offer.reliability != reliable for offer in offers
+        ):
+            self.destroy_subscription(item.subscription)
+            self.subscribe(item, qos.EVERYTHING)
 
     def refuse_stranger(self, item: Input, gid: bytes) -> None:
         """Pass over a message of somebody else: those who need the topic tell."""
@@ -324,6 +341,8 @@ class RecorderNode(TickNode):
             raise Stop(EXIT_FAILED, str(error)) from None
         if self.over_since_s is not None and time.monotonic() - self.over_since_s > FAREWELL_S:
             raise Stop(0)
+        for item in () if self.ticks.lockstep else self.inputs:
+            self.hear_best_effort(item)
 
     def close(self) -> None:
         """Write what is left, and complete the folder."""

@@ -30,5 +30,5 @@ EVENTS = _profile(256, reliable=True, latched=True)
 #: What a node repeats on /diagnostics, for who listens now: neither a recorder nor anybody else
 #: who asks for what was said before is given it.
 REPEATED = _profile(1, reliable=True)
-#: What a recorder asks for in free-running mode: everything, from whatever publisher there is.
+#: What a recorder asks for where somebody publishes with best effort.
 EVERYTHING = _profile(1024)
