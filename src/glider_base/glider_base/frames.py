@@ -35,6 +35,11 @@ def wrap_angle(angle):
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
+def within_180(degrees):
+    """Angle or longitude (deg) brought into [-180, 180), float or array."""
+    return (degrees + 180.0) % 360.0 - 180.0
+
+
 @kernel
 def rotate_to_ned(q_w, q_x, q_y, q_z, x, y, z):
     """Turn a body vector into NED: ``R_NB [x, y, z]`` for the unit quaternion q_NB."""

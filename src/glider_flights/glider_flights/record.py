@@ -13,6 +13,8 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from glider_base.frames import within_180
+
 #: Metres of a degree of latitude, on a sphere of the Earth's mean radius.
 METRES_PER_DEGREE = 6_371_000.0 * math.pi / 180.0
 #: Shallower than this a glider is at the surface (m): it floats with its tail out of the water.
@@ -178,7 +180,7 @@ def usual(values: Sequence[float]) -> float:
 def local_metres(origin_deg: np.ndarray, latitude_deg, longitude_deg) -> np.ndarray:
     """North and east (m, last axis) of an origin (latitude, longitude in degrees)."""
     latitude_deg, longitude_deg = np.asarray(latitude_deg), np.asarray(longitude_deg)
-    turned = (longitude_deg - origin_deg[1] + 180.0) % 360.0 - 180.0
+    turned = within_180(longitude_deg - origin_deg[1])
     scale = np.cos(np.radians(0.5 * (latitude_deg + origin_deg[0])))
     north = (latitude_deg - origin_deg[0]) * METRES_PER_DEGREE
     return np.stack([north, turned * scale * METRES_PER_DEGREE], axis=-1)

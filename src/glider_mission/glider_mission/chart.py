@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from glider_base.errors import shown
-from glider_base.frames import Origin, OriginSettings, from_geodetic
+from glider_base.frames import Origin, OriginSettings, from_geodetic, within_180
 from glider_guidance.path.settings import MAX_DISTANCE_M
 from glider_mission.mafiles import SUFFIX, read_goto_list
 
@@ -173,11 +173,11 @@ def _middle(points: list[tuple[float, float]]) -> dict[str, float]:
     """Middle of some places (deg), across the date line too."""
     latitudes = [latitude for latitude, _ in points]
     first = points[0][1]
-    away = [(longitude - first + 180.0) % 360.0 - 180.0 for _, longitude in points]
+    away = [within_180(longitude - first) for _, longitude in points]
     longitude = first + 0.5 * (min(away) + max(away))
     return {
         'latitude_deg': round(0.5 * (min(latitudes) + max(latitudes)), 4),
-        'longitude_deg': round((longitude + 180.0) % 360.0 - 180.0, 4),
+        'longitude_deg': round(within_180(longitude), 4),
     }
 
 

@@ -18,7 +18,7 @@ import xarray
 from xarray.backends import H5NetCDFStore
 
 from glider_base.errors import ConfigurationError, installed
-from glider_base.frames import on_chart, poses_from_wire
+from glider_base.frames import on_chart, poses_from_wire, within_180
 from glider_base.signals import TICK_NS
 from glider_bringup.door.tracks import start_of
 from glider_bringup.scoring.card import read_score
@@ -171,7 +171,7 @@ def _measured(
         attitude = poses_from_wire(wire)[:, 3:]
         depth = depth_at(rows[:, COLUMNS['pressure'].start])
     latitude, longitude = on_chart(place[:, 0], place[:, 1], scenario.origin.params())
-    longitude = (longitude + 180.0) % 360.0 - 180.0
+    longitude = within_180(longitude)
     fix, fixed = (latitude, longitude), (depth < FIX_DEPTH_M) & (time_s % FIX_EVERY_S == 0.0)
     if 'fix' in scenario.topics:
         status, *fixes = rows[:, COLUMNS['fix']].T[:3]
@@ -213,7 +213,7 @@ def _about(
 ) -> dict[str, str]:
     # over the date line the westernmost is the larger one
     east = np.unwrap(dataset['LONGITUDE'], period=360.0)
-    west, east = ((float(one) + 180.0) % 360.0 - 180.0 for one in (east.min(), east.max()))
+    west, east = (within_180(float(one)) for one in (east.min(), east.max()))
     nobody, now = 'not given', _compact(datetime.now(timezone.utc).timestamp())
     return {
         'Conventions': 'CF-1.10, OG-1.0',

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.integrate import trapezoid
 
-from glider_base.frames import on_chart
+from glider_base.frames import on_chart, within_180
 from glider_base.settings import ConfigurationError
 from glider_bringup.showing.figure import GREEN, ORANGE, new_figure
 from glider_bringup.showing.words import count
@@ -164,7 +164,7 @@ def _where(part: dict[str, Any]) -> list[tuple[str, str]]:
         text = f'{part["seen"]["time"]}, {depth["first"]:g} to {depth["last"]:g} m'
         rows.append(('ranges are of', text))
     south, north = part['latitude_deg'], part['longitude_deg']
-    corners = [place_told(south[k], (north[k] + 180.0) % 360.0 - 180.0) for k in ('first', 'last')]
+    corners = [place_told(south[k], within_180(north[k])) for k in ('first', 'last')]
     rows.append(('places', f'{corners[0]} to {corners[1]}, {south["count"]} x {north["count"]}'))
     if part['land_share'] is not None:
         of = 'the uppermost level' if 'times' in part else 'the chart'
@@ -277,7 +277,7 @@ def draw_plan(made: Plan, scenario: Scenario, file: Path) -> None:
 def _draw_panel(figure: Any, place: tuple[int, int, int], panel: Panel) -> Any:
     """Axis of a figure with colours, and with arrows of a current."""
     axis = figure.add_subplot(*place, xlabel='longitude (deg)', ylabel='latitude (deg)')
-    axis.xaxis.set_major_formatter(lambda degree, _: f'{(degree + 180.0) % 360.0 - 180.0:.8g}')
+    axis.xaxis.set_major_formatter(lambda degree, _: f'{within_180(degree):.8g}')
     latitudes, longitudes = panel.latitudes, panel.longitudes
     drawn = axis.pcolormesh(longitudes, latitudes, panel.values, cmap=panel.colours)
     figure.colorbar(drawn, label=panel.label)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from glider_base.frames import within_180
 from glider_bringup.scoring.one_hertz import Record
 from glider_bringup.scoring.score import windows
 from glider_bringup.scoring.scores import largest, rms
@@ -31,14 +32,10 @@ def _windows(record: Record, scenario: Scenario) -> tuple[np.ndarray, np.ndarray
     return windows(record.depth, record.descending, rules, _SAMPLE_S)
 
 
-def _wrap_deg(angle: np.ndarray) -> np.ndarray:
-    return (angle + 180.0) % 360.0 - 180.0
-
-
 def measure_attitude(record: Record, scenario: Scenario) -> dict[str, Any]:
     """Roll, heading error, and mean pitch and pitch mass in dive and climb, steady."""
     steady, _ = _windows(record, scenario)
-    error = _wrap_deg(record.heading - record.heading_ref)[steady]
+    error = within_180(record.heading - record.heading_ref)[steady]
     down, up = steady & record.descending, steady & ~record.descending
     pitch_mass = 1e3 * record.joints[:, 1]
     return {
@@ -113,7 +110,7 @@ def measure_crab(record: Record, scenario: Scenario) -> dict[str, Any]:
     steady, _ = _windows(record, scenario)
     speed, north, east = horizontal_speed(scenario), *scenario.constant_current()
     best, _, _ = crab_heading(scenario.path.course_rad(), speed, north, east)
-    error = _wrap_deg(record.heading[steady] - math.degrees(best))
+    error = within_180(record.heading[steady] - math.degrees(best))
     return {'crab_error_deg': _mean(np.abs(error))}
 
 

@@ -19,7 +19,7 @@ import pydantic
 from pydantic import Field
 
 from glider_base.errors import ConfigurationError
-from glider_base.frames import Origin, OriginSettings, on_chart
+from glider_base.frames import Origin, OriginSettings, on_chart, within_180
 from glider_base.kernel import kernel
 from glider_base.settings import Settings, beside
 from glider_model.ocean.field import FieldSettings, Mission, bracket, field_velocity
@@ -159,7 +159,7 @@ def _loaded(file: str, stamp: tuple[int, int], mission: Mission, of: str) -> tup
 
 def _beside(place: tuple[float, float], longitude: float) -> tuple[float, float]:
     """A place (deg) with its longitude as near to another one as it can be."""
-    return place[0], longitude + (place[1] - longitude + 180.0) % 360.0 - 180.0
+    return place[0], longitude + within_180(place[1] - longitude)
 
 
 def mission_window(mission: Mission) -> Window:
