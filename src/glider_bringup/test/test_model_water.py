@@ -76,3 +76,11 @@ def test_in_the_warmer_water_of_the_north_it_sinks_faster(tmp_path):
         runs.append(fly({'grid': {'file': file}}, **{'initial.north_m': 20000.0, 'dives': 1}))
     deep_s = [run.to_xarray()['ground_truth_odom_depth'].values.argmax() / 10.0 for run in runs]
     assert deep_s[1] < 0.98 * deep_s[0]
+
+
+def test_a_vehicle_that_a_step_of_the_density_bears_is_said_to_lie_on_denser_water():
+    step = [(0.0, 1015.0), (7.0, 1015.0), (9.0, 1027.0), (1000.0, 1031.0)]
+    told = fly({'profile': step}, duration_s=1500.0).score
+    assert told['status'] == 'surfaced'
+    assert 'on denser water' in told['reason']
+    assert told['depth_m']['max'] < 20.0
