@@ -168,6 +168,18 @@ def test_a_mission_that_drifts_before_the_end_of_its_path_is_unfinished(dives):
     assert told['reason'].startswith('afloat')
 
 
+@pytest.mark.parametrize('vehicle', ['slocum_g2', 'seaglider'])
+def test_a_mission_whose_dives_begin_slowly_goes_on(vehicle):
+    """With so little weight it takes longer than a minute to leave the surface."""
+    path = {'kind': 'waypoints', 'waypoints': [[0, 0], [20000, 0]], 'at_end': 'stop'}
+    yo = {'profile.depth_m': 60.0, 'profile.surface_every_dives': 1, 'profile.pitch_deg': 15.0}
+    changes = {**yo, 'profile.net_heaviness_kg': 0.02, 'dives': 0, 'duration_s': 12000.0}
+    changes |= {'vehicle': vehicle, 'path': path}
+    _, told = fly_scored(load_scenario('current_8deg', changes), [])
+    assert (told['status'], told['sim_time_s']) == ('completed', 12000.0)
+    assert told['dives'] >= 2
+
+
 @pytest.mark.parametrize('depth_m', [60.0, 100.0])
 def test_dives_count_wherever_the_upper_turn_is(depth_m):
     """A mission that has flown its dives is over once it is up, and is told so."""

@@ -82,7 +82,7 @@ class PlantState(NamedTuple):
     deep: bool = False  #: has been below where a dive counts since it was last above
     dives: int = 0  #: completed dives
     surface_ticks: int = 0  #: ticks at the surface without a break
-    afloat_ticks: int = -1  #: those in which the pump was not filled; -1: has not dived yet
+    afloat_ticks: int = -1  #: since the pump was filled last; -1: has not dived yet
     sample: Sample = NO_SAMPLE  #: what the sensors showed at the tick before
     surfacing: Surfacing = LAUNCHED
     faults: NamedTuple = NoFaultState()  #: NoFaultState, or FaultState
@@ -155,8 +155,8 @@ class PlantSettings(Settings):
     afloat_s: float = number(
         0.0,
         (0.0, 1e6),
-        'the run ends once the vehicle, having dived, has been at the surface so long without '
-        'filling its pump (s); 0.0: never',
+        'the run ends once the vehicle, having dived, has been at the surface so long since it '
+        'filled its pump (s); 0.0: never',
     )
     seed: int = number(0, (0, 2**63 - 1), 'seed of the noise')
     sensors: SensorSettings = Field(SensorSettings(), description='errors of the sensors')
@@ -368,10 +368,10 @@ def surface_after(surfacing, depth):
 
 @kernel
 def _afloat(ticks, depth, fills):
-    """Ticks afloat after one more; a vehicle that fills its pump is about to dive."""
-    if depth >= SURFACE_M:
-        return 0 if ticks >= 0 or depth > DIVED_M else -1
-    return ticks if ticks < 0 or fills else ticks + 1
+    """Ticks afloat after one more; of a vehicle that fills its pump since then: it may dive."""
+    if ticks < 0:
+        return 0 if depth > DIVED_M else -1
+    return 0 if fills or depth >= SURFACE_M else ticks + 1
 
 
 @kernel
