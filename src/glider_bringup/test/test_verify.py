@@ -279,6 +279,8 @@ def test_input_that_is_not_finite_ends_what_can_be_computed(
     for reader in readers:
         assert (blocks[reader]['first']['topic'], blocks[reader]['first']['tick']) == (name, 300)
         assert 'not finite' in blocks[reader]['first']['recorded']
+        (note,) = blocks[reader]['notes']
+        assert f'{name} differs at t = 30.0 s from what {source} computes' in note
 
 
 @pytest.mark.parametrize('compression', list(CompressionType))

@@ -15,7 +15,7 @@ from glider_base import wiring
 from glider_base.block import optional_topics
 from glider_base.ros.lockstep.health import seconds
 from glider_base.signals import TICK_NS
-from glider_base.wiring import WHEN_SILENT, WIRING, Wired, present
+from glider_base.wiring import WHEN_SILENT, WIRING, Wired, present, publisher
 from glider_mission.blocks import BLOCKS
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recorded_inputs import RecordedBlock
@@ -120,7 +120,12 @@ def _hints(one: Verdict, verdicts: list[Verdict]) -> list[str]:
     (wired,) = [wired for wired in WIRING if wired.name == one.block]
     for other in verdicts:
         source = other.first
-        if source and source.topic in wired.inputs and source.stamp_ns <= one.first.stamp_ns:
+        if (
+            source
+            and source.topic in wired.inputs
+            and publisher(source.topic).name == other.block
+            and source.stamp_ns <= one.first.stamp_ns
+        ):
             hints.append(
                 f'its input {source.topic} differs at {seconds(source.stamp_ns)} from what '
                 f'{other.block} computes: if the recording is damaged there, this is why'
