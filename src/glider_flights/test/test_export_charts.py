@@ -93,6 +93,17 @@ def test_og1_has_what_its_manual_wants(og1):
         assert np.isfinite(read['LATITUDE_GPS']).sum() > 100
 
 
+def test_og1_of_the_bag_alone_is_the_same(og1, flown, tmp_path):
+    (bag,) = flown.folder.glob('*.mcap')
+    words = ['export', str(bag), '--to', 'og1', '--out', str(tmp_path / 'bag.nc')]
+    assert CliRunner().invoke(app, words, catch_exceptions=False).exit_code == 0
+    with (
+        xarray.open_dataset(og1, engine='h5netcdf') as run,
+        xarray.open_dataset(tmp_path / 'bag.nc', engine='h5netcdf') as read,
+    ):
+        assert read.equals(run)
+
+
 def test_og1_read_back_has_the_same_current(og1, flown):
     """What navigation believed of the current in the flight, from what it measured.
 

@@ -21,11 +21,10 @@ from glider_base.errors import ConfigurationError, installed
 from glider_base.frames import on_chart, poses_from_wire, within_180
 from glider_base.signals import TICK_NS
 from glider_bringup.door.tracks import start_of
-from glider_bringup.scoring.card import read_score
 from glider_bringup.scoring.one_hertz import SECOND, Rows
+from glider_bringup.showing.flown_run import read_run
 from glider_mission.blocks import COLUMNS
 from glider_mission.disk import write_whole
-from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.recorded_log import read_back
 from glider_mission.run_folder import VEHICLE_FILE, scenario_of
@@ -86,21 +85,17 @@ VARIABLES = {
 
 def write_og1(
     run: Path, start: str | None, file: Path, progress: Callable[[int, int], None]
-) -> None:
-    """Write a run with a bag as a flight in OG1.0.
+) -> dict:
+    """Write a run with a bag as a flight in OG1.0; its scorecard.
 
     Raises ConfigurationError if it has no bag, or no tick in it, if nobody knows when it was, or
     the file cannot be written.
     """
     with installed('h5netcdf, which writes NetCDF 4'):
         import h5netcdf  # xarray writes NetCDF 4 through it
-    if not has_bag(run):
-        raise ConfigurationError(
-            f'{run}: no bag in it (allowed: a run over nodes, or one flown with --bag)'
-        )
     bag, taker = Bag(run), Rows(SECOND, ('imu', 'pressure', 'fix', 'odom'))
     with scenario_of(run, bag.attachments) as found:
-        scenario, card = found.scenario, read_score(run) or {}
+        scenario, card = found.scenario, read_run(run, traced=False).card
         began_s = start_of(scenario, start)
         if began_s is None:
             raise ConfigurationError(
@@ -121,6 +116,7 @@ def write_og1(
             encoding={name: _encoding(dataset[name]) for name in dataset.variables},
         )
     write_whole(file, memory.getvalue())
+    return card
 
 
 def _encoding(variable: xarray.DataArray) -> dict[str, Any]:
