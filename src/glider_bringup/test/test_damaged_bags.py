@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from typer.testing import CliRunner
 
 from fuzzing import bags, watch
 from fuzzing.counts import Counter
@@ -21,6 +22,7 @@ from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import PLANT, TOPICS
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS, TICK_S
+from glider_bringup.cli import app
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.traces import load_traces
 from glider_bringup.showing.figure import draw_run
@@ -190,6 +192,9 @@ def test_cut_run_is_not_completed_wherever_it_is_shown(run, share):
     assert f'{card["ticks"]} of {TICKS} ticks are there' in card['reason']
     for traced in (False, True):
         assert read_run(run, traced=traced).card == card
+    for words in (['figure'], *(['export', '--to', kind] for kind in ('netcdf', 'csv', 'kml'))):
+        done = CliRunner().invoke(app, [*words, str(run)], catch_exceptions=False)
+        assert f'status: aborted ({card["reason"]})' in done.stderr, words
 
 
 @pytest.mark.parametrize('size', [0, 1, 100, 6000])

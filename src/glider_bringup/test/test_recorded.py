@@ -8,12 +8,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from glider_base.ros.lockstep import health
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import PLANT, TOPICS
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
+from glider_bringup.cli import app
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
@@ -149,6 +151,17 @@ def test_free_running_recording_is_no_scorecard_of_nothing(tmp_path):
     for use in USES:
         with pytest.raises(ConfigurationError, match='flight: cannot be scored.*free-running'):
             use(folder)
+
+
+@pytest.mark.parametrize('kind', ['netcdf', 'csv', 'mat', 'og1'])
+def test_recording_without_a_tick_is_no_file_that_nobody_can_read(tmp_path, kind):
+    pytest.importorskip('h5netcdf')
+    folder = make_run_folder(load_scenario('helix'), tmp_path / 'flight')
+    BagWriter(folder, 'helix').close()
+    words = ['export', str(folder), '--to', kind, *(['--start', '2026-03-01'] * (kind == 'og1'))]
+    with pytest.raises(ConfigurationError, match='flight: no tick was recorded'):
+        CliRunner().invoke(app, words, catch_exceptions=False)
+    assert not [*folder.glob('run.*')]
 
 
 def test_attached_scenario_that_cannot_be_used_is_named(tmp_path):

@@ -9,6 +9,7 @@ import typer
 
 from glider_base.errors import ConfigurationError
 from glider_bringup.console import Json, Run, beside, counter, messages, print_written
+from glider_bringup.showing.scorecard import tell_stopped
 from glider_mission.disk import write_whole
 
 app = typer.Typer()
@@ -70,12 +71,14 @@ def export(
         from glider_bringup.door.og1 import write_og1
 
         with counter('reading the bag', None) as update:
-            write_og1(run, start, file, update)
+            card = write_og1(run, start, file, update)
     elif to == 'slocum':
         from glider_bringup.door.tracks import write_mafiles
         from glider_bringup.showing.flown_run import read_run
 
-        write_mafiles(read_run(run, traced=False), file)
+        flown = read_run(run, traced=False)
+        write_mafiles(flown, file)
+        card = flown.card
     elif to in ('geojson', 'kml', 'gpx'):
         from glider_bringup.door.tracks import CHARTS, chart_of, start_of
         from glider_bringup.showing.flown_run import read_run
@@ -83,12 +86,15 @@ def export(
         with counter('reading', None) as update:
             flown = read_run(run, update)
         write_whole(file, CHARTS[to](chart_of(flown, start_of(flown.scenario, start))))
+        card = flown.card
     else:
-        _write_all(run, to, file, start)
+        card = _write_all(run, to, file, start)
+    tell_stopped(card)
     print_written('written', run, file, as_json)
 
 
-def _write_all(run: Path, kind: str, file: Path, start: str | None) -> None:
+def _write_all(run: Path, kind: str, file: Path, start: str | None) -> dict:
+    """Write every number of a run; its scorecard."""
     from glider_bringup.door.export import WRITERS, dataset_of
     from glider_bringup.door.run import open_run
     from glider_bringup.door.tracks import start_of
@@ -99,3 +105,4 @@ def _write_all(run: Path, kind: str, file: Path, start: str | None) -> None:
         dataset = dataset_of(flown, began_s)
     with counter('writing', dataset.sizes['time']) as update:
         WRITERS[kind](dataset, file, update)
+    return flown.score

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from glider_bringup.console import Json, Run, beside, counter, print_written
+from glider_bringup.showing.scorecard import tell_stopped
 
 app = typer.Typer()
 
@@ -27,5 +28,7 @@ def figure(
 
     file = out or beside(run, 'run.png')
     with counter('reading the bag', None) as update:
-        draw_run(read_run(run, update), file)
+        flown = read_run(run, update)
+        draw_run(flown, file)
+    tell_stopped(flown.card)
     print_written('drawn', run, file, as_json)

@@ -29,9 +29,12 @@ Progress = Callable[[int], None]
 def dataset_of(run: Run, began_s: float | None = None) -> xarray.Dataset:
     """Dataset of a run, with its score, scenario and vehicle as they stand in a run folder.
 
-    Its time is one by CF where it is known when the run started (s since 1970).
+    Its time is one by CF where it is known when the run started (s since 1970). Raises
+    ConfigurationError if no tick was recorded, of which no file could be read.
     """
     dataset = run.to_xarray()
+    if not dataset.sizes['time']:
+        raise ConfigurationError(f'{run.folder}: no tick was recorded (allowed: one and more)')
     if began_s is not None:
         began = datetime.fromtimestamp(began_s, timezone.utc).replace(tzinfo=None)
         dataset.time.attrs |= {

@@ -11,7 +11,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from glider_bringup.console import output
+from glider_bringup.console import messages, output
+from glider_bringup.scoring.card import STOPPED
 from glider_bringup.scoring.scores import SCORES, Score, reckoned, told_in
 from glider_bringup.showing.words import span, way
 from glider_mission.changes import told_fields
@@ -216,6 +217,13 @@ def print_status(card: dict) -> None:
     """Print what became of a run."""
     text = f'status: {status_text(card)}'
     output.print(text, style=STYLES[card['status']], soft_wrap=True)
+
+
+def tell_stopped(card: dict) -> None:
+    """Say beside what was made of a run that it is not whole, if it is not, and why."""
+    if card['status'] in STOPPED:
+        text = f'status: {status_text(card)}'
+        messages.print(text, style=STYLES[card['status']], soft_wrap=True)
 
 
 def print_places(console: Console, folder: Path, report: Path | None) -> None:
