@@ -367,6 +367,10 @@ def test_what_cannot_be_flown_is_told(file, dive, tmp_path):
     wrong = tmp_path / 'wrong.npy'
     np.save(wrong, np.zeros(5))
     assert 'has shape (5,)' in told(file, *slocum, '--adcp', str(wrong))
+    np.save(wrong, [['a', 'b'], ['c', 'd']])
+    assert 'wrong.npy: cannot be read: could not' in told(file, *slocum, '--adcp', str(wrong))
+    wrong.write_bytes(b'')
+    assert 'wrong.npy: cannot be read: No data left' in told(file, *slocum, '--adcp', str(wrong))
     write_dive(tmp_path / 'p1230001.nc', {name: part[:5] for name, part in dive.items()})
     assert 'no stretch under water of 120 s' in told(str(tmp_path), *slocum)
 

@@ -172,14 +172,15 @@ def find_adcp(place: Path, file: Path | None) -> Adcp | None:
         file = beside[0]
     try:
         table = np.load(file) if file.suffix == '.npy' else np.loadtxt(file, delimiter=',').T
-    except (OSError, ValueError) as error:
+        table = np.asarray(table, float)
+    except (OSError, ValueError, TypeError, EOFError) as error:
         raise ConfigurationError(f'--adcp {file}: cannot be read: {error}') from None
     if table.ndim != 2 or len(table) != 2 or not table.shape[1]:
         raise ConfigurationError(
             f'--adcp {file}: has shape {table.shape} (allowed: 2, n: time in s since 1970, speed '
             'through the water in m/s; as CSV a line for each)'
         )
-    time_s, speed = np.asarray(table, float)
+    time_s, speed = table
     good = np.isfinite(time_s)
     speed = np.where((speed > 0.0) & (speed < FASTEST_MPS), speed, math.nan)
     return Adcp(time_s[good], speed[good])
