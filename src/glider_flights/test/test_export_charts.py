@@ -251,7 +251,8 @@ def test_netcdf_of_a_run_with_a_date_has_times_by_cf(export):
 
 
 def test_a_run_of_no_date_is_refused_unless_it_is_told(tmp_path):
-    run = glider.fly('slocum_shelf', duration=30.0, out=tmp_path / 'run', bag=True)
+    declination = {'sensors.declination_deg': 20.0}
+    run = glider.fly('slocum_shelf', declination, duration=30.0, out=tmp_path / 'run', bag=True)
 
     def told(*words: str) -> str:
         with pytest.raises(ConfigurationError) as error:
@@ -270,6 +271,11 @@ def test_a_run_of_no_date_is_refused_unless_it_is_told(tmp_path):
     assert CliRunner().invoke(app, words, catch_exceptions=False).exit_code == 0
     with xarray.open_dataset(run.folder / 'run.og1.nc', engine='h5netcdf') as read:
         assert read['TIME'].values[0] == np.datetime64('2026-03-01T06:00')
+        # by a compass, which is turned by what the file says of it
+        assert read['MAGNETIC_VARIATION'] == 20.0
+        true_deg = np.degrees(run.to_xarray().imu_heading.values[::10])
+        turned = (read['HEADING'].values + 20.0 - true_deg + 180.0) % 360.0 - 180.0
+        assert np.abs(turned).max() < 1e-9
 
 
 def test_the_route_is_that_of_the_orders(tmp_path):

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run as the OceanGliders community exchanges flights: NetCDF 4 in the format OG1.0.
 
-What the vehicle measured and estimated, as a glider brings it home; nothing of the truth. The
-simulated compass knows no declination: magnetic north is true north. Format:
+What the vehicle measured and estimated, as a glider brings it home; nothing of the truth. Format:
 https://oceangliderscommunity.github.io/OG-format-user-manual/OG_Format.html
 """
 
@@ -139,6 +138,7 @@ def flight_dataset(
     )
     vehicle = load_vehicle(scenario.vehicle)
     serial, day = f'simulated_{vehicle.name}', _compact(began_s)
+    charted = scenario.sensors.charted_deg
     deployed = {
         'TRAJECTORY': (f'{serial}_{day}', 'trajectory', {'cf_role': 'trajectory_id'}),
         'WMO_IDENTIFIER': ('0000000', 'wmo id', {}),
@@ -147,7 +147,7 @@ def flight_dataset(
         'DEPLOYMENT_TIME': (began_s, 'date of deployment', {'standard_name': 'time', **_SECONDS}),
         'DEPLOYMENT_LATITUDE': (values['LATITUDE'][0], 'latitude of deployment', _NORTH),
         'DEPLOYMENT_LONGITUDE': (values['LONGITUDE'][0], 'longitude of deployment', _EAST),
-        'MAGNETIC_VARIATION': (0.0, 'true less magnetic heading, + east', {'units': 'degree'}),
+        'MAGNETIC_VARIATION': (charted, 'true less magnetic heading, + east', {'units': 'degree'}),
     }
     for name, (value, text, more) in deployed.items():
         dataset[name] = ((), value, {'long_name': text, **more})
@@ -186,7 +186,7 @@ def _measured(
         'LONGITUDE_GPS': fix[1],
         'PITCH': pitch,
         'ROLL': roll,
-        'HEADING': heading % 360.0,
+        'HEADING': (heading - scenario.sensors.charted_deg) % 360.0,
         'PHASE': np.array([PHASES.get(one, 0) for one in stage], np.int8),
     }
     reports = (card.get('navigation') or {}).get('reports') or []

@@ -113,9 +113,14 @@ class SensorSettings(Settings):
         [], description='topics of sensors beside those that navigation reads'
     )
 
-    def _imu_errors(self) -> 'ImuErrors':
+    @property
+    def charted_deg(self) -> float:
+        """Declination that the vehicle goes by (deg, + east)."""
         charted = self.chart_declination_deg
-        wrong = 0.0 if charted is None else charted - self.declination_deg
+        return self.declination_deg if charted is None else charted
+
+    def _imu_errors(self) -> 'ImuErrors':
+        wrong = self.charted_deg - self.declination_deg
         return derived(
             ImuErrors,
             self,
