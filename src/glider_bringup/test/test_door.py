@@ -276,6 +276,20 @@ def test_run_over_nodes_gives_the_same_and_leaves_nothing(tmp_path, monkeypatch)
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize('bag', [False, True])
+def test_a_flight_that_is_refused_leaves_no_folder(tmp_path, bag):
+    fault = {'kind': 'message', 'topic': 'odom', 'how': 'drop', 'share': 0.5}
+    out, words = tmp_path / 'run', ['--set', f'faults=[{json.dumps(fault)}]']
+    words = ['run', *words, '--engine', 'direct', '--out', str(out), *(['--bag'] * bag)]
+    for refused in (
+        lambda: CliRunner().invoke(app, words, catch_exceptions=False),
+        lambda: glider.fly('current_8deg', {'faults': [fault]}, out=out, bag=bag),
+    ):
+        with pytest.raises(ConfigurationError, match='no messages that could go wrong'):
+            refused()
+        assert not out.exists()
+
+
 def test_fly_gives_what_the_command_line_gives(flown, tmp_path):
     options = [
         *('run', flown.folder / 'scenario.yaml', '--engine', 'direct', '--json', '--no-report'),

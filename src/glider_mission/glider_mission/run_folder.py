@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The folder of a run or a study: how its files are called, and what lies in a new one."""
 
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime
@@ -42,6 +43,18 @@ def make_run_folder(scenario: Scenario, out: Path | None) -> Path:
     except OSError as error:
         raise ConfigurationError(f'{folder}: {error.strerror}') from None
     return folder
+
+
+@contextmanager
+def run_folder(scenario: Scenario, out: Path | None) -> Iterator[Path]:
+    """The folder that `make_run_folder` makes, which is gone if its flight is refused."""
+    folder = make_run_folder(scenario, out)
+    try:
+        yield folder
+    except ConfigurationError:
+        if {file.name for file in folder.iterdir()} == {SCENARIO_FILE, VEHICLE_FILE}:
+            shutil.rmtree(folder)
+        raise
 
 
 def write_scenario(scenario: Scenario, folder: Path) -> None:

@@ -206,18 +206,18 @@ def _fly(
     from glider_bringup.scoring.card import write_score
     from glider_bringup.scoring.traces import make_tracer
     from glider_mission.planned import planned_ticks
-    from glider_mission.run_folder import make_run_folder
+    from glider_mission.run_folder import run_folder
 
     if bag or engine == 'nodes':  # else nothing of ROS is needed; with it, it is there
         import_module('glider_bringup.engines.recorded')
-    folder = make_run_folder(scenario, out)
-    messages.print(f'{scenario.name}: {scenario.described}')
     tracer = make_tracer(scenario) if report else None
-    with progress(planned_ticks(scenario)) as (flying, reading):
-        if begin_view:
-            flying = _after_first(begin_view, flying)
-        shown, takers = (flying, reading), [tracer] if tracer else []
-        scenario, card = fly_by(engine, scenario, folder, takers, shown, bag, sync, **nodes)
+    with run_folder(scenario, out) as folder:
+        messages.print(f'{scenario.name}: {scenario.described}')
+        with progress(planned_ticks(scenario)) as (flying, reading):
+            if begin_view:
+                flying = _after_first(begin_view, flying)
+            shown, takers = (flying, reading), [tracer] if tracer else []
+            scenario, card = fly_by(engine, scenario, folder, takers, shown, bag, sync, **nodes)
     has_room = True
     try:
         write_score(folder, card)

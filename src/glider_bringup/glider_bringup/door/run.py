@@ -37,7 +37,7 @@ from glider_mission.run_folder import (
     SCENARIO_FILE,
     TRACES_FILE,
     VEHICLE_FILE,
-    make_run_folder,
+    run_folder,
     scenario_of,
     write_scenario,
 )
@@ -248,10 +248,14 @@ def fly(
 def _run_folder(scenario: Scenario, out: str | Path | None, engine: str) -> Iterator[Path | None]:
     """Folder of a run: a new one, one that nodes need for as long as they fly, or none."""
     if out is not None:
-        yield make_run_folder(scenario, Path(out))
+        with run_folder(scenario, Path(out)) as folder:
+            yield folder
     elif engine == 'nodes':
-        with TemporaryDirectory() as scratch:
-            yield make_run_folder(scenario, Path(scratch) / 'run')
+        with (
+            TemporaryDirectory() as scratch,
+            run_folder(scenario, Path(scratch) / 'run') as folder,
+        ):
+            yield folder
     else:
         yield None
 

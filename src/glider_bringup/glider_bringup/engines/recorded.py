@@ -15,6 +15,7 @@ from glider_bringup.engines.flight import (
     Taker,
     ended,
     fly,
+    refuse_message_faults,
     refuse_planned_route,
 )
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
@@ -43,6 +44,7 @@ def fly_recorded(
     sync: Sync = 'end',
 ) -> Outcome:
     """Fly with the direct engine, as `fly` does, and write the bag of the run."""
+    refuse_message_faults(scenario)
     refuse_planned_route(scenario)
     attachments = [folder / SCENARIO_FILE, folder / VEHICLE_FILE]
     topics = scenario.topics
