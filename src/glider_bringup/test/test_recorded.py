@@ -146,6 +146,13 @@ def test_file_cut_short_is_scored_as_far_as_it_goes(bag_only):
     assert 500 < card['ticks'] < 2500
 
 
+def test_aborted_run_tells_of_a_gap_before_its_end(tmp_path):
+    report = said(health.FAILED, 9 * TICK_NS, 'control_node is late')
+    card = score_again(write_bag(tmp_path / 'flight', report))
+    assert (card['status'], card['ticks']) == ('aborted', 3)
+    assert 'control_node is late; 3 of 10 ticks are there; tick 3 ' in card['reason']
+
+
 def test_free_running_recording_is_no_scorecard_of_nothing(tmp_path):
     folder = write_bag(tmp_path / 'flight', said(health.FINISHED, 2 * TICK_NS), but='reference')
     for use in USES:

@@ -219,12 +219,15 @@ class RecordedLog:
     def missing(self, ticks: int | None) -> str:
         """What lacks of a run, in words; empty if nothing does.
 
-        Where nobody knows how many ticks were flown, what the plant said in the bag counts.
+        Where nobody knows how many ticks were flown, what the plant said in the bag counts; of a
+        run that was cut short the last two may not be whole, as in `lost`.
         """
-        if ticks is None and self.end and self.end.phase == health.FINISHED:
+        unsure = 0
+        if ticks is None and self.end:
             ticks = self.end.stamp_ns // TICK_NS + 1
+            unsure = 0 if self.end.phase == health.FINISHED else 2
         told = [self._bag.cut] if self._bag.cut else []
-        if ticks is not None and self.ticks < ticks:
+        if ticks is not None and self.ticks < ticks - unsure:
             told.append(f'{self.ticks:,} of {ticks:,} ticks are there')
             told += [] if self._bag.cut else [self._lacks]
         return '; '.join(told)
