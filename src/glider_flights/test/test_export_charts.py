@@ -179,6 +179,7 @@ def test_lines_are_cut_where_they_cross_the_date_line(tmp_path):
         for part, ours in zip(parts, line['geometry']['coordinates'], strict=True):
             found = [(point.longitude, point.latitude) for point in part.points]
             assert found == pytest.approx(np.array([place[:2] for place in ours]), abs=1e-6)
+            assert all(-180.0 <= east < 180.0 for east, _ in found)  # as its schema has it
     pytest.importorskip('h5netcdf')
     with xarray.open_dataset(exported('og1'), engine='h5netcdf') as read:
         assert read.geospatial_lon_min == pytest.approx(179.9999, abs=1e-5)

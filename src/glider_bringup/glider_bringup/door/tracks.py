@@ -210,7 +210,8 @@ def gpx(chart: Chart) -> bytes:
         depth = '' if row.depth_m is None else f'{-row.depth_m:.2f}'
         told = {'ele': depth, 'time': row.time, 'name': name}
         inside = [_element(key, text) for key, text in told.items() if text]
-        return _element(tag, *inside, lat=f'{row.latitude:.7f}', lon=f'{row.longitude:.7f}')
+        east = min(row.longitude, 179.9999999)  # less than 180, by its schema
+        return _element(tag, *inside, lat=f'{row.latitude:.7f}', lon=f'{east:.7f}')
 
     inside = [at('wpt', Row(*one.place, None, one.time), one.name) for one in chart.surfacings]
     if chart.route:
