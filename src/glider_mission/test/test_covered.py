@@ -172,14 +172,25 @@ def test_a_planned_route_goes_round_land_between_the_points_of_its_chart(land, t
         assert (data.elevation.interp(lat=lat, lon=lon) < 0.0).all()
 
 
-def test_a_planned_route_that_no_way_leads_along_is_refused(tmp_path):
+@pytest.mark.parametrize('strait', [0.0, 0.015])
+def test_a_plan_says_of_a_wall_of_land_and_of_a_strait_in_it_what_is_flown(strait, tmp_path):
+    """A strait is narrower than the step of the chart: straight legs alone lead through it."""
     file = bottom(tmp_path / 'bottom.nc', east=-1.0)
     data = xarray.load_dataset(file['bathymetry.file'])
-    data.elevation.loc[{'lon': slice(121.99, 122.01)}] = 20.0
+    wall = (abs(data.lon - 122.0) < 0.015) & (abs(data.lat - 36.004) > strait)
+    data['elevation'] = data.elevation.where(~wall, 20.0)
     data.to_netcdf(file['bathymetry.file'], engine='scipy')
-    wall = mission(sea(tmp_path / 'sea.nc'), file, **{'guidance.route': 'planned'})
-    with pytest.raises(ConfigurationError, match=r'guidance.route: no way round the land'):
-        Pilot(wall).order(0, None)
+    way = {'waypoints': [[36.004, 121.9], [36.004, 122.1]], 'duration_s': 4e5}
+    walled = mission(sea(tmp_path / 'sea.nc'), file, **way, **{'guidance.route': 'planned'})
+    made = plan(walled)
+    leads_through = strait > 0.0
+    assert made.reachable == np.isfinite(made.arrivals_s).all() == leads_through
+    if leads_through:
+        assert made.arrivals_s[0] == made.straight_s == made.waypoints_s[-1]
+        assert Pilot(walled).order(0, None) is None
+    else:
+        with pytest.raises(ConfigurationError, match=r'guidance.route: no way round the land'):
+            Pilot(walled).order(0, None)
 
 
 def test_an_order_of_a_path_is_not_led_back_by_a_route_that_is_planned_anew(tmp_path):

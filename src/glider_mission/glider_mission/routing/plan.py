@@ -57,7 +57,7 @@ class Route(NamedTuple):
 class Plan(NamedTuple):
     """What a mission will take."""
 
-    route: Route
+    route: Route  #: straight legs, where these alone arrive
     arrivals_s: np.ndarray  #: float64[members], along the route; infinite: not in the time
     straight_s: float  #: along straight legs, by the forecast; infinite: not in the time
     pace: Pace
@@ -67,7 +67,7 @@ class Plan(NamedTuple):
     @property
     def reachable(self) -> bool:
         """Whether it gets there in the time, by the forecast."""
-        return self.route.arrives
+        return self.route.arrives or math.isfinite(self.straight_s)
 
     def arrival_s(self, percent: float) -> float:
         """Arrival (s) that so many of the errors that were tried keep; infinite: not in time."""
@@ -292,11 +292,13 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
     bottom = scenario.bottom()
     route = route_round(chart, land, bottom, waypoints, 0.0, pace.speed, end_s)
     progress(1)
-    arrivals = []
+    straight_s, arrivals = math.inf, []
+    if not crossing(chart, land, bottom, waypoints):
+        straight_s = sailed_s(chart, waypoints, 0.0, pace.speed, end_s)
+    if not route.arrives and math.isfinite(straight_s):
+        route = route._replace(corners=waypoints, ends=[*range(1, len(waypoints))])
+    last_s = end_s if route.arrives or math.isfinite(straight_s) else 0.0
     for sea in with_errors(chart, scenario.forecast.error_mps, scenario):
-        arrivals.append(sailed_s(sea, route.corners, 0.0, pace.speed, end_s))
+        arrivals.append(sailed_s(sea, route.corners, 0.0, pace.speed, last_s))
         progress(len(arrivals) + 1)
-    straight_s = sailed_s(chart, waypoints, 0.0, pace.speed, end_s)
-    if crossing(chart, land, bottom, waypoints):
-        straight_s = math.inf
     return Plan(route, np.array(arrivals), straight_s, pace, chart, end_s)
