@@ -236,6 +236,18 @@ def test_a_plan_ends_with_the_dives_of_its_mission(tmp_path):
     assert not few.reachable and few.end_s == 2.0 * few.pace.cycle_s
 
 
+@pytest.mark.parametrize(
+    ('north_m', 'east_m', 'way_m'),
+    [(0.0, -20e3, 29e3), (4e3, 1e3, 12e3), (500.0, 4e3, 5025.0), (3e3, 16e3, 7616.0)],
+)
+def test_a_plan_joins_the_path_where_a_vehicle_does(north_m, east_m, way_m, tmp_path):
+    """By the shortest way, and not back to its first waypoint."""
+    path = {'kind': 'waypoints', 'waypoints': [[0.0, -9e3], [0.0, 9e3]]}
+    told = {'path': path, 'initial.north_m': north_m, 'initial.east_m': east_m}
+    made = plan(mission(sea(tmp_path / 'sea.nc'), **told, duration_s=4e5))
+    assert made.straight_s * made.pace.speed == pytest.approx(way_m, rel=1e-3)
+
+
 @pytest.mark.parametrize('latitudes', [[36.0], [35.99, 36.01]])
 def test_a_plan_along_a_section_is_that_of_the_same_water_all_round(latitudes, tmp_path):
     files = sea(tmp_path / 'sea.nc', lambda t, z: 0.1, latitudes=np.array(latitudes))

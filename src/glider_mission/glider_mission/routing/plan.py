@@ -10,6 +10,7 @@ import numpy as np
 
 from glider_base.signals import TICK_S
 from glider_guidance.guidance import GuidanceParams
+from glider_guidance.path.curve import path_closest, path_point
 from glider_mission.routing.forecast_chart import erroneous, forecast_of, with_land
 from glider_mission.routing.fronts import Chart, fronts, sail
 from glider_mission.scenario import Scenario
@@ -260,11 +261,13 @@ def sailed_s(chart: Chart, route: np.ndarray, t_s: float, speed: float, end_s: f
 
 
 def waypoints_of(scenario: Scenario) -> np.ndarray:
-    """Where a mission starts, and the corners of its path after that (m), float64[n, 2]."""
-    corners = scenario.path.points(0)[:, :2]
-    start = np.array([scenario.initial.north_m, scenario.initial.east_m])
-    is_there = np.hypot(*(corners[0] - start)) < _STRAIGHT_M
-    return np.vstack((start, corners[1:] if is_there else corners))
+    """Where a mission starts, joins its path, and the corners after that (m), float64[n, 2]."""
+    path, initial = scenario.path.params(), scenario.initial
+    start = initial.north_m, initial.east_m, initial.depth_m
+    s = path_closest(*start, scenario.profile.mode != 'path', path)
+    ways = np.array([path_point(at, path)[:2] for at in (s, *path.knots[path.knots > s])])
+    is_there = len(ways) > 1 and np.hypot(*(ways[0] - start[:2])) < _STRAIGHT_M
+    return np.vstack((start[:2], ways[int(is_there) :]))
 
 
 def with_errors(chart: Chart, error_mps: float, scenario: Scenario) -> Iterator[Chart]:
