@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from glider_base.errors import ConfigurationError
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.routing import pilot as piloting
 from glider_mission.routing.forecast_chart import (
@@ -219,6 +220,11 @@ def test_a_mission_that_is_too_short_is_not_reachable():
     assert not made.reachable
     assert made.arrival_s(50.0) == math.inf
     assert made.wh is None
+
+
+def test_a_helix_is_not_planned_along_a_chord():
+    with pytest.raises(ConfigurationError, match='path.kind = helix: no legs'):
+        plan(load_scenario('helix'))
 
 
 def row_at(place, stage, believed=(0.0, 0.0)):

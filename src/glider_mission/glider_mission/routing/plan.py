@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_guidance.guidance import GuidanceParams
 from glider_guidance.path.curve import path_closest, path_point
@@ -280,10 +281,14 @@ def with_errors(chart: Chart, error_mps: float, scenario: Scenario) -> Iterator[
 
 
 def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None) -> Plan:
-    """Plan a mission by its forecast; errors as `forecast_of`.
+    """Plan a mission by its forecast; errors as `forecast_of`, and of a helix, which has no legs.
 
     ``progress`` gets how many of `MEMBERS` + 1 steps are done.
     """
+    if scenario.path.kind == 'helix':
+        raise ConfigurationError(
+            'path.kind = helix: no legs to be planned (allowed: straight, waypoints, spline)'
+        )
     scenario = as_dived(scenario)
     pace, end_s = pace_of(scenario), scenario.duration_s
     forecast = forecast_of(scenario, pace.stay)
