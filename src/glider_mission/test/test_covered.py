@@ -216,6 +216,15 @@ def test_a_late_forecast_is_as_late_as_it_is_told(tmp_path):
     assert found == pytest.approx([-0.060, -0.048, -0.036], abs=1e-6)
 
 
+def test_a_plan_counts_the_wind_at_the_surface(tmp_path):
+    told = {'duration_s': 4e5, 'profile.surface_every_dives': 1, 'water.wind_from_deg': 90.0}
+    told |= sea(tmp_path / 'sea.nc')
+    calm, against = (plan(mission(told, **{'water.wind_mps': wind})) for wind in (0.0, 10.0))
+    slower = 1.0 - 0.02 * 10.0 * calm.pace.stay / calm.pace.speed
+    assert against.straight_s == pytest.approx(calm.straight_s / slower, rel=1e-3)
+    assert slower < 0.99
+
+
 def test_files_that_begin_at_other_times_need_the_time_of_the_mission(tmp_path):
     first = sea(tmp_path / 'first.nc')
     other = sea(tmp_path / 'other.nc', hours=HOURS + 6.0)

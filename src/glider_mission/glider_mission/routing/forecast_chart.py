@@ -101,7 +101,7 @@ def forecast_of(scenario: Scenario, stay: float) -> Forecast:
     nothing = CurrentState(0, np.zeros(0))
     for levels, found in ((depths, means), (np.zeros(1), at_top)):
         _depth_means(params, nothing, times - late_s, norths, easts, levels, found)
-    stays = stay * (at_top - means)
+    stays = stay * (at_top + np.float32(scenario.water.wind_drift()) - means)
     chart = Chart(times, norths, easts, means)
     land = np.zeros(means.shape[1:3], dtype=bool)
     if isinstance(grid, GridSettings):
