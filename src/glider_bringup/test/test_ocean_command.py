@@ -194,8 +194,13 @@ def test_whether_a_mission_is_covered_by_water_or_bottom(kind, sea_file, tmp_pat
 
 
 def test_it_tells_whether_a_mission_is_covered_and_draws_it(sea_file, tmp_path, capsys):
+    """Whatever files the mission names itself."""
     mission, picture = tmp_path / 'crossing.yaml', tmp_path / 'sea.png'
-    mission.write_text(MISSION)
+    gone = '{field: {kind: grid, file: gone.nc}}'
+    mission.write_text(
+        MISSION + f'navigation: {{method: dead_reckoned, current: forecast, forecast: {gone}}}\n'
+        f'current: {gone}\nwater: {{grid: {{file: gone.nc}}}}\nbathymetry: {{file: gone.nc}}\n'
+    )
     found = told(capsys, sea_file, mission=str(mission), out=picture)
     assert found['mission'] == {'scenario': str(mission), 'covered': True, 'reason': ''}
     assert matplotlib.image.imread(picture).std() > 0.05

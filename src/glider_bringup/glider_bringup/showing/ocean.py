@@ -26,7 +26,7 @@ from glider_model.ocean.water import ModelWaterSettings
 _ARROWS = 22
 #: A mission without the files that it has itself.
 _NO_FILES = {
-    'current': {'speed_mps': 0.0, 'direction_deg': 0.0},
+    **dict.fromkeys(('current', 'navigation.forecast'), {'speed_mps': 0.0, 'direction_deg': 0.0}),
     'water.grid': {},
     'bathymetry': {},
 }
