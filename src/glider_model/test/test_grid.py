@@ -253,6 +253,17 @@ def test_what_the_file_does_not_cover_is_refused(places, more, text, tmp_path):
         grid(path, *places, **more)
 
 
+@pytest.mark.parametrize('kind', ['float32', 'float64'])
+def test_a_waypoint_at_the_edge_of_a_file_is_within_it_as_a_person_writes_both(kind, tmp_path):
+    latitudes, longitudes = np.arange(34.7, 36.35, 0.1), np.arange(121.1, 122.95, 0.1)
+    data = dataset(latitudes=latitudes.astype(kind), longitudes=longitudes.astype(kind))
+    path = written(data, tmp_path / 'sea.nc')
+    found = grid(path, (34.7, 121.1), (36.3, 122.9))
+    assert (len(found.latitudes), len(found.longitudes)) == (17, 19)
+    with pytest.raises(ValueError, match='latitude of the path goes from 34.700 to 36.301'):
+        grid(path, (34.7, 121.1), (36.301, 122.9))
+
+
 def bent(data):
     """The same on a curvilinear grid."""
     flat = data.rename(latitude='y', longitude='x').drop_vars(['y', 'x'])

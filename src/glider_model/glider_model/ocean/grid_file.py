@@ -104,6 +104,8 @@ _OTHER_GRIDS = {
 }
 #: Bytes of a window at most.
 MAX_BYTES = 400_000_000
+#: A place is not beyond a file by what it was rounded, be it to float32 (deg): a metre.
+EDGE_DEG = 1e-5
 #: A step of an axis is a hole if it is so many times as wide as those beside it.
 HOLE_STEPS = 2.5
 #: The fingerprint of a file is made of its size and so many bytes at either end.
@@ -456,6 +458,7 @@ def _refuse_uncovered(axes: Axes, window: Window) -> None:
         ('longitude', axes.longitudes, window.west, window.east),
     ):
         first, last = _hole(values)
+        low, high = low + EDGE_DEG, high - EDGE_DEG
         if low < values[0] or high > values[-1] or (low < last and high > first):
             hole = f', but not {first:.3f} to {last:.3f}' if first < last else ''
             raise ValueError(

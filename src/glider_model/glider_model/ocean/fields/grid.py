@@ -23,12 +23,10 @@ from glider_base.frames import Origin, OriginSettings, on_chart, within_180
 from glider_base.kernel import kernel
 from glider_base.settings import Settings, beside
 from glider_model.ocean.field import FieldSettings, Mission, bracket, field_velocity
-from glider_model.ocean.grid_file import GRIDS, Loaded, Window, fingerprint, load
+from glider_model.ocean.grid_file import EDGE_DEG, GRIDS, Loaded, Window, fingerprint, load
 
 #: Water, or bottom, around the path that is read too, as far as the file has it (m).
 MARGINS_M = {'currents': 150_000.0, 'water': 150_000.0, 'bottom': 50_000.0}
-#: A place is not beyond a file by what it was rounded (deg).
-EDGE_DEG = 1e-9
 
 
 class GridFileSettings(Settings):
