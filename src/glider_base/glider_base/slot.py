@@ -21,7 +21,7 @@ from collections.abc import Callable
 from typing import Any
 
 from numba.core import types
-from numba.core.errors import NumbaError
+from numba.core.errors import NumbaError, UnsupportedBytecodeError
 from numba.extending import is_jitted, overload
 
 from glider_base.errors import ConfigurationError
@@ -30,6 +30,8 @@ from glider_base.kernels.cache import BODIES, Body
 
 #: How the calls of slots are compiled.
 _INLINED = {'error_model': 'numpy', 'forceinline': True}
+#: What numba raises for a function that it cannot compile.
+NOT_COMPILED = (NumbaError, UnsupportedBytecodeError)
 
 
 def slot(stub: Callable) -> Callable:
@@ -133,7 +135,7 @@ def _check(kernel: Any, kinds: tuple, what: tuple[str, ...]) -> None:
             if (i := next(odd, None)) is None:
                 return
             why = f'returns {returned[i]} as {what[i]}'
-    except NumbaError as error:
+    except NOT_COMPILED as error:
         why = f'cannot be compiled: {reason(error)}'
     code = kernel.py_func.__code__
     raise ConfigurationError(
@@ -142,7 +144,7 @@ def _check(kernel: Any, kinds: tuple, what: tuple[str, ...]) -> None:
     )
 
 
-def reason(error: NumbaError) -> str:
+def reason(error: Exception) -> str:
     """The innermost of what numba says, in a line."""
     text = re.sub(r'\x1b\[\d+m', '', str(error)).partition('During:')[0]
     return re.split(r'pipeline \(step: [^)]*\)', text)[-1].strip().partition('\n')[0]

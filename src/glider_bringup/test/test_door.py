@@ -554,6 +554,12 @@ def moments_of_a_bank(seen):
         return -1.0, 0.0
 
 
+def moments_by_an_import(seen):
+    from math import tanh
+
+    return tanh(seen.m_b), 0.0
+
+
 def two_or_three(seen):
     return (0.0, 0.0) if seen.m_b > 0.0 else (0.0, 0.0, 0.0)
 
@@ -648,6 +654,7 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
             {},
             ['moments_of_a_bank (', 'returns nothing', 'returns 2', 'pitch mo'],
         ),
+        (moments_by_an_import, {}, ['moments_by_an_import (', 'test_door.py', 'IMPORT_NAME']),
         (
             two_or_three,
             {},

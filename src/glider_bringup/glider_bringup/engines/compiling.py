@@ -7,12 +7,11 @@ from contextlib import contextmanager
 from functools import partial
 
 import numpy as np
-from numba.core.errors import NumbaError
 
 from glider_base.errors import ConfigurationError
 from glider_base.kernel import compiling_told
 from glider_base.signals import TICK_S
-from glider_base.slot import reason
+from glider_base.slot import NOT_COMPILED, reason
 from glider_bringup.engines.direct import fly_held, hold
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.interrupts import interrupts_noted
@@ -40,7 +39,7 @@ def told(combination: Combination, tell: Tell) -> Iterator[None]:
     try:
         with compiling_told(partial(tell, line)):
             yield
-    except NumbaError as error:
+    except NOT_COMPILED as error:
         raise ConfigurationError(
             f'law {law} with method {method}: cannot be compiled: {reason(error)} (allowed: roll '
             'and pitch moment of a function; numbers that keep their type, 0.0 for a float)'
