@@ -30,9 +30,9 @@ from glider_mission.scenario import load_scenario
 MOST = 500_000
 
 
-def glider(*arguments) -> subprocess.CompletedProcess:
-    """Run a command on a disk on which no file can grow beyond `MOST`."""
-    limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (MOST, MOST))
+def glider(*arguments, most: int = MOST) -> subprocess.CompletedProcess:
+    """Run a command on a disk on which no file can grow beyond so much."""
+    limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (most, most))
     return command_line.glider(*arguments, preexec_fn=limit)
 
 
@@ -88,6 +88,14 @@ def test_device_that_is_full_is_named_and_stays_a_device(tmp_path, name):
     assert (done.returncode, done.stdout) == (1, '')
     assert done.stderr.split() == '/dev/full: cannot be written: No space left on device'.split()
     assert Path('/dev/full').is_char_device()
+
+
+def test_sea_that_the_disk_does_not_take_leaves_nothing(tmp_path):
+    file = tmp_path / 'sea.nc'
+    done = glider('ocean', file, '--make', 3, most=100_000)
+    assert (done.returncode, done.stdout) == (1, '')
+    assert done.stderr.split() == f'{file}: cannot be written: File too large'.split()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_bag_is_readable_up_to_where_the_disk_was_full(tmp_path):

@@ -11,6 +11,7 @@ import typer
 from glider_base.settings import ConfigurationError
 from glider_bringup.console import Json, messages, output, print_table
 from glider_bringup.showing.ocean import draw_sea, in_words, look, mission_in
+from glider_mission.disk import whole_file
 from glider_model.ocean.eddying_sea import EddyingSea, write_sea
 
 app = typer.Typer()
@@ -58,7 +59,8 @@ def ocean(
     if make is not None:
         if file.exists():
             raise ConfigurationError(f'{file}: is there already (allowed: a new file)')
-        write_sea(EddyingSea(seed=make, rms_mps=rms, error_mps=error), file)
+        with whole_file(file) as stream:
+            write_sea(EddyingSea(seed=make, rms_mps=rms, error_mps=error), Path(stream.name))
     with messages.status('reading'):
         told, sea = look(file)
         refused = ''
