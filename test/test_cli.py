@@ -156,6 +156,14 @@ def test_list_names_everything_that_is_shipped():
     assert sorted(listed['sweeps']) == sweep_names()
 
 
+def test_terminal_of_no_width_shows_the_same():
+    path = os.environ.get('PYTHONPATH', '')
+    for words in (('list',), ('list', '--help')):
+        shown = [glider(*words, columns=width, PYTHONPATH=path).stdout for width in (0, 80)]
+        assert 'slocum_g2' in shown[1] or 'Example' in shown[1]
+        assert shown[0] == shown[1]
+
+
 def test_trim_prints_the_steady_glide():
     """Against model figures: 0.4 kg and -30 deg give about 0.51 m/s along -31.6 deg."""
     process = glider('trim', 'zhang2021', '--net-heaviness-kg', 0.4, '--pitch-deg', -30, '--json')

@@ -3,6 +3,7 @@
 """What the commands share: consoles, options, progress bars."""
 
 import json
+import os
 from collections.abc import Callable, Iterable
 from contextlib import contextmanager
 from enum import Enum
@@ -45,6 +46,8 @@ class _PlainConsole(Console):
         return super().render_str(printable(text, keep='\n\t'), **kwargs)
 
 
+if os.environ.get('COLUMNS') == '0':  # of a terminal that tells no size: rich would print nothing
+    del os.environ['COLUMNS']
 # Standard output carries results only; progress and messages go to standard error.
 output = _PlainConsole()
 messages = _PlainConsole(stderr=True)
