@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 
 from glider_base.errors import ConfigurationError, shown
-from glider_bringup.scoring.card import STOPPED, finite, fly_scored
+from glider_bringup.engines.flight import fly
+from glider_bringup.scoring.card import STOPPED, finite
 from glider_bringup.scoring.navigation import FOURTH
+from glider_bringup.scoring.score import Scorer, scores_of
 from glider_bringup.scoring.scores import SCORES, studied
 from glider_mission.changes import overlap, run_command
 from glider_mission.scenario import Scenario, load_scenario
@@ -274,8 +276,14 @@ def _farthest_m(scores: dict) -> float:
 
 def _fly_plant(scenario: Scenario) -> dict[str, Any]:
     """Fly one scenario in a worker."""
-    flight, scores = fly_scored(scenario)
-    return judge(scores, flight.status)
+    scorer = Scorer(scenario)
+    try:
+        status = fly(scenario, [scorer]).status
+    except ConfigurationError:
+        raise
+    except Exception:  # of a law that raises, say: it is the end of this flight only
+        status = 'failed'
+    return judge(scores_of(scenario, scorer), status)
 
 
 def _check_plant(scenario: Scenario) -> dict[str, Any]:

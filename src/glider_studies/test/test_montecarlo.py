@@ -21,6 +21,7 @@ from glider_base.frames import euler_from_quaternion
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
+from glider_bringup.door.run import chosen_scenario
 from glider_bringup.engines.direct import fly_held, held_state, hold
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.again import score_again
@@ -250,6 +251,25 @@ def test_percentiles_are_of_flights_that_were_flown_to_their_end(capsys):
     lost = {(0, 'pid'): flights[3, 'pid']}
     (row,) = report('current_8deg', {}, 0, 0, lost, {0: frames[0]})['rows']
     assert row['max_all_m'] == {'p50': None, 'p95': None, 'worst': None}
+
+
+def test_a_law_that_raises_ends_its_own_flight_only():
+    class Here:
+        def results(self, function, tasks, progress):
+            return {key: function(task) for key, task in tasks.items()}
+
+    def raises(seen):
+        if seen.measured.vertical_rate > 0.0:
+            raise ValueError('none of yours')
+        return 0.0, 0.0
+
+    changes = {}, None, raises, None, None, 300.0
+    scenarios = {
+        (0, 'pid'): load_scenario('current_8deg', {'duration_s': 60.0, 'control.law': 'pid'}),
+        (1, 'raises'): chosen_scenario('current_8deg', *changes),
+    }
+    flights, _ = montecarlo.fly_plants(scenarios, Here(), None)
+    assert [one['outcome'] for one in flights.values()] == ['completed', 'failed']
 
 
 def test_result_is_one_json_object_of_the_promised_shape(study):
