@@ -741,6 +741,10 @@ def test_sweep_of_a_mapping_is_that_of_its_file(tmp_path):
         glider.sweep({'current.speed_kn': [99.0]})
     with pytest.raises(glider.ConfigurationError, match='no field'):
         glider.sweep({})
+    for axes in ({'current.speed_kn': 0.5}, {'control.law': 'pid'}):
+        (field,) = axes
+        with pytest.raises(glider.ConfigurationError, match=rf'{field} = .*a list of values'):
+            glider.sweep(axes)
 
 
 @pytest.mark.parametrize('name', sorted(typer.main.get_command(app).list_commands(None)))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from glider_base.settings import ConfigurationError
+from glider_base.errors import ConfigurationError, shown
 from glider_bringup.console import compiling, counter
 from glider_bringup.door.netcdf import read_dataset
 from glider_mission.scenario import DEFAULT_SCENARIO, scenario_names, scenario_path
@@ -31,6 +31,11 @@ def _plan(name: str | Path | Mapping, scenario: str | Path, changes: dict[str, A
         return load_sweep(str(name), changes)
     if not name:
         raise ConfigurationError('sweep: no field to go through (allowed: one or more)')
+    for field, values in name.items():
+        if isinstance(values, str) or not isinstance(values, Iterable):
+            raise ConfigurationError(
+                f'sweep: {field} = {shown(values)}: not usable (allowed: a list of values)'
+            )
     dimensions = {
         field.replace('.', '_'): {
             'kind': 'values',
