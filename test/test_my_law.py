@@ -86,6 +86,7 @@ BROKEN = {
 BROKEN_PY = """
 from glider_control.law import LawSettings
 from glider_model.ocean.field import FieldSettings
+from glider_navigation.method import NavigationMethodSettings
 NUMBER = 1
 class Law(LawSettings): pass
 class Bare(LawSettings):

@@ -5,14 +5,16 @@
 A method makes the odometry that guidance and control act on, of what the sensors say.
 """
 
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from glider_base.frames import Origin
 from glider_base.settings import Settings
 from glider_base.signals import Covariance, Imu, Joints, Odometry, Vector
 from glider_base.slot import returns, slot
 from glider_model.vehicle.file import Vehicle
-from glider_navigation.forecast import ForecastSettings
+
+if TYPE_CHECKING:  # it loads the fields of packages, in whose file a method may be
+    from glider_navigation.forecast import ForecastSettings
 
 
 class Start(NamedTuple):
@@ -25,7 +27,7 @@ class Start(NamedTuple):
     imu_period_s: float
     gyro: bool
     current: str  #: how the current is to be believed
-    forecast: ForecastSettings  #: of it
+    forecast: 'ForecastSettings'  #: of it
 
 
 class NavigationMethodSettings(Settings):
