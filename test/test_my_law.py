@@ -81,6 +81,7 @@ BROKEN = {
     },
     'glider.commands': {'dry': ('no_such_module:app', 'ModuleNotFoundError: No module named')},
     'glider.guidance_methods': {'los': ('broken:Law', 'ValueError: its name is taken')},
+    'glider.navigation_methods': {'blind': ('broken:Blind', 'ValueError: it reads or tells gps')},
     'glider.currents': {'whirl': ('broken:Whirl', "TypeError: it needs kind: Literal['whirl']")},
 }
 BROKEN_PY = """
@@ -93,6 +94,10 @@ class Bare(LawSettings):
     gain: float
     def params(self, vehicle, bank): pass
     def initial_state(self): pass
+class Blind(NavigationMethodSettings):
+    reads = 'imu', 'gps'
+    def params(self, start): pass
+    def initial_state(self, start): pass
 class Whirl(FieldSettings):
     kind: str = 'eddy'
     def params(self): pass

@@ -11,7 +11,7 @@ from glider_base import plugins
 from glider_base.frames import Origin, OriginSettings
 from glider_base.settings import Settings, derived, number
 from glider_base.signals import Joints
-from glider_base.wiring import SENSORS
+from glider_base.wiring import BELIEFS, SENSORS
 from glider_model.onboard.gate import GateSettings
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation import methods
@@ -22,8 +22,21 @@ from glider_navigation.method import NavigationMethodSettings, Start
 #: Other parameters of navigation: no method can have such a name.
 TAKEN = {'method', 'current', 'forecast', 'gate', 'vehicle', 'origin', 'north_m', 'east_m'}
 TAKEN |= {'imu_period_s', 'gyro', 'also_fitted'}
+
+
+def _check_topics(name: str, method: type[NavigationMethodSettings]) -> None:
+    """Refuse a method that reads or tells what there is not."""
+    if others := {*method.reads} - {*SENSORS} | {*method.tells} - {*BELIEFS}:
+        raise ValueError(
+            f'it reads or tells {", ".join(sorted(others))} (allowed: to read '
+            f'{", ".join(SENSORS)}; to tell {", ".join(BELIEFS)})'
+        )
+
+
 #: Settings of every way to navigate by its name.
-METHODS = plugins.classes(plugins.NAVIGATION_METHODS, NavigationMethodSettings, methods, TAKEN)
+METHODS = plugins.classes(
+    plugins.NAVIGATION_METHODS, NavigationMethodSettings, methods, TAKEN, _check_topics
+)
 
 _MethodChoice = pydantic.create_model(
     '_MethodChoice',
