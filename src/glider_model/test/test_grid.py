@@ -3,6 +3,7 @@
 """Currents from files of ocean models: against xarray's own interpolation, and what is refused."""
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from glider_base.frames import OriginSettings, from_geodetic
 from glider_base.settings import ConfigurationError, validate
 from glider_base.signals import SEA_WATER_DENSITY
 from glider_model.ocean.bottom import BathymetrySettings, bottom_depth
+from glider_model.ocean.cast import read_cast
 from glider_model.ocean.current import current_initial, current_step
 from glider_model.ocean.current_settings import CurrentSettings
 from glider_model.ocean.density import immersed
@@ -299,6 +301,15 @@ def test_what_is_no_file_is_refused(tmp_path):
     (tmp_path / 'text.nc').write_text('hello')
     with pytest.raises(ValueError, match='not a NetCDF file that xarray reads'):
         load(tmp_path / 'text.nc')
+
+
+@pytest.mark.parametrize('read', [load, read_cast])
+def test_who_lacks_a_library_for_netcdf_4_is_told_which(read, tmp_path, monkeypatch):
+    path = tmp_path / 'sea.nc'
+    path.write_bytes(b'\x89HDF\r\n\x1a\n')
+    monkeypatch.setitem(sys.modules, 'h5netcdf', None)
+    with pytest.raises(ValueError, match=rf'{path}: h5netcdf, .*not installed; .*-flights.txt'):
+        read(path)
 
 
 def test_what_is_in_a_file(tmp_path):

@@ -11,11 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_base.errors import installed
+from glider_base.errors import ConfigurationError, installed
 from glider_base.kernel import kernel
 from glider_base.signals import SEA_WATER_DENSITY
 from glider_model.ocean.columns import MAX_ROWS, check_rows, is_height, read_columns
 from glider_model.ocean.density import SPECIFIC_WEIGHT, displacing, immersed
+from glider_model.ocean.grid_file import engine_of
 
 #: Columns of a file: density, or what it follows from by TEOS-10.
 COLUMNS = ('depth_m', 'density_kgpm3', 'temperature_degC', 'salinity_psu')
@@ -157,12 +158,14 @@ def _read_netcdf(path: Path, source: str) -> list[tuple[int, dict[str, float]]]:
     import xarray
 
     try:
-        with xarray.open_dataset(path, decode_times=False) as dataset:
+        with xarray.open_dataset(path, engine=engine_of(path), decode_times=False) as dataset:
             found = {}
             for name, variable in {**dataset.coords, **dataset.data_vars}.items():
                 known = _STANDARD_NAMES.get(variable.attrs.get('standard_name'), name)
                 if known in (*COLUMNS, 'pressure_dbar') and variable.ndim == 1:
                     found.setdefault(known, np.asarray(variable.values, dtype=float))
+    except ConfigurationError:
+        raise
     except (OSError, ValueError, TypeError, ImportError) as error:
         raise ValueError(f'{source}: not a NetCDF file that xarray reads: {error}') from None
     if 'depth_m' not in found and 'pressure_dbar' in found:

@@ -155,6 +155,16 @@ class _Layout(NamedTuple):
     values: dict[str, np.ndarray]  #: of each axis, as in the file; one 0 where it is missing
 
 
+def engine_of(path: Path) -> str:
+    """By what xarray reads a NetCDF file; a ConfigurationError if that is not installed."""
+    with open(path, 'rb') as file:
+        if file.read(4) != b'\x89HDF':
+            return 'scipy'
+    with installed(f'file {path}: h5netcdf, which reads NetCDF 4'):
+        import h5netcdf  # noqa: F401 - xarray has no word of its own for that
+    return 'h5netcdf'
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator['xarray.Dataset']:
     """Dataset of a file, of which nothing is read yet.
@@ -165,14 +175,9 @@ def _opened(path: Path) -> Iterator['xarray.Dataset']:
 
     if not is_file(path):
         raise ConfigurationError(f'file {path}: no such file')
-    with open(path, 'rb') as file:
-        is_hdf = file.read(4) == b'\x89HDF'
+    engine = engine_of(path)
     try:
-        engine = 'h5netcdf' if is_hdf else 'scipy'
-        with installed(f'file {path}: h5netcdf, which reads NetCDF 4'):
-            dataset = xarray.open_dataset(path, engine=engine, decode_times=False)
-    except ConfigurationError:
-        raise
+        dataset = xarray.open_dataset(path, engine=engine, decode_times=False)
     except Exception as error:  # of libraries, of many types, for files that are none
         text = f'xarray reads: {type(error).__name__}: {error}'.splitlines()[0][:200]
         raise ConfigurationError(f'file {path}: not a NetCDF file that {text}') from None
