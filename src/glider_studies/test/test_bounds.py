@@ -11,11 +11,11 @@ import pytest
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_model.onboard.command_filter import FilterParams
-from glider_model.vehicle.file import vehicle_path
+from glider_model.vehicle.file import load_vehicle, vehicle_path
 from glider_studies.bounds import lmi
 from glider_studies.bounds.certificate import dissipates, gain, gain_verified, reached, region
 from glider_studies.bounds.flights import fly_jumps, fly_starts
-from glider_studies.bounds.glide import glides, slope, steering_loop
+from glider_studies.bounds.glide import glides, scenario_of, slope, steering_loop
 from glider_studies.bounds.steering_loop import (
     INPUTS,
     Gains,
@@ -223,6 +223,16 @@ def test_a_loop_that_is_unstable_has_no_slowest_time_and_no_sensitivity(tmp_path
 def test_a_vehicle_that_is_none_is_told_in_a_line():
     with pytest.raises(ConfigurationError, match="^vehicle = 'nosuch': no such vehicle"):
         glides('nosuch')
+
+
+@pytest.mark.parametrize('vehicle', ['slocum_g2', 'seaglider'])
+def test_a_vehicle_of_a_file_dives_as_its_pump_and_hull_allow(vehicle, tmp_path):
+    file = tmp_path / 'mine.yaml'
+    file.write_text(vehicle_path(vehicle).read_text())
+    profile = scenario_of(str(file)).profile
+    assert profile.depth_m == load_vehicle(vehicle).rated_depth_m
+    pump_kg = load_vehicle(vehicle).params().m_b_max
+    assert 0.4 * pump_kg < profile.net_heaviness_kg < 0.6 * pump_kg
 
 
 @pytest.mark.parametrize(('vehicle', 'phase'), [('zhang2021', 'dive'), ('slocum_g2', 'climb')])

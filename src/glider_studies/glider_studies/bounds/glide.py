@@ -79,8 +79,12 @@ class Glide(NamedTuple):
 
 def scenario_of(vehicle: str, changes: dict[str, Any] | None = None) -> Scenario:
     """What a vehicle flies to be looked at."""
-    name = SCENARIOS.get(vehicle, SCENARIOS[''])
-    return load_scenario(name, {**FIELDS, 'vehicle': vehicle, **(changes or {})})
+    fields = {**FIELDS, 'vehicle': vehicle}
+    if vehicle not in SCENARIOS:  # it may be one of a small pump, or of shallow water
+        its = load_vehicle(vehicle)
+        fields['profile.depth_m'] = min(1000.0, its.rated_depth_m)
+        fields['profile.net_heaviness_kg'] = min(0.4, 0.5 * its.params().m_b_max)
+    return load_scenario(SCENARIOS.get(vehicle, SCENARIOS['']), fields | (changes or {}))
 
 
 def straight_on(params: MissionParams, north: float, east: float, course: float) -> MissionParams:
