@@ -65,9 +65,12 @@ def derived(params: type[ParamsT], settings: Settings, **computed: Any) -> Param
 
 
 def beside(file: str, info: pydantic.ValidationInfo) -> str:
-    """Path of a file that is named beside the file of the settings, if that is known."""
+    """Path of a file beside the file of the settings, if that is known, or else from here."""
     folder = (info.context or {}).get('folder')
-    return str((Path(folder) / file).resolve()) if folder and file else file
+    if not (folder and file):
+        return file
+    found = Path(folder) / file
+    return str((found if found.exists() or not Path(file).exists() else Path(file)).resolve())
 
 
 #: ``json_schema_extra`` of a field that can be set on a node while it flies.

@@ -102,7 +102,8 @@ class RouteForecast(Settings):
     file: str = Field(
         '',
         max_length=4000,
-        description='NetCDF file, relative to this one; without: the current of the scenario',
+        description='NetCDF file, beside this one or else in the working folder; without: the '
+        'current of the scenario',
     )
     error_mps: float = number(
         0.0, (0.0, 1.0), 'rms of a random error of each part of the depth-averaged current (m/s)'

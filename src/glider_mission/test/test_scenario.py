@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 from glider_base.settings import ConfigurationError
 from glider_guidance.settings import OLD_NAMES
 from glider_mission.changes import parse_assignment
-from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, scenario_names
+from glider_mission.scenario import (
+    DEFAULT_SCENARIO,
+    Scenario,
+    load_scenario,
+    scenario_names,
+    scenario_path,
+)
 from glider_model.onboard.gate import GateSettings
 from glider_model.vehicle.file import vehicle_path
 
@@ -509,3 +515,27 @@ def test_what_guidance_was_called_before_is_understood(old, new):
     for name in (old, new):
         scenario = load_scenario('current_8deg', {'guidance.los.method': name})
         assert scenario.guidance.los.method == new
+
+
+def test_a_file_lies_beside_the_scenario_or_else_in_the_working_folder(tmp_path, monkeypatch):
+    (tmp_path / 'there').mkdir()
+    (tmp_path / 'here').mkdir()
+    monkeypatch.chdir(tmp_path / 'here')
+    mine = tmp_path / 'there/mine.yaml'
+    mine.write_text(scenario_path('current_8deg').read_text())
+    changes = {
+        'water.profile': 'cast.csv',
+        'current.components': [{'kind': 'table', 'file': 'flow.csv'}],
+    }
+
+    def written(folder, density):
+        (tmp_path / folder / 'cast.csv').write_text(f'depth_m,density_kgpm3\n0,{density}\n')
+        (tmp_path / folder / 'flow.csv').write_text('depth_m,north_mps,east_mps\n0,0.1,0\n')
+
+    with pytest.raises(ConfigurationError, match='there/flow.csv'):
+        load_scenario(str(mine), changes)
+    written('here', 1020.0)
+    for name in ('current_8deg', str(mine)):
+        assert load_scenario(name, changes).water.profile == [[0.0, 1020.0]]
+    written('there', 1025.0)
+    assert load_scenario(str(mine), changes).water.profile == [[0.0, 1025.0]]

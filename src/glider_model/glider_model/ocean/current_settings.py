@@ -16,7 +16,7 @@ from pydantic import Field
 
 from glider_base import plugins
 from glider_base.noise import random_stream
-from glider_base.settings import Settings, number
+from glider_base.settings import Settings, beside, number
 from glider_model.ocean import current, fields
 from glider_model.ocean.columns import MAX_DEPTH_M, MAX_ROWS, check_rows, read_columns
 from glider_model.ocean.current import CurrentParams, CurrentState, current_initial
@@ -192,8 +192,8 @@ class TableCurrent(_Component):
     """A measured profile: velocity by depth, linear between rows and held beyond the ends.
 
     A file is read when the settings are validated and lives on as ``rows``, so that validated
-    settings need no file. Its path is relative to the folder named ``folder`` in the validation
-    context, and to the working directory if there is none.
+    settings need no file. It lies in the folder named ``folder`` in the validation context, or in
+    the working directory.
     """
 
     kind: Literal['table']
@@ -220,8 +220,7 @@ class TableCurrent(_Component):
             raise ValueError(f'give exactly one of file and rows, found {found}')
         if not isinstance(file, str):
             return values
-        folder = (info.context or {}).get('folder', '')
-        return {**values, 'file': None, 'rows': read_profile(Path(folder) / file)}
+        return {**values, 'file': None, 'rows': read_profile(Path(beside(file, info)))}
 
     @pydantic.model_validator(mode='after')
     def _check_rows(self):

@@ -23,7 +23,7 @@ from pydantic import Field
 from glider_base.errors import ConfigurationError
 from glider_base.frames import from_geodetic, on_chart
 from glider_base.kernel import kernel, replace
-from glider_base.settings import number
+from glider_base.settings import beside, number
 from glider_base.signals import SEA_WATER_DENSITY, Vector, Water
 from glider_base.slot import default, slot
 from glider_model.ocean.bottom import NO_BOTTOM, FlatBottom
@@ -132,8 +132,8 @@ class WaterSettings(DensitySettings):
     """Density of the water, depth of its bottom, and wind.
 
     A file of measured water is read when the settings are validated and lives on as its rows, so
-    that validated settings need no file. Its path is relative to the folder named ``folder`` in
-    the validation context, and to the working directory if there is none.
+    that validated settings need no file. It lies in the folder named ``folder`` in the validation
+    context, or in the working directory.
     """
 
     profile: list[list[float]] | None = Field(
@@ -163,7 +163,7 @@ class WaterSettings(DensitySettings):
     def _read_file(cls, profile: Any, info: pydantic.ValidationInfo):
         if not isinstance(profile, str):
             return profile
-        return read_cast(Path((info.context or {}).get('folder', '')) / profile)
+        return read_cast(Path(beside(profile, info)))
 
     @pydantic.model_validator(mode='after')
     def _check_rows(self):

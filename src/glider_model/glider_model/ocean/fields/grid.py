@@ -35,7 +35,9 @@ class GridFileSettings(Settings):
     of: ClassVar[str] = 'currents'  #: which of `GRIDS` is read
 
     file: str = Field(
-        '', max_length=4000, description='NetCDF file, relative to the folder of the scenario.'
+        '',
+        max_length=4000,
+        description='NetCDF file, beside the scenario, or else in the working folder.',
     )
     fingerprint: str = Field(
         '', description='Of the file, where another one is refused; a flown scenario has it.'
