@@ -720,8 +720,11 @@ def test_comparison_shows_differences_and_marks_the_better(tmp_path, call, wide)
 def test_comparison_of_a_long_and_a_short_run_marks_nothing(tmp_path, call, wide):
     one = altered(fly(tmp_path), 'one', sim_time_s=1000.0, cross_track_m__max_all=4.0)
     two = altered(one, 'two', sim_time_s=1101.0, cross_track_m__max_all=3.0)
-    rows, _ = compared(call, one, two)
+    rows, out = compared(call, one, two)
     assert rows['cross-track, after settling, max'] == ['4.00 m', '3.00 m (-1.00)']
+    assert 'The runs last from 17 min to 18 min' in out
+    _, out = compared(call, one, altered(one, 'like', sim_time_s=1000.2))
+    assert 'The runs last from' not in out, 'nobody is told of 17 min to 17 min'
 
 
 def test_comparison_names_a_run_that_has_no_steady_score(tmp_path, call):

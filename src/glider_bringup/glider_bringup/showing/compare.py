@@ -188,9 +188,10 @@ def caveats(cards: list[dict[str, Any]]) -> list[str]:
     """What to mind when these scores are compared."""
     found = []
     times = [card['sim_time_s'] for card in cards]
-    if max(times) != min(times):
+    shortest, longest = span(min(times)), span(max(times))
+    if shortest != longest:
         found.append(
-            f'The runs last from {span(min(times))} to {span(max(times))}: their scores are of '
+            f'The runs last from {shortest} to {longest}: their scores are of '
             'different times, and each curve ends where its run does.'
         )
     for status in ('lost', 'surfaced', *STOPPED):
