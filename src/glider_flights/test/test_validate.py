@@ -14,7 +14,6 @@ from typer.testing import CliRunner
 
 from glider_base.errors import ConfigurationError
 from glider_bringup.cli import app
-from glider_flights.reading import read_whole
 from glider_flights.record import Instruments
 from glider_flights.validation.flying import Simulated, Track
 from glider_flights.validation.score import turn_rates
@@ -442,7 +441,8 @@ def test_one_table_of_all_flights_of_a_folder(dive, tmp_path):
     assert 'left out: short' in shown.stdout
     slocum = ('--vehicle', 'slocum_g2')
     assert 'too few dives' in told(str(tmp_path / 'short'), *slocum, '--fit-on', 'first')
-    assert 'stands alone' in told('--all', str(tmp_path), '--fit-on', 'first')
+    for option in (('--fit-on', 'first'), ('--impose', 'actuators')):
+        assert 'stands alone' in told('--all', str(tmp_path), *option)
     assert 'FLIGHT is missing' in told(*slocum)
     assert '--vehicle is missing' in told(str(tmp_path / 'long'))
     assert 'no such folder' in told('--all', str(tmp_path / 'lost'))

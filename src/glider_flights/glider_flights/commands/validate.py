@@ -46,7 +46,8 @@ def validate(
         typer.Option(
             metavar='NAMES',
             help='Constants to be fitted to the vertical rate, such as Cd0,mass; none for none. '
-            'Default: mass,Cd0; with actuators trim and righting too.',
+            'Default: mass,Cd0, of a Seaglider lift too; with actuators trim and righting, with '
+            'an ADCP pitch_scale.',
         ),
     ] = None,
     fit_on: Annotated[
@@ -91,7 +92,7 @@ def validate(
     from glider_flights.validation.result import validate as validated
 
     if every is not None:
-        if flight is not None or fit_on is not None or adcp is not None or out is not None:
+        if impose != 'pitch' or any(one is not None for one in (flight, fit_on, adcp, out)):
             raise ConfigurationError(
                 f'--all {every}: stands alone (allowed with it: --vehicle, --fit, --cache, --json)'
             )
