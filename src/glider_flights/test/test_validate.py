@@ -240,6 +240,11 @@ def test_a_pitch_sensor_that_reads_too_much_is_found_by_the_adcp(dive, tmp_path)
     assert found['segments'] == 4
     assert found['fitted']['pitch_scale'] == pytest.approx(0.86, abs=0.01)
     assert found['u_adcp_rmse_cmps'] < 0.5
+    later = np.load(tmp_path / 'U_measured.npy')[:, len(times) // 2 :]
+    np.save(tmp_path / 'U_measured.npy', later)  # of the first half no ADCP tells
+    tried = report(str(tmp_path), '--vehicle', 'slocum_g2', '--fit-on', 'first')
+    assert tried['fitted'].keys() == {'mass', 'Cd0', 'lift'}
+    assert tried['u_adcp_rmse_cmps'] is not None
 
 
 def test_the_plant_finds_its_pitch_by_the_actuators(dive, tmp_path):

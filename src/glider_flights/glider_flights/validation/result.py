@@ -63,9 +63,8 @@ def validate(
     """
     found = tracks(flight)
     check(flight, found, impose)
-    foreign = adcp is not None and all(np.isnan(measured(one, adcp)).all() for one in found)
+    foreign = adcp is not None and not _heard(found, adcp)
     adcp = None if foreign else adcp
-    names = chosen('none' if fit_on == 'none' else fit, flight.kind, impose, adcp is not None)
     start = model_of(vehicle, flight)
     learnt_on, begun, tried = found, start, found
     if isinstance(fit_on, Flight):
@@ -73,6 +72,8 @@ def validate(
         check(fit_on, learnt_on, impose)
     elif fit_on in ('first', 'second'):
         learnt_on, tried = _halves(found, flight)[:: 1 if fit_on == 'first' else -1]
+    has_adcp = adcp is not None and _heard(learnt_on, adcp)
+    names = chosen('none' if fit_on == 'none' else fit, flight.kind, impose, has_adcp)
     told = learnt_on if adcp is not None and set(BY_ADCP) & set(names) else []
     learnt = fitted(learnt_on, begun, impose, names, told, adcp)
     model = start
@@ -120,6 +121,11 @@ def validate(
         for turns, learnt_rates in turn_rates(flown_there).items():
             _try_turns(report[turns], learnt_rates)
     return Validation(pairs, model, adcp, report)
+
+
+def _heard(found: list[Track], adcp: Adcp) -> bool:
+    """Whether an ADCP measured at the time of one of these stretches."""
+    return any(np.isfinite(measured(one, adcp)).any() for one in found)
 
 
 def _halves(found: list[Track], flight: Flight) -> tuple[list[Track], list[Track]]:
