@@ -5,6 +5,7 @@
 import json
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from typer.testing import CliRunner
 
 from glider_base.errors import ConfigurationError
 from glider_bringup.cli import app
+from glider_flights.reading import read_whole
 from glider_flights.record import Instruments
 from glider_flights.validation.flying import Simulated, Track
+from glider_flights.validation.result import validate
 from glider_flights.validation.score import turn_rates
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle
@@ -377,6 +380,10 @@ def test_what_cannot_be_flown_is_told(file, dive, tmp_path):
     assert 'wrong.npy: cannot be read: No data left' in told(file, *slocum, '--adcp', str(wrong))
     write_dive(tmp_path / 'p1230001.nc', {name: part[:5] for name, part in dive.items()})
     assert 'no stretch under water of 120 s' in told(str(tmp_path), *slocum)
+    flight = read_whole(Path(file), None, quiet)
+    of_another = flight._replace(kind='slocum')
+    with pytest.raises(ConfigurationError, match='--fit-on a seaglider'):
+        validate(flight, 'seaglider', 'pitch', None, None, quiet, of_another)
 
 
 def test_gsw_that_is_not_there_is_named(file, monkeypatch):

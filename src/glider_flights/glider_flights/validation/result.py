@@ -68,6 +68,11 @@ def validate(
     start = model_of(vehicle, flight)
     learnt_on, begun, tried = found, start, found
     if isinstance(fit_on, Flight):
+        if {fit_on.kind, flight.kind} == VEHICLES.keys():
+            raise ConfigurationError(
+                f'{flight.told}: a {flight.kind} cannot be tried with what is fitted to a '
+                f'{fit_on.kind} (allowed: --fit-on a {flight.kind})'
+            )
         learnt_on, begun = tracks(fit_on), model_of(vehicle, fit_on)
         check(fit_on, learnt_on, impose)
     elif fit_on in ('first', 'second'):
