@@ -79,8 +79,12 @@ def test_a_map_by_surfacing_has_its_own_measure_and_limits(tmp_path, monkeypatch
     found = [CLASSES[i] for i in load_map(file, 'surfacing').classes[0].T.ravel()[:4]]
     assert found == ['stable', 'critical', 'critical', 'lost']
     assert (load_map(file).classes == CLASSES.index('stable')).all()
-    known = write(tmp_path, [1.0])
-    assert 'surfacing' in refused([known, '--by', 'surfacing'], monkeypatch, capsys)
+    for record in records:
+        record['figures'][name] = None  # too few dives
+    write_dataset(make_dataset(plan, records), file)
+    (tmp_path / 'known').mkdir()
+    for none in (file, write(tmp_path / 'known', [1.0])):
+        assert 'surfacing' in refused([none, '--by', 'surfacing'], monkeypatch, capsys)
 
 
 def test_dimensions_are_sorted_out_whatever_their_order(tmp_path):

@@ -83,7 +83,7 @@ def load_map(file: Path, by: str = 'steady') -> StabilityMap:
     if not needed <= set(data.attrs) or 'status' not in data:
         raise ConfigurationError(f'{file}: not a result of ./glider sweep')
     measure = MEASURES[by]
-    if measure.variable not in data:
+    if measure.variable not in data or by != 'steady' and data[measure.variable].isnull().all():
         raise ConfigurationError(
             f'{file}: every cell failed, or has no {measure.variable}: nothing to draw by {by}'
         )
