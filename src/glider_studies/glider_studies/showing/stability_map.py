@@ -78,7 +78,8 @@ def load_map(file: Path, by: str = 'steady') -> StabilityMap:
     except FileNotFoundError:
         raise ConfigurationError(f'{file}: no such file') from None
     except Exception as error:  # readers of damaged files raise whatever they like
-        raise ConfigurationError(f'{file}: cannot be read as NetCDF: {error}') from None
+        why = str(error).partition('\n')[0]  # scipy goes on with what to install for NetCDF 4
+        raise ConfigurationError(f'{file}: cannot be read as NetCDF: {why}') from None
     needed = {'scenario_yaml', 'vehicle_yaml', 'sweep'}
     if not needed <= set(data.attrs) or 'status' not in data:
         raise ConfigurationError(f'{file}: not a result of ./glider sweep')
