@@ -100,7 +100,7 @@ Recording = Annotated[
     typer.Argument(
         metavar='FLIGHT',
         help='Folder of dbd files of a Slocum (or mbd, sbd, dcd, mcd, scd), folder of p*.nc '
-        'of a Seaglider, or one p*.nc; NetCDF of OceanGliders (OG1).',
+        'of a Seaglider, or one p*.nc; to be navigated, NetCDF of OceanGliders (OG1) too.',
     ),
 ]
 Cache = Annotated[
