@@ -246,10 +246,12 @@ def test_heading_fluctuation_tells_a_limit_cycle_from_a_drift():
     assert found['heading_fluctuation_deg']['rms_steady'] == pytest.approx(expected, rel=0.01)
 
 
-def test_dives_are_counted_below_30_and_above_20_m():
-    """Waves around either depth make no dives of their own; one that is not over counts not."""
-    depth = np.array([0, 25, 31, 29, 31, 25, 19, 22, 19, 29, 40, 21, 40, 10, 500.0])
-    assert score(make_log(ticks(1.5), depth=depth))['dives'] == 2
+@pytest.mark.parametrize(('last', 'dives'), [([500.0], 2), ([500, 400], 2), ([500, 400, 19], 3)])
+def test_dives_are_counted_by_20_m_down_and_up(last, dives):
+    """Waves make no dives of their own; one that is not over counts not."""
+    depth = np.array([0, 25, 31, 29, 31, 19, 22, 10, 19, 40, 21, 40, 19, *last], dtype=float)
+    told = score(make_log(ticks(0.1 * len(depth)), depth=depth))
+    assert told['dives'] == dives
 
 
 @pytest.mark.parametrize('target_m', [10.0, 25.0, 40.0, 60.0, 1000.0])

@@ -29,7 +29,6 @@ class Rules(NamedTuple):
     shallowest_m: float = math.inf  #: depth of dives by which they are counted, if less (m)
     dives: int = 0  #: that it is to fly in its time; 0: so many as there are
     dive_s: float = math.inf  #: time that is ample for a stay and a dive, if it is to fly some (s)
-    top_m: float = 10.0  #: depth of the upper turn between dives (m)
 
     @property
     def dives_at_all(self) -> bool:

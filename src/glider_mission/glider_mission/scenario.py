@@ -242,7 +242,6 @@ class Scenario(Settings):
             bathymetry=self._bathymetry(),
             dives=0 if self._holds else self.dives,
             dive_depth_m=self.shallowest_m,
-            dive_top_m=self.profile.top_depth_m,
             afloat_s=self._afloat_s(),
             fitted=[name for name in SENSORS if name in self.topics],
             faults=self.vehicle_faults,
@@ -391,7 +390,6 @@ class Scenario(Settings):
             self.shallowest_m,
             min(self.dives, int(self.duration_s / (dive_s := self._dive_s()))),
             dive_s,
-            self.profile.top_depth_m,
         )
 
     def _dive_s(self) -> float:

@@ -12,7 +12,14 @@ from glider_model.ocean.water import WaterSettings
 from glider_model.plant.energy import FULL
 from glider_model.plant.faults.kinds import NoFaults, NoFaultState
 from glider_model.plant.motion import Motion
-from glider_model.plant.plant import LAUNCHED, PlantParams, PlantState, dive_depths, plant_step
+from glider_model.plant.plant import (
+    LAUNCHED,
+    NO_DIVES,
+    PlantParams,
+    PlantState,
+    dive_m,
+    plant_step,
+)
 from glider_model.plant.readings import make_readings
 from glider_model.plant.sensors import NO_SAMPLE, SensorSettings
 from glider_model.vehicle.energy import NO_ENERGY
@@ -83,7 +90,7 @@ def _plant_params(vehicle='zhang2021', **density):
         0,
         0,
         0,
-        *dive_depths(1000.0, 10.0),
+        dive_m(1000.0),
         SensorSettings().params(0),
         NoFaults(),
         NO_ENERGY,
@@ -99,7 +106,7 @@ def _start(position=(0.0, 0.0, 100.0), euler=(0.0, 0.0, 0.0), velocity=(), joint
     joints = Joints(*(float(number) for number in _with_surface(joints)))
     water = Water(0.0, 0.0, 0.0)
     return PlantState(
-        motion, joints, water, 0, False, 0, 0, -1, NO_SAMPLE, LAUNCHED, NoFaultState(), False, FULL
+        motion, joints, water, 0, NO_DIVES, 0, -1, NO_SAMPLE, LAUNCHED, NoFaultState(), False, FULL
     )
 
 

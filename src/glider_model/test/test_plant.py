@@ -14,6 +14,7 @@ from glider_base.frames import euler_from_quaternion
 from glider_base.signals import TICK_S, Joints, Water
 from glider_model.plant.motion import acceleration, integrate
 from glider_model.plant.plant import (
+    NO_DIVES,
     PlantSettings,
     plant_finished,
     plant_odometry,
@@ -360,8 +361,9 @@ def test_odd_starts_end_in_a_glide(name, theta, velocity, fly, plant_params, sta
 # ------------------------------------------------------------------------------------ end of run
 
 
-def finished(params, **state_fields):
-    state = PlantSettings().initial_state()._replace(**state_fields)
+def finished(params, dives=0, **state_fields):
+    dives = NO_DIVES._replace(count=dives)
+    state = PlantSettings().initial_state()._replace(dives=dives, **state_fields)
     return plant_finished(state, params)
 
 
@@ -381,15 +383,15 @@ def test_run_without_dives_does_not_end_at_the_surface():
     assert not finished(PlantSettings().params(), dives=5, surface_ticks=10**6)
 
 
-def test_a_dive_counts_between_two_depths(plant_params, start):
-    """Deep below 30 m, counted above 20 m; going between the two in the meantime counts once."""
+def test_a_dive_counts_wherever_it_turns(plant_params, start):
+    """Down by 20 m and up by 20 m; going to and fro by less in the meantime counts once."""
     params, history = plant_params(), []
     state = start()
-    for depth in (10.0, 25.0, 35.0, 25.0, 31.0, 25.0, 15.0, 25.0, 15.0, 40.0, 1.0):
+    for depth in (90.0, 100.0, 112.0, 95.0, 91.0, 75.0, 90.0, 96.0, 79.0, 70.0, 40.0, 61.0, 1.0):
         motion = state.motion._replace(p_d=depth)
         state = plant_step(state._replace(motion=motion), state.joints, STILL, params, TICK_S)
-        history.append(state.dives)
-    assert history == [0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2]
+        history.append(state.dives.count)
+    assert history == [0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2, 2, 3]
 
 
 def test_time_at_the_surface_starts_anew(plant_params, start):

@@ -49,7 +49,7 @@ from glider_mission.blocks import COLUMNS
 from glider_mission.rules import Rules
 from glider_mission.scenario import Scenario
 from glider_model.ocean.bottom import NO_BOTTOM
-from glider_model.plant.plant import DIVED_M, dive_depths
+from glider_model.plant.plant import DIVED_M, NO_DIVES, dive_m, dives_after
 from glider_model.plant.readings import make_readings, noise_of_readings
 from glider_model.vehicle.file import Vehicle, load_vehicle
 
@@ -230,8 +230,7 @@ class Scorer:
             turn_m=max([rules.depth_m, *(one.depth_m for one in self._followed if one.depth_m)]),
         )
         believed = flown._replace(e2=series('told_e2'))
-        shallowest_m = min(rules.depth_m, rules.shallowest_m)
-        dives = _count_dives(depth, *dive_depths(shallowest_m, rules.top_m))
+        dives = _count_dives(depth, dive_m(min(rules.depth_m, rules.shallowest_m)))
         way_m, time_s = self._along_path_m(), seconds(ticks)
         held = ~(series('infeasible')[scored & flies] > 0.0)
         infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)
@@ -389,13 +388,17 @@ def _heading_fluctuation_deg(heading: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return np.degrees(unwrapped - mean), last - first == 2 * half + 1
 
 
-def _count_dives(depth: np.ndarray, below_m: float, above_m: float) -> int:
-    """Number of times that the vehicle went deep and came back, as the plant counts them."""
-    zone = np.zeros(len(depth), dtype=np.int8)
-    zone[depth > below_m] = 1
-    zone[depth < above_m] = -1
-    zone = zone[zone != 0]
-    return int(np.count_nonzero((zone[:-1] == 1) & (zone[1:] == -1)))
+@kernel
+def _count_dives(depth, dive):
+    """Number of times that the vehicle dived and came back, as the plant counts them.
+
+    A climb that is its last one leads to above ``dive`` (m).
+    """
+    dives = NO_DIVES
+    for now in depth:
+        dives = dives_after(dives, now, dive)
+    is_up = dives.is_down or dives.turn < dive
+    return dives.count if is_up else max(0, dives.count - 1)
 
 
 def _missing(
@@ -410,17 +413,17 @@ def _missing(
         return ''
     if dives < rules.dives:
         return f'dives flown, of those that there was time for: {dives} of {rules.dives}'
-    if rules.dives_at_all and not _dives_at_all(depth, rules):
+    if rules.dives_at_all and not _dives_at_all(depth):
         return 'no dive flown, for which there was time'
     if rules.dives_at_all and not ended and _idles(depth, rules):
         return f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
     return ''
 
 
-def _dives_at_all(depth: np.ndarray, rules: Rules) -> bool:
+def _dives_at_all(depth: np.ndarray) -> bool:
     """Whether it went down and came back, however little: over a shelf a bottom turns dives."""
     deepest_m = float(np.max(depth, initial=0.0))
-    return deepest_m > DIVED_M and _count_dives(depth, *dive_depths(deepest_m, rules.top_m)) > 0
+    return deepest_m > DIVED_M and _count_dives(depth, dive_m(deepest_m)) > 0
 
 
 def _idles(depth: np.ndarray, rules: Rules) -> bool:

@@ -42,12 +42,9 @@ from glider_model.vehicle.perturb import PerturbSettings, perturbed
 LARGEST_ERROR_J = 1e-6
 #: Steps in a tick at most.
 MOST_STEPS = 256
-#: A dive counts once the vehicle, having been below the first depth, is above the second (m)
-DIVE_BELOW_M, DIVE_ABOVE_M = 30.0, 20.0
-#: or as much deeper as the upper turn is deeper than this (m),
-USUAL_TOP_M = 10.0
-#: but in shallow profiles below and above these shares of their depth.
-DIVE_BELOW_SHARE, DIVE_ABOVE_SHARE = 0.7, 0.6
+#: A dive leads so far down and up again (m), wherever it turns; in shallow profiles this share of
+#: their depth.
+DIVE_M, DIVE_SHARE = 20.0, 0.3
 #: Time at the surface after the last dive (s).
 SURFACE_S = 60.0
 #: Shallower than this the vehicle is at the surface (m).
@@ -70,6 +67,17 @@ class Surfacing(NamedTuple):
 LAUNCHED = Surfacing(0, False, 0, 0)
 
 
+class Dives(NamedTuple):
+    """The dives of a vehicle."""
+
+    count: int  #: each from where it turned up
+    is_down: bool  #: has come down by `dive_m`, and not up again since
+    turn: float  #: deepest since then, or shallowest since it came up (m)
+
+
+NO_DIVES = Dives(0, False, math.inf)
+
+
 class PlantState(NamedTuple):
     """State of the plant at a tick."""
 
@@ -79,8 +87,7 @@ class PlantState(NamedTuple):
         0.0, 0.0, 0.0
     )  #: water velocity during the tick that led here, with the drift of wind
     tick: int = 0
-    deep: bool = False  #: has been below where a dive counts since it was last above
-    dives: int = 0  #: completed dives
+    dives: Dives = NO_DIVES
     surface_ticks: int = 0  #: ticks at the surface without a break
     afloat_ticks: int = -1  #: since the pump was filled last; -1: has not dived yet
     sample: Sample = NO_SAMPLE  #: what the sensors showed at the tick before
@@ -100,8 +107,7 @@ class PlantParams(NamedTuple):
     stop_after_dives: int  #: 0: only max_ticks ends the run
     stop_surface_ticks: int
     stop_afloat_ticks: int  #: 0: never
-    dive_below: float  #: a dive counts once the vehicle, having been below this (m)
-    dive_above: float  #: is above this (m)
+    dive: float  #: a dive leads so far down and up again (m)
     sensors: SensorParams
     faults: NamedTuple  #: NoFaults, or FaultParams
     energy: EnergyParams
@@ -109,13 +115,18 @@ class PlantParams(NamedTuple):
     bottom: NamedTuple = NO_BOTTOM  #: flat, or by a chart
 
 
-def dive_depths(depth_m: float, top_m: float) -> tuple[float, float]:
-    """Depths (m) below and then above which a dive from ``top_m`` to ``depth_m`` counts."""
-    deeper_m = max(0.0, top_m - USUAL_TOP_M)
-    return (
-        min(DIVE_BELOW_M + deeper_m, DIVE_BELOW_SHARE * depth_m),
-        min(DIVE_ABOVE_M + deeper_m, DIVE_ABOVE_SHARE * depth_m),
-    )
+def dive_m(depth_m: float) -> float:
+    """How far (m) a dive leads down and up again, in dives to a depth."""
+    return min(DIVE_M, DIVE_SHARE * depth_m)
+
+
+@kernel
+def dives_after(dives: Dives, depth: float, dive: float) -> Dives:
+    """What there is of the dives a tick later, at a depth (m); ``dive`` is `dive_m`."""
+    turn = max(dives.turn, depth) if dives.is_down else min(dives.turn, depth)
+    if abs(depth - turn) <= dive:
+        return Dives(dives.count, dives.is_down, turn)
+    return Dives(dives.count + dives.is_down, not dives.is_down, depth)
 
 
 class InitialSettings(Settings):
@@ -148,9 +159,6 @@ class PlantSettings(Settings):
     )
     dive_depth_m: float = number(
         1000.0, (1.0, 12000.0), 'depth of the dives, by which they are counted (m)'
-    )
-    dive_top_m: float = number(
-        USUAL_TOP_M, (2.0, 1000.0), 'depth of the upper turn between them, as well (m)'
     )
     afloat_s: float = number(
         0.0,
@@ -211,12 +219,10 @@ class PlantSettings(Settings):
 
     def ends(self) -> dict[str, int | float]:
         """Kernel parameters, by name, of what an order in flight changes: when the run ends."""
-        below, above = dive_depths(self.dive_depth_m, self.dive_top_m)
         return {
             'stop_after_dives': self.dives,
             'stop_afloat_ticks': round(self.afloat_s / TICK_S),
-            'dive_below': below,
-            'dive_above': above,
+            'dive': dive_m(self.dive_depth_m),
         }
 
     def bottom(self) -> NamedTuple:
@@ -320,8 +326,6 @@ def plant_step(
         motion, error = integrate(state.motion, start, end, water, water_rate, body, dt, steps)
         steps *= 2
     motion = aground(motion, water, bottom_depth(motion.p_n, motion.p_e, params.bottom))
-    deep = motion.p_d > params.dive_below or (state.deep and motion.p_d >= params.dive_above)
-    dives = state.dives + 1 if state.deep and not deep else state.dives
     surface_ticks = state.surface_ticks + 1 if motion.p_d < SURFACE_M else 0
     fills = command.m_b > joints.m_b + v.errors.dead_band.m_b
     afloat_ticks = _afloat(state.afloat_ticks, motion.p_d, fills)
@@ -337,8 +341,7 @@ def plant_step(
         joints=joints,
         water=water,
         tick=state.tick + 1,
-        deep=deep,
-        dives=dives,
+        dives=dives_after(state.dives, motion.p_d, params.dive),
         surface_ticks=surface_ticks,
         afloat_ticks=afloat_ticks,
         sample=sample,
@@ -379,7 +382,7 @@ def plant_finished(state, params):
     """Whether the tick of this state is the last one of the run; there is no deeper sea."""
     surfaced = (
         params.stop_after_dives > 0
-        and state.dives >= params.stop_after_dives
+        and state.dives.count >= params.stop_after_dives
         and state.surface_ticks >= params.stop_surface_ticks
     )
     afloat = 0 < params.stop_afloat_ticks <= state.afloat_ticks
