@@ -386,3 +386,12 @@ def test_a_bottom_that_is_near_for_three_seconds_turns_a_dive():
         assert state.stage == GLIDING_DOWN
     assert profile_step(state, 100.0, 0.2, NO_ECHO, NO_END, params).near_ticks == 0
     assert profile_step(state, 100.0, 0.2, 5.0, NO_END, params).stage == INFLECTING_UP
+
+
+@pytest.mark.parametrize(('depth', 'rate'), [(23.0, -0.3), (0.1, 0.8)])
+def test_a_dive_that_has_not_begun_to_sink_does_not_turn(depth, rate):
+    """A start under water rises as yet; at the surface a noisy rate is no way down."""
+    params = ProfileSettings(depth_m=36.0).params(0, PUMP, POLAR)
+    state = INITIAL_PROFILE._replace(stage=GLIDING_DOWN, turn_depth=36.0, depth=36.0)
+    assert profile_step(state, depth, rate, NO_ECHO, NO_END, params).stage == GLIDING_DOWN
+    assert profile_step(state, 23.0, 0.3, NO_ECHO, NO_END, params).stage == INFLECTING_UP

@@ -206,7 +206,10 @@ def _next_stage(state, depth, vertical_rate, turn_depth, params):
     stage = state.stage
     full = params.dive_rate if is_descending(stage) else params.climb_rate
     is_first = state.lead_up_s == 0.0 and state.lead_down_s == 0.0
-    lead = turn_lead_m(vertical_rate, full, turn_lead_s(state, params), is_first)
+    # one that goes the other way as yet, or lies at the surface, is not led into a turn
+    rate = max(0.0, vertical_rate if is_descending(stage) else -vertical_rate)
+    rate = 0.0 if depth < AT_SURFACE_M else rate
+    lead = turn_lead_m(rate, full, turn_lead_s(state, params), is_first)
     if state.aborted:
         return WAITING_ON_SURFACE if depth < AT_SURFACE_M else SURFACING
     if params.holds and depth < AT_SURFACE_M:

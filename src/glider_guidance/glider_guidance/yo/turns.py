@@ -32,14 +32,13 @@ def turn_lead_s(state, params):
 
 
 @kernel
-def turn_lead_m(vertical_rate, full, lead_s, is_first):
-    """Way (m) by which a turn is led.
+def turn_lead_m(rate, full, lead_s, is_first):
+    """Way (m) by which a turn is led, at a vertical rate (m/s) towards it.
 
     The weight goes with the square of the rate, and the lead with the weight. A vehicle that goes
     at less than half of its ``full`` vertical rate (m/s) has its pump nearly in the middle yet.
     One that is heavier than its file says shows it before its first turn; later ones know.
     """
-    rate = abs(vertical_rate)
     share = rate / full
     lead = rate * lead_s * min(1.0, share * share / (SLOW * SLOW))
     return lead * min(MOST_LEAD, share * share) if is_first and share > FAST else lead
