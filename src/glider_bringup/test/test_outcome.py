@@ -168,6 +168,15 @@ def test_a_mission_that_drifts_before_the_end_of_its_path_is_unfinished(dives):
     assert told['reason'].startswith('afloat')
 
 
+def test_a_mission_that_ends_in_a_deeper_dive_than_those_before_flew_some():
+    yo = {'profile.depth_m': 12.0, 'profile.net_heaviness_kg': 0.15}
+    yo |= {'profile.surface_every_dives': 1, 'profile.wait_s': 60.0}
+    deeper = {'dives': 0, 'duration_s': 4000.0, 'orders': [{'at_s': 2500.0, 'depth_m': 600.0}]}
+    _, told = fly_scored(load_scenario('current_8deg', {**yo, **deeper}), [])
+    assert told['depth_m']['max'] > 100.0
+    assert (told['status'], told['dives'] > 1) == ('completed', True)
+
+
 @pytest.mark.parametrize('vehicle', ['slocum_g2', 'seaglider'])
 def test_a_mission_whose_dives_begin_slowly_goes_on(vehicle):
     """With so little weight it takes longer than a minute to leave the surface."""

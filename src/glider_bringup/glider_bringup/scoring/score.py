@@ -413,7 +413,7 @@ def _missing(
         return ''
     if dives < rules.dives:
         return f'dives flown, of those that there was time for: {dives} of {rules.dives}'
-    if rules.dives_at_all and not _dives_at_all(depth):
+    if rules.dives_at_all and not dives and not _dives_at_all(depth):
         return 'no dive flown, for which there was time'
     if rules.dives_at_all and not ended and _idles(depth, rules):
         return f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
