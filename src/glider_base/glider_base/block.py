@@ -95,7 +95,8 @@ def changes_to_tell(flags, stamps_ns, every_ns, told, told_ns):
     found = np.empty(len(flags), np.int64)
     count = 0
     for k in range(len(flags)):
-        if stamps_ns[k] - told_ns >= every_ns and np.any(flags[k] != told):
+        since_ns = stamps_ns[k] - told_ns  # less than nothing: a vehicle's clock was set back
+        if not 0 <= since_ns < every_ns and np.any(flags[k] != told):
             told[:], told_ns = flags[k], stamps_ns[k]
             found[count] = k
             count += 1
@@ -120,7 +121,7 @@ class Telling:
 
     def is_due(self, flags: tuple[int, ...], stamp_ns: int) -> bool:
         """Whether flags of one tick are told."""
-        if flags == self._told or stamp_ns - self._told_ns < self.block.every_ns:
+        if flags == self._told or 0 <= stamp_ns - self._told_ns < self.block.every_ns:
             return False
         self._told, self._told_ns = flags, stamp_ns
         return True

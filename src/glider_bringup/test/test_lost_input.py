@@ -13,6 +13,7 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
+from glider_base.ros.lockstep import health
 from glider_base.ros.wire import qos
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import TOPICS
@@ -117,6 +118,16 @@ def test_lost_input_surfaces_the_vehicle_for_good(flight):
     assert set(vehicle.commands[before:]) == {SAFE}
     flight.until(lambda: vehicle.said('surface: ordered to the surface'))
     assert flight.guard.state.told & ORDERED
+
+
+def test_what_holds_is_told_though_the_clock_of_the_vehicle_was_set_back(flight):
+    vehicle = flight.vehicle
+    vehicle.stamp_ns += 3600 * 10**9
+    flight.guard.surface(health.SURFACE)
+    flight.until(lambda: vehicle.said('surface: ordered to the surface'))
+    vehicle.stamp_ns -= 3600 * 10**9
+    flight.guard.clear()
+    flight.until(lambda: vehicle.said('nothing to react to'))
 
 
 @pytest.mark.parametrize('factor', [0.0, 2.0])
