@@ -145,6 +145,26 @@ def test_a_free_running_node_hears_a_battery_that_is_not_reliable(context):
         node.destroy_node()
 
 
+@pytest.mark.parametrize('set_by_s', [56 * 365.25 * 86400.0, -900.0])
+def test_orders_that_are_known_before_hold_in_time_though_the_clock_is_set(context, set_by_s):
+    """By a first fix, as that of a vehicle is: they count the time that passes."""
+    told = {'lockstep': False, 'orders': '[{"at_s": 5.0, "depth_m": 300.0}]'}
+    overrides = [Parameter(name, value=value) for name, value in told.items()]
+    node = GuidanceNode(context=context, parameter_overrides=overrides)
+    try:
+        followed = []
+        for tick in range(70):
+            stamp_ns = 10**12 + 10**8 * tick + round(1e9 * set_by_s) * (tick > 5)
+            for item in node.inputs:
+                raw = item.topic.codec.encode(stamp_ns, at_rest(item.topic.name))
+                item.accept_newest(raw, node.now_s(), 1.0)
+            node._on_cycle()
+            followed.append(node.settings.profile.depth_m == 300.0)
+        assert 40 <= followed.index(True) <= 50
+    finally:
+        node.destroy_node()
+
+
 def test_an_abort_before_a_node_is_configured_is_not_forgotten(context):
     told = {'lockstep': False, 'managed': True}
     overrides = [Parameter(name, value=value) for name, value in told.items()]

@@ -20,7 +20,7 @@ from glider_base.ros.wire import qos
 from glider_base.ros.wire.codec import MessageError
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
-from glider_base.signals import TICK_NS, Battery, Water
+from glider_base.signals import Battery, Water
 from glider_base.wiring import MAP, SLOW_S, WHEN_SILENT
 from glider_guidance.block import GUIDANCE
 from glider_guidance.order import Order
@@ -54,7 +54,8 @@ class GuidanceNode(BlockNode):
     def forget(self) -> None:
         """Know nothing, as at the start."""
         super().forget()
-        self.waiting, self.first_ns = list(self.settings.orders), None
+        self.waiting = list(self.settings.orders)
+        self.tick = -1  #: the last one, by the time that passes in the steps
         self.answer = ''  #: to the last order
         self.battery, self.battery_ns = Battery(*WHEN_SILENT['battery']), 0  #: and when it said so
 
@@ -65,9 +66,8 @@ class GuidanceNode(BlockNode):
 
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
         """Answer one tick, by the orders that hold from it on."""
-        self.first_ns = stamp_ns if self.first_ns is None else self.first_ns
-        tick = (stamp_ns - self.first_ns) // TICK_NS
-        for order in due(self.waiting, tick, self.flags[0] if self.flags else -1):
+        self.tick += self.passed
+        for order in due(self.waiting, self.tick, self.flags[0] if self.flags else -1):
             self.waiting.remove(order)
             self.follow(stamp_ns, order)
         if self.settings.path != self.told_path:
@@ -76,7 +76,7 @@ class GuidanceNode(BlockNode):
         super().step(stamp_ns, *inputs)
         no_progress = self.flags[2]
         if no_progress and not before:
-            order = reaction(self.settings, no_progress, inputs[0], tick + 1)
+            order = reaction(self.settings, no_progress, inputs[0], self.tick + 1)
             self.waiting += [order] if order else []
         if stamp_ns // SECOND_NS != self.second:
             self.second = stamp_ns // SECOND_NS
