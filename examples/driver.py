@@ -15,6 +15,8 @@ from std_msgs.msg import Header
 
 JOINTS = ['buoyancy_engine', 'pitch_mass', 'roll_mass']
 PERIOD_S = 0.1
+#: Messages that are kept for a recorder that has no time for a while.
+KEPT = 256
 
 
 class Vehicle(Protocol):
@@ -62,7 +64,7 @@ class Driver(Node):
         if not self.navigates:
             kinds = {'joint_states': JointState}
             kinds |= {'imu': Imu, 'pressure': FluidPressure, 'fix': NavSatFix}
-        self.out = {name: self.create_publisher(kind, name, 10) for name, kind in kinds.items()}
+        self.out = {name: self.create_publisher(kind, name, KEPT) for name, kind in kinds.items()}
         self.create_subscription(JointState, 'command', self.on_command, 10)
 
     def start(self) -> None:

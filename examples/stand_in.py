@@ -18,7 +18,7 @@ import random
 import time
 
 import rclpy
-from driver import JOINTS, PERIOD_S, Driver
+from driver import JOINTS, KEPT, PERIOD_S, Driver
 from nav_msgs.msg import Odometry
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.time import Time
@@ -126,7 +126,7 @@ class BadLine(Driver):
         self.vehicle.place(given['depth_m'], given['current_mps'], given['imu_period_s'])
         self.line, self.random = given, random.Random(given['seed'])
         self.clock = self.create_publisher(Clock, '/clock', 10) if given['speed'] > 1.0 else None
-        self.truth = self.create_publisher(Odometry, 'ground_truth/odom', 10)
+        self.truth = self.create_publisher(Odometry, 'ground_truth/odom', KEPT)
         self.under_way: list[tuple[float, dict]] = []
         self.elapsed_s = 0.0
         self.unanswered = None  # periods without a command, once there has been one

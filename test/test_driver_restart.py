@@ -8,6 +8,7 @@ and once it is back with best effort.
 """
 
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -86,6 +87,8 @@ rclpy.spin(driver)
 """
 #: The driver is away for so long (s), and what follows.
 AWAY_S, AFTER_S, DEADLINE_S = 3.5, 6.0, 120.0
+#: So long (s) the recorder is stopped before.
+STOPPED_S = 2.5
 
 
 class Heard:
@@ -168,7 +171,11 @@ def flight(tmp_path_factory):
             heard.until(lambda: heard.ready >= nodes)
             first = start([*driver, 'reliable', *space])
             heard.until(lambda: heard.commands and heard.commands[-1][1] > 0.2 and recorded_s())
-            heard.listen(2.0)
+            recorder.send_signal(signal.SIGSTOP)  # it has no time, and asks for all of it again
+            heard.listen(STOPPED_S)
+            recorder.send_signal(signal.SIGCONT)
+            going_on_s = time.time()
+            heard.until(lambda: recorded_s() > going_on_s)
             first.kill()
             killed_s = time.monotonic()
             heard.listen(AWAY_S)
@@ -220,6 +227,7 @@ def test_recording_goes_on(flight):
     assert stamps_s[0] - begin_s < DEADLINE_S  # the path has no stamp, and comes first
     gaps_s = [after - before for before, after in zip(stamps_s[:-1], stamps_s[1:], strict=True)]
     assert AWAY_S < max(gaps_s) < ended_s - killed_s
+    assert sorted(gaps_s)[-2] < STOPPED_S - 1.5
     assert stamps_s[-1] - stamps_s[gaps_s.index(max(gaps_s)) + 1] > 1.0
 
 
