@@ -4,6 +4,7 @@
 
 import json
 import os
+import re
 import time
 
 import numpy as np
@@ -333,3 +334,20 @@ def test_first_difference_of_such_a_flight_is_named(glider, free_flight, block):
     assert [name for name, one in blocks.items() if one['result'] == 'different'] == [block]
     first = blocks[block]['first']
     assert (first['topic'], first['stamp_ns']) == (topic, stamps[0])
+    assert not [note for note in blocks[block]['notes'] if 'is not on record' in note]
+
+
+def test_hole_in_such_a_recording_is_named_beside_the_difference(glider, free_flight):
+    """What the recorder missed is no change of the code, and no damage."""
+
+    def spoil(vehicle, tick: int) -> None:
+        missed = ('odom', 'joint_states') if 300 <= tick < 310 else ()
+        vehicle.put = lambda name, raw: name in missed or Vehicle.put(vehicle, name, raw)
+
+    code, blocks = verified(glider, free_flight(spoil))
+    assert code == 1
+    for name in ('guidance', 'control'):
+        (note,) = (said for said in blocks[name]['notes'] if said.startswith('odom is not'))
+        first_s, last_s = (float(word) for word in re.findall(r't = (\S+) s', note))
+        assert 0.9 < last_s - first_s < 1.3
+        assert first_s < blocks[name]['first']['t_s'] < last_s + 0.1

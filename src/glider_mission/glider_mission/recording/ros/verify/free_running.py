@@ -7,7 +7,9 @@ from copy import copy
 
 import numpy as np
 
+from glider_base.ros.lockstep.health import seconds
 from glider_base.ros.lockstep.step_node import Passing
+from glider_base.signals import TICK_S
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording, Series
 from glider_mission.recording.ros.verify.check import Check, Track, Verdict
@@ -16,6 +18,8 @@ from glider_mission.recording.ros.verify.check import Check, Track, Verdict
 _OLDER = range(4)
 #: An input goes on by one message from step to step, or by one of these.
 _ADVANCES = (1, 0, 2)
+#: What comes in every tick is missed after so long (s); answers, which may come late, later.
+_MISSED_S = {name: 1.5 * TICK_S for name in ('odom', 'joint_states')}
 
 
 def _by_stamp(series: Series, stamps_ns: np.ndarray) -> tuple[Track, list[int]]:
@@ -74,9 +78,25 @@ def free_running(
         progress(start / len(stamps_ns))
     if check.found:
         check.notes.append('free-running: compared up to the first difference')
+        at_ns = min(one.stamp_ns for one in check.found)
+        check.notes += [
+            f'{name} is not on record from {seconds(begin_ns)} to {seconds(end_ns)}: if the '
+            'recorder missed it there, or its node was started again, this is why'
+            for name in (*block.inputs, marker)
+            for begin_ns, end_ns in _silences(
+                series[name].stamps_ns, at_ns, _MISSED_S.get(name, max_age_s)
+            )
+        ]
     elif check.ticks:
         check.finish_events()
     return check.verdict()
+
+
+def _silences(stamps_ns: np.ndarray, at_ns: int, least_s: float) -> list[tuple[int, int]]:
+    """From when to when a topic, int64[n], is silent for so long, by a time or just before it."""
+    after = int(np.searchsorted(stamps_ns, at_ns))
+    around = map(int, stamps_ns[max(0, after - 1) : after + 2])
+    return [(a, b) for a, b in itertools.pairwise(around) if b - a > 1e9 * least_s]
 
 
 def _places(newest: int, last: int | None) -> list[int]:
