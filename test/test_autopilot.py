@@ -3,6 +3,7 @@
 """Navigation, guidance and control in one process: the same flight, the same ways to end."""
 
 import hashlib
+import json
 import os
 import signal
 import time
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+import yaml
 
 import command_line
 from glider_base.ros.places import domain_id
@@ -67,6 +69,13 @@ def test_scores_are_the_same(flights, other):
 @pytest.mark.parametrize('other', ['autopilot', 'alone'])
 def test_recording_is_the_same_to_the_last_byte(flights, other):
     assert digest(flights['together'][0]) == digest(flights[other][0])
+
+
+def test_who_records_by_hand_is_told_of_the_sensors(glider):
+    """The recorder of a vehicle that reckons its place has to hear what it reckons by."""
+    said = glider('autopilot', 'reckoned_12deg', '--print-parameters')
+    told = yaml.safe_load(said.stdout)['/glider/recorder_node']['ros__parameters']
+    assert {'imu', 'pressure', 'fix'} <= set(json.loads(told['topics']))
 
 
 def test_recording_verifies(glider, flights):

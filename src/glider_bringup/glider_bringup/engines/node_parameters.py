@@ -32,7 +32,7 @@ def node_parameters(
     speed : float
         Times real time; 0.0: as fast as possible.
     record_to : Path, optional
-        Folder of the recording. Without it there is no recorder.
+        Folder of the recording. Without it a recorder is started by hand, if any.
     attachments : iterable of Path
         Files to store in the recording.
     sync : str
@@ -50,12 +50,11 @@ def node_parameters(
         faults[publisher(one.topic).node].append(told)
     for name, told in faults.items():
         nodes[name] |= {'message_faults': json.dumps(told), 'message_seed': scenario.seed}
+    nodes[topics.RECORDER] = {'name': scenario.name, 'topics': json.dumps(scenario.topics)}
     if record_to is not None:
-        nodes[topics.RECORDER] = {
+        nodes[topics.RECORDER] |= {
             'folder': str(record_to.resolve()),
-            'name': scenario.name,
             'attachments': json.dumps([str(path.resolve()) for path in attachments]),
-            'topics': json.dumps(scenario.topics),
             'progress': True,
             'sync': sync,
         }
