@@ -78,6 +78,20 @@ def test_who_records_by_hand_is_told_of_the_sensors(glider):
     assert {'imu', 'pressure', 'fix'} <= set(json.loads(told['topics']))
 
 
+@pytest.mark.parametrize(
+    ('words', 'waits'),
+    [
+        ([], True),
+        (['--no-navigation'], False),
+        (['--no-navigation', '--set', 'sensors.also_fitted=[pressure]'], True),
+    ],
+)
+def test_guard_waits_for_no_pressure_where_the_vehicle_publishes_odom(glider, words, waits):
+    said = glider('autopilot', 'reckoned_12deg', *words, '--print-parameters')
+    told = yaml.safe_load(said.stdout)['/glider/guard_node']['ros__parameters']
+    assert told['pressure'] == waits
+
+
 def test_recording_verifies(glider, flights):
     done = glider('verify', flights['together'][0])
     assert done.returncode == 0, done.stdout + done.stderr
