@@ -120,6 +120,28 @@ def test_lost_input_surfaces_the_vehicle_for_good(flight):
     assert flight.guard.state.told & ORDERED
 
 
+@pytest.mark.parametrize('heard', [True, False])
+def test_a_clock_that_is_set_forward_is_no_lost_input(flight, monkeypatch, heard):
+    """Nor is it that this node was stopped; and who is silent has the time that he has."""
+    vehicle, now_s = flight.vehicle, flight.guard.now_s
+    if not heard:
+        vehicle.says = {}
+        flight.until(lambda: vehicle.said('missing or stale'))
+    before = len(vehicle.commands)
+    monkeypatch.setattr(flight.guard, 'now_s', lambda: now_s() + 3600.0)
+    flight.guard._on_cycle()  # before anything comes
+    flight.until(lambda: len(vehicle.commands) > before + 4)
+    assert not vehicle.said('for good')
+    assert not heard or SAFE not in vehicle.commands[before:]
+
+
+def test_silence_is_seen_by_a_clock_of_coarse_steps_too(flight, monkeypatch):
+    now_s = flight.guard.now_s
+    monkeypatch.setattr(flight.guard, 'now_s', lambda: 20.0 * now_s())
+    flight.vehicle.says = {}
+    flight.until(lambda: flight.vehicle.said('input lost for 1 s: surfacing for good'))
+
+
 def test_what_holds_is_told_though_the_clock_of_the_vehicle_was_set_back(flight):
     vehicle = flight.vehicle
     vehicle.stamp_ns += 3600 * 10**9

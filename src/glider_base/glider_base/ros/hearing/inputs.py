@@ -49,6 +49,7 @@ class Input:
         self.lost = 0  #: messages that lack between those that came
         self.late = 0  #: cycles that had to do with the input of the one before
         self.used_ns = -1
+        self.excused_ns = -1  #: stamp at which time jumped last
         #: raises a `MessageError` if numbers cannot be what was measured
         self.check = _CHECKS.get(topic.name, lambda values: None)
 

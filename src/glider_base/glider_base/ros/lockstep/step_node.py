@@ -31,7 +31,7 @@ class Passing:
     """
 
     def __init__(self, max_age_s: float) -> None:
-        self._most = max(1, round(max_age_s / TICK_S))
+        self.most = max(1, round(max_age_s / TICK_S))
         self._stamp_ns = -1  #: of the last cycle
         self._passed_ns = 0  #: up to where time has passed in the steps
 
@@ -40,9 +40,9 @@ class Passing:
         before_ns, self._stamp_ns = self._stamp_ns, stamp_ns
         if stamp_ns == before_ns:
             return 0
-        if not 0 < stamp_ns - before_ns <= self._most * TICK_NS or before_ns < 0:
+        if not 0 < stamp_ns - before_ns <= self.most * TICK_NS or before_ns < 0:
             self._passed_ns = stamp_ns
-            return self._most if before_ns >= 0 and stamp_ns > before_ns else 1
+            return self.most if before_ns >= 0 and stamp_ns > before_ns else 1
         behind = (stamp_ns - self._passed_ns) / TICK_NS
         ticks = max(round(behind), int(behind > -_AHEAD))
         self._passed_ns += ticks * TICK_NS
@@ -123,7 +123,7 @@ class StepNode(TickNode):
             else:
                 self.event(stamp_ns, health.OK, 'inputs are fresh again')
         if stale:
-            self.on_stale(stamp_ns, due)
+            self.on_stale(stamp_ns, min(due, self._passing.most))
         elif not (passed := self._passing.ticks(stamp_ns)):
             self.repeat()
         else:
@@ -152,8 +152,12 @@ class StepNode(TickNode):
     def _cycles_since(self, now_s: float) -> int:
         """Cycles that there should have been since the last one, this one included."""
         since_s = TICK_S if self._cycle_s is None else now_s - self._cycle_s
-        if since_s < 0.0:  # the clock was set back: nothing came later than now
+        if not 0.0 <= since_s <= self.ticks.input_max_age_s:
+            # the clock was set, or this node stopped: nobody was silent, and nothing came later
             for item in self.inputs:
+                if item.excused_ns != item.stamp_ns:  # once, or a coarse /clock hid a silence
+                    item.arrived_s += max(0.0, since_s)
+                    item.excused_ns = item.stamp_ns
                 item.arrived_s = min(item.arrived_s, now_s)
                 item.owner.heard_s = min(item.owner.heard_s, now_s)
             self._tell_s = min(self._tell_s, now_s)
