@@ -519,6 +519,14 @@ static inline Motion integrate(
     return x;
 }
 
+static Dives dives_after(Dives dives, double depth, double dive)
+{
+    double turn = dives.is_down ? max(dives.turn, depth) : min(dives.turn, depth);
+    if (fabs(depth - turn) <= dive)
+        return (Dives){dives.count, dives.is_down, turn};
+    return (Dives){dives.count + dives.is_down, !dives.is_down, depth};
+}
+
 static void plant_step(
     PlantState *state, Joints command, Water water, const PlantParams *params, double dt)
 {
@@ -535,10 +543,9 @@ static void plant_step(
     for (int steps = 1; error > LARGEST_ERROR_J && steps <= MOST_STEPS; steps *= 2)
         motion = integrate(
             state->motion, state->joints, joints, &water, &water_rate, params, dt, steps, &error);
-    bool deep = motion.p_d > DIVE_BELOW_M || (state->deep && motion.p_d >= DIVE_ABOVE_M);
-    int64_t dives = state->deep && !deep ? state->dives + 1 : state->dives;
+    Dives dives = dives_after(state->dives, motion.p_d, params->dive);
     int64_t surface_ticks = motion.p_d < SURFACE_M ? state->surface_ticks + 1 : 0;
-    *state = (PlantState){motion, joints, water, state->tick + 1, deep, dives, surface_ticks};
+    *state = (PlantState){motion, joints, water, state->tick + 1, dives, surface_ticks};
 }
 
 /* Steps of the plant; rows of log get the 13 numbers of the motion. */
