@@ -64,13 +64,15 @@ def derived(params: type[ParamsT], settings: Settings, **computed: Any) -> Param
     return params(**computed)
 
 
+def named(file: str, info: pydantic.ValidationInfo) -> Path:
+    """A file beside the file of the settings, if that is known and has it, or else from here."""
+    there = Path((info.context or {}).get('folder', '')) / file
+    return there if there.exists() or not Path(file).exists() else Path(file)
+
+
 def beside(file: str, info: pydantic.ValidationInfo) -> str:
-    """Path of a file beside the file of the settings, if that is known, or else from here."""
-    folder = (info.context or {}).get('folder')
-    if not (folder and file):
-        return file
-    found = Path(folder) / file
-    return str((found if found.exists() or not Path(file).exists() else Path(file)).resolve())
+    """The same as a full path, for a node that is started elsewhere, where a folder is known."""
+    return str(named(file, info).resolve()) if file and info.context else file
 
 
 #: ``json_schema_extra`` of a field that can be set on a node while it flies.

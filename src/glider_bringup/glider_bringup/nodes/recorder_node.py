@@ -94,14 +94,15 @@ class RecorderNode(TickNode):
         place = self.get_namespace().rstrip('/')
         self.replay = f'{place}/{topics.REPLAY}'
         self.tellers = [f'{place}/{wired.node}' for wired in WIRING]
+        names = ('recorded', 'heard') if self.ticks.lockstep else ()
+        self.words = {name: self._publisher(TOPICS[name]) for name in names}
+        self.outputs |= {name: (TOPICS[name], word) for name, word in self.words.items()}
         for name in per_tick:
             self.add_input(name)
         self._subscription(TOPICS['path'], self.on_path, gated=False)
         self.events = self._subscription(TOPICS['/diagnostics'], self.on_event, raw=False)
         self.counts = self._subscription(TOPICS['told'], self.on_count, raw=False)
         self.counted: dict[str, health.Told] = {}
-        self.words = {name: self._publisher(TOPICS[name]) for name in ('recorded', 'heard')}
-        self.outputs |= {name: (TOPICS[name], word) for name, word in self.words.items()}
         signal.signal(signal.SIGINT, self.on_signal)
         signal.signal(signal.SIGTERM, self.on_signal)
         self.wall_timer(_DRAIN_S, self.drain)

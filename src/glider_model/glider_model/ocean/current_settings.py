@@ -16,7 +16,7 @@ from pydantic import Field
 
 from glider_base import plugins
 from glider_base.noise import random_stream
-from glider_base.settings import Settings, beside, number
+from glider_base.settings import Settings, named, number
 from glider_model.ocean import current, fields
 from glider_model.ocean.columns import MAX_DEPTH_M, MAX_ROWS, check_rows, read_columns
 from glider_model.ocean.current import CurrentParams, CurrentState, current_initial
@@ -220,7 +220,7 @@ class TableCurrent(_Component):
             raise ValueError(f'give exactly one of file and rows, found {found}')
         if not isinstance(file, str):
             return values
-        return {**values, 'file': None, 'rows': read_profile(Path(beside(file, info)))}
+        return {**values, 'file': None, 'rows': read_profile(named(file, info))}
 
     @pydantic.model_validator(mode='after')
     def _check_rows(self):

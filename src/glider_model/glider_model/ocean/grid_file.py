@@ -20,7 +20,6 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError, installed
 from glider_base.files import is_file
-from glider_base.frames import within_180
 from glider_model.ocean.columns import is_height
 
 if TYPE_CHECKING:
@@ -423,7 +422,7 @@ def _select(layout: _Layout, window: Window | None) -> tuple[dict[str, np.ndarra
     if window is not None:
         middle = 0.5 * (window.west + window.east)
     # the same meridians, as near to the middle as they can be
-    values['longitude'] = middle + within_180(longitudes - middle)
+    values['longitude'] = middle + (longitudes - middle + 180.0) % 360.0 - 180.0
     if window is None:
         chosen = {axis: np.argsort(values[axis], kind='stable') for axis in _AXES}
     else:

@@ -13,7 +13,6 @@ and Stokes drift together. It is as if the water there went faster by that much.
 
 import functools
 import math
-from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -23,7 +22,7 @@ from pydantic import Field
 from glider_base.errors import ConfigurationError
 from glider_base.frames import from_geodetic, on_chart
 from glider_base.kernel import kernel, replace
-from glider_base.settings import beside, number
+from glider_base.settings import named, number
 from glider_base.signals import SEA_WATER_DENSITY, Vector, Water
 from glider_base.slot import default, slot
 from glider_model.ocean.bottom import NO_BOTTOM, FlatBottom
@@ -163,7 +162,7 @@ class WaterSettings(DensitySettings):
     def _read_file(cls, profile: Any, info: pydantic.ValidationInfo):
         if not isinstance(profile, str):
             return profile
-        return read_cast(Path(beside(profile, info)))
+        return read_cast(named(profile, info))
 
     @pydantic.model_validator(mode='after')
     def _check_rows(self):

@@ -21,7 +21,6 @@ from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.clock import MAX_TICKS_AHEAD
 from glider_base.ros.lockstep.executor import take
 from glider_base.ros.lockstep.node import COUNT_TICKS
-from glider_base.ros.lockstep.peers import UNKNOWN
 from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_base.ros.wire import topics
 from glider_base.ros.wire.codec import to_cdr
@@ -215,12 +214,9 @@ class _Brake:
         needed = present((topic.name for topic in TOPICS.values() if topic.per_tick), ())
         names = {TOPICS[name].full_name(plan.namespace) for name in needed}
         self._whole = names <= set(plan.names.values())
-        self._node, self._odom = node, TOPICS['odom'].full_name(plan.namespace)
+        self._node, self._word = node, topic.full_name(plan.namespace)
         self._subscription = node.create_subscription(
-            topic.message_type,
-            topic.full_name(plan.namespace),
-            lambda message: None,
-            topic.qos,
+            topic.message_type, self._word, lambda message: None, topic.qos
         )
         self._recorded_ns: int | None = None
 
@@ -238,15 +234,8 @@ class _Brake:
                 self._recorded_ns = log_ns
 
     def _is_recorded(self) -> bool:
-        """Whether a recorder in lockstep listens: it alone says what it has on disk.
-
-        The name of a node can come later than its subscriptions.
-        """
-        return any(
-            info.node_name in (topics.RECORDER, UNKNOWN)
-            and info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
-            for info in self._node.get_subscriptions_info_by_topic(self._odom)
-        )
+        """Whether a recorder in lockstep listens: it alone says what it has on disk."""
+        return self._node.count_publishers(self._word) > 0
 
 
 class _Count:
