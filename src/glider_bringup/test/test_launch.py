@@ -151,6 +151,10 @@ def test_navigation_of_a_vehicle_can_be_left_out(tmp_path, navigation, method, n
     assert parameters(plan)['/glider/guard_node']['pressure'] == has_pressure
     for node in 'guidance_node', 'guard_node':
         assert parameters(plan)[f'/glider/{node}']['altitude'], 'it keeps clear of the bottom'
+    arguments['scenario'] = str(tmp_path / 'fitted.yaml')
+    fitted = scenario.read_text() + 'sensors: {also_fitted: [pressure]}\n'
+    Path(arguments['scenario']).write_text(fitted)
+    assert parameters(plan_launch(arguments, tmp_path))['/glider/guard_node']['pressure']
     (autopilot,) = plan_launch({**arguments, 'autopilot': 'true'}, tmp_path).nodes
     assert autopilot.executable == 'autopilot'
     assert autopilot.words == (() if nodes else ('guidance', 'control', 'guard'))

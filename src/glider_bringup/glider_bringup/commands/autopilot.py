@@ -10,7 +10,6 @@ import typer
 
 from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace
 from glider_base.settings import ConfigurationError
-from glider_base.wiring import GUARD
 from glider_bringup.console import Changes, Law, Named, changed_fields, messages
 from glider_mission.choices import chosen_fields
 from glider_mission.scenario import load_scenario
@@ -67,9 +66,7 @@ def autopilot(
     flown = load_scenario(scenario, chosen_fields(changed_fields(changes), controller))
     reckons = 'measured_odom' not in flown.navigation.topics if navigation is None else navigation
     parts = [name for name in PARTS if name != 'navigation' or reckons]
-    parameters = node_parameters(flown, lockstep=False)
-    if not reckons and 'pressure' not in flown.sensors.also_fitted:  # nobody publishes it
-        parameters[GUARD.node]['pressure'] = False
+    parameters = node_parameters(flown, lockstep=False, navigates=reckons)
     with tempfile.TemporaryDirectory() as scratch:
         file = Path(scratch) / 'parameters.yaml'
         write_parameters(parameters, file, place)

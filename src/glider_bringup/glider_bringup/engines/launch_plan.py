@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace
-from glider_base.ros.wire.topics import CURRENT, GUARD, NAVIGATION
+from glider_base.ros.wire.topics import CURRENT, NAVIGATION
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
@@ -195,16 +195,19 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     folder = record_to or log_folder.joinpath(namespace[1:])  # a launch may start several gliders
     folder.mkdir(parents=True, exist_ok=True)
     attached = (folder / SCENARIO_FILE, folder / VEHICLE_FILE) if record_to else ()
-    parameters = node_parameters(
-        scenario, speed=speed, lockstep=lockstep, record_to=record_to, attachments=attached
-    )
-    if record_to:
-        parameters[RECORDER]['progress'] = False
     # a vehicle whose place is measured knows it, and publishes odom itself
     knows_place = not simulate and 'measured_odom' in scenario.navigation.topics
     with_navigation = _TRUTH.get(text['navigation'], not knows_place)
-    if not with_navigation:  # nor are there the sensors that it would read
-        parameters[GUARD] |= {'pressure': False}
+    parameters = node_parameters(
+        scenario,
+        speed=speed,
+        lockstep=lockstep,
+        navigates=with_navigation,
+        record_to=record_to,
+        attachments=attached,
+    )
+    if record_to:
+        parameters[RECORDER]['progress'] = False
     nodes = _nodes(
         simulate,
         with_navigation,

@@ -10,7 +10,7 @@ from pathlib import Path
 from glider_base.ros.message_fault import MessageFault
 from glider_base.ros.parameters import parameters_yaml, to_parameters
 from glider_base.ros.wire import topics
-from glider_base.wiring import publisher
+from glider_base.wiring import GUARD, publisher
 from glider_mission.blocks import BLOCKS
 from glider_mission.disk import write_whole
 from glider_mission.scenario import Scenario
@@ -21,6 +21,7 @@ def node_parameters(
     *,
     speed: float = 0.0,
     lockstep: bool = True,
+    navigates: bool = True,
     record_to: Path | None = None,
     attachments: Iterable[Path] = (),
     sync: str = 'end',
@@ -31,6 +32,8 @@ def node_parameters(
     ----------
     speed : float
         Times real time; 0.0: as fast as possible.
+    navigates : bool
+        Whether there is a navigation node. Without it nobody publishes what it alone reads.
     record_to : Path, optional
         Folder of the recording. Without it a recorder is started by hand, if any.
     attachments : iterable of Path
@@ -44,6 +47,8 @@ def node_parameters(
         for block, settings in zip(BLOCKS, scenario.block_settings(), strict=True)
     }
     nodes[topics.PLANT]['speed'] = speed
+    if not navigates and 'pressure' not in scenario.sensors.also_fitted:
+        nodes[GUARD.node]['pressure'] = False
     faults = defaultdict(list)
     for one in scenario.message_faults:
         told = one.model_dump(include=set(MessageFault.model_fields))

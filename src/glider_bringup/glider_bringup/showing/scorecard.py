@@ -213,17 +213,16 @@ def print_card(card: dict, folder: Path, report: Path | None = None) -> None:
     print_places(output, folder, report)
 
 
-def print_status(card: dict) -> None:
+def print_status(card: dict, console: Console = output) -> None:
     """Print what became of a run."""
     text = f'status: {status_text(card)}'
-    output.print(text, style=STYLES[card['status']], soft_wrap=True)
+    console.print(text, style=STYLES[card['status']], soft_wrap=True)
 
 
 def tell_stopped(card: dict) -> None:
     """Say beside what was made of a run that it is not whole, if it is not, and why."""
     if card['status'] in STOPPED:
-        text = f'status: {status_text(card)}'
-        messages.print(text, style=STYLES[card['status']], soft_wrap=True)
+        print_status(card, messages)
 
 
 def print_places(console: Console, folder: Path, report: Path | None) -> None:

@@ -305,8 +305,9 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
         straight_s = sailed_s(chart, waypoints, 0.0, pace.speed, end_s)
     if not route.arrives and math.isfinite(straight_s):
         route = route._replace(corners=waypoints, ends=[*range(1, len(waypoints))])
-    last_s = end_s if route.arrives or math.isfinite(straight_s) else 0.0
+    made = Plan(route, np.empty(0), straight_s, pace, chart, end_s)
     for sea in with_errors(chart, scenario.forecast.error_mps, scenario):
-        arrivals.append(sailed_s(sea, route.corners, 0.0, pace.speed, last_s))
+        s = sailed_s(sea, route.corners, 0.0, pace.speed, end_s) if made.reachable else math.inf
+        arrivals.append(s)
         progress(len(arrivals) + 1)
-    return Plan(route, np.array(arrivals), straight_s, pace, chart, end_s)
+    return made._replace(arrivals_s=np.array(arrivals))
