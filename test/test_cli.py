@@ -187,6 +187,7 @@ MISTAKES = [
     (['run', '--engine', 'direct', '--speed', '2'], ['--speed', 'max']),
     (['run', '--namespace', 'a b'], ['--namespace a b', 'letters']),
     (['run', '--engine', 'direct', '--namespace', 'sea'], ['--namespace sea', 'direct']),
+    (['run', '--engine', 'direct', '--sync', 'chunk'], ['--sync chunk', '--bag']),
     (['run', '--seed', '-1'], ['seed = -1', '>= 0']),
     (['run', '--engine', 'warp'], ['warp', 'nodes', 'direct']),
     (['run', '--controller', 'magic'], ['magic', 'pid']),

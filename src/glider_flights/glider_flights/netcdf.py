@@ -13,6 +13,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError, installed
 from glider_base.files import read_yaml
+from glider_flights.record import usable
 
 SUFFIXES = ('.nc', '.ncdf', '.nc4')
 #: Our unit in those of `variables.yaml`.
@@ -169,7 +170,7 @@ def fixes_of(found: dict[str, np.ndarray]) -> np.ndarray:
     turns = np.where(np.abs(longitude) <= 360.0, np.round(longitude / 360.0), 0.0)
     longitude = longitude - 360.0 * turns
     table = np.stack([times, latitude, longitude], axis=-1)
-    good = np.isfinite(table).all(axis=-1) & (np.abs(table[:, 1:]) <= (90.0, 180.0)).all(axis=-1)
+    good = np.isfinite(table).all(axis=-1) & usable(table[:, 1:])
     return table[good][np.unique(table[good, 0], return_index=True)[1]]
 
 

@@ -2,16 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reading a recorded flight, or its energy, of whichever kind of vehicle its files are."""
 
+import math
 from functools import partial
 from pathlib import Path
+
+import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_flights.energy import Uses, seaglider_uses, slocum_uses
 from glider_flights.folders import Progress, said
 from glider_flights.og1 import og1_files, read_og1
-from glider_flights.record import Flight
+from glider_flights.record import DIVE_DEPTH_M, Flight, vertical_rate
 from glider_flights.seaglider import read_seaglider, seaglider_files
 from glider_flights.slocum import read_slocum, slocum_files
+
+#: Where a glider sinks or rises by more than this (m/s), its nose further down or up than that
+#: (rad), a pitch shows its sign; of more of such samples than this it has the other one.
+RATE_MPS, PITCH_RAD, MOST_AGAINST = 0.05, math.radians(5.0), 0.9
 
 
 def files_by_kind(place: Path) -> dict[str, list[Path]]:
@@ -36,7 +43,7 @@ def read_flight(place: Path, cache: Path | None, progress: Progress) -> Flight:
     ------
     ConfigurationError
     """
-    flight = _read(place, cache, progress, read_slocum, read_seaglider, read_og1)
+    flight = _nose_up(place, _read(place, cache, progress, read_slocum, read_seaglider, read_og1))
     if not flight.segments:
         why = '; '.join(flight.notes)
         raise ConfigurationError(
@@ -48,14 +55,30 @@ def read_flight(place: Path, cache: Path | None, progress: Progress) -> Flight:
 
 def read_whole(place: Path, cache: Path | None, progress: Progress) -> Flight:
     """Read a flight with its instruments, whether or not it has segments; see `read_flight`."""
-    return _read(
-        place, cache, progress, partial(read_slocum, whole=True), read_seaglider, read_og1
-    )
+    slocum = partial(read_slocum, whole=True)
+    return _nose_up(place, _read(place, cache, progress, slocum, read_seaglider, read_og1))
 
 
 def read_uses(place: Path, cache: Path | None, progress: Progress) -> Uses:
     """Read what a flight took out of its battery; see `read_flight`."""
     return _read(place, cache, progress, slocum_uses, seaglider_uses)
+
+
+def _nose_up(place: Path, flight: Flight) -> Flight:
+    """The flight, whose nose is up where it rises; raises ConfigurationError."""
+    shown = against = 0
+    for samples in (segment.samples for segment in flight.segments):
+        rate, pitch = vertical_rate(samples.time_s, samples.depth_m), samples.pitch_rad
+        shows = (np.abs(rate) > RATE_MPS) & (np.abs(pitch) > PITCH_RAD)
+        shows &= samples.depth_m > DIVE_DEPTH_M
+        shown += shows.sum()
+        against += (shows & (rate * pitch > 0.0)).sum()
+    if against > MOST_AGAINST * shown:
+        raise ConfigurationError(
+            f'{place}: the pitch is nose up while it sinks, or down while it rises, in '
+            f'{against / shown:.0%} of its samples (allowed: + nose up)'
+        )
+    return flight
 
 
 def _read(place: Path, cache: Path | None, progress: Progress, slocum, seaglider, og1=None):

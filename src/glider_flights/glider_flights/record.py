@@ -177,6 +177,11 @@ def usual(values: Sequence[float]) -> float:
     return float(np.median(values)) if len(values) else math.nan
 
 
+def usable(degrees: np.ndarray) -> np.ndarray:
+    """Which latitudes and longitudes (degrees, last axis) a fix can have; 0, 0 is none."""
+    return (np.abs(degrees) <= (90.0, 180.0)).all(axis=-1) & degrees.any(axis=-1)
+
+
 def local_metres(origin_deg: np.ndarray, latitude_deg, longitude_deg) -> np.ndarray:
     """North and east (m, last axis) of an origin (latitude, longitude in degrees)."""
     latitude_deg, longitude_deg = np.asarray(latitude_deg), np.asarray(longitude_deg)

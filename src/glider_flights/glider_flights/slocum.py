@@ -40,6 +40,7 @@ from glider_flights.record import (
     instruments,
     local_metres,
     samples_of,
+    usable,
     usual,
 )
 
@@ -402,7 +403,7 @@ def _places(sensors: Sensors, latitude: str, longitude: str) -> tuple[np.ndarray
     (time_s, north), (own_s, east) = sensors[latitude], sensors[longitude]
     _, first, second = np.intersect1d(time_s, own_s, return_indices=True)
     degrees = np.stack([north[first], east[second]], axis=-1)
-    good = (np.abs(degrees) <= (90.0, 180.0)).all(axis=-1)
+    good = usable(degrees)
     return time_s[first][good], degrees[good]
 
 

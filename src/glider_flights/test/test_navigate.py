@@ -609,6 +609,14 @@ def across_the_date_line(data):
     return data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS - data.LONGITUDE_GPS.min() - 180.01)
 
 
+def with_fixes_that_are_none(data):
+    """A receiver without a fix tells 0, 0."""
+    fixed = np.isfinite(data.TIME_GPS)
+    lost = fixed & (fixed.cumsum() % 3 == 1)
+    names = ('LATITUDE_GPS', 'LONGITUDE_GPS')
+    return data.assign({name: data[name].where(~lost, 0.0) for name in names})
+
+
 def with_fills(data):
     """Some have no number, and the file does not say which stands for none."""
     names, dived = ('DEPTH', 'PITCH', 'HEADING'), data.DEPTH > 50.0
@@ -629,6 +637,7 @@ def with_fills(data):
         in_bar,
         in_days,
         from_noon,
+        with_fixes_that_are_none,
     ],
 )
 def test_a_flight_in_og1_is_the_same_however_it_is_told(change, tmp_path):
@@ -646,6 +655,14 @@ def test_a_unit_that_is_not_known_is_refused_by_name(name, unit, tmp_path):
     data.to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
     with pytest.raises(ConfigurationError, match=rf"unit_1.nc: {name} is in '{unit}' \(allowed"):
         read_flight(tmp_path, None, quiet)
+
+
+def test_a_pitch_of_the_other_sign_is_refused(tmp_path):
+    data = og1(2)
+    data.assign(PITCH=-data.PITCH).to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
+    for read in (read_flight, read_whole):
+        with pytest.raises(ConfigurationError, match=r'in 100% of its samples \(allowed: \+ nose'):
+            read(tmp_path, None, quiet)
 
 
 @pytest.mark.parametrize(

@@ -128,6 +128,8 @@ def run(
     if duration not in (None, 'full'):
         duration = number('--duration', duration, 'full', TICK_S, 1e8)
     fields = chosen_fields(changed_fields(changes), controller, guidance, seed, duration)
+    if sync != 'end' and engine == 'direct' and not bag:
+        raise ConfigurationError(f'--sync {sync}: nothing is recorded (allowed: with --bag)')
     rate, place = _checked(engine, speed, namespace, view, processes)
     flown = load_scenario(scenario, fields)
     layout = 'processes' if processes else 'together'
