@@ -87,6 +87,15 @@ def _rows_at(arrays, row):
 
 
 @kernel
+def _differs(flags, told):
+    """Whether one of some flags, int64[m], is not as it was told."""
+    for i in range(len(flags)):
+        if flags[i] != told[i]:
+            return True
+    return False
+
+
+@kernel
 def changes_to_tell(flags, stamps_ns, every_ns, told, told_ns):
     """Where flags int64[n, m] have changed, told at most once in ``every_ns``; indices int64[k].
 
@@ -96,7 +105,7 @@ def changes_to_tell(flags, stamps_ns, every_ns, told, told_ns):
     count = 0
     for k in range(len(flags)):
         since_ns = stamps_ns[k] - told_ns  # less than nothing: a vehicle's clock was set back
-        if not 0 <= since_ns < every_ns and np.any(flags[k] != told):
+        if not 0 <= since_ns < every_ns and _differs(flags[k], told):
             told[:], told_ns = flags[k], stamps_ns[k]
             found[count] = k
             count += 1

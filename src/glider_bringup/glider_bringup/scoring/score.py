@@ -20,8 +20,11 @@ import numpy as np
 from glider_base.frames import (
     OriginSettings,
     euler_from_quaternion,
+    heading_of,
     odometry_from_wire,
+    pitch_of,
     poses_from_wire,
+    swap_world,
 )
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Odometry
@@ -71,24 +74,38 @@ _SERIES = (
     *('target_n', 'target_e', 'infeasible', 'guard', 'mask'),
     *('net_heaviness', 'pitch_mass', 'roll_mass', 'fin'),
 )
-_ODOM, _REFERENCE, _JOINTS = (COLUMNS[name] for name in ('odom', 'reference', 'joint_states'))
-_TARGET = slice(_REFERENCE.start, _REFERENCE.start + 2)
-_E2, _FIRST_JOINT = COLUMNS['tracking_error'].start + 1, _JOINTS.start
+_ODOM, _E2 = COLUMNS['odom'], COLUMNS['tracking_error'].start + 1
+_FIRST_ODOM, _FIRST_REFERENCE, _FIRST_JOINT = (
+    COLUMNS[name].start for name in ('odom', 'reference', 'joint_states')
+)
+_GUARD, _SATURATION, _INFEASIBLE = (
+    COLUMNS[name] for name in ('guard', 'saturation', 'infeasible')
+)
+_TARGET = slice(_FIRST_REFERENCE, _FIRST_REFERENCE + 2)
 
 
-def _series_of(log: np.ndarray, told: np.ndarray) -> np.ndarray:
+@kernel
+def _attitude(wire):
+    """Quaternion of NED and FRD of an odometry as on the wire, or a reference laid out like it."""
+    return swap_world(wire[3], wire[4], wire[5], wire[6])
+
+
+@kernel
+def _series_of(log, told):
     """`_SERIES` of log rows with the true motion, and as they were told, float64[16, n]."""
-    odom, reference = poses_from_wire(log[:, _ODOM]), poses_from_wire(log[:, _REFERENCE])
-    guard = log[:, COLUMNS['guard']]
-    return np.stack(
-        (
-            *(odom[:, 2], log[:, _E2], told[:, _E2]),
-            *(odom[:, 4], reference[:, 4], odom[:, 5], -log[:, _REFERENCE.start + 9]),
-            *(reference[:, 0], reference[:, 1], log[:, COLUMNS['infeasible']], guard),
-            log[:, COLUMNS['saturation']].astype(np.int64) | guard.astype(np.int64),
-            *log[:, _JOINTS].T,
-        )
-    )
+    series = np.empty((len(_SERIES), len(log)))
+    for k in range(len(log)):
+        row, odom, reference = log[k], log[k, _FIRST_ODOM:], log[k, _FIRST_REFERENCE:]
+        attitude, pitch_ref = _attitude(odom), pitch_of(*_attitude(reference))
+        motion = (-odom[2], row[_E2], told[k, _E2])
+        angles = (pitch_of(*attitude), pitch_ref, heading_of(*attitude))
+        asked = (-reference[9], reference[1], reference[0], row[_INFEASIBLE])
+        bits = (row[_GUARD], float(int(row[_SATURATION]) | int(row[_GUARD])))
+        joints = row[_FIRST_JOINT:]
+        values = motion + angles + asked + bits + (joints[0], joints[1], joints[2], joints[3])
+        for i in range(len(values)):
+            series[i, k] = values[i]
+    return series
 
 
 @kernel
@@ -436,13 +453,21 @@ def _along_m(row: np.ndarray, target: np.ndarray, course_rad: float) -> float:
 
     That is on the course to the first of them that is away by `COURSE_M`, or else ``course_rad``.
     """
-    away = target - target[0]
-    far = np.flatnonzero(np.hypot(*away.T) > COURSE_M)
     towards = np.array([math.cos(course_rad), math.sin(course_rad)])
-    if len(far):
-        towards = away[far[0]] / np.hypot(*away[far[0]])
+    if far := _first_away(target):
+        away = target[far] - target[0]
+        towards = away / np.hypot(*away)
     odometry = _odometry_of(row)
     return float(towards @ (odometry.p_n - target[0, 0], odometry.p_e - target[0, 1]))
+
+
+@kernel
+def _first_away(target):
+    """Index of the first target that is `COURSE_M` away from the one they begin with; 0: none."""
+    for i in range(len(target)):
+        if math.hypot(target[i, 0] - target[0, 0], target[i, 1] - target[0, 1]) > COURSE_M:
+            return i
+    return 0
 
 
 def _travel(position: np.ndarray) -> float:

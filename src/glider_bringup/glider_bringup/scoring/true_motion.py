@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 
+from glider_base.kernel import kernel
 from glider_mission.blocks import COLUMNS
 
-_TRUTH, _ODOM_START = COLUMNS['ground_truth/odom'], COLUMNS['odom'].start
-_ODOM = slice(_ODOM_START, _ODOM_START + 13)
+_TRUTH_START, _ODOM_START = (COLUMNS[name].start for name in ('ground_truth/odom', 'odom'))
+_NUMBERS = 13  #: of an odometry, without its covariance
+_ODOM = slice(_ODOM_START, _ODOM_START + _NUMBERS)
 _E1, _E2 = COLUMNS['tracking_error'].start, COLUMNS['tracking_error'].start + 1
 #: Of the virtual target.
 _EAST, _NORTH = COLUMNS['reference'].start, COLUMNS['reference'].start + 1
@@ -34,6 +36,16 @@ def told_course(row: np.ndarray) -> float | None:
     return math.atan2(east, north) - math.atan2(row[_E2], row[_E1])
 
 
+@kernel
+def _is_truth(log):
+    """Whether the odometry of log rows is the truth, to the last bit."""
+    for row in range(len(log)):
+        for i in range(_NUMBERS):
+            if log[row, _ODOM_START + i] != log[row, _TRUTH_START + i]:
+                return False
+    return True
+
+
 class TrueMotion:
     """Gives the log as it would be if the odometry were the truth, block by block.
 
@@ -50,12 +62,10 @@ class TrueMotion:
         ``log`` are the next rows; they are not changed, and given back if the odometry is the
         truth.
         """
-        if not len(log) or np.isnan(log[0, _TRUTH.start]):
-            return log
-        if np.array_equal(log[:, _TRUTH], log[:, _ODOM]):
+        if not len(log) or np.isnan(log[0, _TRUTH_START]) or _is_truth(log):
             return log
         true = log.copy()
-        true[:, _ODOM] = log[:, _TRUTH]
+        true[:, _ODOM] = log[:, _TRUTH_START : _TRUTH_START + _NUMBERS]
         course = self._course_of_target(log)
         east, north = (true[:, i] - log[:, i] for i in (_ODOM_START, _ODOM_START + 1))
         true[:, _E2] += np.cos(course) * east - np.sin(course) * north
