@@ -47,15 +47,13 @@ def limits(field) -> str:
 
 def row(name: str, field) -> tuple[str, ...]:
     """Name, unit, range, whether it is needed, meaning."""
-    model, extra = model_of(field.annotation), field.json_schema_extra or {}
-    unit, allowed = '', ''
-    if is_quantity(model) and 'unit' in extra:
-        unit, allowed = f'{extra["unit"]}, three numbers', extra['allowed']
-    elif is_quantity(model):
-        unit, allowed = (
-            ' or '.join(re.findall(r'\[(.*)\]$', model.__name__)),
-            limits(model.model_fields['value']),
-        )
+    model, unit, allowed = model_of(field.annotation), '', ''
+    if is_quantity(model):
+        unit, value = re.search(r'\[(.*)\]$', model.__name__)[1], model.model_fields['value']
+        allowed = limits(value)
+        if value.annotation is not float:
+            (one,) = get_args(value.annotation)
+            unit, allowed = f'{unit}, three numbers', limits(one.__metadata__[0])
     return (
         f'`{name}`',
         unit,

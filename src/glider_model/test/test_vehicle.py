@@ -154,7 +154,7 @@ def test_vehicle_by_path(edited):
         (
             'rigid_body.hull_center_of_mass.unit',
             'mm',
-            "rigid_body.hull_center_of_mass: unit is 'mm' (allowed: 'm')",
+            "rigid_body.hull_center_of_mass.unit = 'mm': should be 'm' (allowed: 'm'; 1 mm = ",
         ),
         ('hull.length.source', MISSING, 'hull.length.source: missing'),
         ('hull.length.source', '', "hull.length.source = '': "),
@@ -174,13 +174,13 @@ def test_vehicle_by_path(edited):
         (
             'rigid_body.hull_inertia.value',
             [1.0, -2.0, 3.0],
-            'rigid_body.hull_inertia: value = [1.0, -2.0, 3.0] has a negative component',
+            'rigid_body.hull_inertia.value.1 = -2.0: should be greater than or equal to 0 ',
         ),
         (  # beside K_q < 0, which damps, it is easily written so, and was no damping at all
             'hydrodynamics.linear_angular_damping.value',
             [0.0, -5.0, -37.0],
-            'hydrodynamics.linear_angular_damping: value = [0.0, -5.0, -37.0] has a negative '
-            'component (allowed: >= 0)',
+            'hydrodynamics.linear_angular_damping.value.1 = -5.0: should be greater than or '
+            'equal to 0 (allowed: >= 0.0)',
         ),
         (
             'hydrodynamics.K_beta.value',
@@ -230,8 +230,12 @@ def test_vehicle_by_path(edited):
         (
             'added_mass.linear.value',
             [1.0, 2.0, 1e6],
-            'added_mass.linear.value = [1.0, 2.0, 1000000.0]: '
-            'every component must be within +-1e5',
+            'added_mass.linear.value.2 = 1000000.0: should be less than or equal to 100000 ',
+        ),
+        (
+            'added_mass.linear.value',
+            [1.0, True, 3.0],
+            'added_mass.linear.value.1 = True: should be a valid number',
         ),
         ('name', 'My Glider', "name = 'My Glider': "),
     ],

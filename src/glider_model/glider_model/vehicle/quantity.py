@@ -54,20 +54,22 @@ def quantity(unit: str, also: Other | None = None, **limits: float) -> type[Sett
         told = f'{source} ({value:g} {also.unit})' if isinstance(source, str) else source
         return {**values, 'value': value * also.factor, 'unit': unit, 'source': told}
 
+    value = float, Field(strict=True, description=f'number in {unit}', **limits)
+    convert = pydantic.model_validator(mode='before')(convert)
+    return _model(value, unit, also, __validators__={'convert': convert})
+
+
+def _model(value: tuple, unit: str, also: Other | None = None, **more) -> type[Settings]:
+    """Model of a value, a field as of `pydantic.create_model`, with its unit and source."""
     name = f'{unit} or {also.unit}' if also else unit
+    others = {'others': ', '.join(_told(unit, also))}
     return pydantic.create_model(
         f'Quantity[{name}]',
         __base__=Settings,
-        __validators__={'convert': pydantic.model_validator(mode='before')(convert)},
-        value=(float, Field(strict=True, description=f'number in {unit}', **limits)),
-        unit=(
-            Literal[unit],
-            Field(
-                description='unit of the value',
-                json_schema_extra={'others': ', '.join(_told(unit, also))},
-            ),
-        ),
+        value=value,
+        unit=(Literal[unit], Field(description='unit of the value', json_schema_extra=others)),
         source=(str, Field(min_length=3, description='where the number comes from')),
+        **more,
     )
 
 
@@ -82,21 +84,6 @@ NotPositive = {'ge': -1e5, 'le': 0.0}
 Signed = {'ge': -1e5, 'le': 1e5}
 
 
-class Vector(Settings):
-    """Three numbers along x, y, z with unit and source."""
-
-    value: Annotated[list[float], Field(min_length=3, max_length=3)]
-    unit: str
-    source: Annotated[str, Field(min_length=3)]
-
-    @pydantic.field_validator('value')
-    @classmethod
-    def _bounded(cls, value: list[float]) -> list[float]:
-        if any(abs(number) > 1e5 for number in value):
-            raise ValueError('every component must be within +-1e5')
-        return value
-
-
 def required(unit: str, words: str, **limits):
     """Type of a field that has such a `quantity`, and says what it means."""
     return Annotated[quantity(unit, **limits), Field(description=words)]
@@ -108,16 +95,8 @@ def optional(unit: str, words: str, **limits):
 
 
 def vector(unit: str, words: str, not_negative: bool = False):
-    """Vector that says what it means, and whose unit, and if asked sign, is checked."""
-
-    def check(vector: Vector) -> Vector:
-        if vector.unit != unit:
-            raise ValueError(f'unit is {vector.unit!r} (allowed: {unit!r})')
-        if not_negative and min(vector.value) < 0.0:
-            raise ValueError(f'value = {vector.value} has a negative component (allowed: >= 0)')
-        return vector
-
-    about = {'unit': unit, 'allowed': '>= 0.0' if not_negative else ''}
-    return Annotated[
-        Vector, pydantic.AfterValidator(check), Field(description=words, json_schema_extra=about)
-    ]
+    """Type of a field that has three such numbers, along x, y and z."""
+    limits = NotNegative if not_negative else Signed
+    one = Annotated[float, Field(strict=True, **limits)]
+    value = list[one], Field(min_length=3, max_length=3, description=f'numbers in {unit}')
+    return Annotated[_model(value, unit), Field(description=words)]
