@@ -23,7 +23,6 @@ from scipy.linalg import solve_continuous_lyapunov
 from glider_base.signals import TICK_S
 from glider_studies.bounds import lmi
 from glider_studies.bounds.steering_loop import (
-    BOX,
     INPUTS,
     SteeringLoop,
     Tick,
@@ -60,8 +59,6 @@ class Region(NamedTuple):
 
     p: np.ndarray
     times: float  #: m, of the rate limits and of the integral's
-    reach: float  #: largest |e| in it (m)
-    heading: float  #: largest |psi| in it (rad)
     start: np.ndarray  #: (2, 2), V of a start (e, psi) at rest is [e, psi] start [e, psi]'
     aside_m: float  #: start beside the path on its heading (m)
     turned: float  #: start on the path, turned (rad)
@@ -137,11 +134,10 @@ def _bordered(rows: np.ndarray, size: float):
 # ------------------------------------------------------------------------------------- gains
 
 
-def gain(loop: SteeringLoop, column: int, ratios=BOX) -> Gain | None:
+def gain(loop: SteeringLoop, column: int) -> Gain | None:
     """Smallest gain that is found from an input to the cross-track error; None: there is none."""
-    vertices = box(loop, ratios=ratios)
     scale = _scales(loop)
-    ticks = [tick(loop, one) for one in vertices]
+    ticks = [tick(loop, one) for one in box(loop)]
     # an input that moves the vehicle as far as the sizes of its states say
     size = _ANGLE * (loop.bandwidth, loop.speed, loop.bandwidth / abs(loop.b))[column]
     best = None
@@ -171,14 +167,14 @@ def gain_verified(p: np.ndarray, ticks: list[Tick], column: int, rate: float) ->
     return is_positive(p) and all(is_positive(dissipates(p, one, column, rate)) for one in ticks)
 
 
-def reached(loop: SteeringLoop, ratios=BOX) -> np.ndarray:
+def reached(loop: SteeringLoop) -> np.ndarray:
     """Metres per unit (3,) that the worst course of each input does at a vertex that stays.
 
     The sum of the absolute impulse response, over twelve times the slowest time: no true gain of
     the box is less.
     """
     most = np.zeros(len(INPUTS))
-    for one in (tick(loop, at) for at in box(loop, ratios=ratios)):
+    for one in (tick(loop, at) for at in box(loop)):
         slowest = -1.0 / np.linalg.eigvals(one.f).real.max()
         step = np.eye(len(one.f)) + TICK_S * one.f
         x, total = TICK_S * one.g, np.zeros(len(INPUTS))
@@ -238,16 +234,16 @@ def _propose_gain(loop, ticks, column, rate) -> np.ndarray | None:
 # ------------------------------------------------------------------------------------ region
 
 
-def region(loop: SteeringLoop, slope, tried=TRIED, ratios=BOX) -> Region | None:
+def region(loop: SteeringLoop, slope, tried=TRIED) -> Region | None:
     """Largest region that is found; None: there is none.
 
     ``slope`` gives the least gain of the line of sight, of its slope on the path, up to a reach
-    (m). ``tried`` is like `TRIED`, ``ratios`` are the least and largest b / b_hat, and k / k_hat.
+    (m). ``tried`` is like `TRIED`.
     """
     best = None
     for times, part in tried:
         reach = part / loop.line_of_sight
-        found = _region(loop, reach, slope(reach), times, ratios)
+        found = _region(loop, reach, slope(reach), times)
         if found and (best is None or found.aside_m * found.turned > best.aside_m * best.turned):
             best = found
     return best
@@ -293,9 +289,8 @@ def _largest(y: np.ndarray, basis: np.ndarray, rows: np.ndarray) -> float:
     return float(np.einsum('ij,jk,ik->i', rows, inverse, rows).max())
 
 
-def _region(loop, reach, slope, times, ratios) -> Region | None:
-    vertices = box(loop, _least(loop, slope, times), ratios)
-    ticks = [tick(loop, one) for one in vertices]
+def _region(loop, reach, slope, times) -> Region | None:
+    ticks = [tick(loop, one) for one in box(loop, _least(loop, slope, times))]
     scale, rows = _scales(loop), _bounds(loop, ticks, reach, times)
     scaled = [_scaled(one, scale) for one in ticks]
     basis = _symmetric(len(scale))
@@ -322,12 +317,5 @@ def _region(loop, reach, slope, times, ratios) -> Region | None:
     if not region_verified(p, ticks, rows):
         return None
     start = _at_rest(loop).T @ p @ _at_rest(loop)
-    return Region(
-        p,
-        times,
-        reach,
-        _LARGEST_HEADING,
-        start,
-        1.0 / math.sqrt(start[0, 0]),
-        1.0 / math.sqrt(start[1, 1]),
-    )
+    aside, turned = (1.0 / math.sqrt(start[i, i]) for i in range(2))
+    return Region(p, times, start, aside, turned)

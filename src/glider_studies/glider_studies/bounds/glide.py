@@ -7,7 +7,7 @@ it moves what they see by a little, one tick long, and reads what they ask for.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -77,14 +77,14 @@ class Glide(NamedTuple):
     leg_s: float  #: time of the whole glide
 
 
-def scenario_of(vehicle: str, changes: dict[str, Any] | None = None) -> Scenario:
+def scenario_of(vehicle: str) -> Scenario:
     """What a vehicle flies to be looked at."""
     fields = {**FIELDS, 'vehicle': vehicle}
     if vehicle not in SCENARIOS:  # it may be one of a small pump, or of shallow water
         its = load_vehicle(vehicle)
         fields['profile.depth_m'] = min(1000.0, its.rated_depth_m)
         fields['profile.net_heaviness_kg'] = min(0.4, 0.5 * its.params().m_b_max)
-    return load_scenario(SCENARIOS.get(vehicle, SCENARIOS['']), fields | (changes or {}))
+    return load_scenario(SCENARIOS.get(vehicle, SCENARIOS['']), fields)
 
 
 def straight_on(params: MissionParams, north: float, east: float, course: float) -> MissionParams:
@@ -105,10 +105,10 @@ def _stage(held: HeldMission, ticks: int) -> int:
     return -1 if is_over else int(log[rows - 1, COLUMNS['stage']])
 
 
-def glides(vehicle: str, changes: dict[str, Any] | None = None) -> dict[str, Glide]:
+def glides(vehicle: str) -> dict[str, Glide]:
     """A steady glide of each phase, by its name."""
     load_vehicle(vehicle)  # what is wrong with it is told in its own words
-    scenario = scenario_of(vehicle, changes)
+    scenario = scenario_of(vehicle)
     state, params = mission_of(scenario)
     held = hold(state, params)
     found, before, dives, t_s = {}, -1, 0, 0.0

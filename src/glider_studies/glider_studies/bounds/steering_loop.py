@@ -144,13 +144,9 @@ def _filtered(value, rate, command, gain, params):
     return value + h * rate, rate, pull
 
 
-def box(loop: SteeringLoop, least: dict[str, float] | None = None, ratios=BOX) -> list[Gains]:
-    """Vertices of the box of gains.
-
-    The least value of a gain of `Gains` is 1 if ``least`` does not say it; ``ratios`` are the
-    least and largest b / b_hat, and k / k_hat.
-    """
-    edges = {'b': ratios, **({'k': ratios} if loop.k else {})}
+def box(loop: SteeringLoop, least: dict[str, float] | None = None) -> list[Gains]:
+    """Vertices of the box of gains: of b and k `BOX`; of others ``least``, if it says it, to 1."""
+    edges = {'b': BOX, **({'k': BOX} if loop.k else {})}
     edges |= {name: (low, 1.0) for name, low in (least or {}).items() if low < 1.0}
     return [
         Gains(**dict(zip(edges, at, strict=True))) for at in itertools.product(*edges.values())

@@ -20,8 +20,6 @@ SENSITIVITY_MAX = 2.0
 #: Net buoyancies over the nominal one between which the speed exponent is taken, and the roll
 #: mass or fin that turns the vehicle there (deg).
 _WEIGHTS, _TURNED_DEG = (0.8, 1.25), 2.0
-#: Decimals of angles in degrees.
-_DEG = 180.0 / math.pi
 
 
 def bounds(
@@ -122,7 +120,7 @@ def _of_loop(glide: Glide, loop: SteeringLoop) -> dict[str, float | None]:
         'lookahead_s': loop.lookahead_s,
         'heading_filter_s': 2.0 / loop.heading_filter.frequency,
         'roll_filter_s': loop.roll_filter and 2.0 / loop.roll_filter.frequency,
-        'limit_deg': loop.limit * _DEG,
+        'limit_deg': math.degrees(loop.limit),
         'slowest_s': -1.0 / slowest if stable else None,
         'sensitivity': max(sensitivity(loop, one) for one in box(loop)) if stable else None,
         'leg_s': loop.leg_s,
@@ -159,7 +157,7 @@ def _of_region(one: Region) -> dict[str, float]:
     widest = math.sqrt(np.linalg.inv(one.p)[0, 0])
     return {
         'aside_m': one.aside_m,
-        'turned_deg': one.turned * _DEG,
+        'turned_deg': math.degrees(one.turned),
         'widest_m': widest,
         'times_limits': one.times,
     }
