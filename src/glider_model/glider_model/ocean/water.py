@@ -66,7 +66,7 @@ class ModelWaterSettings(GridFileSettings):
 
         A ValueError names the file, and what of it or of the mission is at fault.
         """
-        grid = self.grid_params()._replace(water=_density(self, self.stamp))
+        grid = super().params()._replace(water=_density(self, self.stamp))
         n, e = 0.0, 0.0
         if self.mission.places:
             n, e = from_geodetic(*self.mission.places[0], grid.origin)

@@ -101,8 +101,8 @@ class GridFileSettings(Settings):
             if self.is_land(loaded, at):
                 raise ConfigurationError(f'{told} land (allowed: water)')
 
-    def grid_params(self) -> 'GridParams':
-        """What was read of the file, for kernels.
+    def params(self) -> 'GridParams':
+        """Kernel parameters: what was read of the file.
 
         A ConfigurationError names the file, and what of it or of the mission is at fault.
         """
@@ -139,10 +139,6 @@ class GridSettings(GridFileSettings, FieldSettings):
             for axis, one in zip(loaded.axes[2:], places, strict=True)
         ]
         return loaded.land[np.ix_(*nearest)]
-
-    def params(self) -> 'GridParams':
-        """Kernel parameters; errors as of `grid_params`."""
-        return self.grid_params()
 
 
 @functools.lru_cache(maxsize=8)
