@@ -20,6 +20,7 @@ from glider_model.onboard.moving_mass import (
     make_moving_mass,
     mass_place,
 )
+from glider_model.vehicle.actuators import ranges
 from glider_model.vehicle.file import VehicleParams
 from glider_model.vehicle.rigid_body import GRAVITY
 
@@ -39,13 +40,7 @@ class AllocationParams(NamedTuple):
 
 def make_allocation(vehicle: VehicleParams) -> AllocationParams:
     """What allocation needs to know of a vehicle: what a scale and a ruler tell."""
-    return AllocationParams(
-        make_moving_mass(vehicle),
-        vehicle.m_b_max,
-        vehicle.x_p_max,
-        vehicle.mu_max,
-        vehicle.delta_max,
-    )
+    return AllocationParams(make_moving_mass(vehicle), *ranges(vehicle))
 
 
 @kernel

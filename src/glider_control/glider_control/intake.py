@@ -56,12 +56,6 @@ INITIAL_INTAKE = IntakeState(
 )
 
 
-def make_intake(vehicle, gate: GateParams) -> IntakeParams:
-    """Limits of a vehicle (VehicleParams)."""
-    ranges = Joints(vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max, vehicle.delta_max)
-    return IntakeParams(gate, ranges)
-
-
 @kernel
 def _is_finite(reference):
     """Whether every number that control uses of a reference is finite."""

@@ -14,13 +14,14 @@ from glider_base.signals import Joints
 from glider_control import laws, surfaces
 from glider_control.allocation import make_allocation
 from glider_control.control import ControlParams, ControlState
-from glider_control.intake import INITIAL_INTAKE, make_intake
+from glider_control.intake import INITIAL_INTAKE, IntakeParams
 from glider_control.law import HeadingSettings, LawSettings
 from glider_control.surface import NoSteering, SurfaceLawSettings
 from glider_control.vertical_rate import Trim
 from glider_model.onboard.attitude_filter import STILL
 from glider_model.onboard.gate import GateSettings
 from glider_model.onboard.glide_polar import make_polar
+from glider_model.vehicle.actuators import ranges
 from glider_model.vehicle.file import load_vehicle
 
 
@@ -140,7 +141,7 @@ class ControlSettings(ControlLawSettings):
                 math.radians(surface.dead_band_deg) if surface else 0.0,
             ),
             safe_command=Joints(-kernel_vehicle.m_b_max, -kernel_vehicle.x_p_max, 0.0, 0.0),
-            intake=make_intake(kernel_vehicle, self.gate.params()),
+            intake=IntakeParams(self.gate.params(), ranges(kernel_vehicle)),
         )
 
     def initial_state(self) -> 'ControlState':

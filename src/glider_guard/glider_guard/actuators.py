@@ -7,7 +7,7 @@ from typing import NamedTuple
 from glider_base.kernel import kernel
 from glider_base.signals import Joints
 from glider_guard.rows import STUCK_BUOYANCY, STUCK_PITCH, STUCK_ROLL, STUCK_SURFACE, row
-from glider_model.vehicle.actuators import MOST_NOISE, doubt
+from glider_model.vehicle.actuators import MOST_NOISE, doubt, ranges
 
 #: Of the way that its rate allows an actuator, the share that it goes at least if it follows.
 STALL_RATE_SHARE = 0.1
@@ -45,19 +45,18 @@ INITIAL_FOLLOWERS = Followers(_STILL, _STILL, _STILL, _STILL)
 
 def make_limits(vehicle, follow_share: float, stall_s: float) -> ActuatorLimits:
     """Limits of a vehicle (VehicleParams), beyond its dead bands and what its noise may be."""
-    ranges = Joints(vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max, vehicle.delta_max)
     rates = Joints(vehicle.m_b_rate, vehicle.x_p_rate, vehicle.mu_rate, vehicle.delta_rate)
     tolerance = Joints(
         *(
             max(follow_share * most, off)
-            for most, off in zip(ranges, doubt(vehicle.errors), strict=True)
+            for most, off in zip(ranges(vehicle), doubt(vehicle.errors), strict=True)
         )
     )
     progress = (
         max(min(off, STALL_RATE_SHARE * rate * stall_s), 2.0 * MOST_NOISE * noise)
         for off, rate, noise in zip(tolerance, rates, vehicle.errors.noise, strict=True)
     )
-    return ActuatorLimits(ranges, tolerance, Joints(*progress), stall_s)
+    return ActuatorLimits(ranges(vehicle), tolerance, Joints(*progress), stall_s)
 
 
 @kernel

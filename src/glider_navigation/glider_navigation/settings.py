@@ -10,9 +10,9 @@ from pydantic import Field
 from glider_base import plugins
 from glider_base.frames import Origin, OriginSettings
 from glider_base.settings import Settings, derived, number
-from glider_base.signals import Joints
 from glider_base.wiring import BELIEFS, SENSORS
 from glider_model.onboard.gate import GateSettings
+from glider_model.vehicle.actuators import ranges
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation import methods
 from glider_navigation.forecast import ForecastSettings
@@ -124,7 +124,7 @@ class NavigationSettings(NavigationLawSettings):
         vehicle, gate = load_vehicle(self.vehicle).params(), self.gate.params()
         intake = IntakeParams(
             gate,
-            Joints(vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max, vehicle.delta_max),
+            ranges(vehicle),
             gate.hold_s + self.imu_period_s,
             'imu' in self.chosen.reads,
             'measured_odom' in self.chosen.reads,

@@ -20,6 +20,11 @@ class ActuatorErrors(NamedTuple):
     rate_per_m: float  #: share of the pump's rate that a metre of depth takes off (1/m)
 
 
+def ranges(vehicle) -> Joints:
+    """How far the actuators of a vehicle (`VehicleParams`) go to either side (kg, m, rad, rad)."""
+    return Joints(vehicle.m_b_max, vehicle.x_p_max, vehicle.mu_max, vehicle.delta_max)
+
+
 #: Standard deviations that noise stays within for all that matters.
 MOST_NOISE = 4.0
 
