@@ -16,9 +16,7 @@ setup(
     ],
     install_requires=['setuptools', 'numba', 'numpy', 'pydantic>=2', 'PyYAML'],
     extras_require={'test': ['pytest', 'hypothesis']},
-    zip_safe=False,
     maintainer='The glider stack authors',
     description='What all packages stand on: kernels, settings, signals, and lockstep over ROS 2.',
     license='Apache-2.0',
-    license_files=['LICENSE'],
 )

@@ -30,11 +30,9 @@ setup(
         'xarray',
     ],
     extras_require={'test': ['pytest', 'hypothesis']},
-    zip_safe=False,
     maintainer='The glider stack authors',
     description='Flying an underwater glider: runner, recorder, score, report, command line.',
     license='Apache-2.0',
-    license_files=['LICENSE'],
     entry_points={
         'console_scripts': [
             'autopilot = glider_bringup.nodes.autopilot:main',

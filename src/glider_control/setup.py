@@ -15,11 +15,9 @@ setup(
     ],
     install_requires=['setuptools', 'glider_model'],
     extras_require={'test': ['pytest', 'hypothesis']},
-    zip_safe=False,
     maintainer='The glider stack authors',
     description='Control of an underwater glider: motion laws and actuator allocation.',
     license='Apache-2.0',
-    license_files=['LICENSE'],
     entry_points={
         'console_scripts': [
             'control_node = glider_control.nodes.control_node:main',

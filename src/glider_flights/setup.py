@@ -16,11 +16,9 @@ setup(
     ],
     install_requires=['setuptools', 'glider_bringup'],
     extras_require={'test': ['pytest', 'hypothesis']},
-    zip_safe=False,
     maintainer='The glider stack authors',
     description='Recorded flights of real gliders: their files, navigation over them, validation.',
     license='Apache-2.0',
-    license_files=['LICENSE'],
     entry_points={
         'glider.commands': [
             f'{name} = glider_flights.commands.{name}:app'

@@ -15,11 +15,9 @@ setup(
     ],
     install_requires=['setuptools', 'glider_model'],
     extras_require={'test': ['pytest', 'hypothesis']},
-    zip_safe=False,
     maintainer='The glider stack authors',
     description='Guard of an underwater glider: monitors, and the last word on the command.',
     license='Apache-2.0',
-    license_files=['LICENSE'],
     entry_points={
         'console_scripts': [
             'guard_node = glider_guard.nodes.guard_node:main',

@@ -15,11 +15,9 @@ setup(
     ],
     install_requires=['setuptools', 'glider_model'],
     extras_require={'test': ['pytest', 'hypothesis']},
-    zip_safe=False,
     maintainer='The glider stack authors',
     description='Guidance of an underwater glider: paths, line-of-sight laws, dive profile.',
     license='Apache-2.0',
-    license_files=['LICENSE'],
     entry_points={
         'console_scripts': [
             'guidance_node = glider_guidance.nodes.guidance_node:main',

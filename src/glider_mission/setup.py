@@ -25,9 +25,7 @@ setup(
         'zstandard',
     ],
     extras_require={'test': ['pytest', 'hypothesis']},
-    zip_safe=False,
     maintainer='The glider stack authors',
     description='Missions of an underwater glider: scenarios, the blocks of a tick, recordings.',
     license='Apache-2.0',
-    license_files=['LICENSE'],
 )

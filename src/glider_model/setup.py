@@ -16,11 +16,9 @@ setup(
     ],
     install_requires=['setuptools', 'glider_base', 'scipy', 'xarray'],
     extras_require={'test': ['pytest', 'hypothesis']},
-    zip_safe=False,
     maintainer='The glider stack authors',
     description='Underwater glider, water and frames as pure step functions, and their nodes.',
     license='Apache-2.0',
-    license_files=['LICENSE'],
     entry_points={
         'console_scripts': [
             'plant_node = glider_model.nodes.plant_node:main',

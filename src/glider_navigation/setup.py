@@ -15,11 +15,9 @@ setup(
     ],
     install_requires=['setuptools', 'glider_model'],
     extras_require={'test': ['pytest', 'hypothesis']},
-    zip_safe=False,
     maintainer='The glider stack authors',
     description='Navigation of an underwater glider: dead reckoning, and the current it tells.',
     license='Apache-2.0',
-    license_files=['LICENSE'],
     entry_points={
         'console_scripts': [
             'navigation_node = glider_navigation.nodes.navigation_node:main',

@@ -16,11 +16,9 @@ setup(
     ],
     install_requires=['setuptools', 'glider_bringup', 'dask', 'distributed'],
     extras_require={'test': ['pytest', 'hypothesis']},
-    zip_safe=False,
     maintainer='The glider stack authors',
     description='Many flights of a glider: sweeps, Monte Carlo, experiments, searches.',
     license='Apache-2.0',
-    license_files=['LICENSE'],
     entry_points={
         'glider.commands': [
             f'{name} = glider_studies.commands.{name}:app'
